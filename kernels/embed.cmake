@@ -1,0 +1,12 @@
+# Writes the kernel sources SOURCES into OUT as C arrays, so that the library needs no files at run time.
+set(text "/* generated from the .cl files of kernels */\n#include \"kernel_sources.h\"\n\n")
+set(table "")
+foreach(source ${SOURCES})
+  get_filename_component(name ${source} NAME_WE)
+  file(READ ${source} hex HEX)
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
+  string(APPEND text "static const char ${name}_text[] = {${bytes}0};\n")
+  string(APPEND table "    {\"${name}\", ${name}_text},\n")
+endforeach()
+string(APPEND text "\nconst npg_kernel_source npg_kernel_sources[] = {\n${table}    {0, 0}};\n")
+file(WRITE ${OUT} "${text}")

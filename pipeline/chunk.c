@@ -1,0 +1,111 @@
+/* Chunk: a few consecutive frames on their way through the stages. */
+#include "chunk.h"
+
+#include <assert.h>
+#include <stdatomic.h>
+#include <string.h>
+
+struct npg_chunk {
+    atomic_int references;
+    size_t count, capacity;
+    npg_frame *frames; /* capacity of them, owned */
+};
+
+npg_status npg_chunk_open(npg_chunk **out, size_t capacity)
+{
+    npg_chunk *chunk;
+    NPG_REQUIRE(capacity >= 1);
+    NPG_TRY(npg_alloc(&chunk, NPG_FOR_RUN, sizeof *chunk));
+    npg_status status = npg_alloc_array(&chunk->frames, NPG_FOR_RUN, capacity, sizeof *chunk->frames);
+    if (status) {
+        npg_release(&chunk);
+        return status;
+    }
+    chunk->capacity = capacity;
+    atomic_init(&chunk->references, 1);
+    *out = chunk;
+    return NPG_OK;
+}
+
+npg_chunk *npg_chunk_ref(npg_chunk *chunk)
+{
+    atomic_fetch_add_explicit(&chunk->references, 1, memory_order_relaxed);
+    return chunk;
+}
+
+void npg_chunk_unref(npg_chunk **slot)
+{
+    npg_chunk *chunk = *slot;
+    *slot = NULL;
+    if (!chunk || atomic_fetch_sub_explicit(&chunk->references, 1, memory_order_acq_rel) > 1) return;
+    for (size_t i = 0; i < chunk->count; i++) npg_frame_clear(&chunk->frames[i]);
+    npg_release(&chunk->frames);
+    npg_release(&chunk);
+}
+
+size_t npg_chunk_count(const npg_chunk *chunk)
+{
+    return chunk->count;
+}
+size_t npg_chunk_capacity(const npg_chunk *chunk)
+{
+    return chunk->capacity;
+}
+
+npg_frame *npg_chunk_frame(npg_chunk *chunk, size_t i)
+{
+    assert(i < chunk->count);
+    return &chunk->frames[i];
+}
+
+void npg_chunk_add(npg_chunk *chunk, npg_frame *frame)
+{
+    assert(chunk->count < chunk->capacity);
+    chunk->frames[chunk->count++] = *frame;
+    *frame = (npg_frame){0};
+}
+
+void npg_frame_clear(npg_frame *frame)
+{
+    npg_release(&frame->path);
+    npg_release(&frame->pos_local);
+    npg_release(&frame->normals);
+    npg_release(&frame->vert_unit);
+    *frame = (npg_frame){0};
+}
+
+static npg_status copy_rows(float **out, const float *rows, size_t count)
+{
+    if (!rows) return NPG_OK;
+    NPG_TRY(npg_alloc_array(out, NPG_FOR_FRAMES, count, 3 * sizeof *rows));
+    memcpy(*out, rows, count * 3 * sizeof *rows);
+    return NPG_OK;
+}
+
+npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
+{
+    npg_status status = NPG_OK;
+    *out = *frame;
+    out->path = NULL;
+    out->pos_local = out->normals = out->vert_unit = NULL;
+    if (frame->path) NPG_TRY_OR(fail, status, npg_copy_text(&out->path, frame->path));
+    NPG_TRY_OR(fail, status, copy_rows(&out->pos_local, frame->pos_local, frame->point_count));
+    NPG_TRY_OR(fail, status, copy_rows(&out->normals, frame->normals, frame->point_count));
+    NPG_TRY_OR(fail, status, copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count));
+    return NPG_OK;
+fail:
+    npg_frame_clear(out);
+    return status;
+}
+
+void npg_frame_keep(npg_frame *frame, const uint8_t *keep)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < frame->point_count; i++) {
+        if (!keep[i]) continue;
+        memmove(frame->pos_local + 3 * kept, frame->pos_local + 3 * i, 3 * sizeof(float));
+        if (frame->normals) memmove(frame->normals + 3 * kept, frame->normals + 3 * i, 3 * sizeof(float));
+        kept++;
+    }
+    frame->point_count = kept;
+}

@@ -1,0 +1,82 @@
+/* Chunk: a few consecutive frames on their way through the stages; counted references, one owner per
+ * reference.
+ *
+ * A stage may change a chunk only while it holds the only reference.  A function that takes npg_chunk **
+ * nulls the pointer when it has taken the reference; a pointer that is not NULL afterwards is still the
+ * caller's. */
+#ifndef NPG_CHUNK_H
+#define NPG_CHUNK_H
+
+#include <stdbool.h>
+
+#include "memory.h"
+
+/* What a frame carries.  Stages say which fields they need and give; the chain is checked when it is built.
+ */
+enum {
+    NPG_FIELD_POINTS = 1 << 0,    /* pos_local                                 */
+    NPG_FIELD_CLEAN = 1 << 1,     /* pos_local holds only usable points        */
+    NPG_FIELD_KEY = 1 << 2,       /* run facts: box, keyframe and order known  */
+    NPG_FIELD_REFERENCE = 1 << 3, /* run facts: the reference mesh           */
+    NPG_FIELD_VERTICES = 1 << 4,  /* vert_unit                               */
+    NPG_FIELD_FIGURES = 1 << 5    /* figures                                 */
+};
+
+/* What the outlier stage did to a frame, in points. */
+typedef struct npg_cleaning {
+    size_t read, not_finite, duplicate, isolated, thinned;
+    size_t normals_given, normals_flipped, normals_estimated;
+} npg_cleaning;
+
+/* How well a frame's surface explains its points.  Distances are in diagonals of the frame box. */
+typedef struct npg_figures {
+    double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
+    double vertex_dist_mean; /* surface vertices -> nearest point                */
+    double coverage; /* share of the surface area with points near it, 0..1                                 */
+    double flipped_share;   /* faces turned over against their neighbourhood's rotation, share of all   */
+    double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, share of all */
+    double edge_change;     /* mean |length / reference length - 1|     */
+    double chamfer; /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5                   */
+    double truth_cd, truth_nc, truth_f, truth_corr; /* against a ground truth; NaN without */
+    bool good; /* the frame is above the quality bar                                                  */
+} npg_figures;
+
+typedef struct npg_frame {
+    int64_t index;  /* place in time: 0 is the first frame of the run, gaps count                           */
+    int64_t number; /* the number in its file's name (or pushed), = index where there is none               */
+    char *path;     /* where it came from, for messages; owned, may be NULL                                 */
+    uint32_t fields; /* NPG_FIELD_* of this frame */
+    bool is_key, is_skipped, is_held;
+    size_t point_count; /* N                                                                               */
+    float *pos_local;   /* N x 3, owned; world - origin                                                    */
+    float *normals;     /* N x 3, owned, unit length, or NULL                                              */
+    npg_cleaning cleaning;
+    size_t vert_count; /* V                                                                               */
+    float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates                       */
+    npg_figures figures;
+} npg_frame;
+
+typedef struct npg_chunk npg_chunk;
+
+/* An empty chunk with room for capacity frames and one reference. */
+npg_status npg_chunk_open(npg_chunk **chunk, size_t capacity);
+npg_chunk *npg_chunk_ref(npg_chunk *chunk);
+void npg_chunk_unref(npg_chunk **chunk);
+
+size_t npg_chunk_count(const npg_chunk *chunk);
+size_t npg_chunk_capacity(const npg_chunk *chunk);
+npg_frame *npg_chunk_frame(npg_chunk *chunk, size_t i);
+
+/* Move *frame (its arrays with it) to the end of the chunk; *frame is emptied.  The chunk must have room. */
+void npg_chunk_add(npg_chunk *chunk, npg_frame *frame);
+
+/* Free what a frame owns and empty it. */
+void npg_frame_clear(npg_frame *frame);
+
+/* A copy with its own arrays. */
+npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame);
+
+/* Keep the points whose keep[i] is not 0, in order, with their normals. */
+void npg_frame_keep(npg_frame *frame, const uint8_t *keep);
+
+#endif

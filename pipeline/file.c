@@ -1,0 +1,194 @@
+/* File: output that appears under its final name only when it is whole. */
+#include "file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "memory.h"
+
+#define BUFFER_SIZE (256 << 10)
+
+struct npg_file {
+    int fd;
+    npg_status status; /* of the first failure, with its text in `cause` */
+    char cause[512];
+    char *path, *hidden_path; /* owned */
+    unsigned char *buffer;    /* BUFFER_SIZE, owned */
+    size_t used;
+};
+
+npg_status npg_join_path(char **out, const char *folder, const char *name)
+{
+    size_t size = strlen(folder) + strlen(name) + 2;
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, size));
+    size_t length = strlen(folder);
+    const char *slash = length && folder[length - 1] == '/' ? "" : "/";
+    snprintf(*out, size, "%s%s%s", folder, slash, name);
+    return NPG_OK;
+}
+
+/* The folder part of a path, "." where there is none. */
+static npg_status folder_of(char **out, const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    NPG_TRY(npg_copy_text(out, slash ? path : "."));
+    if (slash) (*out)[slash == path ? 1 : slash - path] = 0;
+    return NPG_OK;
+}
+
+static npg_status hide(char **out, const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    size_t folder = (size_t)(name - path), size = strlen(path) + 8;
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, size));
+    snprintf(*out, size, "%.*s.%s.part", (int)folder, path, name);
+    return NPG_OK;
+}
+
+static void free_file(npg_file **slot)
+{
+    npg_release(&(*slot)->path);
+    npg_release(&(*slot)->hidden_path);
+    npg_release(&(*slot)->buffer);
+    npg_release(slot);
+}
+
+npg_status npg_file_open(npg_file **out, const char *path)
+{
+    npg_file *file;
+    npg_status status;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&file, NPG_FOR_FILES, sizeof *file));
+    NPG_TRY_OR(fail, status, npg_copy_text(&file->path, path));
+    NPG_TRY_OR(fail, status, hide(&file->hidden_path, path));
+    NPG_TRY_OR(fail, status, npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
+    file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (file->fd < 0) {
+        status = npg_error_errno(NPG_DISK, "can't write %s", path);
+        goto fail;
+    }
+    *out = file;
+    return NPG_OK;
+fail:
+    free_file(&file);
+    return status;
+}
+
+static npg_status keep_failure(npg_file *file, const char *verb)
+{
+    file->status = npg_error_errno(NPG_DISK, "can't %s %s", verb, file->path);
+    if (file->status != NPG_MEMORY) file->status = NPG_DISK;
+    snprintf(file->cause, sizeof file->cause, "%s", npg_error_text());
+    return file->status;
+}
+
+static npg_status write_through(npg_file *file, const unsigned char *data, size_t size)
+{
+    while (size) {
+        ssize_t written = write(file->fd, data, size);
+        if (written < 0 && errno == EINTR) continue;
+        if (written == 0) errno = ENOSPC;
+        if (written <= 0) return keep_failure(file, "write");
+        data += written;
+        size -= (size_t)written;
+    }
+    return NPG_OK;
+}
+
+static npg_status flush_buffer(npg_file *file)
+{
+    size_t used = file->used;
+    file->used = 0;
+    return write_through(file, file->buffer, used);
+}
+
+npg_status npg_file_write(npg_file *file, const void *data, size_t size)
+{
+    if (file->status) return file->status;
+    if (size > BUFFER_SIZE - file->used) NPG_TRY(flush_buffer(file));
+    if (size > BUFFER_SIZE) return write_through(file, data, size);
+    memcpy(file->buffer + file->used, data, size);
+    file->used += size;
+    return NPG_OK;
+}
+
+npg_status npg_file_print(npg_file *file, const char *format, ...)
+{
+    char text[4096];
+    va_list arguments;
+    va_start(arguments, format);
+    int length = vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (length < 0 || (size_t)length >= sizeof text)
+        return npg_error(NPG_FAILED, "%s: a line is too long", file->path);
+    return npg_file_write(file, text, (size_t)length);
+}
+
+/* The rename is on disk only once its folder is. */
+static npg_status sync_folder(npg_file *file)
+{
+    char *folder;
+    NPG_TRY(folder_of(&folder, file->path));
+    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    npg_release(&folder);
+    if (fd < 0) return keep_failure(file, "sync the folder of");
+    int failed = fsync(fd) && errno != EINVAL;
+    if (failed) keep_failure(file, "sync the folder of");
+    close(fd);
+    return failed ? file->status : NPG_OK;
+}
+
+npg_status npg_file_commit(npg_file **slot)
+{
+    npg_file *file = *slot;
+    if (!file->status) flush_buffer(file);
+    if (!file->status && fsync(file->fd) && errno != EINVAL) keep_failure(file, "sync");
+    int closed = close(file->fd);
+    file->fd = -1;
+    if (!file->status && closed) keep_failure(file, "close");
+    if (file->status) {
+        npg_status status = npg_error_restore(file->status, file->cause);
+        npg_file_discard(slot);
+        return status;
+    }
+    if (rename(file->hidden_path, file->path)) keep_failure(file, "rename to");
+    npg_status status = file->status ? file->status : sync_folder(file);
+    if (file->status) unlink(file->hidden_path);
+    free_file(slot);
+    return status;
+}
+
+void npg_file_discard(npg_file **slot)
+{
+    npg_file *file = *slot;
+    if (!file) return;
+    if (file->fd >= 0) close(file->fd);
+    unlink(file->hidden_path);
+    free_file(slot);
+}
+
+npg_status npg_make_folder(const char *path)
+{
+    char *copy;
+    struct stat info;
+    NPG_TRY(npg_copy_text(&copy, path));
+    npg_status status = NPG_OK;
+    for (char *slash = copy + 1; !status; slash++) {
+        char c = *slash;
+        if (c && c != '/') continue;
+        *slash = 0;
+        if (mkdir(copy, 0777) && errno != EEXIST)
+            status = npg_error_errno(NPG_DISK, "can't make the folder %s", copy);
+        *slash = c;
+        if (!c) break;
+    }
+    npg_release(&copy);
+    if (status) return status < 0 && status != NPG_MEMORY ? NPG_DISK : status;
+    if (stat(path, &info) || !S_ISDIR(info.st_mode)) return npg_error(NPG_DISK, "%s is not a folder", path);
+    return NPG_OK;
+}

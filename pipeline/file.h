@@ -1,0 +1,31 @@
+/* File: output that appears under its final name only when it is whole.
+ *
+ * Bytes go to a hidden file beside the final one; commit checks, syncs and renames.  A run that is killed
+ * leaves at most the hidden file, which the next attempt overwrites. */
+#ifndef NPG_FILE_H
+#define NPG_FILE_H
+
+#include "status.h"
+
+typedef struct npg_file npg_file;
+
+/* NPG_DISK with path and cause. */
+npg_status npg_file_open(npg_file **file, const char *path);
+
+/* A failed write is remembered: later calls do nothing and commit returns it, so callers may check once. */
+npg_status npg_file_write(npg_file *file, const void *data, size_t size);
+npg_status npg_file_print(npg_file *file, const char *format, ...) NPG_PRINTF(2, 3);
+
+/* Make the file appear under its name; closes it in any case. */
+npg_status npg_file_commit(npg_file **file);
+
+/* Give up: nothing remains.  NULL is fine. */
+void npg_file_discard(npg_file **file);
+
+/* Make a folder and its parents. */
+npg_status npg_make_folder(const char *path);
+
+/* "<folder>/<name>", to be given to npg_release(). */
+npg_status npg_join_path(char **out, const char *folder, const char *name);
+
+#endif

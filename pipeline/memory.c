@@ -1,0 +1,167 @@
+/* Memory: aligned, zeroed, counted by purpose, from the user's allocator; the n-th request can be made to
+ * fail. */
+#include "memory.h"
+
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ALIGN 64
+
+typedef struct head { /* sits in the 64 bytes before every block */
+    size_t size;
+    npg_purpose purpose;
+} head;
+
+_Static_assert(sizeof(head) <= ALIGN, "the head must fit before the block");
+
+static void *default_alloc(void *user, size_t align, size_t size)
+{
+    (void)user;
+    return aligned_alloc(align, (size + align - 1) / align * align);
+}
+
+static void default_release(void *user, void *memory)
+{
+    (void)user;
+    free(memory);
+}
+
+static npg_allocator allocator = {sizeof(npg_allocator), NULL, default_alloc, default_release};
+static _Atomic size_t used[NPG_PURPOSES];
+static _Atomic size_t used_all, peak_all, limit_all;
+static _Atomic uint64_t requests, fail_at;
+static _Atomic bool fail_from_then_on;
+
+npg_status npg_memory_set_allocator(const npg_allocator *chosen)
+{
+    if (atomic_load(&used_all))
+        return npg_error(NPG_USAGE, "the allocator can't change while %zu bytes are in use",
+                         atomic_load(&used_all));
+    if (!chosen) {
+        allocator = (npg_allocator){sizeof allocator, NULL, default_alloc, default_release};
+        return NPG_OK;
+    }
+    NPG_REQUIRE(chosen->struct_size >= sizeof *chosen && chosen->alloc && chosen->release);
+    allocator = *chosen;
+    return NPG_OK;
+}
+
+size_t npg_memory_used(void)
+{
+    return atomic_load(&used_all);
+}
+size_t npg_memory_peak(void)
+{
+    return atomic_load(&peak_all);
+}
+size_t npg_memory_used_for(npg_purpose purpose)
+{
+    return atomic_load(&used[purpose]);
+}
+uint64_t npg_memory_requests(void)
+{
+    return atomic_load(&requests);
+}
+void npg_memory_set_limit(size_t bytes)
+{
+    atomic_store(&limit_all, bytes);
+}
+
+const char *npg_purpose_name(npg_purpose purpose)
+{
+    static const char *const names[NPG_PURPOSES] = {"frames", "mesh",  "fit", "device",
+                                                    "query",  "files", "run"};
+    return names[purpose];
+}
+
+void npg_memory_fail_at(uint64_t n, bool from_then_on)
+{
+    atomic_store(&fail_from_then_on, from_then_on);
+    atomic_store(&fail_at, n ? atomic_load(&requests) + n : 0);
+}
+
+static bool must_fail(void)
+{
+    uint64_t now = atomic_fetch_add(&requests, 1) + 1, at = atomic_load(&fail_at);
+    return at && (now == at || (now > at && atomic_load(&fail_from_then_on)));
+}
+
+npg_status npg_memory_count(npg_purpose purpose, ptrdiff_t bytes)
+{
+    size_t change = (size_t)bytes; /* wraps for negative numbers, as the sums below want it */
+    size_t now = atomic_fetch_add(&used_all, change) + change, limit = atomic_load(&limit_all);
+    if (bytes > 0 && limit && now > limit) {
+        atomic_fetch_sub(&used_all, change);
+        return npg_error(NPG_MEMORY,
+                         "%td more bytes for %s would pass the memory limit of %zu MiB (%zu in use)", bytes,
+                         npg_purpose_name(purpose), limit >> 20, (now - change) >> 20);
+    }
+    atomic_fetch_add(&used[purpose], change);
+    size_t peak = atomic_load(&peak_all);
+    while (now > peak && bytes > 0 && !atomic_compare_exchange_weak(&peak_all, &peak, now)) {
+    }
+    return NPG_OK;
+}
+
+npg_status npg_alloc(void *out, npg_purpose purpose, size_t size)
+{
+    void **result = out;
+    *result = NULL;
+    if (!size) return NPG_OK;
+    if (must_fail() || size > PTRDIFF_MAX - 2 * ALIGN)
+        return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, npg_purpose_name(purpose));
+    NPG_TRY(npg_memory_count(purpose, (ptrdiff_t)size));
+    unsigned char *block = allocator.alloc(allocator.user, ALIGN, size + ALIGN);
+    if (!block) {
+        npg_memory_count(purpose, -(ptrdiff_t)size);
+        return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, npg_purpose_name(purpose));
+    }
+    memset(block, 0, size + ALIGN);
+    *(head *)(void *)block = (head){size, purpose};
+    *result = block + ALIGN;
+    return NPG_OK;
+}
+
+npg_status npg_alloc_array(void *out, npg_purpose purpose, size_t count, size_t size)
+{
+    *(void **)out = NULL;
+    if (size && count > SIZE_MAX / size)
+        return npg_error(NPG_MEMORY, "no memory: %zu x %zu bytes for %s", count, size,
+                         npg_purpose_name(purpose));
+    return npg_alloc(out, purpose, count * size);
+}
+
+npg_status npg_grow(void *array, size_t *capacity, size_t need, size_t size, npg_purpose purpose)
+{
+    void **slot = array, *bigger;
+    if (need <= *capacity) return NPG_OK;
+    size_t count = need > SIZE_MAX / 2 ? need : *capacity + *capacity / 2;
+    if (count < need) count = need;
+    if (count < 16) count = 16;
+    NPG_TRY(npg_alloc_array(&bigger, purpose, count, size));
+    if (*slot) memcpy(bigger, *slot, *capacity * size);
+    npg_release(slot);
+    *slot = bigger;
+    *capacity = count;
+    return NPG_OK;
+}
+
+npg_status npg_copy_text(char **out, const char *text)
+{
+    size_t size = strlen(text) + 1;
+    NPG_TRY(npg_alloc(out, NPG_FOR_RUN, size));
+    memcpy(*out, text, size);
+    return NPG_OK;
+}
+
+void npg_release(void *memory)
+{
+    void **slot = memory;
+    if (!*slot) return;
+    unsigned char *block = (unsigned char *)*slot - ALIGN;
+    head h = *(head *)(void *)block;
+    *slot = NULL;
+    allocator.release(allocator.user, block);
+    npg_memory_count(h.purpose, -(ptrdiff_t)h.size);
+}

@@ -1,0 +1,57 @@
+/* Memory: aligned, zeroed, counted by purpose, from the user's allocator; the n-th request can be made to
+ * fail.
+ *
+ * Threads: all functions may be called from any thread; the counters are atomic. */
+#ifndef NPG_MEMORY_H
+#define NPG_MEMORY_H
+
+#include <stdbool.h>
+
+#include "status.h"
+
+typedef enum npg_purpose {
+    NPG_FOR_FRAMES, /* points, normals and vertices of the frames in flight   */
+    NPG_FOR_MESH,   /* reference mesh and what is derived from it             */
+    NPG_FOR_FIT,    /* the optimisation, host side                            */
+    NPG_FOR_DEVICE, /* device buffers                                         */
+    NPG_FOR_QUERY,  /* search structures                                      */
+    NPG_FOR_FILES,  /* readers, writers, lists of names                       */
+    NPG_FOR_RUN,    /* everything small                                       */
+    NPG_PURPOSES
+} npg_purpose;
+
+/* size bytes, all zero, aligned to 64; *out is NULL on failure.  size 0 gives NULL and NPG_OK.
+ * NPG_MEMORY when the system, the limit or an injected failure refuses. */
+npg_status npg_alloc(void *out, npg_purpose purpose, size_t size);
+
+/* The same for count * size, checked for overflow. */
+npg_status npg_alloc_array(void *out, npg_purpose purpose, size_t count, size_t size);
+
+/* Make *array hold at least `need` elements of `size` bytes; its content stays, the rest is zero.  *capacity
+ * is the number it holds; it grows by half.  On failure array and capacity are as before. */
+npg_status npg_grow(void *array, size_t *capacity, size_t need, size_t size, npg_purpose purpose);
+
+/* A copy of text. */
+npg_status npg_copy_text(char **out, const char *text);
+
+/* Free *memory (what npg_alloc gave) and null it; NULL inside is fine. */
+void npg_release(void *memory);
+
+/* Count bytes that another library holds for us; negative gives them back.  NPG_MEMORY when the limit is
+ * passed (the count is then unchanged). */
+npg_status npg_memory_count(npg_purpose purpose, ptrdiff_t bytes);
+
+size_t npg_memory_used_for(npg_purpose purpose);
+const char *npg_purpose_name(npg_purpose purpose);
+
+/* No more than this many bytes in use (0: no limit). */
+void npg_memory_set_limit(size_t bytes);
+
+/* Tests: the n-th request from now (1 is the next) fails, and so do all after it when `from_then_on`; 0 ends
+ * that. */
+void npg_memory_fail_at(uint64_t n, bool from_then_on);
+
+/* Requests so far. */
+uint64_t npg_memory_requests(void);
+
+#endif

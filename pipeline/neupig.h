@@ -1,0 +1,248 @@
+/* neupig: one moving mesh from a long sequence of point clouds.  The public interface.
+ *
+ * A run takes frames (point clouds in time order), reconstructs the surface once at a keyframe and finds its
+ * deformation in every frame.  Frames come from files that the run reads itself (option "input"), or are
+ * pushed; results go to a folder (option "output"), are pulled, or both.
+ *
+ *     npg_options *options = NULL;
+ *     npg_run *run = NULL;
+ *     npg_options_open(&options);
+ *     npg_options_set(options, "input", "capture/");
+ *     npg_options_set(options, "output", "out/");
+ *     npg_status status = npg_run_open(&run, options, NULL);
+ *     if (!status) status = npg_run_wait(run);
+ *     if (status) fprintf(stderr, "%s\n", npg_error_text());
+ *     npg_run_close(&run);
+ *     npg_options_close(&options);
+ *
+ * Conventions.  Functions that can fail return npg_status: 0 is success, a positive value steers the flow
+ * (NPG_END), a negative value is a failure whose text npg_error_text() gives on the same thread.  A function
+ * that takes T ** consumes the reference and nulls the pointer; T * is a loan until the call returns. Closers
+ * accept NULL.  Structs that cross the border begin with struct_size: set it to sizeof the struct. Arrays are
+ * row-major; letters: T frames, N points, V vertices, F faces.
+ */
+#ifndef NEUPIG_H
+#define NEUPIG_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define NPG_VERSION_MAJOR 0
+#define NPG_VERSION_MINOR 1
+#define NPG_VERSION_PATCH 0
+
+#if defined(__GNUC__)
+#define NPG_API                         __attribute__((visibility("default")))
+#define NPG_PRINTF(format_at, first_at) __attribute__((format(printf, format_at, first_at)))
+#else
+#define NPG_API
+#define NPG_PRINTF(format_at, first_at)
+#endif
+
+/* ---- status
+ * -------------------------------------------------------------------------------------------------- */
+
+typedef enum npg_status {
+    NPG_OK = 0,
+    NPG_END = 1,        /* no more: the stream ended                                       */
+    NPG_STOPPED = 2,    /* npg_run_stop() was called; what is on disk can be gone on from  */
+    NPG_PARTIAL = 3,    /* done, but frames were skipped or fell below the quality bar     */
+    NPG_FAILED = -1,    /* an environment or library failed in a way of no class below     */
+    NPG_USAGE = -2,     /* an option, a configuration or a call that makes no sense        */
+    NPG_BAD_INPUT = -3, /* the data can't be used: the text names file, place and cause    */
+    NPG_DEVICE = -4,    /* OpenCL: no device, a failed build, a kernel that computes wrong */
+    NPG_DISK = -5,      /* writing failed: disk full, no permission                        */
+    NPG_MEMORY = -6,    /* an allocation failed or would pass the limit                    */
+    NPG_DIVERGED = -7,  /* the optimisation produced a number that is not finite           */
+    NPG_ABORTED = -8    /* another stage failed first; its status is the one to report     */
+} npg_status;
+
+/* The exit code of the command for a status: 0 done, 1 failed, 2 usage, 3 bad input, 4 device, 5 disk, 6
+ * memory, 7 finished with frames skipped or below the quality bar, 75 stopped, run again to go on. */
+NPG_API int npg_status_exit_code(npg_status status);
+
+/* A word for a status, for logs and reports.  Never NULL. */
+NPG_API const char *npg_status_name(npg_status status);
+
+/* The text of the last failure on this thread; "" when there was none.  Valid until the next failure. */
+NPG_API const char *npg_error_text(void);
+
+/* "0.1.0". */
+NPG_API const char *npg_version(void);
+
+/* ---- memory
+ * -------------------------------------------------------------------------------------------------- */
+
+/* Where the library takes its own memory from.  alloc returns size bytes aligned to align (a power of two),
+ * or NULL; release frees them.  Both are called from several threads.  Set once, before anything is opened.
+ */
+typedef struct npg_allocator {
+    size_t struct_size;
+    void *user;
+    void *(*alloc)(void *user, size_t align, size_t size);
+    void (*release)(void *user, void *memory);
+} npg_allocator;
+
+/* NPG_USAGE while memory of the library is still in use.  NULL brings back the default. */
+NPG_API npg_status npg_memory_set_allocator(const npg_allocator *allocator);
+
+/* Bytes in use now, and the most ever in use since the process began (device buffers on the CPU included). */
+NPG_API size_t npg_memory_used(void);
+NPG_API size_t npg_memory_peak(void);
+
+/* ---- options
+ * ------------------------------------------------------------------------------------------------- */
+
+typedef struct npg_options npg_options;
+
+typedef enum npg_option_type {
+    NPG_OPTION_FLAG,   /* "yes" or "no"                        */
+    NPG_OPTION_INT,    /* decimal integer                      */
+    NPG_OPTION_REAL,   /* decimal number                       */
+    NPG_OPTION_CHOICE, /* one of the words in choices, "a|b|c" */
+    NPG_OPTION_TEXT    /* any text                             */
+} npg_option_type;
+
+typedef struct npg_option_info {
+    size_t struct_size;
+    const char *stage; /* the stage it belongs to, "run" for the run itself */
+    const char *name, *help, *default_text, *choices, *value_name;
+    npg_option_type type;
+    double min, max;
+} npg_option_info;
+
+NPG_API npg_status npg_options_open(npg_options **options);
+NPG_API void npg_options_close(npg_options **options);
+
+/* Set one option by its name ("epochs", without dashes).  NPG_USAGE names the option and what it takes. */
+NPG_API npg_status npg_options_set(npg_options *options, const char *name, const char *value);
+
+/* Read options from a JSON object in a file: {"epochs": 250, "preset": "paper"}; // comments are allowed.
+ * NPG_USAGE names file, line and option. */
+NPG_API npg_status npg_options_load(npg_options *options, const char *path);
+
+/* The value an option has now, after presets, as text; NULL for a name that does not exist.  Valid until the
+ * options change. */
+NPG_API const char *npg_options_get(const npg_options *options, const char *name);
+
+/* The i-th option of all stages, in the order of the chain; NPG_END after the last. */
+NPG_API npg_status npg_options_describe(size_t i, npg_option_info *info);
+
+/* ---- logs and progress
+ * --------------------------------------------------------------------------------------- */
+
+typedef enum npg_log_level { NPG_LOG_ERROR, NPG_LOG_WARNING, NPG_LOG_INFO, NPG_LOG_DEBUG } npg_log_level;
+
+typedef struct npg_log_record {
+    size_t struct_size;
+    npg_log_level level;
+    double time_s;       /* seconds since the run was opened   */
+    const char *stage;   /* the stage that speaks              */
+    int64_t frame;       /* the frame it speaks of, -1 if none */
+    const char *message; /* one line, no newline at its end    */
+} npg_log_record;
+
+typedef struct npg_progress {
+    size_t struct_size;
+    const char *stage;           /* the stage that decides how far the run is         */
+    double share;                /* 0..1 of the whole run                             */
+    double elapsed_s, left_s;    /* left_s < 0 while it can't be told                 */
+    int64_t frames_done, frames; /* written so far, in all (-1: not known yet)        */
+    int64_t step, steps;         /* epochs of the window at work                      */
+    int64_t window, windows;     /* the window at work, and how many there will be    */
+    double loss;                 /* last mean loss per frame; NaN before the first    */
+} npg_progress;
+
+/* Called from the run's threads, one call at a time for each run.  Pointers in the records are loans. */
+typedef struct npg_hooks {
+    size_t struct_size;
+    void *user;
+    void (*log)(void *user, const npg_log_record *record);
+    void (*progress)(void *user, const npg_progress *progress);
+} npg_hooks;
+
+/* ---- runs
+ * ---------------------------------------------------------------------------------------------------- */
+
+typedef struct npg_run npg_run;
+
+/* A cloud handed in by npg_run_push(): N points, world coordinates. */
+typedef struct npg_cloud {
+    size_t struct_size;
+    int64_t number;       /* the frame's number; numbers must grow                  */
+    size_t point_count;   /* N                                                      */
+    const double *points; /* N x 3, any unit; copied                                */
+    const float *normals; /* N x 3 or NULL; copied                                  */
+} npg_cloud;
+
+/* One frame of the moving mesh, got by npg_run_pull(). */
+typedef struct npg_result {
+    size_t struct_size;
+    int64_t index, number;  /* position in the sequence, and the number in the file's name  */
+    size_t vertex_count;    /* V, the same in every frame                                   */
+    size_t face_count;      /* F                                                            */
+    const double *vertices; /* V x 3, world coordinates                                     */
+    const uint32_t *faces;  /* F x 3, the same list in every frame                          */
+    double residual;        /* median distance points -> surface, in diagonals of the frame box */
+    double coverage;        /* share of the surface that has points near it, 0..1           */
+} npg_result;
+
+/* Check the options, build the chain and start the run's threads.  hooks may be NULL.
+ * With the option input = "" frames come from npg_run_push().  NPG_USAGE, NPG_MEMORY, NPG_BAD_INPUT. */
+NPG_API npg_status npg_run_open(npg_run **run, const npg_options *options, const npg_hooks *hooks);
+
+/* Give the run its next frame; blocks while the run is busy (that is the back-pressure).  Any one thread.
+ * NPG_USAGE when the run reads files or the number does not grow; the run's failure once it has failed. */
+NPG_API npg_status npg_run_push(npg_run *run, const npg_cloud *cloud);
+
+/* Say that no more frames will be pushed. */
+NPG_API npg_status npg_run_finish(npg_run *run);
+
+/* Wait for the next finished frame.  Only for runs with option pull = yes; frames come as windows close, not
+ * in time order.  The caller owns the result.  NPG_END after the last; a failure is the run's failure. */
+NPG_API npg_status npg_run_pull(npg_run *run, npg_result **result);
+NPG_API void npg_result_close(npg_result **result);
+
+/* Wait for the end of the run and return its status: NPG_OK, NPG_PARTIAL, NPG_STOPPED or what failed first.
+ * A run with pull = yes ends only when its results have been pulled. */
+NPG_API npg_status npg_run_wait(npg_run *run);
+
+/* Ask the run to stop soon.  Safe in a signal handler and from any thread. */
+NPG_API void npg_run_stop(npg_run *run);
+
+/* Stop the run if it is going on, wait for its threads, free everything. */
+NPG_API void npg_run_close(npg_run **run);
+
+/* ---- nearest surface point
+ * ----------------------------------------------------------------------------------- */
+
+typedef struct npg_surface npg_surface;
+
+typedef struct npg_surface_hit {
+    uint32_t face;    /* the closest face                                       */
+    float weights[3]; /* barycentric weights of the closest point               */
+    float dist_sq;    /* squared distance, in the mesh's unit                   */
+} npg_surface_hit;
+
+/* A searchable surface from V vertices (V x 3) and F faces (F x 3); both are copied.  NPG_USAGE for an index
+ * out of range or a vertex that is not finite. */
+NPG_API npg_status npg_surface_open(npg_surface **surface, const float *vertices, size_t vertex_count,
+                                    const uint32_t *faces, size_t face_count);
+
+/* Move the vertices; the search tree is refitted.  Not while another thread asks. */
+NPG_API npg_status npg_surface_move(npg_surface *surface, const float *vertices);
+
+/* hits[i] = the surface point closest to points[i] (N x 3).  Thread-safe.  A point that is not finite gets
+ * face = UINT32_MAX and dist_sq = infinity. */
+NPG_API npg_status npg_surface_closest(const npg_surface *surface, npg_surface_hit *hits, const float *points,
+                                       size_t point_count);
+NPG_API void npg_surface_close(npg_surface **surface);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

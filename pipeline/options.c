@@ -1,0 +1,283 @@
+/* Options: tables, one per stage; parser, help, configuration file and manual all come from them. */
+#include "options.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "run_settings.h"
+#include "stage.h"
+
+struct npg_options {
+    size_t count;
+    char **texts; /* count of them: what the user set, or NULL; owned */
+};
+
+/* ---- the tables as one list
+ * ---------------------------------------------------------------------------------- */
+
+const npg_option *npg_option_at(size_t i, const char **stage)
+{
+    const npg_option *table = npg_run_options;
+    const char *name = "run";
+    for (size_t s = 0; table; s++) {
+        for (; table && table->name; table++)
+            if (i-- == 0) {
+                if (stage) *stage = name;
+                return table;
+            }
+        if (!npg_chain[s]) return NULL;
+        table = npg_chain[s]->options;
+        name = npg_chain[s]->name;
+    }
+    return NULL;
+}
+
+static const npg_option *find(const char *name, size_t *at)
+{
+    const npg_option *option;
+    for (*at = 0; (option = npg_option_at(*at, NULL)); ++*at)
+        if (!strcmp(option->name, name)) return option;
+    return NULL;
+}
+
+npg_status npg_options_describe(size_t i, npg_option_info *info)
+{
+    const char *stage;
+    NPG_REQUIRE(info && info->struct_size >= sizeof *info);
+    const npg_option *option = npg_option_at(i, &stage);
+    if (!option) return NPG_END;
+    *info = (npg_option_info){sizeof *info,         stage,           option->name,       option->help,
+                              option->default_text, option->choices, option->value_name, option->type,
+                              option->min,          option->max};
+    return NPG_OK;
+}
+
+/* ---- values
+ * -------------------------------------------------------------------------------------------------- */
+
+static int which_choice(const char *choices, const char *text)
+{
+    size_t length = strlen(text);
+    for (int i = 0; choices; i++) {
+        const char *bar = strchr(choices, '|');
+        size_t size = bar ? (size_t)(bar - choices) : strlen(choices);
+        if (size == length && length && !strncmp(choices, text, size)) return i;
+        choices = bar ? bar + 1 : NULL;
+    }
+    return -1;
+}
+
+static int which_flag(const char *text)
+{
+    return which_choice("no|false|off|0", text) >= 0 ? 0 : which_choice("yes|true|on|1", text) >= 0 ? 1 : -1;
+}
+
+static npg_status check_number(const npg_option *option, const char *text)
+{
+    char *end;
+    errno = 0;
+    double value = strtod(text, &end);
+    bool whole = option->type != NPG_OPTION_INT || (value == floor(value) && !strpbrk(text, ".xXeEnN"));
+    if (end == text || *end || errno || !isfinite(value) || !whole || isspace((unsigned char)*text))
+        return npg_error(NPG_USAGE, "option %s: \"%s\" is not %s", option->name, text,
+                         option->type == NPG_OPTION_INT ? "a whole number" : "a number");
+    if (value < option->min || value > option->max)
+        return npg_error(NPG_USAGE, "option %s: %s is outside %g .. %g", option->name, text, option->min,
+                         option->max);
+    return NPG_OK;
+}
+
+npg_status npg_option_check(const npg_option *option, const char *text)
+{
+    switch (option->type) {
+    case NPG_OPTION_INT:
+    case NPG_OPTION_REAL: return check_number(option, text);
+    case NPG_OPTION_FLAG:
+        if (which_flag(text) >= 0) return NPG_OK;
+        return npg_error(NPG_USAGE, "option %s: \"%s\" is neither yes nor no", option->name, text);
+    case NPG_OPTION_CHOICE:
+        if (which_choice(option->choices, text) >= 0) return NPG_OK;
+        return npg_error(NPG_USAGE, "option %s: \"%s\" is not one of %s", option->name, text,
+                         option->choices);
+    case NPG_OPTION_TEXT: break;
+    }
+    return NPG_OK;
+}
+
+npg_status npg_options_open(npg_options **out)
+{
+    npg_options *options;
+    NPG_REQUIRE(out);
+    *out = NULL;
+    NPG_TRY(npg_alloc(&options, NPG_FOR_RUN, sizeof *options));
+    while (npg_option_at(options->count, NULL)) options->count++;
+    npg_status status = npg_alloc_array(&options->texts, NPG_FOR_RUN, options->count, sizeof *options->texts);
+    if (status) npg_release(&options);
+    *out = options;
+    return status;
+}
+
+void npg_options_close(npg_options **slot)
+{
+    if (!slot || !*slot) return;
+    for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
+    npg_release(&(*slot)->texts);
+    npg_release(slot);
+}
+
+npg_status npg_options_copy(npg_options **out, const npg_options *options)
+{
+    npg_options *copy;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_options_open(&copy));
+    for (size_t i = 0; i < copy->count && !status; i++)
+        if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
+    if (status) npg_options_close(&copy);
+    *out = copy;
+    return status;
+}
+
+npg_status npg_options_set(npg_options *options, const char *name, const char *value)
+{
+    size_t at;
+    char *text;
+    NPG_REQUIRE(options && name && value);
+    const npg_option *option = find(name, &at);
+    if (!option) return npg_error(NPG_USAGE, "there is no option %s", name);
+    NPG_TRY(npg_option_check(option, value));
+    NPG_TRY(npg_copy_text(&text, value));
+    npg_release(&options->texts[at]);
+    options->texts[at] = text;
+    return NPG_OK;
+}
+
+bool npg_options_is_set(const npg_options *options, const char *name)
+{
+    size_t at;
+    return find(name, &at) && options->texts[at];
+}
+
+static const char *text_of_preset(const npg_options *options, const char *name)
+{
+    size_t at;
+    const npg_option *option = find("preset", &at);
+    const char *chosen = options->texts[at] ? options->texts[at] : option->default_text;
+    for (const npg_preset *preset = npg_presets; preset->name; preset++) {
+        if (strcmp(preset->name, chosen) != 0) continue;
+        for (const npg_preset_value *value = preset->values; value->name; value++)
+            if (!strcmp(value->name, name)) return value->value;
+    }
+    return NULL;
+}
+
+static const char *text_of(const npg_options *options, const npg_option *option, size_t at)
+{
+    const char *text = options->texts[at];
+    if (!text && strcmp(option->name, "preset") != 0) text = text_of_preset(options, option->name);
+    return text ? text : option->default_text;
+}
+
+const char *npg_options_get(const npg_options *options, const char *name)
+{
+    size_t at;
+    const npg_option *option = options && name ? find(name, &at) : NULL;
+    return option ? text_of(options, option, at) : NULL;
+}
+
+void npg_options_fill(const npg_options *options, const npg_option *table, void *state)
+{
+    for (const npg_option *option = table; option && option->name; option++) {
+        size_t at;
+        find(option->name, &at);
+        const char *text = text_of(options, option, at);
+        void *slot = (char *)state + option->offset;
+        switch (option->type) {
+        case NPG_OPTION_FLAG: *(bool *)slot = which_flag(text) == 1; break;
+        case NPG_OPTION_INT: *(int64_t *)slot = strtoll(text, NULL, 10); break;
+        case NPG_OPTION_REAL: *(double *)slot = strtod(text, NULL); break;
+        case NPG_OPTION_CHOICE: *(int *)slot = which_choice(option->choices, text); break;
+        case NPG_OPTION_TEXT: *(const char **)slot = text; break;
+        }
+    }
+}
+
+/* ---- configuration file
+ * -------------------------------------------------------------------------------------- */
+
+/* Blank out comments in place, so that line numbers stay. */
+static void blank_comments(char *text)
+{
+    bool in_string = false;
+    for (char *c = text; *c; c++) {
+        if (in_string && *c == '\\' && c[1]) {
+            c++;
+        } else if (*c == '"') {
+            in_string = !in_string;
+        } else if (!in_string && c[0] == '/' && c[1] == '/') {
+            for (; *c && *c != '\n'; c++) *c = ' ';
+            if (!*c) break;
+        }
+    }
+}
+
+static npg_status set_from_json(npg_options *options, const char *name, const json_t *value)
+{
+    char number[64];
+    if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
+    if (json_is_boolean(value)) return npg_options_set(options, name, json_is_true(value) ? "yes" : "no");
+    if (json_is_integer(value))
+        snprintf(number, sizeof number, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
+    else if (json_is_real(value))
+        snprintf(number, sizeof number, "%.17g", json_real_value(value));
+    else
+        return npg_error(NPG_USAGE, "option %s: neither text, number nor true/false", name);
+    return npg_options_set(options, name, number);
+}
+
+static npg_status read_text_file(char **text, const char *path)
+{
+    enum { LIMIT = 1 << 20 };
+    *text = NULL;
+    FILE *file = fopen(path, "rb");
+    if (!file) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
+    npg_status status = npg_alloc(text, NPG_FOR_FILES, LIMIT + 1);
+    size_t size = status ? 0 : fread(*text, 1, LIMIT + 1, file);
+    if (!status && ferror(file)) status = npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
+    if (!status && size > LIMIT)
+        status = npg_error(NPG_USAGE, "%s: larger than 1 MiB, not a configuration", path);
+    fclose(file);
+    if (status)
+        npg_release(text);
+    else
+        (*text)[size] = 0;
+    return status;
+}
+
+npg_status npg_options_load(npg_options *options, const char *path)
+{
+    char *text;
+    json_error_t error;
+    const char *name;
+    json_t *value;
+    NPG_REQUIRE(options && path);
+    NPG_TRY(read_text_file(&text, path));
+    blank_comments(text);
+    json_t *root = json_loads(text, JSON_REJECT_DUPLICATES, &error);
+    npg_release(&text);
+    if (!root) return npg_error(NPG_USAGE, "%s:%d:%d: %s", path, error.line, error.column, error.text);
+    npg_status status = NPG_OK;
+    if (!json_is_object(root)) status = npg_error(NPG_USAGE, "%s: not a JSON object", path);
+    json_object_foreach(root, name, value)
+    {
+        if (status) break;
+        status = npg_error_prefix(set_from_json(options, name, value), "%s", path);
+    }
+    json_decref(root);
+    return status;
+}

@@ -1,0 +1,48 @@
+/* Options: tables, one per stage; parser, help, configuration file and manual all come from them. */
+#ifndef NPG_OPTIONS_H
+#define NPG_OPTIONS_H
+
+#include <stdbool.h>
+
+#include "status.h"
+
+/* One option.  A table ends with a name of NULL.  offset is where the value goes in the stage's state:
+ * FLAG bool, INT int64_t, REAL double, CHOICE int (which word), TEXT const char * (a loan, lives as long as
+ * the run). */
+typedef struct npg_option {
+    const char *name, *help;
+    npg_option_type type;
+    size_t offset;
+    const char *default_text;
+    double min, max;        /* INT and REAL, both inclusive                  */
+    const char *choices;    /* CHOICE: "a|b|c"                               */
+    const char *value_name; /* for the help: N, DIR, FILE; NULL: by the type */
+} npg_option;
+
+/* A named set of values; what the user sets himself wins.  The list ends with a name of NULL, as does each
+ * set. */
+typedef struct npg_preset_value {
+    const char *name, *value;
+} npg_preset_value;
+
+typedef struct npg_preset {
+    const char *name, *help;
+    const npg_preset_value *values;
+} npg_preset;
+
+/* The i-th option of all tables, the run's own first; NULL after the last.  *stage gets the table's name. */
+const npg_option *npg_option_at(size_t i, const char **stage);
+
+/* Write the values of one table into state at their offsets. */
+void npg_options_fill(const npg_options *options, const npg_option *table, void *state);
+
+/* A copy that owns its texts. */
+npg_status npg_options_copy(npg_options **out, const npg_options *options);
+
+/* Whether the user (not a preset, not the default) set it. */
+bool npg_options_is_set(const npg_options *options, const char *name);
+
+/* Check `text` against an option; NPG_USAGE says what it takes. */
+npg_status npg_option_check(const npg_option *option, const char *text);
+
+#endif

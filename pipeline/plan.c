@@ -1,0 +1,70 @@
+/* Plan: which frames are solved together, and in what order the solving pass reads the capture. */
+#include "plan.h"
+
+#include <assert.h>
+
+static int64_t min_of(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+static int64_t max_of(int64_t a, int64_t b)
+{
+    return a > b ? a : b;
+}
+
+static npg_window key_window(const npg_plan *plan)
+{
+    int64_t size = min_of(plan->window, plan->frame_count);
+    int64_t first = min_of(max_of(plan->key - size / 2, 0), plan->frame_count - size);
+    return (npg_window){first, first + size - 1, -1, first, first + size - 1, 0};
+}
+
+static int64_t step_of(const npg_plan *plan)
+{
+    return max_of(plan->window - plan->overlap, 1);
+}
+
+static int64_t forward_count(const npg_plan *plan)
+{
+    int64_t rest = plan->frame_count - 1 - key_window(plan).last;
+    return (rest + step_of(plan) - 1) / step_of(plan);
+}
+
+static int64_t backward_count(const npg_plan *plan)
+{
+    return (key_window(plan).first + step_of(plan) - 1) / step_of(plan);
+}
+
+int64_t npg_plan_window_count(const npg_plan *plan)
+{
+    return 1 + forward_count(plan) + backward_count(plan);
+}
+
+npg_window npg_plan_window(const npg_plan *plan, int64_t i)
+{
+    npg_window key = key_window(plan);
+    int64_t forward = forward_count(plan), step = step_of(plan);
+    if (i == 0) return key;
+    if (i <= forward) {
+        int64_t new_first = key.last + 1 + (i - 1) * step;
+        int64_t new_last = min_of(new_first + step - 1, plan->frame_count - 1);
+        int64_t first = max_of(new_last - plan->window + 1, 0);
+        return (npg_window){first, new_last, i - 1, new_first, new_last, 1};
+    }
+    int64_t new_last = key.first - 1 - (i - forward - 1) * step;
+    int64_t new_first = max_of(new_last - step + 1, 0);
+    int64_t last = min_of(new_first + plan->window - 1, plan->frame_count - 1);
+    return (npg_window){new_first, last, i == forward + 1 ? 0 : i - 1, new_first, new_last, -1};
+}
+
+int64_t npg_plan_frame(const npg_plan *plan, int64_t i)
+{
+    npg_window key = key_window(plan);
+    assert(i >= 0 && i < plan->frame_count);
+    int64_t in_key = key.last - key.first + 1;
+    if (i == 0) return plan->key;
+    if (i < in_key) return key.first + (i <= plan->key - key.first ? i - 1 : i);
+    i -= in_key;
+    int64_t forward_frames = plan->frame_count - 1 - key.last;
+    return i < forward_frames ? key.last + 1 + i : key.first - 1 - (i - forward_frames);
+}

@@ -1,0 +1,32 @@
+/* Plan: which frames are solved together, and in what order the solving pass reads the capture.
+ *
+ * Windows go outward from the one that holds the keyframe: window 0 is around it, then all later windows
+ * forward in time, then all earlier ones backward.  A window shares `overlap` frames with the one it starts
+ * from. */
+#ifndef NPG_PLAN_H
+#define NPG_PLAN_H
+
+#include "status.h"
+
+typedef struct npg_plan {
+    int64_t frame_count; /* T                                                     */
+    int64_t key;         /* index of the keyframe                                 */
+    int64_t window;      /* frames per window; >= T: one joint window over all    */
+    int64_t overlap;     /* frames shared with the neighbour, < window            */
+} npg_plan;
+
+typedef struct npg_window {
+    int64_t first, last;         /* frames first..last, both inclusive                               */
+    int64_t from;                /* the window it starts from, -1 for window 0                       */
+    int64_t new_first, new_last; /* the frames no earlier window has solved                        */
+    int direction;               /* 0 around the keyframe, +1 forward, -1 backward                   */
+} npg_window;
+
+int64_t npg_plan_window_count(const npg_plan *plan);
+npg_window npg_plan_window(const npg_plan *plan, int64_t i);
+
+/* The i-th frame to read (0 <= i < T): the keyframe first, then each window's new frames, nearest to the
+ * solved ones first.  Every frame comes once. */
+int64_t npg_plan_frame(const npg_plan *plan, int64_t i);
+
+#endif

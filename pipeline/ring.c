@@ -1,0 +1,126 @@
+/* Ring: a bounded queue of chunks between two stages. */
+#include "ring.h"
+
+#include <pthread.h>
+
+#include "clock.h"
+#include "memory.h"
+
+typedef enum ring_state { RING_OPEN, RING_ENDED, RING_ABORTED } ring_state;
+
+struct npg_ring {
+    pthread_mutex_t lock;
+    pthread_cond_t changed_full,
+        changed_empty; /* the producer waits on the first, the consumer on the second */
+    ring_state state;
+    size_t capacity, count, first;
+    double push_wait_s, pop_wait_s;
+    npg_chunk **slots; /* capacity of them, owned */
+};
+
+npg_status npg_ring_open(npg_ring **out, size_t capacity)
+{
+    npg_ring *ring;
+    NPG_REQUIRE(capacity >= 1);
+    NPG_TRY(npg_alloc(&ring, NPG_FOR_RUN, sizeof *ring));
+    npg_status status = npg_alloc_array(&ring->slots, NPG_FOR_RUN, capacity, sizeof *ring->slots);
+    if (status) {
+        npg_release(&ring);
+        return status;
+    }
+    ring->capacity = capacity;
+    pthread_mutex_init(&ring->lock, NULL);
+    pthread_cond_init(&ring->changed_full, NULL);
+    pthread_cond_init(&ring->changed_empty, NULL);
+    *out = ring;
+    return NPG_OK;
+}
+
+static void drop_all(npg_ring *ring)
+{
+    for (; ring->count; ring->count--) {
+        npg_chunk_unref(&ring->slots[ring->first]);
+        ring->first = (ring->first + 1) % ring->capacity;
+    }
+}
+
+void npg_ring_close(npg_ring **slot)
+{
+    npg_ring *ring = *slot;
+    if (!ring) return;
+    drop_all(ring);
+    pthread_cond_destroy(&ring->changed_full);
+    pthread_cond_destroy(&ring->changed_empty);
+    pthread_mutex_destroy(&ring->lock);
+    npg_release(&ring->slots);
+    npg_release(slot);
+}
+
+npg_status npg_ring_push(npg_ring *ring, npg_chunk **chunk)
+{
+    npg_status status = NPG_OK;
+    pthread_mutex_lock(&ring->lock);
+    double since = npg_clock_s();
+    while (ring->state == RING_OPEN && ring->count == ring->capacity)
+        pthread_cond_wait(&ring->changed_full, &ring->lock);
+    ring->push_wait_s += npg_clock_s() - since;
+    if (ring->state == RING_OPEN) {
+        ring->slots[(ring->first + ring->count++) % ring->capacity] = *chunk;
+        *chunk = NULL;
+        pthread_cond_signal(&ring->changed_empty);
+    } else {
+        status = ring->state == RING_ABORTED ? NPG_ABORTED
+                                             : npg_error(NPG_USAGE, "pushed into a ring that has ended");
+    }
+    pthread_mutex_unlock(&ring->lock);
+    return status;
+}
+
+npg_status npg_ring_pop(npg_ring *ring, npg_chunk **chunk)
+{
+    npg_status status = NPG_OK;
+    pthread_mutex_lock(&ring->lock);
+    double since = npg_clock_s();
+    while (ring->state == RING_OPEN && !ring->count) pthread_cond_wait(&ring->changed_empty, &ring->lock);
+    ring->pop_wait_s += npg_clock_s() - since;
+    if (ring->state == RING_ABORTED) {
+        status = NPG_ABORTED;
+    } else if (!ring->count) {
+        status = NPG_END;
+    } else {
+        *chunk = ring->slots[ring->first];
+        ring->slots[ring->first] = NULL;
+        ring->first = (ring->first + 1) % ring->capacity;
+        ring->count--;
+        pthread_cond_signal(&ring->changed_full);
+    }
+    pthread_mutex_unlock(&ring->lock);
+    return status;
+}
+
+static void leave_open(npg_ring *ring, ring_state state)
+{
+    pthread_mutex_lock(&ring->lock);
+    if (state == RING_ABORTED || ring->state == RING_OPEN) ring->state = state;
+    if (ring->state == RING_ABORTED) drop_all(ring);
+    pthread_cond_broadcast(&ring->changed_full);
+    pthread_cond_broadcast(&ring->changed_empty);
+    pthread_mutex_unlock(&ring->lock);
+}
+
+void npg_ring_end(npg_ring *ring)
+{
+    leave_open(ring, RING_ENDED);
+}
+void npg_ring_abort(npg_ring *ring)
+{
+    leave_open(ring, RING_ABORTED);
+}
+
+void npg_ring_waits(npg_ring *ring, double *push_wait_s, double *pop_wait_s)
+{
+    pthread_mutex_lock(&ring->lock);
+    *push_wait_s = ring->push_wait_s;
+    *pop_wait_s = ring->pop_wait_s;
+    pthread_mutex_unlock(&ring->lock);
+}

@@ -1,0 +1,436 @@
+/* Run: builds the chain, walks the capture through it in passes, and is what the public interface talks to.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "clock.h"
+#include "run_internal.h"
+
+#define OFFSET(member) offsetof(npg_settings, member)
+
+const npg_option npg_run_options[] = {
+    {"input",
+     "Folder, pattern (frame_%04d.ply), list file, or - for standard input; empty: frames are pushed",
+     NPG_OPTION_TEXT, OFFSET(input), "", 0, 0, NULL, "PATH"},
+    {"output", "Folder for the results; empty: results are only pulled", NPG_OPTION_TEXT, OFFSET(output), "",
+     0, 0, NULL, "DIR"},
+    {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "paper", 0, 0, "paper",
+     NULL},
+    {"device", "OpenCL device: part of its name, its number, or auto (neupig doctor lists them)",
+     NPG_OPTION_TEXT, OFFSET(device), "auto", 0, 0, NULL, "DEVICE"},
+    {"seed", "Seed of all random numbers", NPG_OPTION_INT, OFFSET(seed), "0", 0, 4294967295.0, NULL, NULL},
+    {"keep-going", "Skip frames that can't be used instead of stopping; ends with exit code 7",
+     NPG_OPTION_FLAG, OFFSET(keep_going), "no", 0, 0, NULL, NULL},
+    {"ring", "Chunks that may wait between two stages", NPG_OPTION_INT, OFFSET(ring_capacity), "2", 1, 1024,
+     NULL, NULL},
+    {"chunk", "Frames per chunk", NPG_OPTION_INT, OFFSET(chunk_frames), "4", 1, 1024, NULL, NULL},
+    {"max-memory", "Stop rather than use more than this, in MiB; 0: no limit", NPG_OPTION_INT,
+     OFFSET(max_memory_mib), "0", 0, 1e9, NULL, "MIB"},
+    {"pull", "Finished frames are also pulled through the library", NPG_OPTION_FLAG, OFFSET(pull), "no", 0, 0,
+     NULL, NULL},
+    {0}};
+
+/* ---- failure and log
+ * ----------------------------------------------------------------------------------------- */
+
+void npg_run_fail(npg_run *run, const char *stage, npg_status status)
+{
+    pthread_mutex_lock(&run->lock);
+    if (!run->first_failure && status != NPG_ABORTED) {
+        run->first_failure = status;
+        snprintf(run->failure_text, sizeof run->failure_text, "%s",
+                 status == NPG_STOPPED ? "stopped on request" : npg_error_text());
+        snprintf(run->failure_stage, sizeof run->failure_stage, "%s", stage);
+    }
+    atomic_store(&run->stop, true);
+    for (size_t i = 0; i < run->ring_count; i++) npg_ring_abort(run->rings[i]);
+    if (run->feed) npg_ring_abort(run->feed);
+    if (run->results) npg_ring_abort(run->results);
+    pthread_mutex_unlock(&run->lock);
+}
+
+void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t frame, const char *message)
+{
+    if (!run->hooks.log) return;
+    npg_log_record record = {sizeof record, level, npg_clock_s() - run->opened_s, stage, frame, message};
+    pthread_mutex_lock(&run->lock);
+    run->hooks.log(run->hooks.user, &record);
+    pthread_mutex_unlock(&run->lock);
+}
+
+/* ---- one pass
+ * ------------------------------------------------------------------------------------------------ */
+
+static npg_status open_worker_states(npg_run *run)
+{
+    for (size_t i = 0; i < run->worker_count; i++) {
+        npg_worker *worker = &run->workers[i];
+        NPG_TRY(npg_alloc(&worker->state, NPG_FOR_RUN, worker->stage->state_size + 1));
+        npg_options_fill(run->options, worker->stage->options, worker->state);
+    }
+    return NPG_OK;
+}
+
+static npg_status open_rings(npg_run *run)
+{
+    npg_worker *last = NULL;
+    for (size_t i = 0; i < run->worker_count; i++) {
+        npg_worker *worker = &run->workers[i];
+        worker->in = worker->out = NULL;
+        if (!(worker->stage->passes & run->pass)) continue;
+        if (last) {
+            npg_ring *ring;
+            NPG_TRY(npg_ring_open(&ring, (size_t)run->settings.ring_capacity));
+            pthread_mutex_lock(&run->lock);
+            run->rings[run->ring_count++] = ring;
+            pthread_mutex_unlock(&run->lock);
+            worker->in = last->out = ring;
+        }
+        last = worker;
+    }
+    if (run->pass == NPG_PASS_SOLVE && run->results) last->out = run->results;
+    return NPG_OK;
+}
+
+static void note_waits(const npg_worker *worker)
+{
+    double push_s = 0, pop_s = 0, unused;
+    if (worker->out) npg_ring_waits(worker->out, &push_s, &unused);
+    if (worker->in) npg_ring_waits(worker->in, &unused, &pop_s);
+    json_t *r = worker->report;
+    push_s += json_real_value(json_object_get(r, "waited_for_next_s"));
+    pop_s += json_real_value(json_object_get(r, "waited_for_previous_s"));
+    json_object_set_new(r, "wall_s", json_real(worker->wall_s));
+    json_object_set_new(r, "cpu_s", json_real(worker->cpu_s));
+    json_object_set_new(r, "waited_for_previous_s", json_real(pop_s));
+    json_object_set_new(r, "waited_for_next_s", json_real(push_s));
+}
+
+static void close_pass(npg_run *run)
+{
+    for (size_t i = 0; i < run->worker_count; i++) {
+        npg_worker *worker = &run->workers[i];
+        if (worker->started) {
+            pthread_join(worker->thread, NULL);
+            note_waits(worker);
+        }
+    }
+    for (size_t i = 0; i < run->worker_count; i++) {
+        npg_worker *worker = &run->workers[i];
+        if (worker->started && worker->stage->uninit) worker->stage->uninit(worker);
+        worker->started = false;
+        npg_release(&worker->state);
+    }
+    pthread_mutex_lock(&run->lock);
+    while (run->ring_count) npg_ring_close(&run->rings[--run->ring_count]);
+    pthread_mutex_unlock(&run->lock);
+}
+
+/* Fail the pass when no thread could be started any more. */
+static npg_status start_threads(npg_run *run)
+{
+    for (size_t i = 0; i < run->worker_count; i++) {
+        npg_worker *worker = &run->workers[i];
+        if (!(worker->stage->passes & run->pass)) continue;
+        if (pthread_create(&worker->thread, NULL, npg_worker_main, worker))
+            return npg_error(NPG_FAILED, "can't start the thread of stage %s", worker->stage->name);
+        worker->started = true;
+    }
+    return NPG_OK;
+}
+
+static void announce_memory(npg_run *run);
+
+static npg_status do_pass(npg_run *run, npg_pass pass)
+{
+    run->pass = pass;
+    npg_status status = open_worker_states(run);
+    if (!status && pass == NPG_PASS_SOLVE && !run->facts.is_live) announce_memory(run);
+    if (!status) status = open_rings(run);
+    if (!status) status = start_threads(run);
+    if (status) npg_run_fail(run, "run", status);
+    close_pass(run);
+    return run->first_failure;
+}
+
+/* ---- memory formula
+ * ------------------------------------------------------------------------------------------ */
+
+static void announce_memory(npg_run *run)
+{
+    const npg_facts *facts = &run->facts;
+    size_t frame_bytes = facts->point_count_max * 6 * sizeof(float);
+    size_t chunk_bytes = frame_bytes * (size_t)run->settings.chunk_frames;
+    size_t rings = 0, held = 0, stages = 0;
+    json_t *parts = json_object();
+    for (size_t i = 0; i < run->worker_count; i++) {
+        const npg_worker *worker = &run->workers[i];
+        if (!(worker->stage->passes & NPG_PASS_SOLVE)) continue;
+        size_t chunks = 1, bytes = worker->stage->memory ? worker->stage->memory(worker, &chunks) : 0;
+        rings += (size_t)run->settings.ring_capacity;
+        held += chunks;
+        stages += bytes;
+        json_object_set_new(parts, worker->stage->name,
+                            json_integer((json_int_t)(bytes + chunks * chunk_bytes)));
+    }
+    size_t total = (rings + held) * chunk_bytes + stages;
+    char text[256];
+    snprintf(
+        text, sizeof text,
+        "memory: (%zu chunks in rings + %zu held by stages) x %.2f MiB + stages %.0f MiB = %.0f MiB at most",
+        rings, held, (double)chunk_bytes / 1048576, (double)stages / 1048576, (double)total / 1048576);
+    npg_run_log(run, NPG_LOG_INFO, "run", -1, text);
+    json_object_set_new(parts, "rings", json_integer((json_int_t)(rings * chunk_bytes)));
+    json_object_set_new(parts, "total", json_integer((json_int_t)total));
+    json_object_set_new(run->report, "memory_bound_bytes", parts);
+}
+
+/* ---- the conductor
+ * ------------------------------------------------------------------------------------------- */
+
+static npg_status conclude(npg_run *run)
+{
+    json_t *r = run->report;
+    json_object_set_new(r, "status", json_string(run->is_partial ? "partial" : "ok"));
+    json_object_set_new(r, "exit_code", json_integer(run->is_partial ? 7 : 0));
+    json_object_set_new(r, "wall_s", json_real(npg_clock_s() - run->opened_s));
+    json_object_set_new(r, "process_cpu_s", json_real(npg_clock_process_s()));
+    json_object_set_new(r, "memory_peak_bytes", json_integer((json_int_t)npg_memory_peak()));
+    NPG_TRY(open_worker_states(run));
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < run->worker_count && !status; i++)
+        if (run->workers[i].stage->conclude) status = run->workers[i].stage->conclude(&run->workers[i]);
+    for (size_t i = 0; i < run->worker_count; i++) npg_release(&run->workers[i].state);
+    return status;
+}
+
+static npg_status do_passes(npg_run *run)
+{
+    if (!run->facts.is_live) {
+        NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
+        NPG_TRY(do_pass(run, NPG_PASS_SCORE));
+    }
+    NPG_TRY(do_pass(run, NPG_PASS_SOLVE));
+    npg_status status = conclude(run);
+    if (status) npg_run_fail(run, "run", status);
+    return status;
+}
+
+static void *conduct(void *argument)
+{
+    npg_run *run = argument;
+    npg_status status = do_passes(run);
+    run->end_status = status ? status : run->is_partial ? NPG_PARTIAL : NPG_OK;
+    if (run->results) npg_ring_end(run->results);
+    return NULL;
+}
+
+/* ---- public: open and close
+ * ---------------------------------------------------------------------------------- */
+
+static npg_status check_chain(const npg_run *run)
+{
+    uint32_t have = 0;
+    for (size_t i = 0; i < run->worker_count; i++) {
+        const npg_stage *stage = run->workers[i].stage;
+        if (stage->needs & ~have)
+            return npg_error(NPG_USAGE, "stage %s needs fields 0x%x that no stage before it gives",
+                             stage->name, stage->needs & ~have);
+        have |= stage->gives;
+    }
+    return NPG_OK;
+}
+
+static npg_status open_chain(npg_run *run)
+{
+    json_t *stages = json_object();
+    json_object_set_new(run->report, "stages", stages);
+    for (size_t i = 0; npg_chain[i]; i++) {
+        if (i == NPG_STAGES_MAX) return npg_error(NPG_USAGE, "more than %d stages", NPG_STAGES_MAX);
+        run->workers[i] = (npg_worker){.run = run, .stage = npg_chain[i], .report = json_object()};
+        json_object_set_new(stages, npg_chain[i]->name, run->workers[i].report);
+        run->worker_count++;
+    }
+    return check_chain(run);
+}
+
+static npg_status fill_run(npg_run *run, const npg_options *options, const npg_hooks *hooks)
+{
+    NPG_TRY(npg_options_copy(&run->options, options));
+    npg_options_fill(run->options, npg_run_options, &run->settings);
+    if (hooks) {
+        NPG_REQUIRE(hooks->struct_size >= sizeof *hooks);
+        run->hooks = *hooks;
+    }
+    run->report = json_object();
+    run->warnings = json_array();
+    json_object_set(run->report, "warnings", run->warnings);
+    run->facts.frame_count = -1;
+    run->facts.bounds_local = npg_bounds_empty();
+    run->facts.is_live = !run->settings.input[0] || !strcmp(run->settings.input, "-");
+    if (!run->settings.output[0] && !run->settings.pull)
+        return npg_error(NPG_USAGE, "neither an output folder nor pull = yes: the results would be lost");
+    if (!run->settings.input[0]) NPG_TRY(npg_ring_open(&run->feed, (size_t)run->settings.ring_capacity));
+    if (run->settings.pull) NPG_TRY(npg_ring_open(&run->results, (size_t)run->settings.ring_capacity));
+    npg_memory_set_limit((size_t)run->settings.max_memory_mib << 20);
+    return open_chain(run);
+}
+
+npg_status npg_run_open(npg_run **out, const npg_options *options, const npg_hooks *hooks)
+{
+    npg_run *run;
+    NPG_REQUIRE(out);
+    *out = NULL;
+    NPG_TRY(npg_alloc(&run, NPG_FOR_RUN, sizeof *run));
+    pthread_mutex_init(&run->lock, NULL);
+    run->opened_s = npg_clock_s();
+    run->pushed_number = INT64_MIN;
+    npg_status status = fill_run(run, options, hooks);
+    if (!status && pthread_create(&run->conductor, NULL, conduct, run))
+        status = npg_error(NPG_FAILED, "can't start a thread");
+    if (status) {
+        npg_run_close(&run);
+        return status;
+    }
+    run->conductor_started = true;
+    *out = run;
+    return NPG_OK;
+}
+
+npg_status npg_run_wait(npg_run *run)
+{
+    NPG_REQUIRE(run && run->conductor_started);
+    if (!run->conductor_joined) pthread_join(run->conductor, NULL);
+    run->conductor_joined = true;
+    if (run->end_status < 0 || run->end_status == NPG_STOPPED)
+        return npg_error(run->end_status, "%s: %s", run->failure_stage, run->failure_text);
+    return run->end_status;
+}
+
+void npg_run_stop(npg_run *run)
+{
+    if (run) atomic_store(&run->stop, true);
+}
+
+void npg_run_close(npg_run **slot)
+{
+    if (!slot || !*slot) return;
+    npg_run *run = *slot;
+    npg_run_stop(run);
+    if (run->feed) npg_ring_abort(run->feed);
+    if (run->results) npg_ring_abort(run->results);
+    if (run->conductor_started && !run->conductor_joined) pthread_join(run->conductor, NULL);
+    npg_chunk_unref(&run->pulled);
+    npg_ring_close(&run->feed);
+    npg_ring_close(&run->results);
+    npg_mesh_unref(&run->facts.reference);
+    json_decref(run->warnings);
+    json_decref(run->report);
+    npg_options_close(&run->options);
+    pthread_mutex_destroy(&run->lock);
+    npg_release(slot);
+}
+
+/* ---- public: push and pull
+ * ----------------------------------------------------------------------------------- */
+
+static npg_status frame_of_cloud(npg_frame *frame, npg_run *run, const npg_cloud *cloud)
+{
+    npg_facts *facts = &run->facts;
+    size_t n = cloud->point_count;
+    NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
+    for (size_t i = 0; !facts->origin.known && i < n; i++)
+        npg_origin_offer(&facts->origin, cloud->points + 3 * i);
+    for (size_t i = 0; i < 3 * n; i++)
+        frame->pos_local[i] = (float)(cloud->points[i] - facts->origin.world[i % 3]);
+    if (cloud->normals && n) {
+        NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
+        memcpy(frame->normals, cloud->normals, n * 3 * sizeof(float));
+    }
+    frame->point_count = n;
+    frame->number = cloud->number;
+    frame->fields = NPG_FIELD_POINTS;
+    return NPG_OK;
+}
+
+npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
+{
+    npg_frame frame = {0};
+    npg_chunk *chunk = NULL;
+    NPG_REQUIRE(run && cloud && cloud->struct_size >= sizeof *cloud &&
+                (cloud->points || !cloud->point_count));
+    if (!run->feed) return npg_error(NPG_USAGE, "this run reads its frames from %s", run->settings.input);
+    if (cloud->number <= run->pushed_number)
+        return npg_error(NPG_USAGE, "frame %lld was pushed after frame %lld", (long long)cloud->number,
+                         (long long)run->pushed_number);
+    npg_status status = frame_of_cloud(&frame, run, cloud);
+    if (!status) status = npg_chunk_open(&chunk, 1);
+    if (!status) {
+        npg_chunk_add(chunk, &frame);
+        status = npg_ring_push(run->feed, &chunk);
+    }
+    if (!status) run->pushed_number = cloud->number;
+    npg_frame_clear(&frame);
+    npg_chunk_unref(&chunk);
+    return status == NPG_ABORTED ? npg_run_wait(run) : status;
+}
+
+npg_status npg_run_finish(npg_run *run)
+{
+    NPG_REQUIRE(run);
+    if (!run->feed) return npg_error(NPG_USAGE, "this run reads its frames from %s", run->settings.input);
+    npg_ring_end(run->feed);
+    return NPG_OK;
+}
+
+static npg_status open_result(npg_result **out, const npg_run *run, const npg_frame *frame)
+{
+    const npg_mesh *reference = run->facts.reference;
+    npg_result *result;
+    double *vertices;
+    NPG_TRY(npg_alloc(&result, NPG_FOR_FRAMES, sizeof *result));
+    npg_status status = npg_alloc_array(&vertices, NPG_FOR_FRAMES, frame->vert_count, 3 * sizeof(double));
+    uint32_t *faces = NULL;
+    if (!status)
+        status = npg_alloc_array(&faces, NPG_FOR_FRAMES, reference->face_count, 3 * sizeof(uint32_t));
+    if (status) {
+        npg_release(&vertices);
+        npg_release(&result);
+        return status;
+    }
+    npg_box_unit_to_world(&run->facts.box, vertices, frame->vert_unit, frame->vert_count);
+    memcpy(faces, reference->faces, reference->face_count * 3 * sizeof(uint32_t));
+    *result =
+        (npg_result){sizeof *result,         frame->index, frame->number, frame->vert_count,
+                     reference->face_count,  vertices,     faces,         frame->figures.point_dist_median,
+                     frame->figures.coverage};
+    *out = result;
+    return NPG_OK;
+}
+
+npg_status npg_run_pull(npg_run *run, npg_result **result)
+{
+    NPG_REQUIRE(run && result);
+    *result = NULL;
+    if (!run->results) return npg_error(NPG_USAGE, "results can be pulled only with the option pull = yes");
+    for (;;) {
+        while (run->pulled && run->pulled_at < npg_chunk_count(run->pulled)) {
+            npg_frame *frame = npg_chunk_frame(run->pulled, run->pulled_at++);
+            if (frame->fields & NPG_FIELD_VERTICES) return open_result(result, run, frame);
+        }
+        npg_chunk_unref(&run->pulled);
+        run->pulled_at = 0;
+        npg_status status = npg_ring_pop(run->results, &run->pulled);
+        if (status == NPG_ABORTED) return npg_run_wait(run);
+        if (status) return status;
+    }
+}
+
+void npg_result_close(npg_result **slot)
+{
+    if (!slot || !*slot) return;
+    npg_release(&(*slot)->vertices);
+    npg_release(&(*slot)->faces);
+    npg_release(slot);
+}

@@ -1,0 +1,65 @@
+/* What run.c and worker.c share. */
+#ifndef NPG_RUN_INTERNAL_H
+#define NPG_RUN_INTERNAL_H
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "ring.h"
+#include "stage.h"
+
+#define NPG_STAGES_MAX 16
+
+struct npg_worker {
+    npg_run *run;
+    const npg_stage *stage;
+    void *state;        /* stage->state_size bytes, owned, for one pass */
+    npg_ring *in, *out; /* loans; in is NULL for the first, out for the last without pull */
+    pthread_t thread;
+    bool started;
+    double wall_s, cpu_s; /* of the passes so far: of the thread's life, and of its processor time */
+    json_t *report;       /* loan from the run's report */
+};
+
+struct npg_run {
+    npg_options *options; /* owned */
+    npg_settings settings;
+    npg_hooks hooks;
+    npg_facts facts;
+    double opened_s;
+
+    pthread_mutex_t lock; /* guards what follows up to the rings, and calls of the hooks */
+    npg_status first_failure;
+    char failure_text[1024], failure_stage[32];
+    bool is_partial;
+    npg_progress progress;
+    json_t *report, *warnings; /* owned */
+
+    atomic_bool stop;
+    npg_pass pass;
+    npg_worker workers[NPG_STAGES_MAX];
+    size_t worker_count;
+    npg_ring *
+        rings[NPG_STAGES_MAX]; /* rings[i] leads from worker i to i + 1 of the pass; owned; only under lock */
+    size_t ring_count;
+    npg_ring *feed, *results; /* push -> ingest, last stage -> pull; owned, for the run's whole life */
+
+    pthread_t conductor;
+    bool conductor_started, conductor_joined;
+    npg_status end_status;
+    int64_t pushed_number;
+    npg_chunk *pulled; /* the chunk whose frames are being pulled */
+    size_t pulled_at;
+};
+
+/* Remember the first failure of the run and wake everybody. */
+void npg_run_fail(npg_run *run, const char *stage, npg_status status);
+
+/* The body of a stage's thread: init, process until the end, flush, uninit.  The argument is the npg_worker.
+ */
+void *npg_worker_main(void *worker);
+
+/* A log record through the run's hook. */
+void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t frame, const char *message);
+
+#endif

@@ -1,0 +1,20 @@
+/* The options of the run itself, those that no single stage owns. */
+#ifndef NPG_RUN_SETTINGS_H
+#define NPG_RUN_SETTINGS_H
+
+#include "options.h"
+
+typedef struct npg_settings {
+    const char *input, *output, *device;
+    int preset;
+    int64_t seed;
+    int64_t ring_capacity;  /* chunks per ring                        */
+    int64_t chunk_frames;   /* frames per chunk                       */
+    int64_t max_memory_mib; /* 0: no limit                            */
+    bool keep_going;        /* skip frames that can't be used         */
+    bool pull;              /* finished frames are also to be pulled  */
+} npg_settings;
+
+extern const npg_option npg_run_options[];
+
+#endif

@@ -1,0 +1,110 @@
+/* Stage: the interface between the run and the parts of the chain.
+ *
+ * A stage is one const struct; stages/chain.c lists them in the order of the data's way.  Each stage in a
+ * pass works in a thread of its own and talks to nothing but its npg_worker. */
+#ifndef NPG_STAGE_H
+#define NPG_STAGE_H
+
+#include <jansson.h>
+
+#include "chunk.h"
+#include "frame_box.h"
+#include "mesh.h"
+#include "options.h"
+#include "plan.h"
+#include "run_settings.h"
+
+/* A pass is one walk of the capture through the stages that take part in it. */
+typedef enum npg_pass {
+    NPG_PASS_MEASURE = 1, /* files: find count, box and sizes                 */
+    NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe    */
+    NPG_PASS_SOLVE = 4    /* the work itself; the only pass of a live source  */
+} npg_pass;
+
+/* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
+ * it passes on the first chunk (or ends the pass) that depends on it; the rings' locks publish it downstream.
+ */
+typedef struct npg_facts {
+    /* ingest */
+    bool is_live;          /* frames can't be read a second time                            */
+    npg_origin origin;     /* world; a point of the first frame                             */
+    int64_t frame_count;   /* T, gaps included; -1 while a live source is open              */
+    int64_t skipped_count; /* frames left out under --missing skip or --keep-going          */
+    /* keyframe */
+    size_t point_count_max;  /* of all frames, as read                                        */
+    npg_bounds bounds_local; /* of all usable points                                          */
+    npg_frame_box box;
+    npg_plan plan; /* with the keyframe                                             */
+    /* mesh */
+    npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
+    double unseen_share; /* share of the reference's area that no point of its frame saw  */
+} npg_facts;
+
+typedef struct npg_worker npg_worker;
+
+typedef struct npg_stage {
+    const char *name, *help;
+    const npg_option *options; /* may be NULL */
+    size_t state_size; /* zeroed, filled from the options, then given to init                            */
+    unsigned passes;   /* NPG_PASS_* it takes part in                                                    */
+    uint32_t needs, gives; /* NPG_FIELD_*, in the solving pass */
+
+    /* Take what the pass needs.  Called on the stage's own thread.  May be NULL. */
+    npg_status (*init)(npg_worker *worker);
+    /* Take one chunk.  Left in *chunk, it is passed on; nulled, the stage kept it (or pushed it itself).
+     * The first stage of a chain is called with *chunk NULL and makes one, or returns NPG_END. */
+    npg_status (*process)(npg_worker *worker, npg_chunk **chunk);
+    /* The stream ended: push on what was held back.  May be NULL. */
+    npg_status (*flush)(npg_worker *worker);
+    /* Free everything, after success and failure alike.  May be NULL. */
+    void (*uninit)(npg_worker *worker);
+    /* Bytes the stage holds at most in the solving pass, and how many chunks of them it may hold back; facts
+     * up to the plan are known.  The run prints the sum before it begins.  May be NULL. */
+    size_t (*memory)(const npg_worker *worker, size_t *chunks_held);
+    /* After all stages ended well: the last word (files that must come last).  May be NULL. */
+    npg_status (*conclude)(npg_worker *worker);
+} npg_stage;
+
+/* In the order of the data's way, NULL at the end (stages/chain.c). */
+extern const npg_stage *const npg_chain[];
+extern const npg_preset npg_presets[];
+
+/* ---- what a stage may ask of its worker
+ * ---------------------------------------------------------------------- */
+
+void *npg_worker_state(const npg_worker *worker);
+npg_facts *npg_worker_facts(const npg_worker *worker);
+const npg_settings *npg_worker_settings(const npg_worker *worker);
+const npg_options *npg_worker_options(const npg_worker *worker);
+npg_pass npg_worker_pass(const npg_worker *worker);
+
+/* Hand a chunk to the next stage; waits while the ring is full.  Chunks of the last stage go to
+ * npg_run_pull() or are freed. */
+npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk);
+
+/* For the first stage of a live run: the next chunk that npg_run_push() brought; NPG_END after
+ * npg_run_finish(). */
+npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk);
+
+/* True once the run should stop: long loops ask at least once a second and then return NPG_STOPPED. */
+bool npg_worker_stopping(const npg_worker *worker);
+
+/* A line of the log; frame -1 if it concerns none. */
+void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
+    NPG_PRINTF(4, 5);
+
+/* Something the user must not overlook: goes to the log as a warning and to the report's list.  With
+ * `partial` the run ends with NPG_PARTIAL. */
+void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
+    NPG_PRINTF(4, 5);
+
+/* Tell how far things are; fields the stage does not know are filled by the run. */
+void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
+
+/* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
+json_t *npg_worker_report(npg_worker *worker);
+
+/* The whole report, for conclude(). */
+json_t *npg_worker_whole_report(npg_worker *worker);
+
+#endif

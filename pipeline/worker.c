@@ -1,0 +1,148 @@
+/* Worker: one stage at work in one pass, and what a stage may ask of the run. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "clock.h"
+#include "run_internal.h"
+
+void *npg_worker_state(const npg_worker *worker)
+{
+    return worker->state;
+}
+npg_facts *npg_worker_facts(const npg_worker *worker)
+{
+    return &worker->run->facts;
+}
+const npg_settings *npg_worker_settings(const npg_worker *worker)
+{
+    return &worker->run->settings;
+}
+const npg_options *npg_worker_options(const npg_worker *worker)
+{
+    return worker->run->options;
+}
+npg_pass npg_worker_pass(const npg_worker *worker)
+{
+    return worker->run->pass;
+}
+bool npg_worker_stopping(const npg_worker *worker)
+{
+    return atomic_load(&worker->run->stop);
+}
+json_t *npg_worker_report(npg_worker *worker)
+{
+    return worker->report;
+}
+json_t *npg_worker_whole_report(npg_worker *worker)
+{
+    return worker->run->report;
+}
+
+npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk)
+{
+    if (worker->out) return npg_ring_push(worker->out, chunk);
+    npg_chunk_unref(chunk);
+    return NPG_OK;
+}
+
+npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk)
+{
+    NPG_REQUIRE(worker->run->feed);
+    return npg_ring_pop(worker->run->feed, chunk);
+}
+
+/* ---- log, warnings, progress
+ * --------------------------------------------------------------------------------- */
+
+void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
+{
+    char text[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    npg_run_log(worker->run, level, worker->stage->name, frame, text);
+}
+
+void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
+{
+    char text[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    npg_run_log(worker->run, NPG_LOG_WARNING, worker->stage->name, frame, text);
+    json_t *entry = json_pack("{ss ss%}", "stage", worker->stage->name, "message", text, strlen(text));
+    if (entry && frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
+    pthread_mutex_lock(&worker->run->lock);
+    json_array_append_new(worker->run->warnings, entry);
+    worker->run->is_partial |= partial;
+    pthread_mutex_unlock(&worker->run->lock);
+}
+
+void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
+{
+    npg_run *run = worker->run;
+    if (!run->hooks.progress) return;
+    npg_progress now = *progress;
+    now.struct_size = sizeof now;
+    now.stage = worker->stage->name;
+    now.elapsed_s = npg_clock_s() - run->opened_s;
+    pthread_mutex_lock(&run->lock);
+    run->hooks.progress(run->hooks.user, &now);
+    pthread_mutex_unlock(&run->lock);
+}
+
+/* ---- the thread
+ * ---------------------------------------------------------------------------------------------- */
+
+static npg_status work_as_source(npg_worker *worker)
+{
+    for (;;) {
+        npg_chunk *chunk = NULL;
+        npg_status status =
+            npg_worker_stopping(worker) ? NPG_STOPPED : worker->stage->process(worker, &chunk);
+        if (status == NPG_OK && chunk) status = npg_worker_push(worker, &chunk);
+        npg_chunk_unref(&chunk);
+        if (status) return status == NPG_END ? NPG_OK : status;
+    }
+}
+
+static npg_status work_on_chunks(npg_worker *worker)
+{
+    for (;;) {
+        npg_chunk *chunk = NULL;
+        npg_status status = npg_ring_pop(worker->in, &chunk);
+        if (status == NPG_END) return NPG_OK;
+        if (status == NPG_OK && npg_worker_stopping(worker)) status = NPG_STOPPED;
+        if (status == NPG_OK) status = worker->stage->process(worker, &chunk);
+        if (status == NPG_OK && chunk) status = npg_worker_push(worker, &chunk);
+        npg_chunk_unref(&chunk);
+        if (status) return status;
+    }
+}
+
+static npg_status work(npg_worker *worker)
+{
+    const npg_stage *stage = worker->stage;
+    if (stage->init) NPG_TRY(stage->init(worker));
+    NPG_TRY(worker->in ? work_on_chunks(worker) : work_as_source(worker));
+    return stage->flush ? stage->flush(worker) : NPG_OK;
+}
+
+void *npg_worker_main(void *argument)
+{
+    npg_worker *worker = argument;
+    double since = npg_clock_s();
+    npg_status status = work(worker);
+    if (status) {
+        npg_run_fail(worker->run, worker->stage->name, status);
+    } else if (worker->out) {
+        npg_ring_end(worker->out);
+    }
+    worker->wall_s += npg_clock_s() - since;
+    worker->cpu_s += npg_clock_thread_s();
+    return NULL;
+}

@@ -1,0 +1,35 @@
+/* Readers: clouds and meshes from files and streams.  One .c file per format; this is their common face.
+ *
+ * Formats by the name's ending, then by content: .ply, .obj, .xyz/.txt/.xyzn/.pts, .npy, .pcd.
+ * Positions come out as float relative to an origin that the first finite point read defines (npg_origin), so
+ * that captures far from 0 keep their detail.  Points that are not finite are kept: the outlier stage counts
+ * and drops them. Failures are NPG_BAD_INPUT (with path, line or byte, and cause), NPG_MEMORY.  Memory while
+ * reading stays below 4 x file size + 1 MiB, whatever the header claims.  Threads: different frames may be
+ * read at the same time; *origin is written only while it is not known. */
+#ifndef NPG_READER_H
+#define NPG_READER_H
+
+#include "chunk.h"
+#include "frame_box.h"
+#include "mesh.h"
+
+/* Read a cloud into frame->pos_local, normals (where the file has them), point_count, cleaning.read, path and
+ * fields; the frame is empty before, and after a failure.  A file without points is NPG_OK with point_count
+ * 0. */
+npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin);
+
+/* Read a triangle mesh from PLY or OBJ; polygons are split into fans, normals, colours and UVs per vertex are
+ * kept where given.  vert_pos is local.  Indices are checked; a mesh without faces is NPG_BAD_INPUT. */
+npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin);
+
+/* Frames concatenated on a stream (a pipe will do): PLY or NPY files one after the other.  NPG_END at a clean
+ * end between two frames; a stream that stops inside a frame is NPG_BAD_INPUT. */
+typedef struct npg_stream npg_stream;
+npg_status npg_stream_open(npg_stream **stream, int fd, const char *name);
+npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *origin);
+void npg_stream_close(npg_stream **stream);
+
+/* The format that npg_read_cloud would use for a path ("ply", "obj", "xyz", "npy", "pcd"), NULL for none. */
+const char *npg_reader_for(const char *path);
+
+#endif

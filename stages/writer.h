@@ -1,0 +1,24 @@
+/* Writers: meshes into files that appear only when they are whole (file.h).  One .c file per format. */
+#ifndef NPG_WRITER_H
+#define NPG_WRITER_H
+
+#include "mesh.h"
+
+/* What to write: V world positions with the rest of a mesh (its own vert_pos is not used).  normals may be
+ * NULL. */
+typedef struct npg_mesh_view {
+    size_t vert_count, face_count;
+    const double *vert_world;    /* V x 3 */
+    const float *vert_normals;   /* V x 3 or NULL */
+    const uint32_t *faces;       /* F x 3; face_count 0 writes a cloud */
+    const uint8_t *vert_colours; /* V x 4 or NULL */
+    const float *vert_uvs;       /* V x 2 or NULL */
+} npg_mesh_view;
+
+/* By the name's ending, .ply (binary little-endian) or .obj.  PLY positions are float when float keeps 1e-6
+ * of the extent, else double.  NPG_DISK with path and cause; NPG_USAGE for another ending. */
+npg_status npg_write_mesh(const char *path, const npg_mesh_view *mesh);
+npg_status npg_write_ply(const char *path, const npg_mesh_view *mesh);
+npg_status npg_write_obj(const char *path, const npg_mesh_view *mesh);
+
+#endif
