@@ -43,8 +43,7 @@ extern "C" {
 #define NPG_PRINTF(format_at, first_at)
 #endif
 
-/* ---- status
- * -------------------------------------------------------------------------------------------------- */
+/* ---- status ---- */
 
 typedef enum npg_status {
     NPG_OK = 0,
@@ -74,8 +73,7 @@ NPG_API const char *npg_error_text(void);
 /* "0.1.0". */
 NPG_API const char *npg_version(void);
 
-/* ---- memory
- * -------------------------------------------------------------------------------------------------- */
+/* ---- memory ---- */
 
 /* Where the library takes its own memory from.  alloc returns size bytes aligned to align (a power of two),
  * or NULL; release frees them.  Both are called from several threads.  Set once, before anything is opened.
@@ -94,8 +92,7 @@ NPG_API npg_status npg_memory_set_allocator(const npg_allocator *allocator);
 NPG_API size_t npg_memory_used(void);
 NPG_API size_t npg_memory_peak(void);
 
-/* ---- options
- * ------------------------------------------------------------------------------------------------- */
+/* ---- options ---- */
 
 typedef struct npg_options npg_options;
 
@@ -132,8 +129,7 @@ NPG_API const char *npg_options_get(const npg_options *options, const char *name
 /* The i-th option of all stages, in the order of the chain; NPG_END after the last. */
 NPG_API npg_status npg_options_describe(size_t i, npg_option_info *info);
 
-/* ---- logs and progress
- * --------------------------------------------------------------------------------------- */
+/* ---- logs and progress ---- */
 
 typedef enum npg_log_level { NPG_LOG_ERROR, NPG_LOG_WARNING, NPG_LOG_INFO, NPG_LOG_DEBUG } npg_log_level;
 
@@ -165,8 +161,7 @@ typedef struct npg_hooks {
     void (*progress)(void *user, const npg_progress *progress);
 } npg_hooks;
 
-/* ---- runs
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- runs ---- */
 
 typedef struct npg_run npg_run;
 
@@ -217,8 +212,7 @@ NPG_API void npg_run_stop(npg_run *run);
 /* Stop the run if it is going on, wait for its threads, free everything. */
 NPG_API void npg_run_close(npg_run **run);
 
-/* ---- nearest surface point
- * ----------------------------------------------------------------------------------- */
+/* ---- nearest surface point ---- */
 
 typedef struct npg_surface npg_surface;
 

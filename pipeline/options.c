@@ -18,8 +18,7 @@ struct npg_options {
     char **texts; /* count of them: what the user set, or NULL; owned */
 };
 
-/* ---- the tables as one list
- * ---------------------------------------------------------------------------------- */
+/* ---- the tables as one list ---- */
 
 const npg_option *npg_option_at(size_t i, const char **stage)
 {
@@ -58,8 +57,7 @@ npg_status npg_options_describe(size_t i, npg_option_info *info)
     return NPG_OK;
 }
 
-/* ---- values
- * -------------------------------------------------------------------------------------------------- */
+/* ---- values ---- */
 
 static int which_choice(const char *choices, const char *text)
 {
@@ -207,8 +205,7 @@ void npg_options_fill(const npg_options *options, const npg_option *table, void 
     }
 }
 
-/* ---- configuration file
- * -------------------------------------------------------------------------------------- */
+/* ---- configuration file ---- */
 
 /* Blank out comments in place, so that line numbers stay. */
 static void blank_comments(char *text)

@@ -31,8 +31,7 @@ const npg_option npg_run_options[] = {
      NULL, NULL},
     {0}};
 
-/* ---- failure and log
- * ----------------------------------------------------------------------------------------- */
+/* ---- failure and log ---- */
 
 void npg_run_fail(npg_run *run, const char *stage, npg_status status)
 {
@@ -59,8 +58,7 @@ void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t f
     pthread_mutex_unlock(&run->lock);
 }
 
-/* ---- one pass
- * ------------------------------------------------------------------------------------------------ */
+/* ---- one pass ---- */
 
 static npg_status open_worker_states(npg_run *run)
 {
@@ -154,8 +152,7 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
     return run->first_failure;
 }
 
-/* ---- memory formula
- * ------------------------------------------------------------------------------------------ */
+/* ---- memory formula ---- */
 
 static void announce_memory(npg_run *run)
 {
@@ -186,8 +183,7 @@ static void announce_memory(npg_run *run)
     json_object_set_new(run->report, "memory_bound_bytes", parts);
 }
 
-/* ---- the conductor
- * ------------------------------------------------------------------------------------------- */
+/* ---- the conductor ---- */
 
 static npg_status conclude(npg_run *run)
 {
@@ -226,8 +222,7 @@ static void *conduct(void *argument)
     return NULL;
 }
 
-/* ---- public: open and close
- * ---------------------------------------------------------------------------------- */
+/* ---- public: open and close ---- */
 
 static npg_status check_chain(const npg_run *run)
 {
@@ -332,8 +327,7 @@ void npg_run_close(npg_run **slot)
     npg_release(slot);
 }
 
-/* ---- public: push and pull
- * ----------------------------------------------------------------------------------- */
+/* ---- public: push and pull ---- */
 
 static npg_status frame_of_cloud(npg_frame *frame, npg_run *run, const npg_cloud *cloud)
 {

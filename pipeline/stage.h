@@ -69,8 +69,7 @@ typedef struct npg_stage {
 extern const npg_stage *const npg_chain[];
 extern const npg_preset npg_presets[];
 
-/* ---- what a stage may ask of its worker
- * ---------------------------------------------------------------------- */
+/* ---- what a stage may ask of its worker ---- */
 
 void *npg_worker_state(const npg_worker *worker);
 npg_facts *npg_worker_facts(const npg_worker *worker);

@@ -53,8 +53,7 @@ npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk)
     return npg_ring_pop(worker->run->feed, chunk);
 }
 
-/* ---- log, warnings, progress
- * --------------------------------------------------------------------------------- */
+/* ---- log, warnings, progress ---- */
 
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
 {
@@ -95,8 +94,7 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     pthread_mutex_unlock(&run->lock);
 }
 
-/* ---- the thread
- * ---------------------------------------------------------------------------------------------- */
+/* ---- the thread ---- */
 
 static npg_status work_as_source(npg_worker *worker)
 {
