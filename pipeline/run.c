@@ -316,6 +316,8 @@ void npg_run_close(npg_run **slot)
     if (run->feed) npg_ring_abort(run->feed);
     if (run->results) npg_ring_abort(run->results);
     if (run->conductor_started && !run->conductor_joined) pthread_join(run->conductor, NULL);
+    for (size_t i = 0; i < run->worker_count; i++)
+        if (run->workers[i].kept) run->workers[i].release_kept(run->workers[i].kept);
     npg_chunk_unref(&run->pulled);
     npg_ring_close(&run->feed);
     npg_ring_close(&run->results);
