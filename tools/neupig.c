@@ -11,6 +11,13 @@ const npg_verb npg_verbs[] = {
      "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
      "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.",
      npg_run_verb_options, true, npg_verb_run},
+    {"eval", "PREDICTED TRUTH", 2, 2, "Measure a mesh sequence against a ground truth",
+     "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) with those of "
+     "TRUTH, "
+     "frame by frame, and prints Chamfer distance (x 1e5), normal consistency, F-score and correspondence "
+     "error; "
+     "lengths are in diagonals of the first ground-truth frame's box.",
+     npg_eval_options, false, npg_verb_eval},
     {"synth", "-o DIR", 0, 0, "Make a capture with an exact ground truth",
      "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
      "(DIR/truth).  The same options and seed give the same bytes.",
