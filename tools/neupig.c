@@ -22,6 +22,10 @@ const npg_verb npg_verbs[] = {
      "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
      "(DIR/truth).  The same options and seed give the same bytes.",
      npg_synth_options, false, npg_verb_synth},
+    {"doctor", "", 0, 0, "Check devices and libraries on this machine",
+     "Lists the OpenCL devices and the versions of the libraries in use and computes a small known result on "
+     "each device.  Exit code 4 when there is no device or one computes wrong.",
+     npg_doctor_options, false, npg_verb_doctor},
     {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
      "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page, or shell completion",
