@@ -22,6 +22,11 @@ const npg_verb npg_verbs[] = {
      "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
      "(DIR/truth).  The same options and seed give the same bytes.",
      npg_synth_options, false, npg_verb_synth},
+    {"render", "FILE... -o IMAGE.png", 1, 4096, "Draw meshes or clouds to a PNG without a display",
+     "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  All "
+     "tiles "
+     "share one camera, so that motion shows.",
+     npg_render_options, false, npg_verb_render},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
      "Lists the OpenCL devices and the versions of the libraries in use and computes a small known result on "
      "each device.  Exit code 4 when there is no device or one computes wrong.",
