@@ -188,20 +188,24 @@ const char *npg_options_get(const npg_options *options, const char *name)
     return option ? text_of(options, option, at) : NULL;
 }
 
+void npg_option_store(const npg_option *option, const char *text, void *state)
+{
+    void *slot = (char *)state + option->offset;
+    switch (option->type) {
+    case NPG_OPTION_FLAG: *(bool *)slot = which_flag(text) == 1; break;
+    case NPG_OPTION_INT: *(int64_t *)slot = strtoll(text, NULL, 10); break;
+    case NPG_OPTION_REAL: *(double *)slot = strtod(text, NULL); break;
+    case NPG_OPTION_CHOICE: *(int *)slot = which_choice(option->choices, text); break;
+    case NPG_OPTION_TEXT: *(const char **)slot = text; break;
+    }
+}
+
 void npg_options_fill(const npg_options *options, const npg_option *table, void *state)
 {
     for (const npg_option *option = table; option && option->name; option++) {
         size_t at;
         find(option->name, &at);
-        const char *text = text_of(options, option, at);
-        void *slot = (char *)state + option->offset;
-        switch (option->type) {
-        case NPG_OPTION_FLAG: *(bool *)slot = which_flag(text) == 1; break;
-        case NPG_OPTION_INT: *(int64_t *)slot = strtoll(text, NULL, 10); break;
-        case NPG_OPTION_REAL: *(double *)slot = strtod(text, NULL); break;
-        case NPG_OPTION_CHOICE: *(int *)slot = which_choice(option->choices, text); break;
-        case NPG_OPTION_TEXT: *(const char **)slot = text; break;
-        }
+        npg_option_store(option, text_of(options, option, at), state);
     }
 }
 

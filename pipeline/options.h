@@ -36,6 +36,10 @@ const npg_option *npg_option_at(size_t i, const char **stage);
 /* Write the values of one table into state at their offsets. */
 void npg_options_fill(const npg_options *options, const npg_option *table, void *state);
 
+/* Write one value, which npg_option_check() has accepted, into state at the option's offset.  A TEXT is a
+ * loan. */
+void npg_option_store(const npg_option *option, const char *text, void *state);
+
 /* A copy that owns its texts. */
 npg_status npg_options_copy(npg_options **out, const npg_options *options);
 
