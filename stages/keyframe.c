@@ -206,11 +206,12 @@ static npg_status hold(npg_worker *worker, npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     if (state->held_count >= (size_t)state->look_ahead)
-        return npg_error(NPG_USAGE,
-                         "the live capture is longer than the look-ahead of %lld frames, in which the keyframe "
-                         "is chosen: raise the option look-ahead (each frame is held in memory), or write "
-                         "the frames to files and give those as input",
-                         (long long)state->look_ahead);
+        return npg_error(
+            NPG_USAGE,
+            "the live capture is longer than the look-ahead of %lld frames, in which the keyframe "
+            "is chosen: raise the option look-ahead (each frame is held in memory), or write "
+            "the frames to files and give those as input",
+            (long long)state->look_ahead);
     NPG_TRY(npg_grow(&state->held, &state->held_capacity, state->held_count + 1, sizeof *state->held,
                      NPG_FOR_FRAMES));
     measure_frame(state, npg_worker_facts(worker), frame);
