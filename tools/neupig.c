@@ -11,6 +11,10 @@ const npg_verb npg_verbs[] = {
      "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
      "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.",
      npg_run_verb_options, true, npg_verb_run},
+    {"synth", "-o DIR", 0, 0, "Make a capture with an exact ground truth",
+     "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
+     "(DIR/truth).  The same options and seed give the same bytes.",
+     npg_synth_options, false, npg_verb_synth},
     {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
      "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page, or shell completion",
