@@ -31,9 +31,9 @@ typedef struct npg_facts {
     int64_t frame_count;   /* T, gaps included; -1 while a live source is open              */
     int64_t skipped_count; /* frames left out under --missing skip or --keep-going          */
     /* keyframe */
-    size_t point_count_max;  /* of all frames, as read                                        */
-    int64_t number_max;      /* the largest frame number                                      */
-    npg_bounds bounds_local; /* of all usable points                                          */
+    size_t point_count_max;         /* of all frames, as read                                        */
+    int64_t number_min, number_max; /* of all frames                                          */
+    npg_bounds bounds_local;        /* of all usable points                                          */
     npg_frame_box box;
     npg_plan plan; /* with the keyframe                                             */
     /* mesh */

@@ -64,7 +64,8 @@ static npg_status take_points(evaluate_state *state, const npg_frame_box *box, c
     size_t limit = state->point_limit ? (size_t)state->point_limit : SIZE_MAX;
     size_t step = frame->point_count > limit ? (frame->point_count + limit - 1) / limit : 1;
     size_t count = (frame->point_count + step - 1) / step;
-    NPG_TRY(npg_grow(&state->points, &state->points_capacity, count, 3 * sizeof *state->points, NPG_FOR_QUERY));
+    NPG_TRY(
+        npg_grow(&state->points, &state->points_capacity, count, 3 * sizeof *state->points, NPG_FOR_QUERY));
     NPG_TRY(npg_grow(&state->hits, &state->hits_capacity, count, sizeof *state->hits, NPG_FOR_QUERY));
     NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, count, sizeof *state->dists, NPG_FOR_QUERY));
     *taken = 0;
@@ -164,7 +165,8 @@ static npg_status check_vertices(const npg_frame *frame, const npg_mesh *referen
                          frame->vert_count, reference->vert_count);
     for (size_t i = 0; i < 3 * frame->vert_count; i++)
         if (!isfinite(frame->vert_unit[i]))
-            return npg_error(NPG_DIVERGED, "frame %" PRId64 ": vertex %zu is not finite", frame->number, i / 3);
+            return npg_error(NPG_DIVERGED, "frame %" PRId64 ": vertex %zu is not finite", frame->number,
+                             i / 3);
     return NPG_OK;
 }
 
@@ -187,7 +189,7 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     NPG_TRY(check_vertices(frame, facts->reference));
     npg_shape_measure(state->shape, figures, frame->vert_unit);
     if (state->truth)
-        NPG_TRY(npg_truth_compare(state->truth, frame, facts->reference, &facts->box, &facts->origin));
+        NPG_TRY(npg_truth_compare(state->truth, frame, facts, (uint64_t)npg_worker_settings(worker)->seed));
     if (!frame->is_skipped) NPG_TRY(take_points(state, &facts->box, frame, &point_count));
     if (!point_count) return NPG_OK;
     NPG_TRY(npg_surface_move(state->surface, frame->vert_unit));
@@ -239,16 +241,19 @@ static npg_status judge(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     double value, bound;
-    const char *fault = fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share, &value, &bound);
+    const char *fault =
+        fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share, &value, &bound);
     frame->figures.good = !fault && !frame->is_skipped;
     add_up(state, frame);
     state->good_count += frame->figures.good;
     if (frame->is_skipped || !fault) return NPG_OK;
-    NPG_TRY(npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
+    NPG_TRY(
+        npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
     state->bad[state->bad_count++] = frame->number;
     if (state->bad_count <= WARNINGS_MAX)
-        npg_worker_warn(worker, true, frame->index, "frame %" PRId64 " is below the bar: %s is %.3g, the bar %.3g",
-                        frame->number, fault, value, bound);
+        npg_worker_warn(worker, true, frame->index,
+                        "frame %" PRId64 " is below the bar: %s is %.3g, the bar %.3g", frame->number, fault,
+                        value, bound);
     return NPG_OK;
 }
 
@@ -261,8 +266,8 @@ static json_t *json_of_sums(const evaluate_state *state)
         const aggregate *sum = &state->sums[i];
         if (!sum->count) continue;
         json_object_set_new(figures, summed[i].name,
-                            json_pack("{sf sf sI}", "mean", sum->sum / (double)sum->count, "worst", sum->worst,
-                                      "worst_frame", (json_int_t)sum->worst_number));
+                            json_pack("{sf sf sI}", "mean", sum->sum / (double)sum->count, "worst",
+                                      sum->worst, "worst_frame", (json_int_t)sum->worst_number));
     }
     return figures;
 }
@@ -285,7 +290,8 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
     json_object_set_new(report, "bad", bad);
     if (state->bad_count > WARNINGS_MAX)
-        npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them", state->bad_count);
+        npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
+                        state->bad_count);
     if (state->skipped_count)
         npg_worker_warn(worker, true, -1, "%zu frames were skipped", state->skipped_count);
     return NPG_OK;
@@ -342,11 +348,13 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 #define OFFSET(member) offsetof(evaluate_state, member)
 
 static const npg_option options[] = {
-    {"max-residual", "A frame is good when the median distance of its points to the surface is at most this, "
-                     "in per cent of the capture's diagonal",
+    {"max-residual",
+     "A frame is good when the median distance of its points to the surface is at most this, "
+     "in per cent of the capture's diagonal",
      NPG_OPTION_REAL, OFFSET(residual_max), "0.5", 0, 100, NULL, "PERCENT"},
-    {"min-coverage", "... and at least this share of the surface that the keyframe saw has points near it, in "
-                     "per cent",
+    {"min-coverage",
+     "... and at least this share of the surface that the keyframe saw has points near it, in "
+     "per cent",
      NPG_OPTION_REAL, OFFSET(coverage_min), "50", 0, 100, NULL, "PERCENT"},
     {"max-flipped", "... and at most this share of its faces is turned over, in per cent", NPG_OPTION_REAL,
      OFFSET(flipped_max), "1", 0, 100, NULL, "PERCENT"},

@@ -3,8 +3,8 @@
 #define NPG_EVALUATE_H
 
 #include "chunk.h"
-#include "frame_box.h"
 #include "mesh.h"
+#include "stage.h"
 
 /* ---- how a deformed mesh differs from its reference ---- */
 
@@ -31,14 +31,15 @@ double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count,
 
 typedef struct npg_truth npg_truth;
 
-/* The meshes (PLY or OBJ) of a folder, found by the last number in their names. */
+/* The meshes (PLY or OBJ) of a folder, found by the last number in their names.  NPG_BAD_INPUT when there are
+ * none or two have one number. */
 npg_status npg_truth_open(npg_truth **truth, const char *folder);
 void npg_truth_close(npg_truth **truth);
 
-/* Fill truth_cd, truth_nc, truth_f and truth_corr of a frame by stages/metrics.h; they are NaN when the folder
- * has no mesh of the frame's number.  Lengths are in diagonals of the truth's first frame.  Corr ties vertices
- * in the first frame that is asked for, the keyframe of a run (neupig eval ties them in the first in time). */
-npg_status npg_truth_compare(npg_truth *truth, npg_frame *frame, const npg_mesh *reference,
-                             const npg_frame_box *box, const npg_origin *origin);
+/* Fill truth_cd, truth_nc, truth_f and truth_corr of a frame by stages/metrics.h; they are NaN when the
+ * folder has no mesh of the frame's number.  Lengths are in diagonals of the box of the truth's mesh of the
+ * run's lowest number, or of the first there is.  Corr ties vertices in the first frame that is asked for,
+ * the keyframe of a run (neupig eval ties them in the first in time, which this pass sees last). */
+npg_status npg_truth_compare(npg_truth *truth, npg_frame *frame, const npg_facts *facts, uint64_t seed);
 
 #endif

@@ -33,8 +33,7 @@ static double face_normal(double normal[3], const float *vert_pos, const uint32_
     double u[3], v[3];
     subtract(u, vert_pos + 3 * (size_t)face[1], vert_pos + 3 * (size_t)face[0]);
     subtract(v, vert_pos + 3 * (size_t)face[2], vert_pos + 3 * (size_t)face[0]);
-    for (int i = 0; i < 3; i++)
-        normal[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+    for (int i = 0; i < 3; i++) normal[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
     double length = sqrt(dot(normal, normal));
     for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
     return length / 2;

@@ -43,6 +43,7 @@ static bool is_finite_point(const float *point)
 
 static void measure_frame(keyframe_state *state, npg_facts *facts, const npg_frame *frame)
 {
+    if (frame->number < facts->number_min) facts->number_min = frame->number;
     if (frame->number > facts->number_max) facts->number_max = frame->number;
     if (frame->point_count > facts->point_count_max) facts->point_count_max = frame->point_count;
     if (frame->is_skipped) return;
@@ -286,6 +287,7 @@ static npg_status init(npg_worker *worker)
     if (pass == NPG_PASS_MEASURE || (pass == NPG_PASS_SOLVE && facts->is_live)) {
         facts->bounds_local = npg_bounds_empty();
         facts->point_count_max = 0;
+        facts->number_min = INT64_MAX;
         facts->number_max = INT64_MIN;
     }
     if (pass == NPG_PASS_SCORE || (pass == NPG_PASS_SOLVE && facts->is_live))
