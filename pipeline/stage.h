@@ -31,8 +31,9 @@ typedef struct npg_facts {
     int64_t frame_count;   /* T, gaps included; -1 while a live source is open              */
     int64_t skipped_count; /* frames left out under --missing skip or --keep-going          */
     /* keyframe */
-    size_t point_count_max;  /* of all frames, as read                                        */
-    npg_bounds bounds_local; /* of all usable points                                          */
+    size_t point_count_max;         /* of all frames, as read                                        */
+    int64_t number_min, number_max; /* of all frames                                          */
+    npg_bounds bounds_local;        /* of all usable points                                          */
     npg_frame_box box;
     npg_plan plan; /* with the keyframe                                             */
     /* mesh */
@@ -107,6 +108,13 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
 
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
 json_t *npg_worker_report(npg_worker *worker);
+
+/* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never lost.  NULL
+ * gives null. */
+json_t *npg_json_text(const char *text);
+
+/* A JSON number, or null for one that is not finite. */
+json_t *npg_json_real(double value);
 
 /* The whole report, for conclude(). */
 json_t *npg_worker_whole_report(npg_worker *worker);

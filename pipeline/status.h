@@ -4,6 +4,10 @@
 
 #include "neupig.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Set this thread's error text and return status, so that a failure is one line: return npg_error(...). */
 npg_status npg_error(npg_status status, const char *format, ...) NPG_PRINTF(2, 3);
 
@@ -37,5 +41,9 @@ npg_status npg_error_restore(npg_status status, const char *text);
         (status) = (call);                                                                                   \
         if ((status) != NPG_OK) goto label;                                                                  \
     } while (0)
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
