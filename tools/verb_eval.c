@@ -42,8 +42,8 @@ typedef struct evaluation {
     npg_mesh *first_truth;
     uint32_t *truth_of;
     bool has_corr; /* constant topology on both sides, so far */
-    npg_motion motion;
-    npg_motion_figures moved;
+    npg_eval_motion motion;
+    npg_eval_motion_figures moved;
     npg_frame_metrics sum;
     double corr_sum, sizes[4]; /* vertices and faces of prediction and truth */
     json_t *per_frame;
@@ -196,7 +196,7 @@ static npg_status eval_frame(evaluation *e, size_t t, npg_mesh *predicted, npg_m
     if (t == 0) NPG_TRY(begin(e, predicted, truth, e->truth.paths[0]));
     NPG_TRY(npg_error_prefix(npg_metrics_compare(&m, predicted, truth, &e->metrics, t), "%s, %s",
                              e->predicted.paths[t], e->truth.paths[t]));
-    NPG_TRY(npg_motion_add(&e->motion, predicted));
+    NPG_TRY(npg_eval_motion_add(&e->motion, predicted));
     e->has_corr = e->has_corr && e->motion.vertices_last && same_faces(truth, e->first_truth);
     if (t && e->has_corr)
         e->corr_sum += corr = npg_metrics_drift(predicted, truth, e->truth_of, e->metrics.diagonal);
@@ -217,7 +217,7 @@ static npg_status eval_all(evaluation *e)
         npg_mesh_unref(&truth);
         NPG_TRY(status);
     }
-    return npg_motion_end(&e->moved, &e->motion);
+    return npg_eval_motion_end(&e->moved, &e->motion);
 }
 
 /* ---- output ---- */
@@ -271,7 +271,7 @@ static void close_evaluation(evaluation *e)
     npg_listing_close(&e->truth);
     npg_mesh_unref(&e->first_truth);
     npg_release(&e->truth_of);
-    npg_motion_close(&e->motion);
+    npg_eval_motion_close(&e->motion);
     json_decref(e->per_frame);
 }
 
