@@ -11,10 +11,26 @@ const npg_verb npg_verbs[] = {
      "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
      "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.",
      npg_run_verb_options, true, npg_verb_run},
+    {"eval", "PREDICTED TRUTH", 2, 2, "Measure a mesh sequence against a ground truth",
+     "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) with those of "
+     "TRUTH, "
+     "frame by frame, and prints Chamfer distance (x 1e5), normal consistency, F-score and correspondence "
+     "error; "
+     "lengths are in diagonals of the first ground-truth frame's box.",
+     npg_eval_options, false, npg_verb_eval},
     {"synth", "-o DIR", 0, 0, "Make a capture with an exact ground truth",
      "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
      "(DIR/truth).  The same options and seed give the same bytes.",
      npg_synth_options, false, npg_verb_synth},
+    {"render", "FILE... -o IMAGE.png", 1, 4096, "Draw meshes or clouds to a PNG without a display",
+     "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  All "
+     "tiles "
+     "share one camera, so that motion shows.",
+     npg_render_options, false, npg_verb_render},
+    {"doctor", "", 0, 0, "Check devices and libraries on this machine",
+     "Lists the OpenCL devices and the versions of the libraries in use and computes a small known result on "
+     "each device.  Exit code 4 when there is no device or one computes wrong.",
+     npg_doctor_options, false, npg_verb_doctor},
     {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
      "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page, or shell completion",

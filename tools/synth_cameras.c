@@ -100,8 +100,8 @@ static void face_normal(double normal[3], const npg_mesh *mesh, uint32_t f)
 }
 
 /* The surface point behind every pixel that sees a front side, with noise along its ray. */
-static npg_status take_points(npg_points *points, const picture *seen, const camera *c, const npg_mesh *mesh,
-                              double noise, npg_random *random)
+static npg_status take_points(npg_captured *points, const picture *seen, const camera *c,
+                              const npg_mesh *mesh, double noise, npg_random *random)
 {
     for (int64_t at = 0; at < c->width * c->width; at++) {
         double depth = seen->depth[at], pos[3], normal[3];
@@ -114,12 +114,12 @@ static npg_status take_points(npg_points *points, const picture *seen, const cam
         face_normal(normal, mesh, seen->face[at]);
         double facing = 0;
         for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
-        if (facing > 0) NPG_TRY(npg_points_add(points, pos, normal));
+        if (facing > 0) NPG_TRY(npg_captured_add(points, pos, normal));
     }
     return NPG_OK;
 }
 
-npg_status npg_cameras_see(npg_points *points, const npg_capture *capture, const npg_mesh *mesh,
+npg_status npg_cameras_see(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
                            uint64_t frame)
 {
     picture seen = {0};

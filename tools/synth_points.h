@@ -17,24 +17,24 @@ typedef struct npg_capture {
     double centre[3]; /* what the cameras look at      */
 } npg_capture;
 
-typedef struct npg_points {
+typedef struct npg_captured {
     size_t count, room_pos, room_normals;
     float *pos, *normals; /* count x 3, owned */
-} npg_points;
+} npg_captured;
 
-void npg_points_close(npg_points *points);
+void npg_captured_close(npg_captured *points);
 
 /* The points of one frame of a moving surface.  points is emptied first.  NPG_BAD_INPUT when no camera sees
  * it. */
-npg_status npg_capture_frame(npg_points *points, const npg_capture *capture, const npg_mesh *mesh,
+npg_status npg_capture_frame(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
                              uint64_t frame);
 
 /* ---- between the files of a capture ---- */
 
-npg_status npg_points_add(npg_points *points, const double pos[3], const double normal[3]);
+npg_status npg_captured_add(npg_captured *points, const double pos[3], const double normal[3]);
 
 /* All surface points that a ring of cameras sees, one per pixel, in the order of cameras and pixels. */
-npg_status npg_cameras_see(npg_points *points, const npg_capture *capture, const npg_mesh *mesh,
+npg_status npg_cameras_see(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
                            uint64_t frame);
 
 #endif

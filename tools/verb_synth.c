@@ -99,7 +99,7 @@ static npg_capture capture_of(const settings *s, const npg_mesh *first)
     return capture;
 }
 
-static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh *mesh, npg_points *points,
+static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh *mesh, npg_captured *points,
                               size_t *total)
 {
     npg_capture capture = {0};
@@ -122,7 +122,7 @@ static npg_status make_capture(const settings *s)
 {
     npg_body *body = NULL;
     npg_mesh *mesh = NULL;
-    npg_points points = {0};
+    npg_captured points = {0};
     size_t total = 0;
     if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
     npg_status status = make_folders(s);
@@ -137,7 +137,7 @@ static npg_status make_capture(const settings *s)
             "%s/truth\n",
             (long long)s->frames, (double)total / (double)s->frames, mesh->vert_count, mesh->face_count,
             s->output, s->output);
-    npg_points_close(&points);
+    npg_captured_close(&points);
     npg_mesh_unref(&mesh);
     npg_body_close(&body);
     return status;
