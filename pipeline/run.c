@@ -362,6 +362,8 @@ void npg_run_close(npg_run **slot)
     npg_run_stop(run);
     close_ends(run);
     join_conductor(run);
+    for (size_t i = 0; i < run->worker_count; i++)
+        if (run->workers[i].kept) run->workers[i].release_kept(run->workers[i].kept);
     npg_chunk_unref(&run->pulled);
     npg_ring_close(&run->feed);
     npg_ring_close(&run->results);

@@ -20,6 +20,8 @@ struct npg_worker {
     bool started;
     double wall_s, cpu_s; /* of the passes so far: of the thread's life, and of its processor time */
     json_t *report;       /* loan from the run's report */
+    void *kept;           /* owned for the run's whole life, see npg_worker_keep */
+    void (*release_kept)(void *thing);
 };
 
 struct npg_run {

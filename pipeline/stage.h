@@ -78,6 +78,11 @@ const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);
 
+/* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called
+ * on the thing when the run closes. */
+void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing));
+void *npg_worker_kept(const npg_worker *worker);
+
 /* Hand a chunk to the next stage; waits while the ring is full.  Chunks of the last stage go to
  * npg_run_pull() or are freed. */
 npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk);

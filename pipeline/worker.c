@@ -40,6 +40,16 @@ json_t *npg_worker_whole_report(npg_worker *worker)
     return worker->run->report;
 }
 
+void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing))
+{
+    worker->kept = thing;
+    worker->release_kept = release;
+}
+void *npg_worker_kept(const npg_worker *worker)
+{
+    return worker->kept;
+}
+
 npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk)
 {
     if (worker->out) return npg_ring_push(worker->out, chunk);
