@@ -1,0 +1,326 @@
+/* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
+ * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "clock.h"
+#include "mesh_clean.h"
+#include "mesh_tools.h"
+#include "poisson.h"
+#include "reader.h"
+#include "stage.h"
+#include "vdb.h"
+
+#define SEEN_SPACINGS    2.0  /* a place is seen when a point is nearer than this many spacings */
+#define UNSEEN_TOLERATED 0.02 /* of the area, before the user is told */
+#define LOST_TOLERATED   0.02 /* of the area, in pieces left out */
+#define REBUILD_VOXELS   384  /* along the longest side of the unit box */
+
+enum { UNSEEN_AUTO, UNSEEN_KEEP, UNSEEN_TRIM };
+enum { MESHER_POISSON, MESHER_VDB };
+
+typedef struct mesh_state {
+    const char *reference;
+    int mesher, unseen;
+    int64_t depth, face_max, time_limit_s, memory_limit_mib;
+    double point_weight, trim;
+} mesh_state;
+
+#define OFFSET(member) offsetof(mesh_state, member)
+
+static const npg_option mesh_options[] = {
+    {"reference", "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one",
+     NPG_OPTION_TEXT, OFFSET(reference), "", 0, 0, NULL, "FILE"},
+    {"mesher",
+     "How the keyframe's surface is made: Poisson, or Poisson taken through an OpenVDB level set (even "
+     "triangles, no self-contact)",
+     NPG_OPTION_CHOICE, OFFSET(mesher), "poisson", 0, 0, "poisson|vdb", NULL},
+    {"poisson-depth", "Depth of the Poisson octree", NPG_OPTION_INT, OFFSET(depth), "10", 4, 13, NULL, NULL},
+    {"poisson-weight", "How closely the Poisson surface follows the points", NPG_OPTION_REAL,
+     OFFSET(point_weight), "10", 0, 1000, NULL, NULL},
+    {"poisson-time", "Stop the reconstruction after this many seconds", NPG_OPTION_INT, OFFSET(time_limit_s),
+     "600", 1, 1e6, NULL, "SECONDS"},
+    {"poisson-memory", "Address space the reconstruction may use", NPG_OPTION_INT, OFFSET(memory_limit_mib),
+     "8192", 64, 1e7, NULL, "MIB"},
+    {"faces", "Faces of the reference mesh at most (and no more than 4 per point)", NPG_OPTION_INT,
+     OFFSET(face_max), "20000", 16, 1e8, NULL, NULL},
+    {"trim",
+     "Drop surface farther than this from every point of the keyframe, in diagonals of the keyframe's box",
+     NPG_OPTION_REAL, OFFSET(trim), "0.15", 0.001, 100, NULL, "SHARE"},
+    {"unseen",
+     "Surface without points near it (holes, the far side of a single view): keep it, trim it, or trim it "
+     "when "
+     "it is more than a quarter of the area; it is reported in any case",
+     NPG_OPTION_CHOICE, OFFSET(unseen), "auto", 0, 0, "auto|keep|trim", NULL},
+    {0}};
+
+#define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
+
+typedef struct making { /* what is known while the reference is made */
+    npg_worker *worker;
+    const mesh_state *state;
+    const npg_frame *frame;
+    float *points;   /* N x 3, unit, owned */
+    double spacing;  /* of the points */
+    double diagonal; /* of the points */
+    npg_mesh *mesh;  /* owned */
+} making;
+
+/* ---- report ---- */
+
+static void note(making *m, const char *key, double value)
+{
+    json_object_set_new(npg_worker_report(m->worker), key, json_real(value));
+}
+
+static void note_count(making *m, const char *key, size_t value)
+{
+    json_object_set_new(npg_worker_report(m->worker), key, json_integer((json_int_t)value));
+}
+
+static bool should_stop(void *worker)
+{
+    return npg_worker_stopping(worker);
+}
+
+/* ---- steps ---- */
+
+static npg_status measure_points(making *m)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, m->points, m->frame->point_count);
+    m->diagonal = npg_bounds_diagonal(&bounds);
+    note_count(m, "points", m->frame->point_count);
+    NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->frame->point_count));
+    note(m, "point_spacing_unit", m->spacing);
+    return NPG_OK;
+}
+
+static npg_status reconstruct(making *m)
+{
+    const mesh_state *s = m->state;
+    npg_poisson_settings settings = {.depth = (int)s->depth,
+                                     .point_weight = s->point_weight,
+                                     .time_limit_s = (double)s->time_limit_s,
+                                     .memory_limit = (size_t)s->memory_limit_mib << 20,
+                                     .should_stop = should_stop,
+                                     .user = m->worker};
+    if (!m->frame->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
+    double since = npg_clock_s();
+    NPG_TRY(npg_poisson(&m->mesh, m->points, m->frame->normals, m->frame->point_count, &settings));
+    note(m, "poisson_s", npg_clock_s() - since);
+    note_count(m, "faces_reconstructed", m->mesh->face_count);
+    return NPG_OK;
+}
+
+static npg_status keep_main(making *m, const char *when)
+{
+    size_t count;
+    double lost;
+    NPG_TRY(npg_mesh_keep_main(&m->mesh, &count, &lost));
+    note_count(m, "components", count);
+    if (lost > LOST_TOLERATED)
+        npg_worker_warn(
+            m->worker, false, m->frame->number,
+            "%zu components %s: the main one is kept, the others with %.1f %% of the area are left out",
+            count, when, 100 * lost);
+    return NPG_OK;
+}
+
+/* What no point saw: measured on the closed surface, before anything is trimmed. */
+static npg_status judge_unseen(making *m, bool *trim_unseen)
+{
+    double share, seen_dist = SEEN_SPACINGS * m->spacing;
+    npg_facts *facts = npg_worker_facts(m->worker);
+    NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->frame->point_count, seen_dist));
+    *trim_unseen =
+        m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
+    facts->unseen_share = share;
+    note(m, "unseen_share", share);
+    json_object_set_new(npg_worker_report(m->worker), "unseen",
+                        json_string(*trim_unseen ? "trimmed" : "kept"));
+    if (share > UNSEEN_TOLERATED)
+        npg_worker_warn(
+            m->worker, false, m->frame->number,
+            "%.1f %% of the reconstructed surface has no point near it: unseen in the keyframe, %s",
+            100 * share, *trim_unseen ? "trimmed off" : "kept as Poisson closed it");
+    return NPG_OK;
+}
+
+static npg_status trim(making *m)
+{
+    bool trim_unseen;
+    double limit = m->state->trim * m->diagonal, share;
+    NPG_TRY(judge_unseen(m, &trim_unseen));
+    if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->spacing);
+    NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->frame->point_count, limit));
+    note(m, "trimmed_share", share);
+    if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
+    if (!trim_unseen && share > LOST_TOLERATED)
+        npg_worker_warn(
+            m->worker, false, m->frame->number,
+            "%.1f %% of the reconstructed surface is farther than %g diagonals from every point and "
+            "was trimmed off",
+            100 * share, m->state->trim);
+    return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
+}
+
+static npg_status rebuild(making *m)
+{
+    double voxel = 2 * NPG_UNIT_EXTENT / REBUILD_VOXELS;
+    NPG_TRY(npg_vdb_remesh(&m->mesh, voxel));
+    note_count(m, "faces_rebuilt", m->mesh->face_count);
+    return NPG_OK;
+}
+
+static npg_status decimate(making *m)
+{
+    npg_mending mending;
+    size_t budget = 4 * m->frame->point_count;
+    if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
+    NPG_TRY(npg_mesh_decimate(&m->mesh, budget));
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    note_count(m, "mended_degenerate", mending.degenerate);
+    note_count(m, "mended_duplicate", mending.duplicate);
+    note_count(m, "mended_vertices", mending.split_vertices);
+    note_count(m, "mended_flipped", mending.flipped);
+    return keep_main(m, "after decimation");
+}
+
+/* True where the mesh is one that can be deformed. */
+static npg_status is_sound(bool *sound, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    size_t flipped;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(npg_mesh_flipped(&flipped, NULL, mesh));
+    *sound = !manifold.crowded_edges && !manifold.misoriented_edges && !manifold.degenerate_faces && !flipped;
+    return NPG_OK;
+}
+
+/* Poisson's mesh, trimmed and decimated; when that leaves folds, the closed surface is rebuilt through a
+ * level set first and the same is done again. */
+static npg_status make(making *m)
+{
+    npg_mesh *closed = NULL;
+    bool sound = false;
+    NPG_TRY(reconstruct(m));
+    NPG_TRY(keep_main(m, "reconstructed"));
+    if (m->state->mesher == MESHER_VDB) NPG_TRY(rebuild(m));
+    closed = m->mesh;
+    m->mesh = NULL;
+    npg_status status = npg_mesh_copy(&m->mesh, closed);
+    if (!status) status = trim(m);
+    if (!status) status = decimate(m);
+    if (!status) status = is_sound(&sound, m->mesh);
+    if (!status && !sound) {
+        npg_mesh_unref(&m->mesh);
+        m->mesh = closed;
+        closed = NULL;
+        status = rebuild(m);
+        if (!status) status = trim(m);
+        if (!status) status = decimate(m);
+        if (!status) status = is_sound(&sound, m->mesh);
+        if (!status && !sound)
+            npg_worker_warn(m->worker, false, m->frame->number,
+                            "the reference mesh still has flipped or degenerate faces after it was rebuilt");
+    }
+    npg_mesh_unref(&closed);
+    return status;
+}
+
+/* ---- the user's own mesh ---- */
+
+static npg_status read_reference(making *m)
+{
+    const char *path = m->state->reference;
+    npg_facts *facts = npg_worker_facts(m->worker);
+    NPG_TRY(npg_read_mesh(&m->mesh, path, &facts->origin));
+    for (size_t i = 0; i < 3 * m->mesh->vert_count; i++)
+        if (!isfinite(m->mesh->vert_pos[i]))
+            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
+    npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
+    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->frame->point_count,
+                            SEEN_SPACINGS * m->spacing));
+    note(m, "unseen_share", facts->unseen_share);
+    if (facts->unseen_share > 0.5)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
+                        100 * facts->unseen_share, path);
+    return NPG_OK;
+}
+
+/* ---- the result ---- */
+
+static npg_status finish(making *m)
+{
+    npg_manifold manifold;
+    npg_mesh *mesh = m->mesh;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    npg_release(&mesh->vert_normals);
+    NPG_TRY(npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
+    npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
+                            mesh->face_count);
+    note_count(m, "vertices", mesh->vert_count);
+    note_count(m, "faces", mesh->face_count);
+    note_count(m, "border_edges", manifold.border_edges);
+    note(m, "area_unit", npg_mesh_area(mesh));
+    note(m, "volume_unit", npg_mesh_volume(mesh));
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                   "reference mesh: %zu vertices, %zu faces, %zu border edges", mesh->vert_count,
+                   mesh->face_count, manifold.border_edges);
+    return NPG_OK;
+}
+
+static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
+{
+    making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame};
+    npg_facts *facts = npg_worker_facts(worker);
+    double since = npg_clock_s();
+    NPG_TRY(npg_alloc_array(&m.points, NPG_FOR_MESH, frame->point_count, 3 * sizeof(float)));
+    npg_box_local_to_unit(&facts->box, m.points, frame->pos_local, frame->point_count);
+    npg_status status = measure_points(&m);
+    if (!status) status = *m.state->reference ? read_reference(&m) : make(&m);
+    if (!status) status = finish(&m);
+    note(&m, "seconds", npg_clock_s() - since);
+    npg_release(&m.points);
+    if (status) npg_mesh_unref(&m.mesh);
+    facts->reference = m.mesh;
+    return npg_error_prefix(status, "keyframe %lld (%s)", (long long)frame->number,
+                            frame->path ? frame->path : "pushed");
+}
+
+/* ---- the stage ---- */
+
+static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
+        const npg_frame *frame = npg_chunk_frame(*chunk, i);
+        if (!frame->is_key) continue;
+        if (frame->is_skipped || !frame->point_count)
+            return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)frame->number);
+        NPG_TRY(make_reference(worker, frame));
+    }
+    if (!facts->reference) return npg_error(NPG_FAILED, "the keyframe does not come first");
+    return NPG_OK;
+}
+
+/* The raw reconstruction is the largest thing held: about 16 faces per point at depth 10. */
+static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
+{
+    *chunks_held = 1;
+    return npg_worker_facts(worker)->point_count_max * 16 * 80;
+}
+
+const npg_stage npg_stage_mesh = {.name = "mesh",
+                                  .help = "Reference surface of the keyframe",
+                                  .options = mesh_options,
+                                  .state_size = sizeof(mesh_state),
+                                  .passes = NPG_PASS_SOLVE,
+                                  .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
+                                  .gives = NPG_FIELD_REFERENCE,
+                                  .process = mesh_process,
+                                  .memory = mesh_memory};
