@@ -21,7 +21,7 @@ static inline int open_temp_folder(temp_folder *folder)
 
 static inline void close_temp_folder(temp_folder *folder)
 {
-    char command[300];
+    char command[600];
     snprintf(command, sizeof command, "chmod -R u+rwx '%s'; rm -rf '%s'", folder->path, folder->path);
     if (system(command)) fprintf(stderr, "can't remove %s\n", folder->path);
 }
