@@ -6,7 +6,7 @@
 
 #include "cli.h"
 #include "clock.h"
-#include "frame_list.h"
+#include "frame_files.h"
 #include "listing.h"
 #include "probe_facts.h"
 #include "reader.h"
@@ -27,7 +27,7 @@ typedef struct job {
     settings s;
     const npg_options *options;
     const char *input;
-    npg_frame_list *list; /* NULL for standard input */
+    npg_frame_files *list; /* NULL for standard input */
     npg_probe probe;
 } job;
 
@@ -65,7 +65,7 @@ static npg_status note(job *j, npg_status status, npg_frame *frame, const char *
 static npg_status read_files(job *j)
 {
     const char *selection = npg_options_get(j->options, "frames");
-    NPG_TRY(npg_frame_list_open(&j->list, j->input, selection ? selection : "", true));
+    NPG_TRY(npg_frame_files_open(&j->list, j->input, selection ? selection : "", true));
     for (size_t i = 0; i < j->list->count; i++) {
         const npg_frame_slot *slot = &j->list->slots[i];
         npg_frame frame = {0};
@@ -77,7 +77,7 @@ static npg_status read_files(job *j)
     }
     if (j->list->gap_count) {
         char gaps[256];
-        npg_frame_list_gaps(gaps, sizeof gaps, j->list);
+        npg_frame_files_gaps(gaps, sizeof gaps, j->list);
         npg_probe_attend(&j->probe, "%zu frames are missing in the numbering: %s", j->list->gap_count, gaps);
     }
     if (j->list->left_out)
@@ -216,7 +216,7 @@ int npg_verb_probe(int argc, char **argv)
         j.input = cli.operands[0];
         status = do_probe(&j);
     }
-    npg_frame_list_close(&j.list);
+    npg_frame_files_close(&j.list);
     npg_probe_uninit(&j.probe);
     npg_options_close(&options);
     return npg_cli_end(argv[0], status);
