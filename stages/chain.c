@@ -1,8 +1,8 @@
 /* Chain: the order of the data's way.  The program's table of contents. */
 #include "stage.h"
 
-extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh, npg_stage_optimize, npg_stage_evaluate,
-    npg_stage_export;
+extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
+    npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
 
 const npg_stage *const npg_chain[] = {
     &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points          */
