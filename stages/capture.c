@@ -6,9 +6,9 @@
 static npg_status check_gaps(const npg_capture *capture, const char *input)
 {
     char numbers[256];
-    const npg_frame_list *list = capture->list;
+    const npg_frame_files *list = capture->list;
     if (capture->missing != NPG_MISSING_ERROR || !list->gap_count) return NPG_OK;
-    npg_frame_list_gaps(numbers, sizeof numbers, list);
+    npg_frame_files_gaps(numbers, sizeof numbers, list);
     return npg_error(NPG_BAD_INPUT,
                      "%s: %zu of %zu frames are missing: %s (missing = skip or hold goes on without them)",
                      input, list->gap_count, list->count, numbers);
@@ -24,7 +24,7 @@ npg_status npg_capture_open(npg_capture **out, const char *input, const char *se
     c->missing = missing;
     c->keep_going = keep_going;
     c->cache_limit = cache_limit;
-    NPG_TRY_OR(fail, status, npg_frame_list_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE));
+    NPG_TRY_OR(fail, status, npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE));
     NPG_TRY_OR(fail, status, check_gaps(c, input));
     NPG_TRY_OR(fail, status, npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count));
     NPG_TRY_OR(fail, status, npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached));
@@ -42,7 +42,7 @@ void npg_capture_close(npg_capture **slot)
     for (size_t i = 0; c->cached && i < c->list->count; i++) npg_frame_clear(&c->cached[i]);
     npg_release(&c->cached);
     npg_release(&c->is_bad);
-    npg_frame_list_close(&c->list);
+    npg_frame_files_close(&c->list);
     npg_release(slot);
 }
 

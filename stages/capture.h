@@ -4,7 +4,7 @@
 
 #include "chunk.h"
 #include "frame_box.h"
-#include "frame_list.h"
+#include "frame_files.h"
 
 /* What to do about numbers that no file has. */
 typedef enum npg_missing {
@@ -15,7 +15,7 @@ typedef enum npg_missing {
 } npg_missing;
 
 typedef struct npg_capture {
-    npg_frame_list *list; /* owned */
+    npg_frame_files *list; /* owned */
     npg_missing missing;
     bool keep_going;
     uint8_t *is_bad;   /* per slot: could not be read; owned                    */
@@ -24,7 +24,7 @@ typedef struct npg_capture {
     uint64_t reads; /* files parsed so far */
 } npg_capture;
 
-/* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_list_open. */
+/* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open. */
 npg_status npg_capture_open(npg_capture **capture, const char *input, const char *selection,
                             npg_missing missing, bool keep_going, size_t cache_limit);
 void npg_capture_close(npg_capture **capture);

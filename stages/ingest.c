@@ -57,7 +57,7 @@ static size_t cache_limit(npg_worker *worker)
     return budget && limit > budget / 8 ? budget / 8 : limit;
 }
 
-static void tell_list(npg_worker *worker, const npg_frame_list *list)
+static void tell_list(npg_worker *worker, const npg_frame_files *list)
 {
     char numbers[256];
     json_t *report = npg_worker_report(worker);
@@ -69,7 +69,7 @@ static void tell_list(npg_worker *worker, const npg_frame_list *list)
     if (!list->gap_count) return;
     const state *s = npg_worker_state(worker);
     bool is_held = s->missing == NPG_MISSING_HOLD;
-    npg_frame_list_gaps(numbers, sizeof numbers, list);
+    npg_frame_files_gaps(numbers, sizeof numbers, list);
     json_object_set_new(report, "missing_numbers", json_string(numbers));
     npg_worker_warn(worker, !is_held, -1, "%zu of %zu frames are missing and %s: %s", list->gap_count,
                     list->count, is_held ? "repeat the frame before them" : "are skipped", numbers);
@@ -96,7 +96,7 @@ static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index
     npg_status status =
         npg_capture_read(npg_worker_kept(worker), frame, index, &facts->origin, pass == NPG_PASS_SOLVE);
     if (status == NPG_PARTIAL) {
-        npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
+        npg_worker_warn(worker, true, index, "skipped: %s", npg_error_text());
         status = NPG_OK;
     }
     if (pass == NPG_PASS_MEASURE && !status) facts->skipped_count += frame->is_skipped;
@@ -215,7 +215,7 @@ static npg_status fill_gap(npg_worker *worker, npg_chunk *chunk)
     frame.is_held = is_held;
     frame.is_skipped = !is_held;
     npg_worker_facts(worker)->skipped_count += !is_held;
-    npg_worker_warn(worker, !is_held, number, "the frame is missing and %s",
+    npg_worker_warn(worker, !is_held, frame.index, "frame %lld is missing and %s", (long long)number,
                     is_held ? "repeats the frame before it" : "is skipped");
     npg_chunk_add(chunk, &frame);
     return NPG_OK;

@@ -1,5 +1,5 @@
-/* Frame list: which files are the frames of a capture, in time order, gaps included. */
-#include "frame_list.h"
+/* Frame files: which files are the frames of a capture, in time order, gaps included. */
+#include "frame_files.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -28,7 +28,7 @@ static int64_t step_of(const int64_t *numbers, size_t count)
     return step ? step : 1;
 }
 
-static npg_status add_slot(npg_frame_list *list, size_t *capacity, char **path, int64_t number)
+static npg_status add_slot(npg_frame_files *list, size_t *capacity, char **path, int64_t number)
 {
     NPG_TRY(npg_grow(&list->slots, capacity, list->count + 1, sizeof *list->slots, NPG_FOR_FILES));
     list->slots[list->count++] = (npg_frame_slot){path ? *path : NULL, number};
@@ -38,7 +38,7 @@ static npg_status add_slot(npg_frame_list *list, size_t *capacity, char **path, 
 }
 
 /* Numbers between two frames that the selection wants although no frame has them. */
-static npg_status add_gaps(npg_frame_list *list, size_t *capacity, const npg_selection *selection,
+static npg_status add_gaps(npg_frame_files *list, size_t *capacity, const npg_selection *selection,
                            int64_t *position, int64_t from, int64_t to, int64_t step, int64_t count)
 {
     for (int64_t number = from; number < to; number += step, ++*position)
@@ -48,7 +48,7 @@ static npg_status add_gaps(npg_frame_list *list, size_t *capacity, const npg_sel
 }
 
 /* Selected numbers that lie outside what is there: before the first frame, or after the last. */
-static npg_status add_outside(npg_frame_list *list, size_t *capacity, const npg_selection *selection,
+static npg_status add_outside(npg_frame_files *list, size_t *capacity, const npg_selection *selection,
                               int64_t first, int64_t last, int64_t step, bool before)
 {
     for (size_t i = 0; i < selection->range_count; i++) {
@@ -68,7 +68,7 @@ static npg_status add_outside(npg_frame_list *list, size_t *capacity, const npg_
 }
 
 /* All slots in time order.  Positions count gaps; numbers outside the capture have none. */
-static npg_status fill_slots(npg_frame_list *list, npg_paths *paths, const int64_t *numbers,
+static npg_status fill_slots(npg_frame_files *list, npg_paths *paths, const int64_t *numbers,
                              const npg_selection *selection, bool finds_gaps)
 {
     size_t capacity = 0;
@@ -91,7 +91,7 @@ static npg_status fill_slots(npg_frame_list *list, npg_paths *paths, const int64
     return finds_gaps ? add_outside(list, &capacity, selection, first, last, step, false) : NPG_OK;
 }
 
-static npg_status number_frames(npg_frame_list *list, npg_paths *paths)
+static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
 {
     list->is_numbered = true;
     if (paths->numbers) return NPG_OK;
@@ -101,7 +101,7 @@ static npg_status number_frames(npg_frame_list *list, npg_paths *paths)
                             !paths->is_listed);
 }
 
-static npg_status fill(npg_frame_list *list, npg_paths *paths, const char *input,
+static npg_status fill(npg_frame_files *list, npg_paths *paths, const char *input,
                        const npg_selection *selection, bool finds_gaps)
 {
     NPG_TRY(npg_paths_find(paths, input));
@@ -115,9 +115,9 @@ static npg_status fill(npg_frame_list *list, npg_paths *paths, const char *input
     return NPG_OK;
 }
 
-npg_status npg_frame_list_open(npg_frame_list **out, const char *input, const char *text, bool finds_gaps)
+npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const char *text, bool finds_gaps)
 {
-    npg_frame_list *list;
+    npg_frame_files *list;
     npg_selection selection;
     npg_paths paths = {0};
     *out = NULL;
@@ -125,7 +125,7 @@ npg_status npg_frame_list_open(npg_frame_list **out, const char *input, const ch
     npg_status status = npg_alloc(&list, NPG_FOR_FILES, sizeof *list);
     if (!status) {
         status = fill(list, &paths, input, &selection, finds_gaps);
-        if (status) npg_frame_list_close(&list);
+        if (status) npg_frame_files_close(&list);
         *out = list;
     }
     npg_paths_clear(&paths);
@@ -133,7 +133,7 @@ npg_status npg_frame_list_open(npg_frame_list **out, const char *input, const ch
     return status;
 }
 
-void npg_frame_list_close(npg_frame_list **slot)
+void npg_frame_files_close(npg_frame_files **slot)
 {
     if (!*slot) return;
     for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->slots[i].path);
@@ -141,7 +141,7 @@ void npg_frame_list_close(npg_frame_list **slot)
     npg_release(slot);
 }
 
-void npg_frame_list_gaps(char *text, size_t size, const npg_frame_list *list)
+void npg_frame_files_gaps(char *text, size_t size, const npg_frame_files *list)
 {
     size_t used = 0;
     text[0] = 0;
