@@ -253,9 +253,8 @@ static npg_status judge(npg_worker *worker, npg_frame *frame)
         npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
     state->bad[state->bad_count++] = frame->number;
     if (state->bad_count <= WARNINGS_MAX)
-        npg_worker_warn(worker, true, frame->index,
-                        "frame %" PRId64 " is below the bar: %s is %.3g, the bar %.3g", frame->number, fault,
-                        value, bound);
+        npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g", fault, value,
+                        bound);
     return NPG_OK;
 }
 
