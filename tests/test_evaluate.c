@@ -169,7 +169,7 @@ static scene plain_scene(void)
 static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
 {
     const scene *s = user;
-    facts->origin.known = true;
+    if (!facts->origin.known) facts->origin.known = true;
     frame->is_skipped = s->skipped[index];
     if (frame->is_skipped) return NPG_OK;
     NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, POINTS, 12));

@@ -43,8 +43,7 @@ static void world_corner(double out[3], int64_t index, int corner)
 static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
 {
     const scene *s = user;
-    for (int a = 0; a < 3; a++) facts->origin.world[a] = origin[a];
-    facts->origin.known = true;
+    npg_origin_offer(&facts->origin, origin);
     frame->number = s->numbers[index];
     frame->is_skipped = s->skipped[index];
     if (s->paths[index]) NPG_TRY(npg_copy_text(&frame->path, s->paths[index]));

@@ -59,7 +59,7 @@ static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *
 {
     const scene *s = user;
     if (facts->is_live) return NPG_OK;
-    facts->origin.known = true;
+    if (!facts->origin.known) facts->origin.known = true;
     frame->number = s->first_number + index;
     frame->is_skipped = s->skipped[index];
     return frame->is_skipped ? NPG_OK : fill_points(frame, s->point_counts[index], s->with_bad_points);
