@@ -128,7 +128,7 @@ npg_status npg_device_open(npg_device **out, const char *spec)
         npg_kernel_cache_leave();
         return status;
     }
-    status = choose_device(device, spec ? spec : "");
+    status = choose_device(device, spec && strcmp(spec, "auto") != 0 ? spec : "");
     if (!status) {
         device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
         status = npg_cl_status(code, "clCreateContext");

@@ -22,7 +22,7 @@ typedef struct npg_device_info {
 /* The i-th device of all platforms; NPG_END after the last, NPG_DEVICE when there is no platform at all. */
 npg_status npg_device_describe(size_t i, npg_device_info *info);
 
-/* Open a device.  spec: "" (the first CPU device, else the first), "cpu", "gpu", its number in the list, or a part of
+/* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the list, or a part of
  * its name.  NPG_DEVICE names the devices there are when none fits.  Compiled kernels are cached on disk in a folder
  * that one process uses at a time; a second process gets a folder of its own that goes away at close. */
 npg_status npg_device_open(npg_device **device, const char *spec);

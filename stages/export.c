@@ -29,7 +29,7 @@ typedef struct export_state {
     npg_mesh_names names;
     int64_t *numbers; /* of all frames, while measuring; owned */
     size_t number_count, number_capacity;
-    npg_frame_list *list;
+    npg_frame_log *list;
     uint32_t *faces;     /* F x 3 as they are written; owned */
     double *vert_world;  /* V x 3; owned */
     float *vert_normals; /* V x 3; owned */
@@ -168,7 +168,7 @@ static npg_status prepare_folder(npg_worker *worker)
     npg_status status = npg_make_folder(meshes);
     npg_release(&meshes);
     NPG_TRY(status);
-    return npg_frame_list_open(&state->list, output);
+    return npg_frame_log_open(&state->list, output);
 }
 
 static void place_vertices(double *vert_world, const npg_facts *facts, const export_state *state,
@@ -239,7 +239,7 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
     char file[NPG_MESH_NAME_SIZE + 8] = "meshes/";
     bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit && frame->vert_count;
     state->skipped_count += frame->is_skipped;
-    if (!has_mesh) return npg_frame_list_add(state->list, frame, output_of(worker), NULL);
+    if (!has_mesh) return npg_frame_log_add(state->list, frame, output_of(worker), NULL);
     if (!reference || frame->vert_count != reference->vert_count)
         return npg_error(NPG_FAILED, "frame %lld has %zu vertices, the reference %zu",
                          (long long)frame->number, frame->vert_count, reference ? reference->vert_count : 0);
@@ -247,7 +247,7 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
     npg_mesh_name(file + strlen(file), &state->names, number_of(state, frame));
     NPG_TRY(write_mesh(worker, file, frame->vert_unit, state->with_normals));
     state->mesh_count++;
-    return npg_frame_list_add(state->list, frame, output_of(worker), file);
+    return npg_frame_log_add(state->list, frame, output_of(worker), file);
 }
 
 static void report_settings(json_t *object, const export_state *state)
@@ -266,7 +266,7 @@ static npg_status finish(npg_worker *worker)
     report_settings(report, state);
     json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
-    return npg_frame_list_finish(state->list);
+    return npg_frame_log_finish(state->list);
 }
 
 /* ---- the last files ---- */
@@ -352,7 +352,7 @@ static npg_status flush(npg_worker *worker)
 static void uninit(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    npg_frame_list_close(&state->list);
+    npg_frame_log_close(&state->list);
     npg_release(&state->numbers);
     npg_release(&state->faces);
     npg_release(&state->vert_world);

@@ -41,20 +41,20 @@ npg_status npg_folder_clear(const char *output);
 
 /* ---- the frames ---- */
 
-typedef struct npg_frame_list npg_frame_list;
+typedef struct npg_frame_log npg_frame_log;
 
 /* Begin OUT/frames.partial.jsonl. */
-npg_status npg_frame_list_open(npg_frame_list **list, const char *output);
+npg_status npg_frame_log_open(npg_frame_log **list, const char *output);
 
 /* Append one line for a frame.  file: its mesh relative to OUT, NULL if it has none. */
-npg_status npg_frame_list_add(npg_frame_list *list, const npg_frame *frame, const char *output,
-                              const char *file);
+npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
+                             const char *file);
 
 /* Write OUT/frames.jsonl in the order of the indices and remove the partial one. */
-npg_status npg_frame_list_finish(npg_frame_list *list);
+npg_status npg_frame_log_finish(npg_frame_log *list);
 
 /* The partial file stays when finish has not been called.  NULL is fine. */
-void npg_frame_list_close(npg_frame_list **list);
+void npg_frame_log_close(npg_frame_log **list);
 
 /* {"bytes": n, "xxh3": "16 hex digits"} added to entry for the file OUT/<file>. */
 npg_status npg_file_facts(json_t *entry, const char *output, const char *file);

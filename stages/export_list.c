@@ -17,7 +17,7 @@ typedef struct line_place { /* a frame's line in the partial list */
     size_t size; /* with its newline */
 } line_place;
 
-struct npg_frame_list {
+struct npg_frame_log {
     char *output, *partial_path; /* owned */
     int fd;
     off_t size;
@@ -122,9 +122,9 @@ static json_t *json_of_frame(const npg_frame *frame, const char *file)
 
 /* ---- the list ---- */
 
-npg_status npg_frame_list_open(npg_frame_list **out, const char *output)
+npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
 {
-    npg_frame_list *list;
+    npg_frame_log *list;
     npg_status status;
     NPG_TRY(npg_alloc(&list, NPG_FOR_FILES, sizeof *list));
     list->fd = -1;
@@ -138,13 +138,13 @@ npg_status npg_frame_list_open(npg_frame_list **out, const char *output)
     *out = list;
     return NPG_OK;
 fail:
-    npg_frame_list_close(&list);
+    npg_frame_log_close(&list);
     return status;
 }
 
-void npg_frame_list_close(npg_frame_list **slot)
+void npg_frame_log_close(npg_frame_log **slot)
 {
-    npg_frame_list *list = *slot;
+    npg_frame_log *list = *slot;
     if (!list) return;
     if (list->fd >= 0) close(list->fd);
     npg_release(&list->output);
@@ -153,7 +153,7 @@ void npg_frame_list_close(npg_frame_list **slot)
     npg_release(slot);
 }
 
-static npg_status append(npg_frame_list *list, int64_t index, const char *text, size_t size)
+static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
 {
     NPG_TRY(npg_grow(&list->lines, &list->line_capacity, list->line_count + 1, sizeof *list->lines,
                      NPG_FOR_FILES));
@@ -169,8 +169,8 @@ static npg_status append(npg_frame_list *list, int64_t index, const char *text, 
     return NPG_OK;
 }
 
-npg_status npg_frame_list_add(npg_frame_list *list, const npg_frame *frame, const char *output,
-                              const char *file)
+npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
+                             const char *file)
 {
     json_t *line = json_of_frame(frame, file);
     npg_status status = file ? npg_file_facts(line, output, file) : NPG_OK;
@@ -191,7 +191,7 @@ static int by_index(const void *left, const void *right)
     return a->index < b->index ? -1 : a->index > b->index;
 }
 
-static npg_status copy_lines(npg_frame_list *list, npg_file *file)
+static npg_status copy_lines(npg_frame_log *list, npg_file *file)
 {
     char *line = NULL;
     size_t capacity = 0;
@@ -207,7 +207,7 @@ static npg_status copy_lines(npg_frame_list *list, npg_file *file)
     return status;
 }
 
-npg_status npg_frame_list_finish(npg_frame_list *list)
+npg_status npg_frame_log_finish(npg_frame_log *list)
 {
     npg_file *file;
     char *path;

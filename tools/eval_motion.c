@@ -7,7 +7,7 @@
 
 #include "mesh_tools.h"
 
-void npg_motion_close(npg_motion *motion)
+void npg_eval_motion_close(npg_eval_motion *motion)
 {
     npg_mesh_unref(&motion->first);
     npg_release(&motion->edges);
@@ -16,7 +16,7 @@ void npg_motion_close(npg_motion *motion)
     npg_release(&motion->areas);
 }
 
-static npg_status begin(npg_motion *motion, npg_mesh *mesh)
+static npg_status begin(npg_eval_motion *motion, npg_mesh *mesh)
 {
     motion->first = npg_mesh_ref(mesh);
     motion->faces = mesh->faces;
@@ -35,7 +35,7 @@ static double distance(const float *a, const float *b)
     return sqrt(sum);
 }
 
-static double jitter_of(const npg_motion *motion, const float *after)
+static double jitter_of(const npg_eval_motion *motion, const float *after)
 {
     const float *middle = motion->before[0], *before = motion->before[1];
     double sum = 0;
@@ -50,7 +50,7 @@ static double jitter_of(const npg_motion *motion, const float *after)
     return sum / (double)motion->vert_count / motion->diagonal;
 }
 
-static double edge_change_of(const npg_motion *motion, const float *pos)
+static double edge_change_of(const npg_eval_motion *motion, const float *pos)
 {
     const float *rest = motion->first->vert_pos;
     double sum = 0;
@@ -61,7 +61,7 @@ static double edge_change_of(const npg_motion *motion, const float *pos)
     return sum / (double)motion->edge_count;
 }
 
-npg_status npg_motion_add(npg_motion *motion, npg_mesh *mesh)
+npg_status npg_eval_motion_add(npg_eval_motion *motion, npg_mesh *mesh)
 {
     if (!motion->first) NPG_TRY(begin(motion, mesh));
     motion->vertices_last &= mesh->vert_count == motion->vert_count;
@@ -91,7 +91,7 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static npg_status bad_share(double *share, const npg_motion *motion)
+static npg_status bad_share(double *share, const npg_eval_motion *motion)
 {
     size_t bad = 0, frames = motion->frames;
     float *areas;
@@ -108,9 +108,9 @@ static npg_status bad_share(double *share, const npg_motion *motion)
     return NPG_OK;
 }
 
-npg_status npg_motion_end(npg_motion_figures *figures, npg_motion *motion)
+npg_status npg_eval_motion_end(npg_eval_motion_figures *figures, npg_eval_motion *motion)
 {
-    *figures = (npg_motion_figures){(double)NAN, (double)NAN, (double)NAN};
+    *figures = (npg_eval_motion_figures){(double)NAN, (double)NAN, (double)NAN};
     if (motion->vertices_last && motion->frames > 2)
         figures->jitter = motion->jitter_sum / (double)(motion->frames - 2);
     if (!motion->topology_last || !motion->frames) return NPG_OK;

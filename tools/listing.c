@@ -1,7 +1,6 @@
 /* Listing: files of a folder in natural order, for the verbs that take folders of meshes or clouds. */
 #include "listing.h"
 
-#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -11,34 +10,13 @@
 #include <sys/stat.h>
 
 #include "file.h"
+#include "frame_names.h"
 #include "memory.h"
-
-/* Runs of digits by their value, then by their length; everything else by its bytes. */
-static int compare_natural(const char *a, const char *b)
-{
-    while (*a && *b) {
-        if (isdigit((unsigned char)*a) && isdigit((unsigned char)*b)) {
-            while (*a == '0') a++;
-            while (*b == '0') b++;
-            size_t m = strspn(a, "0123456789"), n = strspn(b, "0123456789");
-            if (m != n) return m < n ? -1 : 1;
-            int order = strncmp(a, b, m);
-            if (order) return order;
-            a += m;
-            b += n;
-        } else {
-            if (*a != *b) return (unsigned char)*a < (unsigned char)*b ? -1 : 1;
-            a++;
-            b++;
-        }
-    }
-    return (*a != 0) - (*b != 0);
-}
 
 static int compare_paths(const void *a, const void *b)
 {
     const char *x = *(char *const *)a, *y = *(char *const *)b;
-    int order = compare_natural(x, y);
+    int order = npg_natural_compare(x, y);
     return order ? order : strcmp(x, y);
 }
 
@@ -96,11 +74,12 @@ npg_status npg_listing_add(npg_listing *listing, const char *path, const char *e
     return add_path(listing, copy);
 }
 
-void npg_listing_slice(npg_listing *listing, size_t first, size_t last)
+void npg_listing_keep(npg_listing *listing, const npg_selection *selection)
 {
     size_t kept = 0;
-    for (size_t i = 0; i < listing->count; i++) {
-        if (i >= first && i < last)
+    int64_t count = (int64_t)listing->count;
+    for (int64_t i = 0; i < count; i++) {
+        if (npg_selection_takes(selection, i, i, count))
             listing->paths[kept++] = listing->paths[i];
         else
             npg_release(&listing->paths[i]);
@@ -110,7 +89,7 @@ void npg_listing_slice(npg_listing *listing, size_t first, size_t last)
 
 void npg_listing_close(npg_listing *listing)
 {
-    npg_listing_slice(listing, 0, 0);
+    for (size_t i = 0; i < listing->count; i++) npg_release(&listing->paths[i]);
     npg_release(&listing->paths);
     *listing = (npg_listing){0};
 }

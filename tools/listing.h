@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "status.h"
+#include "frame_select.h"
 
 typedef struct npg_listing {
     char **paths; /* count of them, owned */
@@ -16,8 +16,8 @@ typedef struct npg_listing {
 npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings);
 void npg_listing_close(npg_listing *listing);
 
-/* Keep entries first .. last - 1. */
-void npg_listing_slice(npg_listing *listing, size_t first, size_t last);
+/* Keep the entries at the selected positions; a number in the selection is a position too, counted from 0. */
+void npg_listing_keep(npg_listing *listing, const npg_selection *selection);
 
 /* Where `folder` has a sub-folder of one of `names` ("truth gt"), that one's path, else the folder's own;
  * to be given to npg_release(). */

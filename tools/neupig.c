@@ -11,6 +11,11 @@ const npg_verb npg_verbs[] = {
      "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
      "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.",
      npg_run_verb_options, true, npg_verb_run},
+    {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
+     "Reads every frame of INPUT and says what is in it, what a run would trip over, and what it would cost "
+     "in "
+     "memory, disk and time.  Exit code 7 when something needs attention.",
+     npg_probe_options, true, npg_verb_probe},
     {"eval", "PREDICTED TRUTH", 2, 2, "Measure a mesh sequence against a ground truth",
      "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) with those of "
      "TRUTH, "

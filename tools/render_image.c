@@ -24,43 +24,41 @@ static void cross(double out[3], const double a[3], const double b[3])
 
 /* ---- camera ---- */
 
-static void turn_eye(npg_eye *eye, double azimuth, double elevation, int up)
+void npg_eye_turn(npg_eye *eye, double azimuth, double elevation, int up)
 {
     double a = azimuth * RADIANS, e = fmin(fmax(elevation, -89.9), 89.9) * RADIANS;
     double back[3] = {sin(a) * cos(e), sin(e), cos(a) * cos(e)}, world_up[3] = {0, 1, 0};
+    double *right = eye->axes, *above = eye->axes + 3, *ahead = eye->axes + 6;
     if (up == 2) {
         double z_up[3] = {back[0], -back[2], back[1]};
         memcpy(back, z_up, sizeof back);
         world_up[1] = 0;
         world_up[2] = 1;
     }
-    for (int k = 0; k < 3; k++) eye->ahead[k] = -back[k];
-    cross(eye->right, eye->ahead, world_up);
-    double length = sqrt(dot(eye->right, eye->right));
-    for (int k = 0; k < 3; k++) eye->right[k] /= length;
-    cross(eye->up, eye->right, eye->ahead);
+    for (int k = 0; k < 3; k++) ahead[k] = -back[k];
+    cross(right, ahead, world_up);
+    double length = sqrt(dot(right, right));
+    for (int k = 0; k < 3; k++) right[k] /= length;
+    cross(above, right, ahead);
 }
 
-void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *box, double azimuth, double elevation,
-                 int up)
+void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *reach)
 {
-    const double margin = 1.04, distances = 3.0; /* the eye is that many diagonals away */
-    double diagonal = npg_bounds_diagonal(box), reach_x = 0, reach_y = 0;
-    if (!(diagonal > 0)) diagonal = 1;
-    turn_eye(eye, azimuth, elevation, up);
-    for (int k = 0; k < 3; k++)
-        eye->position[k] = 0.5 * (box->lo[k] + box->hi[k]) - distances * diagonal * eye->ahead[k];
-    for (int corner = 0; corner < 8; corner++) {
-        double p[3];
-        for (int k = 0; k < 3; k++) p[k] = (corner >> k & 1 ? box->hi[k] : box->lo[k]) - eye->position[k];
-        double depth = dot(p, eye->ahead);
-        reach_x = fmax(reach_x, fabs(dot(p, eye->right)) / depth);
-        reach_y = fmax(reach_y, fabs(dot(p, eye->up)) / depth);
+    const double margin = 1.05, distances = 3.0; /* the eye is that many diagonals away */
+    double diagonal = fmax(npg_bounds_diagonal(reach), 1e-12), half[3], middle[3];
+    for (int k = 0; k < 3; k++) {
+        half[k] = 0.5 * (reach->hi[k] - reach->lo[k]);
+        middle[k] = 0.5 * (reach->hi[k] + reach->lo[k]);
     }
-    reach_x = margin * fmax(reach_x, 1e-3);
-    reach_y = margin * fmax(reach_y, 1e-3);
-    if (!(*aspect > 0)) *aspect = fmin(fmax(reach_x / reach_y, 0.4), 2.5);
-    eye->slope_y = fmax(reach_y, reach_x / *aspect);
+    middle[2] -= distances * diagonal;
+    for (int k = 0; k < 3; k++)
+        eye->position[k] =
+            middle[0] * eye->axes[k] + middle[1] * eye->axes[3 + k] + middle[2] * eye->axes[6 + k];
+    double nearest = distances * diagonal - half[2];
+    double slope_x = margin * fmax(half[0], 0.01 * diagonal) / nearest;
+    double slope_y = margin * fmax(half[1], 0.01 * diagonal) / nearest;
+    if (!(*aspect > 0)) *aspect = fmin(fmax(slope_x / slope_y, 0.25), 4);
+    eye->slope_y = fmax(slope_y, slope_x / *aspect);
     eye->slope_x = eye->slope_y * *aspect;
 }
 
@@ -71,7 +69,7 @@ static void aim(npg_ray *ray, const npg_eye *eye, double x, double y)
     for (int k = 0; k < 3; k++) {
         ray->origin[k] = (float)eye->position[k];
         ray->direction[k] =
-            (float)(eye->ahead[k] + x * eye->slope_x * eye->right[k] - y * eye->slope_y * eye->up[k]);
+            (float)(eye->axes[6 + k] + x * eye->slope_x * eye->axes[k] - y * eye->slope_y * eye->axes[3 + k]);
     }
     ray->t_min = 0;
     ray->t_max = INFINITY;
@@ -99,10 +97,12 @@ static void shade(float out[3], const npg_scene *scene, const npg_eye *eye, cons
     double normal[3], light[3];
     bool is_back = hit->is_back && !scene->ball_middle;
     shading_normal(normal, scene, hit);
-    if (dot(normal, eye->ahead) > 0)
+    if (dot(normal, eye->axes + 6) > 0)
         for (int k = 0; k < 3; k++) normal[k] = -normal[k];
-    for (int k = 0; k < 3; k++) light[k] = -0.55 * eye->right[k] + 0.65 * eye->up[k] - 0.55 * eye->ahead[k];
-    double key = fmax(dot(normal, light) / sqrt(dot(light, light)), 0), head = fabs(dot(normal, eye->ahead));
+    for (int k = 0; k < 3; k++)
+        light[k] = -0.55 * eye->axes[k] + 0.65 * eye->axes[3 + k] - 0.55 * eye->axes[6 + k];
+    double key = fmax(dot(normal, light) / sqrt(dot(light, light)), 0),
+           head = fabs(dot(normal, eye->axes + 6));
     double amount = 0.16 + 0.62 * key + 0.26 * head;
     const uint32_t *face = scene->mesh->faces + 3 * (size_t)hit->face;
     for (size_t k = 0; k < 3; k++) {

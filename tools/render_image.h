@@ -5,7 +5,8 @@
 #include "render_scene.h"
 
 typedef struct npg_eye {
-    double position[3], right[3], up[3], ahead[3];
+    double position[3];
+    double axes[9];          /* rows of unit length: to the right, up, ahead     */
     double slope_x, slope_y; /* half the picture's width and height at distance 1 */
 } npg_eye;
 
@@ -14,11 +15,13 @@ typedef struct npg_image {
     uint8_t *pixels; /* height x width x 3, RGB, owned */
 } npg_image;
 
-/* An eye that looks at the box from azimuth (degrees; 0: along -z from the front, 90: from +x) and elevation,
- * so that all of the box is in the picture; *aspect is width / height of what it sees (in: 0 to choose it).
- * up: 1 for y, 2 for z. */
-void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *box, double azimuth, double elevation,
-                 int up);
+/* Turn the eye: azimuth in degrees (0: along -z from the front, 90: from +x) and elevation; up: 1 for y, 2
+ * for z. */
+void npg_eye_turn(npg_eye *eye, double azimuth, double elevation, int up);
+
+/* Place a turned eye so that all of `reach` (along its axes) is in the picture; *aspect is width / height of
+ * what it sees (in: 0 to choose it). */
+void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *reach);
 
 npg_status npg_image_open(npg_image *image, int64_t width, int64_t height);
 void npg_image_close(npg_image *image);

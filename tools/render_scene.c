@@ -74,12 +74,19 @@ static npg_status read_any(npg_mesh **mesh, bool *faces, const char *path, npg_o
     return NPG_OK;
 }
 
-npg_status npg_scene_measure(npg_bounds *bounds, const char *path, npg_origin *origin)
+npg_status npg_scene_measure(npg_bounds *reach, const char *path, npg_origin *origin, const double axes[9])
 {
     npg_mesh *mesh = NULL;
     bool faces;
     NPG_TRY(read_any(&mesh, &faces, path, origin));
-    npg_bounds_add_points(bounds, mesh->vert_pos, mesh->vert_count);
+    for (size_t v = 0; v < mesh->vert_count; v++)
+        for (int axis = 0; axis < 3; axis++) {
+            double along = 0;
+            for (int k = 0; k < 3; k++)
+                along += axes[3 * axis + k] * (double)mesh->vert_pos[3 * v + (size_t)k];
+            reach->lo[axis] = fmin(reach->lo[axis], along);
+            reach->hi[axis] = fmax(reach->hi[axis], along);
+        }
     npg_mesh_unref(&mesh);
     return NPG_OK;
 }

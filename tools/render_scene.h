@@ -18,8 +18,9 @@ typedef struct npg_scene {
 /* Whether a file holds faces: a PLY that declares some, an OBJ with an f line. */
 npg_status npg_file_has_faces(bool *faces, const char *path);
 
-/* Read only the bounds of a file (points that are not finite are left out), added to *bounds. */
-npg_status npg_scene_measure(npg_bounds *bounds, const char *path, npg_origin *origin);
+/* Read only what a file fills of the space, along three axes (rows of unit length); points that are not
+ * finite are left out.  Added to *reach. */
+npg_status npg_scene_measure(npg_bounds *reach, const char *path, npg_origin *origin, const double axes[9]);
 
 /* Read a file to draw it.  ball_radius: of a cloud's points, in the file's unit.  first: the mesh whose
  * positions give the identity colours (NULL: this one's own); used when the vertex counts are equal. */

@@ -25,7 +25,7 @@ static double dot(const double a[3], const double b[3])
 }
 
 /* The i-th of a ring at half the diagonal's height above the middle, turned to the middle. */
-static camera camera_of_ring(const npg_capture *capture, int64_t i)
+static camera camera_of_ring(const npg_scan *capture, int64_t i)
 {
     const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
     double angle = 2 * PI * (double)i / (double)capture->cameras;
@@ -100,8 +100,8 @@ static void face_normal(double normal[3], const npg_mesh *mesh, uint32_t f)
 }
 
 /* The surface point behind every pixel that sees a front side, with noise along its ray. */
-static npg_status take_points(npg_captured *points, const picture *seen, const camera *c,
-                              const npg_mesh *mesh, double noise, npg_random *random)
+static npg_status take_points(npg_scanned *points, const picture *seen, const camera *c, const npg_mesh *mesh,
+                              double noise, npg_random *random)
 {
     for (int64_t at = 0; at < c->width * c->width; at++) {
         double depth = seen->depth[at], pos[3], normal[3];
@@ -114,13 +114,12 @@ static npg_status take_points(npg_captured *points, const picture *seen, const c
         face_normal(normal, mesh, seen->face[at]);
         double facing = 0;
         for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
-        if (facing > 0) NPG_TRY(npg_captured_add(points, pos, normal));
+        if (facing > 0) NPG_TRY(npg_scanned_add(points, pos, normal));
     }
     return NPG_OK;
 }
 
-npg_status npg_cameras_see(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
-                           uint64_t frame)
+npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame)
 {
     picture seen = {0};
     size_t pixels = (size_t)(capture->width * capture->width);

@@ -12,20 +12,20 @@
 /* Keys of the random streams of a frame. */
 enum { FOR_SAMPLES = 1, FOR_COUNT, FOR_NOISE, FOR_OUTLIERS, FOR_HOLES, FOR_CHOICE };
 
-void npg_captured_close(npg_captured *points)
+void npg_scanned_close(npg_scanned *points)
 {
     npg_release(&points->pos);
     npg_release(&points->normals);
-    *points = (npg_captured){0};
+    *points = (npg_scanned){0};
 }
 
-static npg_status make_room(npg_captured *points, size_t count)
+static npg_status make_room(npg_scanned *points, size_t count)
 {
     NPG_TRY(npg_grow(&points->pos, &points->room_pos, count, 3 * sizeof(float), NPG_FOR_FRAMES));
     return npg_grow(&points->normals, &points->room_normals, count, 3 * sizeof(float), NPG_FOR_FRAMES);
 }
 
-npg_status npg_captured_add(npg_captured *points, const double pos[3], const double normal[3])
+npg_status npg_scanned_add(npg_scanned *points, const double pos[3], const double normal[3])
 {
     NPG_TRY(make_room(points, points->count + 1));
     for (size_t k = 0; k < 3; k++) {
@@ -36,14 +36,14 @@ npg_status npg_captured_add(npg_captured *points, const double pos[3], const dou
     return NPG_OK;
 }
 
-static void copy_point(npg_captured *points, size_t to, size_t from)
+static void copy_point(npg_scanned *points, size_t to, size_t from)
 {
     memcpy(points->pos + 3 * to, points->pos + 3 * from, 3 * sizeof(float));
     memcpy(points->normals + 3 * to, points->normals + 3 * from, 3 * sizeof(float));
 }
 
 /* Keep `count` of the points, drawn evenly, in their order. */
-static void choose(npg_captured *points, size_t count, npg_random random)
+static void choose(npg_scanned *points, size_t count, npg_random random)
 {
     size_t kept = 0, left = points->count;
     for (size_t i = 0; i < points->count && kept < count; i++, left--)
@@ -51,7 +51,7 @@ static void choose(npg_captured *points, size_t count, npg_random random)
     points->count = kept;
 }
 
-static void cut_holes(npg_captured *points, const npg_capture *capture, uint64_t frame)
+static void cut_holes(npg_scanned *points, const npg_scan *capture, uint64_t frame)
 {
     npg_random random = npg_random_stream(capture->seed, frame, FOR_HOLES);
     double radius = 0.06 * capture->diagonal;
@@ -71,7 +71,7 @@ static void cut_holes(npg_captured *points, const npg_capture *capture, uint64_t
     }
 }
 
-static void add_noise(npg_captured *points, const npg_capture *capture, uint64_t frame)
+static void add_noise(npg_scanned *points, const npg_scan *capture, uint64_t frame)
 {
     npg_random random = npg_random_stream(capture->seed, frame, FOR_NOISE);
     double deviation = 0.01 * capture->noise * capture->diagonal;
@@ -79,7 +79,7 @@ static void add_noise(npg_captured *points, const npg_capture *capture, uint64_t
         points->pos[i] = (float)((double)points->pos[i] + deviation * npg_random_gauss(&random));
 }
 
-static void add_outliers(npg_captured *points, const npg_capture *capture, uint64_t frame)
+static void add_outliers(npg_scanned *points, const npg_scan *capture, uint64_t frame)
 {
     npg_random random = npg_random_stream(capture->seed, frame, FOR_OUTLIERS);
     npg_bounds box = npg_bounds_empty();
@@ -98,7 +98,7 @@ static void add_outliers(npg_captured *points, const npg_capture *capture, uint6
     }
 }
 
-static npg_status take_surface(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
+static npg_status take_surface(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
                                size_t count, uint64_t frame)
 {
     NPG_TRY(make_room(points, count));
@@ -107,8 +107,7 @@ static npg_status take_surface(npg_captured *points, const npg_capture *capture,
                            FOR_SAMPLES);
 }
 
-npg_status npg_capture_frame(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
-                             uint64_t frame)
+npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame)
 {
     npg_random random = npg_random_stream(capture->seed, frame, FOR_COUNT);
     size_t count = (size_t)capture->point_count;

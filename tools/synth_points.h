@@ -4,7 +4,7 @@
 
 #include "mesh.h"
 
-typedef struct npg_capture {
+typedef struct npg_scan {
     int64_t point_count; /* N per frame                                                                 */
     bool vary;           /* N / 2 .. N instead, drawn for each frame                                    */
     double noise; /* Gaussian, deviation in % of the diagonal; along the ray with cameras, else each axis */
@@ -15,26 +15,25 @@ typedef struct npg_capture {
     uint64_t seed;
     double diagonal;  /* of the first frame's box      */
     double centre[3]; /* what the cameras look at      */
-} npg_capture;
+} npg_scan;
 
-typedef struct npg_captured {
+typedef struct npg_scanned {
     size_t count, room_pos, room_normals;
     float *pos, *normals; /* count x 3, owned */
-} npg_captured;
+} npg_scanned;
 
-void npg_captured_close(npg_captured *points);
+void npg_scanned_close(npg_scanned *points);
 
 /* The points of one frame of a moving surface.  points is emptied first.  NPG_BAD_INPUT when no camera sees
  * it. */
-npg_status npg_capture_frame(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
-                             uint64_t frame);
+npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame);
 
 /* ---- between the files of a capture ---- */
 
-npg_status npg_captured_add(npg_captured *points, const double pos[3], const double normal[3]);
+npg_status npg_scanned_add(npg_scanned *points, const double pos[3], const double normal[3]);
 
 /* All surface points that a ring of cameras sees, one per pixel, in the order of cameras and pixels. */
-npg_status npg_cameras_see(npg_captured *points, const npg_capture *capture, const npg_mesh *mesh,
+npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
                            uint64_t frame);
 
 #endif

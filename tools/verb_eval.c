@@ -25,8 +25,9 @@ const npg_option npg_eval_options[] = {
      "The truth is point clouds: CD and F between surface samples and all its points, NC with its "
      "normals, no Corr",
      NPG_OPTION_FLAG, AT(points_only), "no", 0, 0, NULL, NULL},
-    {"frames", "Use frames A to B - 1 of the truth (counted from 0; either may be left out)", NPG_OPTION_TEXT,
-     AT(frames), "", 0, 0, NULL, "A:B"},
+    {"frames",
+     "Frames of the truth to use: a:b:step as Python slices, or positions like 1-5,8 (counted from 0)",
+     NPG_OPTION_TEXT, AT(frames), "", 0, 0, NULL, "FRAMES"},
     {"samples", "Samples on either surface", NPG_OPTION_INT, AT(samples), "100000", 1, 1e8, NULL, NULL},
     {"tau", "Distance of the F-score, in diagonals", NPG_OPTION_REAL, AT(tau), "0.005", 0, 1, NULL, NULL},
     {"seed", "Seed of the samples", NPG_OPTION_INT, AT(seed), "0", 0, 4294967295.0, NULL, NULL},
@@ -42,8 +43,8 @@ typedef struct evaluation {
     npg_mesh *first_truth;
     uint32_t *truth_of;
     bool has_corr; /* constant topology on both sides, so far */
-    npg_motion motion;
-    npg_motion_figures moved;
+    npg_eval_motion motion;
+    npg_eval_motion_figures moved;
     npg_frame_metrics sum;
     double corr_sum, sizes[4]; /* vertices and faces of prediction and truth */
     json_t *per_frame;
@@ -75,30 +76,6 @@ static npg_status check_finite(const npg_mesh *mesh, const char *path)
     return NPG_OK;
 }
 
-/* "A:B" as a slice of `count`. */
-static npg_status read_slice(const char *text, size_t count, size_t *first, size_t *last)
-{
-    const char *colon = strchr(text, ':');
-    char *end;
-    *first = 0;
-    *last = count;
-    if (!text[0]) return NPG_OK;
-    if (!colon) return npg_error(NPG_USAGE, "option frames: \"%s\" is not A:B", text);
-    if (colon > text) {
-        *first = strtoull(text, &end, 10);
-        if (end != colon || text[0] == '-')
-            return npg_error(NPG_USAGE, "option frames: \"%s\" is not A:B", text);
-    }
-    if (colon[1]) {
-        *last = strtoull(colon + 1, &end, 10);
-        if (*end || colon[1] == '-') return npg_error(NPG_USAGE, "option frames: \"%s\" is not A:B", text);
-    }
-    if (*last > count) *last = count;
-    if (*first >= *last)
-        return npg_error(NPG_USAGE, "option frames: %s selects no frame of %zu", text, count);
-    return NPG_OK;
-}
-
 static npg_status list_side(npg_listing *listing, const char *folder, const char *subfolders,
                             const char *endings)
 {
@@ -109,20 +86,30 @@ static npg_status list_side(npg_listing *listing, const char *folder, const char
     return status;
 }
 
+static npg_status select_frames(evaluation *e)
+{
+    npg_selection selection;
+    size_t whole = e->truth.count;
+    NPG_TRY(npg_selection_parse(&selection, e->s.frames));
+    if (e->predicted.count == whole) npg_listing_keep(&e->predicted, &selection);
+    npg_listing_keep(&e->truth, &selection);
+    npg_selection_clear(&selection);
+    if (!e->truth.count)
+        return npg_error(NPG_USAGE, "option frames: %s selects none of %zu frames", e->s.frames, whole);
+    return NPG_OK;
+}
+
 static npg_status list_both(evaluation *e, const npg_cli *cli)
 {
     static const char meshes[] = ".ply .obj", clouds[] = ".ply .obj .xyz .xyzn .txt .pts .npy .pcd";
-    size_t first, last;
     bool points = e->s.points_only;
     NPG_TRY(list_side(&e->predicted, cli->operands[0], "meshes", meshes));
     NPG_TRY(list_side(&e->truth, cli->operands[1], points ? "points" : "truth gt", points ? clouds : meshes));
     size_t whole = e->truth.count;
-    NPG_TRY(read_slice(e->s.frames, whole, &first, &last));
-    if (e->predicted.count == whole) npg_listing_slice(&e->predicted, first, last);
-    npg_listing_slice(&e->truth, first, last);
+    NPG_TRY(select_frames(e));
     if (e->predicted.count != e->truth.count)
         return npg_error(NPG_BAD_INPUT,
-                         "%s has %zu meshes, %s has %zu frames (%zu in all); select with --frames A:B",
+                         "%s has %zu meshes, %s has %zu frames (%zu in all); select with --frames",
                          cli->operands[0], e->predicted.count, cli->operands[1], e->truth.count, whole);
     return NPG_OK;
 }
@@ -196,7 +183,7 @@ static npg_status eval_frame(evaluation *e, size_t t, npg_mesh *predicted, npg_m
     if (t == 0) NPG_TRY(begin(e, predicted, truth, e->truth.paths[0]));
     NPG_TRY(npg_error_prefix(npg_metrics_compare(&m, predicted, truth, &e->metrics, t), "%s, %s",
                              e->predicted.paths[t], e->truth.paths[t]));
-    NPG_TRY(npg_motion_add(&e->motion, predicted));
+    NPG_TRY(npg_eval_motion_add(&e->motion, predicted));
     e->has_corr = e->has_corr && e->motion.vertices_last && same_faces(truth, e->first_truth);
     if (t && e->has_corr)
         e->corr_sum += corr = npg_metrics_drift(predicted, truth, e->truth_of, e->metrics.diagonal);
@@ -217,7 +204,7 @@ static npg_status eval_all(evaluation *e)
         npg_mesh_unref(&truth);
         NPG_TRY(status);
     }
-    return npg_motion_end(&e->moved, &e->motion);
+    return npg_eval_motion_end(&e->moved, &e->motion);
 }
 
 /* ---- output ---- */
@@ -271,7 +258,7 @@ static void close_evaluation(evaluation *e)
     npg_listing_close(&e->truth);
     npg_mesh_unref(&e->first_truth);
     npg_release(&e->truth_of);
-    npg_motion_close(&e->motion);
+    npg_eval_motion_close(&e->motion);
     json_decref(e->per_frame);
 }
 

@@ -45,19 +45,20 @@ typedef struct job {
     settings s;
     npg_listing files;
     npg_origin origin;
-    npg_bounds bounds;
+    npg_bounds reach; /* along the eye's axes */
     npg_eye eye;
     npg_image image;
     npg_mesh *first; /* the first file's mesh, for identity colours */
     int64_t columns, tile_width;
 } job;
 
-static void choose_angles(settings *s)
+static void turn_eye(npg_eye *eye, const settings *s)
 {
     static const double angles[][2] = {{0, 0}, {0, 0}, {180, 0}, {-90, 0}, {90, 0}, {0, 90}, {0, -90}};
-    if (!s->view) return;
-    s->azimuth = angles[s->view][0];
-    s->elevation = angles[s->view][1];
+    if (s->view)
+        npg_eye_turn(eye, angles[s->view][0], angles[s->view][1], s->up + 1);
+    else
+        npg_eye_turn(eye, s->azimuth, s->elevation, s->up + 1);
 }
 
 static void thin_out(npg_listing *files, size_t count)
@@ -82,8 +83,8 @@ static npg_status list_files(job *j, const npg_cli *cli)
         NPG_TRY(npg_listing_add(&j->files, cli->operands[i], endings));
     thin_out(&j->files, (size_t)j->s.count);
     for (size_t i = 0; i < j->files.count; i++)
-        NPG_TRY(npg_scene_measure(&j->bounds, j->files.paths[i], &j->origin));
-    if (!(j->bounds.lo[0] <= j->bounds.hi[0]))
+        NPG_TRY(npg_scene_measure(&j->reach, j->files.paths[i], &j->origin, j->eye.axes));
+    if (!(j->reach.lo[0] <= j->reach.hi[0]))
         return npg_error(NPG_BAD_INPUT, "%s: nothing to draw", j->files.paths[0]);
     return NPG_OK;
 }
@@ -92,7 +93,7 @@ static npg_status lay_out(job *j)
 {
     const int64_t count = (int64_t)j->files.count;
     double aspect = j->s.width ? (double)j->s.width / (double)j->s.height : 0;
-    npg_eye_fit(&j->eye, &aspect, &j->bounds, j->s.azimuth, j->s.elevation, j->s.up ? 2 : 1);
+    npg_eye_fit(&j->eye, &aspect, &j->reach);
     j->tile_width = j->s.width ? j->s.width : (int64_t)lrint((double)j->s.height * aspect);
     j->columns = j->s.columns ? j->s.columns : 8;
     if (j->columns > count) j->columns = count;
@@ -108,7 +109,7 @@ static npg_status draw_tile(job *j, size_t i)
 {
     npg_scene scene;
     int64_t column = (int64_t)i % j->columns, row = (int64_t)i / j->columns;
-    double radius = 0.01 * j->s.point_size * npg_bounds_diagonal(&j->bounds);
+    double radius = 0.01 * j->s.point_size * npg_bounds_diagonal(&j->reach);
     NPG_TRY(npg_scene_open(&scene, j->files.paths[i], &j->origin, radius, j->s.colour, j->first));
     if (!j->first && !scene.ball_middle) j->first = npg_mesh_ref(scene.mesh);
     if (scene.shown < scene.total)
@@ -122,10 +123,10 @@ static npg_status draw_tile(job *j, size_t i)
 
 int npg_verb_render(int argc, char **argv)
 {
-    job j = {.bounds = npg_bounds_empty()};
+    job j = {.reach = npg_bounds_empty()};
     npg_cli cli;
     npg_status status = npg_cli_parse(&cli, argv[0], &j.s, NULL, argc, argv);
-    if (!status) choose_angles(&j.s);
+    if (!status) turn_eye(&j.eye, &j.s);
     if (!status) status = list_files(&j, &cli);
     if (!status) status = lay_out(&j);
     for (size_t i = 0; i < j.files.count && !status; i++) status = draw_tile(&j, i);

@@ -82,16 +82,16 @@ static npg_status make_folders(const settings *s)
     return NPG_OK;
 }
 
-static npg_capture capture_of(const settings *s, const npg_mesh *first)
+static npg_scan capture_of(const settings *s, const npg_mesh *first)
 {
-    npg_capture capture = {.point_count = s->points,
-                           .vary = s->vary,
-                           .noise = s->noise,
-                           .outliers = s->outliers,
-                           .holes = s->holes,
-                           .cameras = s->cameras,
-                           .width = s->width,
-                           .seed = (uint64_t)s->seed};
+    npg_scan capture = {.point_count = s->points,
+                        .vary = s->vary,
+                        .noise = s->noise,
+                        .outliers = s->outliers,
+                        .holes = s->holes,
+                        .cameras = s->cameras,
+                        .width = s->width,
+                        .seed = (uint64_t)s->seed};
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, first->vert_pos, first->vert_count);
     capture.diagonal = npg_bounds_diagonal(&bounds);
@@ -99,16 +99,16 @@ static npg_capture capture_of(const settings *s, const npg_mesh *first)
     return capture;
 }
 
-static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh *mesh, npg_captured *points,
+static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh *mesh, npg_scanned *points,
                               size_t *total)
 {
-    npg_capture capture = {0};
+    npg_scan capture = {0};
     for (int64_t t = 0; t < s->frames; t++) {
         npg_body_pose(body, mesh->vert_pos, s->cycles * (double)t / (double)s->frames, s->travel);
         npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
                                 mesh->face_count);
         if (t == 0) capture = capture_of(s, mesh);
-        NPG_TRY(npg_capture_frame(points, &capture, mesh, (uint64_t)t));
+        NPG_TRY(npg_scan_frame(points, &capture, mesh, (uint64_t)t));
         NPG_TRY(write_arrays(s->output, "points", t, s, points->pos, s->normals ? points->normals : NULL,
                              points->count, NULL));
         NPG_TRY(write_arrays(s->output, "truth", t, s, mesh->vert_pos, mesh->vert_normals, mesh->vert_count,
@@ -122,7 +122,7 @@ static npg_status make_capture(const settings *s)
 {
     npg_body *body = NULL;
     npg_mesh *mesh = NULL;
-    npg_captured points = {0};
+    npg_scanned points = {0};
     size_t total = 0;
     if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
     npg_status status = make_folders(s);
@@ -137,7 +137,7 @@ static npg_status make_capture(const settings *s)
             "%s/truth\n",
             (long long)s->frames, (double)total / (double)s->frames, mesh->vert_count, mesh->face_count,
             s->output, s->output);
-    npg_captured_close(&points);
+    npg_scanned_close(&points);
     npg_mesh_unref(&mesh);
     npg_body_close(&body);
     return status;
