@@ -24,7 +24,7 @@ const npg_option *npg_option_at(size_t i, const char **stage)
 {
     const npg_option *table = npg_run_options;
     const char *name = "run";
-    for (size_t s = 0; table; s++) {
+    for (size_t s = 0;; s++) {
         for (; table && table->name; table++)
             if (i-- == 0) {
                 if (stage) *stage = name;
@@ -34,7 +34,6 @@ const npg_option *npg_option_at(size_t i, const char **stage)
         table = npg_chain[s]->options;
         name = npg_chain[s]->name;
     }
-    return NULL;
 }
 
 static const npg_option *find(const char *name, size_t *at)
