@@ -62,9 +62,7 @@ void npg_transform_back_ref(double dout[7], const double g[3], const double out[
                             npg_rotation rotation);
 /* index of the nearest of count points (count x 3), lowest index on ties. */
 size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *points, size_t count);
-/* cd and its gradient g (real x 3, overwritten) of one frame. */
-double npg_chamfer_ref(double *g, const double *x, size_t real, const double *points, size_t count, double alpha);
-/* The same with given correspondences. */
+/* cd and its gradient g (real x 3, overwritten) of one frame with given correspondences. */
 double npg_chamfer_pairs_ref(double *g, const double *x, size_t real, const double *points, size_t count,
                              const size_t *to_points, const size_t *to_verts, double alpha);
 /* Sum over edges of | |x_i - x_j| - rest |, gradient added to g. */
