@@ -38,7 +38,7 @@ static const npg_option ingest_options[] = {
      "the points of the frame before it, ignore takes numbers for mere names",
      NPG_OPTION_CHOICE, OFFSET(missing), "error", 0, 0, "error|skip|hold|ignore", NULL},
     {"cache-mib", "Memory for clouds that were read, so that the later passes need not parse files again",
-     NPG_OPTION_INT, OFFSET(cache_mib), "512", 0, 1048576, NULL, "MIB"},
+     NPG_OPTION_INT, OFFSET(cache_mib), "64", 0, 1048576, NULL, "MIB"},
     {0}};
 
 /* ---- files ---- */
