@@ -1,5 +1,5 @@
-# Bad input of neupig run: the documented exit code, a message with file, place and cause, nothing under a final
-# name; and what goes on where going on is asked for.
+# Selections, lists and standard input that neupig run refuses: the documented exit code, a message with file,
+# place and cause, nothing under a final name.  (Folders and files that are bad: run.bats.)
 
 setup() {
     cd "$BATS_TEST_TMPDIR"
@@ -19,44 +19,6 @@ refused() {
     [ "$status" -eq "$code" ]
     [[ "$output" == *"$words"* ]]
     [ ! -e out/done.json ] && [ ! -e out/report.json ] && [ ! -e out/reference.ply ]
-}
-
-@test "a missing folder, an empty one, one without clouds" {
-    mkdir empty other
-    echo hello > other/notes.md
-    refused 3 "nowhere: there is no such file or folder" nowhere
-    refused 3 "empty: no file here has a format that can be read" empty
-    refused 3 "other: no file here has a format that can be read" other
-}
-
-@test "a file that can't be read" {
-    ln -s /nowhere/at/all in/f4.ply
-    refused 3 "in/f4.ply: can't be read: No such file" in
-}
-
-@test "a truncated file" {
-    head -c 200 in/f2.ply > cut && mv cut in/f2.ply
-    refused 3 "in/f2.ply: " in
-}
-
-@test "headers that lie" {
-    for lie in 's/vertex 20/vertex -5/;line 3: negative count -5' \
-               's/vertex 20/vertex 4000000000/;claims 4000000000 of element "vertex"' \
-               's/vertex 20/vertex 19/;more data than the header declares' \
-               's/float y/quaternion y/;line 5: unknown type "quaternion"' \
-               's/float y/list uchar float y/;list property "y" in element vertex'; do
-        cp in/f2.ply kept
-        sed -i "${lie%%;*}" in/f2.ply
-        refused 3 "in/f2.ply: " in
-        [[ "$output" == *"${lie#*;}"* ]]
-        mv kept in/f2.ply
-    done
-}
-
-@test "a gap in the numbering" {
-    rm in/f2.ply
-    cp in/f3.ply in/f4.ply
-    refused 3 "in: 1 of 4 frames are missing: 2" in
 }
 
 @test "a selection that is malformed, or chooses nothing" {
