@@ -227,6 +227,7 @@ static npg_status do_passes(npg_run *run)
     if (!run->facts.is_live) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
+        if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
     }
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));
     npg_status status = conclude(run);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "choose.h"
 #include "clock.h"
 #include "mesh_clean.h"
 #include "mesh_tools.h"
@@ -98,15 +99,20 @@ static npg_status measure_points(making *m)
     return NPG_OK;
 }
 
+static npg_poisson_settings poisson_settings(npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    return (npg_poisson_settings){.depth = (int)s->depth,
+                                  .point_weight = s->point_weight,
+                                  .time_limit_s = (double)s->time_limit_s,
+                                  .memory_limit = (size_t)s->memory_limit_mib << 20,
+                                  .should_stop = should_stop,
+                                  .user = worker};
+}
+
 static npg_status reconstruct(making *m)
 {
-    const mesh_state *s = m->state;
-    npg_poisson_settings settings = {.depth = (int)s->depth,
-                                     .point_weight = s->point_weight,
-                                     .time_limit_s = (double)s->time_limit_s,
-                                     .memory_limit = (size_t)s->memory_limit_mib << 20,
-                                     .should_stop = should_stop,
-                                     .user = m->worker};
+    npg_poisson_settings settings = poisson_settings(m->worker);
     if (!m->frame->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t n = m->frame->point_count, turned;
@@ -300,11 +306,73 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
                             frame->path ? frame->path : "pushed");
 }
 
+/* ---- the choosing pass ---- */
+
+static void release_sights(void *thing)
+{
+    npg_sights_clear(thing);
+    npg_release(&thing);
+}
+
+static npg_status look_at(npg_worker *worker, npg_chunk *chunk)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_sights *sights = npg_worker_kept(worker);
+    if (!sights) {
+        NPG_TRY(npg_alloc(&sights, NPG_FOR_RUN, sizeof *sights));
+        npg_worker_keep(worker, sights, release_sights);
+    }
+    for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
+        const npg_frame *frame = npg_chunk_frame(chunk, i);
+        const npg_choice *choice = &facts->choice;
+        bool is_candidate = false;
+        for (size_t k = 0; k < choice->count; k++)
+            if (choice->frames[k] == frame->index) is_candidate = choice->is_candidate[k];
+        NPG_TRY(npg_sights_add(sights, frame, &facts->box, is_candidate));
+    }
+    return NPG_OK;
+}
+
+static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count, size_t best, double seconds)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < count; i++)
+        json_array_append_new(
+            list, json_pack("{sI sb sf sf sI sf}", "number", (json_int_t)fares[i].number, "made", fares[i].is_made,
+                            "point_dist_unit", fares[i].point_dist_unit, "stretched_share",
+                            fares[i].stretched_share, "handles", (json_int_t)fares[i].handles, "cost",
+                            fares[i].cost));
+    json_object_set_new(npg_worker_report(worker), "candidates", list);
+    json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
+    npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
+                   "is the keyframe, of %zu candidates (cost %.5f, %lld handles, %.2f %% stretched)", count,
+                   fares[best].cost, (long long)fares[best].handles, 100 * fares[best].stretched_share);
+}
+
+/* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */
+static npg_status choose_key(npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_fare fares[NPG_CHOICE_MAX];
+    size_t count, best;
+    double since = npg_clock_s();
+    if (npg_worker_pass(worker) != NPG_PASS_CHOOSE || facts->choice.candidate_count < 2) return NPG_OK;
+    if (*s->reference || !npg_worker_kept(worker)) return NPG_OK;
+    const npg_poisson_settings settings = poisson_settings(worker);
+    NPG_TRY(npg_choose(fares, &count, &best, npg_worker_kept(worker), facts->plan.key, &settings));
+    if (!count) return NPG_OK;
+    facts->plan.key = fares[best].index;
+    tell_choice(worker, fares, count, best, npg_clock_s() - since);
+    return NPG_OK;
+}
+
 /* ---- the stage ---- */
 
 static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     const npg_facts *facts = npg_worker_facts(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) return look_at(worker, *chunk);
     for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
@@ -327,8 +395,9 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
                                   .state_size = sizeof(mesh_state),
-                                  .passes = NPG_PASS_SOLVE,
+                                  .passes = NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,
+                                  .flush = choose_key,
                                   .memory = mesh_memory};

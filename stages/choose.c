@@ -1,0 +1,153 @@
+/* Choose: drafts of the candidates and what becomes of them in the other frames. */
+#include "choose.h"
+
+#include <math.h>
+
+#include "mesh_clean.h"
+#include "mesh_tools.h"
+#include "resurface.h"
+
+#define DRAFT_DEPTH  7
+#define DRAFT_FACES  4000
+#define STRETCHED    3.0  /* times its area in the candidate's frame */
+#define STRETCH_COST 0.1  /* unit lengths that a stretched area counts for */
+#define HANDLE_COST  0.05 /* share of the cost that a needless handle adds */
+#define CLEARLY_LESS 0.95 /* of the cost of the best-scored frame */
+
+static const npg_tracker_settings draft_tracking = {
+    .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
+
+/* ---- the draft ---- */
+
+static npg_status count_handles(int64_t *handles, const npg_mesh *closed)
+{
+    npg_manifold manifold;
+    NPG_TRY(npg_mesh_manifold(&manifold, closed));
+    int64_t euler = (int64_t)closed->vert_count - (int64_t)manifold.edge_count + (int64_t)closed->face_count;
+    *handles = euler < 2 ? (2 - euler) / 2 : 0;
+    return NPG_OK;
+}
+
+static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
+                             const npg_poisson_settings *settings)
+{
+    size_t turned, components;
+    double lost;
+    int rounds;
+    npg_mending mending;
+    NPG_TRY(npg_resurface(mesh, &turned, &rounds, normals, sight->points, sight->point_count, settings));
+    NPG_TRY(npg_mesh_keep_main(mesh, &components, &lost));
+    NPG_TRY(count_handles(handles, *mesh));
+    NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
+    NPG_TRY(npg_mesh_mend(mesh, &mending));
+    npg_mesh *m = *mesh;
+    NPG_TRY(npg_alloc_array(&m->vert_normals, NPG_FOR_MESH, m->vert_count, 3 * sizeof(float)));
+    npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
+    return NPG_OK;
+}
+
+static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight *sight,
+                             const npg_poisson_settings *settings)
+{
+    npg_poisson_settings quick = *settings;
+    float *normals;
+    *mesh = NULL;
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    NPG_TRY(npg_alloc_array(&normals, NPG_FOR_MESH, sight->point_count, 3 * sizeof(float)));
+    for (size_t i = 0; i < 3 * sight->point_count; i++) normals[i] = sight->normals[i];
+    npg_status status = draft_from(mesh, handles, sight, normals, &quick);
+    npg_release(&normals);
+    if (status) npg_mesh_unref(mesh);
+    return status;
+}
+
+/* ---- how it fares ---- */
+
+typedef struct faring {
+    const npg_mesh *mesh;
+    const npg_poisson_settings *settings; /* for the wish to stop */
+    double point_dist, stretched;
+    size_t frames;
+} faring;
+
+static npg_status see(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
+{
+    faring *f = user;
+    double area = 0, stretched = 0;
+    (void)sight;
+    if (f->settings->should_stop && f->settings->should_stop(f->settings->user))
+        return npg_error(NPG_STOPPED, "stopped while the keyframe was chosen");
+    for (size_t i = 0; i < f->mesh->face_count; i++) {
+        const uint32_t *face = f->mesh->faces + 3 * i;
+        double rest = npg_face_area(f->mesh->vert_pos, face), now = npg_face_area(vert_unit, face);
+        area += now;
+        if (now > STRETCHED * rest) stretched += now;
+    }
+    f->point_dist += tracked->point_dist_mean;
+    f->stretched += area > 0 ? stretched / area : 0;
+    f->frames++;
+    return NPG_OK;
+}
+
+static npg_status rate(npg_fare *fare, const npg_sights *sights, size_t at,
+                       const npg_poisson_settings *settings)
+{
+    npg_mesh *mesh;
+    NPG_TRY(make_draft(&mesh, &fare->handles, &sights->list[at], settings));
+    faring f = {.mesh = mesh, .settings = settings};
+    npg_status status = npg_sights_follow(sights, at, mesh, &draft_tracking, see, &f);
+    npg_mesh_unref(&mesh);
+    NPG_TRY(status);
+    fare->is_made = true;
+    fare->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
+    fare->stretched_share = f.stretched / fmax(1, (double)f.frames);
+    return NPG_OK;
+}
+
+/* A frame of which no surface can be made is no keyframe; that is no failure of the run. */
+static bool is_fatal(npg_status status)
+{
+    return status && status != NPG_BAD_INPUT && status != NPG_FAILED && status != NPG_DIVERGED;
+}
+
+/* ---- the choice ---- */
+
+static void add_up(npg_fare *fares, size_t count)
+{
+    int64_t fewest = INT64_MAX;
+    for (size_t i = 0; i < count; i++)
+        if (fares[i].is_made && fares[i].handles < fewest) fewest = fares[i].handles;
+    for (size_t i = 0; i < count; i++)
+        fares[i].cost = (fares[i].point_dist_unit + STRETCH_COST * fares[i].stretched_share) *
+                        (1 + HANDLE_COST * (double)(fares[i].handles - fewest));
+}
+
+static size_t cheapest(const npg_fare *fares, size_t count, int64_t best_scored)
+{
+    size_t best = count, scored = count;
+    for (size_t i = 0; i < count; i++) {
+        if (fares[i].index == best_scored) scored = i;
+        if (fares[i].is_made && (best == count || fares[i].cost < fares[best].cost)) best = i;
+    }
+    if (scored == count) return best == count ? 0 : best;
+    if (best == count) return scored;
+    bool stays = fares[scored].is_made && fares[best].cost > CLEARLY_LESS * fares[scored].cost;
+    return stays ? scored : best;
+}
+
+npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
+                      int64_t best_scored, const npg_poisson_settings *settings)
+{
+    *count = *best = 0;
+    for (size_t i = 0; i < sights->count; i++) {
+        const npg_sight *sight = &sights->list[i];
+        if (!sight->is_candidate || !sight->normals) continue;
+        npg_fare *fare = &fares[(*count)++];
+        *fare = (npg_fare){.index = sight->index, .number = sight->number};
+        npg_status status = rate(fare, sights, i, settings);
+        if (is_fatal(status)) return status;
+    }
+    add_up(fares, *count);
+    *best = cheapest(fares, *count, best_scored);
+    return NPG_OK;
+}

@@ -1,0 +1,33 @@
+/* Choose: which of the best-scored frames makes the reference, by what their surfaces would do in other
+ * frames.
+ *
+ * The paper's score (keyframe.c) counts cells that hold a point; it hardly tells frames apart and knows
+ * nothing of limbs that touch.  Here each candidate's points are made a draft surface, which the coarse
+ * tracker follows through the other frames (sights.h).  The cost of a candidate is
+ *
+ *     (mean distance of the frames' points from the surface + 0.1 * share of its area stretched threefold)
+ *     * (1 + 0.05 * handles it has more than the candidate with the fewest)
+ *
+ * in unit lengths: a weld keeps surface away from points, stretches where limbs part, and often makes a
+ * handle.  The frame with the best score stays the keyframe unless another is clearly cheaper. */
+#ifndef NPG_CHOOSE_H
+#define NPG_CHOOSE_H
+
+#include "poisson.h"
+#include "sights.h"
+
+typedef struct npg_fare {
+    int64_t index, number;
+    bool is_made;           /* false: no surface could be made or followed; the rest is 0 */
+    double point_dist_unit; /* mean over the other frames                              */
+    double stretched_share; /* of the area, mean over the other frames                 */
+    int64_t handles;        /* of the closed draft: (2 - Euler characteristic) / 2      */
+    double cost;
+} npg_fare;
+
+/* fares: room for as many as there are candidates; *count gets how many, *best which is chosen (its place in
+ * fares).  best_scored: index of the frame to stay with.  NPG_MEMORY, NPG_STOPPED. */
+npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
+                      int64_t best_scored, const npg_poisson_settings *settings);
+
+#endif
