@@ -12,6 +12,7 @@
 #include "resurface.h"
 #include "stage.h"
 #include "vdb.h"
+#include "weld.h"
 
 #define SEEN_SPACINGS    2.0  /* a place is seen when a point is nearer than this many spacings */
 #define UNSEEN_TOLERATED 0.02 /* of the area, before the user is told */
@@ -243,6 +244,41 @@ static npg_status make(making *m)
     return status;
 }
 
+/* ---- welds ---- */
+
+static void tell_welds(making *m, const npg_weld_cut *cut)
+{
+    note_count(m, "weld_frames", cut->frames);
+    note_count(m, "welds_cut", cut->patches);
+    note_count(m, "weld_faces_cut", cut->faces);
+    note(m, "weld_area_share", cut->area_share);
+    note_count(m, "welds_refused", cut->refused);
+    if (cut->patches)
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                       "%zu welds that other frames pull apart were cut: %zu faces, %.2f %% of the area", cut->patches,
+                       cut->faces, 100 * cut->area_share);
+    if (cut->refused)
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                       "%zu patches that other frames stretch could not be cut cleanly and stay", cut->refused);
+}
+
+/* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
+static npg_status cut_welds(making *m)
+{
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    npg_sights *sights = npg_worker_kept(m->worker);
+    npg_weld_settings settings = {.spacing_unit = m->spacing, .should_stop = should_stop, .user = m->worker};
+    npg_weld_cut done;
+    if (!sights || !facts->choice.cut_welds) return NPG_OK;
+    size_t at = npg_sights_find(sights, m->frame->index);
+    double since = npg_clock_s();
+    npg_status status = at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
+    if (!status && at < sights->count) tell_welds(m, &done);
+    note(m, "welds_s", npg_clock_s() - since);
+    npg_sights_clear(sights);
+    return status == NPG_DIVERGED ? NPG_OK : status;
+}
+
 /* ---- the user's own mesh ---- */
 
 static npg_status read_reference(making *m)
@@ -296,6 +332,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
     npg_box_local_to_unit(&facts->box, m.points, frame->pos_local, frame->point_count);
     npg_status status = measure_points(&m);
     if (!status) status = *m.state->reference ? read_reference(&m) : make(&m);
+    if (!status && !*m.state->reference) status = cut_welds(&m);
     if (!status) status = finish(&m);
     note(&m, "seconds", npg_clock_s() - since);
     npg_release(&m.points);

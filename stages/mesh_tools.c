@@ -42,7 +42,7 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
 
 /* A directed edge of a face, ordered by its undirected key. */
 typedef struct half_edge {
-    uint32_t lo, hi;
+    uint32_t lo, hi, at; /* at: the number of its corner, 3 f + k */
     int forward;
 } half_edge;
 
@@ -59,7 +59,7 @@ static npg_status sorted_half_edges(half_edge **out, const uint32_t *faces, size
     NPG_TRY(npg_alloc_array(&halves, NPG_FOR_MESH, face_count, 3 * sizeof *halves));
     for (size_t i = 0; i < 3 * face_count; i++) {
         uint32_t a = faces[i], b = faces[i - i % 3 + (i + 1) % 3];
-        halves[i] = (half_edge){a < b ? a : b, a < b ? b : a, a < b};
+        halves[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i, a < b};
     }
     if (face_count) qsort(halves, 3 * face_count, sizeof *halves, by_key);
     *out = halves;
@@ -82,6 +82,20 @@ npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint3
     }
     npg_release(&halves);
     return status;
+}
+
+npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count)
+{
+    half_edge *halves;
+    size_t count = 3 * face_count;
+    NPG_TRY(sorted_half_edges(&halves, faces, face_count));
+    for (size_t i = 0, next; i < count; i = next) {
+        for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
+        bool is_pair = next - i == 2 && halves[i].forward != halves[i + 1].forward;
+        for (size_t k = i; k < next; k++) twin[halves[k].at] = is_pair ? halves[2 * i + 1 - k].at : UINT32_MAX;
+    }
+    npg_release(&halves);
+    return NPG_OK;
 }
 
 static uint32_t root_of(uint32_t *parent, uint32_t i)
