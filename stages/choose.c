@@ -3,16 +3,19 @@
 
 #include <math.h>
 
+#include "contact.h"
 #include "mesh_clean.h"
 #include "mesh_tools.h"
 #include "resurface.h"
 
 #define DRAFT_DEPTH  7
+#define DRAFT_ROUNDS 2
 #define DRAFT_FACES  4000
 #define STRETCHED    3.0  /* times its area in the candidate's frame */
-#define STRETCH_COST 0.1  /* unit lengths that a stretched area counts for */
+#define STRETCH_COST 0.2  /* unit lengths that a stretched area counts for */
+#define CONTACT_COST 0.1  /* unit lengths that a point in contact counts for */
 #define HANDLE_COST  0.05 /* share of the cost that a needless handle adds */
-#define CLEARLY_LESS 0.95 /* of the cost of the best-scored frame */
+#define CLEARLY_LESS 0.97 /* of the cost of the best-scored frame */
 
 static const npg_tracker_settings draft_tracking = {
     .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
@@ -31,11 +34,13 @@ static npg_status count_handles(int64_t *handles, const npg_mesh *closed)
 static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
                              const npg_poisson_settings *settings)
 {
-    size_t turned, components;
-    double lost;
+    size_t moved, turned, components;
+    double lost, spacing;
     int rounds;
     npg_mending mending;
-    NPG_TRY(npg_resurface(mesh, &turned, &rounds, normals, sight->points, sight->point_count, settings));
+    NPG_TRY(npg_cloud_spacing(&spacing, sight->points, sight->point_count));
+    NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, sight->points, sight->point_count,
+                                spacing, settings));
     NPG_TRY(npg_mesh_keep_main(mesh, &components, &lost));
     NPG_TRY(count_handles(handles, *mesh));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
@@ -53,6 +58,7 @@ static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight 
     float *normals;
     *mesh = NULL;
     if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    quick.rounds_max = DRAFT_ROUNDS;
     NPG_TRY(npg_alloc_array(&normals, NPG_FOR_MESH, sight->point_count, 3 * sizeof(float)));
     for (size_t i = 0; i < 3 * sight->point_count; i++) normals[i] = sight->normals[i];
     npg_status status = draft_from(mesh, handles, sight, normals, &quick);
@@ -66,15 +72,15 @@ static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight 
 typedef struct faring {
     const npg_mesh *mesh;
     const npg_poisson_settings *settings; /* for the wish to stop */
-    double point_dist, stretched;
+    double point_dist, vert_dist, stretched;
     size_t frames;
+    float *dist; /* V, owned */
 } faring;
 
 static npg_status see(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
 {
     faring *f = user;
-    double area = 0, stretched = 0;
-    (void)sight;
+    double area = 0, stretched = 0, dist = 0;
     if (f->settings->should_stop && f->settings->should_stop(f->settings->user))
         return npg_error(NPG_STOPPED, "stopped while the keyframe was chosen");
     for (size_t i = 0; i < f->mesh->face_count; i++) {
@@ -83,6 +89,9 @@ static npg_status see(void *user, const npg_sight *sight, const float *vert_unit
         area += now;
         if (now > STRETCHED * rest) stretched += now;
     }
+    NPG_TRY(npg_points_dist(f->dist, vert_unit, f->mesh->vert_count, sight->points, sight->point_count));
+    for (size_t v = 0; v < f->mesh->vert_count; v++) dist += (double)f->dist[v];
+    f->vert_dist += dist / (double)f->mesh->vert_count;
     f->point_dist += tracked->point_dist_mean;
     f->stretched += area > 0 ? stretched / area : 0;
     f->frames++;
@@ -93,13 +102,18 @@ static npg_status rate(npg_fare *fare, const npg_sights *sights, size_t at,
                        const npg_poisson_settings *settings)
 {
     npg_mesh *mesh;
-    NPG_TRY(make_draft(&mesh, &fare->handles, &sights->list[at], settings));
+    const npg_sight *own = &sights->list[at];
+    NPG_TRY(npg_cloud_contact(&fare->contact, own->points, own->normals, own->point_count));
+    NPG_TRY(make_draft(&mesh, &fare->handles, own, settings));
     faring f = {.mesh = mesh, .settings = settings};
-    npg_status status = npg_sights_follow(sights, at, mesh, &draft_tracking, see, &f);
+    npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, mesh->vert_count, sizeof *f.dist);
+    if (!status) status = npg_sights_follow(sights, at, mesh, &draft_tracking, see, &f);
+    npg_release(&f.dist);
     npg_mesh_unref(&mesh);
     NPG_TRY(status);
     fare->is_made = true;
     fare->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
+    fare->vert_dist_unit = f.vert_dist / fmax(1, (double)f.frames);
     fare->stretched_share = f.stretched / fmax(1, (double)f.frames);
     return NPG_OK;
 }
@@ -118,7 +132,8 @@ static void add_up(npg_fare *fares, size_t count)
     for (size_t i = 0; i < count; i++)
         if (fares[i].is_made && fares[i].handles < fewest) fewest = fares[i].handles;
     for (size_t i = 0; i < count; i++)
-        fares[i].cost = (fares[i].point_dist_unit + STRETCH_COST * fares[i].stretched_share) *
+        fares[i].cost = (fares[i].point_dist_unit + fares[i].vert_dist_unit +
+                         STRETCH_COST * fares[i].stretched_share + CONTACT_COST * fares[i].contact) *
                         (1 + HANDLE_COST * (double)(fares[i].handles - fewest));
 }
 

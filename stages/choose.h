@@ -5,11 +5,14 @@
  * nothing of limbs that touch.  Here each candidate's points are made a draft surface, which the coarse
  * tracker follows through the other frames (sights.h).  The cost of a candidate is
  *
- *     (mean distance of the frames' points from the surface + 0.1 * share of its area stretched threefold)
+ *     (mean distance of points from the surface + mean distance of the surface's vertices from points
+ *      + 0.2 * share of its area stretched threefold + 0.1 * share of points in contact)
  *     * (1 + 0.05 * handles it has more than the candidate with the fewest)
  *
- * in unit lengths: a weld keeps surface away from points, stretches where limbs part, and often makes a
- * handle.  The frame with the best score stays the keyframe unless another is clearly cheaper. */
+ * lengths in units; the first three are means over the other frames, contact is that of its own points
+ * (contact.h).  A weld keeps surface away from points, stretches where limbs part, and often makes a handle;
+ * contact tells of welds that the coarse tracker does not feel.  The frame with the best score stays the
+ * keyframe unless another is clearly cheaper. */
 #ifndef NPG_CHOOSE_H
 #define NPG_CHOOSE_H
 
@@ -19,8 +22,10 @@
 typedef struct npg_fare {
     int64_t index, number;
     bool is_made;           /* false: no surface could be made or followed; the rest is 0 */
-    double point_dist_unit; /* mean over the other frames                              */
+    double point_dist_unit; /* points -> surface, mean over the other frames           */
+    double vert_dist_unit;  /* vertices -> points, mean over the other frames          */
     double stretched_share; /* of the area, mean over the other frames                 */
+    double contact;         /* share of its own points                                 */
     int64_t handles;        /* of the closed draft: (2 - Euler characteristic) / 2      */
     double cost;
 } npg_fare;

@@ -2,7 +2,6 @@
 #include "contact.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <string.h>
 
 #include "kdtree.h"
@@ -13,7 +12,7 @@
 #define AGAINST     (-0.3f) /* cosine of two normals that face each other */
 #define ACROSS      0.5f    /* cosine of a normal and the way across the gap */
 
-static bool is_facing(const float *p, const float *n, const float *q, const float *m)
+bool npg_points_face(const float *p, const float *n, const float *q, const float *m)
 {
     float d[3], along_n = 0, along_m = 0, cosine = 0, length = 0;
     for (int a = 0; a < 3; a++) {
@@ -53,7 +52,7 @@ npg_status npg_cloud_contact(double *share, const float *points, const float *no
         size_t k = 0;
         while (k < NEIGHBOURS) {
             size_t j = near[NEIGHBOURS * i + k];
-            if (j < count && is_facing(p + 3 * i, n + 3 * i, p + 3 * j, n + 3 * j)) break;
+            if (j < count && npg_points_face(p + 3 * i, n + 3 * i, p + 3 * j, n + 3 * j)) break;
             k++;
         }
         facing += k < NEIGHBOURS;

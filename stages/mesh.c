@@ -116,11 +116,12 @@ static npg_status reconstruct(making *m)
     npg_poisson_settings settings = poisson_settings(m->worker);
     if (!m->frame->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
-    size_t n = m->frame->point_count, turned;
+    size_t n = m->frame->point_count, turned, moved;
     int rounds;
     NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, n, 3 * sizeof(float)));
     memcpy(m->normals, m->frame->normals, n * 3 * sizeof(float));
-    NPG_TRY(npg_resurface(&m->mesh, &turned, &rounds, m->normals, m->points, n, &settings));
+    NPG_TRY(npg_resurface_apart(&m->mesh, &moved, &turned, &rounds, m->normals, m->points, n, m->spacing, &settings));
+    note_count(m, "points_held_apart", moved);
     note_count(m, "poisson_rounds", (size_t)rounds);
     note_count(m, "normals_turned", turned);
     note(m, "poisson_s", npg_clock_s() - since);
@@ -375,15 +376,15 @@ static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count,
     json_t *list = json_array();
     for (size_t i = 0; i < count; i++)
         json_array_append_new(
-            list, json_pack("{sI sb sf sf sI sf}", "number", (json_int_t)fares[i].number, "made", fares[i].is_made,
-                            "point_dist_unit", fares[i].point_dist_unit, "stretched_share",
-                            fares[i].stretched_share, "handles", (json_int_t)fares[i].handles, "cost",
-                            fares[i].cost));
+            list, json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number, "made",
+                            fares[i].is_made, "point_dist_unit", fares[i].point_dist_unit, "vert_dist_unit",
+                            fares[i].vert_dist_unit, "stretched_share", fares[i].stretched_share, "contact",
+                            fares[i].contact, "handles", (json_int_t)fares[i].handles, "cost", fares[i].cost));
     json_object_set_new(npg_worker_report(worker), "candidates", list);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
     npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
-                   "is the keyframe, of %zu candidates (cost %.5f, %lld handles, %.2f %% stretched)", count,
-                   fares[best].cost, (long long)fares[best].handles, 100 * fares[best].stretched_share);
+                   "is the keyframe, of %zu candidates (cost %.5f; %.2f %% of its points in contact)", count,
+                   fares[best].cost, 100 * fares[best].contact);
 }
 
 /* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */

@@ -11,8 +11,8 @@
 
 #define SPACING_NEIGHBOUR 8
 
-static npg_status nearest_dist(float *dist, const float *queries, size_t query_count, const float *points,
-                               size_t point_count)
+npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
+                           size_t point_count)
 {
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
@@ -29,7 +29,7 @@ done:
 
 npg_status npg_mesh_point_dist(float *dist, const npg_mesh *mesh, const float *points, size_t point_count)
 {
-    return nearest_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
+    return npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
 }
 
 static int by_value(const void *a, const void *b)

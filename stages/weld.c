@@ -15,6 +15,7 @@
 #define FRAMES_LEAST 3   /* that speak against a face                                  */
 #define SEEDS_LEAST  2   /* faces of a patch that are spoken against                   */
 #define SAVED_LEAST  0.7 /* the new faces' area, at most, of the patch in its worst pose */
+#define LOOPS_LEAST  2   /* of its border: a tube between two parts; a cap or a crease is left */
 #define PATCH_MOST   0.1 /* of the faces: more is no weld but a surface that fits nowhere */
 
 static const npg_tracker_settings weld_tracking = {
@@ -218,10 +219,11 @@ typedef struct cutting {
 } cutting;
 
 /* Fill every loop of the border; *area of all. */
-static npg_status fill_loops(cutting *c, double *area, bool *is_filled, const float *pose)
+static npg_status fill_loops(cutting *c, double *area, size_t *loop_count, bool *is_filled, const float *pose)
 {
     const npg_mesh *mesh = c->hearing->mesh;
     *area = 0;
+    *loop_count = 0;
     *is_filled = true;
     for (size_t v = 0; v < mesh->vert_count && *is_filled; v++) {
         size_t count = 0;
@@ -240,6 +242,7 @@ static npg_status fill_loops(cutting *c, double *area, bool *is_filled, const fl
                               c->edge_count));
         c->new_count += count - 2;
         *area += this_area;
+        ++*loop_count;
     }
     return NPG_OK;
 }
@@ -258,33 +261,6 @@ static bool is_worth(const cutting *c, uint32_t patch)
         dist += h->dist_sum[v] / (double)h->frames;
     }
     return seeds >= SEEDS_LEAST && dist < FAR_SPACINGS * h->settings->spacing_unit * (double)border;
-}
-
-static npg_status cut_patch(cutting *c, npg_weld_cut *done, uint32_t patch)
-{
-    const npg_mesh *mesh = c->hearing->mesh;
-    const float *pose = NULL;
-    size_t border_count, before = c->new_count;
-    double area = 0, worst;
-    bool is_filled = false;
-    memset(c->next, 0xff, mesh->vert_count * sizeof *c->next);
-    if (link_border(c->next, &border_count, mesh, c->patches, patch, c->twin) && is_worth(c, patch)) {
-        worst = worst_pose(&pose, c->hearing, c->patches, patch);
-        NPG_TRY(fill_loops(c, &area, &is_filled, pose));
-        is_filled = is_filled && area < SAVED_LEAST * worst;
-    }
-    if (!is_filled) {
-        c->new_count = before;
-        done->refused++;
-        return NPG_OK;
-    }
-    done->patches++;
-    for (size_t f = 0; f < mesh->face_count; f++)
-        if (c->patches->of_face[f] == patch) {
-            c->is_cut[f] = 1;
-            done->faces++;
-        }
-    return NPG_OK;
 }
 
 /* ---- all of them ---- */
@@ -349,6 +325,58 @@ static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *
     return NPG_OK;
 }
 
+/* Mark the patch's faces as cut or not; returns how many there are. */
+static size_t mark_cut(cutting *c, uint32_t patch, uint8_t value)
+{
+    size_t count = 0;
+    for (size_t f = 0; f < c->hearing->mesh->face_count; f++) {
+        if (c->patches->of_face[f] != patch) continue;
+        c->is_cut[f] = value;
+        count++;
+    }
+    return count;
+}
+
+static npg_status try_patch(bool *is_cut, cutting *c, const npg_weld_cut *done, uint32_t patch)
+{
+    const npg_mesh *mesh = c->hearing->mesh;
+    const float *pose = NULL;
+    size_t border_count, loop_count;
+    double area;
+    *is_cut = false;
+    memset(c->next, 0xff, mesh->vert_count * sizeof *c->next);
+    if (!link_border(c->next, &border_count, mesh, c->patches, patch, c->twin) || !is_worth(c, patch))
+        return NPG_OK;
+    double worst = worst_pose(&pose, c->hearing, c->patches, patch);
+    NPG_TRY(fill_loops(c, &area, &loop_count, is_cut, pose));
+    *is_cut = *is_cut && loop_count >= LOOPS_LEAST && area < SAVED_LEAST * worst;
+    if (!*is_cut) return NPG_OK;
+    npg_mesh *after;
+    size_t count = done->faces + mark_cut(c, patch, 1);
+    *is_cut = (double)count <= PATCH_MOST * (double)mesh->face_count;
+    if (!*is_cut) return NPG_OK;
+    NPG_TRY(rebuild(&after, c, count));
+    npg_status status = is_as_good(is_cut, mesh, after);
+    npg_mesh_unref(&after);
+    return status;
+}
+
+static npg_status cut_patch(cutting *c, npg_weld_cut *done, uint32_t patch)
+{
+    size_t before = c->new_count;
+    bool is_cut;
+    NPG_TRY(try_patch(&is_cut, c, done, patch));
+    size_t count = mark_cut(c, patch, is_cut);
+    if (is_cut) {
+        done->patches++;
+        done->faces += count;
+    } else {
+        c->new_count = before;
+        done->refused++;
+    }
+    return NPG_OK;
+}
+
 static double cut_area(const cutting *c)
 {
     const npg_mesh *mesh = c->hearing->mesh;
@@ -364,21 +392,12 @@ static double cut_area(const cutting *c)
 static npg_status replace(npg_mesh **mesh, npg_weld_cut *done, const cutting *c)
 {
     npg_mesh *after;
-    bool good = false;
     if (!done->patches) return NPG_OK;
     done->area_share = cut_area(c);
     NPG_TRY(rebuild(&after, c, done->faces));
-    npg_status status = is_as_good(&good, *mesh, after);
-    if (!status && good && done->faces <= PATCH_MOST * (double)(*mesh)->face_count) {
-        npg_mesh_unref(mesh);
-        *mesh = after;
-        return NPG_OK;
-    }
-    npg_mesh_unref(&after);
-    done->refused += done->patches;
-    done->patches = done->faces = 0;
-    done->area_share = 0;
-    return status;
+    npg_mesh_unref(mesh);
+    *mesh = after;
+    return NPG_OK;
 }
 
 static npg_status cut(npg_mesh **mesh, npg_weld_cut *done, const hearing *h)
