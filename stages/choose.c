@@ -9,12 +9,13 @@
 #include "resurface.h"
 
 #define DRAFT_DEPTH  7
-#define DRAFT_ROUNDS 2
+#define DRAFT_ROUNDS 1
 #define DRAFT_FACES  4000
 #define STRETCHED    3.0  /* times its area in the candidate's frame */
 #define STRETCH_COST 0.2  /* unit lengths that a stretched area counts for */
 #define CONTACT_COST 0.1  /* unit lengths that a point in contact counts for */
 #define HANDLE_COST  0.05 /* share of the cost that a needless handle adds */
+#define MIDDLE_COST  0.3  /* share of the cost that the capture's whole length from the middle adds */
 #define CLEARLY_LESS 0.97 /* of the cost of the best-scored frame */
 
 static const npg_tracker_settings draft_tracking = {
@@ -126,15 +127,18 @@ static bool is_fatal(npg_status status)
 
 /* ---- the choice ---- */
 
-static void add_up(npg_fare *fares, size_t count)
+static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
 {
     int64_t fewest = INT64_MAX;
     for (size_t i = 0; i < count; i++)
         if (fares[i].is_made && fares[i].handles < fewest) fewest = fares[i].handles;
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
+        double off = (double)fares[i].index / (double)frame_count - 0.5;
         fares[i].cost = (fares[i].point_dist_unit + fares[i].vert_dist_unit +
                          STRETCH_COST * fares[i].stretched_share + CONTACT_COST * fares[i].contact) *
-                        (1 + HANDLE_COST * (double)(fares[i].handles - fewest));
+                        (1 + HANDLE_COST * (double)(fares[i].handles - fewest)) *
+                        (1 + MIDDLE_COST * off * off);
+    }
 }
 
 static size_t cheapest(const npg_fare *fares, size_t count, int64_t best_scored)
@@ -151,7 +155,7 @@ static size_t cheapest(const npg_fare *fares, size_t count, int64_t best_scored)
 }
 
 npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
-                      int64_t best_scored, const npg_poisson_settings *settings)
+                      int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings)
 {
     *count = *best = 0;
     for (size_t i = 0; i < sights->count; i++) {
@@ -162,7 +166,7 @@ npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_si
         npg_status status = rate(fare, sights, i, settings);
         if (is_fatal(status)) return status;
     }
-    add_up(fares, *count);
+    add_up(fares, *count, frame_count);
     *best = cheapest(fares, *count, best_scored);
     return NPG_OK;
 }

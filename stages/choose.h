@@ -8,6 +8,7 @@
  *     (mean distance of points from the surface + mean distance of the surface's vertices from points
  *      + 0.2 * share of its area stretched threefold + 0.1 * share of points in contact)
  *     * (1 + 0.05 * handles it has more than the candidate with the fewest)
+ *     * (1 + 0.3 * (frames from the middle / frames of the capture)^2)
  *
  * lengths in units; the first three are means over the other frames, contact is that of its own points
  * (contact.h).  A weld keeps surface away from points, stretches where limbs part, and often makes a handle;
@@ -30,9 +31,10 @@ typedef struct npg_fare {
     double cost;
 } npg_fare;
 
-/* fares: room for as many as there are candidates; *count gets how many, *best which is chosen (its place in
- * fares).  best_scored: index of the frame to stay with.  NPG_MEMORY, NPG_STOPPED. */
+/* frame_count: of the capture.  fares: room for as many as there are candidates; *count gets how many, *best
+ * which is chosen (its place in fares).  best_scored: index of the frame to stay with.  NPG_MEMORY,
+ * NPG_STOPPED. */
 npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
-                      int64_t best_scored, const npg_poisson_settings *settings);
+                      int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings);
 
 #endif

@@ -398,7 +398,8 @@ static npg_status choose_key(npg_worker *worker)
     if (npg_worker_pass(worker) != NPG_PASS_CHOOSE || facts->choice.candidate_count < 2) return NPG_OK;
     if (*s->reference || !npg_worker_kept(worker)) return NPG_OK;
     const npg_poisson_settings settings = poisson_settings(worker);
-    NPG_TRY(npg_choose(fares, &count, &best, npg_worker_kept(worker), facts->plan.key, &settings));
+    NPG_TRY(npg_choose(fares, &count, &best, npg_worker_kept(worker), facts->plan.key, facts->frame_count,
+                       &settings));
     if (!count) return NPG_OK;
     facts->plan.key = fares[best].index;
     tell_choice(worker, fares, count, best, npg_clock_s() - since);
