@@ -14,9 +14,12 @@
 #define EXPLAINED    0.5 /* spacings from points to surface, in a frame that is heard  */
 #define FRAMES_LEAST 3   /* that speak against a face                                  */
 #define SEEDS_LEAST  2   /* faces of a patch that are spoken against                   */
+#define BORDER_NEAR  0.7 /* times the faces' distance from the points, for the border around them */
 #define SAVED_LEAST  0.7 /* the new faces' area, at most, of the patch in its worst pose */
 #define LOOPS_LEAST  2   /* of its border: a tube between two parts; a cap or a crease is left */
-#define PATCH_MOST   0.1 /* of the faces: more is no weld but a surface that fits nowhere */
+#define TIDY_ROUNDS  10
+#define ISLAND_MOST  0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
+#define PATCH_MOST   0.2  /* of the faces: more is no weld but a surface that fits nowhere */
 
 static const npg_tracker_settings weld_tracking = {
     .nodes = 250, .samples = 2000, .steps = 12, .stiffness = 0.01, .along = 0.1};
@@ -157,6 +160,60 @@ done:
     return status;
 }
 
+/* Take in what is left inside a patch: pieces of the rest that are small. */
+static npg_status take_islands(patches *p, const npg_mesh *mesh)
+{
+    uint32_t *rest = NULL, *component = NULL;
+    size_t *size = NULL, count = 0, components;
+    npg_status status;
+    NPG_TRY_OR(done, status, npg_alloc_array(&rest, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *rest));
+    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
+    NPG_TRY_OR(done, status, npg_alloc_array(&size, NPG_FOR_MESH, mesh->vert_count, sizeof *size));
+    for (size_t f = 0; f < mesh->face_count; f++)
+        if (!p->is_in[f]) memcpy(rest + 3 * count++, mesh->faces + 3 * f, 3 * sizeof *rest);
+    NPG_TRY_OR(done, status, npg_mesh_components(component, &components, mesh->vert_count, rest, count));
+    for (size_t f = 0; f < count; f++) size[component[rest[3 * f]]]++;
+    for (size_t f = 0; f < mesh->face_count; f++)
+        if (!p->is_in[f] &&
+            (double)size[component[mesh->faces[3 * f]]] < ISLAND_MOST * (double)mesh->face_count)
+            p->is_in[f] = 1;
+done:
+    npg_release(&rest);
+    npg_release(&component);
+    npg_release(&size);
+    return status;
+}
+
+/* Where a border passes a vertex twice, take in all faces around it.  Returns how many such vertices there
+ * were. */
+static size_t take_pinches(patches *p, const npg_mesh *mesh, const uint32_t *twin)
+{
+    size_t pinches = 0;
+    memset(p->is_near, 0, mesh->vert_count);
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (!p->is_in[i / 3] || twin[i] == UINT32_MAX || p->is_in[twin[i] / 3]) continue;
+        pinches += p->is_near[mesh->faces[i]] == 1;
+        if (p->is_near[mesh->faces[i]] < 2) p->is_near[mesh->faces[i]]++;
+    }
+    for (size_t i = 0; i < 3 * mesh->face_count; i++)
+        if (p->is_near[mesh->faces[i]] == 2) p->is_in[i / 3] = 1;
+    return pinches;
+}
+
+/* Make the borders simple loops. */
+static npg_status tidy(patches *p, const npg_mesh *mesh)
+{
+    uint32_t *twin;
+    NPG_TRY(npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
+    npg_status status = npg_mesh_twins(twin, mesh->faces, mesh->face_count);
+    for (int round = 0; round < TIDY_ROUNDS && !status; round++) {
+        status = take_islands(p, mesh);
+        if (!status && !take_pinches(p, mesh, twin)) break;
+    }
+    npg_release(&twin);
+    return status;
+}
+
 static npg_status gather(patches *p, const hearing *h)
 {
     const npg_mesh *mesh = h->mesh;
@@ -168,6 +225,7 @@ static npg_status gather(patches *p, const hearing *h)
     for (size_t f = 0; f < mesh->face_count; f++) seeds += p->is_in[f] = h->against[f] >= FRAMES_LEAST;
     if (!seeds) return NPG_OK;
     widen(p, mesh);
+    NPG_TRY(tidy(p, mesh));
     return number_patches(p, mesh);
 }
 
@@ -247,20 +305,24 @@ static npg_status fill_loops(cutting *c, double *area, size_t *loop_count, bool 
     return NPG_OK;
 }
 
+/* Enough faces that are spoken against, and a border that lies much nearer the points than they do. */
 static bool is_worth(const cutting *c, uint32_t patch)
 {
     const hearing *h = c->hearing;
     const patches *p = c->patches;
     size_t seeds = 0, border = 0;
-    double dist = 0;
-    for (size_t f = 0; f < h->mesh->face_count; f++)
-        seeds += p->of_face[f] == patch && h->against[f] >= FRAMES_LEAST;
+    double border_dist = 0, seed_dist = 0;
+    for (size_t f = 0; f < h->mesh->face_count; f++) {
+        if (p->of_face[f] != patch || h->against[f] < FRAMES_LEAST) continue;
+        seeds++;
+        for (size_t k = 0; k < 3; k++) seed_dist += h->dist_sum[h->mesh->faces[3 * f + k]] / 3;
+    }
     for (size_t v = 0; v < h->mesh->vert_count; v++) {
         if (c->next[v] == UINT32_MAX) continue;
         border++;
-        dist += h->dist_sum[v] / (double)h->frames;
+        border_dist += h->dist_sum[v];
     }
-    return seeds >= SEEDS_LEAST && dist < FAR_SPACINGS * h->settings->spacing_unit * (double)border;
+    return seeds >= SEEDS_LEAST && border_dist * (double)seeds < BORDER_NEAR * seed_dist * (double)border;
 }
 
 /* ---- all of them ---- */
