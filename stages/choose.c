@@ -23,15 +23,6 @@ static const npg_tracker_settings draft_tracking = {
 
 /* ---- the draft ---- */
 
-static npg_status count_handles(int64_t *handles, const npg_mesh *closed)
-{
-    npg_manifold manifold;
-    NPG_TRY(npg_mesh_manifold(&manifold, closed));
-    int64_t euler = (int64_t)closed->vert_count - (int64_t)manifold.edge_count + (int64_t)closed->face_count;
-    *handles = euler < 2 ? (2 - euler) / 2 : 0;
-    return NPG_OK;
-}
-
 static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
                              const npg_poisson_settings *settings)
 {
@@ -43,7 +34,7 @@ static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight 
     NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, sight->points, sight->point_count,
                                 spacing, settings));
     NPG_TRY(npg_mesh_keep_main(mesh, &components, &lost));
-    NPG_TRY(count_handles(handles, *mesh));
+    NPG_TRY(npg_mesh_handles(handles, *mesh));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
     NPG_TRY(npg_mesh_mend(mesh, &mending));
     npg_mesh *m = *mesh;

@@ -27,7 +27,7 @@ typedef struct npg_fare {
     double vert_dist_unit;  /* vertices -> points, mean over the other frames          */
     double stretched_share; /* of the area, mean over the other frames                 */
     double contact;         /* share of its own points                                 */
-    int64_t handles;        /* of the closed draft: (2 - Euler characteristic) / 2      */
+    int64_t handles;        /* of the closed draft                                   */
     double cost;
 } npg_fare;
 

@@ -249,6 +249,7 @@ static npg_status make(making *m)
 
 static void tell_welds(making *m, const npg_weld_cut *cut)
 {
+    note(m, "handles", (double)cut->handles);
     note_count(m, "weld_frames", cut->frames);
     note_count(m, "welds_cut", cut->patches);
     note_count(m, "weld_faces_cut", cut->faces);

@@ -183,6 +183,54 @@ npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh)
     return status;
 }
 
+/* Border loops: what the border's edges, as flat faces, are connected to. */
+static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
+{
+    uint32_t *twin = NULL, *flat = NULL, *component = NULL;
+    size_t count = 0, pieces, border_verts = 0, n = mesh->vert_count;
+    npg_status status;
+    *loops = 0;
+    NPG_TRY_OR(done, status, npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
+    NPG_TRY_OR(done, status, npg_alloc_array(&flat, NPG_FOR_MESH, 3 * mesh->face_count, 3 * sizeof *flat));
+    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, n, sizeof *component));
+    NPG_TRY_OR(done, status, npg_mesh_twins(twin, mesh->faces, mesh->face_count));
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (twin[i] != UINT32_MAX) continue;
+        flat[3 * count] = flat[3 * count + 1] = mesh->faces[i];
+        flat[3 * count++ + 2] = mesh->faces[i - i % 3 + (i + 1) % 3];
+    }
+    NPG_TRY_OR(done, status, npg_mesh_components(component, &pieces, n, flat, count));
+    memset(component, 0, n * sizeof *component);
+    for (size_t i = 0; i < 3 * count; i++) {
+        border_verts += component[flat[i]] == 0;
+        component[flat[i]] = 1;
+    }
+    *loops = pieces + border_verts - n; /* every other vertex is a piece of its own */
+done:
+    npg_release(&twin);
+    npg_release(&flat);
+    npg_release(&component);
+    return status;
+}
+
+npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    uint32_t *component;
+    size_t components, loops;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(count_border_loops(&loops, mesh));
+    NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
+    npg_status status =
+        npg_mesh_components(component, &components, mesh->vert_count, mesh->faces, mesh->face_count);
+    npg_release(&component);
+    NPG_TRY(status);
+    int64_t unused = (int64_t)manifold.unused_vertices;
+    int64_t euler = (int64_t)mesh->vert_count - unused - (int64_t)manifold.edge_count + (int64_t)mesh->face_count;
+    *handles = (2 * ((int64_t)components - unused) - euler - (int64_t)loops) / 2;
+    return NPG_OK;
+}
+
 static void copy_vertex(npg_mesh *out, size_t to, const npg_mesh *mesh, size_t from)
 {
     memcpy(out->vert_pos + 3 * to, mesh->vert_pos + 3 * from, 3 * sizeof(float));

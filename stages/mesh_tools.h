@@ -36,6 +36,9 @@ typedef struct npg_manifold {
 } npg_manifold;
 npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh);
 
+/* Handles of all components together, by Euler: (2 components - vertices + edges - faces - border loops) / 2. */
+npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
+
 /* Keep the faces whose keep_face is not 0 and the vertices they use, in order.  Vertex data goes with them.
  */
 npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);

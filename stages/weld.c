@@ -482,6 +482,8 @@ npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_sight
     hearing h = {.settings = settings};
     *done = (npg_weld_cut){0};
     NPG_REQUIRE(at < sights->count && settings->spacing_unit > 0);
+    NPG_TRY(npg_mesh_handles(&done->handles, *mesh));
+    if (done->handles < 1) return NPG_OK;
     NPG_TRY(npg_mesh_copy(&followed, *mesh));
     h.mesh = followed;
     npg_release(&followed->vert_normals);
