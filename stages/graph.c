@@ -25,7 +25,8 @@ typedef struct walk {
 static float edge_length(const npg_mesh *mesh, uint32_t a, uint32_t b)
 {
     const float *p = mesh->vert_pos + 3 * (size_t)a, *q = mesh->vert_pos + 3 * (size_t)b;
-    return sqrtf((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
+    return sqrtf((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
+                 (p[2] - q[2]) * (p[2] - q[2]));
 }
 
 static void fill_neighbours(walk *w, const npg_mesh *mesh, const uint32_t (*edges)[2], size_t edge_count)
@@ -155,7 +156,8 @@ static void turn_to_weights(npg_graph *graph)
     }
 }
 
-/* Vertices in order become nodes unless an earlier node is within a radius; every node then offers itself around. */
+/* Vertices in order become nodes unless an earlier node is within a radius; every node then offers itself
+ * around. */
 static npg_status choose_nodes(npg_graph *graph, walk *w, const npg_mesh *mesh)
 {
     size_t capacity = 0;
@@ -164,7 +166,8 @@ static npg_status choose_nodes(npg_graph *graph, walk *w, const npg_mesh *mesh)
     npg_status status = NPG_OK;
     for (size_t v = 0; v < mesh->vert_count && !status; v++) {
         if (covered[v]) continue;
-        status = npg_grow(&graph->node_pos, &capacity, graph->node_count + 1, 3 * sizeof(float), NPG_FOR_MESH);
+        status =
+            npg_grow(&graph->node_pos, &capacity, graph->node_count + 1, 3 * sizeof(float), NPG_FOR_MESH);
         if (status) break;
         memcpy(graph->node_pos + 3 * graph->node_count, mesh->vert_pos + 3 * v, 3 * sizeof(float));
         walk_from(w, (uint32_t)v, (float)(REACH * graph->radius));
@@ -262,7 +265,8 @@ void npg_pose_point(double out[3], const npg_graph *graph, const double *pose, c
         double d[3], w = (double)weights[b];
         for (int i = 0; i < 3; i++) d[i] = (double)rest[i] - (double)g[i];
         for (int i = 0; i < 3; i++)
-            out[i] += w * (p[3 * i] * d[0] + p[3 * i + 1] * d[1] + p[3 * i + 2] * d[2] + (double)g[i] + p[9 + i]);
+            out[i] +=
+                w * (p[3 * i] * d[0] + p[3 * i + 1] * d[1] + p[3 * i + 2] * d[2] + (double)g[i] + p[9 + i]);
     }
 }
 
