@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "clock.h"
@@ -38,6 +39,14 @@ json_t *npg_worker_report(npg_worker *worker)
 json_t *npg_worker_whole_report(npg_worker *worker)
 {
     return worker->run->report;
+}
+
+size_t npg_worker_verts_at_most(const npg_worker *worker)
+{
+    const npg_mesh *reference = worker->run->facts.reference;
+    const char *faces = npg_options_get(worker->run->options, "faces");
+    if (reference) return reference->vert_count;
+    return faces ? (size_t)strtoull(faces, NULL, 10) / 2 + 2 : 0; /* a closed mesh has half as many */
 }
 
 void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing))

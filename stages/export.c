@@ -359,13 +359,13 @@ static void uninit(npg_worker *worker)
     npg_release(&state->vert_normals);
 }
 
+/* A place per frame in the list; coordinates, normals and two faces per vertex; the buffers of two files. */
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
-    const npg_facts *facts = npg_worker_facts(worker);
-    const npg_mesh *reference = facts->reference;
+    int64_t frame_count = npg_worker_facts(worker)->frame_count;
     *chunks_held = 1;
-    size_t frame_list = (size_t)(facts->frame_count > 0 ? facts->frame_count : 0) * 24;
-    return frame_list + (reference ? reference->vert_count * 36 + reference->face_count * 12 : 0);
+    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + 60 * npg_worker_verts_at_most(worker) +
+           (512 << 10);
 }
 
 #define OFFSET(member) offsetof(export_state, member)
