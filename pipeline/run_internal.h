@@ -35,7 +35,7 @@ struct npg_run {
     npg_status first_failure;
     char failure_text[1024], failure_stage[32];
     bool is_partial;
-    npg_progress progress;
+    npg_progress progress;     /* the first word of it: what is left is told from the pace since */
     json_t *report, *warnings; /* owned */
 
     atomic_bool stop;

@@ -102,6 +102,16 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     pthread_mutex_unlock(&worker->run->lock);
 }
 
+/* Seconds left by the pace since the run's first word of progress; -1 while there is no pace yet.  Called
+ * under the lock. */
+static double time_left(npg_run *run, const npg_progress *now)
+{
+    const npg_progress *first = &run->progress;
+    if (!first->struct_size) run->progress = *now;
+    double done = now->share - first->share, taken_s = now->elapsed_s - first->elapsed_s;
+    return done > 0 && taken_s > 0 ? (1 - now->share) * taken_s / done : -1;
+}
+
 void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
 {
     npg_run *run = worker->run;
@@ -111,6 +121,7 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     now.stage = worker->stage->name;
     now.elapsed_s = npg_clock_s() - run->opened_s;
     pthread_mutex_lock(&run->lock);
+    now.left_s = time_left(run, &now);
     run->hooks.progress(run->hooks.user, &now);
     pthread_mutex_unlock(&run->lock);
 }

@@ -215,7 +215,7 @@ static double measure_flops(void)
 void npg_probe_estimate(npg_estimate *e, const npg_probe *probe, size_t vertices, size_t epochs,
                         size_t window)
 {
-    const double flop_per_vertex = 1.72e6, fit_bytes_per_vertex = 6500, fixed_bytes = 150e6;
+    const double flop_per_vertex = 1.72e6, fit_bytes_per_vertex = 2400, fixed_bytes = 320e6;
     double frames = (double)probe->frames, in_window = fmin(frames, (double)window);
     size_t most = 0;
     for (size_t i = 0; i + probe->unreadable < probe->frames; i++)

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -36,7 +37,9 @@ static void on_log(void *user, const npg_log_record *record)
     char frame[40] = "";
     if (record->level > reporter->level) return;
     wipe_bar(reporter);
-    if (record->frame >= 0) snprintf(frame, sizeof frame, "frame %lld: ", (long long)record->frame);
+    bool says_frame = !strncmp(record->message, "frame ", 6);
+    if (record->frame >= 0 && !says_frame)
+        snprintf(frame, sizeof frame, "frame %lld: ", (long long)record->frame);
     fprintf(stderr, "%s[%8.2f] %s: %s%s%s%s\n", reporter->colour ? colours[record->level] : "",
             record->time_s, record->stage, words[record->level], frame, record->message,
             reporter->colour ? "\033[0m" : "");

@@ -13,14 +13,10 @@
 
 typedef struct settings {
     bool json;
-    int64_t vertices;
 } settings;
 
 const npg_option npg_probe_options[] = {{"json", "Print one JSON object instead of text", NPG_OPTION_FLAG,
                                          offsetof(settings, json), "no", 0, 0, NULL, NULL},
-                                        {"assume-vertices", "Vertices of the moving mesh, for the estimates",
-                                         NPG_OPTION_INT, offsetof(settings, vertices), "10000", 4, 1e9, NULL,
-                                         NULL},
                                         {0}};
 
 typedef struct job {
@@ -193,7 +189,9 @@ static npg_status do_probe(job *j)
     npg_estimate estimate;
     NPG_TRY(read_all(j));
     judge_whole(&j->probe);
-    npg_probe_estimate(&estimate, &j->probe, (size_t)j->s.vertices,
+    /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
+    size_t faces = (size_t)option_number(j->options, "faces", 20000), most = npg_probe_counts(&j->probe).most;
+    npg_probe_estimate(&estimate, &j->probe, (faces < 4 * most ? faces : 4 * most) / 2,
                        (size_t)option_number(j->options, "epochs", 250),
                        (size_t)option_number(j->options, "window", INT64_MAX));
     if (j->s.json)

@@ -2,6 +2,7 @@
 #include <signal.h>
 #include <stddef.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "cli.h"
@@ -92,6 +93,9 @@ static npg_status check_paths(npg_options *options, const npg_cli *cli)
     if (cli->operand_count) NPG_TRY(npg_options_set(options, "input", cli->operands[0]));
     if (!npg_options_get(options, "input")[0])
         return npg_error(NPG_USAGE, "no input; usage: neupig run %s", cli->verb->operands);
+    if (!strcmp(npg_options_get(options, "pull"), "yes"))
+        return npg_error(NPG_USAGE,
+                         "option pull is for programs that use the library; nobody would pull here");
     if (!npg_options_get(options, "output")[0])
         return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
     return NPG_OK;
