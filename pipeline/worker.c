@@ -43,10 +43,12 @@ json_t *npg_worker_whole_report(npg_worker *worker)
 
 size_t npg_worker_verts_at_most(const npg_worker *worker)
 {
-    const npg_mesh *reference = worker->run->facts.reference;
-    const char *faces = npg_options_get(worker->run->options, "faces");
-    if (reference) return reference->vert_count;
-    return faces ? (size_t)strtoull(faces, NULL, 10) / 2 + 2 : 0; /* a closed mesh has half as many */
+    const npg_facts *facts = &worker->run->facts;
+    const char *text = npg_options_get(worker->run->options, "faces");
+    size_t faces = text ? (size_t)strtoull(text, NULL, 10) : 0, by_points = 4 * facts->point_count_max;
+    if (facts->reference) return facts->reference->vert_count;
+    if (by_points && faces > by_points) faces = by_points;
+    return faces ? faces / 2 + 2 : 0; /* a closed mesh has half as many vertices as faces */
 }
 
 void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing))

@@ -156,6 +156,18 @@ static npg_status check_numbers(npg_worker *worker)
 
 /* ---- solving pass ---- */
 
+/* About what the meshes take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be told. */
+static uint64_t bytes_of_meshes(const npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
+    uint64_t verts = npg_worker_verts_at_most(worker), per_vert = state->format ? 30 : 12;
+    if (facts->frame_count < 0 || (reference && reference[0])) return 0;
+    if (state->with_normals) per_vert *= 2;
+    return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (state->format ? 20 : 13));
+}
+
 static npg_status prepare_folder(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
@@ -163,6 +175,7 @@ static npg_status prepare_folder(npg_worker *worker)
     char *meshes;
     if (npg_worker_facts(worker)->is_live && !state->overwrite)
         NPG_TRY(npg_folder_check(output, &state->names, NULL, 0));
+    NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     NPG_TRY(npg_folder_clear(output));
     NPG_TRY(npg_join_path(&meshes, output, "meshes"));
     npg_status status = npg_make_folder(meshes);
