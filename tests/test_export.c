@@ -70,7 +70,7 @@ static npg_status give_mesh(npg_facts *facts, npg_frame *frame)
     npg_box_local_to_unit(&facts->box, frame->vert_unit, frame->pos_local, 4);
     frame->vert_count = 4;
     frame->fields |= NPG_FIELD_VERTICES | NPG_FIELD_FIGURES;
-    frame->figures = (npg_figures){.coverage = 0.75, .truth_cd = NAN, .good = true};
+    frame->figures = (npg_figures){.coverage = 0.75, .truth_cd = (double)NAN, .good = true};
     return NPG_OK;
 }
 
