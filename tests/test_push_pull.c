@@ -1,4 +1,5 @@
-/* The whole library through its public interface alone: clouds are pushed, meshes are pulled. */
+/* The whole library through its public interface: clouds are pushed, meshes are pulled; memory that is
+ * refused and a close in the middle end it cleanly. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -8,7 +9,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "memory.h"
 #include "neupig.h"
 
 enum { FRAMES = 4, POINTS = 900, VERTS_MAX = 2000 };
@@ -124,8 +127,54 @@ static void clouds_become_one_moving_mesh_the_same_every_time(void **state)
     free(second);
 }
 
+/* The whole run with the n-th request for memory refused, whichever stage it is that asks. */
+static npg_status run_without_memory_at(uint64_t n)
+{
+    npg_options *options = open_options();
+    npg_run *run = NULL;
+    npg_result *result = NULL;
+    assert_int_equal(npg_options_set(options, "epochs", "2"), NPG_OK);
+    npg_memory_fail_at(n, false);
+    npg_status status = npg_run_open(&run, options, NULL);
+    if (!status) status = push_all(run);
+    while (!status && (status = npg_run_pull(run, &result)) == NPG_OK) npg_result_close(&result);
+    if (status == NPG_END) status = npg_run_wait(run);
+    npg_memory_fail_at(0, false);
+    npg_run_close(&run);
+    npg_options_close(&options);
+    return status;
+}
+
+static void no_memory_anywhere_ends_the_run_cleanly(void **state)
+{
+    (void)state;
+    npg_status status = NPG_MEMORY;
+    for (uint64_t n = 25; status < 0 && n < 100000; n = n * 9 / 5) {
+        status = run_without_memory_at(n);
+        assert_true(status == NPG_MEMORY || status >= 0);
+        assert_int_equal(npg_memory_used(), 0);
+    }
+    assert_true(status >= 0); /* the last one asked for less */
+}
+
+static void closing_while_the_fit_is_at_work_frees_everything(void **state)
+{
+    (void)state;
+    npg_options *options = open_options();
+    npg_run *run;
+    assert_int_equal(npg_options_set(options, "epochs", "1000000"), NPG_OK);
+    assert_int_equal(npg_run_open(&run, options, NULL), NPG_OK);
+    assert_int_equal(push_all(run), NPG_OK);
+    sleep(1); /* wherever that is: it may be any stage */
+    npg_run_close(&run);
+    npg_options_close(&options);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(clouds_become_one_moving_mesh_the_same_every_time)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(clouds_become_one_moving_mesh_the_same_every_time),
+                                       cmocka_unit_test(no_memory_anywhere_ends_the_run_cleanly),
+                                       cmocka_unit_test(closing_while_the_fit_is_at_work_frees_everything)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
