@@ -1,10 +1,10 @@
 /* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "clock.h"
+#include "denoise.h"
 #include "mesh_clean.h"
 #include "mesh_tools.h"
 #include "reader.h"
@@ -12,19 +12,25 @@
 #include "stage.h"
 #include "vdb.h"
 
-#define SEEN_SPACINGS    2.0  /* a place is seen when a point is nearer than this many spacings */
-#define UNSEEN_TOLERATED 0.02 /* of the area, before the user is told */
-#define LOST_TOLERATED   0.02 /* of the area, in pieces left out */
-#define REBUILD_VOXELS   384  /* along the longest side of the unit box */
+#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
+#define SMOOTH_NEIGHBOURS 24
+#define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
+#define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
+#define PIECE_SHARE       0.01 /* of the area */
+#define PIECE_DIST        0.1  /* in diagonals */
+#define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
+#define REBUILD_VOXELS    384  /* along the longest side of the unit box */
 
 enum { UNSEEN_AUTO, UNSEEN_KEEP, UNSEEN_TRIM };
+enum { PIECES_NEAR, PIECES_MAIN };
 enum { MESHER_POISSON, MESHER_VDB };
 
 typedef struct mesh_state {
     const char *reference;
-    int mesher, unseen;
+    int mesher, unseen, pieces;
     int64_t depth, face_max, time_limit_s, memory_limit_mib;
     double point_weight, trim;
+    bool smooth;
 } mesh_state;
 
 #define OFFSET(member) offsetof(mesh_state, member)
@@ -43,6 +49,12 @@ static const npg_option mesh_options[] = {
      "600", 1, 1e6, NULL, "SECONDS"},
     {"poisson-memory", "Address space the reconstruction may use", NPG_OPTION_INT, OFFSET(memory_limit_mib),
      "8192", 64, 1e7, NULL, "MIB"},
+    {"pieces",
+     "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, within a "
+     "tenth of the diagonal), or the main one alone",
+     NPG_OPTION_CHOICE, OFFSET(pieces), "near", 0, 0, "near|main", NULL},
+    {"smooth", "Smooth the keyframe's points for the reconstruction when they are noisy", NPG_OPTION_FLAG,
+     OFFSET(smooth), "yes", 0, 0, NULL, NULL},
     {"faces", "Faces of the reference mesh at most (and no more than 4 per point)", NPG_OPTION_INT,
      OFFSET(face_max), "20000", 16, 1e8, NULL, NULL},
     {"trim",
@@ -98,6 +110,20 @@ static npg_status measure_points(making *m)
     return NPG_OK;
 }
 
+/* Noise would become bumps of the surface that every frame then carries. */
+static npg_status smooth(making *m)
+{
+    double sigma;
+    size_t n = m->frame->point_count;
+    NPG_TRY(npg_cloud_noise(&sigma, m->points, n));
+    note(m, "noise_unit", sigma);
+    if (!m->state->smooth || sigma < NOISE_MIN * m->spacing) return NPG_OK;
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                   "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   sigma);
+    return npg_cloud_smooth(m->points, m->normals, n, SMOOTH_NEIGHBOURS);
+}
+
 static npg_status reconstruct(making *m)
 {
     const mesh_state *s = m->state;
@@ -113,6 +139,7 @@ static npg_status reconstruct(making *m)
     int rounds;
     NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, n, 3 * sizeof(float)));
     memcpy(m->normals, m->frame->normals, n * 3 * sizeof(float));
+    NPG_TRY(smooth(m));
     NPG_TRY(npg_resurface(&m->mesh, &turned, &rounds, m->normals, m->points, n, &settings));
     note_count(m, "poisson_rounds", (size_t)rounds);
     note_count(m, "normals_turned", turned);
@@ -123,15 +150,17 @@ static npg_status reconstruct(making *m)
 
 static npg_status keep_main(making *m, const char *when)
 {
-    size_t count;
-    double lost;
-    NPG_TRY(npg_mesh_keep_main(&m->mesh, &count, &lost));
-    note_count(m, "components", count);
-    if (lost > LOST_TOLERATED)
-        npg_worker_warn(
-            m->worker, false, m->frame->number,
-            "%zu components %s: the main one is kept, the others with %.1f %% of the area are left out",
-            count, when, 100 * lost);
+    npg_pieces pieces;
+    double dist_max = m->state->pieces == PIECES_NEAR ? PIECE_DIST * m->diagonal : 0;
+    NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, PIECE_SHARE, dist_max));
+    note_count(m, "components", pieces.kept);
+    if (pieces.kept > 1)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+    if (pieces.lost_share > LOST_TOLERATED)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+                        pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
     return NPG_OK;
 }
 
@@ -186,11 +215,17 @@ static npg_status decimate(making *m)
     npg_mending mending;
     size_t budget = 4 * m->frame->point_count;
     if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
-    NPG_TRY(npg_mesh_decimate(&m->mesh, budget));
-    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending)); /* closes small holes before the faces are counted */
+    size_t holes = mending.holes;
+    for (int round = 0; round < 4 && (!round || m->mesh->face_count > budget); round++) {
+        NPG_TRY(npg_mesh_decimate(&m->mesh, budget - budget / 200 * (size_t)round));
+        NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+        holes += mending.holes;
+    }
     note_count(m, "mended_degenerate", mending.degenerate);
     note_count(m, "mended_duplicate", mending.duplicate);
     note_count(m, "mended_vertices", mending.split_vertices);
+    note_count(m, "mended_holes", holes);
     note_count(m, "mended_flipped", mending.flipped);
     return keep_main(m, "after decimation");
 }
@@ -213,7 +248,7 @@ static npg_status make(making *m)
     npg_mesh *closed = NULL;
     bool sound = false;
     NPG_TRY(reconstruct(m));
-    NPG_TRY(keep_main(m, "reconstructed"));
+    NPG_TRY(keep_main(m, "as reconstructed"));
     if (m->state->mesher == MESHER_VDB) NPG_TRY(rebuild(m));
     closed = m->mesh;
     m->mesh = NULL;

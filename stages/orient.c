@@ -16,14 +16,15 @@
 #include "normals.h"
 
 #define NEIGHBOURS     12
-#define CORE_MAX       12000 /* points that are oriented together: pairs of them are looked at */
+#define CORE_MAX       8000 /* points that are oriented together: pairs of them are looked at */
 #define PATCH_ROUNDS   4
 #define POINT_ROUNDS   30
 #define MEND_ROUNDS    6
 #define DOUBT_ROUNDS   4
 #define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given */
 #define BORDER_WEIGHT  0.1  /* of a patch's border beside its winding number */
-#define WINDING_WEIGHT 0.6  /* of the winding number beside the neighbours' vote, for single points */
+#define MISFIT_WEIGHT  4.0
+#define WINDING_WEIGHT 0.6 /* of the winding number beside the neighbours' vote, for single points */
 
 typedef struct link { /* two neighbours and how well their sides agree, -1..1 */
     uint32_t a, b;
@@ -440,10 +441,25 @@ done:
     return status;
 }
 
-static npg_status orient_core(cloud *c, bool from_given)
+/* How well the sides fit together, larger is better: agreement of neighbours less the misfit of the winding
+ * number.  Its weight is such that a limb turned inside out costs more than rough normals. */
+static double score_of(cloud *c)
+{
+    double lost = 0, area = 0, votes = 0;
+    find_winding(c);
+    for (uint32_t i = 0; i < c->count; i++) {
+        lost += (double)c->area[i] * misfit(c->winding[i]);
+        area += (double)c->area[i];
+        votes += vote(c, i);
+    }
+    return votes / (double)c->count - MISFIT_WEIGHT * lost / area;
+}
+
+static npg_status orient_core(cloud *c, bool from_given, double *score)
 {
     npg_status status = find_neighbours(c);
     if (!status) status = from_given ? orient_from_given(c) : orient_from_nothing(c);
+    if (!status && score) *score = score_of(c);
     close_cloud(c);
     return status;
 }
@@ -494,20 +510,20 @@ done:
     return status;
 }
 
-static npg_status orient(float *normals, const float *points, size_t n, bool from_given)
+static npg_status orient(float *normals, double *score, const float *points, size_t n, bool from_given)
 {
     float *core_points = NULL, *core_normals = NULL;
     uint32_t *from = NULL;
     npg_status status;
     cloud whole = {.count = n, .points = points, .normals = normals};
     if (n < 4) return NPG_OK;
-    if (n <= CORE_MAX) return orient_core(&whole, from_given);
+    if (n <= CORE_MAX) return orient_core(&whole, from_given, score);
     NPG_TRY_OR(done, status, npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
     NPG_TRY_OR(done, status, npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
     NPG_TRY_OR(done, status, npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from));
     take_core(core_points, core_normals, from, CORE_MAX, points, normals, n);
     cloud core = {.count = CORE_MAX, .points = core_points, .normals = core_normals};
-    NPG_TRY_OR(done, status, orient_core(&core, from_given));
+    NPG_TRY_OR(done, status, orient_core(&core, from_given, score));
     status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
 done:
     npg_release(&core_points);
@@ -516,9 +532,29 @@ done:
     return status;
 }
 
-npg_status npg_normals_orient(float *normals, const float *points, size_t point_count)
+npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count)
 {
-    return orient(normals, points, point_count, false);
+    *score = 0;
+    return orient(normals, score, points, point_count, false);
+}
+
+npg_status npg_normals_make(float *normals, const float *points, size_t n)
+{
+    static const int neighbours[] = {10, 12, 16, 24};
+    float *trial;
+    double best = -INFINITY;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_alloc_array(&trial, NPG_FOR_FRAMES, n, 3 * sizeof *trial));
+    for (size_t i = 0; i < sizeof neighbours / sizeof *neighbours && !status; i++) {
+        double score;
+        status = npg_normals_estimate(trial, points, n, neighbours[i]);
+        if (!status) status = npg_normals_orient(trial, &score, points, n);
+        if (status || !(score > best)) continue;
+        best = score;
+        memcpy(normals, trial, n * 3 * sizeof *normals);
+    }
+    npg_release(&trial);
+    return status;
 }
 
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t n)
@@ -527,7 +563,7 @@ npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points
     *flipped = 0;
     NPG_TRY(npg_alloc_array(&before, NPG_FOR_FRAMES, n, 3 * sizeof *before));
     memcpy(before, normals, n * 3 * sizeof *before);
-    npg_status status = orient(normals, points, n, true);
+    npg_status status = orient(normals, NULL, points, n, true);
     for (size_t i = 0; i < n; i++)
         *flipped += memcmp(before + 3 * i, normals + 3 * i, 3 * sizeof *before) != 0;
     npg_release(&before);
