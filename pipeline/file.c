@@ -176,6 +176,7 @@ npg_status npg_make_folder(const char *path)
 {
     char *copy;
     struct stat info;
+    if (!*path) return npg_error(NPG_DISK, "a folder without a name can't be made");
     NPG_TRY(npg_copy_text(&copy, path));
     npg_status status = NPG_OK;
     for (char *slash = copy + 1; !status; slash++) {

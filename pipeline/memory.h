@@ -9,6 +9,10 @@
 
 #include "status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum npg_purpose {
     NPG_FOR_FRAMES, /* points, normals and vertices of the frames in flight   */
     NPG_FOR_MESH,   /* reference mesh and what is derived from it             */
@@ -53,5 +57,9 @@ void npg_memory_fail_at(uint64_t n, bool from_then_on);
 
 /* Requests so far. */
 uint64_t npg_memory_requests(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

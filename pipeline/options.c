@@ -4,7 +4,9 @@
 #include <ctype.h>
 #include <errno.h>
 #include <jansson.h>
+#include <locale.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,32 +16,38 @@
 #include "stage.h"
 
 struct npg_options {
+    const npg_stage *const *chain; /* whose tables count */
     size_t count;
     char **texts; /* count of them: what the user set, or NULL; owned */
 };
 
 /* ---- the tables as one list ---- */
 
-const npg_option *npg_option_at(size_t i, const char **stage)
+static const npg_option *option_at(const npg_stage *const *chain, size_t i, const char **stage)
 {
     const npg_option *table = npg_run_options;
     const char *name = "run";
-    for (size_t s = 0;; s++) {
+    for (;; chain++) {
         for (; table && table->name; table++)
             if (i-- == 0) {
                 if (stage) *stage = name;
                 return table;
             }
-        if (!npg_chain[s]) return NULL;
-        table = npg_chain[s]->options;
-        name = npg_chain[s]->name;
+        if (!*chain) return NULL;
+        table = (*chain)->options;
+        name = (*chain)->name;
     }
 }
 
-static const npg_option *find(const char *name, size_t *at)
+const npg_option *npg_option_at(size_t i, const char **stage)
+{
+    return option_at(npg_chain, i, stage);
+}
+
+static const npg_option *find(const npg_options *options, const char *name, size_t *at)
 {
     const npg_option *option;
-    for (*at = 0; (option = npg_option_at(*at, NULL)); ++*at)
+    for (*at = 0; (option = option_at(options->chain, *at, NULL)); ++*at)
         if (!strcmp(option->name, name)) return option;
     return NULL;
 }
@@ -75,11 +83,26 @@ static int which_flag(const char *text)
     return which_choice("no|false|off|0", text) >= 0 ? 0 : which_choice("yes|true|on|1", text) >= 0 ? 1 : -1;
 }
 
+/* Numbers are written with a point whatever the program's locale says. */
+static locale_t plain_locale;
+
+static void make_plain_locale(void)
+{
+    plain_locale = newlocale(LC_ALL_MASK, "C", NULL);
+}
+
+static double read_number(const char *text, char **end)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, make_plain_locale);
+    return plain_locale ? strtod_l(text, end, plain_locale) : strtod(text, end);
+}
+
 static npg_status check_number(const npg_option *option, const char *text)
 {
     char *end;
     errno = 0;
-    double value = strtod(text, &end);
+    double value = read_number(text, &end);
     bool whole = option->type != NPG_OPTION_INT || (value == floor(value) && !strpbrk(text, ".xXeEnN"));
     if (end == text || *end || errno || !isfinite(value) || !whole || isspace((unsigned char)*text))
         return npg_error(NPG_USAGE, "option %s: \"%s\" is not %s", option->name, text,
@@ -109,11 +132,17 @@ npg_status npg_option_check(const npg_option *option, const char *text)
 
 npg_status npg_options_open(npg_options **out)
 {
+    return npg_options_open_chain(out, npg_chain);
+}
+
+npg_status npg_options_open_chain(npg_options **out, const npg_stage *const *chain)
+{
     npg_options *options;
     NPG_REQUIRE(out);
     *out = NULL;
     NPG_TRY(npg_alloc(&options, NPG_FOR_RUN, sizeof *options));
-    while (npg_option_at(options->count, NULL)) options->count++;
+    options->chain = chain;
+    while (option_at(chain, options->count, NULL)) options->count++;
     npg_status status = npg_alloc_array(&options->texts, NPG_FOR_RUN, options->count, sizeof *options->texts);
     if (status) npg_release(&options);
     *out = options;
@@ -132,7 +161,7 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options)
 {
     npg_options *copy;
     npg_status status = NPG_OK;
-    NPG_TRY(npg_options_open(&copy));
+    NPG_TRY(npg_options_open_chain(&copy, options ? options->chain : npg_chain));
     for (size_t i = 0; i < copy->count && !status; i++)
         if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
     if (status) npg_options_close(&copy);
@@ -145,7 +174,7 @@ npg_status npg_options_set(npg_options *options, const char *name, const char *v
     size_t at;
     char *text;
     NPG_REQUIRE(options && name && value);
-    const npg_option *option = find(name, &at);
+    const npg_option *option = find(options, name, &at);
     if (!option) return npg_error(NPG_USAGE, "there is no option %s", name);
     NPG_TRY(npg_option_check(option, value));
     NPG_TRY(npg_copy_text(&text, value));
@@ -157,13 +186,13 @@ npg_status npg_options_set(npg_options *options, const char *name, const char *v
 bool npg_options_is_set(const npg_options *options, const char *name)
 {
     size_t at;
-    return find(name, &at) && options->texts[at];
+    return find(options, name, &at) && options->texts[at];
 }
 
 static const char *text_of_preset(const npg_options *options, const char *name)
 {
     size_t at;
-    const npg_option *option = find("preset", &at);
+    const npg_option *option = find(options, "preset", &at);
     const char *chosen = options->texts[at] ? options->texts[at] : option->default_text;
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
         if (strcmp(preset->name, chosen) != 0) continue;
@@ -183,24 +212,28 @@ static const char *text_of(const npg_options *options, const npg_option *option,
 const char *npg_options_get(const npg_options *options, const char *name)
 {
     size_t at;
-    const npg_option *option = options && name ? find(name, &at) : NULL;
+    const npg_option *option = options && name ? find(options, name, &at) : NULL;
     return option ? text_of(options, option, at) : NULL;
+}
+
+void npg_option_store(const npg_option *option, const char *text, void *state)
+{
+    void *slot = (char *)state + option->offset;
+    switch (option->type) {
+    case NPG_OPTION_FLAG: *(bool *)slot = which_flag(text) == 1; break;
+    case NPG_OPTION_INT: *(int64_t *)slot = strtoll(text, NULL, 10); break;
+    case NPG_OPTION_REAL: *(double *)slot = read_number(text, NULL); break;
+    case NPG_OPTION_CHOICE: *(int *)slot = which_choice(option->choices, text); break;
+    case NPG_OPTION_TEXT: *(const char **)slot = text; break;
+    }
 }
 
 void npg_options_fill(const npg_options *options, const npg_option *table, void *state)
 {
     for (const npg_option *option = table; option && option->name; option++) {
         size_t at;
-        find(option->name, &at);
-        const char *text = text_of(options, option, at);
-        void *slot = (char *)state + option->offset;
-        switch (option->type) {
-        case NPG_OPTION_FLAG: *(bool *)slot = which_flag(text) == 1; break;
-        case NPG_OPTION_INT: *(int64_t *)slot = strtoll(text, NULL, 10); break;
-        case NPG_OPTION_REAL: *(double *)slot = strtod(text, NULL); break;
-        case NPG_OPTION_CHOICE: *(int *)slot = which_choice(option->choices, text); break;
-        case NPG_OPTION_TEXT: *(const char **)slot = text; break;
-        }
+        bool is_known = find(options, option->name, &at) == option;
+        npg_option_store(option, is_known ? text_of(options, option, at) : option->default_text, state);
     }
 }
 
@@ -220,6 +253,25 @@ static void blank_comments(char *text)
             if (!*c) break;
         }
     }
+}
+
+/* The line of the key `name` of the outermost object, in text that is known to be good JSON. */
+static int line_of_key(const char *text, const char *name)
+{
+    int line = 1, depth = 0;
+    size_t length = strlen(name);
+    for (const char *c = text; *c; c++) {
+        line += *c == '\n';
+        depth += (*c == '{' || *c == '[') - (*c == '}' || *c == ']');
+        if (*c != '"') continue;
+        const char *first = ++c;
+        for (; *c && *c != '"'; c++) c += *c == '\\' && c[1];
+        if (!*c) break;
+        bool is_key = c[1 + strspn(c + 1, " \t\r\n")] == ':';
+        if (depth == 1 && is_key && (size_t)(c - first) == length && !strncmp(first, name, length))
+            return line;
+    }
+    return 0;
 }
 
 static npg_status set_from_json(npg_options *options, const char *name, const json_t *value)
@@ -255,25 +307,31 @@ static npg_status read_text_file(char **text, const char *path)
     return status;
 }
 
+static npg_status set_all_from_json(npg_options *options, json_t *root, const char *path, const char *text)
+{
+    const char *name;
+    json_t *value;
+    if (!json_is_object(root)) return npg_error(NPG_USAGE, "%s: not a JSON object", path);
+    json_object_foreach(root, name, value)
+    {
+        npg_status status = set_from_json(options, name, value);
+        if (status) return npg_error_prefix(status, "%s:%d", path, line_of_key(text, name));
+    }
+    return NPG_OK;
+}
+
 npg_status npg_options_load(npg_options *options, const char *path)
 {
     char *text;
     json_error_t error;
-    const char *name;
-    json_t *value;
     NPG_REQUIRE(options && path);
     NPG_TRY(read_text_file(&text, path));
     blank_comments(text);
     json_t *root = json_loads(text, JSON_REJECT_DUPLICATES, &error);
+    npg_status status =
+        root ? set_all_from_json(options, root, path, text)
+             : npg_error(NPG_USAGE, "%s:%d:%d: %s", path, error.line, error.column, error.text);
     npg_release(&text);
-    if (!root) return npg_error(NPG_USAGE, "%s:%d:%d: %s", path, error.line, error.column, error.text);
-    npg_status status = NPG_OK;
-    if (!json_is_object(root)) status = npg_error(NPG_USAGE, "%s: not a JSON object", path);
-    json_object_foreach(root, name, value)
-    {
-        if (status) break;
-        status = npg_error_prefix(set_from_json(options, name, value), "%s", path);
-    }
     json_decref(root);
     return status;
 }

@@ -30,11 +30,23 @@ typedef struct npg_preset {
     const npg_preset_value *values;
 } npg_preset;
 
-/* The i-th option of all tables, the run's own first; NULL after the last.  *stage gets the table's name. */
+struct npg_stage;
+
+/* Options of the tables of a chain (NULL-terminated) instead of npg_chain; npg_options_open() is this with
+ * npg_chain. */
+npg_status npg_options_open_chain(npg_options **options, const struct npg_stage *const *chain);
+
+/* The i-th option of all tables of npg_chain, the run's own first; NULL after the last.  *stage gets the
+ * table's name. */
 const npg_option *npg_option_at(size_t i, const char **stage);
 
-/* Write the values of one table into state at their offsets. */
+/* Write the values of one table into state at their offsets; an option that is in no table of the options'
+ * chain gets its default. */
 void npg_options_fill(const npg_options *options, const npg_option *table, void *state);
+
+/* Write one value, which npg_option_check() has accepted, into state at the option's offset.  A TEXT is a
+ * loan. */
+void npg_option_store(const npg_option *option, const char *text, void *state);
 
 /* A copy that owns its texts. */
 npg_status npg_options_copy(npg_options **out, const npg_options *options);

@@ -1,5 +1,6 @@
 /* Run: builds the chain, walks the capture through it in passes, and is what the public interface talks to.
  */
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +37,8 @@ const npg_option npg_run_options[] = {
 void npg_run_fail(npg_run *run, const char *stage, npg_status status)
 {
     pthread_mutex_lock(&run->lock);
-    if (!run->first_failure && status != NPG_ABORTED) {
+    if (status == NPG_ABORTED) status = NPG_STOPPED;
+    if (!run->first_failure) {
         run->first_failure = status;
         snprintf(run->failure_text, sizeof run->failure_text, "%s",
                  status == NPG_STOPPED ? "stopped on request" : npg_error_text());
@@ -105,8 +107,27 @@ static void note_waits(const npg_worker *worker)
     json_object_set_new(r, "waited_for_next_s", json_real(push_s));
 }
 
+/* Somebody outside may be what a stage waits for; after a request to stop it must not be. */
+static void close_ends(npg_run *run)
+{
+    if (run->feed) npg_ring_abort(run->feed);
+    if (run->results) npg_ring_abort(run->results);
+}
+
+static void wait_for_workers(npg_run *run)
+{
+    size_t started_count = 0;
+    for (size_t i = 0; i < run->worker_count; i++) started_count += run->workers[i].started;
+    while (atomic_load(&run->ended_count) < started_count) {
+        if (atomic_load(&run->stop)) close_ends(run);
+        while (sem_wait(&run->event) && errno == EINTR) {
+        }
+    }
+}
+
 static void close_pass(npg_run *run)
 {
+    wait_for_workers(run);
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
         if (worker->started) {
@@ -143,6 +164,7 @@ static void announce_memory(npg_run *run);
 static npg_status do_pass(npg_run *run, npg_pass pass)
 {
     run->pass = pass;
+    atomic_store(&run->ended_count, 0);
     npg_status status = open_worker_states(run);
     if (!status && pass == NPG_PASS_SOLVE && !run->facts.is_live) announce_memory(run);
     if (!status) status = open_rings(run);
@@ -193,8 +215,7 @@ static npg_status conclude(npg_run *run)
     json_object_set_new(r, "wall_s", json_real(npg_clock_s() - run->opened_s));
     json_object_set_new(r, "process_cpu_s", json_real(npg_clock_process_s()));
     json_object_set_new(r, "memory_peak_bytes", json_integer((json_int_t)npg_memory_peak()));
-    NPG_TRY(open_worker_states(run));
-    npg_status status = NPG_OK;
+    npg_status status = open_worker_states(run);
     for (size_t i = 0; i < run->worker_count && !status; i++)
         if (run->workers[i].stage->conclude) status = run->workers[i].stage->conclude(&run->workers[i]);
     for (size_t i = 0; i < run->worker_count; i++) npg_release(&run->workers[i].state);
@@ -229,6 +250,8 @@ static npg_status check_chain(const npg_run *run)
     uint32_t have = 0;
     for (size_t i = 0; i < run->worker_count; i++) {
         const npg_stage *stage = run->workers[i].stage;
+        if (stage->passes && !stage->process)
+            return npg_error(NPG_USAGE, "stage %s takes part in passes but processes nothing", stage->name);
         if (stage->needs & ~have)
             return npg_error(NPG_USAGE, "stage %s needs fields 0x%x that no stage before it gives",
                              stage->name, stage->needs & ~have);
@@ -237,22 +260,24 @@ static npg_status check_chain(const npg_run *run)
     return NPG_OK;
 }
 
-static npg_status open_chain(npg_run *run)
+static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
 {
     json_t *stages = json_object();
     json_object_set_new(run->report, "stages", stages);
-    for (size_t i = 0; npg_chain[i]; i++) {
+    for (size_t i = 0; chain[i]; i++) {
         if (i == NPG_STAGES_MAX) return npg_error(NPG_USAGE, "more than %d stages", NPG_STAGES_MAX);
-        run->workers[i] = (npg_worker){.run = run, .stage = npg_chain[i], .report = json_object()};
-        json_object_set_new(stages, npg_chain[i]->name, run->workers[i].report);
+        run->workers[i] = (npg_worker){.run = run, .stage = chain[i], .report = json_object()};
+        json_object_set_new(stages, chain[i]->name, run->workers[i].report);
         run->worker_count++;
     }
     return check_chain(run);
 }
 
-static npg_status fill_run(npg_run *run, const npg_options *options, const npg_hooks *hooks)
+static npg_status fill_run(npg_run *run, const npg_options *options, const npg_hooks *hooks,
+                           const npg_stage *const *chain)
 {
-    NPG_TRY(npg_options_copy(&run->options, options));
+    NPG_TRY(options ? npg_options_copy(&run->options, options)
+                    : npg_options_open_chain(&run->options, chain));
     npg_options_fill(run->options, npg_run_options, &run->settings);
     if (hooks) {
         NPG_REQUIRE(hooks->struct_size >= sizeof *hooks);
@@ -269,19 +294,27 @@ static npg_status fill_run(npg_run *run, const npg_options *options, const npg_h
     if (!run->settings.input[0]) NPG_TRY(npg_ring_open(&run->feed, (size_t)run->settings.ring_capacity));
     if (run->settings.pull) NPG_TRY(npg_ring_open(&run->results, (size_t)run->settings.ring_capacity));
     npg_memory_set_limit((size_t)run->settings.max_memory_mib << 20);
-    return open_chain(run);
+    return open_chain(run, chain);
 }
 
 npg_status npg_run_open(npg_run **out, const npg_options *options, const npg_hooks *hooks)
+{
+    return npg_run_open_chain(out, options, hooks, npg_chain);
+}
+
+npg_status npg_run_open_chain(npg_run **out, const npg_options *options, const npg_hooks *hooks,
+                              const npg_stage *const *chain)
 {
     npg_run *run;
     NPG_REQUIRE(out);
     *out = NULL;
     NPG_TRY(npg_alloc(&run, NPG_FOR_RUN, sizeof *run));
     pthread_mutex_init(&run->lock, NULL);
+    pthread_mutex_init(&run->join_lock, NULL);
+    sem_init(&run->event, 0, 0);
     run->opened_s = npg_clock_s();
     run->pushed_number = INT64_MIN;
-    npg_status status = fill_run(run, options, hooks);
+    npg_status status = fill_run(run, options, hooks, chain);
     if (!status && pthread_create(&run->conductor, NULL, conduct, run))
         status = npg_error(NPG_FAILED, "can't start a thread");
     if (status) {
@@ -293,11 +326,18 @@ npg_status npg_run_open(npg_run **out, const npg_options *options, const npg_hoo
     return NPG_OK;
 }
 
+static void join_conductor(npg_run *run)
+{
+    pthread_mutex_lock(&run->join_lock);
+    if (run->conductor_started && !run->conductor_joined) pthread_join(run->conductor, NULL);
+    run->conductor_joined = true;
+    pthread_mutex_unlock(&run->join_lock);
+}
+
 npg_status npg_run_wait(npg_run *run)
 {
     NPG_REQUIRE(run && run->conductor_started);
-    if (!run->conductor_joined) pthread_join(run->conductor, NULL);
-    run->conductor_joined = true;
+    join_conductor(run);
     if (run->end_status < 0 || run->end_status == NPG_STOPPED)
         return npg_error(run->end_status, "%s: %s", run->failure_stage, run->failure_text);
     return run->end_status;
@@ -305,7 +345,16 @@ npg_status npg_run_wait(npg_run *run)
 
 void npg_run_stop(npg_run *run)
 {
-    if (run) atomic_store(&run->stop, true);
+    if (!run) return;
+    atomic_store(&run->stop, true);
+    sem_post(&run->event);
+}
+
+/* What to return when the run's end was closed: why it failed, or that it was stopped. */
+static npg_status why_closed(npg_run *run)
+{
+    npg_status status = npg_run_wait(run);
+    return status < 0 ? status : npg_error(NPG_STOPPED, "stopped on request");
 }
 
 void npg_run_close(npg_run **slot)
@@ -313,9 +362,10 @@ void npg_run_close(npg_run **slot)
     if (!slot || !*slot) return;
     npg_run *run = *slot;
     npg_run_stop(run);
-    if (run->feed) npg_ring_abort(run->feed);
-    if (run->results) npg_ring_abort(run->results);
-    if (run->conductor_started && !run->conductor_joined) pthread_join(run->conductor, NULL);
+    close_ends(run);
+    join_conductor(run);
+    for (size_t i = 0; i < run->worker_count; i++)
+        if (run->workers[i].kept) run->workers[i].release_kept(run->workers[i].kept);
     npg_chunk_unref(&run->pulled);
     npg_ring_close(&run->feed);
     npg_ring_close(&run->results);
@@ -323,6 +373,8 @@ void npg_run_close(npg_run **slot)
     json_decref(run->warnings);
     json_decref(run->report);
     npg_options_close(&run->options);
+    sem_destroy(&run->event);
+    pthread_mutex_destroy(&run->join_lock);
     pthread_mutex_destroy(&run->lock);
     npg_release(slot);
 }
@@ -367,7 +419,7 @@ npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
     if (!status) run->pushed_number = cloud->number;
     npg_frame_clear(&frame);
     npg_chunk_unref(&chunk);
-    return status == NPG_ABORTED ? npg_run_wait(run) : status;
+    return status == NPG_ABORTED ? why_closed(run) : status;
 }
 
 npg_status npg_run_finish(npg_run *run)
@@ -416,7 +468,7 @@ npg_status npg_run_pull(npg_run *run, npg_result **result)
         npg_chunk_unref(&run->pulled);
         run->pulled_at = 0;
         npg_status status = npg_ring_pop(run->results, &run->pulled);
-        if (status == NPG_ABORTED) return npg_run_wait(run);
+        if (status == NPG_ABORTED) return why_closed(run);
         if (status) return status;
     }
 }

@@ -3,6 +3,7 @@
 #define NPG_RUN_INTERNAL_H
 
 #include <pthread.h>
+#include <semaphore.h>
 #include <stdatomic.h>
 
 #include "ring.h"
@@ -19,6 +20,8 @@ struct npg_worker {
     bool started;
     double wall_s, cpu_s; /* of the passes so far: of the thread's life, and of its processor time */
     json_t *report;       /* loan from the run's report */
+    void *kept;           /* owned for the run's whole life, see npg_worker_keep */
+    void (*release_kept)(void *thing);
 };
 
 struct npg_run {
@@ -32,10 +35,12 @@ struct npg_run {
     npg_status first_failure;
     char failure_text[1024], failure_stage[32];
     bool is_partial;
-    npg_progress progress;
+    npg_progress progress;     /* the first word of it: what is left is told from the pace since */
     json_t *report, *warnings; /* owned */
 
     atomic_bool stop;
+    atomic_size_t ended_count; /* workers of the pass that have ended */
+    sem_t event;               /* posted when a worker ends and when a stop is asked for */
     npg_pass pass;
     npg_worker workers[NPG_STAGES_MAX];
     size_t worker_count;
@@ -45,14 +50,21 @@ struct npg_run {
     npg_ring *feed, *results; /* push -> ingest, last stage -> pull; owned, for the run's whole life */
 
     pthread_t conductor;
-    bool conductor_started, conductor_joined;
+    bool conductor_started;
+    pthread_mutex_t join_lock; /* guards what follows: any thread may wait for the conductor */
+    bool conductor_joined;
     npg_status end_status;
     int64_t pushed_number;
     npg_chunk *pulled; /* the chunk whose frames are being pulled */
     size_t pulled_at;
 };
 
-/* Remember the first failure of the run and wake everybody. */
+/* npg_run_open() with stages of one's own in place of npg_chain. */
+npg_status npg_run_open_chain(npg_run **run, const npg_options *options, const npg_hooks *hooks,
+                              const npg_stage *const *chain);
+
+/* Remember the first failure of the run and wake everybody.  NPG_ABORTED is the echo of an earlier failure;
+ * where there was none, somebody closed the run's ends, and the run was stopped. */
 void npg_run_fail(npg_run *run, const char *stage, npg_status status);
 
 /* The body of a stage's thread: init, process until the end, flush, uninit.  The argument is the npg_worker.

@@ -31,8 +31,9 @@ typedef struct npg_facts {
     int64_t frame_count;   /* T, gaps included; -1 while a live source is open              */
     int64_t skipped_count; /* frames left out under --missing skip or --keep-going          */
     /* keyframe */
-    size_t point_count_max;  /* of all frames, as read                                        */
-    npg_bounds bounds_local; /* of all usable points                                          */
+    size_t point_count_max;         /* of all frames, as read                                        */
+    int64_t number_min, number_max; /* of all frames                                          */
+    npg_bounds bounds_local;        /* of all usable points                                          */
     npg_frame_box box;
     npg_plan plan; /* with the keyframe                                             */
     /* mesh */
@@ -77,6 +78,11 @@ const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);
 
+/* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called
+ * on the thing when the run closes. */
+void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing));
+void *npg_worker_kept(const npg_worker *worker);
+
 /* Hand a chunk to the next stage; waits while the ring is full.  Chunks of the last stage go to
  * npg_run_pull() or are freed. */
 npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk);
@@ -88,7 +94,7 @@ npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk);
 /* True once the run should stop: long loops ask at least once a second and then return NPG_STOPPED. */
 bool npg_worker_stopping(const npg_worker *worker);
 
-/* A line of the log; frame -1 if it concerns none. */
+/* A line of the log; frame is the number of the frame it is about, -1 if none. */
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
     NPG_PRINTF(4, 5);
 
@@ -102,6 +108,13 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
 
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
 json_t *npg_worker_report(npg_worker *worker);
+
+/* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never lost.  NULL
+ * gives null. */
+json_t *npg_json_text(const char *text);
+
+/* A JSON number, or null for one that is not finite. */
+json_t *npg_json_real(double value);
 
 /* The whole report, for conclude(). */
 json_t *npg_worker_whole_report(npg_worker *worker);

@@ -40,6 +40,16 @@ json_t *npg_worker_whole_report(npg_worker *worker)
     return worker->run->report;
 }
 
+void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing))
+{
+    worker->kept = thing;
+    worker->release_kept = release;
+}
+void *npg_worker_kept(const npg_worker *worker)
+{
+    return worker->kept;
+}
+
 npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk)
 {
     if (worker->out) return npg_ring_push(worker->out, chunk);
@@ -73,12 +83,24 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     npg_run_log(worker->run, NPG_LOG_WARNING, worker->stage->name, frame, text);
-    json_t *entry = json_pack("{ss ss%}", "stage", worker->stage->name, "message", text, strlen(text));
-    if (entry && frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
+    json_t *entry = json_object();
+    json_object_set_new(entry, "stage", json_string(worker->stage->name));
+    json_object_set_new(entry, "message", npg_json_text(text));
+    if (frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
     pthread_mutex_lock(&worker->run->lock);
     json_array_append_new(worker->run->warnings, entry);
     worker->run->is_partial |= partial;
     pthread_mutex_unlock(&worker->run->lock);
+}
+
+/* Seconds left by the pace since the run's first word of progress; -1 while there is no pace yet.  Called
+ * under the lock. */
+static double time_left(npg_run *run, const npg_progress *now)
+{
+    const npg_progress *first = &run->progress;
+    if (!first->struct_size) run->progress = *now;
+    double done = now->share - first->share, taken_s = now->elapsed_s - first->elapsed_s;
+    return done > 0 && taken_s > 0 ? (1 - now->share) * taken_s / done : -1;
 }
 
 void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
@@ -90,6 +112,7 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     now.stage = worker->stage->name;
     now.elapsed_s = npg_clock_s() - run->opened_s;
     pthread_mutex_lock(&run->lock);
+    now.left_s = time_left(run, &now);
     run->hooks.progress(run->hooks.user, &now);
     pthread_mutex_unlock(&run->lock);
 }
@@ -137,10 +160,12 @@ void *npg_worker_main(void *argument)
     npg_status status = work(worker);
     if (status) {
         npg_run_fail(worker->run, worker->stage->name, status);
-    } else if (worker->out) {
-        npg_ring_end(worker->out);
+    } else if (worker->out && worker->out != worker->run->results) {
+        npg_ring_end(worker->out); /* the results end with the run, when its last files are written */
     }
     worker->wall_s += npg_clock_s() - since;
     worker->cpu_s += npg_clock_thread_s();
+    atomic_fetch_add(&worker->run->ended_count, 1);
+    sem_post(&worker->run->event);
     return NULL;
 }

@@ -29,6 +29,10 @@ npg_status npg_stream_open(npg_stream **stream, int fd, const char *name);
 npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *origin);
 void npg_stream_close(npg_stream **stream);
 
+/* stopping(user) is asked about four times a second while nothing comes; true makes next return NPG_STOPPED.
+ */
+void npg_stream_set_stop(npg_stream *stream, bool (*stopping)(void *user), void *user);
+
 /* The format that npg_read_cloud would use for a path ("ply", "obj", "xyz", "npy", "pcd"), NULL for none. */
 const char *npg_reader_for(const char *path);
 

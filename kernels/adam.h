@@ -1,0 +1,27 @@
+/* adam: the optimiser's step; kernel in adam.cl, twin in adam_ref.c. */
+#ifndef NPG_ADAM_H
+#define NPG_ADAM_H
+
+#include "device.h"
+
+/* State for one list of parameters. */
+typedef struct npg_adam {
+    npg_program *program;
+    npg_buffer first, second, rate; /* moments [count], learning rates [ceil(count / row)] */
+    size_t count, row;
+    double beta1, beta2, epsilon;
+    int64_t step; /* steps done */
+} npg_adam;
+
+/* rates: one for each `row` parameters. */
+npg_status npg_adam_open(npg_adam *adam, npg_device *device, const float *rates, size_t row, size_t count);
+void npg_adam_close(npg_adam *adam);
+
+/* One step: parameters -= rate m^ / (sqrt(v^) + epsilon). */
+npg_status npg_adam_step(npg_adam *adam, const npg_buffer *parameters, const npg_buffer *gradient);
+
+/* The plain twin, in double: step counts from 1. */
+void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
+                       const float *rates, size_t row, size_t count, int64_t step);
+
+#endif

@@ -1,0 +1,58 @@
+/* Check: random values, comparison, finite differences. */
+#include "check.h"
+
+#include <math.h>
+
+npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random)
+{
+    NPG_TRY(npg_alloc_array(values, NPG_FOR_RUN, n, sizeof **values));
+    if (wide) {
+        npg_status status = npg_alloc_array(wide, NPG_FOR_RUN, n, sizeof **wide);
+        if (status) {
+            npg_release(values);
+            return status;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        (*values)[i] = (float)(scale * (2 * npg_random_real(random) - 1));
+        if (wide) (*wide)[i] = (double)(*values)[i];
+    }
+    return NPG_OK;
+}
+
+void npg_check_compare(double *error, const float *got, const double *want, size_t n)
+{
+    double largest = 1e-30, worst = 0;
+    for (size_t i = 0; i < n; i++) {
+        double off = fabs((double)got[i] - want[i]);
+        largest = fmax(largest, fabs(want[i]));
+        worst = isfinite(off) ? fmax(worst, off) : (double)INFINITY;
+    }
+    *error = fmax(*error, worst / largest);
+}
+
+npg_status npg_check_buffer(double *error, const npg_buffer *got, const double *want, size_t n)
+{
+    float *values;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_RUN, n, sizeof *values));
+    npg_status status = npg_buffer_read(got, 0, values, n * sizeof *values);
+    if (!status) npg_check_compare(error, values, want, n);
+    npg_release(&values);
+    return status;
+}
+
+void npg_check_slope(double *error, double *x, const double *slope, size_t n, size_t stride, double h,
+                     npg_check_function *f, void *user)
+{
+    double largest = 1e-30;
+    for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(slope[i]));
+    for (size_t i = 0; i < n; i += stride) {
+        double before = x[i];
+        x[i] = before + h;
+        double up = f(user);
+        x[i] = before - h;
+        double down = f(user);
+        x[i] = before;
+        *error = fmax(*error, fabs(slope[i] - (up - down) / (2 * h)) / largest);
+    }
+}

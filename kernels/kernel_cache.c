@@ -1,0 +1,114 @@
+/* Kernel cache: one folder per version behind a lock, private folders for everybody else. */
+#include "kernel_cache.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <ftw.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "file.h"
+#include "kernel_sources.h"
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static int users, lock_fd = -1;
+static char private_folder[2048]; /* "" while the shared folder is ours */
+
+static unsigned long long hash_of_sources(void)
+{
+    XXH64_hash_t hash = 0;
+    for (const npg_kernel_source *source = npg_kernel_sources; source->name; source++)
+        hash = XXH64(source->text, strlen(source->text), hash);
+    return hash;
+}
+
+static void name_base(char *out, size_t size)
+{
+    const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    if (cache && cache[0] == '/')
+        snprintf(out, size, "%s/neupig", cache);
+    else if (home && home[0] == '/')
+        snprintf(out, size, "%s/.cache/neupig", home);
+    else
+        snprintf(out, size, "/tmp/neupig-%ld", (long)getuid());
+}
+
+/* The folder of this version, or "" when another process uses it. */
+static npg_status take_shared(char *folder, size_t size)
+{
+    char base[2048], path[4200];
+    name_base(base, sizeof base);
+    snprintf(folder, size, "%s/%s-%016llx", base, npg_version(), hash_of_sources());
+    npg_status status = npg_make_folder(folder);
+    if (status) return status;
+    snprintf(path, sizeof path, "%.4096s/lock", folder);
+    lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (lock_fd < 0) return npg_error_errno(NPG_DISK, "%s", path);
+    if (!flock(lock_fd, LOCK_EX | LOCK_NB)) return NPG_OK;
+    close(lock_fd);
+    lock_fd = -1;
+    folder[0] = 0;
+    return NPG_OK;
+}
+
+static npg_status make_private(void)
+{
+    const char *temp = getenv("TMPDIR");
+    snprintf(private_folder, sizeof private_folder, "%s/neupig-kernels-XXXXXX",
+             temp && temp[0] == '/' ? temp : "/tmp");
+    if (mkdtemp(private_folder)) return NPG_OK;
+    npg_status status = npg_error_errno(NPG_DISK, "%s", private_folder);
+    private_folder[0] = 0;
+    return status;
+}
+
+static npg_status choose_folder(void)
+{
+    char folder[4096];
+    if (getenv("POCL_CACHE_DIR")) return NPG_OK;
+    if (take_shared(folder, sizeof folder))
+        folder[0] = 0; /* a home that can't be written to is no obstacle */
+    if (!folder[0]) NPG_TRY(make_private());
+    setenv("POCL_CACHE_DIR", folder[0] ? folder : private_folder, 1);
+    return NPG_OK;
+}
+
+npg_status npg_kernel_cache_enter(void)
+{
+    static bool chosen;
+    pthread_mutex_lock(&lock);
+    npg_status status = chosen ? NPG_OK : choose_folder();
+    if (!status) {
+        chosen = true;
+        users++;
+    }
+    pthread_mutex_unlock(&lock);
+    return status;
+}
+
+static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
+{
+    (void)info, (void)kind, (void)walk;
+    remove(path);
+    return 0;
+}
+
+static void remove_private(void)
+{
+    if (private_folder[0]) nftw(private_folder, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+}
+
+/* The driver keeps using the folder until the process ends, so that is when it goes. */
+void npg_kernel_cache_leave(void)
+{
+    static bool registered;
+    pthread_mutex_lock(&lock);
+    users--;
+    if (private_folder[0] && !registered) registered = !atexit(remove_private);
+    pthread_mutex_unlock(&lock);
+}

@@ -1,0 +1,27 @@
+/* Kernels: the table of ops, and the self-test that compares each with its plain twin. */
+#ifndef NPG_KERNELS_H
+#define NPG_KERNELS_H
+
+#include "device.h"
+
+/* Run one op on the device and its twin on the host over random data of the given size (1 is small; the
+ * figures of size 8 are large and odd) and give the largest error, relative to the largest value. */
+typedef npg_status npg_kernel_check(npg_device *device, int size, uint64_t seed, double *error);
+
+/* The gradient of a twin against central differences of the twin, in double; the largest relative error. */
+typedef npg_status npg_kernel_gradient(uint64_t seed, double *error);
+
+typedef struct npg_kernel_case {
+    const char *op;
+    npg_kernel_check *check;
+    npg_kernel_gradient *gradient; /* NULL: the op has no gradient */
+    double tolerance;              /* of the check                 */
+} npg_kernel_case;
+
+/* Ends with op NULL. */
+extern const npg_kernel_case npg_kernel_cases[];
+
+/* Check every op once, small.  NPG_DEVICE names the op that computes wrong. */
+npg_status npg_kernels_self_test(npg_device *device);
+
+#endif

@@ -1,0 +1,127 @@
+/* latent: the sparse sampling matrix and its kernels. */
+#include "latent.h"
+
+#include <string.h>
+
+/* ---- the matrix ---- */
+
+static void fill_row(npg_samples *samples, const npg_levels *levels, size_t row, const float *position,
+                     const float *normal)
+{
+    for (int l = 0; l < levels->count; l++) {
+        const npg_level *level = &levels->level[l];
+        size_t at = row * samples->per_row + 8 * (size_t)l;
+        npg_level_sample(level, level->kind == NPG_LEVEL_NORMAL ? normal : position, samples->index + at,
+                         samples->weight + at);
+    }
+}
+
+static void fill_channels(npg_samples *samples, const npg_levels *levels)
+{
+    for (int l = 0; l < levels->count; l++) {
+        const npg_level *level = &levels->level[l];
+        for (size_t i = 0; i < level->row_count; i++)
+            samples->channels[level->first_row + i] = level->channel_first | level->channel_end << 8;
+    }
+}
+
+/* Sort the entries of the real rows by node (counting sort, so in order of row within a node). */
+static void transpose(npg_samples *samples, size_t real)
+{
+    size_t entries = real * samples->per_row;
+    for (size_t i = 0; i < entries; i++) samples->start[samples->index[i] + 1]++;
+    for (size_t n = 0; n < samples->node_count; n++) samples->start[n + 1] += samples->start[n];
+    for (size_t i = 0; i < entries; i++) {
+        int32_t at = samples->start[samples->index[i]]++;
+        samples->vertex[at] = (int32_t)(i / samples->per_row);
+        samples->weight_back[at] = samples->weight[i];
+    }
+    memmove(samples->start + 1, samples->start, samples->node_count * sizeof *samples->start);
+    samples->start[0] = 0;
+}
+
+npg_status npg_samples_open(npg_samples *samples, const npg_levels *levels, const float *positions,
+                            const float *normals, size_t real, size_t rows)
+{
+    NPG_REQUIRE(real && real <= rows && rows < INT32_MAX / 256);
+    size_t per_row = 8 * (size_t)levels->count, nodes = levels->row_count;
+    npg_status status;
+    *samples = (npg_samples){.rows = rows, .node_count = nodes, .per_row = per_row};
+    NPG_TRY_OR(failed, status,
+               npg_alloc_array(&samples->index, NPG_FOR_FIT, rows * per_row, sizeof(int32_t)));
+    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->weight, NPG_FOR_FIT, rows * per_row, sizeof(float)));
+    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->start, NPG_FOR_FIT, nodes + 2, sizeof(int32_t)));
+    NPG_TRY_OR(failed, status,
+               npg_alloc_array(&samples->vertex, NPG_FOR_FIT, real * per_row, sizeof(int32_t)));
+    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->channels, NPG_FOR_FIT, nodes, sizeof(int32_t)));
+    NPG_TRY_OR(failed, status,
+               npg_alloc_array(&samples->weight_back, NPG_FOR_FIT, real * per_row, sizeof(float)));
+    for (size_t row = 0; row < rows; row++) {
+        size_t from = row < real ? row : real - 1;
+        fill_row(samples, levels, row, positions + 3 * from, normals + 3 * from);
+    }
+    fill_channels(samples, levels);
+    transpose(samples, real);
+    return NPG_OK;
+failed:
+    npg_samples_close(samples);
+    return status;
+}
+
+void npg_samples_close(npg_samples *samples)
+{
+    npg_release(&samples->index);
+    npg_release(&samples->weight);
+    npg_release(&samples->start);
+    npg_release(&samples->vertex);
+    npg_release(&samples->channels);
+    npg_release(&samples->weight_back);
+}
+
+/* ---- the kernels ---- */
+
+npg_status npg_latent_open(npg_latent *latent, npg_device *device, const npg_samples *s)
+{
+    npg_status status;
+    size_t entries = s->rows * s->per_row, back = (size_t)s->start[s->node_count];
+    *latent = (npg_latent){.rows = s->rows, .node_count = s->node_count, .per_row = s->per_row};
+    NPG_TRY_OR(failed, status, npg_program_open(&latent->program, device, "latent", ""));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->index, device, s->index, entries * 4));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->weight, device, s->weight, entries * 4));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->start, device, s->start, (s->node_count + 1) * 4));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->vertex, device, s->vertex, back * 4));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->weight_back, device, s->weight_back, back * 4));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->channels, device, s->channels, s->node_count * 4));
+    return NPG_OK;
+failed:
+    npg_latent_close(latent);
+    return status;
+}
+
+void npg_latent_close(npg_latent *latent)
+{
+    npg_program_close(&latent->program);
+    npg_buffer_close(&latent->index);
+    npg_buffer_close(&latent->weight);
+    npg_buffer_close(&latent->start);
+    npg_buffer_close(&latent->vertex);
+    npg_buffer_close(&latent->weight_back);
+    npg_buffer_close(&latent->channels);
+}
+
+npg_status npg_latent_sample(const npg_latent *latent, const npg_buffer *z, const npg_buffer *nodes)
+{
+    return NPG_LAUNCH(latent->program, "latent_sample", latent->rows, 1, NPG_BUF(z), NPG_BUF(nodes),
+                      NPG_BUF(&latent->index), NPG_BUF(&latent->weight), NPG_INT(latent->per_row),
+                      NPG_INT(latent->rows));
+}
+
+npg_status npg_latent_back(const npg_latent *latent, const npg_buffer *dnodes, const npg_buffer *dz,
+                           const npg_buffer *z)
+{
+    NPG_TRY(NPG_LAUNCH(latent->program, "latent_tanh_back", latent->rows, 1, NPG_BUF(dz), NPG_BUF(z),
+                       NPG_INT(latent->rows)));
+    return NPG_LAUNCH(latent->program, "latent_back", latent->node_count, 1, NPG_BUF(dnodes), NPG_BUF(dz),
+                      NPG_BUF(&latent->start), NPG_BUF(&latent->vertex), NPG_BUF(&latent->weight_back),
+                      NPG_BUF(&latent->channels), NPG_INT(latent->node_count));
+}

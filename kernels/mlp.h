@@ -1,0 +1,74 @@
+/* mlp: the decoder, forward and backward, for many vertices in many frames; kernels in mlp.cl and time.cl,
+ * twins in mlp_ref.c.
+ *
+ * Parameters, gradient and Adam's moments are one list of floats (npg_mlp_shape_*), in the order
+ *     W2 (packed W1 x W2) | W3 (W2 x 16) | b2 (W2) | b3 (16) | W1z (packed 32 x W1) | W1t (M x W1) | b1 (W1)
+ * "packed K x C" is [C / 32][K][32]. */
+#ifndef NPG_MLP_H
+#define NPG_MLP_H
+
+#include "device.h"
+
+#define NPG_MLP_ROWS 192 /* vertices per block */
+#define NPG_MLP_OUT  8   /* floats of output per vertex, 7 used */
+
+typedef struct npg_mlp_shape {
+    size_t w1, w2;    /* widths of the hidden layers, multiples of 32       */
+    size_t code_size; /* M, length of the time code                         */
+    float slope;      /* of the leaky rectifier                             */
+} npg_mlp_shape;
+
+size_t npg_mlp_param_count(const npg_mlp_shape *shape);
+size_t npg_mlp_at_w3(const npg_mlp_shape *shape);
+size_t npg_mlp_at_b2(const npg_mlp_shape *shape);
+size_t npg_mlp_at_b3(const npg_mlp_shape *shape);
+size_t npg_mlp_at_w1z(const npg_mlp_shape *shape);
+size_t npg_mlp_at_w1t(const npg_mlp_shape *shape);
+size_t npg_mlp_at_b1(const npg_mlp_shape *shape);
+
+/* Where element (row, column) of a packed matrix with `rows` rows lies. */
+size_t npg_mlp_packed(size_t rows, size_t row, size_t column);
+
+typedef struct npg_mlp {
+    npg_program *program, *time;
+    npg_mlp_shape shape;
+    size_t rows, blocks, groups, frames, batch;
+    npg_buffer params, grad; /* [param count]                                         */
+    npg_buffer code;         /* [frames][M]                                           */
+    npg_buffer z, dz;        /* [rows][32]: input of all frames and its gradient       */
+    npg_buffer out, dout;    /* [frames][rows][8]                                     */
+    npg_buffer p, dp;        /* [blocks][W1 panels]: z W1z and its gradient            */
+    npg_buffer c, dc;        /* [frames][W1], [groups][frames][W1]                     */
+    npg_buffer h2;           /* [batch][blocks][W2 panels]                             */
+    npg_buffer sums, transposed, scratch;
+} npg_mlp;
+
+/* rows: a multiple of NPG_MLP_ROWS; frames: T; batch: frames whose second layer is kept between forward and
+ * backward (0: forward only).  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
+npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
+                        size_t frames, size_t batch);
+void npg_mlp_close(npg_mlp *mlp);
+
+/* What depends on z, code and params alone: p, c and, for the backward pass, the transposes; sums to 0. */
+npg_status npg_mlp_begin(npg_mlp *mlp);
+
+/* out for the frames first .. first + count - 1, count <= batch. */
+npg_status npg_mlp_forward(npg_mlp *mlp, size_t first, size_t count);
+
+/* From dout of the same frames, right after their forward pass: adds to the gradient. */
+npg_status npg_mlp_backward(npg_mlp *mlp, size_t first, size_t count);
+
+/* grad and dz, after all frames have gone backward. */
+npg_status npg_mlp_end(npg_mlp *mlp);
+
+/* dcode [frames][M], after npg_mlp_end: for a learned time code. */
+npg_status npg_mlp_code_back(npg_mlp *mlp, const npg_buffer *dcode);
+
+/* The plain twins, in double, for one vertex in one frame: out (7) of z (32) and code (M); and the gradients,
+ * added to grad, dz, dcode. */
+void npg_mlp_forward_ref(double *out, const double *z, const double *code, const double *params,
+                         const npg_mlp_shape *shape);
+void npg_mlp_backward_ref(double *grad, double *dz, double *dcode, const double *dout, const double *z,
+                          const double *code, const double *params, const npg_mlp_shape *shape);
+
+#endif

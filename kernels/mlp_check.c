@@ -1,0 +1,171 @@
+/* mlp and adam: the checker's cases. */
+#include <math.h>
+
+#include "adam.h"
+#include "check.h"
+#include "levels.h"
+#include "mlp.h"
+
+#define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
+
+typedef struct mlp_data {
+    npg_mlp_shape shape;
+    size_t rows, frames, param_count;
+    float *params, *z, *code, *dout;
+    double *params_wide, *z_wide, *code_wide, *dout_wide;
+    double *out, *grad, *dz, *dcode;
+} mlp_data;
+
+/* Some sizes have one block, some several frames in several batches, some uneven widths. */
+static npg_status open_mlp_data(mlp_data *d, int size, uint64_t seed)
+{
+    npg_random random = npg_random_stream(seed, 12, (uint64_t)size);
+    d->shape = (npg_mlp_shape){32 * (size_t)size, size > 1 ? 64 : 32, size == 2 ? 2 : 8, 0.01f};
+    d->rows = NPG_MLP_ROWS * (size > 2 ? 3 : 1);
+    d->frames = size == 1 ? 1 : 5;
+    size_t n = d->param_count = npg_mlp_param_count(&d->shape), samples = d->rows * d->frames;
+    NPG_TRY(npg_check_values(&d->params, &d->params_wide, n, 1 / sqrt((double)d->shape.w1), &random));
+    NPG_TRY(npg_check_values(&d->z, &d->z_wide, d->rows * CHANNELS, 1, &random));
+    NPG_TRY(npg_check_values(&d->code, &d->code_wide, d->frames * d->shape.code_size, 1, &random));
+    NPG_TRY(npg_check_values(&d->dout, &d->dout_wide, samples * NPG_MLP_OUT, 1, &random));
+    for (size_t k = 0; k < d->shape.w2; k++)
+        for (size_t o = 7; o < 16; o++) d->params[npg_mlp_at_w3(&d->shape) + k * 16 + o] = 0;
+    for (size_t o = 7; o < 16; o++) d->params[npg_mlp_at_b3(&d->shape) + o] = 0;
+    for (size_t i = 7; i < samples * NPG_MLP_OUT; i += NPG_MLP_OUT) d->dout[i] = 0;
+    NPG_TRY(npg_alloc_array(&d->out, NPG_FOR_RUN, samples * NPG_MLP_OUT, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&d->grad, NPG_FOR_RUN, n, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&d->dz, NPG_FOR_RUN, d->rows * CHANNELS, sizeof(double)));
+    return npg_alloc_array(&d->dcode, NPG_FOR_RUN, d->frames * d->shape.code_size, sizeof(double));
+}
+
+static void close_mlp_data(mlp_data *d)
+{
+    void *all[] = {&d->params,    &d->z,         &d->code, &d->dout, &d->params_wide, &d->z_wide,
+                   &d->code_wide, &d->dout_wide, &d->out,  &d->grad, &d->dz,          &d->dcode};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+}
+
+static void mlp_twins(mlp_data *d)
+{
+    for (size_t t = 0; t < d->frames; t++)
+        for (size_t v = 0; v < d->rows; v++) {
+            size_t at = (t * d->rows + v) * NPG_MLP_OUT, code = t * d->shape.code_size;
+            npg_mlp_forward_ref(d->out + at, d->z_wide + v * CHANNELS, d->code_wide + code, d->params_wide,
+                                &d->shape);
+            npg_mlp_backward_ref(d->grad, d->dz + v * CHANNELS, d->dcode + code, d->dout_wide + at,
+                                 d->z_wide + v * CHANNELS, d->code_wide + code, d->params_wide, &d->shape);
+        }
+}
+
+static npg_status run_mlp(npg_mlp *mlp, mlp_data *d)
+{
+    NPG_TRY(npg_buffer_write(&mlp->params, 0, d->params, d->param_count * sizeof(float)));
+    NPG_TRY(npg_buffer_write(&mlp->z, 0, d->z, d->rows * CHANNELS * sizeof(float)));
+    NPG_TRY(npg_buffer_write(&mlp->code, 0, d->code, d->frames * d->shape.code_size * sizeof(float)));
+    NPG_TRY(npg_buffer_write(&mlp->dout, 0, d->dout, d->rows * d->frames * NPG_MLP_OUT * sizeof(float)));
+    NPG_TRY(npg_mlp_begin(mlp));
+    for (size_t first = 0; first < d->frames; first += mlp->batch) {
+        size_t left = d->frames - first, count = left < mlp->batch ? left : mlp->batch;
+        NPG_TRY(npg_mlp_forward(mlp, first, count));
+        NPG_TRY(npg_mlp_backward(mlp, first, count));
+    }
+    return npg_mlp_end(mlp);
+}
+
+static npg_status compare_mlp(npg_device *device, mlp_data *d, npg_mlp *mlp, npg_buffer *dcode, double *error)
+{
+    NPG_TRY(npg_mlp_open(mlp, device, &d->shape, d->rows, d->frames, d->frames > 1 ? 2 : 1));
+    NPG_TRY(npg_buffer_open(dcode, device, d->frames * d->shape.code_size * sizeof(float)));
+    NPG_TRY(run_mlp(mlp, d));
+    NPG_TRY(npg_mlp_code_back(mlp, dcode));
+    mlp_twins(d);
+    NPG_TRY(npg_check_buffer(error, &mlp->out, d->out, d->rows * d->frames * NPG_MLP_OUT));
+    NPG_TRY(npg_check_buffer(error, &mlp->grad, d->grad, d->param_count));
+    NPG_TRY(npg_check_buffer(error, dcode, d->dcode, d->frames * d->shape.code_size));
+    return npg_check_buffer(error, &mlp->dz, d->dz, d->rows * CHANNELS);
+}
+
+npg_status npg_check_mlp(npg_device *device, int size, uint64_t seed, double *error)
+{
+    mlp_data d = {0};
+    npg_mlp mlp = {0};
+    npg_buffer dcode = {0};
+    *error = 0;
+    npg_status status = open_mlp_data(&d, size, seed);
+    if (!status) status = compare_mlp(device, &d, &mlp, &dcode, error);
+    npg_mlp_close(&mlp);
+    npg_buffer_close(&dcode);
+    close_mlp_data(&d);
+    return status;
+}
+
+/* One sample: the function whose gradient the twin gives is the sum of dout out. */
+static double mlp_value(void *user)
+{
+    mlp_data *d = user;
+    double sum = 0;
+    npg_mlp_forward_ref(d->out, d->z_wide, d->code_wide, d->params_wide, &d->shape);
+    for (size_t o = 0; o < 7; o++) sum += d->dout_wide[o] * d->out[o];
+    return sum;
+}
+
+npg_status npg_slope_mlp(uint64_t seed, double *error)
+{
+    mlp_data d = {0};
+    *error = 0;
+    npg_status status = open_mlp_data(&d, 2, seed);
+    if (!status) {
+        npg_mlp_backward_ref(d.grad, d.dz, d.dcode, d.dout_wide, d.z_wide, d.code_wide, d.params_wide,
+                             &d.shape);
+        npg_check_slope(error, d.params_wide, d.grad, d.param_count, 13, 1e-6, mlp_value, &d);
+        npg_check_slope(error, d.z_wide, d.dz, CHANNELS, 1, 1e-6, mlp_value, &d);
+        npg_check_slope(error, d.code_wide, d.dcode, d.shape.code_size, 1, 1e-6, mlp_value, &d);
+    }
+    close_mlp_data(&d);
+    return status;
+}
+
+/* ---- adam ---- */
+
+typedef struct adam_data {
+    npg_adam adam;
+    npg_buffer params, gradient;
+    float *start, *slope, *rates;
+    double *wide, *slope_wide, *first, *second;
+} adam_data;
+
+static npg_status run_adam(npg_device *device, adam_data *d, size_t n, size_t row, npg_random *random,
+                           double *error)
+{
+    NPG_TRY(npg_check_values(&d->start, &d->wide, n, 1, random));
+    NPG_TRY(npg_check_values(&d->rates, NULL, (n + row - 1) / row, 0.1, random));
+    NPG_TRY(npg_alloc_array(&d->first, NPG_FOR_RUN, n, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&d->second, NPG_FOR_RUN, n, sizeof(double)));
+    NPG_TRY(npg_adam_open(&d->adam, device, d->rates, row, n));
+    NPG_TRY(npg_buffer_from(&d->params, device, d->start, n * sizeof(float)));
+    for (int64_t step = 1; step <= 5; step++) {
+        npg_release(&d->slope);
+        npg_release(&d->slope_wide);
+        npg_buffer_close(&d->gradient);
+        /* gradients down to the size of epsilon */
+        NPG_TRY(npg_check_values(&d->slope, &d->slope_wide, n, step % 2 ? 1 : 1e-7, random));
+        NPG_TRY(npg_buffer_from(&d->gradient, device, d->slope, n * sizeof(float)));
+        NPG_TRY(npg_adam_step(&d->adam, &d->params, &d->gradient));
+        npg_adam_step_ref(d->wide, d->first, d->second, d->slope_wide, d->rates, row, n, step);
+    }
+    return npg_check_buffer(error, &d->params, d->wide, n);
+}
+
+npg_status npg_check_adam(npg_device *device, int size, uint64_t seed, double *error)
+{
+    adam_data d = {0};
+    npg_random random = npg_random_stream(seed, 13, (uint64_t)size);
+    *error = 0;
+    npg_status status = run_adam(device, &d, size == 1 ? 7 : (size_t)size * 1009, 32, &random, error);
+    npg_adam_close(&d.adam);
+    npg_buffer_close(&d.params);
+    npg_buffer_close(&d.gradient);
+    void *all[] = {&d.start, &d.slope, &d.rates, &d.wide, &d.slope_wide, &d.first, &d.second};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    return status;
+}

@@ -1,0 +1,291 @@
+/* motion: buffers and launches of transform, nearest, chamfer and isometry. */
+#include "motion.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- layout ---- */
+
+void npg_pack16(float *out, const float *points, size_t count, size_t padded)
+{
+    for (size_t i = 0; i < padded; i++) {
+        const float *from = points + 3 * (i < count ? i : count - 1);
+        for (size_t axis = 0; axis < 3; axis++) out[i / 16 * 48 + axis * 16 + i % 16] = from[axis];
+    }
+}
+
+void npg_unpack16(float *points, const float *packed, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        for (size_t axis = 0; axis < 3; axis++)
+            points[3 * i + axis] = packed[i / 16 * 48 + axis * 16 + i % 16];
+}
+
+size_t npg_tree_blocks(size_t count)
+{
+    size_t total = 0, children = (count + 15) / 16;
+    do {
+        children = (children + 15) / 16;
+        total += children;
+    } while (children > 1);
+    return total;
+}
+
+typedef struct keyed {
+    uint64_t key;
+    uint32_t index;
+} keyed;
+
+static int by_key(const void *a, const void *b)
+{
+    const keyed *x = a, *y = b;
+    if (x->key != y->key) return x->key < y->key ? -1 : 1;
+    return x->index < y->index ? -1 : x->index > y->index;
+}
+
+/* Spread the low 21 bits to every third bit. */
+static uint64_t spread(uint64_t v)
+{
+    v &= 0x1fffff;
+    v = (v | v << 32) & 0x1f00000000ffffULL;
+    v = (v | v << 16) & 0x1f0000ff0000ffULL;
+    v = (v | v << 8) & 0x100f00f00f00f00fULL;
+    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
+    return (v | v << 2) & 0x1249249249249249ULL;
+}
+
+npg_status npg_morton_order(uint32_t *order, const float *points, size_t count)
+{
+    keyed *keys;
+    float lo[3] = {INFINITY, INFINITY, INFINITY}, extent = 0;
+    NPG_TRY(npg_alloc_array(&keys, NPG_FOR_FIT, count, sizeof *keys));
+    for (size_t i = 0; i < 3 * count; i++) lo[i % 3] = fminf(lo[i % 3], points[i]);
+    for (size_t i = 0; i < 3 * count; i++) extent = fmaxf(extent, points[i] - lo[i % 3]);
+    float scale = extent > 0 ? 2097151.0f / extent : 0;
+    for (size_t i = 0; i < count; i++) {
+        keys[i].index = (uint32_t)i;
+        for (size_t axis = 0; axis < 3; axis++)
+            keys[i].key |= spread((uint64_t)((points[3 * i + axis] - lo[axis]) * scale)) << axis;
+    }
+    qsort(keys, count, sizeof *keys, by_key);
+    for (size_t i = 0; i < count; i++) order[i] = keys[i].index;
+    npg_release(&keys);
+    return NPG_OK;
+}
+
+/* ---- opening ---- */
+
+static npg_status open_programs(npg_motion *m, npg_device *device, npg_rotation rotation)
+{
+    char constants[32];
+    snprintf(constants, sizeof constants, "-DROTATION=%d", (int)rotation);
+    NPG_TRY(npg_program_open(&m->transform, device, "transform", constants));
+    NPG_TRY(npg_program_open(&m->nearest, device, "nearest", ""));
+    NPG_TRY(npg_program_open(&m->chamfer, device, "chamfer", ""));
+    return npg_program_open(&m->isometry, device, "isometry", "");
+}
+
+static npg_status upload_rest(npg_motion *m, npg_device *device, const float *vertices)
+{
+    float *packed;
+    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, m->rows * 3, sizeof(float)));
+    npg_pack16(packed, vertices, m->real, m->rows);
+    npg_status status = npg_buffer_from(&m->rest, device, packed, m->rows * 3 * sizeof(float));
+    npg_release(&packed);
+    return status;
+}
+
+static double edge_size(const float *vertices, const uint32_t edge[2])
+{
+    double sum = 0;
+    for (size_t axis = 0; axis < 3; axis++) {
+        double d = (double)vertices[3 * edge[0] + axis] - (double)vertices[3 * edge[1] + axis];
+        sum += d * d;
+    }
+    return sqrt(sum);
+}
+
+static void fill_edges(int32_t *start, int32_t *neighbour, float *rest, const float *vertices, size_t rows,
+                       const uint32_t (*edges)[2], size_t edge_count)
+{
+    for (size_t e = 0; e < edge_count; e++)
+        for (int end = 0; end < 2; end++) start[edges[e][end] + 1]++;
+    for (size_t v = 0; v < rows; v++) start[v + 1] += start[v];
+    for (size_t e = 0; e < edge_count; e++)
+        for (int end = 0; end < 2; end++) {
+            int32_t at = start[edges[e][end]]++;
+            neighbour[at] = (int32_t)edges[e][1 - end];
+            rest[at] = (float)edge_size(vertices, edges[e]);
+        }
+    memmove(start + 1, start, rows * sizeof *start);
+    start[0] = 0;
+}
+
+static npg_status upload_edges(npg_motion *m, npg_device *device, const float *vertices,
+                               const uint32_t (*edges)[2], size_t edge_count)
+{
+    int32_t *start = NULL, *neighbour = NULL;
+    float *rest = NULL;
+    size_t half = m->half_edges = 2 * edge_count;
+    npg_status status = npg_alloc_array(&start, NPG_FOR_FIT, m->rows + 2, sizeof *start);
+    if (!status) status = npg_alloc_array(&neighbour, NPG_FOR_FIT, half + 1, sizeof *neighbour);
+    if (!status) status = npg_alloc_array(&rest, NPG_FOR_FIT, half + 1, sizeof *rest);
+    if (!status) {
+        fill_edges(start, neighbour, rest, vertices, m->rows, edges, edge_count);
+        status = npg_buffer_from(&m->start, device, start, (m->rows + 1) * sizeof *start);
+    }
+    if (!status) status = npg_buffer_from(&m->neighbour, device, neighbour, (half + 1) * sizeof *neighbour);
+    if (!status) status = npg_buffer_from(&m->edge_rest, device, rest, (half + 1) * sizeof *rest);
+    npg_release(&start);
+    npg_release(&neighbour);
+    npg_release(&rest);
+    return status;
+}
+
+typedef struct totals {
+    size_t leaves, boxes, points;
+} totals;
+
+/* The searches of frame t both ways; `before` sums what the earlier frames take. */
+static void fill_slots(int32_t *forward, int32_t *reverse, const npg_motion *m, size_t t, size_t count,
+                       const totals *before)
+{
+    const size_t vert_boxes = npg_tree_blocks(m->real);
+    const int32_t f[NPG_SLOT] = {(int32_t)m->real,       (int32_t)(t * m->rows / 16),
+                                 (int32_t)count,         (int32_t)before->leaves,
+                                 (int32_t)before->boxes, (int32_t)(t * m->rows)};
+    const int32_t r[NPG_SLOT] = {(int32_t)count,
+                                 (int32_t)before->leaves,
+                                 (int32_t)m->real,
+                                 (int32_t)(t * m->rows / 16),
+                                 (int32_t)(t * vert_boxes),
+                                 (int32_t)before->points};
+    memcpy(forward + t * NPG_SLOT, f, sizeof f);
+    memcpy(reverse + t * NPG_SLOT, r, sizeof r);
+}
+
+static npg_status upload_points(npg_motion *m, npg_device *device, const npg_target *targets, size_t leaves)
+{
+    float *packed;
+    size_t at = 0;
+    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, leaves * 48, sizeof(float)));
+    for (size_t t = 0; t < m->frames; t++) {
+        size_t padded = (targets[t].count + 15) / 16 * 16;
+        npg_pack16(packed + at, targets[t].points, targets[t].count, padded);
+        at += padded * 3;
+    }
+    npg_status status = npg_buffer_from(&m->points, device, packed, leaves * 48 * sizeof(float));
+    npg_release(&packed);
+    return status;
+}
+
+static npg_status upload_targets(npg_motion *m, npg_device *device, const npg_target *targets)
+{
+    int32_t *slots;
+    totals sum = {0};
+    size_t bytes = m->frames * NPG_SLOT * sizeof *slots;
+    NPG_TRY(npg_alloc(&slots, NPG_FOR_FIT, 2 * bytes));
+    for (size_t t = 0; t < m->frames; t++) {
+        fill_slots(slots, slots + m->frames * NPG_SLOT, m, t, targets[t].count, &sum);
+        sum.leaves += (targets[t].count + 15) / 16;
+        sum.boxes += npg_tree_blocks(targets[t].count);
+        sum.points += targets[t].count;
+        if (targets[t].count > m->most_points) m->most_points = targets[t].count;
+    }
+    npg_status status = sum.points < INT32_MAX / 64 && m->frames * m->rows < INT32_MAX / 64
+                            ? upload_points(m, device, targets, sum.leaves)
+                            : npg_error(NPG_USAGE, "%zu points in one window are too many", sum.points);
+    if (!status) status = npg_buffer_from(&m->forward, device, slots, bytes);
+    if (!status) status = npg_buffer_from(&m->reverse, device, slots + m->frames * NPG_SLOT, bytes);
+    if (!status) status = npg_buffer_open(&m->point_boxes, device, sum.boxes * 96 * sizeof(float));
+    if (!status) status = npg_buffer_open(&m->to_verts, device, sum.points * sizeof(int32_t));
+    npg_release(&slots);
+    return status;
+}
+
+static npg_status open_moving(npg_motion *m, npg_device *device)
+{
+    const size_t f = sizeof(float), all = m->frames * m->rows;
+    NPG_TRY(npg_buffer_open(&m->x, device, all * 3 * f));
+    NPG_TRY(npg_buffer_open(&m->g, device, all * 3 * f));
+    NPG_TRY(npg_buffer_open(&m->vert_boxes, device, m->frames * npg_tree_blocks(m->real) * 96 * f));
+    NPG_TRY(npg_buffer_open(&m->to_points, device, all * sizeof(int32_t)));
+    NPG_TRY(npg_buffer_open(&m->cd, device, m->frames * f));
+    NPG_TRY(npg_buffer_open(&m->part, device, all / 16 * f));
+    return npg_buffer_open(&m->gain, device, m->frames * f);
+}
+
+static npg_status refit(npg_motion *m, npg_buffer *boxes, npg_buffer *points, npg_buffer *slots, size_t first,
+                        size_t count)
+{
+    return NPG_LAUNCH(m->nearest, "nearest_refit", count, 1, NPG_BUF(boxes), NPG_BUF(points), NPG_BUF(slots),
+                      NPG_INT(first), NPG_INT(count));
+}
+
+npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotation, const float *vertices,
+                           size_t real, size_t rows, const uint32_t (*edges)[2], size_t edge_count,
+                           const npg_target *targets, size_t frames)
+{
+    NPG_REQUIRE(real && real <= rows && rows % 16 == 0);
+    *m = (npg_motion){.rows = rows, .real = real, .frames = frames};
+    npg_status status = open_programs(m, device, rotation);
+    if (!status) status = upload_rest(m, device, vertices);
+    if (!status) status = upload_edges(m, device, vertices, edges, edge_count);
+    if (!status) status = upload_targets(m, device, targets);
+    if (!status) status = open_moving(m, device);
+    if (!status) status = refit(m, &m->point_boxes, &m->points, &m->forward, 0, frames);
+    if (status) npg_motion_close(m);
+    return status;
+}
+
+void npg_motion_close(npg_motion *m)
+{
+    npg_buffer *all[] = {&m->rest,      &m->x,           &m->g,         &m->vert_boxes,
+                         &m->points,    &m->point_boxes, &m->to_points, &m->to_verts,
+                         &m->forward,   &m->reverse,     &m->start,     &m->neighbour,
+                         &m->edge_rest, &m->cd,          &m->part,      &m->gain};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
+    npg_program_close(&m->transform);
+    npg_program_close(&m->nearest);
+    npg_program_close(&m->chamfer);
+    npg_program_close(&m->isometry);
+}
+
+/* ---- steps ---- */
+
+npg_status npg_motion_apply(npg_motion *m, const npg_buffer *out, size_t first, size_t count)
+{
+    return NPG_LAUNCH(m->transform, "transform_apply", m->rows, count, NPG_BUF(&m->x), NPG_BUF(out),
+                      NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count));
+}
+
+npg_status npg_motion_chamfer(npg_motion *m, double alpha, size_t first, size_t count)
+{
+    NPG_TRY(refit(m, &m->vert_boxes, &m->x, &m->reverse, first, count));
+    NPG_TRY(NPG_LAUNCH(m->nearest, "nearest_find", (m->real + 63) / 64, count, NPG_BUF(&m->to_points),
+                       NPG_BUF(&m->x), NPG_BUF(&m->points), NPG_BUF(&m->point_boxes), NPG_BUF(&m->forward),
+                       NPG_INT(first), NPG_INT(count)));
+    NPG_TRY(NPG_LAUNCH(m->nearest, "nearest_find", (m->most_points + 63) / 64, count, NPG_BUF(&m->to_verts),
+                       NPG_BUF(&m->points), NPG_BUF(&m->x), NPG_BUF(&m->vert_boxes), NPG_BUF(&m->reverse),
+                       NPG_INT(first), NPG_INT(count)));
+    return NPG_LAUNCH(m->chamfer, "chamfer_frame", count, 1, NPG_BUF(&m->cd), NPG_BUF(&m->g), NPG_BUF(&m->x),
+                      NPG_BUF(&m->points), NPG_BUF(&m->to_points), NPG_BUF(&m->to_verts),
+                      NPG_BUF(&m->forward), NPG_BUF(&m->reverse),
+                      NPG_REAL(alpha > 0 ? 1 / (2 * alpha * alpha) : 0), NPG_INT(m->rows), NPG_INT(first),
+                      NPG_INT(count));
+}
+
+npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buffer *out, const float *gains,
+                           double iso_gain, size_t first, size_t count)
+{
+    NPG_TRY(npg_buffer_write(&m->gain, first * sizeof *gains, gains, count * sizeof *gains));
+    NPG_TRY(NPG_LAUNCH(m->isometry, "isometry_back", m->rows / 16, count, NPG_BUF(&m->g), NPG_BUF(&m->part),
+                       NPG_BUF(&m->x), NPG_BUF(&m->start), NPG_BUF(&m->neighbour), NPG_BUF(&m->edge_rest),
+                       NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows), NPG_INT(first),
+                       NPG_INT(count)));
+    return NPG_LAUNCH(m->transform, "transform_back", m->rows, count, NPG_BUF(dout), NPG_BUF(&m->g),
+                      NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count),
+                      NPG_INT(m->real));
+}

@@ -1,0 +1,115 @@
+/* sobolev: tables of the levels and the six passes. */
+#include "sobolev.h"
+
+#include <math.h>
+
+typedef struct tables {
+    int32_t level[NPG_LEVELS_MAX][4];
+    int32_t eigen_first[NPG_LEVELS_MAX];
+    float lambda[NPG_LEVELS_MAX], diagonal[NPG_LEVELS_MAX];
+    size_t matrix_size, eigen_size, lines;
+} tables;
+
+static bool is_smoothed(const npg_level *level)
+{
+    return level->lambda > 0 && level->kind != NPG_LEVEL_HASHED;
+}
+
+static void fill_tables(tables *t, const npg_levels *levels)
+{
+    for (int l = 0; l < levels->count; l++) {
+        const npg_level *level = &levels->level[l];
+        size_t n = is_smoothed(level) ? (size_t)level->nodes : 0;
+        t->level[l][0] = (int32_t)n;
+        t->level[l][1] = (int32_t)level->first_row;
+        t->level[l][2] = (int32_t)t->lines;
+        t->level[l][3] = (int32_t)t->matrix_size;
+        t->eigen_first[l] = (int32_t)t->eigen_size;
+        t->lambda[l] = (float)level->lambda;
+        t->diagonal[l] = (float)(1 + (level->screened ? 6 * level->lambda : 0));
+        t->matrix_size += n * n;
+        t->eigen_size += n;
+        t->lines += n ? n * n : level->row_count;
+    }
+}
+
+/* Orthonormal DCT-II: C[k][j] = s_k cos(pi (j + 1/2) k / n), s_0 = sqrt(1 / n), s_k = sqrt(2 / n). */
+static void fill_transform(float *matrix, float *eigen, int n)
+{
+    for (int k = 0; k < n; k++) {
+        eigen[k] = (float)(2 - 2 * cos(M_PI * k / n));
+        for (int j = 0; j < n; j++)
+            matrix[k * n + j] = (float)(sqrt((k ? 2.0 : 1.0) / n) * cos(M_PI * (j + 0.5) * k / n));
+    }
+}
+
+static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, const tables *t)
+{
+    float *matrices = NULL, *eigen = NULL;
+    npg_status status = npg_alloc_array(&matrices, NPG_FOR_FIT, t->matrix_size + 1, sizeof(float));
+    if (!status) status = npg_alloc_array(&eigen, NPG_FOR_FIT, t->eigen_size + 1, sizeof(float));
+    for (int l = 0; !status && l < sobolev->level_count; l++)
+        fill_transform(matrices + t->level[l][3], eigen + t->eigen_first[l], t->level[l][0]);
+    if (!status)
+        status = npg_buffer_from(&sobolev->matrices, device, matrices, (t->matrix_size + 1) * sizeof(float));
+    if (!status)
+        status = npg_buffer_from(&sobolev->eigen, device, eigen, (t->eigen_size + 1) * sizeof(float));
+    npg_release(&matrices);
+    npg_release(&eigen);
+    return status;
+}
+
+npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels)
+{
+    tables t = {0};
+    npg_status status;
+    size_t bytes = levels->row_count * NPG_LATENT_CHANNELS * sizeof(float);
+    fill_tables(&t, levels);
+    *sobolev = (npg_sobolev){.level_count = levels->count, .line_count = t.lines};
+    NPG_TRY_OR(failed, status, npg_program_open(&sobolev->program, device, "sobolev", ""));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level));
+    NPG_TRY_OR(failed, status,
+               npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda));
+    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal));
+    NPG_TRY_OR(failed, status, upload_transforms(sobolev, device, &t));
+    NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->a, device, bytes));
+    NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->b, device, bytes));
+    return NPG_OK;
+failed:
+    npg_sobolev_close(sobolev);
+    return status;
+}
+
+void npg_sobolev_close(npg_sobolev *sobolev)
+{
+    npg_program_close(&sobolev->program);
+    npg_buffer_close(&sobolev->levels);
+    npg_buffer_close(&sobolev->matrices);
+    npg_buffer_close(&sobolev->eigen);
+    npg_buffer_close(&sobolev->eigen_first);
+    npg_buffer_close(&sobolev->lambda);
+    npg_buffer_close(&sobolev->diagonal);
+    npg_buffer_close(&sobolev->a);
+    npg_buffer_close(&sobolev->b);
+}
+
+static npg_status pass(npg_sobolev *s, const npg_buffer *out, const npg_buffer *in, int axis, int back,
+                       int scale)
+{
+    return NPG_LAUNCH(s->program, "sobolev_pass", s->line_count, 1, NPG_BUF(out), NPG_BUF(in),
+                      NPG_BUF(&s->levels), NPG_BUF(&s->matrices), NPG_BUF(&s->eigen),
+                      NPG_BUF(&s->eigen_first), NPG_BUF(&s->lambda), NPG_BUF(&s->diagonal),
+                      NPG_INT(s->level_count), NPG_INT(s->line_count), NPG_INT(axis), NPG_INT(back),
+                      NPG_INT(scale));
+}
+
+npg_status npg_sobolev_solve(npg_sobolev *s, const npg_buffer *x, const npg_buffer *y)
+{
+    NPG_TRY(pass(s, &s->a, y, 0, 0, 0));
+    NPG_TRY(pass(s, &s->b, &s->a, 1, 0, 0));
+    NPG_TRY(pass(s, &s->a, &s->b, 2, 0, 1));
+    NPG_TRY(pass(s, &s->b, &s->a, 2, 1, 0));
+    NPG_TRY(pass(s, &s->a, &s->b, 1, 1, 0));
+    return pass(s, x, &s->a, 0, 1, 0);
+}

@@ -1,0 +1,45 @@
+/* JSON values from data that JSON can't hold as it is. */
+#include <math.h>
+#include <string.h>
+
+#include "stage.h"
+
+/* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
+static size_t sequence_length(const unsigned char *text)
+{
+    unsigned char c = text[0];
+    size_t length = c < 0x80                ? 1
+                    : c >= 0xc2 && c < 0xe0 ? 2
+                    : c >= 0xe0 && c < 0xf0 ? 3
+                    : c >= 0xf0 && c < 0xf5 ? 4
+                                            : 0;
+    for (size_t i = 1; i < length; i++)
+        if ((text[i] & 0xc0) != 0x80) return 0;
+    if (c == 0xe0 && text[1] < 0xa0) return 0;
+    if (c == 0xed && text[1] >= 0xa0) return 0;
+    if (c == 0xf0 && text[1] < 0x90) return 0;
+    if (c == 0xf4 && text[1] >= 0x90) return 0;
+    return length;
+}
+
+json_t *npg_json_text(const char *text)
+{
+    if (!text) return json_null();
+    json_t *value = json_string(text);
+    if (value) return value;
+    char *copy;
+    if (npg_copy_text(&copy, text)) return NULL;
+    for (unsigned char *c = (unsigned char *)copy; *c;) {
+        size_t length = sequence_length(c);
+        if (!length) *c = '?';
+        c += length ? length : 1;
+    }
+    value = json_string(copy);
+    npg_release(&copy);
+    return value;
+}
+
+json_t *npg_json_real(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}

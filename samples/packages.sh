@@ -1,0 +1,32 @@
+# The Debian 12 packages this project needs, and how they come onto the machine.  Read by samples/run.sh and
+# tests/run.sh: this is the only list.
+
+packages_to_build="build-essential cmake ninja-build pkg-config pocl-opencl-icd ocl-icd-opencl-dev opencl-headers
+libpcl-dev libeigen3-dev libboost-dev libembree-dev libopenvdb-dev libtbb-dev libmeshoptimizer-dev libjansson-dev
+libpng-dev libzstd-dev libxxhash-dev libnanoflann-dev"
+
+packages_to_test="libcmocka-dev bats clang-format-14"
+
+# Install those of the named packages that are missing; says what it installs, asks nothing.
+install_packages()
+{
+    local missing="" package as_root=""
+    for package in "$@"; do
+        case $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) in
+            installed) ;;
+            *) missing="$missing $package" ;;
+        esac
+    done
+    [ -n "$missing" ] || return 0
+    if [ "$(id -u)" -ne 0 ]; then
+        if ! command -v sudo >/dev/null; then
+            echo "These packages are missing, and neither root nor sudo is at hand to install them:$missing" >&2
+            return 1
+        fi
+        as_root="sudo"
+    fi
+    echo "Installing:$missing"
+    $as_root apt-get update -qq
+    # shellcheck disable=SC2086  # the lists are meant to be split
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing
+}

@@ -1,0 +1,37 @@
+#!/bin/bash
+# The main job in one command: build what is needed, make a sample capture, turn it into one moving mesh, measure
+# it and draw it.  On a fresh Debian 12 it installs what is missing (as root, or through sudo).
+#
+#   samples/run.sh [OUT]      OUT: folder for capture and results, build/sample by default
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=${1:-build/sample}
+frames=${FRAMES:-12}
+epochs=${EPOCHS:-100}
+
+. samples/packages.sh
+# shellcheck disable=SC2086
+install_packages $packages_to_build
+
+cmake --preset release
+cmake --build build --target neupig
+
+echo "== A capture: $frames frames of a walking figure, with noise and outliers, without normals"
+build/neupig synth -o "$out/capture" --frames "$frames" --points 5000 --noise 0.1 --outliers 0.5 --no-normals
+
+echo "== The main job"
+code=0
+build/neupig run "$out/capture/points" -o "$out/result" --epochs "$epochs" || code=$?
+# 7: finished, with frames below the quality bar; the report says which
+[ "$code" -eq 0 ] || [ "$code" -eq 7 ] || exit "$code"
+
+echo "== Against the ground truth"
+build/neupig eval "$out/result" "$out/capture/truth"
+
+build/neupig render "$out/result/meshes" -o "$out/result/strip.png" --count 6 --columns 6
+
+echo
+echo "meshes   $out/result/meshes"
+echo "report   $out/result/report.json"
+echo "picture  $out/result/strip.png"
+exit "$code"

@@ -1,0 +1,385 @@
+/* Evaluate: says for every frame how well the deformed surface explains the points, and whether that is good
+ * enough. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "evaluate.h"
+#include "kdtree.h"
+#include "stage.h"
+
+#define WARNINGS_MAX 10 /* frames below the bar that get a warning of their own */
+
+typedef struct aggregate {
+    double sum, worst;
+    size_t count;
+    int64_t worst_number;
+} aggregate;
+
+/* The figures that the report sums up. */
+static const struct {
+    const char *name;
+    size_t offset;
+    bool is_small_bad;
+} summed[] = {{"point_dist_median", offsetof(npg_figures, point_dist_median), false},
+              {"point_dist_mean", offsetof(npg_figures, point_dist_mean), false},
+              {"point_dist_p95", offsetof(npg_figures, point_dist_p95), false},
+              {"vertex_dist_mean", offsetof(npg_figures, vertex_dist_mean), false},
+              {"coverage", offsetof(npg_figures, coverage), true},
+              {"flipped_share", offsetof(npg_figures, flipped_share), false},
+              {"stretched_share", offsetof(npg_figures, stretched_share), false},
+              {"edge_change", offsetof(npg_figures, edge_change), false},
+              {"chamfer", offsetof(npg_figures, chamfer), false},
+              {"truth_cd", offsetof(npg_figures, truth_cd), false},
+              {"truth_nc", offsetof(npg_figures, truth_nc), true},
+              {"truth_f", offsetof(npg_figures, truth_f), true},
+              {"truth_corr", offsetof(npg_figures, truth_corr), false}};
+enum { SUMMED = sizeof summed / sizeof *summed };
+
+typedef struct evaluate_state {
+    /* options; the shares in per cent */
+    double residual_max, coverage_min, flipped_max, stretched_max, cover_dist;
+    int64_t point_limit;
+    const char *truth_folder;
+    /* of the run */
+    npg_surface *surface;
+    npg_shape *shape;
+    npg_truth *truth;
+    float *points, *dists; /* N x 3 and max(N, V), of the frame at hand, in units; owned */
+    npg_surface_hit *hits; /* N; owned */
+    uint32_t *nearest;     /* V; owned */
+    double *vert_areas;    /* V; owned */
+    size_t points_capacity, dists_capacity, hits_capacity;
+    aggregate sums[SUMMED];
+    int64_t *bad; /* numbers of the frames below the bar; owned */
+    size_t bad_count, bad_capacity, good_count, skipped_count;
+} evaluate_state;
+
+/* ---- points -> surface ---- */
+
+/* Every step-th point, so that no more than the limit are asked for. */
+static npg_status take_points(evaluate_state *state, const npg_frame_box *box, const npg_frame *frame,
+                              size_t *taken)
+{
+    size_t limit = state->point_limit ? (size_t)state->point_limit : SIZE_MAX;
+    size_t step = frame->point_count > limit ? (frame->point_count + limit - 1) / limit : 1;
+    size_t count = (frame->point_count + step - 1) / step;
+    NPG_TRY(
+        npg_grow(&state->points, &state->points_capacity, count, 3 * sizeof *state->points, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&state->hits, &state->hits_capacity, count, sizeof *state->hits, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, count, sizeof *state->dists, NPG_FOR_QUERY));
+    *taken = 0;
+    for (size_t i = 0; i < frame->point_count; i += step) {
+        const float *p = frame->pos_local + 3 * i;
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) continue;
+        npg_box_local_to_unit(box, state->points + 3 * (*taken)++, p, 1);
+    }
+    return NPG_OK;
+}
+
+static int by_size(const void *left, const void *right)
+{
+    float a = *(const float *)left, b = *(const float *)right;
+    return a < b ? -1 : a > b;
+}
+
+/* The value that a share of the sorted values does not pass. */
+static double quantile(const float *sorted, size_t count, double share)
+{
+    double at = share * (double)(count - 1);
+    size_t below = (size_t)at, above = below + 1 < count ? below + 1 : below;
+    double rest = at - (double)below;
+    return (double)sorted[below] * (1 - rest) + (double)sorted[above] * rest;
+}
+
+/* The distances of `count` points; the result in *mean_sq is in diagonals, squared. */
+static npg_status measure_points(evaluate_state *state, npg_figures *figures, size_t count, double per_unit,
+                                 double *mean_sq)
+{
+    double sum = 0, sum_sq = 0;
+    NPG_TRY(npg_surface_closest(state->surface, state->hits, state->points, count));
+    for (size_t i = 0; i < count; i++) {
+        double dist_sq = (double)state->hits[i].dist_sq;
+        sum_sq += dist_sq;
+        sum += sqrt(dist_sq);
+        state->dists[i] = (float)sqrt(dist_sq);
+    }
+    qsort(state->dists, count, sizeof *state->dists, by_size);
+    figures->point_dist_median = quantile(state->dists, count, 0.5) * per_unit;
+    figures->point_dist_p95 = quantile(state->dists, count, 0.95) * per_unit;
+    figures->point_dist_mean = sum / (double)count * per_unit;
+    *mean_sq = sum_sq / (double)count * per_unit * per_unit;
+    return NPG_OK;
+}
+
+/* ---- surface -> points ---- */
+
+/* A vertex is covered when a point lies within cover-distance of it, or within twice the mean spacing of the
+ * points on the surface where they are sparser than that. */
+static double cover_radius(const evaluate_state *state, double area, size_t point_count, double per_unit)
+{
+    double spacing = sqrt(area / (double)point_count);
+    return fmax(state->cover_dist / 100 / per_unit, 2 * spacing);
+}
+
+static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_mesh *reference,
+                                   const float *vert_unit, size_t point_count, double per_unit,
+                                   double *mean_sq)
+{
+    size_t v = reference->vert_count;
+    npg_kdtree *tree;
+    NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, v, sizeof *state->dists, NPG_FOR_QUERY));
+    NPG_TRY(npg_kdtree_open(&tree, state->points, point_count));
+    npg_status status = npg_kdtree_nearest(tree, state->nearest, state->dists, vert_unit, v, 1, 0);
+    npg_kdtree_close(&tree);
+    NPG_TRY(status);
+    double area = npg_vertex_areas(state->vert_areas, vert_unit, v, reference->faces, reference->face_count);
+    double radius = cover_radius(state, area, point_count, per_unit), covered = 0, whole = 0, sum = 0,
+           sum_sq = 0;
+    for (size_t i = 0; i < v; i++) {
+        double dist_sq = (double)state->dists[i];
+        sum_sq += dist_sq;
+        sum += sqrt(dist_sq);
+        whole += state->vert_areas[i];
+        if (dist_sq <= radius * radius) covered += state->vert_areas[i];
+    }
+    figures->coverage = whole > 0 ? covered / whole : 0;
+    figures->vertex_dist_mean = sum / (double)v * per_unit;
+    *mean_sq = sum_sq / (double)v * per_unit * per_unit;
+    return NPG_OK;
+}
+
+/* ---- one frame ---- */
+
+static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference)
+{
+    size_t v = reference->vert_count;
+    NPG_TRY(npg_shape_open(&state->shape, reference));
+    NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, v, sizeof *state->nearest));
+    NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, v, sizeof *state->vert_areas));
+    return npg_surface_open(&state->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+}
+
+static npg_status check_vertices(const npg_frame *frame, const npg_mesh *reference)
+{
+    if (frame->vert_count != reference->vert_count)
+        return npg_error(NPG_FAILED, "frame %" PRId64 " has %zu vertices, the reference %zu", frame->number,
+                         frame->vert_count, reference->vert_count);
+    for (size_t i = 0; i < 3 * frame->vert_count; i++)
+        if (!isfinite(frame->vert_unit[i]))
+            return npg_error(NPG_DIVERGED, "frame %" PRId64 ": vertex %zu is not finite", frame->number,
+                             i / 3);
+    return NPG_OK;
+}
+
+static npg_figures no_figures(void)
+{
+    npg_figures figures;
+    for (size_t i = 0; i < SUMMED; i++) *(double *)((char *)&figures + summed[i].offset) = (double)NAN;
+    figures.good = false;
+    return figures;
+}
+
+static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_figures *figures = &frame->figures;
+    double per_unit = 1 / (facts->box.scale * facts->box.diagonal), points_sq, vertices_sq;
+    size_t point_count = 0;
+    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference));
+    NPG_TRY(check_vertices(frame, facts->reference));
+    npg_shape_measure(state->shape, figures, frame->vert_unit);
+    if (state->truth)
+        NPG_TRY(npg_truth_compare(state->truth, frame, facts, (uint64_t)npg_worker_settings(worker)->seed));
+    if (!frame->is_skipped) NPG_TRY(take_points(state, &facts->box, frame, &point_count));
+    if (!point_count) return NPG_OK;
+    NPG_TRY(npg_surface_move(state->surface, frame->vert_unit));
+    NPG_TRY(measure_points(state, figures, point_count, per_unit, &points_sq));
+    NPG_TRY(measure_vertices(state, figures, facts->reference, frame->vert_unit, point_count, per_unit,
+                             &vertices_sq));
+    figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5;
+    return NPG_OK;
+}
+
+/* ---- the verdict ---- */
+
+/* What is wrong with a frame, NULL when it is above the bar.  A comparison with NaN fails, as it should. */
+static const char *fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share,
+                            double *value, double *bound)
+{
+    *value = 100 * f->point_dist_median;
+    *bound = state->residual_max;
+    if (!(*value <= *bound)) return "median distance of the points to the surface, in % of the diagonal,";
+    *value = 100 * f->coverage;
+    *bound = state->coverage_min * (1 - unseen_share);
+    if (!(*value >= *bound)) return "share of the surface with points near it, in %,";
+    *value = 100 * f->flipped_share;
+    *bound = state->flipped_max;
+    if (!(*value <= *bound)) return "share of flipped faces, in %,";
+    *value = 100 * f->stretched_share;
+    *bound = state->stretched_max;
+    if (!(*value <= *bound)) return "share of stretched faces, in %,";
+    return NULL;
+}
+
+static void add_up(evaluate_state *state, const npg_frame *frame)
+{
+    for (size_t i = 0; i < SUMMED; i++) {
+        double value = *(const double *)((const char *)&frame->figures + summed[i].offset);
+        aggregate *sum = &state->sums[i];
+        if (!isfinite(value)) continue;
+        bool is_worse = summed[i].is_small_bad ? value < sum->worst : value > sum->worst;
+        bool is_tie = value == sum->worst && frame->number < sum->worst_number;
+        if (!sum->count++ || is_worse || is_tie) {
+            sum->worst = value;
+            sum->worst_number = frame->number;
+        }
+        sum->sum += value;
+    }
+}
+
+static npg_status judge(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    double value, bound;
+    const char *fault =
+        fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share, &value, &bound);
+    frame->figures.good = !fault && !frame->is_skipped;
+    add_up(state, frame);
+    state->good_count += frame->figures.good;
+    if (frame->is_skipped || !fault) return NPG_OK;
+    NPG_TRY(
+        npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
+    state->bad[state->bad_count++] = frame->number;
+    if (state->bad_count <= WARNINGS_MAX)
+        npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g", fault, value,
+                        bound);
+    return NPG_OK;
+}
+
+/* ---- the report ---- */
+
+static json_t *json_of_sums(const evaluate_state *state)
+{
+    json_t *figures = json_object();
+    for (size_t i = 0; i < SUMMED; i++) {
+        const aggregate *sum = &state->sums[i];
+        if (!sum->count) continue;
+        json_object_set_new(figures, summed[i].name,
+                            json_pack("{sf sf sI}", "mean", sum->sum / (double)sum->count, "worst",
+                                      sum->worst, "worst_frame", (json_int_t)sum->worst_number));
+    }
+    return figures;
+}
+
+static int by_number(const void *left, const void *right)
+{
+    int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
+    return a < b ? -1 : a > b;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    json_t *report = npg_worker_report(worker), *bad = json_array();
+    if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, by_number);
+    for (size_t i = 0; i < state->bad_count; i++)
+        json_array_append_new(bad, json_integer((json_int_t)state->bad[i]));
+    json_object_set_new(report, "figures", json_of_sums(state));
+    json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
+    json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
+    json_object_set_new(report, "bad", bad);
+    if (state->bad_count > WARNINGS_MAX)
+        npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
+                        state->bad_count);
+    if (state->skipped_count)
+        npg_worker_warn(worker, true, -1, "%zu frames were skipped", state->skipped_count);
+    return NPG_OK;
+}
+
+/* ---- the stage ---- */
+
+static npg_status init(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    return state->truth_folder[0] ? npg_truth_open(&state->truth, state->truth_folder) : NPG_OK;
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit;
+        frame->figures = no_figures();
+        frame->fields |= NPG_FIELD_FIGURES;
+        state->skipped_count += frame->is_skipped;
+        if (has_mesh) NPG_TRY(measure_frame(worker, frame));
+        NPG_TRY(judge(worker, frame));
+    }
+    return NPG_OK;
+}
+
+static void uninit(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    npg_surface_close(&state->surface);
+    npg_shape_close(&state->shape);
+    npg_truth_close(&state->truth);
+    npg_release(&state->points);
+    npg_release(&state->dists);
+    npg_release(&state->hits);
+    npg_release(&state->nearest);
+    npg_release(&state->vert_areas);
+    npg_release(&state->bad);
+}
+
+/* Points, hits and distances; the k-d tree holds about as much again.  The surface counts its own. */
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    size_t points = facts->point_count_max, limit = (size_t)state->point_limit;
+    if (limit && points > limit) points = limit;
+    *chunks_held = 1;
+    return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float));
+}
+
+#define OFFSET(member) offsetof(evaluate_state, member)
+
+static const npg_option options[] = {
+    {"max-residual",
+     "A frame is good when the median distance of its points to the surface is at most this, "
+     "in per cent of the capture's diagonal",
+     NPG_OPTION_REAL, OFFSET(residual_max), "0.5", 0, 100, NULL, "PERCENT"},
+    {"min-coverage",
+     "... and at least this share of the surface that the keyframe saw has points near it, in "
+     "per cent",
+     NPG_OPTION_REAL, OFFSET(coverage_min), "50", 0, 100, NULL, "PERCENT"},
+    {"max-flipped", "... and at most this share of its faces is turned over, in per cent", NPG_OPTION_REAL,
+     OFFSET(flipped_max), "1", 0, 100, NULL, "PERCENT"},
+    {"max-stretched", "... and at most this share of its faces grew or shrank tenfold, in per cent",
+     NPG_OPTION_REAL, OFFSET(stretched_max), "5", 0, 100, NULL, "PERCENT"},
+    {"cover-distance", "How near a point must be to cover the surface, in per cent of the diagonal",
+     NPG_OPTION_REAL, OFFSET(cover_dist), "1", 0, 100, NULL, "PERCENT"},
+    {"evaluate-points", "Points per frame that figures are taken from, evenly spread over the file; 0: all",
+     NPG_OPTION_INT, OFFSET(point_limit), "100000", 0, 1e12, NULL, NULL},
+    {"truth", "Folder with the true meshes, numbered as the frames: their figures go into the report",
+     NPG_OPTION_TEXT, OFFSET(truth_folder), "", 0, 0, NULL, "DIR"},
+    {0}};
+
+extern const npg_stage npg_stage_evaluate;
+const npg_stage npg_stage_evaluate = {.name = "evaluate",
+                                      .help = "Measure every frame and judge it",
+                                      .options = options,
+                                      .state_size = sizeof(evaluate_state),
+                                      .passes = NPG_PASS_SOLVE,
+                                      .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE |
+                                               NPG_FIELD_VERTICES,
+                                      .gives = NPG_FIELD_FIGURES,
+                                      .init = init,
+                                      .process = process,
+                                      .flush = flush,
+                                      .uninit = uninit,
+                                      .memory = memory};

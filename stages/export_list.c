@@ -1,0 +1,308 @@
+/* The list of frames and the last file of a run. */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "export.h"
+#include "file.h"
+
+typedef struct line_place { /* a frame's line in the partial list */
+    int64_t index;
+    off_t offset;
+    size_t size; /* with its newline */
+} line_place;
+
+struct npg_frame_log {
+    char *output, *partial_path; /* owned */
+    int fd;
+    off_t size;
+    line_place *lines; /* owned */
+    size_t line_count, line_capacity;
+};
+
+/* ---- checksums ---- */
+
+static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
+{
+    unsigned char block[16 << 10];
+    XXH3_state_t *state = XXH3_createState();
+    if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
+    XXH3_64bits_reset(state);
+    npg_status status = NPG_OK;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    *size = 0;
+    while (!status) {
+        ssize_t got = read(fd, block, sizeof block);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+        if (got <= 0) break;
+        XXH3_64bits_update(state, block, (size_t)got);
+        *size += got;
+    }
+    if (fd >= 0) close(fd);
+    *hash = XXH3_64bits_digest(state);
+    XXH3_freeState(state);
+    return status;
+}
+
+npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
+{
+    char *path, text[17];
+    XXH64_hash_t hash;
+    int64_t size;
+    NPG_TRY(npg_join_path(&path, output, file));
+    npg_status status = hash_file(&hash, &size, path);
+    npg_release(&path);
+    NPG_TRY(status);
+    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)size));
+    json_object_set_new(entry, "xxh3", json_string(text));
+    return NPG_OK;
+}
+
+/* ---- one line ---- */
+
+static json_t *json_of_cleaning(const npg_cleaning *c)
+{
+    return json_pack("{sI sI sI sI sI sI sI sI}", "read", (json_int_t)c->read, "not_finite",
+                     (json_int_t)c->not_finite, "duplicate", (json_int_t)c->duplicate, "isolated",
+                     (json_int_t)c->isolated, "thinned", (json_int_t)c->thinned, "normals_given",
+                     (json_int_t)c->normals_given, "normals_flipped", (json_int_t)c->normals_flipped,
+                     "normals_estimated", (json_int_t)c->normals_estimated);
+}
+
+static json_t *json_of_figures(const npg_figures *f)
+{
+    const struct {
+        const char *name;
+        double value;
+    } values[] = {{"point_dist_median", f->point_dist_median},
+                  {"point_dist_mean", f->point_dist_mean},
+                  {"point_dist_p95", f->point_dist_p95},
+                  {"vertex_dist_mean", f->vertex_dist_mean},
+                  {"coverage", f->coverage},
+                  {"flipped_share", f->flipped_share},
+                  {"stretched_share", f->stretched_share},
+                  {"edge_change", f->edge_change},
+                  {"chamfer", f->chamfer},
+                  {"truth_cd", f->truth_cd},
+                  {"truth_nc", f->truth_nc},
+                  {"truth_f", f->truth_f},
+                  {"truth_corr", f->truth_corr}};
+    json_t *figures = json_object();
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
+        json_object_set_new(figures, values[i].name, npg_json_real(values[i].value));
+    return figures;
+}
+
+static json_t *json_of_frame(const npg_frame *frame, const char *file)
+{
+    json_t *line = json_object();
+    json_object_set_new(line, "index", json_integer((json_int_t)frame->index));
+    json_object_set_new(line, "number", json_integer((json_int_t)frame->number));
+    json_object_set_new(line, "source", npg_json_text(frame->path));
+    json_object_set_new(line, "key", json_boolean(frame->is_key));
+    json_object_set_new(line, "skipped", json_boolean(frame->is_skipped));
+    json_object_set_new(line, "held", json_boolean(frame->is_held));
+    json_object_set_new(line, "points", json_integer((json_int_t)frame->point_count));
+    json_object_set_new(line, "cleaning", json_of_cleaning(&frame->cleaning));
+    if (frame->fields & NPG_FIELD_FIGURES) {
+        json_object_set_new(line, "good", json_boolean(frame->figures.good));
+        json_object_set_new(line, "figures", json_of_figures(&frame->figures));
+    }
+    json_object_set_new(line, "file", npg_json_text(file));
+    return line;
+}
+
+/* ---- the list ---- */
+
+npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
+{
+    npg_frame_log *list;
+    npg_status status;
+    NPG_TRY(npg_alloc(&list, NPG_FOR_FILES, sizeof *list));
+    list->fd = -1;
+    NPG_TRY_OR(fail, status, npg_copy_text(&list->output, output));
+    NPG_TRY_OR(fail, status, npg_join_path(&list->partial_path, output, "frames.partial.jsonl"));
+    list->fd = open(list->partial_path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (list->fd < 0) {
+        status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
+        goto fail;
+    }
+    *out = list;
+    return NPG_OK;
+fail:
+    npg_frame_log_close(&list);
+    return status;
+}
+
+void npg_frame_log_close(npg_frame_log **slot)
+{
+    npg_frame_log *list = *slot;
+    if (!list) return;
+    if (list->fd >= 0) close(list->fd);
+    npg_release(&list->output);
+    npg_release(&list->partial_path);
+    npg_release(&list->lines);
+    npg_release(slot);
+}
+
+static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
+{
+    NPG_TRY(npg_grow(&list->lines, &list->line_capacity, list->line_count + 1, sizeof *list->lines,
+                     NPG_FOR_FILES));
+    for (size_t at = 0; at < size;) {
+        ssize_t written = pwrite(list->fd, text + at, size - at, list->size + (off_t)at);
+        if (written < 0 && errno == EINTR) continue;
+        if (written == 0) errno = ENOSPC;
+        if (written <= 0) return npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
+        at += (size_t)written;
+    }
+    list->lines[list->line_count++] = (line_place){index, list->size, size};
+    list->size += (off_t)size;
+    return NPG_OK;
+}
+
+npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
+                             const char *file)
+{
+    json_t *line = json_of_frame(frame, file);
+    npg_status status = file ? npg_file_facts(line, output, file) : NPG_OK;
+    char *text = status ? NULL : json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_decref(line);
+    NPG_TRY(status);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for the line of frame %lld", (long long)frame->number);
+    size_t size = strlen(text);
+    text[size] = '\n'; /* in the place of the final 0: the size goes along */
+    status = append(list, frame->index, text, size + 1);
+    free(text);
+    return status;
+}
+
+static int by_index(const void *left, const void *right)
+{
+    const line_place *a = left, *b = right;
+    return a->index < b->index ? -1 : a->index > b->index;
+}
+
+static npg_status copy_lines(npg_frame_log *list, npg_file *file)
+{
+    char *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < list->line_count && !status; i++) {
+        const line_place *place = &list->lines[i];
+        status = npg_grow(&line, &capacity, place->size, 1, NPG_FOR_FILES);
+        if (!status && pread(list->fd, line, place->size, place->offset) != (ssize_t)place->size)
+            status = npg_error_errno(NPG_DISK, "can't read back %s", list->partial_path);
+        if (!status) status = npg_file_write(file, line, place->size);
+    }
+    npg_release(&line);
+    return status;
+}
+
+npg_status npg_frame_log_finish(npg_frame_log *list)
+{
+    npg_file *file;
+    char *path;
+    if (list->line_count) qsort(list->lines, list->line_count, sizeof *list->lines, by_index);
+    NPG_TRY(npg_join_path(&path, list->output, "frames.jsonl"));
+    npg_status status = npg_file_open(&file, path);
+    npg_release(&path);
+    NPG_TRY(status);
+    status = copy_lines(list, file);
+    if (status)
+        npg_file_discard(&file);
+    else
+        status = npg_file_commit(&file);
+    if (!status && unlink(list->partial_path))
+        status = npg_error_errno(NPG_DISK, "can't remove %s", list->partial_path);
+    return status;
+}
+
+/* ---- done.json ---- */
+
+static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)
+{
+    char *text = json_dumps(entry, JSON_COMPACT);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
+    npg_status status = npg_file_print(file, "%s\n    ", *is_first ? "" : ",");
+    if (!status) status = npg_file_write(file, text, strlen(text));
+    *is_first = false;
+    free(text);
+    return status;
+}
+
+static npg_status write_file_entry(npg_file *file, const char *output, const char *name, bool *is_first)
+{
+    json_t *entry = json_pack("{ss}", "path", name);
+    npg_status status = npg_file_facts(entry, output, name);
+    if (!status) status = write_entry(file, entry, is_first);
+    json_decref(entry);
+    return status;
+}
+
+/* The meshes' sizes and checksums, from the lines of frames.jsonl. */
+static npg_status write_mesh_entries(npg_file *file, const char *output, bool *is_first)
+{
+    char *path, *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_join_path(&path, output, "frames.jsonl"));
+    FILE *list = fopen(path, "re");
+    if (!list) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    while (!status && getline(&line, &capacity, list) > 0) {
+        json_t *frame = json_loads(line, 0, NULL), *name = json_object_get(frame, "file");
+        if (!frame) status = npg_error(NPG_DISK, "%s was changed while the run wrote it", path);
+        if (json_is_string(name)) {
+            json_t *entry = json_pack("{sO sO sO}", "path", name, "bytes", json_object_get(frame, "bytes"),
+                                      "xxh3", json_object_get(frame, "xxh3"));
+            status =
+                entry ? write_entry(file, entry, is_first) : npg_error(NPG_MEMORY, "no memory for done.json");
+            json_decref(entry);
+        }
+        json_decref(frame);
+    }
+    if (list) fclose(list);
+    free(line);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status write_done(npg_file *file, const char *output, const json_t *head)
+{
+    static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
+    bool is_first = true;
+    char *text = json_dumps(head, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
+    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
+    size_t size = strlen(text) - 2; /* without the last newline and brace: the files are added */
+    npg_status status = npg_file_write(file, text, size);
+    free(text);
+    if (!status) status = npg_file_print(file, ",\n  \"files\": [");
+    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++)
+        status = write_file_entry(file, output, names[i], &is_first);
+    if (!status) status = write_mesh_entries(file, output, &is_first);
+    return status ? status : npg_file_print(file, "\n  ]\n}\n");
+}
+
+npg_status npg_done_write(const char *output, json_t *head)
+{
+    char *path;
+    npg_file *file = NULL;
+    npg_status status = npg_join_path(&path, output, "done.json");
+    if (!status) status = npg_file_open(&file, path);
+    if (!status) status = write_done(file, output, head);
+    if (!status)
+        status = npg_file_commit(&file);
+    else
+        npg_file_discard(&file);
+    npg_release(&path);
+    json_decref(head);
+    return status;
+}

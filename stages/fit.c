@@ -1,0 +1,478 @@
+/* Fit: grids, decoder and motion put together; one epoch is a walk over all frames, in batches from the key
+ * outward.
+ */
+#include "fit.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "adam.h"
+#include "fit_weights.h"
+#include "latent.h"
+#include "mesh_tools.h"
+#include "mlp.h"
+#include "random.h"
+#include "sobolev.h"
+
+#define HASH_LEVELS    15
+#define HASH_ROWS      16384
+#define HASH_FIRST     16
+#define HASH_GROWTH    1.35
+#define POSITION_FIRST 0 /* channels of the position grids */
+#define POSITION_END   30
+#define NORMAL_END     32 /* channels of the normal grid: 30, 31 */
+
+struct npg_fit {
+    npg_fit_settings settings;
+    npg_device *device;   /* loan */
+    size_t real, rows;    /* V, V padded to blocks */
+    uint32_t *order;      /* order[i]: vertex of the reference at row i; Morton order; owned */
+    float *rest;          /* V x 3 in that order, owned */
+    uint32_t (*edges)[2]; /* between rows, owned */
+    size_t edge_count;
+    npg_levels levels;
+    npg_latent latent;
+    npg_sobolev sobolev;
+    npg_buffer u, nodes, dnodes; /* differential coordinates, features, gradient: [nodes][32] */
+    npg_adam grid_adam, mlp_adam;
+    npg_time_code *time_code;
+    float *params; /* decoder's parameters between windows, owned */
+    uint64_t seed;
+    /* of the window */
+    npg_mlp mlp;
+    npg_motion motion;
+    npg_buffer dcode;
+    size_t frame_count;
+    size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
+    size_t *rank;                       /* its inverse */
+    int64_t *index;                     /* by k */
+    double *times;                      /* by k */
+    float *cd, *gains, *codes, *packed; /* by k; packed: one frame's positions */
+    bool *has_points;                   /* by k */
+};
+
+/* ---- opening: what does not depend on the window ---- */
+
+static void add_grids(npg_levels *levels, const npg_fit_settings *s)
+{
+    bool single = s->encoding == NPG_ENCODING_SINGLE;
+    for (int64_t l = single ? s->grid_levels - 1 : 0; l < s->grid_levels; l++)
+        npg_levels_add(levels,
+                       (npg_level){.kind = NPG_LEVEL_POSITION,
+                                   .nodes = (int)(s->grid_base + l * s->grid_step),
+                                   .channel_first = POSITION_FIRST,
+                                   .channel_end = POSITION_END,
+                                   .share = single ? 1.0 : 1.0 / (double)s->grid_levels,
+                                   .lambda = s->lambda * pow(s->lambda_growth, (double)l),
+                                   .screened = s->smoothing == 1,
+                                   .rate = s->grid_rate * pow(s->grid_rate_growth, (double)l)},
+                       0);
+}
+
+static void add_hash(npg_levels *levels, const npg_fit_settings *s)
+{
+    for (int l = 0; l < HASH_LEVELS; l++)
+        npg_levels_add(levels,
+                       (npg_level){.kind = NPG_LEVEL_HASHED,
+                                   .nodes = (int)floor(HASH_FIRST * pow(HASH_GROWTH, l)),
+                                   .channel_first = 2 * l,
+                                   .channel_end = 2 * l + 2,
+                                   .share = 1,
+                                   .rate = s->grid_rate},
+                       HASH_ROWS);
+}
+
+static void choose_levels(npg_levels *levels, const npg_fit_settings *s)
+{
+    if (s->encoding == NPG_ENCODING_HASH)
+        add_hash(levels, s);
+    else
+        add_grids(levels, s);
+    if (!s->normal_grid) return;
+    npg_levels_add(levels,
+                   (npg_level){.kind = NPG_LEVEL_NORMAL,
+                               .nodes = (int)s->normal_nodes,
+                               .channel_first = POSITION_END,
+                               .channel_end = NORMAL_END,
+                               .share = 1,
+                               .lambda = s->lambda,
+                               .screened = s->smoothing == 1,
+                               .rate = s->grid_rate},
+                   0);
+}
+
+static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **normals)
+{
+    uint32_t *row_of;
+    NPG_TRY(npg_alloc_array(&fit->order, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
+    NPG_TRY(npg_alloc_array(&fit->rest, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(normals, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
+    NPG_TRY(npg_morton_order(fit->order, mesh->vert_pos, fit->real));
+    for (size_t i = 0; i < 3 * fit->real; i++) {
+        fit->rest[i] = mesh->vert_pos[3 * fit->order[i / 3] + i % 3];
+        (*normals)[i] = mesh->vert_normals[3 * fit->order[i / 3] + i % 3];
+    }
+    NPG_TRY(npg_mesh_edges(&fit->edges, &fit->edge_count, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_alloc_array(&row_of, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
+    for (size_t i = 0; i < fit->real; i++) row_of[fit->order[i]] = (uint32_t)i;
+    for (size_t e = 0; e < 2 * fit->edge_count; e++)
+        fit->edges[e / 2][e % 2] = row_of[fit->edges[e / 2][e % 2]];
+    npg_release(&row_of);
+    return NPG_OK;
+}
+
+static npg_status open_grid_adam(npg_fit *fit)
+{
+    float *rates;
+    size_t rows = fit->levels.row_count;
+    NPG_TRY(npg_alloc_array(&rates, NPG_FOR_FIT, rows, sizeof(float)));
+    for (int l = 0; l < fit->levels.count; l++)
+        for (size_t i = 0; i < fit->levels.level[l].row_count; i++)
+            rates[fit->levels.level[l].first_row + i] = (float)fit->levels.level[l].rate;
+    npg_status status =
+        npg_adam_open(&fit->grid_adam, fit->device, rates, NPG_LATENT_CHANNELS, rows * NPG_LATENT_CHANNELS);
+    npg_release(&rates);
+    return status;
+}
+
+static npg_status open_grids(npg_fit *fit, const float *normals)
+{
+    npg_samples samples;
+    size_t bytes = fit->levels.row_count * NPG_LATENT_CHANNELS * sizeof(float);
+    NPG_TRY(npg_samples_open(&samples, &fit->levels, fit->rest, normals, fit->real, fit->rows));
+    npg_status status = npg_latent_open(&fit->latent, fit->device, &samples);
+    npg_samples_close(&samples);
+    if (status) return status;
+    NPG_TRY(npg_sobolev_open(&fit->sobolev, fit->device, &fit->levels));
+    NPG_TRY(npg_buffer_open(&fit->u, fit->device, bytes));
+    NPG_TRY(npg_buffer_open(&fit->nodes, fit->device, bytes));
+    NPG_TRY(npg_buffer_open(&fit->dnodes, fit->device, bytes));
+    return open_grid_adam(fit);
+}
+
+static npg_mlp_shape shape_of(const npg_fit_settings *s)
+{
+    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies,
+                           (float)s->slope};
+}
+
+/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all begins as the identity.
+ */
+static npg_status draw_params(npg_fit *fit)
+{
+    npg_mlp_shape s = shape_of(&fit->settings);
+    npg_random random = npg_random_stream(fit->seed, 0, 0);
+    size_t count = npg_mlp_param_count(&s);
+    double first = 1 / sqrt((double)(NPG_LATENT_CHANNELS + s.code_size)), second = 1 / sqrt((double)s.w1);
+    NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
+    for (size_t i = 0; i < count; i++) {
+        double value = 2 * npg_random_real(&random) - 1;
+        bool head = (i >= npg_mlp_at_w3(&s) && i < npg_mlp_at_b2(&s)) ||
+                    (i >= npg_mlp_at_b3(&s) && i < npg_mlp_at_w1z(&s));
+        fit->params[i] = head ? 0 : (float)(value * (i >= npg_mlp_at_w1z(&s) ? first : second));
+    }
+    float rate = (float)fit->settings.mlp_rate;
+    return npg_adam_open(&fit->mlp_adam, fit->device, &rate, count, count);
+}
+
+npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_settings *settings,
+                        const npg_mesh *reference, uint64_t seed)
+{
+    npg_fit *fit;
+    float *normals = NULL;
+    *out = NULL;
+    NPG_REQUIRE(reference->vert_normals && reference->vert_count);
+    NPG_TRY(npg_alloc(&fit, NPG_FOR_FIT, sizeof *fit));
+    fit->settings = *settings;
+    fit->device = device;
+    fit->seed = seed;
+    fit->real = reference->vert_count;
+    fit->rows = (fit->real + NPG_MLP_ROWS - 1) / NPG_MLP_ROWS * NPG_MLP_ROWS;
+    choose_levels(&fit->levels, settings);
+    npg_status status = sort_vertices(fit, reference, &normals);
+    if (!status) status = open_grids(fit, normals);
+    if (!status) status = draw_params(fit);
+    if (!status)
+        status = npg_time_code_open(&fit->time_code, (npg_time_kind)settings->time_code,
+                                    (size_t)settings->frequencies, seed);
+    npg_release(&normals);
+    if (status) npg_fit_close(&fit);
+    *out = fit;
+    return status;
+}
+
+static void close_window(npg_fit *fit)
+{
+    npg_mlp_close(&fit->mlp);
+    npg_motion_close(&fit->motion);
+    npg_buffer_close(&fit->dcode);
+    npg_release(&fit->place);
+    npg_release(&fit->rank);
+    npg_release(&fit->index);
+    npg_release(&fit->times);
+    npg_release(&fit->cd);
+    npg_release(&fit->gains);
+    npg_release(&fit->codes);
+    npg_release(&fit->packed);
+    npg_release(&fit->has_points);
+    fit->frame_count = 0;
+}
+
+void npg_fit_close(npg_fit **slot)
+{
+    if (!slot || !*slot) return;
+    npg_fit *fit = *slot;
+    close_window(fit);
+    npg_latent_close(&fit->latent);
+    npg_sobolev_close(&fit->sobolev);
+    npg_adam_close(&fit->grid_adam);
+    npg_adam_close(&fit->mlp_adam);
+    npg_buffer_close(&fit->u);
+    npg_buffer_close(&fit->nodes);
+    npg_buffer_close(&fit->dnodes);
+    npg_time_code_close(&fit->time_code);
+    npg_release(&fit->params);
+    npg_release(&fit->order);
+    npg_release(&fit->rest);
+    npg_release(&fit->edges);
+    npg_release(slot);
+}
+
+/* ---- opening a window ---- */
+
+static npg_status alloc_window(npg_fit *fit, size_t count)
+{
+    size_t code = 2 * (size_t)fit->settings.frequencies;
+    NPG_TRY(npg_alloc_array(&fit->place, NPG_FOR_FIT, count, sizeof(size_t)));
+    NPG_TRY(npg_alloc_array(&fit->rank, NPG_FOR_FIT, count, sizeof(size_t)));
+    NPG_TRY(npg_alloc_array(&fit->index, NPG_FOR_FIT, count, sizeof(int64_t)));
+    NPG_TRY(npg_alloc_array(&fit->times, NPG_FOR_FIT, count, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&fit->cd, NPG_FOR_FIT, count, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fit->gains, NPG_FOR_FIT, count, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fit->codes, NPG_FOR_FIT, count * code, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fit->packed, NPG_FOR_FIT, fit->rows, 3 * sizeof(float)));
+    return npg_alloc_array(&fit->has_points, NPG_FOR_FIT, count, sizeof(bool));
+}
+
+/* The caller's frames from the key outward: nearest first, the earlier one on ties. */
+static void sort_outward(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+{
+    for (size_t i = 0; i < count; i++) {
+        size_t k = i;
+        for (; k > 0; k--) {
+            int64_t before = frames[fit->place[k - 1]].index;
+            if (llabs(before - key) <= llabs(frames[i].index - key)) break;
+            fit->place[k] = fit->place[k - 1];
+        }
+        fit->place[k] = i;
+    }
+    for (size_t k = 0; k < count; k++) {
+        const npg_fit_frame *frame = &frames[fit->place[k]];
+        fit->rank[fit->place[k]] = k;
+        fit->index[k] = frame->index;
+        fit->times[k] = frame->time;
+        fit->has_points[k] = frame->count > 0;
+    }
+}
+
+/* A frame's points in Morton order; an empty frame gets one point that the confidence then ignores. */
+static npg_status copy_target(npg_target *target, const npg_fit_frame *frame)
+{
+    static const float nowhere[3] = {0, 0, 0};
+    uint32_t *order = NULL;
+    float *points = NULL;
+    size_t count = frame->count ? frame->count : 1;
+    const float *from = frame->count ? frame->points : nowhere;
+    npg_status status = npg_alloc_array(&order, NPG_FOR_FIT, count, sizeof *order);
+    if (!status) status = npg_alloc_array(&points, NPG_FOR_FIT, count, 3 * sizeof *points);
+    if (!status) status = npg_morton_order(order, from, count);
+    for (size_t i = 0; !status && i < 3 * count; i++) points[i] = from[3 * order[i / 3] + i % 3];
+    npg_release(&order);
+    *target = (npg_target){points, count};
+    return status;
+}
+
+static npg_status open_motion(npg_fit *fit, const npg_fit_frame *frames, size_t count)
+{
+    npg_target *targets;
+    NPG_TRY(npg_alloc_array(&targets, NPG_FOR_FIT, count, sizeof *targets));
+    npg_status status = NPG_OK;
+    for (size_t k = 0; k < count && !status; k++) status = copy_target(&targets[k], &frames[fit->place[k]]);
+    if (!status)
+        status = npg_motion_open(&fit->motion, fit->device, (npg_rotation)fit->settings.rotation, fit->rest,
+                                 fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count,
+                                 targets, count);
+    for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
+    npg_release(&targets);
+    return status;
+}
+
+static npg_status open_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+{
+    npg_mlp_shape shape = shape_of(&fit->settings);
+    size_t batch = (size_t)fit->settings.batch < count ? (size_t)fit->settings.batch : count;
+    close_window(fit);
+    fit->frame_count = count;
+    NPG_TRY(alloc_window(fit, count));
+    sort_outward(fit, frames, count, key);
+    NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count, batch));
+    NPG_TRY(npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float)));
+    if (npg_time_code_learns(fit->time_code))
+        NPG_TRY(npg_buffer_open(&fit->dcode, fit->device, count * shape.code_size * sizeof(float)));
+    return open_motion(fit, frames, count);
+}
+
+/* ---- one epoch ---- */
+
+static npg_status begin_epoch(npg_fit *fit)
+{
+    npg_time_code_fill(fit->time_code, fit->codes, fit->times, fit->frame_count);
+    NPG_TRY(npg_buffer_write(&fit->mlp.code, 0, fit->codes,
+                             fit->frame_count * fit->mlp.shape.code_size * sizeof(float)));
+    NPG_TRY(npg_sobolev_solve(&fit->sobolev, &fit->nodes, &fit->u));
+    NPG_TRY(npg_latent_sample(&fit->latent, &fit->mlp.z, &fit->nodes));
+    return npg_mlp_begin(&fit->mlp);
+}
+
+static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, int64_t epoch)
+{
+    for (size_t k = first; k < first + count; k++)
+        if (!isfinite(fit->cd[k]))
+            return npg_error(NPG_DIVERGED, "the loss of frame %lld is not finite in epoch %lld",
+                             (long long)fit->index[k], (long long)epoch);
+    return NPG_OK;
+}
+
+static npg_status do_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
+{
+    const npg_fit_settings *s = &fit->settings;
+    double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
+    NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
+    NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
+    NPG_TRY(npg_motion_chamfer(&fit->motion, s->alpha, first, count));
+    NPG_TRY(npg_buffer_read(&fit->motion.cd, first * sizeof(float), fit->cd + first, count * sizeof(float)));
+    NPG_TRY(check_losses(fit, first, count, epoch));
+    for (size_t k = first; k < first + count; k++)
+        fit->gains[k] = (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
+    NPG_TRY(
+        npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first, count));
+    return npg_mlp_backward(&fit->mlp, first, count);
+}
+
+static npg_status step_time_code(npg_fit *fit)
+{
+    if (!npg_time_code_learns(fit->time_code)) return NPG_OK;
+    size_t bytes = fit->frame_count * fit->mlp.shape.code_size * sizeof(float);
+    NPG_TRY(npg_mlp_code_back(&fit->mlp, &fit->dcode));
+    NPG_TRY(npg_buffer_read(&fit->dcode, 0, fit->codes, bytes));
+    return npg_time_code_step(fit->time_code, fit->codes, fit->times, fit->frame_count,
+                              fit->settings.mlp_rate);
+}
+
+static npg_status end_epoch(npg_fit *fit)
+{
+    NPG_TRY(npg_mlp_end(&fit->mlp));
+    NPG_TRY(npg_latent_back(&fit->latent, &fit->dnodes, &fit->mlp.dz, &fit->mlp.z));
+    NPG_TRY(npg_sobolev_solve(&fit->sobolev, &fit->dnodes, &fit->dnodes));
+    NPG_TRY(step_time_code(fit));
+    NPG_TRY(npg_adam_step(&fit->grid_adam, &fit->u, &fit->dnodes));
+    return npg_adam_step(&fit->mlp_adam, &fit->mlp.params, &fit->mlp.grad);
+}
+
+static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
+{
+    size_t blocks = fit->rows / 16, solved = 0, all = fit->frame_count * blocks;
+    float *part;
+    double sum = 0, weighted = 0;
+    NPG_TRY(npg_alloc_array(&part, NPG_FOR_FIT, all, sizeof(float)));
+    npg_status status = npg_buffer_read(&fit->motion.part, 0, part, all * sizeof(float));
+    for (size_t i = 0; !status && i < all; i++) sum += (double)part[i];
+    npg_release(&part);
+    step->chamfer = 0;
+    for (size_t k = 0; k < fit->frame_count; k++) {
+        if (!fit->has_points[k]) continue;
+        step->chamfer += (double)fit->cd[k];
+        weighted += (double)(fit->cd[k] * fit->gains[k]);
+        solved++;
+    }
+    step->chamfer /= solved ? (double)solved : 1;
+    step->isometry = 0.5 * sum / ((double)fit->frame_count * (double)fit->edge_count);
+    step->loss = weighted + fit->settings.isometry * step->isometry;
+    return status;
+}
+
+static npg_status do_epoch(npg_fit *fit, npg_fit_step *step)
+{
+    npg_weights weights;
+    double progress = (double)step->epoch / (double)step->epochs;
+    npg_weights_begin(&weights, &fit->settings, progress, fit->index[0], fit->frame_count);
+    NPG_TRY(begin_epoch(fit));
+    for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
+        size_t left = fit->frame_count - first;
+        NPG_TRY(do_batch(fit, &weights, first, left < fit->mlp.batch ? left : fit->mlp.batch, step->epoch));
+    }
+    NPG_TRY(end_epoch(fit));
+    return sum_up(fit, step);
+}
+
+/* The positions that follow from the parameters after the last step. */
+static npg_status decode(npg_fit *fit)
+{
+    NPG_TRY(begin_epoch(fit));
+    for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
+        size_t left = fit->frame_count - first, count = left < fit->mlp.batch ? left : fit->mlp.batch;
+        NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
+        NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
+    }
+    return npg_device_finish(fit->device);
+}
+
+npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
+                          npg_fit_watch *watch, void *user)
+{
+    NPG_REQUIRE(fit && frames && count);
+    NPG_TRY(open_window(fit, frames, count, key));
+    npg_fit_step step = {.epochs = fit->settings.epochs};
+    for (step.epoch = 0; step.epoch < step.epochs; step.epoch++) {
+        NPG_TRY(do_epoch(fit, &step));
+        if (watch) NPG_TRY(watch(user, &step));
+    }
+    NPG_TRY(npg_buffer_read(&fit->mlp.params, 0, fit->params,
+                            npg_mlp_param_count(&fit->mlp.shape) * sizeof(float)));
+    return decode(fit);
+}
+
+npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
+{
+    NPG_REQUIRE(i < fit->frame_count);
+    size_t bytes = fit->rows * 3 * sizeof(float);
+    NPG_TRY(npg_buffer_read(&fit->motion.x, fit->rank[i] * bytes, fit->packed, bytes));
+    for (size_t row = 0; row < fit->real; row++)
+        for (size_t axis = 0; axis < 3; axis++) {
+            float at = fit->packed[row / 16 * 48 + axis * 16 + row % 16];
+            if (!isfinite(at)) return npg_error(NPG_DIVERGED, "a vertex of frame %zu is not finite", i);
+            vert_unit[3 * fit->order[row] + axis] = at;
+        }
+    return NPG_OK;
+}
+
+double npg_fit_frame_loss(const npg_fit *fit, size_t i)
+{
+    size_t k = fit->rank[i];
+    return fit->has_points[k] ? (double)fit->cd[k] : (double)NAN;
+}
+
+size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frames, size_t points, int units)
+{
+    npg_levels levels = {0};
+    npg_mlp_shape shape = shape_of(s);
+    choose_levels(&levels, s);
+    size_t rows = (vert_count + NPG_MLP_ROWS - 1) / NPG_MLP_ROWS * NPG_MLP_ROWS, groups = 2 * (size_t)units;
+    size_t batch = (size_t)s->batch < frames ? (size_t)s->batch : frames;
+    size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
+    size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
+    size_t per_group =
+        npg_mlp_param_count(&shape) + 2 * NPG_MLP_ROWS * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
+    size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 7, decoder = npg_mlp_param_count(&shape) * 6;
+    return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
+}

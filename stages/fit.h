@@ -1,0 +1,85 @@
+/* Fit: the joint optimisation of one window (paper, sections on latent grids to objectives), on the OpenCL
+ * device.
+ *
+ * A fit keeps grids, decoder and optimiser from window to window; a window brings its frames.  Everything is
+ * in unit coordinates.  Not for several threads at a time. */
+#ifndef NPG_FIT_H
+#define NPG_FIT_H
+
+#include "device.h"
+#include "mesh.h"
+#include "motion.h"
+#include "time_code.h"
+
+typedef enum npg_confidence {
+    NPG_CONFIDENCE_CUMULATIVE, /* product of omega from the key outward (paper)  */
+    NPG_CONFIDENCE_SINGLE,     /* omega of the frame alone                       */
+    NPG_CONFIDENCE_DELTA,      /* omega = 0.5                                    */
+    NPG_CONFIDENCE_CONSTANT    /* omega = 1                                      */
+} npg_confidence;
+
+typedef enum npg_catch_up {
+    NPG_CATCH_UP_ROOT,        /* delta = 1 - sqrt(e) (paper)   */
+    NPG_CATCH_UP_CONSTANT,    /* delta = 1                     */
+    NPG_CATCH_UP_LINEAR,      /* delta = 1 - e                 */
+    NPG_CATCH_UP_EXPONENTIAL, /* delta = exp(-5 e)             */
+    NPG_CATCH_UP_INTERPOLATED /* w = (1 - e) omega + e         */
+} npg_catch_up;
+
+typedef enum npg_encoding { NPG_ENCODING_GRID, NPG_ENCODING_SINGLE, NPG_ENCODING_HASH } npg_encoding;
+
+typedef struct npg_fit_settings {
+    int64_t epochs;
+    int rotation, time_code, encoding, confidence, catch_up, smoothing /* 0 graph, 1 screened */;
+    int64_t frequencies;
+    int64_t grid_base, grid_step, grid_levels, normal_nodes;
+    bool normal_grid;
+    double lambda, lambda_growth, grid_rate, grid_rate_growth;
+    double mlp_rate, slope, isometry, alpha;
+    int64_t width_1, width_2;
+    int64_t batch; /* frames whose hidden layer is kept at a time */
+} npg_fit_settings;
+
+/* The values that the options have now (table of the optimize stage). */
+void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *options);
+
+/* One frame of a window. */
+typedef struct npg_fit_frame {
+    int64_t index;       /* place in time; |index - key| orders the confidence               */
+    double time;         /* what the time code is a function of, 0..1 over the whole capture */
+    const float *points; /* N x 3, unit, finite; a loan during npg_fit_window                */
+    size_t count;        /* N; 0: no points, the frame follows from the others                */
+} npg_fit_frame;
+
+typedef struct npg_fit npg_fit;
+
+/* How an epoch went: mean unweighted Chamfer of the frames with points, and the isometry term. */
+typedef struct npg_fit_step {
+    int64_t epoch, epochs;
+    double chamfer, isometry, loss;
+} npg_fit_step;
+
+/* Asked after each epoch; anything but NPG_OK ends the fit with that status. */
+typedef npg_status npg_fit_watch(void *user, const npg_fit_step *step);
+
+/* The device is a loan.  reference: unit coordinates with normals; a loan. */
+npg_status npg_fit_open(npg_fit **fit, npg_device *device, const npg_fit_settings *settings,
+                        const npg_mesh *reference, uint64_t seed);
+void npg_fit_close(npg_fit **fit);
+
+/* Fit the frames jointly.  key: index of the frame where the confidence is 1 (the window's frame nearest to
+ * it counts as the key when it is not among them).  NPG_DIVERGED names epoch and frame. */
+npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
+                          npg_fit_watch *watch, void *user);
+
+/* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
+npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
+
+/* The last epoch's unweighted Chamfer sum of the i-th frame; NaN without points. */
+double npg_fit_frame_loss(const npg_fit *fit, size_t i);
+
+/* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
+size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points,
+                      int units);
+
+#endif

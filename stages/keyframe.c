@@ -1,0 +1,369 @@
+/* Keyframe: finds the box of the capture, scores every frame and chooses the one whose surface becomes the
+ * reference.
+ *
+ * Based on: the keyframe selection of the Neu-PiG paper.  The score of frame t of T is the number of cells of
+ * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
+ * surface, near the middle in time. */
+#include <math.h>
+#include <string.h>
+
+#include "stage.h"
+
+#define GRID         512 /* cells per axis */
+#define CELL_WORDS   ((size_t)GRID * GRID * GRID / 64)
+#define BLOCK        1024 /* points turned into unit coordinates at a time */
+#define SHOWN_SCORES 5
+#define NO_NUMBER    (-1)
+
+typedef struct candidate {
+    int64_t index, number;
+    size_t cell_count;
+    double score;
+} candidate;
+
+typedef struct keyframe_state {
+    int64_t number, window, overlap, look_ahead; /* options */
+    uint64_t *cells;                             /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
+    candidate best[SHOWN_SCORES];                /* best first */
+    size_t best_count;
+    candidate chosen; /* the frame the user named */
+    bool is_chosen, is_chosen_skipped;
+    int64_t usable_count; /* frames that were not skipped                    */
+    int64_t passed_count; /* frames of the solving pass so far               */
+    npg_frame *held;      /* a live run's frames until the key is known; owned */
+    size_t held_count, held_capacity;
+} keyframe_state;
+
+/* ---- measuring ---- */
+
+static bool is_finite_point(const float *point)
+{
+    return isfinite(point[0]) && isfinite(point[1]) && isfinite(point[2]);
+}
+
+static void measure_frame(keyframe_state *state, npg_facts *facts, const npg_frame *frame)
+{
+    if (frame->number < facts->number_min) facts->number_min = frame->number;
+    if (frame->number > facts->number_max) facts->number_max = frame->number;
+    if (frame->point_count > facts->point_count_max) facts->point_count_max = frame->point_count;
+    if (frame->is_skipped) return;
+    state->usable_count++;
+    for (size_t i = 0; i < frame->point_count; i++)
+        if (is_finite_point(frame->pos_local + 3 * i))
+            npg_bounds_add_points(&facts->bounds_local, frame->pos_local + 3 * i, 1);
+}
+
+static void report_box(json_t *report, const npg_facts *facts)
+{
+    const npg_frame_box *box = &facts->box;
+    json_t *lo = json_array(), *hi = json_array();
+    for (int a = 0; a < 3; a++) {
+        json_array_append_new(lo, json_real(facts->bounds_local.lo[a] + box->origin[a]));
+        json_array_append_new(hi, json_real(facts->bounds_local.hi[a] + box->origin[a]));
+    }
+    json_object_set_new(report, "box_lo", lo);
+    json_object_set_new(report, "box_hi", hi);
+    json_object_set_new(report, "box_diagonal", json_real(box->diagonal));
+    json_object_set_new(report, "point_count_max", json_integer((json_int_t)facts->point_count_max));
+}
+
+static npg_status close_measuring(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!state->usable_count)
+        return npg_error(NPG_BAD_INPUT, "no frame is left: every frame was skipped or the input has none");
+    NPG_TRY(npg_frame_box_set(&facts->box, &facts->origin, &facts->bounds_local));
+    report_box(npg_worker_report(worker), facts);
+    return NPG_OK;
+}
+
+/* ---- scoring ---- */
+
+static size_t cell_of(const float *unit)
+{
+    size_t cell = 0;
+    for (int a = 0; a < 3; a++) {
+        double at = floor(((double)unit[a] + 1) * (GRID / 2));
+        cell = cell * GRID + (size_t)fmin(fmax(at, 0), GRID - 1);
+    }
+    return cell;
+}
+
+/* Set or clear the cells of all finite points; the result is the number of bits that changed. */
+static size_t mark_cells(uint64_t *cells, const npg_frame_box *box, const npg_frame *frame, bool on)
+{
+    float unit[3 * BLOCK];
+    size_t changed = 0;
+    for (size_t first = 0; first < frame->point_count; first += BLOCK) {
+        size_t count = frame->point_count - first < BLOCK ? frame->point_count - first : BLOCK;
+        npg_box_local_to_unit(box, unit, frame->pos_local + 3 * first, count);
+        for (size_t i = 0; i < count; i++) {
+            if (!is_finite_point(unit + 3 * i)) continue;
+            size_t cell = cell_of(unit + 3 * i);
+            uint64_t bit = UINT64_C(1) << (cell % 64), *word = &cells[cell / 64];
+            changed += on ? !(*word & bit) : (*word & bit) != 0;
+            *word = on ? *word | bit : *word & ~bit;
+        }
+    }
+    return changed;
+}
+
+static bool is_better(const candidate *a, const candidate *b)
+{
+    return a->score > b->score || (a->score == b->score && a->index < b->index);
+}
+
+static void offer(keyframe_state *state, candidate new)
+{
+    size_t at = state->best_count;
+    if (at < SHOWN_SCORES)
+        state->best_count++;
+    else if (is_better(&new, &state->best[at - 1]))
+        at--;
+    else
+        return;
+    for (; at > 0 && is_better(&new, &state->best[at - 1]); at--) state->best[at] = state->best[at - 1];
+    state->best[at] = new;
+}
+
+static void score_frame(keyframe_state *state, const npg_facts *facts, int64_t frame_count,
+                        const npg_frame *frame)
+{
+    bool is_named = frame->number == state->number && state->number != NO_NUMBER;
+    if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
+    if (frame->is_skipped) return;
+    size_t cell_count = mark_cells(state->cells, &facts->box, frame, true);
+    mark_cells(state->cells, &facts->box, frame, false);
+    double from_middle = (double)frame->index - (double)frame_count / 2;
+    double score = (double)cell_count * exp(-0.001 * from_middle * from_middle);
+    candidate new = {frame->index, frame->number, cell_count, score};
+    if (cell_count) offer(state, new);
+    if (is_named && cell_count && !state->is_chosen) {
+        state->chosen = new;
+        state->is_chosen = true;
+    }
+}
+
+static json_t *json_of(const candidate *c)
+{
+    return json_pack("{sI sI sI sf}", "index", (json_int_t)c->index, "number", (json_int_t)c->number, "cells",
+                     (json_int_t)c->cell_count, "score", c->score);
+}
+
+static npg_status choose(const keyframe_state *state, candidate *key)
+{
+    if (!state->best_count) return npg_error(NPG_BAD_INPUT, "no frame has a usable point");
+    *key = state->best[0];
+    if (state->number == NO_NUMBER) return NPG_OK;
+    *key = state->chosen;
+    if (state->is_chosen) return NPG_OK;
+    if (state->is_chosen_skipped)
+        return npg_error(NPG_BAD_INPUT, "keyframe %lld: this frame was skipped and can't be the keyframe",
+                         (long long)state->number);
+    return npg_error(NPG_USAGE, "keyframe %lld: no usable frame has this number", (long long)state->number);
+}
+
+static npg_status set_plan(npg_worker *worker, int64_t frame_count)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    candidate key = {0};
+    NPG_TRY(choose(state, &key));
+    int64_t window = state->window && state->window < frame_count ? state->window : frame_count;
+    int64_t overlap = window < frame_count ? state->overlap : 0;
+    facts->plan = (npg_plan){frame_count, key.index, window, overlap};
+    json_t *report = npg_worker_report(worker), *scores = json_array();
+    for (size_t i = 0; i < state->best_count; i++) json_array_append_new(scores, json_of(&state->best[i]));
+    json_object_set_new(report, "key", json_of(&key));
+    json_object_set_new(report, "best", scores);
+    json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
+    npg_worker_log(worker, NPG_LOG_INFO, key.number, "is the keyframe of %lld frames (%zu cells, score %.1f)",
+                   (long long)frame_count, key.cell_count, key.score);
+    return NPG_OK;
+}
+
+/* ---- solving pass, from files ---- */
+
+static npg_status mark_key(npg_worker *worker, npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    int64_t key = npg_worker_facts(worker)->plan.key;
+    bool is_first = state->passed_count++ == 0;
+    frame->is_key = frame->index == key;
+    frame->fields |= NPG_FIELD_KEY;
+    if (is_first != frame->is_key)
+        return npg_error(NPG_FAILED, "frame %lld came %s the keyframe (index %lld) of the solving pass",
+                         (long long)frame->index, is_first ? "before" : "again as", (long long)key);
+    if (frame->is_key && frame->is_skipped)
+        return npg_error(NPG_BAD_INPUT, "%s: the keyframe could be read before but not any more",
+                         frame->path ? frame->path : "frame");
+    return NPG_OK;
+}
+
+/* ---- solving pass of a live run: hold everything until the end, then key first ---- */
+
+static npg_status hold(npg_worker *worker, npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    if (state->held_count >= (size_t)state->look_ahead)
+        return npg_error(
+            NPG_USAGE,
+            "the live capture is longer than the look-ahead of %lld frames, in which the keyframe "
+            "is chosen: raise the option look-ahead (each frame is held in memory), or write "
+            "the frames to files and give those as input",
+            (long long)state->look_ahead);
+    NPG_TRY(npg_grow(&state->held, &state->held_capacity, state->held_count + 1, sizeof *state->held,
+                     NPG_FOR_FRAMES));
+    measure_frame(state, npg_worker_facts(worker), frame);
+    state->held[state->held_count++] = *frame;
+    *frame = (npg_frame){0};
+    return NPG_OK;
+}
+
+static int64_t held_frame_count(const keyframe_state *state)
+{
+    int64_t count = 0;
+    for (size_t i = 0; i < state->held_count; i++)
+        if (state->held[i].index >= count) count = state->held[i].index + 1;
+    return count;
+}
+
+/* Where in `held` each index is, SIZE_MAX for an index that never came. */
+static npg_status place_held(const keyframe_state *state, size_t **out, int64_t frame_count)
+{
+    NPG_TRY(npg_alloc_array(out, NPG_FOR_RUN, (size_t)frame_count, sizeof **out));
+    memset(*out, 0xff, (size_t)frame_count * sizeof **out);
+    for (size_t i = 0; i < state->held_count; i++) (*out)[state->held[i].index] = i;
+    return NPG_OK;
+}
+
+static npg_status emit_held(npg_worker *worker, const size_t *place, const npg_plan *plan)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    size_t capacity = (size_t)npg_worker_settings(worker)->chunk_frames;
+    npg_chunk *chunk = NULL;
+    npg_status status = NPG_OK;
+    for (int64_t i = 0; i < plan->frame_count && !status; i++) {
+        size_t at = place[npg_plan_frame(plan, i)];
+        if (at == SIZE_MAX) continue;
+        if (!chunk) status = npg_chunk_open(&chunk, capacity);
+        if (!status) status = mark_key(worker, &state->held[at]);
+        if (status) break;
+        npg_chunk_add(chunk, &state->held[at]);
+        if (npg_chunk_count(chunk) == capacity) status = npg_worker_push(worker, &chunk);
+    }
+    if (!status && chunk) status = npg_worker_push(worker, &chunk);
+    npg_chunk_unref(&chunk);
+    return status;
+}
+
+static npg_status release_held(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    int64_t frame_count = held_frame_count(state);
+    size_t *place;
+    NPG_TRY(close_measuring(worker));
+    if (facts->frame_count < frame_count) facts->frame_count = frame_count;
+    for (size_t i = 0; i < state->held_count; i++) score_frame(state, facts, frame_count, &state->held[i]);
+    NPG_TRY(set_plan(worker, frame_count));
+    NPG_TRY(place_held(state, &place, frame_count));
+    npg_status status = emit_held(worker, place, &facts->plan);
+    npg_release(&place);
+    return status;
+}
+
+/* ---- the stage ---- */
+
+static npg_status init(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    if (state->window && state->overlap >= state->window)
+        return npg_error(NPG_USAGE, "option overlap: %lld frames don't fit in windows of %lld",
+                         (long long)state->overlap, (long long)state->window);
+    if (pass == NPG_PASS_MEASURE || (pass == NPG_PASS_SOLVE && facts->is_live)) {
+        facts->bounds_local = npg_bounds_empty();
+        facts->point_count_max = 0;
+        facts->number_min = INT64_MAX;
+        facts->number_max = INT64_MIN;
+    }
+    if (pass == NPG_PASS_SCORE || (pass == NPG_PASS_SOLVE && facts->is_live))
+        NPG_TRY(npg_alloc_array(&state->cells, NPG_FOR_RUN, CELL_WORDS, sizeof *state->cells));
+    return NPG_OK;
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        if (pass == NPG_PASS_MEASURE)
+            measure_frame(state, facts, frame);
+        else if (pass == NPG_PASS_SCORE)
+            score_frame(state, facts, facts->frame_count, frame);
+        else
+            NPG_TRY(facts->is_live ? hold(worker, frame) : mark_key(worker, frame));
+    }
+    if (pass == NPG_PASS_SOLVE && facts->is_live) npg_chunk_unref(chunk);
+    return NPG_OK;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    npg_facts *facts = npg_worker_facts(worker);
+    switch (npg_worker_pass(worker)) {
+    case NPG_PASS_MEASURE: return close_measuring(worker);
+    case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
+    case NPG_PASS_SOLVE: break;
+    }
+    return facts->is_live ? release_held(worker) : NPG_OK;
+}
+
+static void uninit(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    for (size_t i = 0; i < state->held_count; i++) npg_frame_clear(&state->held[i]);
+    npg_release(&state->held);
+    npg_release(&state->cells);
+}
+
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const keyframe_state *state = npg_worker_state(worker);
+    if (!npg_worker_facts(worker)->is_live) return 0;
+    int64_t per_chunk = npg_worker_settings(worker)->chunk_frames;
+    *chunks_held = (size_t)((state->look_ahead + per_chunk - 1) / per_chunk) + 1;
+    return CELL_WORDS * sizeof(uint64_t);
+}
+
+#define OFFSET(member) offsetof(keyframe_state, member)
+
+static const npg_option options[] = {
+    {"keyframe", "Number of the frame whose surface is the reference, as in the file names; -1: by score",
+     NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
+    {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
+     OFFSET(window), "0", 0, 1e6, NULL, NULL},
+    {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
+     1e6, NULL, NULL},
+    {"look-ahead", "Live runs: frames that may be held while the keyframe is chosen", NPG_OPTION_INT,
+     OFFSET(look_ahead), "64", 1, 1e6, NULL, NULL},
+    {0}};
+
+extern const npg_stage npg_stage_keyframe;
+const npg_stage npg_stage_keyframe = {.name = "keyframe",
+                                      .help = "Find the capture's box and choose the keyframe",
+                                      .options = options,
+                                      .state_size = sizeof(keyframe_state),
+                                      .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_SOLVE,
+                                      .needs = NPG_FIELD_POINTS,
+                                      .gives = NPG_FIELD_KEY,
+                                      .init = init,
+                                      .process = process,
+                                      .flush = flush,
+                                      .uninit = uninit,
+                                      .memory = memory};

@@ -1,0 +1,154 @@
+# The command: verbs, help, options, exit codes.
+
+setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
+
+@test "without a verb it lists the verbs and fails as wrong usage" {
+    run "$NEUPIG"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"run "*"probe "*"eval "*"synth "*"render "*"doctor "* ]]
+}
+
+@test "an unknown verb is wrong usage" {
+    run "$NEUPIG" rnu
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'no verb "rnu"'* ]]
+}
+
+@test "every verb shows its own help in both ways" {
+    for verb in run probe eval synth render doctor help man version; do
+        run "$NEUPIG" "$verb" --help
+        [ "$status" -eq 0 ]
+        [[ "${lines[0]}" == "Usage: neupig $verb"* ]]
+        one="$output"
+        run "$NEUPIG" help "$verb"
+        [ "$status" -eq 0 ]
+        [ "$output" = "$one" ]
+    done
+}
+
+@test "help of an unknown verb is wrong usage" {
+    run "$NEUPIG" help nothing
+    [ "$status" -eq 2 ]
+}
+
+@test "an unknown option names the nearest one" {
+    run "$NEUPIG" run in -o out --sed 3
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"--sed"*"--seed"* ]]
+    [ ! -e out ]
+}
+
+@test "an option without its value, or outside its range, is wrong usage" {
+    run "$NEUPIG" synth -o out --frames
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"--frames needs a value"* ]]
+    run "$NEUPIG" synth -o out --frames 0
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"frames"*"outside"* ]]
+    run "$NEUPIG" synth -o out --frames 2x
+    [ "$status" -eq 2 ]
+    run "$NEUPIG" synth -o out --body horse
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"walker|bar"* ]]
+    [ ! -e out ]
+}
+
+@test "operands that are missing or too many are wrong usage" {
+    run "$NEUPIG" eval one
+    [ "$status" -eq 2 ]
+    run "$NEUPIG" eval one two three
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'"three"'* ]]
+    run "$NEUPIG" run
+    [ "$status" -eq 2 ]
+    run "$NEUPIG" run in
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"-o DIR"* ]]
+}
+
+@test "values stand after a space or an equals sign, flags with and without no-" {
+    "$NEUPIG" synth --output=a --frames=1 --points=50 --no-normals
+    "$NEUPIG" synth -o b --frames 1 --points 50 --normals=no
+    cmp a/points/frame_0000.ply b/points/frame_0000.ply
+    "$NEUPIG" synth -o c --frames 1 --points 50
+    run cmp a/points/frame_0000.ply c/points/frame_0000.ply
+    [ "$status" -eq 1 ]
+}
+
+@test "a configuration file is read, its mistakes are named, and the command line wins" {
+    echo '{"seed": 7, // a comment' >broken.json
+    run "$NEUPIG" run in -o out --config broken.json
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"broken.json:"* ]]
+    echo '{"no-such-option": 7}' >unknown.json
+    run "$NEUPIG" run in -o out --config unknown.json
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"unknown.json"*"no-such-option"* ]]
+    run "$NEUPIG" run in -o out --config missing.json
+    [ "$status" -eq 2 ]
+    echo '{"ring": 0}' >range.json
+    run "$NEUPIG" run in -o out --config range.json
+    [ "$status" -eq 2 ]
+    # The file alone would be refused for its input; with the command line's input another one is named.
+    echo '{"input": "from-file", "output": "out"}' >good.json
+    run "$NEUPIG" run --config good.json
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"from-file"* ]]
+    run "$NEUPIG" run from-line --config good.json
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"from-line"* ]]
+}
+
+@test "an input that does not exist is bad input and leaves nothing under a final name" {
+    run "$NEUPIG" run nowhere -o out
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"nowhere"* ]]
+    [ ! -e out/done.json ]
+}
+
+@test "progress as JSON ends with a record of how it went" {
+    "$NEUPIG" run nowhere -o out --progress json 2>/dev/null >lines || true
+    tail -n 1 lines | grep -q '"event":"end".*"exit_code":3'
+}
+
+@test "the manual and the completion know every verb" {
+    "$NEUPIG" man >manual
+    [[ "$(head -n 1 manual)" == ".TH NEUPIG 1"* ]]
+    "$NEUPIG" man --completion >completion
+    bash -n completion
+    for verb in run probe eval synth render doctor; do
+        grep -q "^.SS neupig $verb" manual
+        grep -q "  $verb) words=" completion
+    done
+    grep -q -- '--keep\\-going' manual || grep -q 'keep\\-going' manual
+    . ./completion
+    COMP_WORDS=(neupig synth --fra) COMP_CWORD=2
+    _neupig
+    [ "${COMPREPLY[*]}" = "--frames" ]
+}
+
+@test "output that can't be written is a disk failure" {
+    [ -e /dev/full ] || skip "no /dev/full here"
+    run bash -c '"$NEUPIG" man >/dev/full'
+    [ "$status" -eq 5 ]
+}
+
+@test "version" {
+    run "$NEUPIG" version
+    [ "$status" -eq 0 ]
+    [[ "$output" =~ ^neupig\ [0-9]+\.[0-9]+\.[0-9]+$ ]]
+    run "$NEUPIG" --version
+    [ "$status" -eq 0 ]
+}
+
+@test "doctor lists devices, and says so with exit code 4 where there is none" {
+    run "$NEUPIG" doctor
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"device 0:"*"self-test: ok"* ]]
+    mkdir empty
+    OCL_ICD_VENDORS="$PWD/empty" run "$NEUPIG" doctor
+    [ "$status" -eq 4 ]
+    [[ "$output" == *"no OpenCL device"* ]]
+    OCL_ICD_VENDORS="$PWD/empty" run "$NEUPIG" doctor --json
+    [ "$status" -eq 4 ]
+}

@@ -1,0 +1,59 @@
+# render: pictures without a display.
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    "$NEUPIG" synth -o s --body bar --frames 5 --points 500 --cell 0.05 >/dev/null
+    unset DISPLAY
+}
+
+# Width and height in a PNG's header.
+size_of() { od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }'; }
+
+@test "a mesh, a cloud and a strip" {
+    "$NEUPIG" render s/truth/frame_0000.ply -o mesh.png --height 100 --width 80
+    [ "$(size_of mesh.png)" = "80 100" ]
+    [ "$(od -An -tx1 -N4 mesh.png)" = " 89 50 4e 47" ]
+    "$NEUPIG" render s/points/frame_0000.ply -o cloud.png --height 100 --width 80
+    run cmp -s mesh.png cloud.png
+    [ "$status" -eq 1 ]
+    "$NEUPIG" render s/truth -o strip.png --height 50 --width 40
+    [ "$(size_of strip.png)" = "200 50" ]
+    "$NEUPIG" render s/truth -o rows.png --height 50 --width 40 --count 3 --columns 2
+    [ "$(size_of rows.png)" = "80 100" ]
+}
+
+@test "the same bytes every time, others from another side or in other colours" {
+    for i in 1 2; do "$NEUPIG" render s/truth/frame_0001.ply -o $i.png --height 60; done
+    cmp 1.png 2.png
+    for option in "--view left" "--view top" "--colour normal" "--colour identity" "--up z"; do
+        # shellcheck disable=SC2086
+        "$NEUPIG" render s/truth/frame_0001.ply -o other.png --height 60 $option
+        run cmp -s 1.png other.png
+        [ "$status" -eq 1 ]
+    done
+}
+
+@test "colours in the file are shown" {
+    printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n' >c.ply
+    printf 'property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n' >>c.ply
+    printf 'property list uchar int vertex_indices\nend_header\n' >>c.ply
+    printf '0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n' >>c.ply
+    "$NEUPIG" render c.ply -o red.png --height 40 --colour vertex
+    "$NEUPIG" render c.ply -o plain.png --height 40
+    run cmp -s red.png plain.png
+    [ "$status" -eq 1 ]
+}
+
+@test "what can't be drawn or written ends with its exit code and leaves no picture" {
+    run "$NEUPIG" render s/truth
+    [ "$status" -eq 2 ]
+    run "$NEUPIG" render nowhere.ply -o a.png
+    [ "$status" -eq 3 ]
+    head -c 2000 s/truth/frame_0000.ply >cut.ply
+    run "$NEUPIG" render cut.ply -o a.png
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"cut.ply"* ]]
+    [ ! -e a.png ]
+    run "$NEUPIG" render s/truth/frame_0000.ply -o s/truth/frame_0000.ply/a.png --height 20
+    [ "$status" -eq 5 ]
+}

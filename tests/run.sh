@@ -1,0 +1,40 @@
+#!/bin/bash
+# All tests: release build with warnings as errors, everything again with the address and undefined-behaviour
+# sanitizers, ring and run with the thread sanitizer, and the formatting.  Installs what is missing (as root, or
+# through sudo).  Stops at the first part that fails; the output ends with CTest's summary of the last part run.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+. samples/packages.sh
+# shellcheck disable=SC2086
+install_packages $packages_to_build $packages_to_test
+
+jobs=$(nproc)
+export CTEST_PARALLEL_LEVEL=$jobs
+export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0"
+export ASAN_OPTIONS="detect_leaks=1:allocator_may_return_null=1"
+export UBSAN_OPTIONS="print_stacktrace=1"
+
+build()
+{
+    echo "== Build: $1"
+    cmake --preset "$1" -DNPG_WERROR=ON >/dev/null
+    cmake --build --preset "$1"
+}
+
+echo "== Format"
+find pipeline stages kernels tools tests samples \( -name '*.[ch]' -o -name '*.cpp' -o -name '*.hpp' \) -print0 |
+    xargs -0 clang-format-14 --dry-run -Werror
+
+build release
+
+build asan
+echo "== Tests: address and undefined behaviour"
+ctest --preset asan
+
+build tsan
+echo "== Tests: threads"
+ctest --preset tsan -L tsan
+
+echo "== Tests: release"
+ctest --preset release

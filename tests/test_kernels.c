@@ -1,0 +1,128 @@
+/* Every op against its plain twin on random and extreme sizes, twins against finite differences, and equal
+ * bytes from equal input. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "check.h"
+#include "kernels.h"
+#include "latent.h"
+#include "mlp.h"
+
+static npg_device *device;
+
+static int open_device(void **state)
+{
+    (void)state;
+    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    return 0;
+}
+
+static int close_device(void **state)
+{
+    (void)state;
+    npg_device_close(&device);
+    return 0;
+}
+
+static void ops_agree_with_their_twins(void **state)
+{
+    const int sizes[] = {1, 2, 3, 5, 8};
+    (void)state;
+    for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++)
+        for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+            double error = 1;
+            if (c->check(device, sizes[i], 100 + i, &error)) fail_msg("%s: %s", c->op, npg_error_text());
+            print_message("%-24s size %d: error %.2g, allowed %.2g\n", c->op, sizes[i], error, c->tolerance);
+            if (!(error <= c->tolerance)) fail_msg("%s of size %d is off by %g", c->op, sizes[i], error);
+        }
+}
+
+static void gradients_of_twins_are_slopes(void **state)
+{
+    (void)state;
+    for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++) {
+        double error = 1;
+        if (!c->gradient) continue;
+        if (c->gradient(3, &error)) fail_msg("%s: %s", c->op, npg_error_text());
+        print_message("%-24s gradient: error %.2g\n", c->op, error);
+        if (!(error <= 1e-5)) fail_msg("the gradient of %s is off by %g", c->op, error);
+    }
+}
+
+/* Sample and pass back 2000 points twice; compare all bytes. */
+static void sampling_gives_equal_bytes(void **state)
+{
+    enum { POINTS = 2000, ROWS = 2112 };
+    npg_levels levels = {0};
+    npg_samples samples;
+    npg_latent latent;
+    npg_random random = npg_random_stream(5, 0, 0);
+    float *points, *nodes, *dz, *first = NULL;
+    (void)state;
+    for (int l = 0; l < 8; l++)
+        npg_levels_add(&levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, true, 1},
+                       0);
+    size_t size = levels.row_count * NPG_LATENT_CHANNELS;
+    assert_int_equal(npg_check_values(&points, NULL, POINTS * 3, 1, &random), 0);
+    assert_int_equal(npg_check_values(&nodes, NULL, size, 1, &random), 0);
+    assert_int_equal(npg_check_values(&dz, NULL, ROWS * NPG_LATENT_CHANNELS, 1, &random), 0);
+    assert_int_equal(npg_samples_open(&samples, &levels, points, points, POINTS, ROWS), 0);
+    assert_int_equal(npg_latent_open(&latent, device, &samples), 0);
+    for (int run = 0; run < 2; run++) {
+        npg_buffer z, grid, back, slope;
+        float *bytes;
+        assert_int_equal(npg_buffer_open(&z, device, ROWS * NPG_LATENT_CHANNELS * sizeof(float)), 0);
+        assert_int_equal(npg_buffer_from(&grid, device, nodes, size * sizeof(float)), 0);
+        assert_int_equal(npg_buffer_open(&back, device, size * sizeof(float)), 0);
+        assert_int_equal(npg_buffer_from(&slope, device, dz, ROWS * NPG_LATENT_CHANNELS * sizeof(float)), 0);
+        assert_int_equal(npg_latent_sample(&latent, &z, &grid), 0);
+        assert_int_equal(npg_latent_back(&latent, &back, &slope, &z), 0);
+        assert_int_equal(npg_alloc_array(&bytes, NPG_FOR_RUN, size, sizeof *bytes), 0);
+        assert_int_equal(npg_buffer_read(&back, 0, bytes, size * sizeof *bytes), 0);
+        if (first) assert_memory_equal(first, bytes, size * sizeof *bytes);
+        npg_release(&first);
+        first = bytes;
+        npg_buffer_close(&z);
+        npg_buffer_close(&grid);
+        npg_buffer_close(&back);
+        npg_buffer_close(&slope);
+    }
+    npg_release(&first);
+    npg_release(&points);
+    npg_release(&nodes);
+    npg_release(&dz);
+    npg_samples_close(&samples);
+    npg_latent_close(&latent);
+}
+
+static void unknown_device_is_named(void **state)
+{
+    npg_device *none;
+    (void)state;
+    assert_int_equal(npg_device_open(&none, "no such device"), NPG_DEVICE);
+    assert_non_null(strstr(npg_error_text(), "no such device"));
+    assert_null(none);
+}
+
+static void self_test_passes(void **state)
+{
+    (void)state;
+    if (npg_kernels_self_test(device)) fail_msg("%s", npg_error_text());
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(self_test_passes),
+        cmocka_unit_test(ops_agree_with_their_twins),
+        cmocka_unit_test(gradients_of_twins_are_slopes),
+        cmocka_unit_test(sampling_gives_equal_bytes),
+        cmocka_unit_test(unknown_device_is_named),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}

@@ -1,0 +1,119 @@
+/* Motion figures of a mesh sequence of constant topology. */
+#include "eval_motion.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh_tools.h"
+
+void npg_eval_motion_close(npg_eval_motion *motion)
+{
+    npg_mesh_unref(&motion->first);
+    npg_release(&motion->edges);
+    npg_release(&motion->before[0]);
+    npg_release(&motion->before[1]);
+    npg_release(&motion->areas);
+}
+
+static npg_status begin(npg_eval_motion *motion, npg_mesh *mesh)
+{
+    motion->first = npg_mesh_ref(mesh);
+    motion->faces = mesh->faces;
+    motion->vert_count = mesh->vert_count;
+    motion->face_count = mesh->face_count;
+    motion->vertices_last = motion->topology_last = true;
+    for (int i = 0; i < 2; i++)
+        NPG_TRY(npg_alloc_array(&motion->before[i], NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
+    return npg_mesh_edges(&motion->edges, &motion->edge_count, mesh->faces, mesh->face_count);
+}
+
+static double distance(const float *a, const float *b)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) sum += ((double)a[k] - (double)b[k]) * ((double)a[k] - (double)b[k]);
+    return sqrt(sum);
+}
+
+static double jitter_of(const npg_eval_motion *motion, const float *after)
+{
+    const float *middle = motion->before[0], *before = motion->before[1];
+    double sum = 0;
+    for (size_t v = 0; v < motion->vert_count; v++) {
+        double bend_sq = 0;
+        for (size_t k = 3 * v; k < 3 * v + 3; k++) {
+            double bend = (double)before[k] - 2 * (double)middle[k] + (double)after[k];
+            bend_sq += bend * bend;
+        }
+        sum += sqrt(bend_sq);
+    }
+    return sum / (double)motion->vert_count / motion->diagonal;
+}
+
+static double edge_change_of(const npg_eval_motion *motion, const float *pos)
+{
+    const float *rest = motion->first->vert_pos;
+    double sum = 0;
+    for (size_t e = 0; e < motion->edge_count; e++) {
+        size_t a = 3 * (size_t)motion->edges[e][0], b = 3 * (size_t)motion->edges[e][1];
+        sum += fabs(distance(pos + a, pos + b) / fmax(distance(rest + a, rest + b), 1e-30) - 1);
+    }
+    return sum / (double)motion->edge_count;
+}
+
+npg_status npg_eval_motion_add(npg_eval_motion *motion, npg_mesh *mesh)
+{
+    if (!motion->first) NPG_TRY(begin(motion, mesh));
+    motion->vertices_last &= mesh->vert_count == motion->vert_count;
+    motion->topology_last &=
+        motion->vertices_last && mesh->face_count == motion->face_count &&
+        !memcmp(mesh->faces, motion->faces, motion->face_count * 3 * sizeof *motion->faces);
+    size_t t = motion->frames++;
+    if (motion->vertices_last) {
+        if (t >= 2) motion->jitter_sum += jitter_of(motion, mesh->vert_pos);
+        float *oldest = motion->before[1];
+        memcpy(oldest, mesh->vert_pos, motion->vert_count * 3 * sizeof(float));
+        motion->before[1] = motion->before[0];
+        motion->before[0] = oldest;
+    }
+    if (!motion->topology_last) return NPG_OK;
+    motion->edge_sum += edge_change_of(motion, mesh->vert_pos);
+    NPG_TRY(npg_grow(&motion->areas, &motion->area_room, t + 1, motion->face_count * sizeof(float),
+                     NPG_FOR_MESH));
+    for (size_t f = 0; f < motion->face_count; f++)
+        motion->areas[t * motion->face_count + f] = (float)npg_face_area(mesh->vert_pos, mesh->faces + 3 * f);
+    return NPG_OK;
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static npg_status bad_share(double *share, const npg_eval_motion *motion)
+{
+    size_t bad = 0, frames = motion->frames;
+    float *areas;
+    NPG_TRY(npg_alloc_array(&areas, NPG_FOR_MESH, frames, sizeof *areas));
+    for (size_t f = 0; f < motion->face_count; f++) {
+        for (size_t t = 0; t < frames; t++) areas[t] = motion->areas[t * motion->face_count + f];
+        qsort(areas, frames, sizeof *areas, compare_floats);
+        double median = 0.5 * ((double)areas[(frames - 1) / 2] + (double)areas[frames / 2]);
+        for (size_t t = 0; t < frames; t++)
+            bad += (double)areas[t] > 10 * median || (double)areas[t] < 0.1 * median;
+    }
+    npg_release(&areas);
+    *share = (double)bad / (double)(frames * motion->face_count);
+    return NPG_OK;
+}
+
+npg_status npg_eval_motion_end(npg_eval_motion_figures *figures, npg_eval_motion *motion)
+{
+    *figures = (npg_eval_motion_figures){(double)NAN, (double)NAN, (double)NAN};
+    if (motion->vertices_last && motion->frames > 2)
+        figures->jitter = motion->jitter_sum / (double)(motion->frames - 2);
+    if (!motion->topology_last || !motion->frames) return NPG_OK;
+    figures->edge = motion->edge_sum / (double)motion->frames;
+    return bad_share(&figures->bad, motion);
+}

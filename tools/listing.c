@@ -1,0 +1,116 @@
+/* Listing: files of a folder in natural order, for the verbs that take folders of meshes or clouds. */
+#include "listing.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "file.h"
+#include "frame_names.h"
+#include "memory.h"
+
+static int compare_paths(const void *a, const void *b)
+{
+    const char *x = *(char *const *)a, *y = *(char *const *)b;
+    int order = npg_natural_compare(x, y);
+    return order ? order : strcmp(x, y);
+}
+
+static bool ends_in(const char *name, const char *endings)
+{
+    const char *dot = strrchr(name, '.');
+    if (!dot || name[0] == '.') return false;
+    for (const char *at = endings; *at; at += strspn(at, " ")) {
+        size_t length = strcspn(at, " ");
+        if (strlen(dot) == length && !strncasecmp(dot, at, length)) return true;
+        at += length;
+    }
+    return false;
+}
+
+static npg_status add_path(npg_listing *listing, char *path)
+{
+    npg_status status =
+        npg_grow(&listing->paths, &listing->room, listing->count + 1, sizeof *listing->paths, NPG_FOR_FILES);
+    if (status)
+        npg_release(&path);
+    else
+        listing->paths[listing->count++] = path;
+    return status;
+}
+
+static npg_status add_folder(npg_listing *listing, const char *path, const char *endings)
+{
+    size_t before = listing->count;
+    npg_status status = NPG_OK;
+    const struct dirent *entry;
+    DIR *folder = opendir(path);
+    if (!folder) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
+    while (!status && (entry = readdir(folder))) {
+        char *joined;
+        if (!ends_in(entry->d_name, endings)) continue;
+        status = npg_join_path(&joined, path, entry->d_name);
+        if (!status) status = add_path(listing, joined);
+    }
+    closedir(folder);
+    if (!status && listing->count == before)
+        return npg_error(NPG_BAD_INPUT, "%s: the folder has no file that ends in %s", path, endings);
+    if (!status)
+        qsort(listing->paths + before, listing->count - before, sizeof *listing->paths, compare_paths);
+    return status;
+}
+
+npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings)
+{
+    struct stat facts;
+    char *copy;
+    if (stat(path, &facts) != 0) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
+    if (S_ISDIR(facts.st_mode)) return add_folder(listing, path, endings);
+    NPG_TRY(npg_copy_text(&copy, path));
+    return add_path(listing, copy);
+}
+
+void npg_listing_keep(npg_listing *listing, const npg_selection *selection)
+{
+    size_t kept = 0;
+    int64_t count = (int64_t)listing->count;
+    for (int64_t i = 0; i < count; i++) {
+        if (npg_selection_takes(selection, i, i, count))
+            listing->paths[kept++] = listing->paths[i];
+        else
+            npg_release(&listing->paths[i]);
+    }
+    listing->count = kept;
+}
+
+void npg_listing_close(npg_listing *listing)
+{
+    for (size_t i = 0; i < listing->count; i++) npg_release(&listing->paths[i]);
+    npg_release(&listing->paths);
+    *listing = (npg_listing){0};
+}
+
+npg_status npg_subfolder(char **out, const char *folder, const char *names)
+{
+    struct stat facts;
+    for (const char *at = names; *at; at += strspn(at, " ")) {
+        char name[64];
+        size_t length = strcspn(at, " ");
+        snprintf(name, sizeof name, "%.*s", (int)length, at);
+        NPG_TRY(npg_join_path(out, folder, name));
+        if (stat(*out, &facts) == 0 && S_ISDIR(facts.st_mode)) return NPG_OK;
+        npg_release(out);
+        at += length;
+    }
+    return npg_copy_text(out, folder);
+}
+
+uint64_t npg_file_bytes(const char *path)
+{
+    struct stat facts;
+    return stat(path, &facts) == 0 && facts.st_size > 0 ? (uint64_t)facts.st_size : 0;
+}

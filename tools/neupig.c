@@ -1,0 +1,112 @@
+/* neupig: the command.  One verb per file; this one holds their table and the small verbs. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+
+const npg_verb npg_verbs[] = {
+    {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",
+     "Reads the point clouds of INPUT (a folder, a pattern like frame_%04d.ply, a list file, or - for "
+     "standard "
+     "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
+     "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.",
+     npg_run_verb_options, true, npg_verb_run},
+    {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
+     "Reads every frame of INPUT and says what is in it, what a run would trip over, and what it would cost "
+     "in "
+     "memory, disk and time.  Exit code 7 when something needs attention.",
+     npg_probe_options, true, npg_verb_probe},
+    {"eval", "PREDICTED TRUTH", 2, 2, "Measure a mesh sequence against a ground truth",
+     "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) with those of "
+     "TRUTH, "
+     "frame by frame, and prints Chamfer distance (x 1e5), normal consistency, F-score and correspondence "
+     "error; "
+     "lengths are in diagonals of the first ground-truth frame's box.",
+     npg_eval_options, false, npg_verb_eval},
+    {"synth", "-o DIR", 0, 0, "Make a capture with an exact ground truth",
+     "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
+     "(DIR/truth).  The same options and seed give the same bytes.",
+     npg_synth_options, false, npg_verb_synth},
+    {"render", "FILE... -o IMAGE.png", 1, 4096, "Draw meshes or clouds to a PNG without a display",
+     "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  All "
+     "tiles "
+     "share one camera, so that motion shows.",
+     npg_render_options, false, npg_verb_render},
+    {"bench", "", 0, 0, "Time the kernels and the fit on this machine",
+     "Prints one JSON object: operations and bytes per second of every kernel beside the machine's measured "
+     "peaks "
+     "for multiply-adds and memory, and how many frames per second the fit solves.  Take figures on an idle "
+     "machine.",
+     npg_bench_options, false, npg_verb_bench},
+    {"doctor", "", 0, 0, "Check devices and libraries on this machine",
+     "Lists the OpenCL devices and the versions of the libraries in use and computes a small known result on "
+     "each device.  Exit code 4 when there is no device or one computes wrong.",
+     npg_doctor_options, false, npg_verb_doctor},
+    {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
+     "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},
+    {"man", "", 0, 0, "Print the manual page, or shell completion",
+     "Prints the manual page in roff, made from the same tables as the help.  Read it with: neupig man | man "
+     "-l -",
+     npg_man_options, false, npg_verb_man},
+    {"version", "", 0, 0, "Print the version", "Prints the version of neupig.", NULL, false,
+     npg_verb_version},
+    {0}};
+
+const npg_verb *npg_verb_find(const char *name)
+{
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++)
+        if (!strcmp(verb->name, name)) return verb;
+    return NULL;
+}
+
+static int unknown_verb(const char *name)
+{
+    fprintf(stderr, "neupig: there is no verb \"%s\"; neupig help lists them\n", name);
+    return npg_status_exit_code(NPG_USAGE);
+}
+
+int npg_verb_help(int argc, char **argv)
+{
+    npg_cli cli;
+    npg_status status = npg_cli_parse(&cli, argv[0], NULL, NULL, argc, argv);
+    if (status) return npg_cli_end(argv[0], status);
+    if (!cli.operand_count) {
+        npg_cli_print_verbs(stdout);
+        return 0;
+    }
+    const npg_verb *verb = npg_verb_find(cli.operands[0]);
+    if (!verb) return unknown_verb(cli.operands[0]);
+    npg_cli_print_verb(stdout, verb);
+    return 0;
+}
+
+int npg_verb_version(int argc, char **argv)
+{
+    npg_cli cli;
+    npg_status status = npg_cli_parse(&cli, argv[0], NULL, NULL, argc, argv);
+    if (!status) printf("neupig %s\n", npg_version());
+    return npg_cli_end(argv[0], status);
+}
+
+/* Output that could not be written (a full disk, a closed pipe) is a failure too. */
+static int close_stdout(int code)
+{
+    if (fflush(stdout) == 0 && !ferror(stdout)) return code;
+    perror("neupig: standard output");
+    return code ? code : npg_status_exit_code(NPG_DISK);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        npg_cli_print_verbs(stderr);
+        return npg_status_exit_code(NPG_USAGE);
+    }
+    static char help[] = "help", version[] = "version";
+    const char *name = argv[1];
+    if (!strcmp(name, "--help") || !strcmp(name, "-h")) argv[1] = help;
+    if (!strcmp(name, "--version") || !strcmp(name, "-V")) argv[1] = version;
+    const npg_verb *verb = npg_verb_find(argv[1]);
+    if (!verb) return unknown_verb(name);
+    return close_stdout(verb->main(argc - 1, argv + 1));
+}

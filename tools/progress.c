@@ -1,0 +1,149 @@
+/* Progress: how far a run is, as a bar on a terminal or as JSON lines, and the log on standard error. */
+#include "progress.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose)
+{
+    bool terminal = isatty(STDERR_FILENO);
+    if (show == NPG_SHOW_AUTO) show = terminal && !quiet ? NPG_SHOW_BAR : NPG_SHOW_NONE;
+    *reporter = (npg_reporter){.show = show,
+                               .level = quiet     ? NPG_LOG_WARNING
+                                        : verbose ? NPG_LOG_DEBUG
+                                                  : NPG_LOG_INFO,
+                               .colour = terminal && !getenv("NO_COLOR"),
+                               .drawn_s = -1};
+}
+
+/* ---- log ---- */
+
+static void wipe_bar(npg_reporter *reporter)
+{
+    if (reporter->bar_drawn) fputs("\r\033[K", stderr);
+    reporter->bar_drawn = false;
+}
+
+static void on_log(void *user, const npg_log_record *record)
+{
+    static const char *const words[] = {"error: ", "warning: ", "", ""};
+    static const char *const colours[] = {"\033[31m", "\033[33m", "", "\033[2m"};
+    npg_reporter *reporter = user;
+    char frame[40] = "";
+    if (record->level > reporter->level) return;
+    wipe_bar(reporter);
+    bool says_frame = !strncmp(record->message, "frame ", 6);
+    if (record->frame >= 0 && !says_frame)
+        snprintf(frame, sizeof frame, "frame %lld: ", (long long)record->frame);
+    fprintf(stderr, "%s[%8.2f] %s: %s%s%s%s\n", reporter->colour ? colours[record->level] : "",
+            record->time_s, record->stage, words[record->level], frame, record->message,
+            reporter->colour ? "\033[0m" : "");
+}
+
+/* ---- progress ---- */
+
+/* "1:02:03", "2:03", or "?" while it can't be told. */
+static void spell_time(char *out, size_t size, double seconds)
+{
+    if (!(seconds >= 0) || seconds > 1e8) {
+        snprintf(out, size, "?");
+        return;
+    }
+    long whole = lround(seconds), hours = whole / 3600, minutes = whole / 60 % 60;
+    if (hours)
+        snprintf(out, size, "%ld:%02ld:%02ld", hours, minutes, whole % 60);
+    else
+        snprintf(out, size, "%ld:%02ld", minutes, whole % 60);
+}
+
+static int terminal_width(void)
+{
+    struct winsize size;
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 20 ? size.ws_col : 80;
+}
+
+static void draw_bar(npg_reporter *reporter, const npg_progress *progress)
+{
+    char left[32], elapsed[32], tail[160], bar[32];
+    if (reporter->drawn_s >= 0 && progress->elapsed_s - reporter->drawn_s < 0.1 && progress->share < 1)
+        return;
+    reporter->drawn_s = progress->elapsed_s;
+    spell_time(left, sizeof left, progress->left_s);
+    spell_time(elapsed, sizeof elapsed, progress->elapsed_s);
+    int at = snprintf(tail, sizeof tail, " %3.0f %% %s, left %s, %s", 100 * progress->share, elapsed, left,
+                      progress->stage ? progress->stage : "");
+    if (progress->steps > 0)
+        at += snprintf(tail + at, sizeof tail - (size_t)at, " %lld/%lld", (long long)progress->step,
+                       (long long)progress->steps);
+    if (progress->windows > 1 && at < (int)sizeof tail)
+        at += snprintf(tail + at, sizeof tail - (size_t)at, " of window %lld/%lld",
+                       (long long)progress->window + 1, (long long)progress->windows);
+    if (isfinite(progress->loss) && at < (int)sizeof tail)
+        snprintf(tail + at, sizeof tail - (size_t)at, ", loss %.3g", progress->loss);
+    enum { CELLS = 20 };
+    double share = fmin(fmax(progress->share, 0), 1);
+    for (int i = 0; i < CELLS; i++) bar[i] = i < (int)(share * CELLS) ? '=' : ' ';
+    bar[CELLS] = 0;
+    int room = terminal_width() - CELLS - 3;
+    fprintf(stderr, "\r\033[K[%s]%.*s", bar, room > 0 ? room : 0, tail);
+    fflush(stderr);
+    reporter->bar_drawn = true;
+}
+
+static void set_real(json_t *object, const char *name, double value)
+{
+    json_object_set_new(object, name, isfinite(value) ? json_real(value) : json_null());
+}
+
+static void print_line(json_t *object)
+{
+    char *text = json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(6));
+    if (text) puts(text);
+    fflush(stdout);
+    free(text);
+    json_decref(object);
+}
+
+static void print_json(const npg_progress *progress)
+{
+    json_t *line =
+        json_pack("{s:s,s:s}", "event", "progress", "stage", progress->stage ? progress->stage : "");
+    set_real(line, "share", progress->share);
+    set_real(line, "elapsed_s", progress->elapsed_s);
+    set_real(line, "left_s", progress->left_s >= 0 ? progress->left_s : (double)NAN);
+    json_object_set_new(line, "frames_done", json_integer(progress->frames_done));
+    json_object_set_new(line, "frames", json_integer(progress->frames));
+    json_object_set_new(line, "step", json_integer(progress->step));
+    json_object_set_new(line, "steps", json_integer(progress->steps));
+    json_object_set_new(line, "window", json_integer(progress->window));
+    json_object_set_new(line, "windows", json_integer(progress->windows));
+    set_real(line, "loss", progress->loss);
+    print_line(line);
+}
+
+static void on_progress(void *user, const npg_progress *progress)
+{
+    npg_reporter *reporter = user;
+    if (reporter->show == NPG_SHOW_BAR) draw_bar(reporter, progress);
+    if (reporter->show == NPG_SHOW_JSON) print_json(progress);
+}
+
+npg_hooks npg_reporter_hooks(npg_reporter *reporter)
+{
+    return (npg_hooks){sizeof(npg_hooks), reporter, on_log, on_progress};
+}
+
+void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output)
+{
+    wipe_bar(reporter);
+    if (reporter->show != NPG_SHOW_JSON) return;
+    json_t *line = json_pack("{s:s,s:s,s:i,s:s}", "event", "end", "status", npg_status_name(status),
+                             "exit_code", npg_status_exit_code(status), "output", output);
+    if (line && status < 0) json_object_set_new(line, "message", json_string(npg_error_text()));
+    if (line) print_line(line);
+}

@@ -1,0 +1,131 @@
+/* neupig man: the manual page and shell completion, made from the tables of options. */
+#include <stddef.h>
+#include <string.h>
+
+#include "cli.h"
+#include "stage.h"
+
+typedef struct settings {
+    bool completion;
+} settings;
+
+const npg_option npg_man_options[] = {{"completion", "Print completion for bash instead", NPG_OPTION_FLAG,
+                                       offsetof(settings, completion), "no", 0, 0, NULL, NULL},
+                                      {0}};
+
+/* Text as roff shows it letter by letter. */
+static void put_text(const char *text)
+{
+    for (const char *c = text; *c; c++) {
+        if (c == text && (*c == '.' || *c == '\'')) fputs("\\&", stdout);
+        if (*c == '\\')
+            fputs("\\e", stdout);
+        else if (*c == '-')
+            fputs("\\-", stdout);
+        else
+            putchar(*c);
+    }
+}
+
+static void put_option(const npg_option_info *option)
+{
+    char spelled[128], limits[256];
+    npg_cli_spell(spelled, sizeof spelled, option);
+    npg_cli_limits(limits, sizeof limits, option);
+    fputs(".TP\n.B ", stdout);
+    put_text(spelled);
+    putchar('\n');
+    put_text(option->help);
+    if (limits[0]) {
+        fputs(" (", stdout);
+        put_text(limits);
+        putchar(')');
+    }
+    putchar('\n');
+}
+
+static void put_verb(const npg_verb *verb)
+{
+    npg_option_info info;
+    const char *stage = "";
+    printf(".SS neupig %s", verb->name);
+    putchar(' ');
+    put_text(verb->operands);
+    putchar('\n');
+    put_text(verb->text);
+    putchar('\n');
+    for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
+        if (strcmp(stage, info.stage) != 0) printf(".PP\nOptions of %s:\n", info.stage);
+        stage = info.stage;
+        put_option(&info);
+    }
+}
+
+static void put_presets(void)
+{
+    fputs(".SH PRESETS\n", stdout);
+    for (const npg_preset *preset = npg_presets; preset->name; preset++) {
+        printf(".TP\n.B %s\n", preset->name);
+        put_text(preset->help);
+        putchar('\n');
+    }
+}
+
+static void print_manual(void)
+{
+    static const char *const codes[][2] = {
+        {"0", "done"},
+        {"1", "failed"},
+        {"2", "usage or configuration"},
+        {"3", "bad input; the message names file, place and cause"},
+        {"4", "device: no OpenCL device, or one that computes wrong"},
+        {"5", "disk: writing failed"},
+        {"6", "memory"},
+        {"7", "finished with frames skipped or below the quality bar"},
+        {"75", "stopped by a signal"},
+    };
+    printf(".TH NEUPIG 1 \"\" \"neupig %s\" \"User Commands\"\n", npg_version());
+    fputs(".SH NAME\nneupig \\- one moving mesh from a long sequence of point clouds\n"
+          ".SH SYNOPSIS\n.B neupig\n.I VERB\n[options] [operands]\n"
+          ".SH DESCRIPTION\nTurns a sequence of point clouds into one mesh that moves through all of them, "
+          "every "
+          "vertex keeping its identity.\nOptions are written \\-\\-name VALUE or \\-\\-name=VALUE; flags "
+          "\\-\\-name or \\-\\-no\\-name.\n.SH VERBS\n",
+          stdout);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) put_verb(verb);
+    put_presets();
+    fputs(".SH EXIT STATUS\n", stdout);
+    for (size_t i = 0; i < sizeof codes / sizeof *codes; i++)
+        printf(".TP\n.B %s\n%s\n", codes[i][0], codes[i][1]);
+}
+
+static void print_completion(void)
+{
+    npg_option_info info;
+    fputs("# bash completion for neupig, made by: neupig man --completion\n_neupig()\n{\n"
+          "    local word=${COMP_WORDS[COMP_CWORD]} words=\n"
+          "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n        COMPREPLY=($(compgen -W '",
+          stdout);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) printf("%s ", verb->name);
+    fputs("' -- \"$word\"))\n        return\n    fi\n    case ${COMP_WORDS[1]} in\n", stdout);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) {
+        printf("    %s) words='--help", verb->name);
+        for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) printf(" --%s", info.name);
+        fputs("' ;;\n", stdout);
+    }
+    fputs("    esac\n    if [[ $word == -* ]]; then\n        COMPREPLY=($(compgen -W \"$words\" -- "
+          "\"$word\"))\n"
+          "    else\n        COMPREPLY=($(compgen -f -- \"$word\"))\n    fi\n}\n"
+          "complete -o filenames -F _neupig neupig\n",
+          stdout);
+}
+
+int npg_verb_man(int argc, char **argv)
+{
+    settings s;
+    npg_cli cli;
+    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
+    if (!status && s.completion) print_completion();
+    if (!status && !s.completion) print_manual();
+    return npg_cli_end(argv[0], status);
+}

@@ -1,0 +1,221 @@
+/* neupig probe: what a capture holds, what a run would trip over, what it would cost. */
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli.h"
+#include "clock.h"
+#include "frame_files.h"
+#include "listing.h"
+#include "probe_facts.h"
+#include "reader.h"
+
+typedef struct settings {
+    bool json;
+} settings;
+
+const npg_option npg_probe_options[] = {{"json", "Print one JSON object instead of text", NPG_OPTION_FLAG,
+                                         offsetof(settings, json), "no", 0, 0, NULL, NULL},
+                                        {0}};
+
+typedef struct job {
+    settings s;
+    const npg_options *options;
+    const char *input;
+    npg_frame_files *list; /* NULL for standard input */
+    npg_probe probe;
+} job;
+
+/* The value of a run's option as a number, or `otherwise` where it is not one. */
+static int64_t option_number(const npg_options *options, const char *name, int64_t otherwise)
+{
+    const char *text = npg_options_get(options, name);
+    char *end = NULL;
+    long long value = text ? strtoll(text, &end, 10) : 0;
+    return text && end != text && value > 0 ? value : otherwise;
+}
+
+static bool option_on(const npg_options *options, const char *name)
+{
+    const char *text = npg_options_get(options, name);
+    return text &&
+           (!strcmp(text, "yes") || !strcmp(text, "true") || !strcmp(text, "on") || !strcmp(text, "1"));
+}
+
+/* ---- reading ---- */
+
+/* Bad data is noted and looked past; anything else ends the probe. */
+static npg_status note(job *j, npg_status status, npg_frame *frame, const char *format, int64_t number)
+{
+    if (status == NPG_BAD_INPUT) {
+        npg_probe_add_fault(&j->probe, number);
+        status = NPG_OK;
+    } else if (!status) {
+        status = npg_probe_add(&j->probe, frame, format, number);
+    }
+    npg_frame_clear(frame);
+    return status;
+}
+
+static npg_status read_files(job *j)
+{
+    const char *selection = npg_options_get(j->options, "frames");
+    NPG_TRY(npg_frame_files_open(&j->list, j->input, selection ? selection : "", true));
+    for (size_t i = 0; i < j->list->count; i++) {
+        const npg_frame_slot *slot = &j->list->slots[i];
+        npg_frame frame = {0};
+        if (!slot->path) continue;
+        const char *format = npg_reader_for(slot->path);
+        j->probe.bytes += npg_file_bytes(slot->path);
+        npg_status status = npg_read_cloud(&frame, slot->path, &j->probe.origin);
+        NPG_TRY(note(j, status, &frame, format ? format : "unknown", slot->number));
+    }
+    if (j->list->gap_count) {
+        char gaps[256];
+        npg_frame_files_gaps(gaps, sizeof gaps, j->list);
+        npg_probe_attend(&j->probe, "%zu frames are missing in the numbering: %s", j->list->gap_count, gaps);
+    }
+    if (j->list->left_out)
+        npg_probe_attend(&j->probe, "%zu files with other endings were left out", j->list->left_out);
+    return NPG_OK;
+}
+
+static npg_status read_stream(job *j)
+{
+    npg_stream *stream;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input"));
+    for (int64_t number = 0; !status; number++) {
+        npg_frame frame = {0};
+        status = npg_stream_next(stream, &frame, &j->probe.origin);
+        if (status == NPG_END) break;
+        bool broken = status == NPG_BAD_INPUT; /* nothing behind it can be found again */
+        status = note(j, status, &frame, "stream", number);
+        if (broken) break;
+    }
+    npg_stream_close(&stream);
+    return status == NPG_END ? NPG_OK : status;
+}
+
+static npg_status read_all(job *j)
+{
+    double begin_s = npg_clock_s();
+    npg_status status = strcmp(j->input, "-") ? read_files(j) : read_stream(j);
+    j->probe.read_s = npg_clock_s() - begin_s;
+    if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
+    return status;
+}
+
+static void judge_whole(npg_probe *probe)
+{
+    size_t readable = probe->frames - probe->unreadable;
+    npg_probe_spread counts = npg_probe_counts(probe);
+    if (probe->not_finite)
+        npg_probe_attend(probe, "%zu points have coordinates that are not finite", probe->not_finite);
+    if (probe->zero_normals) npg_probe_attend(probe, "%zu normals have no direction", probe->zero_normals);
+    if (probe->with_normals && probe->with_normals < readable)
+        npg_probe_attend(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
+    if (counts.most > 10 * counts.least)
+        npg_probe_attend(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
+                         counts.most);
+}
+
+/* ---- output ---- */
+
+static void print_json(job *j, const npg_estimate *e)
+{
+    npg_probe *p = &j->probe;
+    npg_probe_spread counts = npg_probe_counts(p);
+    const double *origin = p->origin.world, *lo = p->bounds.lo, *hi = p->bounds.hi;
+    bool has_box = lo[0] <= hi[0];
+    json_t *box = has_box ? json_pack("{s:[fff],s:[fff],s:f}", "low", origin[0] + lo[0], origin[1] + lo[1],
+                                      origin[2] + lo[2], "high", origin[0] + hi[0], origin[1] + hi[1],
+                                      origin[2] + hi[2], "diagonal", npg_bounds_diagonal(&p->bounds))
+                          : json_null();
+    json_t *all = json_pack(
+        "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:O,s:{s:I,s:I,s:I,s:f,s:f,s:f},s:O}",
+        "input", j->input, "frames", (json_int_t)p->frames, "gaps",
+        (json_int_t)(j->list ? j->list->gap_count : 0), "unreadable", (json_int_t)p->unreadable, "formats",
+        p->formats, "points", "least", (json_int_t)counts.least, "median", (json_int_t)counts.median, "most",
+        (json_int_t)counts.most, "total", (json_int_t)p->point_total, "not_finite", (json_int_t)p->not_finite,
+        "frames_with_normals", (json_int_t)p->with_normals, "box", box, "bytes", (json_int_t)p->bytes,
+        "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
+        "epochs", (json_int_t)e->epochs, "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes,
+        "disk_bytes", e->disk_bytes, "time_s", e->time_s, "per_frame", p->per_frame);
+    char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
+    puts(text ? text : "{}");
+    free(text);
+    json_decref(all);
+}
+
+static void print_text(job *j, const npg_estimate *e)
+{
+    npg_probe *p = &j->probe;
+    npg_probe_spread counts = npg_probe_counts(p);
+    const char *format;
+    json_t *value;
+    size_t i;
+    printf("frames    %zu", p->frames);
+    json_object_foreach(p->formats, format, value) printf(", %s %d", format, (int)json_integer_value(value));
+    printf("; missing %zu, unreadable %zu\n", j->list ? j->list->gap_count : 0, p->unreadable);
+    printf("points    %zu to %zu per frame, median %zu; %zu not finite\n", counts.least, counts.most,
+           counts.median, p->not_finite);
+    printf("normals   in %zu of %zu frames\n", p->with_normals, p->frames - p->unreadable);
+    if (p->bounds.lo[0] <= p->bounds.hi[0]) {
+        const double *o = p->origin.world, *lo = p->bounds.lo, *hi = p->bounds.hi;
+        printf("box       %.6g %.6g %.6g .. %.6g %.6g %.6g, diagonal %.6g\n", o[0] + lo[0], o[1] + lo[1],
+               o[2] + lo[2], o[0] + hi[0], o[1] + hi[1], o[2] + hi[2], npg_bounds_diagonal(&p->bounds));
+    }
+    printf("files     %.1f MiB, read in %.2f s\n", (double)p->bytes / 0x1p20, p->read_s);
+    printf("estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s (%zu vertices, %zu epochs, windows of %zu "
+           "frames; "
+           "within a factor of two)\n",
+           e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->epochs,
+           e->window < p->frames ? e->window : p->frames);
+    json_array_foreach(p->attention, i, value) printf("attention %s\n", json_string_value(value));
+}
+
+/* Unreadable frames are bad input unless the run would go on without them. */
+static npg_status verdict(const job *j)
+{
+    if (j->probe.unreadable && !option_on(j->options, "keep-going"))
+        return npg_error(NPG_BAD_INPUT, "%s", j->probe.first_fault);
+    return json_array_size(j->probe.attention) ? NPG_PARTIAL : NPG_OK;
+}
+
+static npg_status do_probe(job *j)
+{
+    npg_estimate estimate;
+    NPG_TRY(read_all(j));
+    judge_whole(&j->probe);
+    /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
+    size_t faces = (size_t)option_number(j->options, "faces", 20000), most = npg_probe_counts(&j->probe).most;
+    npg_probe_estimate(&estimate, &j->probe, (faces < 4 * most ? faces : 4 * most) / 2,
+                       (size_t)option_number(j->options, "epochs", 250),
+                       (size_t)option_number(j->options, "window", INT64_MAX));
+    if (j->s.json)
+        print_json(j, &estimate);
+    else
+        print_text(j, &estimate);
+    return verdict(j);
+}
+
+int npg_verb_probe(int argc, char **argv)
+{
+    job j = {0};
+    npg_cli cli;
+    npg_options *options = NULL;
+    npg_probe_init(&j.probe);
+    npg_status status = npg_options_open(&options);
+    if (!status) status = npg_cli_parse(&cli, argv[0], &j.s, options, argc, argv);
+    if (!status) {
+        j.options = options;
+        j.input = cli.operands[0];
+        status = do_probe(&j);
+    }
+    npg_frame_files_close(&j.list);
+    npg_probe_uninit(&j.probe);
+    npg_options_close(&options);
+    return npg_cli_end(argv[0], status);
+}

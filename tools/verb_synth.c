@@ -1,0 +1,153 @@
+/* neupig synth: moving bodies as captures, with their exact ground truth. */
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+#include "file.h"
+#include "frame_box.h"
+#include "mesh_tools.h"
+#include "metrics.h"
+#include "synth_body.h"
+#include "synth_points.h"
+#include "writer.h"
+
+typedef struct settings {
+    const char *output;
+    int body, format;
+    int64_t frames, points, holes, cameras, width, seed;
+    double cell, cycles, travel, noise, outliers;
+    bool vary, normals;
+} settings;
+
+#define AT(member) offsetof(settings, member)
+
+const npg_option npg_synth_options[] = {
+    {"output", "Folder for points/ and truth/ (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "DIR"},
+    {"body", "What moves: a walking figure or a bending bar", NPG_OPTION_CHOICE, AT(body), "walker", 0, 0,
+     "walker|bar", NULL},
+    {"frames", "Frames", NPG_OPTION_INT, AT(frames), "24", 1, 1e6, NULL, NULL},
+    {"points", "Points per frame", NPG_OPTION_INT, AT(points), "5000", 1, 1e8, NULL, NULL},
+    {"cycles", "Cycles of the motion over all frames", NPG_OPTION_REAL, AT(cycles), "1", 0, 1e4, NULL, NULL},
+    {"travel", "Metres the walker goes forward per cycle", NPG_OPTION_REAL, AT(travel), "0", -100, 100, NULL,
+     NULL},
+    {"cell", "Size of the truth mesh's triangles, metres", NPG_OPTION_REAL, AT(cell), "0.025", 0.004, 0.06,
+     NULL, "M"},
+    {"noise", "Gaussian noise, deviation in % of the diagonal; along the rays with cameras", NPG_OPTION_REAL,
+     AT(noise), "0", 0, 10, NULL, "PERCENT"},
+    {"outliers", "Share of points replaced by points anywhere in the box, in %", NPG_OPTION_REAL,
+     AT(outliers), "0", 0, 90, NULL, "PERCENT"},
+    {"holes", "Balls of 6 % of the diagonal cut out of every frame", NPG_OPTION_INT, AT(holes), "0", 0, 1000,
+     NULL, NULL},
+    {"vary", "Let the point count vary between half and all of --points", NPG_OPTION_FLAG, AT(vary), "no", 0,
+     0, NULL, NULL},
+    {"normals", "Write normals", NPG_OPTION_FLAG, AT(normals), "yes", 0, 0, NULL, NULL},
+    {"cameras", "See the body through a ring of this many depth cameras; 0: its whole surface",
+     NPG_OPTION_INT, AT(cameras), "0", 0, 64, NULL, NULL},
+    {"width", "Width and height of a camera's picture, pixels", NPG_OPTION_INT, AT(width), "256", 16, 4096,
+     NULL, "PIXELS"},
+    {"format", "Of the files", NPG_OPTION_CHOICE, AT(format), "ply", 0, 0, "ply|obj", NULL},
+    {"seed", "Seed of all random numbers", NPG_OPTION_INT, AT(seed), "0", 0, 4294967295.0, NULL, NULL},
+    {0}};
+
+static npg_status write_arrays(const char *folder, const char *kind, int64_t frame, const settings *s,
+                               const float *pos, const float *normals, size_t count, const npg_mesh *mesh)
+{
+    char path[4096];
+    double *world;
+    NPG_TRY(npg_alloc_array(&world, NPG_FOR_FILES, count, 3 * sizeof *world));
+    for (size_t i = 0; i < 3 * count; i++) world[i] = (double)pos[i];
+    npg_mesh_view view = {.vert_count = count, .vert_world = world, .vert_normals = normals};
+    if (mesh) {
+        view.faces = mesh->faces;
+        view.face_count = mesh->face_count;
+    }
+    snprintf(path, sizeof path, "%s/%s/frame_%04lld.%s", folder, kind, (long long)frame,
+             s->format ? "obj" : "ply");
+    npg_status status = npg_write_mesh(path, &view);
+    npg_release(&world);
+    return status;
+}
+
+static npg_status make_folders(const settings *s)
+{
+    static const char *const kinds[] = {"points", "truth"};
+    for (int i = 0; i < 2; i++) {
+        char *path;
+        NPG_TRY(npg_join_path(&path, s->output, kinds[i]));
+        npg_status status = npg_make_folder(path);
+        npg_release(&path);
+        NPG_TRY(status);
+    }
+    return NPG_OK;
+}
+
+static npg_scan capture_of(const settings *s, const npg_mesh *first)
+{
+    npg_scan capture = {.point_count = s->points,
+                        .vary = s->vary,
+                        .noise = s->noise,
+                        .outliers = s->outliers,
+                        .holes = s->holes,
+                        .cameras = s->cameras,
+                        .width = s->width,
+                        .seed = (uint64_t)s->seed};
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, first->vert_pos, first->vert_count);
+    capture.diagonal = npg_bounds_diagonal(&bounds);
+    for (int k = 0; k < 3; k++) capture.centre[k] = 0.5 * (bounds.lo[k] + bounds.hi[k]);
+    return capture;
+}
+
+static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh *mesh, npg_scanned *points,
+                              size_t *total)
+{
+    npg_scan capture = {0};
+    for (int64_t t = 0; t < s->frames; t++) {
+        npg_body_pose(body, mesh->vert_pos, s->cycles * (double)t / (double)s->frames, s->travel);
+        npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
+                                mesh->face_count);
+        if (t == 0) capture = capture_of(s, mesh);
+        NPG_TRY(npg_scan_frame(points, &capture, mesh, (uint64_t)t));
+        NPG_TRY(write_arrays(s->output, "points", t, s, points->pos, s->normals ? points->normals : NULL,
+                             points->count, NULL));
+        NPG_TRY(write_arrays(s->output, "truth", t, s, mesh->vert_pos, mesh->vert_normals, mesh->vert_count,
+                             mesh));
+        *total += points->count;
+    }
+    return NPG_OK;
+}
+
+static npg_status make_capture(const settings *s)
+{
+    npg_body *body = NULL;
+    npg_mesh *mesh = NULL;
+    npg_scanned points = {0};
+    size_t total = 0;
+    if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
+    npg_status status = make_folders(s);
+    if (!status) status = npg_body_open(&body, s->body, s->cell);
+    if (!status) status = npg_mesh_copy(&mesh, npg_body_rest(body));
+    if (!status && !mesh->vert_normals)
+        status = npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float));
+    if (!status) status = make_frames(s, body, mesh, &points, &total);
+    if (!status)
+        printf(
+            "%lld frames, %.0f points each, truth of %zu vertices and %zu faces\npoints  %s/points\ntruth   "
+            "%s/truth\n",
+            (long long)s->frames, (double)total / (double)s->frames, mesh->vert_count, mesh->face_count,
+            s->output, s->output);
+    npg_scanned_close(&points);
+    npg_mesh_unref(&mesh);
+    npg_body_close(&body);
+    return status;
+}
+
+int npg_verb_synth(int argc, char **argv)
+{
+    settings s;
+    npg_cli cli;
+    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
+    if (!status) status = make_capture(&s);
+    return npg_cli_end(argv[0], status);
+}
