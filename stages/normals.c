@@ -117,14 +117,14 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
 }
 
 #define VIEW_CELLS_MAX 512 /* per side of the picture */
-#define HIDDEN_DEPTH                                                                                         \
-    0.05                /* a point this much farther (in diagonals) than the nearest in its cell is hidden */
-#define HIDDEN_MAX 0.04 /* share of hidden points in one view; a closed body has near one half */
+#define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
+#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half */
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
     double half_width; /* tangent of half the angle */
     size_t cells;      /* per side */
+    double cell_width; /* at the cloud's middle */
 } view;
 
 static double dot(const double a[3], const double b[3])
@@ -164,6 +164,7 @@ static bool aim(view *v, const npg_bounds *bounds, const double sensor[3], size_
     v->half_width = radius / sqrt(distance * distance - radius * radius);
     v->cells = (size_t)sqrt((double)point_count / 4);
     if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
+    v->cell_width = 2 * v->half_width * distance / (double)v->cells;
     return v->cells >= 4;
 }
 
@@ -193,7 +194,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, co
     npg_bounds_add_points(&bounds, points, n);
     *yes = false;
     if (!aim(&v, &bounds, sensor, n)) return NPG_OK;
-    double depth, hidden_depth = HIDDEN_DEPTH * npg_bounds_diagonal(&bounds);
+    double depth, hidden_depth = HIDDEN_CELLS * v.cell_width;
     NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));
     for (size_t i = 0; i < v.cells * v.cells; i++) nearest[i] = INFINITY;
     for (size_t i = 0; i < n; i++) {
