@@ -113,7 +113,7 @@ static void bad_clouds_are_refused(void **state)
     expect_refusal(N, NPG_BAD_INPUT, "contradict each other");
     shape_sphere(points, normals, N, 1, &r);
     for (size_t i = 0; i < 3 * N; i++) normals[i] = -normals[i];
-    expect_refusal(N, NPG_FAILED, "");
+    expect_refusal(N, NPG_FAILED, "inside out");
     for (size_t i = 0; i < N; i++) shape_put(normals + 3 * i, 0, 0, 1);
     expect_refusal(N, NPG_BAD_INPUT, "one plane");
     shape_sphere(points, normals, N, 1, &r);
