@@ -238,9 +238,10 @@ static npg_status name_frame(npg_status status, const npg_frame *frame)
 static npg_status refuse(npg_worker *worker, npg_frame *frame, npg_status status)
 {
     outlier_state *s = npg_worker_state(worker);
-    name_frame(status, frame);
-    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return status;
-    if (is_first_pass(worker)) npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
+    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return name_frame(status, frame);
+    if (is_first_pass(worker))
+        npg_worker_warn(worker, true, frame->number, "skipped %s: %s",
+                        frame->path ? frame->path : "what was pushed", npg_error_text());
     frame->is_skipped = true;
     frame->point_count = 0;
     npg_release(&frame->pos_local);
