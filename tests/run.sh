@@ -24,7 +24,7 @@ build()
 
 echo "== Format"
 find pipeline stages kernels tools tests samples \( -name '*.[ch]' -o -name '*.cpp' -o -name '*.hpp' \) -print0 |
-    xargs -0 clang-format-14 --dry-run -Werror
+    xargs -0 clang-format-14 --dry-run -Werror --ferror-limit=1
 
 build release
 
