@@ -21,7 +21,7 @@ void npg_adam_close(npg_adam *adam);
 npg_status npg_adam_step(npg_adam *adam, const npg_buffer *parameters, const npg_buffer *gradient);
 
 /* The plain twin, in double: step counts from 1. */
-void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient, const float *rates,
-                       size_t row, size_t count, int64_t step);
+void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
+                       const float *rates, size_t row, size_t count, int64_t step);
 
 #endif

@@ -3,8 +3,8 @@
 
 #include "adam.h"
 
-void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient, const float *rates,
-                       size_t row, size_t count, int64_t step)
+void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
+                       const float *rates, size_t row, size_t count, int64_t step)
 {
     const double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8;
     for (size_t i = 0; i < count; i++) {

@@ -22,7 +22,8 @@ double npg_chamfer_pairs_ref(double *g, const double *x, size_t real, const doub
 {
     double cd = 0, falloff = alpha > 0 ? 1 / (2 * alpha * alpha) : 0;
     memset(g, 0, real * 3 * sizeof *g);
-    for (size_t v = 0; v < real; v++) cd += add_pair(g + 3 * v, x + 3 * v, points + 3 * to_points[v], falloff);
+    for (size_t v = 0; v < real; v++)
+        cd += add_pair(g + 3 * v, x + 3 * v, points + 3 * to_points[v], falloff);
     for (size_t p = 0; p < count; p++)
         cd += add_pair(g + 3 * to_verts[p], x + 3 * to_verts[p], points + 3 * p, falloff);
     return cd;

@@ -9,7 +9,8 @@
 /* n values in +-scale, as float and (when `wide` is not NULL) the same in double. */
 npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random);
 
-/* *error = max(*error, max |got - want| / max |want|); a value that is not finite counts as infinitely wrong. */
+/* *error = max(*error, max |got - want| / max |want|); a value that is not finite counts as infinitely wrong.
+ */
 void npg_check_compare(double *error, const float *got, const double *want, size_t n);
 
 /* The same for what is in a buffer. */
@@ -25,7 +26,7 @@ void npg_check_slope(double *error, double *x, const double *slope, size_t n, si
 npg_kernel_check npg_check_latent, npg_check_sobolev, npg_check_sobolev_graph, npg_check_mlp, npg_check_adam,
     npg_check_transform, npg_check_cayley, npg_check_exponential, npg_check_nearest, npg_check_chamfer,
     npg_check_isometry;
-npg_kernel_gradient npg_slope_latent, npg_slope_mlp, npg_slope_transform, npg_slope_cayley, npg_slope_exponential,
-    npg_slope_chamfer, npg_slope_isometry;
+npg_kernel_gradient npg_slope_latent, npg_slope_mlp, npg_slope_transform, npg_slope_cayley,
+    npg_slope_exponential, npg_slope_chamfer, npg_slope_isometry;
 
 #endif

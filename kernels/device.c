@@ -20,8 +20,8 @@ struct npg_device {
 };
 
 struct npg_program {
-    npg_device *device;   /* loan */
-    const char *name;     /* of the source, static */
+    npg_device *device; /* loan */
+    const char *name;   /* of the source, static */
     cl_program program;
     cl_kernel kernels[KERNELS_MAX];
     char kernel_names[KERNELS_MAX][48];
@@ -43,7 +43,8 @@ static npg_status all_devices(cl_device_id *ids, size_t capacity, size_t *count)
                          "no OpenCL driver is installed (on Debian: apt-get install pocl-opencl-icd)");
     NPG_TRY(npg_cl_status(code, "clGetPlatformIDs"));
     for (cl_uint i = 0; i < platform_count && i < 16; i++) {
-        code = clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, (cl_uint)(capacity - *count), ids + *count, &found);
+        code = clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, (cl_uint)(capacity - *count), ids + *count,
+                              &found);
         if (code == CL_DEVICE_NOT_FOUND) continue;
         NPG_TRY(npg_cl_status(code, "clGetDeviceIDs"));
         *count += found < capacity - *count ? found : capacity - *count;
@@ -137,8 +138,7 @@ npg_status npg_device_open(npg_device **out, const char *spec)
         device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
         status = npg_cl_status(code, "clCreateCommandQueue");
     }
-    if (status)
-        npg_device_close(&device);
+    if (status) npg_device_close(&device);
     *out = device;
     return status;
 }
@@ -195,21 +195,24 @@ void npg_buffer_close(npg_buffer *buffer)
 npg_status npg_buffer_write(npg_buffer *buffer, size_t offset, const void *data, size_t size)
 {
     if (!size) return NPG_OK;
-    CL_TRY(clEnqueueWriteBuffer(buffer->device->queue, buffer->memory, CL_TRUE, offset, size, data, 0, NULL, NULL));
+    CL_TRY(clEnqueueWriteBuffer(buffer->device->queue, buffer->memory, CL_TRUE, offset, size, data, 0, NULL,
+                                NULL));
     return NPG_OK;
 }
 
 npg_status npg_buffer_read(const npg_buffer *buffer, size_t offset, void *data, size_t size)
 {
     if (!size) return NPG_OK;
-    CL_TRY(clEnqueueReadBuffer(buffer->device->queue, buffer->memory, CL_TRUE, offset, size, data, 0, NULL, NULL));
+    CL_TRY(clEnqueueReadBuffer(buffer->device->queue, buffer->memory, CL_TRUE, offset, size, data, 0, NULL,
+                               NULL));
     return NPG_OK;
 }
 
 npg_status npg_buffer_zero(npg_buffer *buffer)
 {
     const cl_uchar zero = 0;
-    CL_TRY(clEnqueueFillBuffer(buffer->device->queue, buffer->memory, &zero, 1, 0, buffer->size, 0, NULL, NULL));
+    CL_TRY(
+        clEnqueueFillBuffer(buffer->device->queue, buffer->memory, &zero, 1, 0, buffer->size, 0, NULL, NULL));
     return NPG_OK;
 }
 
@@ -237,7 +240,8 @@ static npg_status build_failure(const npg_program *program, cl_int code)
     size_t size = 0;
     clGetProgramBuildInfo(program->program, program->device->id, CL_PROGRAM_BUILD_LOG, 0, NULL, &size);
     if (size && size <= sizeof log)
-        clGetProgramBuildInfo(program->program, program->device->id, CL_PROGRAM_BUILD_LOG, sizeof log, log, NULL);
+        clGetProgramBuildInfo(program->program, program->device->id, CL_PROGRAM_BUILD_LOG, sizeof log, log,
+                              NULL);
     return npg_error_prefix(npg_cl_status(code, "clBuildProgram"), "kernels/%s.cl on %s: %s", program->name,
                             program->device->info.name, log);
 }
@@ -312,7 +316,8 @@ npg_status npg_launch_on(npg_program *program, const char *name, size_t x, size_
                                  "kernel %s, argument %u", name, i));
     if (!local) local = program->device->info.is_cpu ? 1 : 64;
     size_t global[2] = {(x + local - 1) / local * local, y}, groups[2] = {local, 1};
-    cl_int code = clEnqueueNDRangeKernel(program->device->queue, kernel, y > 1 ? 2 : 1, NULL, global, groups, 0,
-                                         NULL, NULL);
-    return npg_error_prefix(npg_cl_status(code, "clEnqueueNDRangeKernel"), "kernel %s over %zu x %zu", name, x, y);
+    cl_int code = clEnqueueNDRangeKernel(program->device->queue, kernel, y > 1 ? 2 : 1, NULL, global, groups,
+                                         0, NULL, NULL);
+    return npg_error_prefix(npg_cl_status(code, "clEnqueueNDRangeKernel"), "kernel %s over %zu x %zu", name,
+                            x, y);
 }

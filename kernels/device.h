@@ -1,7 +1,7 @@
 /* Device: an OpenCL device with one in-order queue, its buffers, programs and launches.
  *
- * Threads: a device and all that belongs to it is used by one thread at a time.  Failures are NPG_DEVICE with the
- * OpenCL call and error by name, or NPG_MEMORY. */
+ * Threads: a device and all that belongs to it is used by one thread at a time.  Failures are NPG_DEVICE with
+ * the OpenCL call and error by name, or NPG_MEMORY. */
 #ifndef NPG_DEVICE_H
 #define NPG_DEVICE_H
 
@@ -22,9 +22,10 @@ typedef struct npg_device_info {
 /* The i-th device of all platforms; NPG_END after the last, NPG_DEVICE when there is no platform at all. */
 npg_status npg_device_describe(size_t i, npg_device_info *info);
 
-/* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the list, or a part of
- * its name.  NPG_DEVICE names the devices there are when none fits.  Compiled kernels are cached on disk in a folder
- * that one process uses at a time; a second process gets a folder of its own that goes away at close. */
+/* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the
+ * list, or a part of its name.  NPG_DEVICE names the devices there are when none fits.  Compiled kernels are
+ * cached on disk in a folder that one process uses at a time; a second process gets a folder of its own that
+ * goes away at close. */
 npg_status npg_device_open(npg_device **device, const char *spec);
 void npg_device_close(npg_device **device);
 const npg_device_info *npg_device_facts(const npg_device *device);
@@ -51,7 +52,8 @@ npg_status npg_buffer_zero(npg_buffer *buffer);
 npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *data, size_t size);
 
 /* Build kernels/<name>.cl with the given build constants ("-DROWS=192 ...", may be ""). */
-npg_status npg_program_open(npg_program **program, npg_device *device, const char *name, const char *constants);
+npg_status npg_program_open(npg_program **program, npg_device *device, const char *name,
+                            const char *constants);
 void npg_program_close(npg_program **program);
 
 /* One argument of a kernel. */

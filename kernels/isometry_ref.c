@@ -3,7 +3,8 @@
 
 #include "motion.h"
 
-double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest, size_t edge_count)
+double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest,
+                        size_t edge_count)
 {
     double total = 0;
     for (size_t e = 0; e < edge_count; e++) {

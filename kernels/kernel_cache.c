@@ -71,7 +71,8 @@ static npg_status choose_folder(void)
 {
     char folder[4096];
     if (getenv("POCL_CACHE_DIR")) return NPG_OK;
-    if (take_shared(folder, sizeof folder)) folder[0] = 0; /* a home that can't be written to is no obstacle */
+    if (take_shared(folder, sizeof folder))
+        folder[0] = 0; /* a home that can't be written to is no obstacle */
     if (!folder[0]) NPG_TRY(make_private());
     setenv("POCL_CACHE_DIR", folder[0] ? folder : private_folder, 1);
     return NPG_OK;

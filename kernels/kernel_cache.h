@@ -1,6 +1,6 @@
-/* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale between
- * versions, so each version of neupig has a folder of its own, used by the process that holds its lock; any other
- * process works in a private folder that is removed at the end. */
+/* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
+ * between versions, so each version of neupig has a folder of its own, used by the process that holds its
+ * lock; any other process works in a private folder that is removed at the end. */
 #ifndef NPG_KERNEL_CACHE_H
 #define NPG_KERNEL_CACHE_H
 
@@ -8,8 +8,8 @@
 
 #include "status.h"
 
-/* Point the driver at the folder.  Call before the first OpenCL call; later calls count only.  A cache folder that
- * the user has set (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made. */
+/* Point the driver at the folder.  Call before the first OpenCL call; later calls count only.  A cache folder
+ * that the user has set (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made. */
 npg_status npg_kernel_cache_enter(void);
 void npg_kernel_cache_leave(void);
 

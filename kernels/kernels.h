@@ -4,8 +4,8 @@
 
 #include "device.h"
 
-/* Run one op on the device and its twin on the host over random data of the given size (1 is small; the figures of
- * size 8 are large and odd) and give the largest error, relative to the largest value. */
+/* Run one op on the device and its twin on the host over random data of the given size (1 is small; the
+ * figures of size 8 are large and odd) and give the largest error, relative to the largest value. */
 typedef npg_status npg_kernel_check(npg_device *device, int size, uint64_t seed, double *error);
 
 /* The gradient of a twin against central differences of the twin, in double; the largest relative error. */

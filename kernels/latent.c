@@ -47,12 +47,15 @@ npg_status npg_samples_open(npg_samples *samples, const npg_levels *levels, cons
     size_t per_row = 8 * (size_t)levels->count, nodes = levels->row_count;
     npg_status status;
     *samples = (npg_samples){.rows = rows, .node_count = nodes, .per_row = per_row};
-    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->index, NPG_FOR_FIT, rows * per_row, sizeof(int32_t)));
+    NPG_TRY_OR(failed, status,
+               npg_alloc_array(&samples->index, NPG_FOR_FIT, rows * per_row, sizeof(int32_t)));
     NPG_TRY_OR(failed, status, npg_alloc_array(&samples->weight, NPG_FOR_FIT, rows * per_row, sizeof(float)));
     NPG_TRY_OR(failed, status, npg_alloc_array(&samples->start, NPG_FOR_FIT, nodes + 2, sizeof(int32_t)));
-    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->vertex, NPG_FOR_FIT, real * per_row, sizeof(int32_t)));
+    NPG_TRY_OR(failed, status,
+               npg_alloc_array(&samples->vertex, NPG_FOR_FIT, real * per_row, sizeof(int32_t)));
     NPG_TRY_OR(failed, status, npg_alloc_array(&samples->channels, NPG_FOR_FIT, nodes, sizeof(int32_t)));
-    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->weight_back, NPG_FOR_FIT, real * per_row, sizeof(float)));
+    NPG_TRY_OR(failed, status,
+               npg_alloc_array(&samples->weight_back, NPG_FOR_FIT, real * per_row, sizeof(float)));
     for (size_t row = 0; row < rows; row++) {
         size_t from = row < real ? row : real - 1;
         fill_row(samples, levels, row, positions + 3 * from, normals + 3 * from);

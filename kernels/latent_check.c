@@ -51,7 +51,8 @@ static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
 static void close_latent_data(latent_data *d)
 {
     npg_samples_close(&d->samples);
-    void *all[] = {&d->positions, &d->normals, &d->nodes, &d->dz, &d->nodes_wide, &d->dz_wide, &d->z, &d->dnodes};
+    void *all[] = {&d->positions,  &d->normals, &d->nodes, &d->dz,
+                   &d->nodes_wide, &d->dz_wide, &d->z,     &d->dnodes};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 

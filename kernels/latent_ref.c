@@ -10,7 +10,8 @@ void npg_latent_sample_ref(double *z, const double *nodes, const npg_samples *sa
         for (size_t c = 0; c < NPG_LATENT_CHANNELS; c++) {
             double sum = 0;
             for (size_t k = v * samples->per_row; k < (v + 1) * samples->per_row; k++)
-                sum += (double)samples->weight[k] * nodes[(size_t)samples->index[k] * NPG_LATENT_CHANNELS + c];
+                sum +=
+                    (double)samples->weight[k] * nodes[(size_t)samples->index[k] * NPG_LATENT_CHANNELS + c];
             z[v * NPG_LATENT_CHANNELS + c] = tanh(sum);
         }
 }

@@ -45,7 +45,8 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
 {
     const size_t f = sizeof(float);
     const npg_mlp_shape *s = &m->shape;
-    size_t wide = s->w1 > s->w2 ? s->w1 : s->w2, kept = m->batch ? m->batch * m->rows : m->groups * NPG_MLP_ROWS;
+    size_t wide = s->w1 > s->w2 ? s->w1 : s->w2,
+           kept = m->batch ? m->batch * m->rows : m->groups * NPG_MLP_ROWS;
     NPG_TRY(npg_buffer_open(&m->params, d, npg_mlp_param_count(s) * f));
     NPG_TRY(npg_buffer_open(&m->code, d, m->frames * s->code_size * f));
     NPG_TRY(npg_buffer_open(&m->z, d, m->rows * CHANNELS * f));
@@ -64,17 +65,18 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     return npg_buffer_open(&m->transposed, d, (s->w1 * s->w2 + s->w1 * CHANNELS + 7 * s->w2) * f);
 }
 
-npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows, size_t frames,
-                        size_t batch)
+npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
+                        size_t frames, size_t batch)
 {
     char constants[128];
     NPG_REQUIRE(rows && rows % NPG_MLP_ROWS == 0 && frames && shape->w1 % 32 == 0 && shape->w2 % 32 == 0);
     NPG_REQUIRE(shape->w1 >= 32 && shape->w2 >= 32);
-    *mlp = (npg_mlp){.shape = *shape, .rows = rows, .blocks = rows / NPG_MLP_ROWS, .frames = frames, .batch = batch};
+    *mlp = (npg_mlp){
+        .shape = *shape, .rows = rows, .blocks = rows / NPG_MLP_ROWS, .frames = frames, .batch = batch};
     mlp->groups = 2 * (size_t)npg_device_facts(device)->units;
     if (mlp->groups > mlp->blocks) mlp->groups = mlp->blocks;
-    snprintf(constants, sizeof constants, "-DROWS=%d -DMR=12 -DCZ=%zu -DW1=%zu -DW2=%zu -DSLOPE=%.9gf", NPG_MLP_ROWS,
-             CHANNELS, shape->w1, shape->w2, (double)shape->slope);
+    snprintf(constants, sizeof constants, "-DROWS=%d -DMR=12 -DCZ=%zu -DW1=%zu -DW2=%zu -DSLOPE=%.9gf",
+             NPG_MLP_ROWS, CHANNELS, shape->w1, shape->w2, (double)shape->slope);
     npg_status status = npg_program_open(&mlp->program, device, "mlp", constants);
     if (!status) status = npg_program_open(&mlp->time, device, "time", "");
     if (!status) status = open_buffers(mlp, device);
@@ -84,9 +86,9 @@ npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *s
 
 void npg_mlp_close(npg_mlp *mlp)
 {
-    npg_buffer *all[] = {&mlp->params, &mlp->grad, &mlp->code, &mlp->z,  &mlp->dz,   &mlp->out,        &mlp->dout,
-                         &mlp->p,      &mlp->dp,   &mlp->c,    &mlp->dc, &mlp->h2,   &mlp->sums,       &mlp->scratch,
-                         &mlp->transposed};
+    npg_buffer *all[] = {&mlp->params, &mlp->grad, &mlp->code, &mlp->z,       &mlp->dz,
+                         &mlp->out,    &mlp->dout, &mlp->p,    &mlp->dp,      &mlp->c,
+                         &mlp->dc,     &mlp->h2,   &mlp->sums, &mlp->scratch, &mlp->transposed};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
     npg_program_close(&mlp->program);
     npg_program_close(&mlp->time);
@@ -110,17 +112,17 @@ npg_status npg_mlp_begin(npg_mlp *m)
 
 npg_status npg_mlp_forward(npg_mlp *m, size_t first, size_t count)
 {
-    return NPG_LAUNCH_SINGLE(m->program, "mlp_forward", m->groups, NPG_BUF(&m->out), NPG_BUF(&m->h2), NPG_BUF(&m->p),
-                             NPG_BUF(&m->c), NPG_BUF(&m->params), NPG_BUF(&m->scratch), NPG_INT(m->blocks),
-                             NPG_INT(count), NPG_INT(first), NPG_INT(m->batch > 0));
+    return NPG_LAUNCH_SINGLE(m->program, "mlp_forward", m->groups, NPG_BUF(&m->out), NPG_BUF(&m->h2),
+                             NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->params), NPG_BUF(&m->scratch),
+                             NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first), NPG_INT(m->batch > 0));
 }
 
 npg_status npg_mlp_backward(npg_mlp *m, size_t first, size_t count)
 {
     return NPG_LAUNCH_SINGLE(m->program, "mlp_backward", m->groups, NPG_BUF(&m->dp), NPG_BUF(&m->sums),
-                             NPG_BUF(&m->dc), NPG_BUF(&m->dout), NPG_BUF(&m->h2), NPG_BUF(&m->p), NPG_BUF(&m->c),
-                             NPG_BUF(&m->transposed), NPG_BUF(&m->scratch), NPG_INT(m->blocks), NPG_INT(count),
-                             NPG_INT(first), NPG_INT(m->frames));
+                             NPG_BUF(&m->dc), NPG_BUF(&m->dout), NPG_BUF(&m->h2), NPG_BUF(&m->p),
+                             NPG_BUF(&m->c), NPG_BUF(&m->transposed), NPG_BUF(&m->scratch),
+                             NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first), NPG_INT(m->frames));
 }
 
 npg_status npg_mlp_end(npg_mlp *m)
@@ -130,14 +132,15 @@ npg_status npg_mlp_end(npg_mlp *m)
                               NPG_BUF(&m->dp), NPG_BUF(&m->z), NPG_BUF(&m->transposed), NPG_INT(m->blocks)));
     NPG_TRY(NPG_LAUNCH(m->program, "mlp_reduce", (at_w1t + 15) / 16, 1, NPG_BUF(&m->grad), NPG_BUF(&m->sums),
                        NPG_INT(m->groups)));
-    return NPG_LAUNCH(m->time, "time_back", m->shape.w1, 1, NPG_BUF(&m->grad), NPG_BUF(&m->dc), NPG_BUF(&m->code),
-                      NPG_INT(at_w1t), NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1), NPG_INT(m->frames),
-                      NPG_INT(m->groups));
+    return NPG_LAUNCH(m->time, "time_back", m->shape.w1, 1, NPG_BUF(&m->grad), NPG_BUF(&m->dc),
+                      NPG_BUF(&m->code), NPG_INT(at_w1t), NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1),
+                      NPG_INT(m->frames), NPG_INT(m->groups));
 }
 
 npg_status npg_mlp_code_back(npg_mlp *m, const npg_buffer *dcode)
 {
-    return NPG_LAUNCH(m->time, "time_code_back", m->shape.code_size, m->frames, NPG_BUF(dcode), NPG_BUF(&m->dc),
-                      NPG_BUF(&m->params), NPG_INT(npg_mlp_at_w1t(&m->shape)), NPG_INT(m->shape.code_size),
-                      NPG_INT(m->shape.w1), NPG_INT(m->frames), NPG_INT(m->groups));
+    return NPG_LAUNCH(m->time, "time_code_back", m->shape.code_size, m->frames, NPG_BUF(dcode),
+                      NPG_BUF(&m->dc), NPG_BUF(&m->params), NPG_INT(npg_mlp_at_w1t(&m->shape)),
+                      NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1), NPG_INT(m->frames),
+                      NPG_INT(m->groups));
 }

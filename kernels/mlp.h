@@ -1,5 +1,5 @@
-/* mlp: the decoder, forward and backward, for many vertices in many frames; kernels in mlp.cl and time.cl, twins in
- * mlp_ref.c.
+/* mlp: the decoder, forward and backward, for many vertices in many frames; kernels in mlp.cl and time.cl,
+ * twins in mlp_ref.c.
  *
  * Parameters, gradient and Adam's moments are one list of floats (npg_mlp_shape_*), in the order
  *     W2 (packed W1 x W2) | W3 (W2 x 16) | b2 (W2) | b3 (16) | W1z (packed 32 x W1) | W1t (M x W1) | b1 (W1)
@@ -43,10 +43,10 @@ typedef struct npg_mlp {
     npg_buffer sums, transposed, scratch;
 } npg_mlp;
 
-/* rows: a multiple of NPG_MLP_ROWS; frames: T; batch: frames whose second layer is kept between forward and backward
- * (0: forward only).  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
-npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows, size_t frames,
-                        size_t batch);
+/* rows: a multiple of NPG_MLP_ROWS; frames: T; batch: frames whose second layer is kept between forward and
+ * backward (0: forward only).  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
+npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
+                        size_t frames, size_t batch);
 void npg_mlp_close(npg_mlp *mlp);
 
 /* What depends on z, code and params alone: p, c and, for the backward pass, the transposes; sums to 0. */
@@ -64,8 +64,8 @@ npg_status npg_mlp_end(npg_mlp *mlp);
 /* dcode [frames][M], after npg_mlp_end: for a learned time code. */
 npg_status npg_mlp_code_back(npg_mlp *mlp, const npg_buffer *dcode);
 
-/* The plain twins, in double, for one vertex in one frame: out (7) of z (32) and code (M); and the gradients, added
- * to grad, dz, dcode. */
+/* The plain twins, in double, for one vertex in one frame: out (7) of z (32) and code (M); and the gradients,
+ * added to grad, dz, dcode. */
 void npg_mlp_forward_ref(double *out, const double *z, const double *code, const double *params,
                          const npg_mlp_shape *shape);
 void npg_mlp_backward_ref(double *grad, double *dz, double *dcode, const double *dout, const double *z,

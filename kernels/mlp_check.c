@@ -40,8 +40,8 @@ static npg_status open_mlp_data(mlp_data *d, int size, uint64_t seed)
 
 static void close_mlp_data(mlp_data *d)
 {
-    void *all[] = {&d->params,      &d->z,       &d->code, &d->dout, &d->params_wide, &d->z_wide, &d->code_wide,
-                   &d->dout_wide,   &d->out,     &d->grad, &d->dz,   &d->dcode};
+    void *all[] = {&d->params,    &d->z,         &d->code, &d->dout, &d->params_wide, &d->z_wide,
+                   &d->code_wide, &d->dout_wide, &d->out,  &d->grad, &d->dz,          &d->dcode};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 
@@ -115,7 +115,8 @@ npg_status npg_slope_mlp(uint64_t seed, double *error)
     *error = 0;
     npg_status status = open_mlp_data(&d, 2, seed);
     if (!status) {
-        npg_mlp_backward_ref(d.grad, d.dz, d.dcode, d.dout_wide, d.z_wide, d.code_wide, d.params_wide, &d.shape);
+        npg_mlp_backward_ref(d.grad, d.dz, d.dcode, d.dout_wide, d.z_wide, d.code_wide, d.params_wide,
+                             &d.shape);
         npg_check_slope(error, d.params_wide, d.grad, d.param_count, 13, 1e-6, mlp_value, &d);
         npg_check_slope(error, d.z_wide, d.dz, CHANNELS, 1, 1e-6, mlp_value, &d);
         npg_check_slope(error, d.code_wide, d.dcode, d.shape.code_size, 1, 1e-6, mlp_value, &d);
@@ -133,7 +134,8 @@ typedef struct adam_data {
     double *wide, *slope_wide, *first, *second;
 } adam_data;
 
-static npg_status run_adam(npg_device *device, adam_data *d, size_t n, size_t row, npg_random *random, double *error)
+static npg_status run_adam(npg_device *device, adam_data *d, size_t n, size_t row, npg_random *random,
+                           double *error)
 {
     NPG_TRY(npg_check_values(&d->start, &d->wide, n, 1, random));
     NPG_TRY(npg_check_values(&d->rates, NULL, (n + row - 1) / row, 0.1, random));

@@ -2,7 +2,7 @@
 #include "levels.h"
 #include "mlp.h"
 
-#define CHANNELS NPG_LATENT_CHANNELS
+#define CHANNELS  NPG_LATENT_CHANNELS
 #define WIDTH_MAX 4096
 
 static double leaky(double x, double slope)
@@ -14,7 +14,8 @@ static double leaky(double x, double slope)
 static void hidden(double *h1, double *h2, const double *z, const double *code, const double *params,
                    const npg_mlp_shape *s)
 {
-    const double *w1z = params + npg_mlp_at_w1z(s), *w1t = params + npg_mlp_at_w1t(s), *b1 = params + npg_mlp_at_b1(s);
+    const double *w1z = params + npg_mlp_at_w1z(s), *w1t = params + npg_mlp_at_w1t(s),
+                 *b1 = params + npg_mlp_at_b1(s);
     const double *b2 = params + npg_mlp_at_b2(s);
     for (size_t n = 0; n < s->w1; n++) {
         double sum = b1[n];
@@ -71,8 +72,8 @@ static void second_back(double *d1, double *grad, const double *d2, const double
     }
 }
 
-static void first_back(double *grad, double *dz, double *dcode, const double *d1, const double *z, const double *code,
-                       const double *params, const npg_mlp_shape *s)
+static void first_back(double *grad, double *dz, double *dcode, const double *d1, const double *z,
+                       const double *code, const double *params, const npg_mlp_shape *s)
 {
     size_t at_z = npg_mlp_at_w1z(s), at_t = npg_mlp_at_w1t(s);
     for (size_t n = 0; n < s->w1; n++) {

@@ -19,7 +19,8 @@ void npg_pack16(float *out, const float *points, size_t count, size_t padded)
 void npg_unpack16(float *points, const float *packed, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        for (size_t axis = 0; axis < 3; axis++) points[3 * i + axis] = packed[i / 16 * 48 + axis * 16 + i % 16];
+        for (size_t axis = 0; axis < 3; axis++)
+            points[3 * i + axis] = packed[i / 16 * 48 + axis * 16 + i % 16];
 }
 
 size_t npg_tree_blocks(size_t count)
@@ -122,8 +123,8 @@ static void fill_edges(int32_t *start, int32_t *neighbour, float *rest, const fl
     start[0] = 0;
 }
 
-static npg_status upload_edges(npg_motion *m, npg_device *device, const float *vertices, const uint32_t (*edges)[2],
-                               size_t edge_count)
+static npg_status upload_edges(npg_motion *m, npg_device *device, const float *vertices,
+                               const uint32_t (*edges)[2], size_t edge_count)
 {
     int32_t *start = NULL, *neighbour = NULL;
     float *rest = NULL;
@@ -152,10 +153,15 @@ static void fill_slots(int32_t *forward, int32_t *reverse, const npg_motion *m, 
                        const totals *before)
 {
     const size_t vert_boxes = npg_tree_blocks(m->real);
-    const int32_t f[NPG_SLOT] = {(int32_t)m->real,          (int32_t)(t * m->rows / 16), (int32_t)count,
-                                 (int32_t)before->leaves,   (int32_t)before->boxes,      (int32_t)(t * m->rows)};
-    const int32_t r[NPG_SLOT] = {(int32_t)count,            (int32_t)before->leaves,     (int32_t)m->real,
-                                 (int32_t)(t * m->rows / 16), (int32_t)(t * vert_boxes), (int32_t)before->points};
+    const int32_t f[NPG_SLOT] = {(int32_t)m->real,       (int32_t)(t * m->rows / 16),
+                                 (int32_t)count,         (int32_t)before->leaves,
+                                 (int32_t)before->boxes, (int32_t)(t * m->rows)};
+    const int32_t r[NPG_SLOT] = {(int32_t)count,
+                                 (int32_t)before->leaves,
+                                 (int32_t)m->real,
+                                 (int32_t)(t * m->rows / 16),
+                                 (int32_t)(t * vert_boxes),
+                                 (int32_t)before->points};
     memcpy(forward + t * NPG_SLOT, f, sizeof f);
     memcpy(reverse + t * NPG_SLOT, r, sizeof r);
 }
@@ -236,9 +242,10 @@ npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotat
 
 void npg_motion_close(npg_motion *m)
 {
-    npg_buffer *all[] = {&m->rest,     &m->x,       &m->g,       &m->vert_boxes, &m->points, &m->point_boxes,
-                         &m->to_points, &m->to_verts, &m->forward, &m->reverse,    &m->start,  &m->neighbour,
-                         &m->edge_rest, &m->cd,       &m->part,    &m->gain};
+    npg_buffer *all[] = {&m->rest,      &m->x,           &m->g,         &m->vert_boxes,
+                         &m->points,    &m->point_boxes, &m->to_points, &m->to_verts,
+                         &m->forward,   &m->reverse,     &m->start,     &m->neighbour,
+                         &m->edge_rest, &m->cd,          &m->part,      &m->gain};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
     npg_program_close(&m->transform);
     npg_program_close(&m->nearest);
@@ -264,9 +271,10 @@ npg_status npg_motion_chamfer(npg_motion *m, double alpha, size_t first, size_t 
                        NPG_BUF(&m->points), NPG_BUF(&m->x), NPG_BUF(&m->vert_boxes), NPG_BUF(&m->reverse),
                        NPG_INT(first), NPG_INT(count)));
     return NPG_LAUNCH(m->chamfer, "chamfer_frame", count, 1, NPG_BUF(&m->cd), NPG_BUF(&m->g), NPG_BUF(&m->x),
-                      NPG_BUF(&m->points), NPG_BUF(&m->to_points), NPG_BUF(&m->to_verts), NPG_BUF(&m->forward),
-                      NPG_BUF(&m->reverse), NPG_REAL(alpha > 0 ? 1 / (2 * alpha * alpha) : 0), NPG_INT(m->rows),
-                      NPG_INT(first), NPG_INT(count));
+                      NPG_BUF(&m->points), NPG_BUF(&m->to_points), NPG_BUF(&m->to_verts),
+                      NPG_BUF(&m->forward), NPG_BUF(&m->reverse),
+                      NPG_REAL(alpha > 0 ? 1 / (2 * alpha * alpha) : 0), NPG_INT(m->rows), NPG_INT(first),
+                      NPG_INT(count));
 }
 
 npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buffer *out, const float *gains,
@@ -275,7 +283,9 @@ npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buff
     NPG_TRY(npg_buffer_write(&m->gain, first * sizeof *gains, gains, count * sizeof *gains));
     NPG_TRY(NPG_LAUNCH(m->isometry, "isometry_back", m->rows / 16, count, NPG_BUF(&m->g), NPG_BUF(&m->part),
                        NPG_BUF(&m->x), NPG_BUF(&m->start), NPG_BUF(&m->neighbour), NPG_BUF(&m->edge_rest),
-                       NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count)));
-    return NPG_LAUNCH(m->transform, "transform_back", m->rows, count, NPG_BUF(dout), NPG_BUF(&m->g), NPG_BUF(out),
-                      NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count), NPG_INT(m->real));
+                       NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows), NPG_INT(first),
+                       NPG_INT(count)));
+    return NPG_LAUNCH(m->transform, "transform_back", m->rows, count, NPG_BUF(dout), NPG_BUF(&m->g),
+                      NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count),
+                      NPG_INT(m->real));
 }

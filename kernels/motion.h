@@ -1,5 +1,6 @@
-/* motion: what happens to vertices once the decoder has spoken: transform, nearest, chamfer, isometry; one .cl and one
- * _ref.c for each.  Positions on the device are in blocks of 16: [rows / 16][3][16] per frame, see npg_pack16. */
+/* motion: what happens to vertices once the decoder has spoken: transform, nearest, chamfer, isometry; one
+ * .cl and one _ref.c for each.  Positions on the device are in blocks of 16: [rows / 16][3][16] per frame,
+ * see npg_pack16. */
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H
 
@@ -7,13 +8,19 @@
 
 #define NPG_SLOT 8 /* ints that describe one search of one frame, see nearest.cl */
 
-typedef enum npg_rotation { NPG_ROTATION_QUATERNION, NPG_ROTATION_CAYLEY, NPG_ROTATION_EXPONENTIAL } npg_rotation;
+typedef enum npg_rotation {
+    NPG_ROTATION_QUATERNION,
+    NPG_ROTATION_CAYLEY,
+    NPG_ROTATION_EXPONENTIAL
+} npg_rotation;
 
-/* count x 3 -> [blocks of 16][3][16], padded to `padded` points (a multiple of 16) by repeating the last; and back. */
+/* count x 3 -> [blocks of 16][3][16], padded to `padded` points (a multiple of 16) by repeating the last; and
+ * back. */
 void npg_pack16(float *out, const float *points, size_t count, size_t padded);
 void npg_unpack16(float *points, const float *packed, size_t count);
 
-/* Order of points along a Morton curve of their own box: order[i] is the index of the i-th.  Points are finite. */
+/* Order of points along a Morton curve of their own box: order[i] is the index of the i-th.  Points are
+ * finite. */
 npg_status npg_morton_order(uint32_t *order, const float *points, size_t count);
 
 /* Box blocks (of 96 floats) of the tree over `count` points. */
@@ -21,13 +28,13 @@ size_t npg_tree_blocks(size_t count);
 
 typedef struct npg_motion {
     npg_program *transform, *nearest, *chamfer, *isometry;
-    size_t rows, real, frames; /* V padded, V, T */
-    npg_buffer rest;           /* positions of the reference                               */
-    npg_buffer x, g;           /* [frames] positions and dL/dx                             */
-    npg_buffer vert_boxes;     /* [frames][tree blocks of V][96]                           */
-    npg_buffer points, point_boxes; /* all targets, and their trees                        */
-    npg_buffer to_points, to_verts; /* nearest indices, kept as candidates from step to step */
-    npg_buffer forward, reverse;    /* slots: vertex -> point, point -> vertex              */
+    size_t rows, real, frames;              /* V padded, V, T */
+    npg_buffer rest;                        /* positions of the reference                               */
+    npg_buffer x, g;                        /* [frames] positions and dL/dx                             */
+    npg_buffer vert_boxes;                  /* [frames][tree blocks of V][96]                           */
+    npg_buffer points, point_boxes;         /* all targets, and their trees                        */
+    npg_buffer to_points, to_verts;         /* nearest indices, kept as candidates from step to step */
+    npg_buffer forward, reverse;            /* slots: vertex -> point, point -> vertex              */
     npg_buffer start, neighbour, edge_rest; /* half-edges by vertex                         */
     npg_buffer cd, part, gain;
     size_t most_points, half_edges;
@@ -40,9 +47,9 @@ typedef struct npg_target {
 } npg_target;
 
 /* vertices: real x 3 in Morton order; edges between them (E pairs).  rows: real padded, a multiple of 16. */
-npg_status npg_motion_open(npg_motion *motion, npg_device *device, npg_rotation rotation, const float *vertices,
-                           size_t real, size_t rows, const uint32_t (*edges)[2], size_t edge_count,
-                           const npg_target *targets, size_t frames);
+npg_status npg_motion_open(npg_motion *motion, npg_device *device, npg_rotation rotation,
+                           const float *vertices, size_t real, size_t rows, const uint32_t (*edges)[2],
+                           size_t edge_count, const npg_target *targets, size_t frames);
 void npg_motion_close(npg_motion *motion);
 
 /* x of frames first .. first + count - 1 from the decoder's out [frames][rows][8]. */
@@ -53,8 +60,8 @@ npg_status npg_motion_chamfer(npg_motion *motion, double alpha, size_t first, si
 
 /* g = gain[frame] g + iso_gain d(isometry)/dx; then dout from g.  gains: one per frame from `first` on.
  * part [frames][rows / 16] gets the sums of edge changes over half-edges. */
-npg_status npg_motion_back(npg_motion *motion, const npg_buffer *dout, const npg_buffer *out, const float *gains,
-                           double iso_gain, size_t first, size_t count);
+npg_status npg_motion_back(npg_motion *motion, const npg_buffer *dout, const npg_buffer *out,
+                           const float *gains, double iso_gain, size_t first, size_t count);
 
 /* Plain twins, in double; one vertex each where no more is said. */
 void npg_transform_ref(double x[3], const double out[7], const double rest[3], npg_rotation rotation);
@@ -66,6 +73,7 @@ size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *poi
 double npg_chamfer_pairs_ref(double *g, const double *x, size_t real, const double *points, size_t count,
                              const size_t *to_points, const size_t *to_verts, double alpha);
 /* Sum over edges of | |x_i - x_j| - rest |, gradient added to g. */
-double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest, size_t edge_count);
+double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest,
+                        size_t edge_count);
 
 #endif

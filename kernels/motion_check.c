@@ -66,7 +66,8 @@ static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
         d->edges[e][0] = (uint32_t)(e / 2);
         d->edges[e][1] = (uint32_t)(e / 2 + 1 + e % 2);
         const double *a = d->rest_wide + 3 * d->edges[e][0], *b = d->rest_wide + 3 * d->edges[e][1];
-        d->edge_rest[e] = (double)(float)sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
+        d->edge_rest[e] =
+            (double)(float)sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
     }
     NPG_TRY(npg_alloc_array(&d->x, NPG_FOR_RUN, FRAMES * d->real * 3, sizeof(double)));
     NPG_TRY(npg_alloc_array(&d->g, NPG_FOR_RUN, FRAMES * d->real * 3, sizeof(double)));
@@ -75,8 +76,8 @@ static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
 
 static void close_motion_data(motion_data *d)
 {
-    void *all[] = {&d->rest, &d->out,   &d->rest_wide, &d->out_wide, &d->edge_rest, &d->x,
-                   &d->g,    &d->dout,  &d->edges,     &d->order,    &d->to_points, &d->to_verts};
+    void *all[] = {&d->rest, &d->out,  &d->rest_wide, &d->out_wide, &d->edge_rest, &d->x,
+                   &d->g,    &d->dout, &d->edges,     &d->order,    &d->to_points, &d->to_verts};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     for (size_t t = 0; t < FRAMES; t++) {
         npg_release(&d->points[t]);
@@ -89,8 +90,8 @@ static npg_status open_motion(npg_motion *motion, npg_buffer *out, npg_device *d
 {
     npg_target targets[FRAMES];
     for (size_t t = 0; t < FRAMES; t++) targets[t] = (npg_target){d->points[t], d->count[t]};
-    NPG_TRY(npg_motion_open(motion, device, rotation, d->rest, d->real, d->rows, (const uint32_t(*)[2])d->edges,
-                            d->edge_count, targets, FRAMES));
+    NPG_TRY(npg_motion_open(motion, device, rotation, d->rest, d->real, d->rows,
+                            (const uint32_t(*)[2])d->edges, d->edge_count, targets, FRAMES));
     NPG_TRY(npg_buffer_from(out, device, d->out, FRAMES * d->rows * NPG_MLP_OUT * sizeof(float)));
     return npg_motion_apply(motion, out, 0, FRAMES);
 }
@@ -110,7 +111,8 @@ static npg_status read_frames(float *points, const npg_buffer *buffer, const mot
     return status;
 }
 
-static npg_status compare_frames(double *error, const npg_buffer *buffer, const double *want, const motion_data *d)
+static npg_status compare_frames(double *error, const npg_buffer *buffer, const double *want,
+                                 const motion_data *d)
 {
     float *got;
     NPG_TRY(npg_alloc_array(&got, NPG_FOR_RUN, FRAMES * d->real, 3 * sizeof(float)));
@@ -141,7 +143,8 @@ static void transform_back_twins(motion_data *d, npg_rotation rotation)
         }
 }
 
-/* The gradient that is passed back here is the positions themselves, brought in as the data term with gain 1. */
+/* The gradient that is passed back here is the positions themselves, brought in as the data term with gain 1.
+ */
 static npg_status compare_transform(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
                                     npg_buffer *dout, npg_rotation rotation, double *error)
 {
@@ -162,7 +165,8 @@ static npg_status compare_transform(npg_device *device, motion_data *d, npg_moti
     return npg_check_buffer(error, dout, d->dout, FRAMES * d->rows * NPG_MLP_OUT);
 }
 
-static npg_status check_transform(npg_device *device, int size, uint64_t seed, npg_rotation rotation, double *error)
+static npg_status check_transform(npg_device *device, int size, uint64_t seed, npg_rotation rotation,
+                                  double *error)
 {
     motion_data d = {0};
     npg_motion motion = {0};
@@ -285,7 +289,8 @@ static npg_status take_positions(npg_motion *motion, motion_data *d)
     return status;
 }
 
-static npg_status run_chamfer(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out, double alpha)
+static npg_status run_chamfer(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
+                              double alpha)
 {
     NPG_TRY(open_motion(motion, out, device, d, NPG_ROTATION_QUATERNION));
     NPG_TRY(take_positions(motion, d));
@@ -309,16 +314,18 @@ static npg_status compare_chamfer(npg_device *device, motion_data *d, npg_motion
     double want[FRAMES];
     for (size_t t = 0; t < FRAMES; t++) {
         pair_up(d, d->x + t * d->real * 3, t);
-        want[t] = npg_chamfer_pairs_ref(d->g + t * d->real * 3, d->x + t * d->real * 3, d->real, d->points_wide[t],
-                                        d->count[t], d->to_points, d->to_verts, 0.3);
+        want[t] = npg_chamfer_pairs_ref(d->g + t * d->real * 3, d->x + t * d->real * 3, d->real,
+                                        d->points_wide[t], d->count[t], d->to_points, d->to_verts, 0.3);
     }
     NPG_TRY(npg_check_buffer(error, &motion->cd, want, FRAMES));
     return compare_frames(error, &motion->g, d->g, d);
 }
 
-typedef npg_status compare_with(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out, double *error);
+typedef npg_status compare_with(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
+                                double *error);
 
-static npg_status check_motion(npg_device *device, int size, uint64_t seed, compare_with *compare, double *error)
+static npg_status check_motion(npg_device *device, int size, uint64_t seed, compare_with *compare,
+                               double *error)
 {
     motion_data d = {0};
     npg_motion motion = {0};
@@ -341,11 +348,13 @@ npg_status npg_check_chamfer(npg_device *device, int size, uint64_t seed, double
     return check_motion(device, size, seed, compare_chamfer, error);
 }
 
-/* Without the robust weight the value and the gradient belong together (the weight is held constant in the latter). */
+/* Without the robust weight the value and the gradient belong together (the weight is held constant in the
+ * latter). */
 static double chamfer_value(void *user)
 {
     motion_data *d = user;
-    return npg_chamfer_pairs_ref(d->g, d->x, d->real, d->points_wide[2], d->count[2], d->to_points, d->to_verts, 0);
+    return npg_chamfer_pairs_ref(d->g, d->x, d->real, d->points_wide[2], d->count[2], d->to_points,
+                                 d->to_verts, 0);
 }
 
 npg_status npg_slope_chamfer(uint64_t seed, double *error)

@@ -52,7 +52,8 @@ static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, co
         fill_transform(matrices + t->level[l][3], eigen + t->eigen_first[l], t->level[l][0]);
     if (!status)
         status = npg_buffer_from(&sobolev->matrices, device, matrices, (t->matrix_size + 1) * sizeof(float));
-    if (!status) status = npg_buffer_from(&sobolev->eigen, device, eigen, (t->eigen_size + 1) * sizeof(float));
+    if (!status)
+        status = npg_buffer_from(&sobolev->eigen, device, eigen, (t->eigen_size + 1) * sizeof(float));
     npg_release(&matrices);
     npg_release(&eigen);
     return status;
@@ -67,7 +68,8 @@ npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_
     *sobolev = (npg_sobolev){.level_count = levels->count, .line_count = t.lines};
     NPG_TRY_OR(failed, status, npg_program_open(&sobolev->program, device, "sobolev", ""));
     NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first));
+    NPG_TRY_OR(failed, status,
+               npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first));
     NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda));
     NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal));
     NPG_TRY_OR(failed, status, upload_transforms(sobolev, device, &t));
@@ -92,12 +94,14 @@ void npg_sobolev_close(npg_sobolev *sobolev)
     npg_buffer_close(&sobolev->b);
 }
 
-static npg_status pass(npg_sobolev *s, const npg_buffer *out, const npg_buffer *in, int axis, int back, int scale)
+static npg_status pass(npg_sobolev *s, const npg_buffer *out, const npg_buffer *in, int axis, int back,
+                       int scale)
 {
-    return NPG_LAUNCH(s->program, "sobolev_pass", s->line_count, 1, NPG_BUF(out), NPG_BUF(in), NPG_BUF(&s->levels),
-                      NPG_BUF(&s->matrices), NPG_BUF(&s->eigen), NPG_BUF(&s->eigen_first), NPG_BUF(&s->lambda),
-                      NPG_BUF(&s->diagonal), NPG_INT(s->level_count), NPG_INT(s->line_count), NPG_INT(axis),
-                      NPG_INT(back), NPG_INT(scale));
+    return NPG_LAUNCH(s->program, "sobolev_pass", s->line_count, 1, NPG_BUF(out), NPG_BUF(in),
+                      NPG_BUF(&s->levels), NPG_BUF(&s->matrices), NPG_BUF(&s->eigen),
+                      NPG_BUF(&s->eigen_first), NPG_BUF(&s->lambda), NPG_BUF(&s->diagonal),
+                      NPG_INT(s->level_count), NPG_INT(s->line_count), NPG_INT(axis), NPG_INT(back),
+                      NPG_INT(scale));
 }
 
 npg_status npg_sobolev_solve(npg_sobolev *s, const npg_buffer *x, const npg_buffer *y)

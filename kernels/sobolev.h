@@ -1,4 +1,5 @@
-/* sobolev: the exact solve (I + lambda L) x = y on every grid level; kernels in sobolev.cl, twin in sobolev_ref.c. */
+/* sobolev: the exact solve (I + lambda L) x = y on every grid level; kernels in sobolev.cl, twin in
+ * sobolev_ref.c. */
 #ifndef NPG_SOBOLEV_H
 #define NPG_SOBOLEV_H
 
@@ -16,8 +17,8 @@ typedef struct npg_sobolev {
 npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels);
 void npg_sobolev_close(npg_sobolev *sobolev);
 
-/* x = (a I + lambda L)^-1 y, [nodes][32]; x may be y.  Levels with lambda = 0 and hashed levels are copied.  The
- * matrix is symmetric: the same call passes gradients back. */
+/* x = (a I + lambda L)^-1 y, [nodes][32]; x may be y.  Levels with lambda = 0 and hashed levels are copied.
+ * The matrix is symmetric: the same call passes gradients back. */
 npg_status npg_sobolev_solve(npg_sobolev *sobolev, const npg_buffer *x, const npg_buffer *y);
 
 /* y = (a I + lambda L) x, the matrix itself, in double: what the solve must invert. */

@@ -10,7 +10,8 @@ static double apply_at(const double *x, const npg_level *level, int i, int j, in
     double mine = x[row * NPG_LATENT_CHANNELS + channel];
     double sum = (1 + (level->screened ? 6 * level->lambda : 0)) * mine;
     for (int axis = 0; axis < 3; axis++) {
-        if (at[axis] > 0) sum += level->lambda * (mine - x[(row - step[axis]) * NPG_LATENT_CHANNELS + channel]);
+        if (at[axis] > 0)
+            sum += level->lambda * (mine - x[(row - step[axis]) * NPG_LATENT_CHANNELS + channel]);
         if (at[axis] < n - 1)
             sum += level->lambda * (mine - x[(row + step[axis]) * NPG_LATENT_CHANNELS + channel]);
     }

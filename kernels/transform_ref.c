@@ -66,7 +66,8 @@ void npg_transform_back_ref(double dout[7], const double g[3], const double out[
         for (int i = 1; i < 4; i++) along += dq[i] * out[i];
         for (int i = 1; i < 4; i++) dout[i] = sinc * dq[i] + out[i] * (slope * along - sinc / 2 * dq[0]);
     } else {
-        double s = rotation == NPG_ROTATION_QUATERNION ? 1 + out[0] : 1, norm = fmax(sqrt(s * s + t * t), 1e-8);
+        double s = rotation == NPG_ROTATION_QUATERNION ? 1 + out[0] : 1,
+               norm = fmax(sqrt(s * s + t * t), 1e-8);
         for (int i = 0; i < 4; i++) along += dq[i] * q[i];
         for (int i = rotation == NPG_ROTATION_CAYLEY; i < 4; i++) dout[i] = (dq[i] - q[i] * along) / norm;
     }

@@ -138,7 +138,7 @@ typedef struct npg_log_record {
     npg_log_level level;
     double time_s;       /* seconds since the run was opened   */
     const char *stage;   /* the stage that speaks              */
-    int64_t frame;       /* the frame it speaks of, -1 if none */
+    int64_t frame;       /* number of the frame it speaks of, -1 if none */
     const char *message; /* one line, no newline at its end    */
 } npg_log_record;
 

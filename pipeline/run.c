@@ -250,6 +250,8 @@ static npg_status check_chain(const npg_run *run)
     uint32_t have = 0;
     for (size_t i = 0; i < run->worker_count; i++) {
         const npg_stage *stage = run->workers[i].stage;
+        if (stage->passes && !stage->process)
+            return npg_error(NPG_USAGE, "stage %s takes part in passes but processes nothing", stage->name);
         if (stage->needs & ~have)
             return npg_error(NPG_USAGE, "stage %s needs fields 0x%x that no stage before it gives",
                              stage->name, stage->needs & ~have);

@@ -94,7 +94,7 @@ npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk);
 /* True once the run should stop: long loops ask at least once a second and then return NPG_STOPPED. */
 bool npg_worker_stopping(const npg_worker *worker);
 
-/* A line of the log; frame -1 if it concerns none. */
+/* A line of the log; frame is the number of the frame it is about, -1 if none. */
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
     NPG_PRINTF(4, 5);
 

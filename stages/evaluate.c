@@ -134,14 +134,16 @@ static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, 
     npg_kdtree_close(&tree);
     NPG_TRY(status);
     double area = npg_vertex_areas(state->vert_areas, vert_unit, v, reference->faces, reference->face_count);
-    double radius = cover_radius(state, area, point_count, per_unit), covered = 0, sum = 0, sum_sq = 0;
+    double radius = cover_radius(state, area, point_count, per_unit), covered = 0, whole = 0, sum = 0,
+           sum_sq = 0;
     for (size_t i = 0; i < v; i++) {
         double dist_sq = (double)state->dists[i];
         sum_sq += dist_sq;
         sum += sqrt(dist_sq);
+        whole += state->vert_areas[i];
         if (dist_sq <= radius * radius) covered += state->vert_areas[i];
     }
-    figures->coverage = area > 0 ? covered / area : 0;
+    figures->coverage = whole > 0 ? covered / whole : 0;
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
     return NPG_OK;
@@ -251,9 +253,8 @@ static npg_status judge(npg_worker *worker, npg_frame *frame)
         npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
     state->bad[state->bad_count++] = frame->number;
     if (state->bad_count <= WARNINGS_MAX)
-        npg_worker_warn(worker, true, frame->index,
-                        "frame %" PRId64 " is below the bar: %s is %.3g, the bar %.3g", frame->number, fault,
-                        value, bound);
+        npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g", fault, value,
+                        bound);
     return NPG_OK;
 }
 

@@ -1,4 +1,5 @@
-/* Fit: grids, decoder and motion put together; one epoch is a walk over all frames, in batches from the key outward.
+/* Fit: grids, decoder and motion put together; one epoch is a walk over all frames, in batches from the key
+ * outward.
  */
 #include "fit.h"
 
@@ -13,20 +14,20 @@
 #include "random.h"
 #include "sobolev.h"
 
-#define HASH_LEVELS     15
-#define HASH_ROWS       16384
-#define HASH_FIRST      16
-#define HASH_GROWTH     1.35
-#define POSITION_FIRST  0  /* channels of the position grids */
-#define POSITION_END    30
-#define NORMAL_END      32 /* channels of the normal grid: 30, 31 */
+#define HASH_LEVELS    15
+#define HASH_ROWS      16384
+#define HASH_FIRST     16
+#define HASH_GROWTH    1.35
+#define POSITION_FIRST 0 /* channels of the position grids */
+#define POSITION_END   30
+#define NORMAL_END     32 /* channels of the normal grid: 30, 31 */
 
 struct npg_fit {
     npg_fit_settings settings;
-    npg_device *device; /* loan */
-    size_t real, rows;  /* V, V padded to blocks */
-    uint32_t *order;    /* order[i]: vertex of the reference at row i; Morton order; owned */
-    float *rest;        /* V x 3 in that order, owned */
+    npg_device *device;   /* loan */
+    size_t real, rows;    /* V, V padded to blocks */
+    uint32_t *order;      /* order[i]: vertex of the reference at row i; Morton order; owned */
+    float *rest;          /* V x 3 in that order, owned */
     uint32_t (*edges)[2]; /* between rows, owned */
     size_t edge_count;
     npg_levels levels;
@@ -42,12 +43,12 @@ struct npg_fit {
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
-    size_t *place;    /* place[k]: which frame of the caller comes k-th outward; owned */
-    size_t *rank;     /* its inverse */
-    int64_t *index;   /* by k */
-    double *times;    /* by k */
+    size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
+    size_t *rank;                       /* its inverse */
+    int64_t *index;                     /* by k */
+    double *times;                      /* by k */
     float *cd, *gains, *codes, *packed; /* by k; packed: one frame's positions */
-    bool *has_points; /* by k */
+    bool *has_points;                   /* by k */
 };
 
 /* ---- opening: what does not depend on the window ---- */
@@ -114,7 +115,8 @@ static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **norm
     NPG_TRY(npg_mesh_edges(&fit->edges, &fit->edge_count, mesh->faces, mesh->face_count));
     NPG_TRY(npg_alloc_array(&row_of, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
     for (size_t i = 0; i < fit->real; i++) row_of[fit->order[i]] = (uint32_t)i;
-    for (size_t e = 0; e < 2 * fit->edge_count; e++) fit->edges[e / 2][e % 2] = row_of[fit->edges[e / 2][e % 2]];
+    for (size_t e = 0; e < 2 * fit->edge_count; e++)
+        fit->edges[e / 2][e % 2] = row_of[fit->edges[e / 2][e % 2]];
     npg_release(&row_of);
     return NPG_OK;
 }
@@ -127,8 +129,8 @@ static npg_status open_grid_adam(npg_fit *fit)
     for (int l = 0; l < fit->levels.count; l++)
         for (size_t i = 0; i < fit->levels.level[l].row_count; i++)
             rates[fit->levels.level[l].first_row + i] = (float)fit->levels.level[l].rate;
-    npg_status status = npg_adam_open(&fit->grid_adam, fit->device, rates, NPG_LATENT_CHANNELS,
-                                      rows * NPG_LATENT_CHANNELS);
+    npg_status status =
+        npg_adam_open(&fit->grid_adam, fit->device, rates, NPG_LATENT_CHANNELS, rows * NPG_LATENT_CHANNELS);
     npg_release(&rates);
     return status;
 }
@@ -150,10 +152,12 @@ static npg_status open_grids(npg_fit *fit, const float *normals)
 
 static npg_mlp_shape shape_of(const npg_fit_settings *s)
 {
-    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies, (float)s->slope};
+    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies,
+                           (float)s->slope};
 }
 
-/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all begins as the identity. */
+/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all begins as the identity.
+ */
 static npg_status draw_params(npg_fit *fit)
 {
     npg_mlp_shape s = shape_of(&fit->settings);
@@ -171,8 +175,8 @@ static npg_status draw_params(npg_fit *fit)
     return npg_adam_open(&fit->mlp_adam, fit->device, &rate, count, count);
 }
 
-npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_settings *settings, const npg_mesh *reference,
-                        uint64_t seed)
+npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_settings *settings,
+                        const npg_mesh *reference, uint64_t seed)
 {
     npg_fit *fit;
     float *normals = NULL;
@@ -296,8 +300,8 @@ static npg_status open_motion(npg_fit *fit, const npg_fit_frame *frames, size_t 
     for (size_t k = 0; k < count && !status; k++) status = copy_target(&targets[k], &frames[fit->place[k]]);
     if (!status)
         status = npg_motion_open(&fit->motion, fit->device, (npg_rotation)fit->settings.rotation, fit->rest,
-                                 fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count, targets,
-                                 count);
+                                 fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count,
+                                 targets, count);
     for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
     npg_release(&targets);
     return status;
@@ -350,7 +354,8 @@ static npg_status do_batch(npg_fit *fit, npg_weights *weights, size_t first, siz
     NPG_TRY(check_losses(fit, first, count, epoch));
     for (size_t k = first; k < first + count; k++)
         fit->gains[k] = (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
-    NPG_TRY(npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first, count));
+    NPG_TRY(
+        npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first, count));
     return npg_mlp_backward(&fit->mlp, first, count);
 }
 
@@ -360,7 +365,8 @@ static npg_status step_time_code(npg_fit *fit)
     size_t bytes = fit->frame_count * fit->mlp.shape.code_size * sizeof(float);
     NPG_TRY(npg_mlp_code_back(&fit->mlp, &fit->dcode));
     NPG_TRY(npg_buffer_read(&fit->dcode, 0, fit->codes, bytes));
-    return npg_time_code_step(fit->time_code, fit->codes, fit->times, fit->frame_count, fit->settings.mlp_rate);
+    return npg_time_code_step(fit->time_code, fit->codes, fit->times, fit->frame_count,
+                              fit->settings.mlp_rate);
 }
 
 static npg_status end_epoch(npg_fit *fit)
@@ -421,8 +427,8 @@ static npg_status decode(npg_fit *fit)
     return npg_device_finish(fit->device);
 }
 
-npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key, npg_fit_watch *watch,
-                          void *user)
+npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
+                          npg_fit_watch *watch, void *user)
 {
     NPG_REQUIRE(fit && frames && count);
     NPG_TRY(open_window(fit, frames, count, key));
@@ -465,7 +471,8 @@ size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frame
     size_t batch = (size_t)s->batch < frames ? (size_t)s->batch : frames;
     size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
     size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
-    size_t per_group = npg_mlp_param_count(&shape) + 2 * NPG_MLP_ROWS * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
+    size_t per_group =
+        npg_mlp_param_count(&shape) + 2 * NPG_MLP_ROWS * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
     size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 7, decoder = npg_mlp_param_count(&shape) * 6;
     return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
 }

@@ -1,7 +1,8 @@
-/* Fit: the joint optimisation of one window (paper, sections on latent grids to objectives), on the OpenCL device.
+/* Fit: the joint optimisation of one window (paper, sections on latent grids to objectives), on the OpenCL
+ * device.
  *
- * A fit keeps grids, decoder and optimiser from window to window; a window brings its frames.  Everything is in unit
- * coordinates.  Not for several threads at a time. */
+ * A fit keeps grids, decoder and optimiser from window to window; a window brings its frames.  Everything is
+ * in unit coordinates.  Not for several threads at a time. */
 #ifndef NPG_FIT_H
 #define NPG_FIT_H
 
@@ -39,6 +40,9 @@ typedef struct npg_fit_settings {
     int64_t batch; /* frames whose hidden layer is kept at a time */
 } npg_fit_settings;
 
+/* The values that the options have now (table of the optimize stage). */
+void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *options);
+
 /* One frame of a window. */
 typedef struct npg_fit_frame {
     int64_t index;       /* place in time; |index - key| orders the confidence               */
@@ -59,14 +63,14 @@ typedef struct npg_fit_step {
 typedef npg_status npg_fit_watch(void *user, const npg_fit_step *step);
 
 /* The device is a loan.  reference: unit coordinates with normals; a loan. */
-npg_status npg_fit_open(npg_fit **fit, npg_device *device, const npg_fit_settings *settings, const npg_mesh *reference,
-                        uint64_t seed);
+npg_status npg_fit_open(npg_fit **fit, npg_device *device, const npg_fit_settings *settings,
+                        const npg_mesh *reference, uint64_t seed);
 void npg_fit_close(npg_fit **fit);
 
-/* Fit the frames jointly.  key: index of the frame where the confidence is 1 (the window's frame nearest to it
- * counts as the key when it is not among them).  NPG_DIVERGED names epoch and frame. */
-npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key, npg_fit_watch *watch,
-                          void *user);
+/* Fit the frames jointly.  key: index of the frame where the confidence is 1 (the window's frame nearest to
+ * it counts as the key when it is not among them).  NPG_DIVERGED names epoch and frame. */
+npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
+                          npg_fit_watch *watch, void *user);
 
 /* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
@@ -75,6 +79,7 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
 double npg_fit_frame_loss(const npg_fit *fit, size_t i);
 
 /* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
-size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points, int units);
+size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points,
+                      int units);
 
 #endif

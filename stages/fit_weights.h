@@ -4,15 +4,16 @@
 
 #include "fit.h"
 
-/* State of one epoch; frames are asked for from the key outward, so that each product is ready when needed. */
+/* State of one epoch; frames are asked for from the key outward, so that each product is ready when needed.
+ */
 typedef struct npg_weights {
     int confidence, catch_up;
     double progress; /* e / e_max */
     double delta;
     int64_t key;
-    double key_cd;       /* NaN before the first frame with points */
+    double key_cd;        /* NaN before the first frame with points */
     double before, after; /* product of omega on either side of the key so far */
-    double share;        /* 1 / T */
+    double share;         /* 1 / T */
 } npg_weights;
 
 void npg_weights_begin(npg_weights *weights, const npg_fit_settings *settings, double progress, int64_t key,

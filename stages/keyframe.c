@@ -178,8 +178,8 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     json_object_set_new(report, "key", json_of(&key));
     json_object_set_new(report, "best", scores);
     json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
-    npg_worker_log(worker, NPG_LOG_INFO, key.index, "keyframe: frame %lld of %lld (%zu cells, score %.1f)",
-                   (long long)key.number, (long long)frame_count, key.cell_count, key.score);
+    npg_worker_log(worker, NPG_LOG_INFO, key.number, "is the keyframe of %lld frames (%zu cells, score %.1f)",
+                   (long long)frame_count, key.cell_count, key.score);
     return NPG_OK;
 }
 

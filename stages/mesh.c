@@ -7,8 +7,8 @@
 #include "clock.h"
 #include "mesh_clean.h"
 #include "mesh_tools.h"
-#include "poisson.h"
 #include "reader.h"
+#include "resurface.h"
 #include "stage.h"
 #include "vdb.h"
 
@@ -62,6 +62,7 @@ typedef struct making { /* what is known while the reference is made */
     const mesh_state *state;
     const npg_frame *frame;
     float *points;   /* N x 3, unit, owned */
+    float *normals;  /* N x 3, owned */
     double spacing;  /* of the points */
     double diagonal; /* of the points */
     npg_mesh *mesh;  /* owned */
@@ -108,7 +109,13 @@ static npg_status reconstruct(making *m)
                                      .user = m->worker};
     if (!m->frame->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
-    NPG_TRY(npg_poisson(&m->mesh, m->points, m->frame->normals, m->frame->point_count, &settings));
+    size_t n = m->frame->point_count, turned;
+    int rounds;
+    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, n, 3 * sizeof(float)));
+    memcpy(m->normals, m->frame->normals, n * 3 * sizeof(float));
+    NPG_TRY(npg_resurface(&m->mesh, &turned, &rounds, m->normals, m->points, n, &settings));
+    note_count(m, "poisson_rounds", (size_t)rounds);
+    note_count(m, "normals_turned", turned);
     note(m, "poisson_s", npg_clock_s() - since);
     note_count(m, "faces_reconstructed", m->mesh->face_count);
     return NPG_OK;
@@ -286,6 +293,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
     if (!status) status = finish(&m);
     note(&m, "seconds", npg_clock_s() - since);
     npg_release(&m.points);
+    npg_release(&m.normals);
     if (status) npg_mesh_unref(&m.mesh);
     facts->reference = m.mesh;
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)frame->number,

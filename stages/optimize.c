@@ -1,7 +1,8 @@
-/* optimize: slides windows over time and finds the deformation of the reference in every frame (paper, method).
+/* optimize: slides windows over time and finds the deformation of the reference in every frame (paper,
+ * method).
  *
- * Holds the frames of one window, fits them jointly on the OpenCL device, writes vertices into each frame and passes
- * on what no later window needs. */
+ * Holds the frames of one window, fits them jointly on the OpenCL device, writes vertices into each frame and
+ * passes on what no later window needs. */
 #include <math.h>
 #include <string.h>
 
@@ -23,46 +24,59 @@ typedef struct state {
 
 /* ---- options ---- */
 
-#define AT(field)       offsetof(state, fit_settings.field)
-#define INT_OPTION      NPG_OPTION_INT
-#define REAL_OPTION     NPG_OPTION_REAL
-#define CHOICE_OPTION   NPG_OPTION_CHOICE
+#define AT(field)     offsetof(state, fit_settings.field)
+#define INT_OPTION    NPG_OPTION_INT
+#define REAL_OPTION   NPG_OPTION_REAL
+#define CHOICE_OPTION NPG_OPTION_CHOICE
 
 static const npg_option options[] = {
     {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "250", 1, 1e6, NULL, "N"},
-    {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0, 0,
-     "quaternion|cayley|exponential", NULL},
+    {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
+     0, "quaternion|cayley|exponential", NULL},
     {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,
      "fourier|polynomial|gaussian|learned", NULL},
-    {"time-frequencies", "frequencies of the time code; it has twice as many values", INT_OPTION, AT(frequencies), "4",
-     1, 16, NULL, "M"},
-    {"encoding", "features: a hierarchy of grids, its finest grid alone, or a hash table", CHOICE_OPTION, AT(encoding),
-     "grid", 0, 0, "grid|single|hash", NULL},
+    {"time-frequencies", "frequencies of the time code; it has twice as many values", INT_OPTION,
+     AT(frequencies), "4", 1, 16, NULL, "M"},
+    {"encoding", "features: a hierarchy of grids, its finest grid alone, or a hash table", CHOICE_OPTION,
+     AT(encoding), "grid", 0, 0, "grid|single|hash", NULL},
     {"grid-levels", "levels of the position grid", INT_OPTION, AT(grid_levels), "8", 1, 16, NULL, "L"},
     {"grid-base", "nodes per axis of the coarsest level", INT_OPTION, AT(grid_base), "2", 2, 64, NULL, "N"},
     {"grid-step", "nodes per axis that each level adds", INT_OPTION, AT(grid_step), "3", 0, 16, NULL, "N"},
-    {"grid-rate", "learning rate of the coarsest level", REAL_OPTION, AT(grid_rate), "0.005", 0, 10, NULL, NULL},
-    {"grid-rate-growth", "its growth per level", REAL_OPTION, AT(grid_rate_growth), "2.5", 0.1, 10, NULL, NULL},
-    {"lambda", "smoothing of the coarsest level, 0 for none", REAL_OPTION, AT(lambda), "0.4", 0, 1e4, NULL, NULL},
+    {"grid-rate", "learning rate of the coarsest level", REAL_OPTION, AT(grid_rate), "0.005", 0, 10, NULL,
+     NULL},
+    {"grid-rate-growth", "its growth per level", REAL_OPTION, AT(grid_rate_growth), "2.5", 0.1, 10, NULL,
+     NULL},
+    {"lambda", "smoothing of the coarsest level, 0 for none", REAL_OPTION, AT(lambda), "0.4", 0, 1e4, NULL,
+     NULL},
     {"lambda-growth", "its growth per level", REAL_OPTION, AT(lambda_growth), "1.5", 0.1, 10, NULL, NULL},
-    {"smoothing", "matrix of the smoothing: I + lambda (D - A), or with 6 lambda on the diagonal", CHOICE_OPTION,
-     AT(smoothing), "screened", 0, 0, "graph|screened", NULL},
-    {"normal-grid", "features by normal direction beside those by position", NPG_OPTION_FLAG, AT(normal_grid), "yes",
-     0, 0, NULL, NULL},
-    {"normal-nodes", "nodes per axis of the normal grid", INT_OPTION, AT(normal_nodes), "4", 2, 32, NULL, "N"},
+    {"smoothing", "matrix of the smoothing: I + lambda (D - A), or with 6 lambda on the diagonal",
+     CHOICE_OPTION, AT(smoothing), "screened", 0, 0, "graph|screened", NULL},
+    {"normal-grid", "features by normal direction beside those by position", NPG_OPTION_FLAG, AT(normal_grid),
+     "yes", 0, 0, NULL, NULL},
+    {"normal-nodes", "nodes per axis of the normal grid", INT_OPTION, AT(normal_nodes), "4", 2, 32, NULL,
+     "N"},
     {"width-1", "units of the first hidden layer", INT_OPTION, AT(width_1), "512", 32, 4096, NULL, "N"},
     {"width-2", "units of the second hidden layer", INT_OPTION, AT(width_2), "512", 32, 4096, NULL, "N"},
     {"mlp-rate", "learning rate of the decoder", REAL_OPTION, AT(mlp_rate), "0.001", 0, 1, NULL, NULL},
     {"slope", "slope of the leaky rectifier below 0", REAL_OPTION, AT(slope), "0.01", 0, 1, NULL, NULL},
-    {"isometry", "weight of the change of edge lengths", REAL_OPTION, AT(isometry), "100", 0, 1e6, NULL, NULL},
-    {"welsch", "width of the robust weight on squared unit distances, 0 for none", REAL_OPTION, AT(alpha), "0.3", 0,
-     1e3, NULL, NULL},
-    {"confidence", "weight of a frame by how well it and those nearer the key fit", CHOICE_OPTION, AT(confidence),
-     "cumulative", 0, 0, "cumulative|single|delta|constant", NULL},
+    {"isometry", "weight of the change of edge lengths", REAL_OPTION, AT(isometry), "100", 0, 1e6, NULL,
+     NULL},
+    {"welsch", "width of the robust weight on squared unit distances, 0 for none", REAL_OPTION, AT(alpha),
+     "0.3", 0, 1e3, NULL, NULL},
+    {"confidence", "weight of a frame by how well it and those nearer the key fit", CHOICE_OPTION,
+     AT(confidence), "cumulative", 0, 0, "cumulative|single|delta|constant", NULL},
     {"catch-up", "how the confidence opens with the epochs", CHOICE_OPTION, AT(catch_up), "root", 0, 0,
      "root|constant|linear|exponential|interpolated", NULL},
-    {"fit-batch", "frames whose hidden layer is kept at a time", INT_OPTION, AT(batch), "4", 1, 64, NULL, "N"},
+    {"fit-batch", "frames whose hidden layer is kept at a time", INT_OPTION, AT(batch), "4", 1, 64, NULL,
+     "N"},
     {0}};
+
+void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
+{
+    state filled = {0};
+    npg_options_fill(from, options, &filled);
+    *settings = filled.fit_settings;
+}
 
 /* ---- opening ---- */
 
@@ -82,7 +96,8 @@ static npg_status init(npg_worker *worker)
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
     if (npg_worker_facts(worker)->is_live) NPG_TRY(npg_kernels_self_test(s->device));
     const npg_device_info *info = npg_device_facts(s->device);
-    npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform, info->units);
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
+                   info->units);
     json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
     return NPG_OK;
 }
@@ -138,8 +153,9 @@ static void report_epoch(npg_worker *worker, const npg_fit_step *step)
                              .loss = step->loss};
     npg_worker_progress(worker, &progress);
     if (step->epoch % 25 == 0 || step->epoch + 1 == step->epochs)
-        npg_worker_log(worker, NPG_LOG_DEBUG, -1, "window %lld epoch %lld: chamfer %.4g isometry %.4g loss %.4g",
-                       (long long)s->window_at, (long long)step->epoch, step->chamfer, step->isometry, step->loss);
+        npg_worker_log(
+            worker, NPG_LOG_DEBUG, -1, "window %lld epoch %lld: chamfer %.4g isometry %.4g loss %.4g",
+            (long long)s->window_at, (long long)step->epoch, step->chamfer, step->isometry, step->loss);
 }
 
 static npg_status watch(void *user, const npg_fit_step *step)
@@ -192,7 +208,8 @@ static npg_status take_vertices(npg_worker *worker)
     for (int64_t t = s->window.first; t <= s->window.last; t++) {
         npg_frame *frame = held_frame(s, t);
         if (!frame->vert_unit)
-            NPG_TRY(npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
+            NPG_TRY(
+                npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
         frame->vert_count = reference->vert_count;
         frame->fields |= NPG_FIELD_VERTICES;
         NPG_TRY(npg_fit_vertices(s->fit, frame->vert_unit, (size_t)(t - s->window.first)));

@@ -10,9 +10,9 @@
 
 struct npg_time_code {
     npg_time_kind kind;
-    size_t size;          /* 2 M                                            */
-    double *frequencies;  /* gaussian: M, owned                              */
-    double *params;       /* learned: w1, b1 (HIDDEN each), w2 (HIDDEN x size), b2 (size); owned */
+    size_t size;         /* 2 M                                            */
+    double *frequencies; /* gaussian: M, owned                              */
+    double *params;      /* learned: w1, b1 (HIDDEN each), w2 (HIDDEN x size), b2 (size); owned */
     double *first, *second, *gradient;
     size_t param_count;
     int64_t step;
@@ -78,7 +78,8 @@ static void fill_one(const npg_time_code *code, float *out, double t)
         return;
     }
     for (size_t j = 0; j < code->size; j++) {
-        double turn = code->kind == NPG_TIME_GAUSSIAN ? 2 * code->frequencies[j % half] : (double)(1 << j % half);
+        double turn =
+            code->kind == NPG_TIME_GAUSSIAN ? 2 * code->frequencies[j % half] : (double)(1 << j % half);
         if (code->kind == NPG_TIME_POLYNOMIAL)
             out[j] = (float)pow(t, (double)j + 1);
         else

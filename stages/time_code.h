@@ -1,4 +1,5 @@
-/* Time code: what the decoder is told about time (paper: "Fourier Time Encoding" and the table on time functions). */
+/* Time code: what the decoder is told about time (paper: "Fourier Time Encoding" and the table on time
+ * functions). */
 #ifndef NPG_TIME_CODE_H
 #define NPG_TIME_CODE_H
 

@@ -18,13 +18,13 @@ static int decimals_for(const npg_mesh_view *mesh)
     return decimals < 1 ? 1 : decimals > 30 ? 30 : decimals;
 }
 
-/* printf writes the decimal sign of the process's locale; OBJ knows only the point. */
-static void print_numbers(npg_file *file, const char *word, int decimals, const double *values, int count)
+/* Append numbers to a line.  printf writes the decimal sign of the process's locale; OBJ knows only the
+ * point. */
+static void add_numbers(char *line, size_t size, int decimals, const double *values, int count)
 {
-    char text[512];
-    size_t used = (size_t)snprintf(text, sizeof text, "%s", word);
     const char *sign = localeconv()->decimal_point;
-    for (int i = 0; i < count && used < sizeof text; i++) {
+    size_t used = strlen(line);
+    for (int i = 0; i < count && used < size; i++) {
         char number[360];
         snprintf(number, sizeof number, fabs(values[i]) < 1e15 ? "%.*f" : "%.*e", decimals, values[i]);
         char *at = strcmp(sign, ".") != 0 && *sign ? strstr(number, sign) : NULL;
@@ -32,21 +32,21 @@ static void print_numbers(npg_file *file, const char *word, int decimals, const 
             *at = '.';
             memmove(at + 1, at + strlen(sign), strlen(at + strlen(sign)) + 1);
         }
-        used += (size_t)snprintf(text + used, sizeof text - used, " %s", number);
+        used += (size_t)snprintf(line + used, size - used, " %s", number);
     }
-    npg_file_print(file, "%s\n", text);
 }
 
 static void write_vertices(npg_file *file, const npg_mesh_view *mesh)
 {
     int decimals = decimals_for(mesh);
     for (size_t i = 0; i < mesh->vert_count; i++) {
-        double row[6];
-        int count = 3;
-        memcpy(row, mesh->vert_world + 3 * i, 3 * sizeof *row);
+        char line[512] = "v";
+        double colour[3];
+        add_numbers(line, sizeof line, decimals, mesh->vert_world + 3 * i, 3);
         for (size_t c = 0; c < 3 && mesh->vert_colours; c++)
-            row[count++] = (double)mesh->vert_colours[4 * i + c] / 255;
-        print_numbers(file, "v", decimals, row, count);
+            colour[c] = (double)mesh->vert_colours[4 * i + c] / 255;
+        if (mesh->vert_colours) add_numbers(line, sizeof line, 4, colour, 3);
+        npg_file_print(file, "%s\n", line);
     }
 }
 
@@ -54,8 +54,11 @@ static void write_rows(npg_file *file, const char *word, const float *rows, size
 {
     for (size_t i = 0; i < count && rows; i++) {
         double row[3];
+        char line[512];
+        snprintf(line, sizeof line, "%s", word);
         for (int a = 0; a < width; a++) row[a] = (double)rows[i * (size_t)width + (size_t)a];
-        print_numbers(file, word, 6, row, width);
+        add_numbers(line, sizeof line, 7, row, width);
+        npg_file_print(file, "%s\n", line);
     }
 }
 

@@ -1,4 +1,5 @@
 /* PLY writer: binary little-endian. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -10,7 +11,7 @@
 /* float rounds by at most 2^-24 of the largest coordinate. */
 static bool float_is_enough(const npg_mesh_view *mesh)
 {
-    double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double lo[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, hi[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
     double extent = 0, largest = 0;
     for (size_t i = 0; i < 3 * mesh->vert_count; i++) {
         lo[i % 3] = fmin(lo[i % 3], mesh->vert_world[i]);

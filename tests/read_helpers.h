@@ -53,6 +53,7 @@ static inline void put_double(bytes *b, double value, bool is_big)
 static inline const char *save(const char *name, const void *data, size_t size)
 {
     const char *path = in_folder(&folder, name);
+    unlink(path); /* some file systems write a file out at once when it is cut and filled again */
     FILE *file = fopen(path, "wb");
     if (!file || fwrite(data, 1, size, file) != size || fclose(file)) abort();
     return path;

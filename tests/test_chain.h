@@ -38,7 +38,7 @@ static npg_status source_process(npg_worker *worker, npg_chunk **chunk)
     source_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
     if (facts->is_live) return source_from_feed(worker, chunk);
-    facts->frame_count = script.frame_count;
+    if (!state->next) facts->frame_count = script.frame_count; /* written once, before the first chunk */
     if (state->next >= script.frame_count) return NPG_END;
     NPG_TRY(npg_chunk_open(chunk, (size_t)npg_worker_settings(worker)->chunk_frames));
     while (npg_chunk_count(*chunk) < npg_chunk_capacity(*chunk) && state->next < script.frame_count) {

@@ -1,5 +1,5 @@
-/* Every op against its plain twin on random and extreme sizes, twins against finite differences, and equal bytes from
- * equal input. */
+/* Every op against its plain twin on random and extreme sizes, twins against finite differences, and equal
+ * bytes from equal input. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -65,7 +65,8 @@ static void sampling_gives_equal_bytes(void **state)
     float *points, *nodes, *dz, *first = NULL;
     (void)state;
     for (int l = 0; l < 8; l++)
-        npg_levels_add(&levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, true, 1}, 0);
+        npg_levels_add(&levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, true, 1},
+                       0);
     size_t size = levels.row_count * NPG_LATENT_CHANNELS;
     assert_int_equal(npg_check_values(&points, NULL, POINTS * 3, 1, &random), 0);
     assert_int_equal(npg_check_values(&nodes, NULL, size, 1, &random), 0);
@@ -117,8 +118,10 @@ static void self_test_passes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(self_test_passes),           cmocka_unit_test(ops_agree_with_their_twins),
-        cmocka_unit_test(gradients_of_twins_are_slopes), cmocka_unit_test(sampling_gives_equal_bytes),
+        cmocka_unit_test(self_test_passes),
+        cmocka_unit_test(ops_agree_with_their_twins),
+        cmocka_unit_test(gradients_of_twins_are_slopes),
+        cmocka_unit_test(sampling_gives_equal_bytes),
         cmocka_unit_test(unknown_device_is_named),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -173,7 +173,9 @@ static void a_partial_warning_makes_a_partial_run(void **state)
 
 static const npg_stage needy = {
     .name = "needy", .help = "", .passes = NPG_PASS_SOLVE, .needs = NPG_FIELD_FIGURES};
+static const npg_stage idle = {.name = "idle", .help = "", .passes = NPG_PASS_SOLVE};
 static const npg_stage *const broken_chain[] = {&test_source, &needy, NULL};
+static const npg_stage *const idle_chain[] = {&test_source, &idle, NULL};
 
 static void misuse_is_refused(void **state)
 {
@@ -185,6 +187,8 @@ static void misuse_is_refused(void **state)
     (void)state;
     assert_int_equal(run_chain(broken_chain, from_files, text), NPG_USAGE);
     assert_non_null(strstr(text, "needy"));
+    assert_int_equal(run_chain(idle_chain, from_files, text), NPG_USAGE);
+    assert_non_null(strstr(text, "idle"));
     assert_int_equal(run_chain(probe_chain, nowhere, text), NPG_USAGE);
     assert_int_equal(npg_run_open(NULL, NULL, NULL), NPG_USAGE);
     assert_int_equal(npg_run_wait(NULL), NPG_USAGE);

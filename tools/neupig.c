@@ -32,6 +32,12 @@ const npg_verb npg_verbs[] = {
      "tiles "
      "share one camera, so that motion shows.",
      npg_render_options, false, npg_verb_render},
+    {"bench", "", 0, 0, "Time the kernels and the fit on this machine",
+     "Prints one JSON object: operations and bytes per second of every kernel beside the machine's measured "
+     "peaks "
+     "for multiply-adds and memory, and how many frames per second the fit solves.  Take figures on an idle "
+     "machine.",
+     npg_bench_options, false, npg_verb_bench},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
      "Lists the OpenCL devices and the versions of the libraries in use and computes a small known result on "
      "each device.  Exit code 4 when there is no device or one computes wrong.",

@@ -1,0 +1,78 @@
+/* Resurface: Poisson again and again, until points and surface agree on which side is out. */
+#include "resurface.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "mesh_tools.h"
+#include "query.h"
+
+#define ROUNDS_MAX  12
+#define DRAFT_DEPTH 7      /* of the reconstructions that only serve the normals */
+#define CLEARLY (-0.3f)
+#define SETTLED     0.0005 /* share of turned normals that ends it */
+
+/* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */
+static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const float *n)
+{
+    float sum = 0;
+    for (size_t k = 0; k < 3; k++) {
+        const float *v = mesh->vert_normals + 3 * (size_t)mesh->faces[3 * (size_t)hit->face + k];
+        sum += hit->weights[k] * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2]);
+    }
+    return sum;
+}
+
+static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh *mesh, const float *points,
+                                  size_t n)
+{
+    npg_surface *surface = NULL;
+    npg_surface_hit *hits = NULL;
+    npg_status status;
+    *turned = 0;
+    NPG_TRY_OR(done, status, npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits));
+    NPG_TRY_OR(done, status,
+               npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
+    NPG_TRY_OR(done, status, npg_surface_closest_near(surface, hits, points, n, NULL, NULL, 0));
+    for (size_t i = 0; i < n; i++) {
+        if (side_at(mesh, &hits[i], normals + 3 * i) >= CLEARLY) continue;
+        for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
+        ++*turned;
+    }
+done:
+    npg_surface_close(&surface);
+    npg_release(&hits);
+    return status;
+}
+
+static npg_status draft(size_t *turned, float *normals, const float *points, size_t n,
+                        const npg_poisson_settings *settings)
+{
+    npg_poisson_settings quick = *settings;
+    npg_mesh *mesh;
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    NPG_TRY(npg_poisson(&mesh, points, normals, n, &quick));
+    npg_status status =
+        npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float));
+    if (!status) {
+        npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
+                                mesh->face_count);
+        status = turn_to_surface(turned, normals, mesh, points, n);
+    }
+    npg_mesh_unref(&mesh);
+    return status;
+}
+
+npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *normals, const float *points,
+                         size_t point_count, const npg_poisson_settings *settings)
+{
+    size_t now = point_count;
+    *mesh = NULL;
+    *turned = 0;
+    for (*rounds = 0; *rounds < ROUNDS_MAX && (double)now > SETTLED * (double)point_count; ++*rounds) {
+        NPG_TRY(draft(&now, normals, points, point_count, settings));
+        *turned += now;
+    }
+    ++*rounds;
+    return npg_poisson(mesh, points, normals, point_count, settings);
+}

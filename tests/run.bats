@@ -1,0 +1,159 @@
+# The whole chain on a small capture: what a run leaves, that it is the same every time, how bad input ends.
+
+small=(--epochs 8 --width-1 64 --width-2 64 --faces 800 --poisson-depth 7 --quiet)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 5 --points 1200 -o capture >synth.log
+    "$NEUPIG" run capture/points -o first "${small[@]}" --max-residual 100 >first.log
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# A cloud of $2 points, coordinates by the awk expressions $3 $4 $5 of i, into $1.
+cloud() {
+    awk -v n="$2" "BEGIN {
+        srand(7)
+        print \"ply\nformat ascii 1.0\nelement vertex \" n \"\nproperty double x\nproperty double y\"
+        print \"property double z\nend_header\"
+        for (i = 0; i < n; i++) printf \"%.10g %.10g %.10g\n\", $3, $4, $5
+    }" >"$1"
+}
+
+# run_bad STATUS WORD ARGUMENTS...: the run ends with the exit code, names the word, leaves no final name.
+run_bad() {
+    local expected=$1 word=$2
+    shift 2
+    rm -rf bad-out
+    run "$NEUPIG" run "$@" -o bad-out "${small[@]}"
+    echo "$output"
+    [ "$status" -eq "$expected" ]
+    [[ "$output" == *"$word"* ]]
+    [ ! -e bad-out/done.json ]
+    [ ! -e bad-out/frames.jsonl ]
+    [ ! -e bad-out/report.json ]
+}
+
+@test "a run leaves one mesh per frame, the list, the report and at last the word that it is done" {
+    [ "$(ls first/meshes | wc -l)" -eq 5 ]
+    [ "$(wc -l <first/frames.jsonl)" -eq 5 ]
+    grep -q '"status": "ok"' first/done.json
+    grep -q '"meshes/frame_0004.ply"' first/done.json
+    [ -s first/report.json ]
+    [ -s first/reference.ply ]
+    [ "$(ls -A first | grep -c '^\.')" -eq 0 ]
+}
+
+@test "every frame has the same faces, byte for byte" {
+    faces=$(sed -n 's/^element face //p;/^end_header/q' first/reference.ply)
+    [ "$faces" -gt 100 ]
+    tail -c $((13 * faces)) first/reference.ply >faces
+    for mesh in first/meshes/*.ply; do
+        tail -c $((13 * faces)) "$mesh" | cmp - faces
+    done
+}
+
+@test "frames on standard input give the same meshes as the files" {
+    cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --max-residual 100 >/dev/null
+    for mesh in first/meshes/*.ply; do
+        cmp "$mesh" "piped/meshes/$(basename "$mesh")"
+    done
+}
+
+@test "a request to stop ends with 75 and nothing that looks done" {
+    "$NEUPIG" run capture/points -o stopped "${small[@]}" --epochs 1000000 --progress json >progress 2>stop.log &
+    pid=$!
+    while [ ! -e stopped/frames.partial.jsonl ]; do
+        kill -0 $pid
+        sleep 0.1
+    done
+    kill -TERM $pid
+    status=0
+    wait $pid || status=$?
+    [ "$status" -eq 75 ]
+    [ ! -e stopped/done.json ]
+    [ ! -e stopped/frames.jsonl ]
+}
+
+@test "with keep-going a truncated frame is skipped, said, and the run ends with 7" {
+    cp -r capture/points cut
+    truncate -s 5000 cut/frame_0001.ply
+    run "$NEUPIG" run cut -o cut-out "${small[@]}" --max-residual 100 --keep-going
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [[ "$output" == *frame_0001.ply* ]]
+    grep -q '"exit_code": 7' cut-out/done.json
+    sed -n 2p cut-out/frames.jsonl | grep -q '"skipped":true'
+    run_bad 3 frame_0001.ply cut
+}
+
+@test "a missing, an empty and a gappy folder are bad input" {
+    run_bad 3 nowhere nowhere
+    mkdir -p nothing
+    run_bad 3 nothing nothing
+    cp -r capture/points gap
+    rm gap/frame_0002.ply
+    run_bad 3 "missing: 2" gap
+}
+
+@test "a file that can't be read is bad input" {
+    cp -r capture/points locked
+    rm locked/frame_0003.ply
+    ln -s nowhere locked/frame_0003.ply
+    run_bad 3 frame_0003.ply locked
+}
+
+@test "frames without a surface are bad input" {
+    mkdir -p few equal plane
+    for n in 0 1 3; do
+        cloud few/frame_0.ply $n "rand()" "rand()" "rand()"
+        run_bad 3 few/frame_0.ply few
+    done
+    cloud equal/frame_0.ply 500 1 2 3
+    run_bad 3 equal/frame_0.ply equal
+    cloud plane/frame_0.ply 500 "rand()" "rand()" 4
+    run_bad 3 plane/frame_0.ply plane
+}
+
+@test "headers that lie are bad input" {
+    mkdir -p lies
+    for lie in "s/vertex [0-9]*/vertex 4000000000/" "s/vertex [0-9]*/vertex -5/" "s/vertex [0-9]*/vertex 99999999999999999999/" \
+        "s/property float x/property quad x/" "s/property float x/property list uchar float x/" "s/^ply/plx/"; do
+        sed "1,12$lie" capture/points/frame_0000.ply >lies/frame_0.ply
+        run cmp -s lies/frame_0.ply capture/points/frame_0000.ply
+        [ "$status" -eq 1 ]
+        run_bad 3 lies/frame_0.ply lies
+    done
+}
+
+@test "a keyframe that does not exist is wrong usage" {
+    run_bad 2 "keyframe 99" capture/points --keyframe 99
+}
+
+@test "without a device the exit code is 4" {
+    OCL_ICD_VENDORS=/nonexistent run_bad 4 OpenCL capture/points
+}
+
+@test "an output that can't be written is 5, before any work" {
+    touch a-file
+    run "$NEUPIG" run capture/points -o a-file/out "${small[@]}"
+    [ "$status" -eq 5 ]
+    [[ "$output" == *a-file* ]]
+    run "$NEUPIG" run capture/points -o /proc/neupig "${small[@]}"
+    [ "$status" -eq 5 ]
+}
+
+@test "too little memory is 6" {
+    run_bad 6 "memory limit of 4 MiB" capture/points --max-memory 4
+}
+
+@test "results of another numbering are not mixed in" {
+    cp -r first mixed
+    cp mixed/meshes/frame_0000.ply mixed/meshes/frame_0077.ply
+    run "$NEUPIG" run capture/points -o mixed "${small[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *frame_0077.ply*overwrite* ]]
+    [ -e mixed/done.json ]
+}
