@@ -12,12 +12,12 @@ install_packages $packages_to_build $packages_to_test
 CTEST_PARALLEL_LEVEL=$(nproc)
 export CTEST_PARALLEL_LEVEL
 
-# Build a preset, all of it or the targets named.
+# Build a preset, all of it or one target.
 build()
 {
     echo "== Build: $1"
     cmake --preset "$1" -DNPG_WERROR=ON >/dev/null
-    cmake --build --preset "$1" ${2:+--target "${@:2}"}
+    cmake --build --preset "$1" ${2:+--target "$2"}
 }
 
 echo "== Format"
@@ -30,7 +30,7 @@ build asan
 echo "== Tests: address and undefined behaviour"
 ctest --preset asan
 
-build tsan test_ring test_run
+build tsan threaded_tests
 echo "== Tests: threads"
 ctest --preset tsan -L tsan
 
