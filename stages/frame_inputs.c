@@ -85,41 +85,45 @@ static const char *ending_of(const char *path)
     return strrchr(path, '.');
 }
 
-static size_t count_ending(const npg_paths *list, const char *ending)
+typedef struct ending_count {
+    const char *ending; /* into a path */
+    size_t count;
+} ending_count;
+
+enum { ENDINGS_MAX = 32 }; /* more than readers know, upper and lower case being one */
+
+static size_t count_endings(ending_count counts[ENDINGS_MAX], const npg_paths *list)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < list->count; i++) count += !strcasecmp(ending_of(list->paths[i]), ending);
-    return count;
+    size_t known = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        size_t k = 0;
+        while (k < known && strcasecmp(counts[k].ending, ending_of(list->paths[i])) != 0) k++;
+        if (k == ENDINGS_MAX) continue;
+        if (k == known) counts[known++] = (ending_count){ending_of(list->paths[i]), 0};
+        counts[k].count++;
+    }
+    return known;
+}
+
+static int by_count(const void *left, const void *right)
+{
+    const ending_count *a = left, *b = right;
+    return a->count > b->count ? -1 : a->count < b->count;
 }
 
 /* Frames of one capture have one ending; the others are counted, not taken. */
 static npg_status keep_one_ending(npg_paths *list, const char *folder)
 {
-    const char *best = NULL, *second = NULL;
-    size_t best_count = 0, second_count = 0, kept = 0;
+    ending_count counts[ENDINGS_MAX];
+    size_t known = count_endings(counts, list), kept = 0;
     char ending[16];
-    for (size_t i = 0; i < list->count; i++) {
-        const char *now = ending_of(list->paths[i]);
-        if (best && !strcasecmp(now, best)) continue;
-        size_t count = count_ending(list, now);
-        if (count > best_count) {
-            best = now;
-            best_count = count;
-        }
-    }
-    for (size_t i = 0; i < list->count; i++) {
-        const char *now = ending_of(list->paths[i]);
-        size_t count = strcasecmp(now, best) != 0 ? count_ending(list, now) : 0;
-        if (count > second_count) {
-            second = now;
-            second_count = count;
-        }
-    }
-    if (best_count == second_count && best)
-        return npg_error(NPG_BAD_INPUT,
-                         "%s: holds %zu files *%s and as many *%s; say which with a pattern such as %s/*%s",
-                         folder, best_count, best, second, folder, best);
-    snprintf(ending, sizeof ending, "%s", best ? best : "");
+    if (!known) return NPG_OK;
+    qsort(counts, known, sizeof *counts, by_count);
+    if (known > 1 && counts[0].count == counts[1].count)
+        return npg_error(
+            NPG_BAD_INPUT, "%s: holds %zu files *%s and as many *%s; say which with a pattern such as %s/*%s",
+            folder, counts[0].count, counts[0].ending, counts[1].ending, folder, counts[0].ending);
+    snprintf(ending, sizeof ending, "%s", counts[0].ending);
     for (size_t i = 0; i < list->count; i++) {
         if (!strcasecmp(ending_of(list->paths[i]), ending)) {
             list->paths[kept++] = list->paths[i];

@@ -38,7 +38,7 @@ static const npg_option ingest_options[] = {
      "the points of the frame before it, ignore takes numbers for mere names",
      NPG_OPTION_CHOICE, OFFSET(missing), "error", 0, 0, "error|skip|hold|ignore", NULL},
     {"cache-mib", "Memory for clouds that were read, so that the later passes need not parse files again",
-     NPG_OPTION_INT, OFFSET(cache_mib), "512", 0, 1048576, NULL, "MIB"},
+     NPG_OPTION_INT, OFFSET(cache_mib), "64", 0, 1048576, NULL, "MIB"},
     {0}};
 
 /* ---- files ---- */
@@ -96,7 +96,7 @@ static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index
     npg_status status =
         npg_capture_read(npg_worker_kept(worker), frame, index, &facts->origin, pass == NPG_PASS_SOLVE);
     if (status == NPG_PARTIAL) {
-        npg_worker_warn(worker, true, index, "skipped: %s", npg_error_text());
+        npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
         status = NPG_OK;
     }
     if (pass == NPG_PASS_MEASURE && !status) facts->skipped_count += frame->is_skipped;
@@ -215,7 +215,7 @@ static npg_status fill_gap(npg_worker *worker, npg_chunk *chunk)
     frame.is_held = is_held;
     frame.is_skipped = !is_held;
     npg_worker_facts(worker)->skipped_count += !is_held;
-    npg_worker_warn(worker, !is_held, frame.index, "frame %lld is missing and %s", (long long)number,
+    npg_worker_warn(worker, !is_held, number, "the frame is missing and %s",
                     is_held ? "repeats the frame before it" : "is skipped");
     npg_chunk_add(chunk, &frame);
     return NPG_OK;

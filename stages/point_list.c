@@ -2,9 +2,12 @@
 #include "point_list.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* A number beyond this is damage, not a place: as origin it would swallow every other point. */
 #define ORIGIN_MAX 1e15
+#define SAMPLES    1001 /* of a cloud, for its median                                                    */
+#define AWAY_MAX   16   /* spreads between origin and median; float then still keeps 1e-6 of the spread */
 
 npg_status npg_points_reserve(npg_point_list *list, size_t more)
 {
@@ -25,6 +28,31 @@ void npg_local_of(float local[3], npg_origin *origin, const double world[3])
         fabs(world[2]) < ORIGIN_MAX)
         npg_origin_offer(origin, world);
     for (int a = 0; a < 3; a++) local[a] = (float)(world[a] - (origin->known ? origin->world[a] : 0));
+}
+
+static int by_value(const void *left, const void *right)
+{
+    double a = *(const double *)left, b = *(const double *)right;
+    return a < b ? -1 : a > b;
+}
+
+bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point_count)
+{
+    double values[SAMPLES], median[3] = {0}, spread = 0, away = 0;
+    size_t step = point_count / SAMPLES + 1;
+    for (size_t a = 0; a < 3; a++) {
+        size_t count = 0;
+        for (size_t i = 0; i < point_count; i += step)
+            if (isfinite(pos_local[3 * i + a])) values[count++] = (double)pos_local[3 * i + a];
+        if (count < 8) return false;
+        qsort(values, count, sizeof *values, by_value);
+        median[a] = values[count / 2];
+        spread = fmax(spread, values[count * 9 / 10] - values[count / 10]);
+        away = fmax(away, fabs(median[a]));
+    }
+    if (!origin->known || away <= AWAY_MAX * spread) return false;
+    for (int a = 0; a < 3; a++) origin->world[a] += median[a];
+    return true;
 }
 
 void npg_unit_normal(float out[3], const double normal[3])

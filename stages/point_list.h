@@ -22,6 +22,10 @@ void npg_points_add(npg_point_list *list, const double world[3], const double no
 /* world -> local, one point; the first finite one becomes the origin. */
 void npg_local_of(float local[3], npg_origin *origin, const double world[3]);
 
+/* Move the origin to the median of the points when it lies so far from them that float can't tell them apart
+ * well; true when it moved (the points must then be read again). */
+bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point_count);
+
 /* Unit length, (0, 0, 0) where there is no direction. */
 void npg_unit_normal(float out[3], const double normal[3]);
 

@@ -3,8 +3,10 @@
 
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 #include "formats.h"
+#include "point_list.h"
 
 typedef npg_status (*cloud_reader)(npg_frame *frame, npg_source *source, npg_origin *origin);
 
@@ -102,7 +104,7 @@ static npg_status expect_end(npg_source *source)
     }
 }
 
-npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin)
+static npg_status read_points(npg_frame *frame, const char *path, npg_origin *origin)
 {
     npg_source *source = NULL;
     const struct format *format;
@@ -112,6 +114,29 @@ npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin
     if (!status && format->needs_whole) status = expect_end(source);
     if (status == NPG_END) status = npg_error(NPG_BAD_INPUT, "%s: the file is empty", path);
     npg_source_close(&source);
+    return status;
+}
+
+/* The first file settles the origin.  Where its first point turns out to lie far off (many sensors write
+ * 0 0 0 for a pixel they could not see), float has lost the detail of all others: read again around the
+ * median. */
+static npg_status read_first(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    struct stat info;
+    npg_origin found = {0};
+    NPG_TRY(read_points(frame, path, &found));
+    bool is_file = !stat(path, &info) && S_ISREG(info.st_mode);
+    if (is_file && npg_origin_improve(&found, frame->pos_local, frame->point_count)) {
+        npg_frame_clear(frame);
+        NPG_TRY(read_points(frame, path, &found));
+    }
+    *origin = found;
+    return NPG_OK;
+}
+
+npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    npg_status status = origin->known ? read_points(frame, path, origin) : read_first(frame, path, origin);
     if (!status) status = npg_copy_text(&frame->path, path);
     if (status) {
         npg_frame_clear(frame);

@@ -1,11 +1,13 @@
 /* Readers: clouds and meshes from files and streams.  One .c file per format; this is their common face.
  *
  * Formats by the name's ending, then by content: .ply, .obj, .xyz/.txt/.xyzn/.pts, .npy, .pcd.
- * Positions come out as float relative to an origin that the first finite point read defines (npg_origin), so
- * that captures far from 0 keep their detail.  Points that are not finite are kept: the outlier stage counts
- * and drops them. Failures are NPG_BAD_INPUT (with path, line or byte, and cause), NPG_MEMORY.  Memory while
- * reading stays below 4 x file size + 1 MiB, whatever the header claims.  Threads: different frames may be
- * read at the same time; *origin is written only while it is not known. */
+ * Positions come out as float relative to an origin (npg_origin) that the first file read settles: its first
+ * finite point, or the median of its points where that one lies far off, so that captures far from 0 keep
+ * their detail.  Points that are not finite are kept: the outlier stage counts and drops them.  Normals come
+ * out with unit length; one without a direction is (0, 0, 0).
+ * Failures are NPG_BAD_INPUT (with path, line or byte, and cause), NPG_MEMORY.  Memory while reading a cloud
+ * stays below 4 x file size + 1 MiB, whatever the header claims (PCL's own for PCD aside).  Threads:
+ * different frames may be read at the same time; *origin is written only while it is not known. */
 #ifndef NPG_READER_H
 #define NPG_READER_H
 

@@ -330,6 +330,25 @@ static void millimetres_at_a_million(void **state)
     check_far(save("far.obj", obj, strlen(obj)));
 }
 
+static void a_first_point_at_zero_costs_no_detail(void **state)
+{
+    (void)state;
+    char text[4096] = "0 0 0\n";
+    size_t used = strlen(text);
+    for (int i = 0; i < 50; i++)
+        used += (size_t)snprintf(text + used, sizeof text - used, "%.3f 2000000.5 -3000000.25\n",
+                                 1e6 + i * 0.001);
+    npg_frame frame;
+    npg_origin origin = {0};
+    assert_int_equal(read_within_bounds(&frame, save("zero.xyz", text, used), &origin), NPG_OK);
+    assert_int_equal(frame.point_count, 51);
+    for (size_t i = 1; i < 51; i++) {
+        double x = (double)frame.pos_local[3 * i] + origin.world[0];
+        assert_true(fabs(x - (1e6 + (double)(i - 1) * 0.001)) < 1e-6);
+    }
+    npg_frame_clear(&frame);
+}
+
 static void points_that_are_not_finite_are_kept(void **state)
 {
     (void)state;
@@ -622,6 +641,7 @@ int main(void)
                                        cmocka_unit_test(pcd_in_bytes),
                                        cmocka_unit_test(npy_of_every_kind),
                                        cmocka_unit_test(millimetres_at_a_million),
+                                       cmocka_unit_test(a_first_point_at_zero_costs_no_detail),
                                        cmocka_unit_test(points_that_are_not_finite_are_kept),
                                        cmocka_unit_test(no_points_is_no_failure),
                                        cmocka_unit_test(meshes_with_all_they_carry),

@@ -1,0 +1,357 @@
+/* Tracker: correspondences and Gauss-Newton steps on the deformation graph. */
+#include "tracker.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "block_system.h"
+#include "kdtree.h"
+#include "mesh_tools.h"
+#include "query.h"
+
+#define STIFF_START 10.0 /* times the final stiffness at the first step */
+#define REVERSE     0.5  /* weight of surface -> points against points -> surface */
+
+struct npg_tracker {
+    npg_tracker_settings settings;
+    npg_mesh *mesh; /* counted reference */
+    npg_graph *graph;
+    npg_block_system *system;
+    npg_surface *surface;
+    float *vert_pos, *vert_normals; /* V x 3: the pose at work */
+    uint32_t *samples;              /* vertices, spread over the surface */
+    size_t sample_count;
+    double *step; /* K x 6 */
+    /* of the frame at work */
+    float *targets, *target_normals; /* M x 3 */
+    size_t target_count, target_capacity;
+    npg_surface_hit *hits; /* M */
+    uint32_t *near;        /* samples: nearest target */
+    float *near_sq, *sample_pos;
+};
+
+size_t npg_tracker_node_count(const npg_tracker *tracker)
+{
+    return tracker->graph->node_count;
+}
+
+void npg_tracker_close(npg_tracker **slot)
+{
+    if (!slot || !*slot) return;
+    npg_tracker *t = *slot;
+    npg_graph_close(&t->graph);
+    npg_block_close(&t->system);
+    npg_surface_close(&t->surface);
+    npg_mesh_unref(&t->mesh);
+    void *all[] = {&t->vert_pos, &t->vert_normals, &t->samples, &t->step,    &t->targets,   &t->target_normals,
+                   &t->hits,     &t->near,         &t->near_sq, &t->sample_pos};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_release(slot);
+}
+
+/* Every n-th vertex: Poisson meshes have their vertices evenly over the surface, and in no order that repeats. */
+static void choose_samples(npg_tracker *t)
+{
+    size_t step = t->mesh->vert_count / t->settings.samples + 1;
+    for (size_t v = 0; v < t->mesh->vert_count; v += step) t->samples[t->sample_count++] = (uint32_t)v;
+}
+
+npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tracker_settings *settings)
+{
+    npg_tracker *t;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&t, NPG_FOR_FIT, sizeof *t));
+    t->settings = *settings;
+    t->mesh = npg_mesh_ref(reference);
+    size_t v = reference->vert_count, m = settings->samples;
+    npg_status status = npg_graph_open(&t->graph, reference, settings->nodes);
+    if (!status)
+        status = npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->graph->edges,
+                                t->graph->edge_count);
+    if (!status) status = npg_surface_open(&t->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+    if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, v, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, v, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->samples, NPG_FOR_FIT, v, sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&t->step, NPG_FOR_FIT, t->graph->node_count, 6 * sizeof(double));
+    if (!status) status = npg_alloc_array(&t->targets, NPG_FOR_FIT, m, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->target_normals, NPG_FOR_FIT, m, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->hits, NPG_FOR_FIT, m, sizeof *t->hits);
+    if (!status) choose_samples(t);
+    if (!status) status = npg_alloc_array(&t->near, NPG_FOR_FIT, t->sample_count, sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&t->near_sq, NPG_FOR_FIT, t->sample_count, sizeof(float));
+    if (!status) status = npg_alloc_array(&t->sample_pos, NPG_FOR_FIT, t->sample_count, 3 * sizeof(float));
+    if (status) npg_tracker_close(&t);
+    *out = t;
+    return status;
+}
+
+/* At most settings.samples of the points, evenly by their order. */
+static void choose_targets(npg_tracker *t, const float *points, const float *normals, size_t count)
+{
+    size_t most = t->settings.samples;
+    t->target_count = count < most ? count : most;
+    for (size_t i = 0; i < t->target_count; i++) {
+        size_t from = i * count / t->target_count;
+        memcpy(t->targets + 3 * i, points + 3 * from, 3 * sizeof(float));
+        if (normals) memcpy(t->target_normals + 3 * i, normals + 3 * from, 3 * sizeof(float));
+    }
+}
+
+/* ---- one term ---- */
+
+/* A point that nodes carry and where it should go. */
+typedef struct pull {
+    float rest[3];
+    uint32_t nodes[NPG_GRAPH_BIND];
+    float weights[NPG_GRAPH_BIND];
+    double normal[3], target[3];
+} pull;
+
+/* The nodes of a surface point: those of its face's corners, the four that matter most. */
+static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit *hit)
+{
+    uint32_t nodes[3 * NPG_GRAPH_BIND];
+    float weights[3 * NPG_GRAPH_BIND], sum = 0;
+    int count = 0;
+    memset(p->rest, 0, sizeof p->rest);
+    for (int corner = 0; corner < 3; corner++) {
+        size_t v = t->mesh->faces[3 * (size_t)hit->face + (size_t)corner];
+        for (size_t i = 0; i < 3; i++) p->rest[i] += hit->weights[corner] * t->mesh->vert_pos[3 * v + i];
+        for (size_t b = 0; b < NPG_GRAPH_BIND; b++) {
+            uint32_t node = t->graph->vert_node[v * NPG_GRAPH_BIND + b];
+            float weight = hit->weights[corner] * t->graph->vert_weight[v * NPG_GRAPH_BIND + b];
+            if (node == UINT32_MAX) break;
+            int at = 0;
+            while (at < count && nodes[at] != node) at++;
+            weights[at] = at < count ? weights[at] + weight : weight;
+            nodes[at] = node;
+            count += at == count;
+        }
+    }
+    for (int b = 0; b < NPG_GRAPH_BIND; b++) {
+        int best = -1;
+        for (int i = 0; i < count; i++)
+            if (weights[i] > 0 && (best < 0 || weights[i] > weights[best])) best = i;
+        p->nodes[b] = best < 0 ? UINT32_MAX : nodes[best];
+        p->weights[b] = best < 0 ? 0 : weights[best];
+        if (best >= 0) weights[best] = 0;
+        sum += p->weights[b];
+    }
+    for (int b = 0; b < NPG_GRAPH_BIND; b++) p->weights[b] /= sum;
+}
+
+/* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
+static void add_pull(npg_tracker *t, const pull *p, const double *pose, double weight, double width)
+{
+    double x[3], d[3], dist_sq = 0, jacobians[NPG_GRAPH_BIND][18], w[9];
+    size_t count = 0;
+    npg_pose_point(x, t->graph, pose, p->rest, p->nodes, p->weights);
+    for (int i = 0; i < 3; i++) {
+        d[i] = p->target[i] - x[i];
+        dist_sq += d[i] * d[i];
+    }
+    double robust = 1 / (1 + dist_sq / (width * width));
+    weight *= robust * robust;
+    for (; count < NPG_GRAPH_BIND && p->nodes[count] != UINT32_MAX; count++) {
+        const double *k = pose + p->nodes[count] * NPG_POSE_SIZE;
+        const float *g = t->graph->node_pos + 3 * (size_t)p->nodes[count];
+        double y[3], share = (double)p->weights[count], *j = jacobians[count];
+        for (int i = 0; i < 3; i++) {
+            y[i] = 0;
+            for (int c = 0; c < 3; c++) y[i] += k[3 * i + c] * ((double)p->rest[c] - (double)g[c]);
+        }
+        const double rows[18] = {0,     y[2], -y[1], 1, 0, 0, /* omega x y, translation */
+                                 -y[2], 0,    y[0],  0, 1, 0, y[1], -y[0], 0, 0, 0, 1};
+        for (int i = 0; i < 18; i++) j[i] = share * rows[i];
+    }
+    for (int i = 0; i < 9; i++)
+        w[i] = weight * ((1 - t->settings.along) * p->normal[i / 3] * p->normal[i % 3] +
+                         (i % 4 == 0 ? t->settings.along : 0));
+    npg_block_add(t->system, p->nodes, (const double(*)[18])jacobians, count, w, d);
+}
+
+/* ---- the terms of a step ---- */
+
+static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface_hit *hit)
+{
+    double size = 0;
+    for (size_t i = 0; i < 3; i++) {
+        normal[i] = 0;
+        for (size_t c = 0; c < 3; c++)
+            normal[i] += (double)hit->weights[c] *
+                         (double)t->vert_normals[3 * t->mesh->faces[3 * (size_t)hit->face + c] + i];
+        size += normal[i] * normal[i];
+    }
+    for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
+}
+
+/* Points -> surface.  Returns the mean distance. */
+static double add_targets(npg_tracker *t, const double *pose, bool with_normals, double width)
+{
+    double sum = 0, share = 1 / (double)t->target_count;
+    for (size_t i = 0; i < t->target_count; i++) {
+        const npg_surface_hit *hit = &t->hits[i];
+        pull p;
+        sum += sqrt((double)hit->dist_sq);
+        hit_normal(p.normal, t, hit);
+        double facing = 0;
+        for (size_t c = 0; c < 3 && with_normals; c++) facing += p.normal[c] * (double)t->target_normals[3 * i + c];
+        if (facing < -0.2) continue;
+        bind_face_point(&p, t, hit);
+        for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
+        add_pull(t, &p, pose, share, width);
+    }
+    return sum * share;
+}
+
+/* Surface -> points, for samples whose nearest point is close enough to be theirs. */
+static void add_samples(npg_tracker *t, const double *pose, const float *points, const float *normals, double width)
+{
+    double share = REVERSE / (double)t->sample_count;
+    for (size_t s = 0; s < t->sample_count; s++) {
+        size_t v = t->samples[s];
+        pull p;
+        double facing = 0;
+        for (size_t c = 0; c < 3; c++) {
+            p.rest[c] = t->mesh->vert_pos[3 * v + c];
+            p.normal[c] = (double)t->vert_normals[3 * v + c];
+            p.target[c] = (double)points[3 * (size_t)t->near[s] + c];
+            if (normals) facing += p.normal[c] * (double)normals[3 * (size_t)t->near[s] + c];
+        }
+        if (facing < -0.2 || (double)t->near_sq[s] > 9 * width * width) continue;
+        memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
+        memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
+        add_pull(t, &p, pose, share, width);
+    }
+}
+
+/* Edges keep their length and direction in the frame of each end. */
+static void add_edges(npg_tracker *t, const double *pose, double stiffness)
+{
+    const npg_graph *graph = t->graph;
+    double weight = stiffness / (double)graph->edge_count;
+    const double w[9] = {weight, 0, 0, 0, weight, 0, 0, 0, weight};
+    for (size_t e = 0; e < 2 * graph->edge_count; e++) {
+        uint32_t j = graph->edges[e / 2][e % 2], k = graph->edges[e / 2][1 - e % 2];
+        const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
+        const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
+        double y[3], r[3];
+        for (int i = 0; i < 3; i++) {
+            y[i] = 0;
+            for (int c = 0; c < 3; c++) y[i] += pj[3 * i + c] * ((double)gk[c] - (double)gj[c]);
+            r[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - y[i];
+        }
+        const double jacobians[2][18] = {
+            {0, y[2], -y[1], 1, 0, 0, -y[2], 0, y[0], 0, 1, 0, y[1], -y[0], 0, 0, 0, 1},
+            {0, 0, 0, -1, 0, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 0, -1}};
+        const uint32_t nodes[2] = {j, k};
+        npg_block_add(t->system, nodes, jacobians, 2, w, r);
+    }
+}
+
+/* ---- moving ---- */
+
+/* rotation = exp(omega) rotation (Rodrigues). */
+static void turn(double rotation[9], const double omega[3])
+{
+    double angle = sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]), m[9], out[9];
+    double s = angle > 1e-9 ? sin(angle) / angle : 1, c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
+    const double x[9] = {0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0};
+    for (int i = 0; i < 9; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++) square += x[i / 3 * 3 + k] * x[3 * k + i % 3];
+        m[i] = (i % 4 == 0) + s * x[i] + c * square;
+    }
+    for (int i = 0; i < 9; i++) {
+        out[i] = 0;
+        for (int k = 0; k < 3; k++) out[i] += m[i / 3 * 3 + k] * rotation[3 * k + i % 3];
+    }
+    memcpy(rotation, out, sizeof out);
+}
+
+static double move_nodes(npg_tracker *t, double *pose)
+{
+    double largest = 0;
+    for (size_t k = 0; k < t->graph->node_count; k++) {
+        const double *d = t->step + 6 * k;
+        turn(pose + k * NPG_POSE_SIZE, d);
+        double moved = 0;
+        for (int i = 0; i < 3; i++) {
+            pose[k * NPG_POSE_SIZE + 9 + (size_t)i] += d[3 + i];
+            moved += d[3 + i] * d[3 + i];
+        }
+        largest = fmax(largest, moved);
+    }
+    return sqrt(largest);
+}
+
+void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose)
+{
+    npg_pose_vertices(vert_unit, tracker->graph, pose, tracker->mesh->vert_pos);
+}
+
+static npg_status find_pairs(npg_tracker *t, const double *pose, const npg_kdtree *tree)
+{
+    npg_tracker_vertices(t, t->vert_pos, pose);
+    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces, t->mesh->face_count);
+    NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
+    NPG_TRY(npg_surface_closest(t->surface, t->hits, t->targets, t->target_count));
+    for (size_t s = 0; s < t->sample_count; s++)
+        memcpy(t->sample_pos + 3 * s, t->vert_pos + 3 * (size_t)t->samples[s], 3 * sizeof(float));
+    return npg_kdtree_nearest(tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1);
+}
+
+static npg_status do_step(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_kdtree *tree,
+                          const float *points, const float *normals, double progress)
+{
+    double radius = t->graph->radius;
+    /* from several radii down to a part of one; stiffness from STIFF_START down to 1 */
+    double width = radius * (2 * pow(0.15, progress)), stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress);
+    NPG_TRY(find_pairs(t, pose, tree));
+    npg_block_clear(t->system);
+    tracked->point_dist_mean = add_targets(t, pose, normals != NULL, width);
+    add_samples(t, pose, points, normals, width);
+    add_edges(t, pose, stiffness);
+    npg_block_damp(t->system, 1e-9);
+    npg_block_solve(t->system, t->step, 1e-3, 60);
+    tracked->change = move_nodes(t, pose);
+    return isfinite(tracked->change) ? NPG_OK : npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
+}
+
+npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
+                           const float *normals, size_t point_count)
+{
+    npg_kdtree *tree;
+    NPG_REQUIRE(point_count);
+    choose_targets(t, points, normals, point_count);
+    NPG_TRY(npg_kdtree_open(&tree, points, point_count));
+    *tracked = (npg_tracked){0};
+    npg_status status = NPG_OK;
+    int last = t->settings.steps - 1;
+    while (tracked->steps < t->settings.steps && !status) {
+        double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
+        status = do_step(t, tracked, pose, tree, points, normals, progress);
+        tracked->steps++;
+        if (progress >= 1 && tracked->change < 0.01 * t->graph->radius) break;
+    }
+    npg_kdtree_close(&tree);
+    return status;
+}
+
+/* ---- extrapolation ---- */
+
+void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)
+{
+    for (size_t k = 0; k < node_count; k++, next += NPG_POSE_SIZE, now += NPG_POSE_SIZE, before += NPG_POSE_SIZE) {
+        double change[9];
+        for (int i = 0; i < 9; i++) { /* now before^T */
+            change[i] = 0;
+            for (int c = 0; c < 3; c++) change[i] += now[i / 3 * 3 + c] * before[i % 3 * 3 + c];
+        }
+        for (int i = 0; i < 9; i++) {
+            next[i] = 0;
+            for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
+        }
+        for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
+    }
+}
