@@ -12,7 +12,7 @@ npg_status npg_outliers_statistical(uint8_t *keep, size_t *dropped, const float 
 {
     NPG_REQUIRE(neighbours >= 1 && ratio >= 0);
     *dropped = 0;
-    std::memset(keep, 1, point_count);
+    if (point_count) std::memset(keep, 1, point_count);
     if (point_count <= size_t(neighbours)) return NPG_OK;
     return npg::guard("PCL's outlier filter", [&] {
         pcl::PointCloud<pcl::PointXYZ>::Ptr cloud(new pcl::PointCloud<pcl::PointXYZ>);
