@@ -209,7 +209,8 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
     const outlier_state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return false;
-    return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || frame->index == facts->plan.key;
+    bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
+    return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || is_planned_key;
 }
 
 /* ---- the stage ---- */

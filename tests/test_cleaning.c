@@ -10,6 +10,9 @@
 
 #include "cleaning.h"
 #include "shapes.h"
+#include "test_chain.h"
+
+extern const npg_stage npg_stage_outlier;
 
 static float truth[3 * 400000];
 
@@ -169,6 +172,79 @@ static void refused_memory_is_survived(void **state)
     assert_true(refused >= 6);
 }
 
+/* ---- the stage ---- */
+
+typedef struct seen {
+    int frames, skipped;
+    size_t points[3], normals[3];
+} seen;
+
+/* Frame 1 has three points only; the others are toruses with a stray point and one that is no number. */
+static npg_status make_frame(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
+{
+    (void)facts;
+    (void)user;
+    shape_random r = {40 + (uint64_t)index};
+    size_t n = index == 1 ? 3 : 2000;
+    NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
+    shape_torus(frame->pos_local, truth, n, 1, 0.3, &r);
+    frame->point_count = n;
+    frame->is_key = index == 2;
+    if (index == 1) return NPG_OK;
+    shape_put(frame->pos_local, 5, 5, 5);
+    shape_put(frame->pos_local + 3, NAN, 0, 0);
+    return NPG_OK;
+}
+
+static npg_status see_frame(npg_worker *worker, npg_frame *frame, void *user)
+{
+    seen *s = user;
+    (void)worker;
+    s->frames++;
+    s->skipped += frame->is_skipped;
+    s->points[frame->index] = frame->point_count;
+    s->normals[frame->index] = frame->normals ? frame->cleaning.normals_estimated : 0;
+    return NPG_OK;
+}
+
+static void the_stage_skips_or_refuses(void **state)
+{
+    (void)state;
+    char text[1024];
+    seen s = {0};
+    const npg_stage *const chain[] = {&test_source, &npg_stage_outlier, &test_sink, NULL};
+    const char *const strict[][2] = {{"input", "none"}, {"output", "none"}, {NULL, NULL}};
+    const char *const going[][2] = {
+        {"input", "none"}, {"output", "none"}, {"keep-going", "yes"}, {NULL, NULL}};
+    script = (test_script){3, make_frame, see_frame, &s};
+    assert_int_equal(run_chain(chain, strict, text), NPG_BAD_INPUT);
+    assert_non_null(strstr(text, "frame 1"));
+    assert_non_null(strstr(text, "3 usable points of 3"));
+    memset(&s, 0, sizeof s);
+    assert_int_equal(run_chain(chain, going, text), NPG_PARTIAL);
+    assert_int_equal(s.frames, 3);
+    assert_int_equal(s.skipped, 1);
+    assert_int_equal(s.points[1], 0);
+    assert_true(s.points[0] <= 1998 && s.points[0] >= 1988);
+    assert_int_equal(s.normals[2], s.points[2]); /* the keyframe has normals, */
+    assert_int_equal(s.normals[0], 0);           /* the others need none */
+}
+
+static void a_sensor_that_is_none_is_refused(void **state)
+{
+    (void)state;
+    char text[1024];
+    const npg_stage *const chain[] = {&test_source, &npg_stage_outlier, &test_sink, NULL};
+    const char *const texts[] = {"1,2", "1,2,x", "1,2,3,4", "", "nan,0,0"};
+    script = (test_script){3, make_frame, NULL, NULL};
+    for (size_t i = 0; i < 5; i++) {
+        const char *const settings[][2] = {
+            {"input", "none"}, {"output", "none"}, {"sensor", texts[i]}, {NULL, NULL}};
+        assert_int_equal(run_chain(chain, settings, text), NPG_USAGE);
+        assert_non_null(strstr(text, "option sensor"));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_not_a_number_goes),
@@ -177,6 +253,8 @@ int main(void)
                                        cmocka_unit_test(too_many_points_are_thinned),
                                        cmocka_unit_test(isolated_points_go_and_others_stay),
                                        cmocka_unit_test(what_is_no_surface_is_refused),
-                                       cmocka_unit_test(refused_memory_is_survived)};
+                                       cmocka_unit_test(refused_memory_is_survived),
+                                       cmocka_unit_test(the_stage_skips_or_refuses),
+                                       cmocka_unit_test(a_sensor_that_is_none_is_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
