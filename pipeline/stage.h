@@ -29,7 +29,7 @@ typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass                   */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
-    bool cut_welds; /* cut from the reference what the other frames contradict      */
+    bool cut_welds;                       /* cut from the reference what the other frames contradict      */
 } npg_choice;
 
 /* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
@@ -89,6 +89,10 @@ npg_facts *npg_worker_facts(const npg_worker *worker);
 const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);
+
+/* Vertices of the reference mesh; before it is known, as many as the option faces and the points let it have.
+ */
+size_t npg_worker_verts_at_most(const npg_worker *worker);
 
 /* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called
  * on the thing when the run closes. */

@@ -8,15 +8,17 @@
 #include "mesh_tools.h"
 #include "resurface.h"
 
-#define DRAFT_DEPTH  7
-#define DRAFT_ROUNDS 1
-#define DRAFT_FACES  4000
-#define STRETCHED    3.0  /* times its area in the candidate's frame */
-#define STRETCH_COST 0.2  /* unit lengths that a stretched area counts for */
-#define CONTACT_COST 0.1  /* unit lengths that a point in contact counts for */
-#define HANDLE_COST  0.05 /* share of the cost that a needless handle adds */
-#define MIDDLE_COST  0.3  /* share of the cost that the capture's whole length from the middle adds */
-#define CLEARLY_LESS 0.97 /* of the cost of the best-scored frame */
+#define DRAFT_DEPTH     7
+#define DRAFT_ROUNDS    1
+#define DRAFT_FACES     4000
+#define PIECE_SHARE     0.01 /* of the area, and units from the main piece: what belongs to the body */
+#define PIECE_DIST_UNIT 0.1
+#define STRETCHED       3.0  /* times its area in the candidate's frame */
+#define STRETCH_COST    0.2  /* unit lengths that a stretched area counts for */
+#define CONTACT_COST    0.1  /* unit lengths that a point in contact counts for */
+#define HANDLE_COST     0.05 /* share of the cost that a needless handle adds */
+#define MIDDLE_COST     0.3  /* share of the cost that the capture's whole length from the middle adds */
+#define CLEARLY_LESS    0.97 /* of the cost of the best-scored frame */
 
 static const npg_tracker_settings draft_tracking = {
     .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
@@ -26,14 +28,15 @@ static const npg_tracker_settings draft_tracking = {
 static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
                              const npg_poisson_settings *settings)
 {
-    size_t moved, turned, components;
-    double lost, spacing;
+    size_t moved, turned;
+    double spacing;
+    npg_pieces pieces;
     int rounds;
     npg_mending mending;
     NPG_TRY(npg_cloud_spacing(&spacing, sight->points, sight->point_count));
     NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, sight->points, sight->point_count,
                                 spacing, settings));
-    NPG_TRY(npg_mesh_keep_main(mesh, &components, &lost));
+    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
     NPG_TRY(npg_mesh_handles(handles, *mesh));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
     NPG_TRY(npg_mesh_mend(mesh, &mending));

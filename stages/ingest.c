@@ -1,5 +1,5 @@
-/* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice), from
- * standard input, or from those that are pushed. */
+/* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
+ * from standard input, or from those that are pushed. */
 #include <string.h>
 #include <unistd.h>
 
@@ -296,8 +296,8 @@ const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .help = "reads the frames",
                                     .options = ingest_options,
                                     .state_size = sizeof(state),
-                                    .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
-                                              NPG_PASS_SOLVE,
+                                    .passes =
+                                        NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
                                     .gives = NPG_FIELD_POINTS,
                                     .init = init,
                                     .process = process,

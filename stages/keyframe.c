@@ -31,8 +31,8 @@ typedef struct keyframe_state {
     int64_t number, window, overlap, look_ahead; /* options */
     int choice, welds;
     npg_shortlist shortlist;
-    uint64_t *cells;                             /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
-    candidate best[SHOWN_SCORES];                /* best first */
+    uint64_t *cells;              /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
+    candidate best[SHOWN_SCORES]; /* best first */
     size_t best_count;
     candidate chosen; /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
@@ -157,7 +157,8 @@ static npg_status score_frame(keyframe_state *state, const npg_facts *facts, int
         state->chosen = new;
         state->is_chosen = true;
     }
-    if (facts->is_live || !has_candidates(state) || !npg_shortlist_wants(frame->index, frame_count)) return NPG_OK;
+    if (facts->is_live || !has_candidates(state) || !npg_shortlist_wants(frame->index, frame_count))
+        return NPG_OK;
     return npg_shortlist_add(&state->shortlist, frame, cell_count);
 }
 
@@ -190,7 +191,8 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     int64_t overlap = window < frame_count ? state->overlap : 0;
     facts->plan = (npg_plan){frame_count, key.index, window, overlap};
     if (!facts->is_live && frame_count > 1 && (has_candidates(state) || state->welds == WELDS_CUT)) {
-        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count, !has_candidates(state));
+        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count,
+                             !has_candidates(state));
         facts->choice.cut_welds = state->welds == WELDS_CUT;
     }
     json_t *report = npg_worker_report(worker), *scores = json_array();
@@ -370,15 +372,18 @@ static const npg_option options[] = {
     {"keyframe", "Number of the frame whose surface is the reference, as in the file names; -1: by score",
      NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
     {"keyframe-choice",
-     "Take the frame with the best score (paper), or the one of several good frames whose surface fares best in the "
-     "others, so that limbs which touch in one frame are not joined for the whole capture (apart; not for live runs)",
+     "Take the frame with the best score (paper), or the one of several good frames whose surface fares best "
+     "in the "
+     "others, so that limbs which touch in one frame are not joined for the whole capture (apart; not for "
+     "live runs)",
      NPG_OPTION_CHOICE, OFFSET(choice), "apart", 0, 0, "paper|apart", NULL},
     {"welds",
-     "Surface of the reference that other frames stretch far from all points: cut it and close the holes, or keep it "
+     "Surface of the reference that other frames stretch far from all points: cut it and close the holes, or "
+     "keep it "
      "(live runs keep it)",
      NPG_OPTION_CHOICE, OFFSET(welds), "cut", 0, 0, "keep|cut", NULL},
     {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
-     OFFSET(window), "0", 0, 1e6, NULL, NULL},
+     OFFSET(window), "24", 0, 1e6, NULL, NULL},
     {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
      1e6, NULL, NULL},
     {"look-ahead", "Live runs: frames that may be held while the keyframe is chosen", NPG_OPTION_INT,

@@ -8,9 +8,9 @@
 #include "mesh_tools.h"
 #include "query.h"
 
-#define ROUNDS_MAX  12
-#define DRAFT_DEPTH 7      /* of the reconstructions that only serve the normals */
-#define CLEARLY (-0.3f)
+#define ROUNDS_MAX  4
+#define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
+#define CLEARLY     (-0.3f)
 #define SETTLED     0.0005 /* share of turned normals that ends it */
 #define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
 
