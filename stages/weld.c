@@ -9,17 +9,19 @@
 #include "mesh_clean.h"
 #include "mesh_tools.h"
 
-#define LONGER       2.0 /* times its length: an edge that speaks against its face     */
-#define FAR_SPACINGS 1.0 /* mean distance of a face's corners from the points          */
-#define EXPLAINED    0.5 /* spacings from points to surface, in a frame that is heard  */
-#define FRAMES_LEAST 3   /* that speak against a face                                  */
-#define SEEDS_LEAST  2   /* faces of a patch that are spoken against                   */
-#define BORDER_NEAR  0.7 /* times the faces' distance from the points, for the border around them */
-#define SAVED_LEAST  0.7 /* the new faces' area, at most, of the patch in its worst pose */
-#define LOOPS_LEAST  2   /* of its border: a tube between two parts; a cap or a crease is left */
-#define TIDY_ROUNDS  10
-#define ISLAND_MOST  0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
-#define PATCH_MOST   0.2  /* of the faces: more is no weld but a surface that fits nowhere */
+#define LONGER        2.0 /* times its length: an edge that speaks against its face     */
+#define FAR_SPACINGS  1.0 /* mean distance of a face's corners from the points          */
+#define EXPLAINED     0.5 /* spacings from points to surface, in a frame that is heard  */
+#define LEAN_LONGER   1.4 /* the same, for faces that go with those beside them          */
+#define LEAN_SPACINGS 0.6
+#define FRAMES_LEAST  3   /* that speak against a face                                  */
+#define SEEDS_LEAST   2   /* faces of a patch that are spoken against                   */
+#define BORDER_NEAR   0.7 /* times the faces' distance from the points, for the border around them */
+#define SAVED_LEAST   0.7 /* the new faces' area, at most, of the patch in its worst pose */
+#define LOOPS_LEAST   2   /* of its border: a tube between two parts; a cap or a crease is left */
+#define TIDY_ROUNDS   10
+#define ISLAND_MOST   0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
+#define PATCH_MOST    0.2  /* of the faces: more is no weld but a surface that fits nowhere */
 
 static const npg_tracker_settings weld_tracking = {
     .nodes = 250, .samples = 2000, .steps = 12, .stiffness = 0.01, .along = 0.1};
@@ -28,6 +30,7 @@ typedef struct hearing {
     const npg_weld_settings *settings;
     const npg_mesh *mesh;
     uint8_t *against; /* F: frames that speak against a face                 */
+    uint8_t *leaning; /* F: frames that do so or nearly                      */
     double *dist_sum; /* V: over the heard frames                            */
     float *poses;     /* frames x V x 3: the mesh in the heard frames        */
     size_t frames, room;
@@ -49,14 +52,18 @@ static double edge_growth(const float *rest, const float *now, uint32_t a, uint3
     return before > 0 ? sqrt(after / before) : 0;
 }
 
-static bool is_against(const hearing *h, const float *now, const uint32_t face[3])
+/* Count what a frame says of a face: `against`, and with half the distance and less growth, `leaning`. */
+static void count_face(hearing *h, size_t f, const float *now)
 {
+    const uint32_t *face = h->mesh->faces + 3 * f;
     double growth = 0, dist = 0;
     for (int k = 0; k < 3; k++) {
         growth = fmax(growth, edge_growth(h->mesh->vert_pos, now, face[k], face[(k + 1) % 3]));
         dist += sqrt((double)h->dist_sq[face[k]]) / 3;
     }
-    return growth >= LONGER && dist > FAR_SPACINGS * h->settings->spacing_unit;
+    dist /= h->settings->spacing_unit;
+    h->against[f] += growth >= LONGER && dist > FAR_SPACINGS;
+    h->leaning[f] += growth >= LEAN_LONGER && dist > LEAN_SPACINGS;
 }
 
 static npg_status hear(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
@@ -73,8 +80,7 @@ static npg_status hear(void *user, const npg_sight *sight, const float *vert_uni
     npg_kdtree_close(&tree);
     NPG_TRY(status);
     for (size_t i = 0; i < v; i++) h->dist_sum[i] += sqrt((double)h->dist_sq[i]);
-    for (size_t f = 0; f < h->mesh->face_count; f++)
-        h->against[f] += is_against(h, vert_unit, h->mesh->faces + 3 * f);
+    for (size_t f = 0; f < h->mesh->face_count; f++) count_face(h, f, vert_unit);
     memcpy(h->poses + h->frames++ * v * 3, vert_unit, v * 3 * sizeof(float));
     return NPG_OK;
 }
@@ -84,6 +90,7 @@ static npg_status open_hearing(hearing *h, size_t room)
     size_t v = h->mesh->vert_count;
     h->room = room;
     NPG_TRY(npg_alloc_array(&h->against, NPG_FOR_MESH, h->mesh->face_count, 1));
+    NPG_TRY(npg_alloc_array(&h->leaning, NPG_FOR_MESH, h->mesh->face_count, 1));
     NPG_TRY(npg_alloc_array(&h->dist_sum, NPG_FOR_MESH, v, sizeof *h->dist_sum));
     NPG_TRY(npg_alloc_array(&h->dist_sq, NPG_FOR_MESH, v, sizeof *h->dist_sq));
     NPG_TRY(npg_alloc_array(&h->near, NPG_FOR_MESH, v, sizeof *h->near));
@@ -93,6 +100,7 @@ static npg_status open_hearing(hearing *h, size_t room)
 static void close_hearing(hearing *h)
 {
     npg_release(&h->against);
+    npg_release(&h->leaning);
     npg_release(&h->dist_sum);
     npg_release(&h->dist_sq);
     npg_release(&h->near);
@@ -222,7 +230,10 @@ static npg_status gather(patches *p, const hearing *h)
     NPG_TRY(npg_alloc(&p->is_near, NPG_FOR_MESH, mesh->vert_count));
     NPG_TRY(npg_alloc_array(&p->of_vert, NPG_FOR_MESH, mesh->vert_count, sizeof *p->of_vert));
     NPG_TRY(npg_alloc_array(&p->of_face, NPG_FOR_MESH, mesh->face_count, sizeof *p->of_face));
-    for (size_t f = 0; f < mesh->face_count; f++) seeds += p->is_in[f] = h->against[f] >= FRAMES_LEAST;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        seeds += h->against[f] >= FRAMES_LEAST;
+        p->is_in[f] = h->leaning[f] >= FRAMES_LEAST;
+    }
     if (!seeds) return NPG_OK;
     widen(p, mesh);
     NPG_TRY(tidy(p, mesh));
@@ -305,24 +316,29 @@ static npg_status fill_loops(cutting *c, double *area, size_t *loop_count, bool 
     return NPG_OK;
 }
 
-/* Enough faces that are spoken against, and a border that lies much nearer the points than they do. */
+static size_t count_seeds(const cutting *c, uint32_t patch)
+{
+    size_t seeds = 0;
+    for (size_t f = 0; f < c->hearing->mesh->face_count; f++)
+        seeds += c->patches->of_face[f] == patch && c->hearing->against[f] >= FRAMES_LEAST;
+    return seeds;
+}
+
+/* Whether the border lies much nearer the points than the faces that are spoken against. */
 static bool is_worth(const cutting *c, uint32_t patch)
 {
     const hearing *h = c->hearing;
-    const patches *p = c->patches;
-    size_t seeds = 0, border = 0;
+    size_t seeds = count_seeds(c, patch), border = 0;
     double border_dist = 0, seed_dist = 0;
-    for (size_t f = 0; f < h->mesh->face_count; f++) {
-        if (p->of_face[f] != patch || h->against[f] < FRAMES_LEAST) continue;
-        seeds++;
-        for (size_t k = 0; k < 3; k++) seed_dist += h->dist_sum[h->mesh->faces[3 * f + k]] / 3;
-    }
+    for (size_t f = 0; f < h->mesh->face_count; f++)
+        for (size_t k = 0; k < 3 && c->patches->of_face[f] == patch && h->against[f] >= FRAMES_LEAST; k++)
+            seed_dist += h->dist_sum[h->mesh->faces[3 * f + k]] / 3;
     for (size_t v = 0; v < h->mesh->vert_count; v++) {
         if (c->next[v] == UINT32_MAX) continue;
         border++;
         border_dist += h->dist_sum[v];
     }
-    return seeds >= SEEDS_LEAST && border_dist * (double)seeds < BORDER_NEAR * seed_dist * (double)border;
+    return border_dist * (double)seeds < BORDER_NEAR * seed_dist * (double)border;
 }
 
 /* ---- all of them ---- */
@@ -427,6 +443,7 @@ static npg_status cut_patch(cutting *c, npg_weld_cut *done, uint32_t patch)
 {
     size_t before = c->new_count;
     bool is_cut;
+    if (count_seeds(c, patch) < SEEDS_LEAST) return NPG_OK;
     NPG_TRY(try_patch(&is_cut, c, done, patch));
     size_t count = mark_cut(c, patch, is_cut);
     if (is_cut) {

@@ -2,13 +2,13 @@
  *
  * The reference is followed through the other frames (sights.h).  A face speaks against itself in a frame
  * when its longest edge is there twice as long as in the reference and its corners lie far from every point,
- * in a frame that the surface explains on the whole.  Patches of faces that do so in three frames or more are
- * cut where the surface around them lies on the points, and the holes are closed in the pose that stretched
- * the patch most, where its sides are apart.  Only tubes are cut, patches with two border loops or more,
- * which takes a handle from the mesh: a crease that was closed too far can't be told from a part that was
- * followed badly, so it stays (apart.h and choose.h see to those).  The result is closed and oriented where
- * the mesh was; a cut that can't be closed so, that would save little area or that would leave the mesh in
- * pieces, is not made.
+ * in a frame that the surface explains on the whole; faces beside it that nearly do go with it.  Patches of
+ * faces that do so in three frames or more are cut where the surface around them lies on the points, and the
+ * holes are closed in the pose that stretched the patch most, where its sides are apart.  Only tubes are cut,
+ * patches with two border loops or more, which takes a handle from the mesh: a crease that was closed too far
+ * can't be told from a part that was followed badly, so it stays (apart.h and choose.h see to those).  The
+ * result is closed and oriented where the mesh was; a cut that can't be closed so, that would save little
+ * area or that would leave the mesh in pieces, is not made.
  */
 #ifndef NPG_WELD_H
 #define NPG_WELD_H
