@@ -14,6 +14,10 @@ const npg_option npg_run_options[] = {
     {"input",
      "Folder, pattern (frame_%04d.ply), list file, or - for standard input; empty: frames are pushed",
      NPG_OPTION_TEXT, OFFSET(input), "", 0, 0, NULL, "PATH"},
+    {"follow",
+     "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): its files are frames as they are "
+     "complete; takes the place of the input",
+     NPG_OPTION_TEXT, OFFSET(follow), "", 0, 0, NULL, "DIR"},
     {"output", "Folder for the results; empty: results are only pulled", NPG_OPTION_TEXT, OFFSET(output), "",
      0, 0, NULL, "DIR"},
     {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "paper", 0, 0, "paper",
@@ -273,6 +277,18 @@ static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
     return check_chain(run);
 }
 
+/* Files, or a live source: standard input, a folder that grows, frames that are pushed. */
+static npg_status open_source(npg_run *run)
+{
+    const char *input = run->settings.input, *follow = run->settings.follow;
+    if (input[0] && follow[0])
+        return npg_error(NPG_USAGE,
+                         "frames come either from the input %s or from the folder %s that is followed", input,
+                         follow);
+    run->facts.is_live = follow[0] || !input[0] || !strcmp(input, "-");
+    return input[0] || follow[0] ? NPG_OK : npg_ring_open(&run->feed, (size_t)run->settings.ring_capacity);
+}
+
 static npg_status fill_run(npg_run *run, const npg_options *options, const npg_hooks *hooks,
                            const npg_stage *const *chain)
 {
@@ -288,10 +304,9 @@ static npg_status fill_run(npg_run *run, const npg_options *options, const npg_h
     json_object_set(run->report, "warnings", run->warnings);
     run->facts.frame_count = -1;
     run->facts.bounds_local = npg_bounds_empty();
-    run->facts.is_live = !run->settings.input[0] || !strcmp(run->settings.input, "-");
+    NPG_TRY(open_source(run));
     if (!run->settings.output[0] && !run->settings.pull)
         return npg_error(NPG_USAGE, "neither an output folder nor pull = yes: the results would be lost");
-    if (!run->settings.input[0]) NPG_TRY(npg_ring_open(&run->feed, (size_t)run->settings.ring_capacity));
     if (run->settings.pull) NPG_TRY(npg_ring_open(&run->results, (size_t)run->settings.ring_capacity));
     npg_memory_set_limit((size_t)run->settings.max_memory_mib << 20);
     return open_chain(run, chain);
@@ -400,13 +415,20 @@ static npg_status frame_of_cloud(npg_frame *frame, npg_run *run, const npg_cloud
     return NPG_OK;
 }
 
+static npg_status refuse_push(const npg_run *run)
+{
+    const npg_settings *settings = &run->settings;
+    return npg_error(NPG_USAGE, "this run reads its frames from %s",
+                     settings->input[0] ? settings->input : settings->follow);
+}
+
 npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
 {
     npg_frame frame = {0};
     npg_chunk *chunk = NULL;
     NPG_REQUIRE(run && cloud && cloud->struct_size >= sizeof *cloud &&
                 (cloud->points || !cloud->point_count));
-    if (!run->feed) return npg_error(NPG_USAGE, "this run reads its frames from %s", run->settings.input);
+    if (!run->feed) return refuse_push(run);
     if (cloud->number <= run->pushed_number)
         return npg_error(NPG_USAGE, "frame %lld was pushed after frame %lld", (long long)cloud->number,
                          (long long)run->pushed_number);
@@ -425,7 +447,7 @@ npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
 npg_status npg_run_finish(npg_run *run)
 {
     NPG_REQUIRE(run);
-    if (!run->feed) return npg_error(NPG_USAGE, "this run reads its frames from %s", run->settings.input);
+    if (!run->feed) return refuse_push(run);
     npg_ring_end(run->feed);
     return NPG_OK;
 }
