@@ -10,6 +10,7 @@ typedef struct npg_adam {
     npg_buffer first, second, rate; /* moments [count], learning rates [ceil(count / row)] */
     size_t count, row;
     double beta1, beta2, epsilon;
+    double scale; /* of all learning rates, 1 at first */
     int64_t step; /* steps done */
 } npg_adam;
 

@@ -26,5 +26,6 @@ const npg_kernel_case npg_kernel_cases[] = {
     {"transform, exponential", npg_check_exponential, npg_slope_exponential, 2e-5},
     {"nearest", npg_check_nearest, NULL, 1e-6},
     {"chamfer", npg_check_chamfer, npg_slope_chamfer, 2e-5},
+    {"pull", npg_check_pull, npg_slope_pull, 2e-5},
     {"isometry", npg_check_isometry, npg_slope_isometry, 2e-5},
     {0}};

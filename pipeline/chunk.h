@@ -19,6 +19,7 @@ enum {
     NPG_FIELD_KEY = 1 << 2,       /* run facts: box, keyframe and order known  */
     NPG_FIELD_REFERENCE = 1 << 3, /* run facts: the reference mesh           */
     NPG_FIELD_VERTICES = 1 << 4,  /* vert_unit                               */
+    NPG_FIELD_POSE = 1 << 6,      /* vert_unit, coarsely aligned               */
     NPG_FIELD_FIGURES = 1 << 5    /* figures                                 */
 };
 

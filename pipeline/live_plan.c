@@ -83,7 +83,8 @@ int64_t npg_live_frame(const npg_plan *plan, int64_t i)
     int64_t in_key = key.last - key.first + 1;
     assert(i >= 0);
     if (i == 0) return plan->key;
-    if (i < in_key) return key.first + (i <= plan->key - key.first ? i - 1 : i);
+    if (plan->key + i <= key.last) return plan->key + i;
+    if (i < in_key) return key.last - i;
     i -= in_key;
     return i < key.first ? key.first - 1 - i : key.last + 1 + (i - key.first);
 }

@@ -63,7 +63,8 @@ int64_t npg_plan_frame(const npg_plan *plan, int64_t i)
     assert(i >= 0 && i < plan->frame_count);
     int64_t in_key = key.last - key.first + 1;
     if (i == 0) return plan->key;
-    if (i < in_key) return key.first + (i <= plan->key - key.first ? i - 1 : i);
+    if (plan->key + i <= key.last) return plan->key + i;
+    if (i < in_key) return key.last - i;
     i -= in_key;
     int64_t forward_frames = plan->frame_count - 1 - key.last;
     return i < forward_frames ? key.last + 1 + i : key.first - 1 - (i - forward_frames);

@@ -25,8 +25,9 @@ typedef struct npg_window {
 int64_t npg_plan_window_count(const npg_plan *plan);
 npg_window npg_plan_window(const npg_plan *plan, int64_t i);
 
-/* The i-th frame to read (0 <= i < T): the keyframe first, then each window's new frames, nearest to the
- * solved ones first.  Every frame comes once. */
+/* The i-th frame to read (0 <= i < T): the keyframe first, then those after it in window 0 and
+ * those before it, then each window's new frames; each next to one that came before.  Every frame comes once.
+ */
 int64_t npg_plan_frame(const npg_plan *plan, int64_t i);
 
 #endif

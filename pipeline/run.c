@@ -20,8 +20,8 @@ const npg_option npg_run_options[] = {
      NPG_OPTION_TEXT, OFFSET(follow), "", 0, 0, NULL, "DIR"},
     {"output", "Folder for the results; empty: results are only pulled", NPG_OPTION_TEXT, OFFSET(output), "",
      0, 0, NULL, "DIR"},
-    {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "paper", 0, 0, "paper",
-     NULL},
+    {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "default", 0, 0,
+     "default|paper", NULL},
     {"device", "OpenCL device: part of its name, its number, or auto (neupig doctor lists them)",
      NPG_OPTION_TEXT, OFFSET(device), "auto", 0, 0, NULL, "DEVICE"},
     {"seed", "Seed of all random numbers", NPG_OPTION_INT, OFFSET(seed), "0", 0, 4294967295.0, NULL, NULL},
@@ -183,7 +183,8 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
 static void announce_memory(npg_run *run)
 {
     const npg_facts *facts = &run->facts;
-    size_t frame_bytes = facts->point_count_max * 6 * sizeof(float);
+    size_t verts = npg_worker_verts_at_most(&run->workers[0]);
+    size_t frame_bytes = facts->point_count_max * 6 * sizeof(float) + verts * 3 * sizeof(float);
     size_t chunk_bytes = frame_bytes * (size_t)run->settings.chunk_frames;
     size_t rings = 0, held = 0, stages = 0;
     json_t *parts = json_object();

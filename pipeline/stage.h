@@ -81,6 +81,10 @@ const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);
 
+/* Vertices of the reference mesh; before it is known, as many as the option faces and the points let it have.
+ */
+size_t npg_worker_verts_at_most(const npg_worker *worker);
+
 /* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called
  * on the thing when the run closes. */
 void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing));

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "clock.h"
@@ -38,6 +39,16 @@ json_t *npg_worker_report(npg_worker *worker)
 json_t *npg_worker_whole_report(npg_worker *worker)
 {
     return worker->run->report;
+}
+
+size_t npg_worker_verts_at_most(const npg_worker *worker)
+{
+    const npg_facts *facts = &worker->run->facts;
+    const char *text = npg_options_get(worker->run->options, "faces");
+    size_t faces = text ? (size_t)strtoull(text, NULL, 10) : 0, by_points = 4 * facts->point_count_max;
+    if (facts->reference) return facts->reference->vert_count;
+    if (by_points && faces > by_points) faces = by_points;
+    return faces ? faces / 2 + 2 : 0; /* a closed mesh has half as many vertices as faces */
 }
 
 void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing))

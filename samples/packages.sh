@@ -1,3 +1,4 @@
+# shellcheck shell=bash disable=SC2034
 # The Debian 12 packages this project needs, and how they come onto the machine.  Read by samples/run.sh and
 # tests/run.sh: this is the only list.
 

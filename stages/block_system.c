@@ -74,7 +74,8 @@ static double *block_of(npg_block_system *s, uint32_t a, uint32_t b)
 static void add_product(double *block, const double *a, const double *b)
 {
     for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++) block[6 * i + j] += a[i] * b[j] + a[6 + i] * b[6 + j] + a[12 + i] * b[12 + j];
+        for (int j = 0; j < 6; j++)
+            block[6 * i + j] += a[i] * b[j] + a[6 + i] * b[6 + j] + a[12 + i] * b[12 + j];
 }
 
 void npg_block_add(npg_block_system *s, const uint32_t *nodes, const double (*jacobians)[18], size_t count,
@@ -139,7 +140,8 @@ static void multiply(const npg_block_system *s, double *y, const double *x)
             y[6 * k + i] = sum;
         }
     for (size_t e = 0; e < s->pair_count; e++) {
-        const double *m = s->off + 36 * e, *xa = x + 6 * (size_t)s->pairs[e][0], *xb = x + 6 * (size_t)s->pairs[e][1];
+        const double *m = s->off + 36 * e, *xa = x + 6 * (size_t)s->pairs[e][0],
+                     *xb = x + 6 * (size_t)s->pairs[e][1];
         double *ya = y + 6 * (size_t)s->pairs[e][0], *yb = y + 6 * (size_t)s->pairs[e][1];
         for (int i = 0; i < 6; i++) {
             double sum = 0;

@@ -2,16 +2,25 @@
 #include "stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
-    npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
+    npg_stage_align, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
 
 const npg_stage *const npg_chain[] = {
     &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points          */
     &npg_stage_outlier,  /* drops what is no surface, makes or mends normals               */
     &npg_stage_keyframe, /* box, keyframe, plan of the windows                            */
     &npg_stage_mesh,     /* the reference surface of the keyframe                         */
+    &npg_stage_align,    /* the reference brought coarsely into each frame                 */
     &npg_stage_optimize, /* its deformation in every frame                                */
     &npg_stage_evaluate, /* figures and a verdict per frame                               */
     &npg_stage_export,   /* meshes, report, the last word                                 */
     NULL};
 
-const npg_preset npg_presets[] = {{NULL, NULL, NULL}};
+static const npg_preset_value paper[] = {{"align", "no"},   {"window", "0"},
+                                         {"epochs", "250"}, {"confidence", "cumulative"},
+                                         {"rate-end", "1"}, {"feature-start", "0"}, {NULL, NULL}};
+static const npg_preset_value none[] = {{NULL, NULL}};
+
+const npg_preset npg_presets[] = {
+    {"default", "coarse alignment, then windows of few samples", none},
+    {"paper", "the method as the paper has it: every vertex, from the reference, one joint window", paper},
+    {NULL, NULL, NULL}};

@@ -40,6 +40,8 @@ static bool is_program(const char *path)
 static npg_status find_program(char path[4096], const char *name)
 {
     char self[3072];
+    snprintf(path, 4096, "%s", name);
+    if (*name == '/') return is_program(name) ? NPG_OK : npg_error(NPG_FAILED, "%s is no program", name);
     ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
     self[length > 0 ? length : 0] = 0;
     char *slash = strrchr(self, '/');

@@ -7,7 +7,8 @@
 #include "status.h"
 
 typedef struct npg_child_job {
-    const char *program;  /* name of the helper, "neupig-poisson"; looked for beside this program, in its
+    const char *program;  /* name of the helper, "neupig-poisson", or an absolute path; a name is looked for
+                             beside this program, in its
                              ../libexec/neupig, where it was installed and where it was built */
     const void *input[2]; /* written one after the other, then standard input is closed */
     size_t input_size[2];

@@ -195,8 +195,9 @@ npg_status npg_clean_check(const npg_frame *frame)
                                     d[0] * d[1], d[0] * d[2], d[1] * d[2]};
         for (int k = 0; k < 6; k++) m[k] += products[k] / n;
     }
-    double trace = m[0] + m[1] + m[2];
-    if (!(trace > 0)) return npg_error(NPG_BAD_INPUT, "all %zu points are in one place", frame->point_count);
+    double trace = m[0] + m[1] + m[2], far_sq = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2];
+    if (!(trace > 1e-24 * far_sq)) /* the mean itself is rounded */
+        return npg_error(NPG_BAD_INPUT, "all %zu points are in one place", frame->point_count);
     for (int k = 0; k < 6; k++) m[k] /= trace;
     double minors = m[0] * m[1] + m[0] * m[2] + m[1] * m[2] - m[3] * m[3] - m[4] * m[4] - m[5] * m[5];
     double determinant = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4]) +

@@ -335,7 +335,8 @@ static void uninit(npg_worker *worker)
     npg_release(&state->bad);
 }
 
-/* Points, hits and distances; the k-d tree holds about as much again.  The surface counts its own. */
+/* Points, hits and distances, with the k-d tree about as much again; per vertex of the reference the shape,
+ * the surface and its search tree. */
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const evaluate_state *state = npg_worker_state(worker);
@@ -343,7 +344,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t points = facts->point_count_max, limit = (size_t)state->point_limit;
     if (limit && points > limit) points = limit;
     *chunks_held = 1;
-    return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float));
+    return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
+           600 * npg_worker_verts_at_most(worker);
 }
 
 #define OFFSET(member) offsetof(evaluate_state, member)

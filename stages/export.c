@@ -156,6 +156,18 @@ static npg_status check_numbers(npg_worker *worker)
 
 /* ---- solving pass ---- */
 
+/* About what the meshes take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be told. */
+static uint64_t bytes_of_meshes(const npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
+    uint64_t verts = npg_worker_verts_at_most(worker), per_vert = state->format ? 30 : 12;
+    if (facts->frame_count < 0 || (reference && reference[0])) return 0;
+    if (state->with_normals) per_vert *= 2;
+    return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (state->format ? 20 : 13));
+}
+
 static npg_status prepare_folder(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
@@ -163,6 +175,7 @@ static npg_status prepare_folder(npg_worker *worker)
     char *meshes;
     if (npg_worker_facts(worker)->is_live && !state->overwrite)
         NPG_TRY(npg_folder_check(output, &state->names, NULL, 0));
+    NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     NPG_TRY(npg_folder_clear(output));
     NPG_TRY(npg_join_path(&meshes, output, "meshes"));
     npg_status status = npg_make_folder(meshes);
@@ -359,13 +372,13 @@ static void uninit(npg_worker *worker)
     npg_release(&state->vert_normals);
 }
 
+/* A place per frame in the list; coordinates, normals and two faces per vertex; the buffers of two files. */
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
-    const npg_facts *facts = npg_worker_facts(worker);
-    const npg_mesh *reference = facts->reference;
+    int64_t frame_count = npg_worker_facts(worker)->frame_count;
     *chunks_held = 1;
-    size_t frame_list = (size_t)(facts->frame_count > 0 ? facts->frame_count : 0) * 24;
-    return frame_list + (reference ? reference->vert_count * 36 + reference->face_count * 12 : 0);
+    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + 60 * npg_worker_verts_at_most(worker) +
+           (512 << 10);
 }
 
 #define OFFSET(member) offsetof(export_state, member)

@@ -30,6 +30,10 @@ int npg_number_width(int64_t number_max);
 /* Make OUT and see that bytes can be written into it, by writing and removing some.  NPG_DISK. */
 npg_status npg_folder_probe(const char *output);
 
+/* NPG_DISK when fewer bytes than these are free where OUT lies, with those of the earlier mesh files in OUT
+ * that will be removed. */
+npg_status npg_folder_has_room(const char *output, uint64_t bytes);
+
 /* NPG_USAGE when OUT/meshes holds mesh files that this run would not write over: their numbering would mix
  * with the run's.  numbers: the frames' numbers, sorted; with none every mesh file is in the way. */
 npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,

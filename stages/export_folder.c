@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include "export.h"
@@ -62,9 +64,9 @@ static bool is_mesh_name(const char *name, int64_t *number)
 }
 
 /* Call visit(user, folder, name, number) for each mesh file; a folder that does not exist has none. */
-typedef npg_status visit_mesh(const void *user, const char *folder, const char *name, int64_t number);
+typedef npg_status visit_mesh(void *user, const char *folder, const char *name, int64_t number);
 
-static npg_status each_mesh(const char *output, visit_mesh *visit, const void *user)
+static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
 {
     char *folder;
     int64_t number;
@@ -91,7 +93,7 @@ typedef struct own_meshes {
     size_t number_count;
 } own_meshes;
 
-static npg_status refuse_foreign(const void *user, const char *folder, const char *name, int64_t number)
+static npg_status refuse_foreign(void *user, const char *folder, const char *name, int64_t number)
 {
     const own_meshes *own = user;
     char own_name[NPG_MESH_NAME_SIZE];
@@ -112,6 +114,34 @@ npg_status npg_folder_check(const char *output, const npg_mesh_names *names, con
     return each_mesh(output, refuse_foreign, &(own_meshes){names, numbers, number_count});
 }
 
+/* ---- room ---- */
+
+static npg_status add_size(void *user, const char *folder, const char *name, int64_t number)
+{
+    uint64_t *sum = user;
+    struct stat info;
+    char *path;
+    (void)number;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    if (!stat(path, &info)) *sum += (uint64_t)info.st_size;
+    npg_release(&path);
+    return NPG_OK;
+}
+
+npg_status npg_folder_has_room(const char *output, uint64_t bytes)
+{
+    struct statvfs info;
+    uint64_t old_bytes = 0;
+    NPG_TRY(each_mesh(output, add_size, &old_bytes));
+    bytes -= old_bytes < bytes ? old_bytes : bytes;
+    if (statvfs(output, &info)) return npg_error_errno(NPG_DISK, "can't look at the disk of %s", output);
+    uint64_t block = info.f_frsize ? info.f_frsize : 1;
+    if (bytes / block <= info.f_bavail) return NPG_OK;
+    return npg_error(NPG_DISK, "%s: the results take about %llu MiB, but only %llu MiB are free", output,
+                     (unsigned long long)(bytes >> 20),
+                     (unsigned long long)((double)info.f_bavail * (double)block / 1048576));
+}
+
 /* ---- removing ---- */
 
 static npg_status remove_file(const char *folder, const char *name)
@@ -124,7 +154,7 @@ static npg_status remove_file(const char *folder, const char *name)
     return status;
 }
 
-static npg_status remove_mesh(const void *user, const char *folder, const char *name, int64_t number)
+static npg_status remove_mesh(void *user, const char *folder, const char *name, int64_t number)
 {
     (void)user;
     (void)number;

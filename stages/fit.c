@@ -27,6 +27,7 @@ struct npg_fit {
     npg_device *device;   /* loan */
     size_t real, rows;    /* V, V padded to blocks */
     uint32_t *order;      /* order[i]: vertex of the reference at row i; Morton order; owned */
+    uint32_t *row_of;     /* its inverse, owned */
     float *rest;          /* V x 3 in that order, owned */
     uint32_t (*edges)[2]; /* between rows, owned */
     size_t edge_count;
@@ -43,6 +44,7 @@ struct npg_fit {
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
+    bool is_pulled;                     /* by known correspondences, from bases */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
     size_t *rank;                       /* its inverse */
     int64_t *index;                     /* by k */
@@ -103,7 +105,6 @@ static void choose_levels(npg_levels *levels, const npg_fit_settings *s)
 
 static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **normals)
 {
-    uint32_t *row_of;
     NPG_TRY(npg_alloc_array(&fit->order, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
     NPG_TRY(npg_alloc_array(&fit->rest, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(normals, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
@@ -113,11 +114,10 @@ static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **norm
         (*normals)[i] = mesh->vert_normals[3 * fit->order[i / 3] + i % 3];
     }
     NPG_TRY(npg_mesh_edges(&fit->edges, &fit->edge_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_alloc_array(&row_of, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
-    for (size_t i = 0; i < fit->real; i++) row_of[fit->order[i]] = (uint32_t)i;
+    NPG_TRY(npg_alloc_array(&fit->row_of, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
+    for (size_t i = 0; i < fit->real; i++) fit->row_of[fit->order[i]] = (uint32_t)i;
     for (size_t e = 0; e < 2 * fit->edge_count; e++)
-        fit->edges[e / 2][e % 2] = row_of[fit->edges[e / 2][e % 2]];
-    npg_release(&row_of);
+        fit->edges[e / 2][e % 2] = fit->row_of[fit->edges[e / 2][e % 2]];
     return NPG_OK;
 }
 
@@ -135,6 +135,21 @@ static npg_status open_grid_adam(npg_fit *fit)
     return status;
 }
 
+/* Features that differ from place to place from the start; with a head of zero the motion still begins at rest. */
+static npg_status draw_features(npg_fit *fit)
+{
+    float *values;
+    size_t count = fit->levels.row_count * NPG_LATENT_CHANNELS;
+    npg_random random = npg_random_stream(fit->seed, 2, 0);
+    if (fit->settings.feature_start <= 0) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_FIT, count, sizeof *values));
+    for (size_t i = 0; i < count; i++)
+        values[i] = (float)(fit->settings.feature_start * (2 * npg_random_real(&random) - 1));
+    npg_status status = npg_buffer_write(&fit->u, 0, values, count * sizeof *values);
+    npg_release(&values);
+    return status;
+}
+
 static npg_status open_grids(npg_fit *fit, const float *normals)
 {
     npg_samples samples;
@@ -147,6 +162,7 @@ static npg_status open_grids(npg_fit *fit, const float *normals)
     NPG_TRY(npg_buffer_open(&fit->u, fit->device, bytes));
     NPG_TRY(npg_buffer_open(&fit->nodes, fit->device, bytes));
     NPG_TRY(npg_buffer_open(&fit->dnodes, fit->device, bytes));
+    NPG_TRY(draw_features(fit));
     return open_grid_adam(fit);
 }
 
@@ -233,6 +249,7 @@ void npg_fit_close(npg_fit **slot)
     npg_time_code_close(&fit->time_code);
     npg_release(&fit->params);
     npg_release(&fit->order);
+    npg_release(&fit->row_of);
     npg_release(&fit->rest);
     npg_release(&fit->edges);
     npg_release(slot);
@@ -292,34 +309,79 @@ static npg_status copy_target(npg_target *target, const npg_fit_frame *frame)
     return status;
 }
 
-static npg_status open_motion(npg_fit *fit, const npg_fit_frame *frames, size_t count)
+static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
+{
+    return npg_motion_open(&fit->motion, fit->device, (npg_rotation)fit->settings.rotation, fit->rest,
+                           fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count, targets,
+                           fit->frame_count);
+}
+
+static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
 {
     npg_target *targets;
+    size_t count = fit->frame_count;
     NPG_TRY(npg_alloc_array(&targets, NPG_FOR_FIT, count, sizeof *targets));
     npg_status status = NPG_OK;
     for (size_t k = 0; k < count && !status; k++) status = copy_target(&targets[k], &frames[fit->place[k]]);
-    if (!status)
-        status = npg_motion_open(&fit->motion, fit->device, (npg_rotation)fit->settings.rotation, fit->rest,
-                                 fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count,
-                                 targets, count);
+    if (!status) status = open_motion_on(fit, targets);
     for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
     npg_release(&targets);
     return status;
 }
 
-static npg_status open_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+/* The bases in the order of rows and outward. */
+static npg_status open_bases(npg_fit *fit, const npg_fit_frame *frames)
 {
+    float *bases;
+    size_t size = 3 * fit->real;
+    NPG_TRY(open_motion_on(fit, NULL));
+    NPG_TRY(npg_alloc_array(&bases, NPG_FOR_FIT, fit->frame_count, size * sizeof(float)));
+    for (size_t k = 0; k < fit->frame_count; k++)
+        for (size_t i = 0; i < size; i++)
+            bases[k * size + i] = frames[fit->place[k]].base[3 * fit->order[i / 3] + i % 3];
+    npg_status status = npg_motion_set_bases(&fit->motion, bases);
+    npg_release(&bases);
+    return status;
+}
+
+npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+{
+    NPG_REQUIRE(fit && frames && count);
     npg_mlp_shape shape = shape_of(&fit->settings);
     size_t batch = (size_t)fit->settings.batch < count ? (size_t)fit->settings.batch : count;
     close_window(fit);
     fit->frame_count = count;
+    fit->is_pulled = frames[0].base != NULL;
     NPG_TRY(alloc_window(fit, count));
     sort_outward(fit, frames, count, key);
     NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count, batch));
     NPG_TRY(npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float)));
     if (npg_time_code_learns(fit->time_code))
         NPG_TRY(npg_buffer_open(&fit->dcode, fit->device, count * shape.code_size * sizeof(float)));
-    return open_motion(fit, frames, count);
+    return fit->is_pulled ? open_bases(fit, frames) : open_targets(fit, frames);
+}
+
+npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start)
+{
+    npg_pull *sorted;
+    int32_t *starts;
+    size_t count = fit->frame_count, at = 0;
+    NPG_REQUIRE(fit->is_pulled && start[count] < INT32_MAX);
+    NPG_TRY(npg_alloc_array(&sorted, NPG_FOR_FIT, start[count] + 1, sizeof *sorted));
+    npg_status status = npg_alloc_array(&starts, NPG_FOR_FIT, count + 1, sizeof *starts);
+    for (size_t k = 0; k < count && !status; k++) {
+        size_t from = fit->place[k];
+        for (size_t i = start[from]; i < start[from + 1]; i++) {
+            for (int c = 0; c < 3; c++) pulls[i].vertex[c] = (int32_t)fit->row_of[pulls[i].vertex[c]];
+            sorted[at++] = pulls[i];
+        }
+        starts[k + 1] = (int32_t)at;
+        fit->has_points[k] = start[from + 1] > start[from];
+    }
+    if (!status) status = npg_motion_set_pulls(&fit->motion, sorted, starts);
+    npg_release(&sorted);
+    npg_release(&starts);
+    return status;
 }
 
 /* ---- one epoch ---- */
@@ -349,7 +411,8 @@ static npg_status do_batch(npg_fit *fit, npg_weights *weights, size_t first, siz
     double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
     NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
     NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
-    NPG_TRY(npg_motion_chamfer(&fit->motion, s->alpha, first, count));
+    NPG_TRY(fit->is_pulled ? npg_motion_pull(&fit->motion, first, count)
+                           : npg_motion_chamfer(&fit->motion, s->alpha, first, count));
     NPG_TRY(npg_buffer_read(&fit->motion.cd, first * sizeof(float), fit->cd + first, count * sizeof(float)));
     NPG_TRY(check_losses(fit, first, count, epoch));
     for (size_t k = first; k < first + count; k++)
@@ -427,13 +490,18 @@ static npg_status decode(npg_fit *fit)
     return npg_device_finish(fit->device);
 }
 
-npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
-                          npg_fit_watch *watch, void *user)
+/* Half a cosine from 1 down to rate_end. */
+static double rate_at(const npg_fit_settings *s, int64_t epoch)
 {
-    NPG_REQUIRE(fit && frames && count);
-    NPG_TRY(open_window(fit, frames, count, key));
-    npg_fit_step step = {.epochs = fit->settings.epochs};
-    for (step.epoch = 0; step.epoch < step.epochs; step.epoch++) {
+    double part = s->epochs > 1 ? (double)epoch / (double)(s->epochs - 1) : 0;
+    return s->rate_end + (1 - s->rate_end) * 0.5 * (1 + cos(M_PI * part));
+}
+
+npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
+{
+    npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
+    for (; step.epoch < end; step.epoch++) {
+        fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step.epoch);
         NPG_TRY(do_epoch(fit, &step));
         if (watch) NPG_TRY(watch(user, &step));
     }

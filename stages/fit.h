@@ -37,23 +37,28 @@ typedef struct npg_fit_settings {
     double lambda, lambda_growth, grid_rate, grid_rate_growth;
     double mlp_rate, slope, isometry, alpha;
     int64_t width_1, width_2;
-    int64_t batch; /* frames whose hidden layer is kept at a time */
+    double rate_end; /* learning rates at the last epoch, as a share; they fall by half a cosine */
+    double feature_start; /* grid features begin evenly spread over +- this before smoothing; paper: 0 */
+    int64_t batch;   /* frames whose hidden layer is kept at a time */
 } npg_fit_settings;
 
 /* The values that the options have now (table of the optimize stage). */
 void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *options);
 
-/* One frame of a window. */
+/* One frame of a window.  All frames of a window have points (and follow by Chamfer distance), or all have
+ * bases (and follow by pulls). */
 typedef struct npg_fit_frame {
     int64_t index;       /* place in time; |index - key| orders the confidence               */
-    double time;         /* what the time code is a function of, 0..1 over the whole capture */
-    const float *points; /* N x 3, unit, finite; a loan during npg_fit_window                */
-    size_t count;        /* N; 0: no points, the frame follows from the others                */
+    double time;         /* what the time code is a function of, 0..1 over the window        */
+    const float *points; /* N x 3, unit, finite; a loan during npg_fit_begin                 */
+    size_t count;        /* N; 0: no points, the frame follows from the others               */
+    const float *base; /* V x 3: positions that the decoder moves, or NULL: the reference; a loan likewise */
 } npg_fit_frame;
 
 typedef struct npg_fit npg_fit;
 
-/* How an epoch went: mean unweighted Chamfer of the frames with points, and the isometry term. */
+/* How an epoch went: mean unweighted Chamfer of the frames with points (or mean loss of the pulls), and the
+ * isometry term. */
 typedef struct npg_fit_step {
     int64_t epoch, epochs;
     double chamfer, isometry, loss;
@@ -67,10 +72,17 @@ npg_status npg_fit_open(npg_fit **fit, npg_device *device, const npg_fit_setting
                         const npg_mesh *reference, uint64_t seed);
 void npg_fit_close(npg_fit **fit);
 
-/* Fit the frames jointly.  key: index of the frame where the confidence is 1 (the window's frame nearest to
- * it counts as the key when it is not among them).  NPG_DIVERGED names epoch and frame. */
-npg_status npg_fit_window(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
-                          npg_fit_watch *watch, void *user);
+/* Begin a window.  key: index of the frame where the confidence is 1 (the window's frame nearest to it counts
+ * as the key when it is not among them). */
+npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key);
+
+/* Correspondences of all frames, in the order of npg_fit_begin: frame i has pulls[start[i]] .. pulls[start[i
+ * + 1]]. Their vertices are changed to the fit's own order. */
+npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start);
+
+/* Epochs first .. end - 1 of settings.epochs; afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED
+ * names epoch and frame. */
+npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user);
 
 /* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);

@@ -4,8 +4,8 @@
  *
  *     x(v) = sum_k w_k(v) (R_k (v - g_k) + g_k + t_k)
  *
- * Nodes g_k lie on the surface, about a radius apart; the weights w_k(v) fall off with the distance along the surface,
- * so that parts which only touch do not hold each other. */
+ * Nodes g_k lie on the surface, about a radius apart; the weights w_k(v) fall off with the distance along the
+ * surface, so that parts which only touch do not hold each other. */
 #ifndef NPG_GRAPH_H
 #define NPG_GRAPH_H
 

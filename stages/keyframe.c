@@ -346,7 +346,7 @@ static const npg_option options[] = {
     {"keyframe", "Number of the frame whose surface is the reference, as in the file names; -1: by score",
      NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
     {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
-     OFFSET(window), "0", 0, 1e6, NULL, NULL},
+     OFFSET(window), "24", 0, 1e6, NULL, NULL},
     {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
      1e6, NULL, NULL},
     {"look-ahead", "Live runs: frames that are held while box and keyframe are chosen among them",

@@ -1,10 +1,10 @@
 /* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "clock.h"
+#include "denoise.h"
 #include "mesh_clean.h"
 #include "mesh_tools.h"
 #include "reader.h"
@@ -12,19 +12,27 @@
 #include "stage.h"
 #include "vdb.h"
 
-#define SEEN_SPACINGS    2.0  /* a place is seen when a point is nearer than this many spacings */
-#define UNSEEN_TOLERATED 0.02 /* of the area, before the user is told */
-#define LOST_TOLERATED   0.02 /* of the area, in pieces left out */
-#define REBUILD_VOXELS   384  /* along the longest side of the unit box */
+#define POINTS_MAX        80000
+#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
+#define SMOOTH_NEIGHBOURS 24
+#define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
+#define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
+#define PIECE_SHARE       0.01 /* of the area */
+#define PIECE_DIST        0.1  /* in diagonals */
+#define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
+#define REBUILD_AREA_MIN  0.8  /* of the area; less is not the same surface */
+#define REBUILD_VOXELS    384  /* along the longest side of the unit box */
 
 enum { UNSEEN_AUTO, UNSEEN_KEEP, UNSEEN_TRIM };
+enum { PIECES_NEAR, PIECES_MAIN };
 enum { MESHER_POISSON, MESHER_VDB };
 
 typedef struct mesh_state {
     const char *reference;
-    int mesher, unseen;
+    int mesher, unseen, pieces;
     int64_t depth, face_max, time_limit_s, memory_limit_mib;
     double point_weight, trim;
+    bool smooth;
 } mesh_state;
 
 #define OFFSET(member) offsetof(mesh_state, member)
@@ -43,6 +51,12 @@ static const npg_option mesh_options[] = {
      "600", 1, 1e6, NULL, "SECONDS"},
     {"poisson-memory", "Address space the reconstruction may use", NPG_OPTION_INT, OFFSET(memory_limit_mib),
      "8192", 64, 1e7, NULL, "MIB"},
+    {"pieces",
+     "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, within a "
+     "tenth of the diagonal), or the main one alone",
+     NPG_OPTION_CHOICE, OFFSET(pieces), "near", 0, 0, "near|main", NULL},
+    {"smooth", "Smooth the keyframe's points for the reconstruction when they are noisy", NPG_OPTION_FLAG,
+     OFFSET(smooth), "yes", 0, 0, NULL, NULL},
     {"faces", "Faces of the reference mesh at most (and no more than 4 per point)", NPG_OPTION_INT,
      OFFSET(face_max), "20000", 16, 1e8, NULL, NULL},
     {"trim",
@@ -61,8 +75,9 @@ typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
     const mesh_state *state;
     const npg_frame *frame;
+    size_t count;    /* N, of the points used */
     float *points;   /* N x 3, unit, owned */
-    float *normals;  /* N x 3, owned */
+    float *normals;  /* N x 3 or NULL, owned */
     double spacing;  /* of the points */
     double diagonal; /* of the points */
     npg_mesh *mesh;  /* owned */
@@ -87,15 +102,49 @@ static bool should_stop(void *worker)
 
 /* ---- steps ---- */
 
+/* The points to reconstruct from, in unit coordinates, with their normals.  Frames with more than POINTS_MAX
+ * give an even choice: the face budget could not hold more detail, and Poisson's time goes with the points.
+ */
+static npg_status take_points(making *m)
+{
+    const npg_frame *frame = m->frame;
+    size_t n = frame->point_count;
+    m->count = n < POINTS_MAX ? n : POINTS_MAX;
+    NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    for (size_t i = 0; i < m->count; i++) {
+        size_t from = (size_t)((uint64_t)n * i / m->count);
+        memcpy(m->points + 3 * i, frame->pos_local + 3 * from, 3 * sizeof(float));
+        if (m->normals) memcpy(m->normals + 3 * i, frame->normals + 3 * from, 3 * sizeof(float));
+    }
+    npg_box_local_to_unit(&npg_worker_facts(m->worker)->box, m->points, m->points, m->count);
+    return NPG_OK;
+}
+
 static npg_status measure_points(making *m)
 {
     npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, m->points, m->frame->point_count);
+    npg_bounds_add_points(&bounds, m->points, m->count);
     m->diagonal = npg_bounds_diagonal(&bounds);
     note_count(m, "points", m->frame->point_count);
-    NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->frame->point_count));
+    note_count(m, "points_used", m->count);
+    NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->count));
     note(m, "point_spacing_unit", m->spacing);
     return NPG_OK;
+}
+
+/* Noise would become bumps of the surface that every frame then carries. */
+static npg_status smooth(making *m)
+{
+    double sigma;
+    size_t n = m->count;
+    NPG_TRY(npg_cloud_noise(&sigma, m->points, n));
+    note(m, "noise_unit", sigma);
+    if (!m->state->smooth || sigma < NOISE_MIN * m->spacing) return NPG_OK;
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                   "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   sigma);
+    return npg_cloud_smooth(m->points, m->normals, n, SMOOTH_NEIGHBOURS);
 }
 
 static npg_status reconstruct(making *m)
@@ -107,12 +156,11 @@ static npg_status reconstruct(making *m)
                                      .memory_limit = (size_t)s->memory_limit_mib << 20,
                                      .should_stop = should_stop,
                                      .user = m->worker};
-    if (!m->frame->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
+    if (!m->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
-    size_t n = m->frame->point_count, turned;
+    size_t n = m->count, turned;
     int rounds;
-    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, n, 3 * sizeof(float)));
-    memcpy(m->normals, m->frame->normals, n * 3 * sizeof(float));
+    NPG_TRY(smooth(m));
     NPG_TRY(npg_resurface(&m->mesh, &turned, &rounds, m->normals, m->points, n, &settings));
     note_count(m, "poisson_rounds", (size_t)rounds);
     note_count(m, "normals_turned", turned);
@@ -123,15 +171,17 @@ static npg_status reconstruct(making *m)
 
 static npg_status keep_main(making *m, const char *when)
 {
-    size_t count;
-    double lost;
-    NPG_TRY(npg_mesh_keep_main(&m->mesh, &count, &lost));
-    note_count(m, "components", count);
-    if (lost > LOST_TOLERATED)
-        npg_worker_warn(
-            m->worker, false, m->frame->number,
-            "%zu components %s: the main one is kept, the others with %.1f %% of the area are left out",
-            count, when, 100 * lost);
+    npg_pieces pieces;
+    double dist_max = m->state->pieces == PIECES_NEAR ? PIECE_DIST * m->diagonal : 0;
+    NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, PIECE_SHARE, dist_max));
+    note_count(m, "components", pieces.kept);
+    if (pieces.kept > 1)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+    if (pieces.lost_share > LOST_TOLERATED)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+                        pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
     return NPG_OK;
 }
 
@@ -140,7 +190,7 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
 {
     double share, seen_dist = SEEN_SPACINGS * m->spacing;
     npg_facts *facts = npg_worker_facts(m->worker);
-    NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->frame->point_count, seen_dist));
+    NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->count, seen_dist));
     *trim_unseen =
         m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
     facts->unseen_share = share;
@@ -161,7 +211,7 @@ static npg_status trim(making *m)
     double limit = m->state->trim * m->diagonal, share;
     NPG_TRY(judge_unseen(m, &trim_unseen));
     if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->spacing);
-    NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->frame->point_count, limit));
+    NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->count, limit));
     note(m, "trimmed_share", share);
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
     if (!trim_unseen && share > LOST_TOLERATED)
@@ -173,12 +223,37 @@ static npg_status trim(making *m)
     return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
 }
 
+/* A level set knows inside from outside only where the surface is closed. */
+static npg_status is_closed(bool *closed, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    *closed = !manifold.border_edges;
+    return NPG_OK;
+}
+
 static npg_status rebuild(making *m)
 {
-    double voxel = 2 * NPG_UNIT_EXTENT / REBUILD_VOXELS;
+    double voxel = 2 * NPG_UNIT_EXTENT / REBUILD_VOXELS, area = npg_mesh_area(m->mesh);
     NPG_TRY(npg_vdb_remesh(&m->mesh, voxel));
     note_count(m, "faces_rebuilt", m->mesh->face_count);
+    double ratio = npg_mesh_area(m->mesh) / area;
+    if (ratio < REBUILD_AREA_MIN || ratio > 1 / REBUILD_AREA_MIN)
+        return npg_error(NPG_FAILED, "rebuilt through a level set, the surface has %.0f %% of its area",
+                         100 * ratio);
     return NPG_OK;
+}
+
+static npg_status rebuild_on_request(making *m)
+{
+    bool closed;
+    npg_mending mending;
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    NPG_TRY(is_closed(&closed, m->mesh));
+    if (!closed)
+        return npg_error(NPG_FAILED,
+                         "mesher vdb takes a closed surface, but Poisson's is open (a single view?)");
+    return rebuild(m);
 }
 
 static npg_status decimate(making *m)
@@ -186,11 +261,17 @@ static npg_status decimate(making *m)
     npg_mending mending;
     size_t budget = 4 * m->frame->point_count;
     if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
-    NPG_TRY(npg_mesh_decimate(&m->mesh, budget));
-    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending)); /* closes small holes before the faces are counted */
+    size_t holes = mending.holes;
+    for (int round = 0; round < 4 && (!round || m->mesh->face_count > budget); round++) {
+        NPG_TRY(npg_mesh_decimate(&m->mesh, budget - budget / 200 * (size_t)round));
+        NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+        holes += mending.holes;
+    }
     note_count(m, "mended_degenerate", mending.degenerate);
     note_count(m, "mended_duplicate", mending.duplicate);
     note_count(m, "mended_vertices", mending.split_vertices);
+    note_count(m, "mended_holes", holes);
     note_count(m, "mended_flipped", mending.flipped);
     return keep_main(m, "after decimation");
 }
@@ -206,34 +287,40 @@ static npg_status is_sound(bool *sound, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-/* Poisson's mesh, trimmed and decimated; when that leaves folds, the closed surface is rebuilt through a
- * level set first and the same is done again. */
+static npg_status shape(making *m, bool *sound)
+{
+    NPG_TRY(trim(m));
+    NPG_TRY(decimate(m));
+    return is_sound(sound, m->mesh);
+}
+
+/* Try again from the whole surface, taken through a level set. */
+static npg_status make_again(making *m, npg_mesh **whole, bool *sound)
+{
+    npg_mesh_unref(&m->mesh);
+    m->mesh = *whole;
+    *whole = NULL;
+    NPG_TRY(rebuild(m));
+    return shape(m, sound);
+}
+
+/* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
+ * through a level set and the same is done again. */
 static npg_status make(making *m)
 {
-    npg_mesh *closed = NULL;
-    bool sound = false;
+    npg_mesh *whole = NULL;
+    bool sound = false, closed = false;
     NPG_TRY(reconstruct(m));
-    NPG_TRY(keep_main(m, "reconstructed"));
-    if (m->state->mesher == MESHER_VDB) NPG_TRY(rebuild(m));
-    closed = m->mesh;
-    m->mesh = NULL;
-    npg_status status = npg_mesh_copy(&m->mesh, closed);
-    if (!status) status = trim(m);
-    if (!status) status = decimate(m);
-    if (!status) status = is_sound(&sound, m->mesh);
-    if (!status && !sound) {
-        npg_mesh_unref(&m->mesh);
-        m->mesh = closed;
-        closed = NULL;
-        status = rebuild(m);
-        if (!status) status = trim(m);
-        if (!status) status = decimate(m);
-        if (!status) status = is_sound(&sound, m->mesh);
-        if (!status && !sound)
-            npg_worker_warn(m->worker, false, m->frame->number,
-                            "the reference mesh still has flipped or degenerate faces after it was rebuilt");
-    }
-    npg_mesh_unref(&closed);
+    NPG_TRY(keep_main(m, "as reconstructed"));
+    if (m->state->mesher == MESHER_VDB) NPG_TRY(rebuild_on_request(m));
+    NPG_TRY(npg_mesh_copy(&whole, m->mesh));
+    npg_status status = shape(m, &sound);
+    if (!status && !sound) status = is_closed(&closed, whole);
+    if (!status && !sound && closed) status = make_again(m, &whole, &sound);
+    if (!status && !sound)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "the reference mesh still has flipped or degenerate faces after all mending");
+    npg_mesh_unref(&whole);
     return status;
 }
 
@@ -249,8 +336,7 @@ static npg_status read_reference(making *m)
             return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
-    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->frame->point_count,
-                            SEEN_SPACINGS * m->spacing));
+    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
     note(m, "unseen_share", facts->unseen_share);
     if (facts->unseen_share > 0.5)
         npg_worker_warn(m->worker, false, m->frame->number,
@@ -286,9 +372,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
     making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame};
     npg_facts *facts = npg_worker_facts(worker);
     double since = npg_clock_s();
-    NPG_TRY(npg_alloc_array(&m.points, NPG_FOR_MESH, frame->point_count, 3 * sizeof(float)));
-    npg_box_local_to_unit(&facts->box, m.points, frame->pos_local, frame->point_count);
-    npg_status status = measure_points(&m);
+    npg_status status = take_points(&m);
+    if (!status) status = measure_points(&m);
     if (!status) status = *m.state->reference ? read_reference(&m) : make(&m);
     if (!status) status = finish(&m);
     note(&m, "seconds", npg_clock_s() - since);

@@ -115,35 +115,68 @@ npg_status npg_mesh_unseen(double *share, const npg_mesh *mesh, const float *poi
     return status;
 }
 
-static npg_status keep_largest(npg_mesh **mesh, double *share, const uint32_t *component_of, size_t count)
+/* is_near[c] = component c has at least area_min of area and a vertex within dist_max of the largest one. */
+static npg_status find_near(uint8_t *is_near, const npg_mesh *mesh, const uint32_t *component_of,
+                            const double *area, size_t largest, double area_min, double dist_max)
 {
-    double *area = NULL;
-    uint8_t *keep_face = NULL;
+    float *main_pos = NULL, *dist = NULL;
+    size_t main_count = 0;
+    npg_status status;
+    NPG_TRY_OR(done, status,
+               npg_alloc_array(&main_pos, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *main_pos));
+    NPG_TRY_OR(done, status, npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist));
+    for (size_t i = 0; i < mesh->vert_count; i++)
+        if (component_of[i] == largest)
+            memcpy(main_pos + 3 * main_count++, mesh->vert_pos + 3 * i, 3 * sizeof *main_pos);
+    NPG_TRY_OR(done, status, nearest_dist(dist, mesh->vert_pos, mesh->vert_count, main_pos, main_count));
+    for (size_t i = 0; i < mesh->vert_count; i++)
+        if ((double)dist[i] <= dist_max && area[component_of[i]] >= area_min) is_near[component_of[i]] = 1;
+done:
+    npg_release(&main_pos);
+    npg_release(&dist);
+    return status;
+}
+
+static npg_status keep_pieces(npg_mesh **mesh, npg_pieces *pieces, const uint32_t *component_of,
+                              double share_min, double dist_max)
+{
+    double *area = NULL, total = 0;
+    uint8_t *keep_face = NULL, *is_kept = NULL;
     size_t largest = 0, face_count = (*mesh)->face_count;
     npg_status status;
-    NPG_TRY_OR(done, status, npg_alloc_array(&area, NPG_FOR_MESH, count, sizeof *area));
+    NPG_TRY_OR(done, status, npg_alloc_array(&area, NPG_FOR_MESH, pieces->found, sizeof *area));
+    NPG_TRY_OR(done, status, npg_alloc(&is_kept, NPG_FOR_MESH, pieces->found));
     NPG_TRY_OR(done, status, npg_alloc(&keep_face, NPG_FOR_MESH, face_count));
     for (size_t f = 0; f < face_count; f++) {
         const uint32_t *face = (*mesh)->faces + 3 * f;
         area[component_of[face[0]]] += npg_face_area((*mesh)->vert_pos, face);
     }
-    for (size_t i = 1; i < count; i++)
+    for (size_t i = 0; i < pieces->found; i++) {
+        total += area[i];
         if (area[i] > area[largest]) largest = i;
-    for (size_t f = 0; f < face_count; f++) keep_face[f] = component_of[(*mesh)->faces[3 * f]] == largest;
-    status = keep(mesh, share, keep_face);
+    }
+    if (dist_max > 0 && pieces->found > 1)
+        NPG_TRY_OR(done, status,
+                   find_near(is_kept, *mesh, component_of, area, largest, share_min * total, dist_max));
+    is_kept[largest] = 1;
+    for (size_t i = 0; i < pieces->found; i++) pieces->kept += is_kept[i];
+    for (size_t f = 0; f < face_count; f++) keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];
+    status = keep(mesh, &pieces->lost_share, keep_face);
 done:
     npg_release(&area);
+    npg_release(&is_kept);
     npg_release(&keep_face);
     return status;
 }
 
-npg_status npg_mesh_keep_main(npg_mesh **mesh, size_t *component_count, double *share)
+npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max)
 {
     uint32_t *component_of;
+    *pieces = (npg_pieces){0};
     NPG_TRY(npg_alloc_array(&component_of, NPG_FOR_MESH, (*mesh)->vert_count, sizeof *component_of));
-    npg_status status = npg_mesh_components(component_of, component_count, (*mesh)->vert_count,
-                                            (*mesh)->faces, (*mesh)->face_count);
-    if (!status) status = keep_largest(mesh, share, component_of, *component_count);
+    npg_status status = npg_mesh_components(component_of, &pieces->found, (*mesh)->vert_count, (*mesh)->faces,
+                                            (*mesh)->face_count);
+    if (!status) status = keep_pieces(mesh, pieces, component_of, share_min, dist_max);
     npg_release(&component_of);
     return status;
 }

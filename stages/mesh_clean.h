@@ -25,20 +25,26 @@ npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, si
 npg_status npg_mesh_unseen(double *share, const npg_mesh *mesh, const float *points, size_t point_count,
                            double dist_max);
 
-/* Keep the component of the largest area.  *component_count is how many there were, *share the share of the
- * area that went. */
-npg_status npg_mesh_keep_main(npg_mesh **mesh, size_t *component_count, double *share);
+typedef struct npg_pieces {
+    size_t found, kept; /* components */
+    double lost_share;  /* share of the area that went */
+} npg_pieces;
+
+/* Keep the component of the largest area, and those with at least share_min of all area that come within
+ * dist_max of it (a hand that a hole in the points cuts off belongs to the body; a ball beside it does not).
+ * dist_max 0: the largest alone. */
+npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max);
 
 /* At most face_max faces, by edge collapse (meshoptimizer). */
 npg_status npg_mesh_decimate(npg_mesh **mesh, size_t face_max);
 
 typedef struct npg_mending {
-    size_t degenerate, duplicate, split_vertices, flipped; /* what was found and mended */
+    size_t degenerate, duplicate, split_vertices, holes, flipped; /* what was found and mended */
 } npg_mending;
 
 /* Drop faces that use a vertex twice, repeat another or lie back to back with another; give each fan around a
- * vertex its own vertex; smooth where faces are turned over or have no area.  Only the last moves vertices.
- */
+ * vertex its own vertex; close holes of up to 32 edges; smooth where faces are turned over or have no area,
+ * and collapse them where that does not help. */
 npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done);
 
 /* Faces turned over against their surroundings: the normal points against the mean of the neighbours', or the

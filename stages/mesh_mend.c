@@ -6,7 +6,9 @@
 #include "mesh_clean.h"
 #include "mesh_tools.h"
 
-#define SMOOTH_ROUNDS 40
+#define SMOOTH_ROUNDS 12
+#define MEND_ROUNDS   12
+#define HOLE_MAX      32     /* edges of a hole that is filled */
 #define FLIPPED_COS   (-0.2) /* against the mean normal of the faces around */
 
 /* ---- duplicate and degenerate faces ---- */
@@ -204,6 +206,84 @@ end:
     return status;
 }
 
+/* ---- small holes ---- */
+
+/* The border's successor of a vertex: a face uses next -> vertex and none uses vertex -> next. */
+static npg_status find_border(uint32_t *next, const npg_mesh *mesh)
+{
+    side *sides;
+    size_t count = 3 * mesh->face_count;
+    memset(next, 0xff, mesh->vert_count * sizeof *next);
+    NPG_TRY(sorted_sides(&sides, mesh));
+    for (size_t i = 0; i < count; i++) {
+        size_t back = find_side(sides, count, sides[i].to, sides[i].from);
+        bool is_border = back == count || sides[back].from != sides[i].to || sides[back].to != sides[i].from;
+        if (is_border) next[sides[i].to] = sides[i].from;
+    }
+    npg_release(&sides);
+    return NPG_OK;
+}
+
+/* The closed loop along the border from a vertex, its length; 0 if it is longer than HOLE_MAX or comes back
+ * elsewhere. */
+static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
+{
+    size_t count = 0;
+    uint32_t at = from;
+    do {
+        if (count == HOLE_MAX || at == UINT32_MAX) return 0;
+        loop[count++] = at;
+        at = next[at];
+    } while (at != from);
+    return count >= 3 ? count : 0;
+}
+
+/* Holes of a few edges get a vertex in their middle (three edges: just the face).  Larger ones are openings.
+ */
+static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
+{
+    npg_mesh *mesh = *slot, *out = NULL;
+    uint32_t *next = NULL, loop[HOLE_MAX];
+    npg_status status;
+    size_t hole_count = 0, edge_count = 0;
+    NPG_TRY_OR(end, status, npg_alloc_array(&next, NPG_FOR_MESH, mesh->vert_count, sizeof *next));
+    NPG_TRY_OR(end, status, find_border(next, mesh));
+    for (uint32_t v = 0; v < mesh->vert_count; v++) edge_count += next[v] != UINT32_MAX;
+    if (!edge_count) goto end;
+    NPG_TRY_OR(end, status,
+               npg_mesh_open(&out, mesh->vert_count + edge_count, mesh->face_count + edge_count));
+    memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
+    memcpy(out->faces, mesh->faces, mesh->face_count * 3 * sizeof(uint32_t));
+    size_t vert_count = mesh->vert_count, face_count = mesh->face_count;
+    for (uint32_t v = 0; v < mesh->vert_count; v++) {
+        size_t count = next[v] == UINT32_MAX ? 0 : follow(loop, next, v);
+        if (!count) continue;
+        for (size_t k = 0; k < count; k++) next[loop[k]] = UINT32_MAX;
+        hole_count++;
+        if (count == 3) {
+            memcpy(out->faces + 3 * face_count++, loop, 3 * sizeof *loop);
+            continue;
+        }
+        for (size_t k = 0; k < count; k++) {
+            uint32_t face[3] = {(uint32_t)vert_count, loop[k], loop[(k + 1) % count]};
+            memcpy(out->faces + 3 * face_count++, face, sizeof face);
+            for (size_t a = 0; a < 3; a++)
+                out->vert_pos[3 * vert_count + a] += mesh->vert_pos[3 * (size_t)loop[k] + a] / (float)count;
+        }
+        vert_count++;
+    }
+    out->vert_count = vert_count;
+    out->face_count = face_count;
+    done->holes += hole_count;
+    npg_mesh_unref(slot);
+    *slot = out;
+    out = NULL;
+end:
+    npg_mesh_unref(&out);
+    npg_release(&next);
+    return status;
+}
+
 /* ---- folds ---- */
 
 static double face_normal(double n[3], const npg_mesh *mesh, size_t f)
@@ -289,7 +369,36 @@ static void smooth_round(npg_mesh *mesh, const uint8_t *is_flipped, double *sum,
         }
 }
 
-static npg_status unfold(npg_mesh *mesh, npg_mending *done)
+/* Where smoothing does not help, the turned face's shortest edge shrinks to its middle. */
+static void collapse_flipped(npg_mesh *mesh, const uint8_t *is_flipped)
+{
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        uint32_t *face = mesh->faces + 3 * f;
+        float least = INFINITY;
+        size_t at = 0;
+        for (size_t k = 0; k < 3 && is_flipped[f]; k++) {
+            const float *p = mesh->vert_pos + 3 * (size_t)face[k],
+                        *q = mesh->vert_pos + 3 * (size_t)face[(k + 1) % 3];
+            float d[3] = {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
+            float length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            if (length_sq < least) {
+                least = length_sq;
+                at = k;
+            }
+        }
+        uint32_t keep = face[at], gone = face[(at + 1) % 3];
+        if (!is_flipped[f] || keep == gone) continue;
+        for (size_t a = 0; a < 3; a++) {
+            float *to = mesh->vert_pos + 3 * (size_t)keep + a;
+            *to = 0.5f * (*to + mesh->vert_pos[3 * (size_t)gone + a]);
+        }
+        for (size_t c = 0; c < 3 * mesh->face_count; c++)
+            if (mesh->faces[c] == gone) mesh->faces[c] = keep;
+    }
+}
+
+/* *left is the number of faces that are still turned; their shortest edges are then collapsed. */
+static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
 {
     double *sum = NULL;
     uint8_t *is_flipped = NULL;
@@ -298,12 +407,13 @@ static npg_status unfold(npg_mesh *mesh, npg_mending *done)
     NPG_TRY_OR(end, status, npg_alloc_array(&sum, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *sum));
     NPG_TRY_OR(end, status, npg_alloc_array(&weight, NPG_FOR_MESH, mesh->vert_count, sizeof *weight));
     NPG_TRY_OR(end, status, npg_alloc(&is_flipped, NPG_FOR_MESH, mesh->face_count));
-    size_t found = find_flipped(is_flipped, sum, mesh), left = found;
-    for (int round = 0; round < SMOOTH_ROUNDS && left; round++) {
+    *left = find_flipped(is_flipped, sum, mesh);
+    done->flipped += *left;
+    for (int round = 0; round < SMOOTH_ROUNDS && *left; round++) {
         smooth_round(mesh, is_flipped, sum, weight);
-        left = find_flipped(is_flipped, sum, mesh);
+        *left = find_flipped(is_flipped, sum, mesh);
     }
-    done->flipped += found - (left < found ? left : found);
+    if (*left) collapse_flipped(mesh, is_flipped);
 end:
     npg_release(&sum);
     npg_release(&weight);
@@ -311,12 +421,45 @@ end:
     return status;
 }
 
+/* ---- edges of more than two faces that splitting could not part ---- */
+
+/* Of the faces that use an edge in one direction only the first is kept. */
+static npg_status drop_crowded(npg_mesh **mesh, npg_mending *done, size_t *dropped)
+{
+    side *sides;
+    uint8_t *keep_face = NULL;
+    size_t face_count = (*mesh)->face_count;
+    *dropped = 0;
+    NPG_TRY(sorted_sides(&sides, *mesh));
+    npg_status status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
+    if (!status) memset(keep_face, 1, face_count);
+    for (size_t i = 1; i < 3 * face_count && !status; i++) {
+        uint32_t face = sides[i].corner / 3;
+        if (!same_ends(&sides[i - 1], &sides[i]) || !keep_face[face]) continue;
+        keep_face[face] = 0;
+        ++*dropped;
+    }
+    done->duplicate += *dropped;
+    if (!status && *dropped) status = npg_mesh_keep_faces(mesh, keep_face);
+    npg_release(&sides);
+    npg_release(&keep_face);
+    return status;
+}
+
 npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done)
 {
     memset(done, 0, sizeof *done);
-    NPG_TRY(drop_faces(mesh, done));
-    NPG_TRY(split(mesh, done));
-    return unfold(*mesh, done);
+    for (int round = 0; round < MEND_ROUNDS; round++) {
+        size_t dropped, left;
+        NPG_TRY(drop_faces(mesh, done));
+        NPG_TRY(split(mesh, done));
+        NPG_TRY(drop_crowded(mesh, done, &dropped));
+        if (dropped) NPG_TRY(split(mesh, done));
+        NPG_TRY(fill_holes(mesh, done));
+        NPG_TRY(unfold(*mesh, done, &left));
+        if (!left) break;
+    }
+    return NPG_OK;
 }
 
 /* ---- check ---- */

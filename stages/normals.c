@@ -52,42 +52,51 @@ static void smallest_axis(float axis[3], double m[3][3])
 
 /* ---- estimate ---- */
 
-static void normal_of(float normal[3], const float *points, const uint32_t *index, size_t k)
+void npg_normal_of(float normal[3], const float *points, size_t count)
 {
     double mean[3] = {0}, m[3][3] = {{0}};
-    size_t count = 0;
-    for (; count < k && index[count] != UINT32_MAX; count++)
-        for (size_t a = 0; a < 3; a++) mean[a] += (double)points[3 * (size_t)index[count] + a];
-    for (int a = 0; a < 3; a++) mean[a] /= (double)count;
+    for (size_t i = 0; i < 3 * count; i++) mean[i % 3] += (double)points[i] / (double)count;
     for (size_t i = 0; i < count; i++) {
         double d[3];
-        for (size_t a = 0; a < 3; a++) d[a] = (double)points[3 * (size_t)index[i] + a] - mean[a];
+        for (size_t a = 0; a < 3; a++) d[a] = (double)points[3 * i + a] - mean[a];
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++) m[a][b] += d[a] * d[b];
     }
     smallest_axis(normal, m);
 }
 
+/* From the points with these indices; around: room for k points. */
+static void normal_from(float normal[3], float *around, const float *points, const uint32_t *index, size_t k)
+{
+    size_t count = 0;
+    for (; count < k && index[count] != UINT32_MAX; count++)
+        memcpy(around + 3 * count, points + 3 * (size_t)index[count], 3 * sizeof *around);
+    npg_normal_of(normal, around, count);
+}
+
 npg_status npg_normals_estimate(float *normals, const float *points, size_t n, int neighbours)
 {
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
-    float *dist_sq = NULL;
+    float *dist_sq = NULL, *around = NULL;
     npg_status status;
     size_t k = (size_t)neighbours;
     NPG_REQUIRE(neighbours >= 3);
     NPG_TRY(npg_kdtree_open(&tree, points, n));
     NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index));
     NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq));
+    NPG_TRY_OR(done, status, npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around));
     for (size_t first = 0; first < n; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
         NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0));
-        for (size_t i = 0; i < count; i++) normal_of(normals + 3 * (first + i), points, index + k * i, k);
+        for (size_t i = 0; i < count; i++)
+            normal_from(normals + 3 * (first + i), around, points, index + k * i, k);
     }
 done:
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);
+    npg_release(&around);
     return status;
 }
 
@@ -108,14 +117,14 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
 }
 
 #define VIEW_CELLS_MAX 512 /* per side of the picture */
-#define HIDDEN_DEPTH                                                                                         \
-    0.05                /* a point this much farther (in diagonals) than the nearest in its cell is hidden */
-#define HIDDEN_MAX 0.04 /* share of hidden points in one view; a closed body has near one half */
+#define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
+#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half */
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
     double half_width; /* tangent of half the angle */
     size_t cells;      /* per side */
+    double cell_width; /* at the cloud's middle */
 } view;
 
 static double dot(const double a[3], const double b[3])
@@ -155,6 +164,7 @@ static bool aim(view *v, const npg_bounds *bounds, const double sensor[3], size_
     v->half_width = radius / sqrt(distance * distance - radius * radius);
     v->cells = (size_t)sqrt((double)point_count / 4);
     if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
+    v->cell_width = 2 * v->half_width * distance / (double)v->cells;
     return v->cells >= 4;
 }
 
@@ -184,7 +194,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, co
     npg_bounds_add_points(&bounds, points, n);
     *yes = false;
     if (!aim(&v, &bounds, sensor, n)) return NPG_OK;
-    double depth, hidden_depth = HIDDEN_DEPTH * npg_bounds_diagonal(&bounds);
+    double depth, hidden_depth = HIDDEN_CELLS * v.cell_width;
     NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));
     for (size_t i = 0; i < v.cells * v.cells; i++) nearest[i] = INFINITY;
     for (size_t i = 0; i < n; i++) {

@@ -10,6 +10,9 @@
 
 #include "status.h"
 
+/* The direction in which a few points spread least. */
+void npg_normal_of(float normal[3], const float *points, size_t point_count);
+
 /* Unit normals without a side: the direction in which the `neighbours` nearest points spread least. */
 npg_status npg_normals_estimate(float *normals, const float *points, size_t point_count, int neighbours);
 
@@ -19,8 +22,12 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
 
 /* Give normals without sides their sides: a spanning tree over neighbours, surest agreement first, then whole
  * patches and single points by the winding number, then the sign of the whole.  Outward for closed bodies, to
- * the convex side for open ones. */
-npg_status npg_normals_orient(float *normals, const float *points, size_t point_count);
+ * the convex side for open ones.  *score tells how well the sides fit together, to compare results by. */
+npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count);
+
+/* Estimate and orient with several numbers of neighbours and keep the result of the best score: few follow
+ * thin limbs, many see through noise. */
+npg_status npg_normals_make(float *normals, const float *points, size_t point_count);
 
 /* Find normals on the wrong side among given ones and turn them: by neighbours and winding number, beginning
  * from the sides given.  *flipped counts the turned ones. */

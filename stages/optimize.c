@@ -6,15 +6,15 @@
 #include <math.h>
 #include <string.h>
 
-#include "fit.h"
 #include "kernels.h"
 #include "stage.h"
+#include "window.h"
 
 typedef struct state {
-    npg_fit_settings fit_settings;
+    npg_window_settings window_settings;
     npg_device *device;
-    npg_fit *fit;
-    npg_frame *held; /* owned, with what they own; in order of arrival */
+    npg_window_solver *solver;
+    npg_held *held; /* owned, with what they own; in order of arrival */
     size_t held_count, held_capacity;
     npg_window window;
     int64_t window_at, window_count;
@@ -24,13 +24,14 @@ typedef struct state {
 
 /* ---- options ---- */
 
-#define AT(field)     offsetof(state, fit_settings.field)
+#define AT(field)     offsetof(state, window_settings.fit.field)
+#define MATCH(field)  offsetof(state, window_settings.match.field)
 #define INT_OPTION    NPG_OPTION_INT
 #define REAL_OPTION   NPG_OPTION_REAL
 #define CHOICE_OPTION NPG_OPTION_CHOICE
 
 static const npg_option options[] = {
-    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "250", 1, 1e6, NULL, "N"},
+    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "60", 1, 1e6, NULL, "N"},
     {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
      0, "quaternion|cayley|exponential", NULL},
     {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,
@@ -64,9 +65,27 @@ static const npg_option options[] = {
     {"welsch", "width of the robust weight on squared unit distances, 0 for none", REAL_OPTION, AT(alpha),
      "0.3", 0, 1e3, NULL, NULL},
     {"confidence", "weight of a frame by how well it and those nearer the key fit", CHOICE_OPTION,
-     AT(confidence), "cumulative", 0, 0, "cumulative|single|delta|constant", NULL},
+     AT(confidence), "constant", 0, 0, "cumulative|single|delta|constant", NULL},
     {"catch-up", "how the confidence opens with the epochs", CHOICE_OPTION, AT(catch_up), "root", 0, 0,
      "root|constant|linear|exponential|interpolated", NULL},
+    {"feature-start", "grid features begin spread over +- this; 0 as in the paper", REAL_OPTION, AT(feature_start), "3",
+     0, 1e3, NULL, NULL},
+    {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
+     AT(rate_end), "0.1", 0, 1, NULL, NULL},
+    {"samples", "vertices of aligned frames that are fitted and carry the others, 0: all", INT_OPTION,
+     offsetof(state, window_settings.samples), "2500", 0, 1e6, NULL, "N"},
+    {"rounds", "times in a window's fit that aligned frames are matched with their points", INT_OPTION,
+     offsetof(state, window_settings.rounds), "3", 1, 1000, NULL, "N"},
+    {"match-points", "most points of an aligned frame that pull at the surface", INT_OPTION, MATCH(points),
+     "5000", 10, 1e7, NULL, "N"},
+    {"match-along", "share of distances along the surface, 0 to 1", REAL_OPTION, MATCH(along), "0.02", 0, 1,
+     NULL, NULL},
+    {"match-reverse", "weight of surface to points against points to surface", REAL_OPTION, MATCH(reverse),
+     "0.5", 0, 100, NULL, NULL},
+    {"match-total", "weight of all points of an aligned frame", REAL_OPTION, MATCH(total), "5000", 1, 1e9,
+     NULL, NULL},
+    {"match-tie", "weight of staying where the window before has put a frame, against its points",
+     REAL_OPTION, MATCH(tie), "1", 0, 1e6, NULL, NULL},
     {"fit-batch", "frames whose hidden layer is kept at a time", INT_OPTION, AT(batch), "4", 1, 64, NULL,
      "N"},
     {0}};
@@ -75,7 +94,7 @@ void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
 {
     state filled = {0};
     npg_options_fill(from, options, &filled);
-    *settings = filled.fit_settings;
+    *settings = filled.window_settings.fit;
 }
 
 /* ---- opening ---- */
@@ -91,7 +110,7 @@ static npg_status check_widths(const npg_fit_settings *s)
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    NPG_TRY(check_widths(&s->fit_settings));
+    NPG_TRY(check_widths(&s->window_settings.fit));
     NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
     if (npg_worker_facts(worker)->is_live) NPG_TRY(npg_kernels_self_test(s->device));
@@ -102,31 +121,40 @@ static npg_status init(npg_worker *worker)
     return NPG_OK;
 }
 
+static void clear_held(npg_held *held)
+{
+    npg_frame_clear(&held->frame);
+    npg_release(&held->solved);
+}
+
 static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    npg_fit_close(&s->fit);
+    npg_window_solver_close(&s->solver);
     npg_device_close(&s->device);
-    for (size_t i = 0; i < s->held_count; i++) npg_frame_clear(&s->held[i]);
+    for (size_t i = 0; i < s->held_count; i++) clear_held(&s->held[i]);
     npg_release(&s->held);
 }
 
-static npg_status open_fit(npg_worker *worker)
+static npg_status open_solver(npg_worker *worker, bool is_aligned)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     s->window_count = npg_plan_window_count(&facts->plan);
     s->window = npg_plan_window(&facts->plan, 0);
-    return npg_fit_open(&s->fit, s->device, &s->fit_settings, facts->reference,
-                        (uint64_t)npg_worker_settings(worker)->seed);
+    NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
+                                   (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
+    json_object_set_new(npg_worker_report(worker), "samples",
+                        json_integer((json_int_t)npg_window_sample_count(s->solver)));
+    return NPG_OK;
 }
 
 /* ---- a window ---- */
 
-static npg_frame *held_frame(state *s, int64_t index)
+static npg_held *held_frame(state *s, int64_t index)
 {
     for (size_t i = 0; i < s->held_count; i++)
-        if (s->held[i].index == index) return &s->held[i];
+        if (s->held[i].frame.index == index) return &s->held[i];
     return NULL;
 }
 
@@ -165,56 +193,17 @@ static npg_status watch(void *user, const npg_fit_step *step)
     return npg_worker_stopping(worker) ? NPG_STOPPED : NPG_OK;
 }
 
-/* 0 for the first frame of the capture, 1 for the last. */
-static double time_of(const npg_facts *facts, int64_t index)
-{
-    return facts->plan.frame_count > 1 ? (double)index / (double)(facts->plan.frame_count - 1) : 0;
-}
-
-static npg_status fit_frames(npg_worker *worker, npg_fit_frame *frames, float *points)
+static npg_status solve_window(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    size_t count = 0;
-    for (int64_t t = s->window.first; t <= s->window.last; t++) {
-        const npg_frame *frame = held_frame(s, t);
-        npg_box_local_to_unit(&facts->box, points, frame->pos_local, frame->point_count);
-        frames[count++] = (npg_fit_frame){t, time_of(facts, t), points, frame->point_count};
-        points += 3 * frame->point_count;
-    }
-    return npg_fit_window(s->fit, frames, count, facts->plan.key, watch, worker);
-}
-
-static npg_status fit_window(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    size_t point_count = 0, frame_count = (size_t)(s->window.last - s->window.first + 1);
-    npg_fit_frame *frames = NULL;
-    float *points = NULL;
-    for (int64_t t = s->window.first; t <= s->window.last; t++) point_count += held_frame(s, t)->point_count;
-    npg_status status = npg_alloc_array(&frames, NPG_FOR_FIT, frame_count, sizeof *frames);
-    if (!status) status = npg_alloc_array(&points, NPG_FOR_FIT, point_count + 1, 3 * sizeof *points);
-    if (!status) status = fit_frames(worker, frames, points);
+    size_t count = (size_t)(s->window.last - s->window.first + 1);
+    npg_held **frames;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
+    for (size_t i = 0; i < count; i++) frames[i] = held_frame(s, s->window.first + (int64_t)i);
+    npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
     npg_release(&frames);
-    npg_release(&points);
     return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
                             (long long)s->window.first, (long long)s->window.last);
-}
-
-static npg_status take_vertices(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    const npg_mesh *reference = npg_worker_facts(worker)->reference;
-    for (int64_t t = s->window.first; t <= s->window.last; t++) {
-        npg_frame *frame = held_frame(s, t);
-        if (!frame->vert_unit)
-            NPG_TRY(
-                npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
-        frame->vert_count = reference->vert_count;
-        frame->fields |= NPG_FIELD_VERTICES;
-        NPG_TRY(npg_fit_vertices(s->fit, frame->vert_unit, (size_t)(t - s->window.first)));
-    }
-    return NPG_OK;
 }
 
 /* ---- passing on ---- */
@@ -230,12 +219,18 @@ static bool is_needed_later(npg_worker *worker, int64_t index)
     return false;
 }
 
-static npg_status emit(npg_worker *worker, npg_frame *frame)
+/* Pass a solved frame on; its vertices are now the solved ones. */
+static npg_status emit(npg_worker *worker, npg_held *held)
 {
     state *s = npg_worker_state(worker);
     npg_chunk *chunk;
     NPG_TRY(npg_chunk_open(&chunk, 1));
-    npg_chunk_add(chunk, frame);
+    npg_release(&held->frame.vert_unit);
+    held->frame.vert_unit = held->solved;
+    held->frame.vert_count = npg_worker_facts(worker)->reference->vert_count;
+    held->frame.fields |= NPG_FIELD_VERTICES;
+    held->solved = NULL;
+    npg_chunk_add(chunk, &held->frame);
     s->emitted++;
     npg_status status = npg_worker_push(worker, &chunk);
     npg_chunk_unref(&chunk);
@@ -248,13 +243,13 @@ static npg_status emit_done(npg_worker *worker)
     size_t kept = 0;
     npg_status status = NPG_OK;
     for (size_t i = 0; i < s->held_count; i++) {
-        npg_frame *frame = &s->held[i];
-        if (!status && (frame->fields & NPG_FIELD_VERTICES) && !is_needed_later(worker, frame->index)) {
-            status = emit(worker, frame);
-            npg_frame_clear(frame);
+        npg_held *held = &s->held[i];
+        if (!status && held->solved && !is_needed_later(worker, held->frame.index)) {
+            status = emit(worker, held);
+            clear_held(held);
         } else {
-            npg_frame moved = *frame;
-            memset(frame, 0, sizeof *frame);
+            npg_held moved = *held;
+            memset(held, 0, sizeof *held);
             s->held[kept++] = moved;
         }
     }
@@ -265,10 +260,8 @@ static npg_status emit_done(npg_worker *worker)
 static npg_status solve_complete_windows(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    if (!s->fit) NPG_TRY(open_fit(worker));
     while (s->window_at < s->window_count && window_is_complete(s)) {
-        NPG_TRY(fit_window(worker));
-        NPG_TRY(take_vertices(worker));
+        NPG_TRY(solve_window(worker));
         NPG_TRY(emit_done(worker));
         if (++s->window_at < s->window_count)
             s->window = npg_plan_window(&npg_worker_facts(worker)->plan, s->window_at);
@@ -281,10 +274,12 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     state *s = npg_worker_state(worker);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
     size_t count = npg_chunk_count(*chunk);
+    if (count && !s->solver)
+        NPG_TRY(open_solver(worker, npg_chunk_frame(*chunk, 0)->fields & NPG_FIELD_POSE));
     NPG_TRY(npg_grow(&s->held, &s->held_capacity, s->held_count + count, sizeof *s->held, NPG_FOR_FRAMES));
     for (size_t i = 0; i < count; i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
-        s->held[s->held_count++] = *frame;
+        s->held[s->held_count++] = (npg_held){.frame = *frame};
         memset(frame, 0, sizeof *frame);
     }
     npg_chunk_unref(chunk);
@@ -300,7 +295,7 @@ static npg_status flush(npg_worker *worker)
                          (long long)s->window_at, (long long)s->window.first, (long long)s->window.last);
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "windows", json_integer(s->window_count));
-    json_object_set_new(report, "epochs", json_integer(s->fit_settings.epochs));
+    json_object_set_new(report, "epochs", json_integer(s->window_settings.fit.epochs));
     json_object_set_new(report, "last_chamfer", json_real(s->last_chamfer));
     json_object_set_new(report, "last_isometry", json_real(s->last_isometry));
     return NPG_OK;
@@ -316,7 +311,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;
     size_t verts = facts->reference ? facts->reference->vert_count : 10000;
-    return npg_fit_memory(&s->fit_settings, verts, frames, facts->point_count_max, 2) +
+    return npg_fit_memory(&s->window_settings.fit, verts, frames, facts->point_count_max, 2) +
            frames * verts * 3 * sizeof(float);
 }
 

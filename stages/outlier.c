@@ -47,8 +47,8 @@ static const npg_option outlier_options[] = {
      NPG_OPTION_CHOICE, OFFSET(normals), "auto", 0, 0, "auto|estimate|given", NULL},
     {"normals-for", "Make and mend normals for the keyframe alone or for all frames", NPG_OPTION_CHOICE,
      OFFSET(normals_for), "key", 0, 0, "key|all", NULL},
-    {"normal-neighbours", "Points a normal is estimated from", NPG_OPTION_INT, OFFSET(normal_neighbours),
-     "16", 4, 200, NULL, NULL},
+    {"normal-neighbours", "Points a normal is estimated from, 4 or more; 0: several numbers are tried",
+     NPG_OPTION_INT, OFFSET(normal_neighbours), "0", 0, 200, NULL, NULL},
     {"sensor",
      "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; none: "
      "the "
@@ -80,6 +80,10 @@ static npg_status parse_sensor(outlier_state *s)
 
 static npg_status outlier_init(npg_worker *worker)
 {
+    const outlier_state *s = npg_worker_state(worker);
+    if (s->normal_neighbours && s->normal_neighbours < 4)
+        return npg_error(NPG_USAGE, "option normal-neighbours: %lld is neither 0 nor at least 4",
+                         (long long)s->normal_neighbours);
     return parse_sensor(npg_worker_state(worker));
 }
 
@@ -137,6 +141,11 @@ static npg_status find_sensor(npg_worker *worker, const npg_frame *frame, double
     return NPG_OK;
 }
 
+static int neighbours_of(const outlier_state *s)
+{
+    return s->normal_neighbours ? (int)s->normal_neighbours : 16;
+}
+
 static npg_status make_normals(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -144,10 +153,12 @@ static npg_status make_normals(npg_worker *worker, npg_frame *frame)
     double sensor[3];
     bool has_sensor;
     NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
-    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, (int)s->normal_neighbours));
     frame->cleaning.normals_estimated = n;
     NPG_TRY(find_sensor(worker, frame, sensor, &has_sensor));
-    if (!has_sensor) return npg_normals_orient(frame->normals, frame->pos_local, n);
+    if (!has_sensor && !s->normal_neighbours) return npg_normals_make(frame->normals, frame->pos_local, n);
+    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, neighbours_of(s)));
+    double score;
+    if (!has_sensor) return npg_normals_orient(frame->normals, &score, frame->pos_local, n);
     size_t turned;
     npg_normals_face_sensor(frame->normals, &turned, frame->pos_local, n, sensor);
     return NPG_OK;
@@ -161,7 +172,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     double sensor[3];
     bool has_sensor;
     NPG_TRY(npg_alloc_array(&estimate, NPG_FOR_FRAMES, n, 3 * sizeof *estimate));
-    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, (int)s->normal_neighbours);
+    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, neighbours_of(s));
     if (!status) repair_directions(frame->normals, &bad, estimate, n);
     npg_release(&estimate);
     NPG_TRY(status);
@@ -198,7 +209,8 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
     const outlier_state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return false;
-    return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || frame->index == facts->plan.key;
+    bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
+    return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || is_planned_key;
 }
 
 /* ---- the stage ---- */
@@ -227,9 +239,10 @@ static npg_status name_frame(npg_status status, const npg_frame *frame)
 static npg_status refuse(npg_worker *worker, npg_frame *frame, npg_status status)
 {
     outlier_state *s = npg_worker_state(worker);
-    name_frame(status, frame);
-    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return status;
-    if (is_first_pass(worker)) npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
+    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return name_frame(status, frame);
+    if (is_first_pass(worker))
+        npg_worker_warn(worker, true, frame->number, "skipped %s: %s",
+                        frame->path ? frame->path : "what was pushed", npg_error_text());
     frame->is_skipped = true;
     frame->point_count = 0;
     npg_release(&frame->pos_local);

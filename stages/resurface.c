@@ -7,9 +7,9 @@
 #include "mesh_tools.h"
 #include "query.h"
 
-#define ROUNDS_MAX  12
-#define DRAFT_DEPTH 7      /* of the reconstructions that only serve the normals */
-#define CLEARLY (-0.3f)
+#define ROUNDS_MAX  4
+#define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
+#define CLEARLY     (-0.3f)
 #define SETTLED     0.0005 /* share of turned normals that ends it */
 
 /* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */

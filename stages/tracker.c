@@ -43,13 +43,14 @@ void npg_tracker_close(npg_tracker **slot)
     npg_block_close(&t->system);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->mesh);
-    void *all[] = {&t->vert_pos, &t->vert_normals, &t->samples, &t->step,    &t->targets,   &t->target_normals,
-                   &t->hits,     &t->near,         &t->near_sq, &t->sample_pos};
+    void *all[] = {&t->vert_pos,       &t->vert_normals, &t->samples, &t->step,    &t->targets,
+                   &t->target_normals, &t->hits,         &t->near,    &t->near_sq, &t->sample_pos};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
 
-/* Every n-th vertex: Poisson meshes have their vertices evenly over the surface, and in no order that repeats. */
+/* Every n-th vertex: Poisson meshes have their vertices evenly over the surface, and in no order that
+ * repeats. */
 static void choose_samples(npg_tracker *t)
 {
     size_t step = t->mesh->vert_count / t->settings.samples + 1;
@@ -68,7 +69,9 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     if (!status)
         status = npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->graph->edges,
                                 t->graph->edge_count);
-    if (!status) status = npg_surface_open(&t->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+    if (!status)
+        status =
+            npg_surface_open(&t->surface, reference->vert_pos, v, reference->faces, reference->face_count);
     if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, v, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, v, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->samples, NPG_FOR_FIT, v, sizeof(uint32_t));
@@ -195,7 +198,8 @@ static double add_targets(npg_tracker *t, const double *pose, bool with_normals,
         sum += sqrt((double)hit->dist_sq);
         hit_normal(p.normal, t, hit);
         double facing = 0;
-        for (size_t c = 0; c < 3 && with_normals; c++) facing += p.normal[c] * (double)t->target_normals[3 * i + c];
+        for (size_t c = 0; c < 3 && with_normals; c++)
+            facing += p.normal[c] * (double)t->target_normals[3 * i + c];
         if (facing < -0.2) continue;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
@@ -205,7 +209,8 @@ static double add_targets(npg_tracker *t, const double *pose, bool with_normals,
 }
 
 /* Surface -> points, for samples whose nearest point is close enough to be theirs. */
-static void add_samples(npg_tracker *t, const double *pose, const float *points, const float *normals, double width)
+static void add_samples(npg_tracker *t, const double *pose, const float *points, const float *normals,
+                        double width)
 {
     double share = REVERSE / (double)t->sample_count;
     for (size_t s = 0; s < t->sample_count; s++) {
@@ -255,7 +260,8 @@ static void add_edges(npg_tracker *t, const double *pose, double stiffness)
 static void turn(double rotation[9], const double omega[3])
 {
     double angle = sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]), m[9], out[9];
-    double s = angle > 1e-9 ? sin(angle) / angle : 1, c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
+    double s = angle > 1e-9 ? sin(angle) / angle : 1,
+           c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
     const double x[9] = {0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0};
     for (int i = 0; i < 9; i++) {
         double square = 0;
@@ -293,7 +299,8 @@ void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const do
 static npg_status find_pairs(npg_tracker *t, const double *pose, const npg_kdtree *tree)
 {
     npg_tracker_vertices(t, t->vert_pos, pose);
-    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces, t->mesh->face_count);
+    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                            t->mesh->face_count);
     NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
     NPG_TRY(npg_surface_closest(t->surface, t->hits, t->targets, t->target_count));
     for (size_t s = 0; s < t->sample_count; s++)
@@ -306,7 +313,8 @@ static npg_status do_step(npg_tracker *t, npg_tracked *tracked, double *pose, co
 {
     double radius = t->graph->radius;
     /* from several radii down to a part of one; stiffness from STIFF_START down to 1 */
-    double width = radius * (2 * pow(0.15, progress)), stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress);
+    double width = radius * (2 * pow(0.15, progress)),
+           stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress);
     NPG_TRY(find_pairs(t, pose, tree));
     npg_block_clear(t->system);
     tracked->point_dist_mean = add_targets(t, pose, normals != NULL, width);
@@ -342,7 +350,8 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
 
 void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)
 {
-    for (size_t k = 0; k < node_count; k++, next += NPG_POSE_SIZE, now += NPG_POSE_SIZE, before += NPG_POSE_SIZE) {
+    for (size_t k = 0; k < node_count;
+         k++, next += NPG_POSE_SIZE, now += NPG_POSE_SIZE, before += NPG_POSE_SIZE) {
         double change[9];
         for (int i = 0; i < 9; i++) { /* now before^T */
             change[i] = 0;

@@ -157,3 +157,10 @@ run_bad() {
     [[ "$output" == *frame_0077.ply*overwrite* ]]
     [ -e mixed/done.json ]
 }
+
+@test "the memory formula holds" {
+    total=$(sed -n 's/.*"total": \([0-9]*\).*/\1/p' first/report.json)
+    peak=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' first/report.json)
+    [ "$peak" -gt 1000000 ]
+    [ "$peak" -le "$total" ]
+}

@@ -9,22 +9,20 @@ cd "$(dirname "$0")/.."
 # shellcheck disable=SC2086
 install_packages $packages_to_build $packages_to_test
 
-jobs=$(nproc)
-export CTEST_PARALLEL_LEVEL=$jobs
-export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0"
-export ASAN_OPTIONS="detect_leaks=1:allocator_may_return_null=1"
-export UBSAN_OPTIONS="print_stacktrace=1"
+CTEST_PARALLEL_LEVEL=$(nproc)
+export CTEST_PARALLEL_LEVEL
 
+# Build a preset, all of it or one target.
 build()
 {
     echo "== Build: $1"
     cmake --preset "$1" -DNPG_WERROR=ON >/dev/null
-    cmake --build --preset "$1"
+    cmake --build --preset "$1" ${2:+--target "$2"}
 }
 
 echo "== Format"
 find pipeline stages kernels tools tests samples \( -name '*.[ch]' -o -name '*.cpp' -o -name '*.hpp' \) -print0 |
-    xargs -0 clang-format-14 --dry-run -Werror
+    xargs -0 clang-format-14 --dry-run -Werror --ferror-limit=1
 
 build release
 
@@ -32,7 +30,7 @@ build asan
 echo "== Tests: address and undefined behaviour"
 ctest --preset asan
 
-build tsan
+build tsan threaded_tests
 echo "== Tests: threads"
 ctest --preset tsan -L tsan
 

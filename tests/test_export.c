@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <xxhash.h>
 
+#include "export.h"
 #include "mesh_tools.h"
 #include "reader.h"
 #include "temp_folder.h"
@@ -69,7 +70,7 @@ static npg_status give_mesh(npg_facts *facts, npg_frame *frame)
     npg_box_local_to_unit(&facts->box, frame->vert_unit, frame->pos_local, 4);
     frame->vert_count = 4;
     frame->fields |= NPG_FIELD_VERTICES | NPG_FIELD_FIGURES;
-    frame->figures = (npg_figures){.coverage = 0.75, .truth_cd = NAN, .good = true};
+    frame->figures = (npg_figures){.coverage = 0.75, .truth_cd = (double)NAN, .good = true};
     return NPG_OK;
 }
 
@@ -417,6 +418,16 @@ static void a_folder_that_can_not_be_written_is_said_at_once(void **state)
     assert_int_equal(run_scene(&s, "unused", proc), NPG_DISK);
 }
 
+static void results_that_can_not_fit_are_refused_at_once(void **state)
+{
+    (void)state;
+    assert_int_equal(npg_folder_has_room(folder.path, 4096), NPG_OK);
+    assert_int_equal(npg_folder_has_room(folder.path, UINT64_C(1) << 62), NPG_DISK);
+    assert_non_null(strstr(npg_error_text(), folder.path));
+    assert_non_null(strstr(npg_error_text(), "4398046511104 MiB"));
+    assert_int_equal(npg_folder_has_room(in_folder(&folder, "nowhere"), 1), NPG_DISK);
+}
+
 static int run_with_limit(rlim_t limit)
 {
     const struct rlimit bound = {limit, limit};
@@ -490,6 +501,7 @@ int main(void)
         cmocka_unit_test(leftovers_of_a_killed_run_go),
         cmocka_unit_test(inputs_are_never_written_over),
         cmocka_unit_test(a_folder_that_can_not_be_written_is_said_at_once),
+        cmocka_unit_test(results_that_can_not_fit_are_refused_at_once),
         cmocka_unit_test(a_full_disk_ends_the_run_with_its_code),
         cmocka_unit_test(no_memory_leaves_no_done),
     };

@@ -58,7 +58,7 @@ static npg_status make_frame(npg_fit_frame *frame, size_t point_count, size_t t,
         pose(points + 3 * i, at, bend);
     }
     *frame = (npg_fit_frame){(int64_t)t, frame_count > 1 ? (double)t / (double)(frame_count - 1) : 0, points,
-                             point_count};
+                             point_count, NULL};
     return NPG_OK;
 }
 

@@ -332,10 +332,10 @@ static npg_status bench_fit(bench *b, json_t *root)
     NPG_TRY(fit_settings(&fit_with, b->s.epochs));
     npg_status status = npg_alloc_array(&e.seconds, NPG_FOR_RUN, n, sizeof *e.seconds);
     if (!status) status = npg_fit_open(&fit, b->device, &fit_with, b->body.mesh, 1);
-    e.last_s = npg_clock_s();
     if (!status)
-        status = npg_fit_window(fit, b->body.frames, b->body.frame_count, (int64_t)b->body.frame_count / 2,
-                                watch, &e);
+        status = npg_fit_begin(fit, b->body.frames, b->body.frame_count, (int64_t)b->body.frame_count / 2);
+    e.last_s = npg_clock_s();
+    if (!status) status = npg_fit_run(fit, 0, b->s.epochs, watch, &e);
     npg_fit_close(&fit);
     if (!status) {
         qsort(e.seconds, n, sizeof *e.seconds, by_size);

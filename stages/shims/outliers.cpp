@@ -2,6 +2,7 @@
 #include <pcl/filters/statistical_outlier_removal.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "guard.hpp"
@@ -12,7 +13,7 @@ npg_status npg_outliers_statistical(uint8_t *keep, size_t *dropped, const float 
 {
     NPG_REQUIRE(neighbours >= 1 && ratio >= 0);
     *dropped = 0;
-    std::memset(keep, 1, point_count);
+    std::fill_n(keep, point_count, uint8_t(1)); // keep may be null for no points
     if (point_count <= size_t(neighbours)) return NPG_OK;
     return npg::guard("PCL's outlier filter", [&] {
         pcl::PointCloud<pcl::PointXYZ>::Ptr cloud(new pcl::PointCloud<pcl::PointXYZ>);

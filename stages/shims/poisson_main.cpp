@@ -125,14 +125,8 @@ int reconstruct(int out)
     return write_mesh(out, points, polygons) ? 0 : 1;
 }
 
-} // namespace
-
-int main()
+int guarded(int out)
 {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    // What libraries print must not get between the bytes of the answer.
-    int out = dup(STDOUT_FILENO);
-    dup2(STDERR_FILENO, STDOUT_FILENO);
     try {
         return reconstruct(out);
     } catch (const std::bad_alloc &) {
@@ -142,4 +136,18 @@ int main()
         std::fprintf(stderr, "%s\n", e.what());
         return 1;
     }
+}
+
+} // namespace
+
+int main()
+{
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    // What libraries print must not get between the bytes of the answer.
+    int out = dup(STDOUT_FILENO);
+    dup2(STDERR_FILENO, STDOUT_FILENO);
+    int code = guarded(out);
+    // Without the checks at exit: PCL's reconstruction keeps memory that nothing points to any more.
+    std::fflush(nullptr);
+    _exit(code);
 }

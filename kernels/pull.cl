@@ -1,0 +1,45 @@
+/* pull: known correspondences between points of the moving surface and target points, and their gradient.
+ *
+ *     r = sum_i b_i x_{v_i} + q          loss = sum w ((1 - a) (n . r)^2 + a |r|^2)
+ *
+ * A surface point is a fixed combination of three vertices plus a constant; q is that constant less the target.  n is
+ * the surface's normal there: distances along the surface count by the small share a only, so that the surface may
+ * slide.  Our own; it takes the place of the Chamfer distance once a coarse alignment has brought surface and points
+ * together (stages/tracker.h). */
+
+/* pulls: [..][16] floats = v0 v1 v2 (as int bits) w | b0 b1 b2 a | q x y z 0 | n x y z 0, those of frame f from
+ * start[f] to start[f + 1].  x, g: [frames][rows / 16][3][16]; g is overwritten.  loss: [frames].  One work-item per
+ * frame walks its list in order: equal input gives equal bits.  Global size: (count), frames first ... */
+kernel void pull_frame(global float *loss, global float *g, global const float *x, global const float *pulls,
+                       global const int *start, int rows, int first, int count)
+{
+    size_t frame = first + get_global_id(0);
+    if (frame >= (size_t)(first + count)) return;
+    x += frame * rows * 3;
+    g += frame * rows * 3;
+    for (int i = 0; i < rows * 3; i++) g[i] = 0.0f;
+    float total = 0.0f, part = 0.0f;
+    for (int k = start[frame]; k < start[frame + 1]; k++) {
+        global const float *p = pulls + (size_t)k * 16;
+        int3 v = as_int3((float3)(p[0], p[1], p[2]));
+        size_t a0 = (size_t)(v.x / 16) * 48 + v.x % 16, a1 = (size_t)(v.y / 16) * 48 + v.y % 16;
+        size_t a2 = (size_t)(v.z / 16) * 48 + v.z % 16;
+        float3 r = p[4] * (float3)(x[a0], x[a0 + 16], x[a0 + 32]) + p[5] * (float3)(x[a1], x[a1 + 16], x[a1 + 32]) +
+                   p[6] * (float3)(x[a2], x[a2 + 16], x[a2 + 32]) + (float3)(p[8], p[9], p[10]);
+        float3 n = (float3)(p[12], p[13], p[14]);
+        float along = p[7], w = p[3], over = dot(n, r);
+        float3 pull = 2.0f * w * ((1.0f - along) * over * n + along * r);
+        part += w * ((1.0f - along) * over * over + along * dot(r, r));
+        for (int axis = 0; axis < 3; axis++) {
+            float d = axis == 0 ? pull.x : axis == 1 ? pull.y : pull.z;
+            g[a0 + 16 * axis] += p[4] * d;
+            g[a1 + 16 * axis] += p[5] * d;
+            g[a2 + 16 * axis] += p[6] * d;
+        }
+        if (k % 64 == 63) { /* short partial sums keep the digits */
+            total += part;
+            part = 0.0f;
+        }
+    }
+    loss[frame] = total + part;
+}

@@ -1,0 +1,174 @@
+/* align: brings the reference coarsely into every frame, from the pose of the frame before it (tracker.h).
+ *
+ * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  The
+ * aligned positions are where the joint fit starts; the fit then only looks for what the coarse alignment
+ * can't express. */
+#include <math.h>
+#include <string.h>
+
+#include "stage.h"
+#include "tracker.h"
+
+/* The two last poses on one side of the key. */
+typedef struct side {
+    double *now, *before; /* K x 12, owned */
+    int64_t index;        /* of now        */
+    bool has_before;
+} side;
+
+typedef struct state {
+    bool is_on;
+    int64_t nodes, samples, steps;
+    double stiffness, along;
+    npg_tracker *tracker;
+    side sides[2]; /* forward, backward */
+    float *points; /* of the frame at work, owned */
+    size_t points_capacity;
+    double worst_dist, dist_sum;
+    int64_t worst_frame, frames;
+} state;
+
+static const npg_option options[] = {
+    {"align", "bring the reference coarsely into each frame before the joint fit", NPG_OPTION_FLAG,
+     offsetof(state, is_on), "yes", 0, 0, NULL, NULL},
+    {"align-nodes", "nodes of the deformation graph, about", NPG_OPTION_INT, offsetof(state, nodes), "800", 4,
+     20000, NULL, "N"},
+    {"align-samples", "points of a frame, and of the surface, that the coarse alignment looks at",
+     NPG_OPTION_INT, offsetof(state, samples), "3000", 100, 1e6, NULL, "N"},
+    {"align-steps", "most Gauss-Newton steps of a frame", NPG_OPTION_INT, offsetof(state, steps), "15", 1,
+     1000, NULL, "N"},
+    {"align-stiffness", "weight of the graph's edges against the distances", NPG_OPTION_REAL,
+     offsetof(state, stiffness), "0.003", 0, 1e6, NULL, NULL},
+    {"align-along", "share of distances along the surface, 0 to 1", NPG_OPTION_REAL, offsetof(state, along),
+     "0.01", 0, 1, NULL, NULL},
+    {0}};
+
+static void uninit(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    npg_tracker_close(&s->tracker);
+    for (int i = 0; i < 2; i++) {
+        npg_release(&s->sides[i].now);
+        npg_release(&s->sides[i].before);
+    }
+    npg_release(&s->points);
+}
+
+static npg_status open_tracker(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_tracker_settings settings = {(size_t)s->nodes, (size_t)s->samples, (int)s->steps, s->stiffness,
+                                           s->along};
+    NPG_TRY(npg_tracker_open(&s->tracker, npg_worker_facts(worker)->reference, &settings));
+    size_t nodes = npg_tracker_node_count(s->tracker);
+    for (int i = 0; i < 2; i++) {
+        NPG_TRY(npg_alloc_array(&s->sides[i].now, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
+        NPG_TRY(npg_alloc_array(&s->sides[i].before, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
+        npg_pose_rest(s->sides[i].now, nodes);
+    }
+    json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
+    return NPG_OK;
+}
+
+/* The pose to start from becomes `now`, the last one `before`. */
+static void step_on(state *s, side *at, int64_t index)
+{
+    size_t nodes = npg_tracker_node_count(s->tracker), bytes = nodes * NPG_POSE_SIZE * sizeof(double);
+    double *start = at->before; /* its content is not needed once the extrapolation is made */
+    if (at->has_before)
+        npg_pose_extrapolate(start, at->now, at->before, nodes);
+    else
+        memcpy(start, at->now, bytes);
+    at->before = at->now;
+    at->now = start;
+    at->has_before = true;
+    at->index = index;
+}
+
+static npg_status fit_pose(npg_worker *worker, double *pose, const npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    npg_tracked tracked;
+    if (!frame->point_count) return NPG_OK; /* nothing to see: the motion goes on as before */
+    NPG_TRY(npg_grow(&s->points, &s->points_capacity, frame->point_count, 3 * sizeof(float), NPG_FOR_FIT));
+    npg_box_local_to_unit(&npg_worker_facts(worker)->box, s->points, frame->pos_local, frame->point_count);
+    NPG_TRY(npg_tracker_fit(s->tracker, &tracked, pose, s->points, frame->normals, frame->point_count));
+    npg_worker_log(worker, NPG_LOG_DEBUG, frame->number, "coarse alignment: mean distance %.5f in %d steps",
+                   tracked.point_dist_mean, tracked.steps);
+    s->frames++;
+    s->dist_sum += tracked.point_dist_mean;
+    if (tracked.point_dist_mean > s->worst_dist) {
+        s->worst_dist = tracked.point_dist_mean;
+        s->worst_frame = frame->number;
+    }
+    return NPG_OK;
+}
+
+static npg_status align_frame(npg_worker *worker, npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_mesh *reference = facts->reference;
+    size_t bytes = npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
+    side *at = &s->sides[frame->index < facts->plan.key];
+    if (frame->index != facts->plan.key) step_on(s, at, frame->index);
+    NPG_TRY(fit_pose(worker, at->now, frame));
+    if (frame->index == facts->plan.key) memcpy(s->sides[1].now, at->now, bytes);
+    NPG_TRY(npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
+    frame->vert_count = reference->vert_count;
+    frame->fields |= NPG_FIELD_POSE;
+    npg_tracker_vertices(s->tracker, frame->vert_unit, at->now);
+    return NPG_OK;
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    state *s = npg_worker_state(worker);
+    if (!s->is_on) return NPG_OK;
+    if (!s->tracker) NPG_TRY(open_tracker(worker));
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)frame->number));
+        if (npg_worker_stopping(worker)) return NPG_STOPPED;
+    }
+    return NPG_OK;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    json_t *report = npg_worker_report(worker);
+    if (!s->frames) return NPG_OK;
+    json_object_set_new(report, "mean_distance_unit", json_real(s->dist_sum / (double)s->frames));
+    json_object_set_new(report, "worst_distance_unit", json_real(s->worst_dist));
+    json_object_set_new(report, "worst_frame", json_integer(s->worst_frame));
+    return NPG_OK;
+}
+
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    size_t verts = facts->reference ? facts->reference->vert_count : 10000, nodes = (size_t)s->nodes;
+    *chunks_held = 1;
+    if (!s->is_on) return 0;
+    /* two sides of two poses; blocks of the equations, about 20 pairs a node; per vertex weights, positions,
+     * normals */
+    return nodes * (4 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 160 +
+           facts->point_count_max * 40;
+}
+
+extern const npg_stage npg_stage_align;
+const npg_stage npg_stage_align = {
+    .name = "align",
+    .help = "brings the reference coarsely into each frame",
+    .options = options,
+    .state_size = sizeof(state),
+    .passes = NPG_PASS_SOLVE,
+    .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
+    .gives = NPG_FIELD_POSE,
+    .process = process,
+    .flush = flush,
+    .uninit = uninit,
+    .memory = memory,
+};

@@ -1,0 +1,44 @@
+/* Carry: few well-spread vertices of the reference that are optimised, and how they carry the rest of the
+ * surface.
+ *
+ *     x(v) = y(v) + sum_i b_i(v) (x_i - y_i)
+ *
+ * y: positions before the fit (the coarse alignment), x_i: fitted samples, b(v): barycentric weights of v's
+ * closest point on the mesh of the samples.  What is carried is the difference, which is smooth: the surface
+ * keeps its detail, and the distance to it is not biased by the spacing of the samples (method: few samples
+ * fitted, dense mesh delivered). */
+#ifndef NPG_CARRY_H
+#define NPG_CARRY_H
+
+#include "mesh.h"
+
+typedef struct npg_carrier {
+    int32_t sample[3];
+    float share[3];
+} npg_carrier;
+
+typedef struct npg_carry {
+    npg_mesh
+        *mesh; /* S samples: a decimated reference whose vertices are vertices of it; counted reference */
+    uint32_t *vertex;      /* S: which vertex of the reference each sample is      */
+    npg_carrier *carriers; /* V */
+    npg_surface *surface;  /* of mesh, at rest  */
+    size_t vert_count;     /* V     */
+} npg_carry;
+
+/* About sample_target samples (0, or more than V: all vertices).  reference has normals; it is a loan. */
+npg_status npg_carry_open(npg_carry **carry, const npg_mesh *reference, size_t sample_target);
+void npg_carry_close(npg_carry **carry);
+
+/* Which samples carry points given at rest (N x 3). */
+npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const float *rest, size_t count);
+
+/* samples (S x 3) = the samples' rows of vert_pos (V x 3). */
+void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_pos);
+
+/* vert_pos (V x 3), the y of the formula on entry, becomes x: samples_before are the y_i, samples the x_i (S
+ * x 3). */
+void npg_carry_move(const npg_carry *carry, float *vert_pos, const float *samples_before,
+                    const float *samples);
+
+#endif

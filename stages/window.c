@@ -1,0 +1,203 @@
+/* Window: solving one, from aligned frames or as in the paper. */
+#include "window.h"
+
+#include <string.h>
+
+struct npg_window_solver {
+    npg_window_settings settings;
+    const npg_facts *facts; /* loan */
+    bool is_aligned;
+    npg_fit *fit;
+    npg_carry *carry;
+    npg_matcher *matcher;
+    /* of the window at work, owned */
+    float *points;       /* all frames' points in units   */
+    size_t *point_start; /* count + 1                     */
+    float *bases, *now;  /* count x S x 3                 */
+    float *dense;        /* V x 3                         */
+    npg_pull *pulls;
+    size_t *pull_start;
+    npg_fit_frame *frames;
+    size_t count;
+};
+
+size_t npg_window_sample_count(const npg_window_solver *solver)
+{
+    return solver->carry ? solver->carry->mesh->vert_count : solver->facts->reference->vert_count;
+}
+
+static void close_frames(npg_window_solver *s)
+{
+    void *all[] = {&s->points, &s->point_start, &s->bases,      &s->now,
+                   &s->dense,  &s->pulls,       &s->pull_start, &s->frames};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+}
+
+void npg_window_solver_close(npg_window_solver **slot)
+{
+    if (!slot || !*slot) return;
+    close_frames(*slot);
+    npg_fit_close(&(*slot)->fit);
+    npg_matcher_close(&(*slot)->matcher);
+    npg_carry_close(&(*slot)->carry);
+    npg_release(slot);
+}
+
+npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
+                                  const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
+                                  bool is_aligned)
+{
+    npg_window_solver *s;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&s, NPG_FOR_FIT, sizeof *s));
+    s->settings = *settings;
+    s->facts = facts;
+    s->is_aligned = is_aligned;
+    npg_status status = NPG_OK;
+    if (is_aligned) status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples);
+    if (is_aligned && !status)
+        status = npg_matcher_open(&s->matcher, s->carry, facts->reference, &settings->match);
+    if (!status)
+        status = npg_fit_open(&s->fit, device, &settings->fit, is_aligned ? s->carry->mesh : facts->reference,
+                              seed);
+    if (status) npg_window_solver_close(&s);
+    *out = s;
+    return status;
+}
+
+/* ---- the window's frames ---- */
+
+static npg_status take_points(npg_window_solver *s, npg_held *const *held)
+{
+    NPG_TRY(npg_alloc_array(&s->point_start, NPG_FOR_FIT, s->count + 1, sizeof *s->point_start));
+    for (size_t i = 0; i < s->count; i++)
+        s->point_start[i + 1] = s->point_start[i] + held[i]->frame.point_count;
+    NPG_TRY(npg_alloc_array(&s->points, NPG_FOR_FIT, s->point_start[s->count] + 1, 3 * sizeof(float)));
+    for (size_t i = 0; i < s->count; i++)
+        npg_box_local_to_unit(&s->facts->box, s->points + 3 * s->point_start[i], held[i]->frame.pos_local,
+                              held[i]->frame.point_count);
+    return NPG_OK;
+}
+
+/* The time code is a function of the absolute frame with a fixed period, the length of a window, so that
+ * frames which two windows share mean the same to both. */
+static double time_of(const npg_window_solver *s, int64_t index)
+{
+    npg_window first = npg_plan_window(&s->facts->plan, 0);
+    int64_t length = first.last - first.first;
+    return length ? (double)(index - first.first) / (double)length : 0;
+}
+
+static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_t count)
+{
+    size_t size = 3 * npg_window_sample_count(s), verts = s->facts->reference->vert_count;
+    close_frames(s);
+    s->count = count;
+    NPG_TRY(take_points(s, held));
+    NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FIT, count, sizeof *s->frames));
+    NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, count, size * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&s->dense, NPG_FOR_FIT, verts, 3 * sizeof(float)));
+    if (s->is_aligned) NPG_TRY(npg_alloc_array(&s->bases, NPG_FOR_FIT, count, size * sizeof(float)));
+    for (size_t i = 0; i < count; i++) {
+        const npg_frame *frame = &held[i]->frame;
+        if (s->is_aligned) npg_carry_gather(s->carry, s->bases + i * size, frame->vert_unit);
+        s->frames[i] =
+            (npg_fit_frame){frame->index, time_of(s, frame->index), s->points + 3 * s->point_start[i],
+                            frame->point_count, s->is_aligned ? s->bases + i * size : NULL};
+    }
+    return NPG_OK;
+}
+
+/* ---- aligned frames ---- */
+
+/* The dense surface that the samples now make, from the aligned one. */
+static void carry_dense(npg_window_solver *s, const npg_frame *frame, size_t i)
+{
+    size_t size = 3 * s->carry->mesh->vert_count;
+    memcpy(s->dense, frame->vert_unit, s->carry->vert_count * 3 * sizeof(float));
+    npg_carry_move(s->carry, s->dense, s->bases + i * size, s->now + i * size);
+}
+
+static npg_status read_samples(npg_window_solver *s)
+{
+    size_t size = 3 * npg_window_sample_count(s);
+    for (size_t i = 0; i < s->count; i++) NPG_TRY(npg_fit_vertices(s->fit, s->now + i * size, i));
+    return NPG_OK;
+}
+
+/* Pulls of all frames at the samples' present positions. */
+static npg_status match_all(npg_window_solver *s, npg_held *const *held)
+{
+    size_t size = 3 * s->carry->mesh->vert_count, most = npg_matcher_most(s->matcher), count = 0;
+    npg_release(&s->pulls);
+    npg_release(&s->pull_start);
+    NPG_TRY(npg_alloc_array(&s->pulls, NPG_FOR_FIT, s->count * most, sizeof *s->pulls));
+    NPG_TRY(npg_alloc_array(&s->pull_start, NPG_FOR_FIT, s->count + 1, sizeof *s->pull_start));
+    for (size_t i = 0; i < s->count; i++) {
+        const npg_frame *frame = &held[i]->frame;
+        carry_dense(s, frame, i);
+        NPG_TRY(npg_match_points(s->matcher, s->pulls, &count, s->dense, s->now + i * size,
+                                 s->points + 3 * s->point_start[i], frame->normals, frame->point_count));
+        if (held[i]->solved) {
+            npg_carry_gather(s->carry, s->dense, held[i]->solved); /* S x 3 fits into V x 3 */
+            npg_match_tie(s->matcher, s->pulls, &count, s->dense);
+        }
+        s->pull_start[i + 1] = count;
+    }
+    return npg_fit_set_pulls(s->fit, s->pulls, s->pull_start);
+}
+
+static npg_status run_rounds(npg_window_solver *s, npg_held *const *held, npg_fit_watch *watch, void *user)
+{
+    int64_t epochs = s->settings.fit.epochs, rounds = s->settings.rounds;
+    NPG_TRY(npg_fit_run(s->fit, 0, 0, NULL, NULL)); /* where the last window's decoder puts these frames */
+    for (int64_t round = 0; round < rounds; round++) {
+        NPG_TRY(read_samples(s));
+        NPG_TRY(match_all(s, held));
+        NPG_TRY(npg_fit_run(s->fit, round * epochs / rounds, (round + 1) * epochs / rounds, watch, user));
+    }
+    return read_samples(s);
+}
+
+/* What a window says of a frame that an earlier one has solved counts more the nearer the frame is to the new
+ * ones. */
+static float share_of_new(const npg_window *window, int64_t index)
+{
+    if (index >= window->new_first && index <= window->new_last) return 1;
+    int64_t overlap =
+        window->direction > 0 ? window->new_first - window->first : window->last - window->new_last;
+    int64_t away = window->direction > 0 ? window->new_first - index : index - window->new_last;
+    return (float)(overlap + 1 - away) / (float)(overlap + 1);
+}
+
+static npg_status keep_solved(npg_held *held, const float *dense, size_t verts, float share)
+{
+    if (!held->solved) {
+        NPG_TRY(npg_alloc_array(&held->solved, NPG_FOR_FRAMES, verts, 3 * sizeof(float)));
+        memcpy(held->solved, dense, verts * 3 * sizeof(float));
+        return NPG_OK;
+    }
+    for (size_t i = 0; i < 3 * verts; i++) held->solved[i] += share * (dense[i] - held->solved[i]);
+    return NPG_OK;
+}
+
+npg_status npg_window_solve(npg_window_solver *s, npg_held *const *held, const npg_window *window,
+                            npg_fit_watch *watch, void *user)
+{
+    size_t verts = s->facts->reference->vert_count, size = 3 * npg_window_sample_count(s);
+    NPG_TRY(open_frames(s, held, (size_t)(window->last - window->first + 1)));
+    NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
+    if (s->is_aligned) {
+        NPG_TRY(run_rounds(s, held, watch, user));
+    } else {
+        NPG_TRY(npg_fit_run(s->fit, 0, s->settings.fit.epochs, watch, user));
+        NPG_TRY(read_samples(s));
+    }
+    for (size_t i = 0; i < s->count; i++) {
+        if (s->is_aligned) carry_dense(s, &held[i]->frame, i);
+        NPG_TRY(keep_solved(held[i], s->is_aligned ? s->dense : s->now + i * size, verts,
+                            share_of_new(window, held[i]->frame.index)));
+    }
+    close_frames(s);
+    return NPG_OK;
+}

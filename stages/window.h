@@ -1,0 +1,40 @@
+/* Window: the joint fit of consecutive frames, and what goes from one window to the next.
+ *
+ * With aligned frames (stage align) the decoder moves the aligned positions of a few samples that carry the
+ * dense surface (carry.h), drawn by correspondences that are renewed a few times (match.h); frames that an
+ * earlier window solved stay tied to that and are cross-faded.  Without, it is the paper's fit: all vertices
+ * from the reference by Chamfer distance. */
+#ifndef NPG_WINDOW_H
+#define NPG_WINDOW_H
+
+#include "fit.h"
+#include "match.h"
+#include "stage.h"
+
+typedef struct npg_window_settings {
+    npg_fit_settings fit;
+    npg_match_settings match;
+    int64_t samples; /* 0: all vertices             */
+    int64_t rounds;  /* times the matches are made  */
+} npg_window_settings;
+
+/* A frame in hand. */
+typedef struct npg_held {
+    npg_frame frame; /* owned; vert_unit are the aligned positions while is_aligned */
+    float *solved;   /* V x 3 once a window has solved it, owned, or NULL           */
+} npg_held;
+
+typedef struct npg_window_solver npg_window_solver;
+
+/* The device and facts are loans that outlive the solver; facts->reference and box are known. */
+npg_status npg_window_solver_open(npg_window_solver **solver, npg_device *device,
+                                  const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
+                                  bool is_aligned);
+void npg_window_solver_close(npg_window_solver **solver);
+size_t npg_window_sample_count(const npg_window_solver *solver);
+
+/* Solve a window: held[i] are its frames in order of time; fills `solved` of each. */
+npg_status npg_window_solve(npg_window_solver *solver, npg_held *const *held, const npg_window *window,
+                            npg_fit_watch *watch, void *user);
+
+#endif
