@@ -123,6 +123,11 @@ json_t *npg_json_text(const char *text);
 /* A JSON number, or null for one that is not finite. */
 json_t *npg_json_real(double value);
 
+/* Log and report the bound on memory.  The run itself does so before the solving pass of files; in a live one
+ * the stage that makes the plan does, as soon as it is made.  Asks all stages' memory(), which then read
+ * nothing but options and facts. */
+void npg_worker_announce_memory(npg_worker *worker);
+
 /* The whole report, for conclude(). */
 json_t *npg_worker_whole_report(npg_worker *worker);
 

@@ -219,10 +219,21 @@ static npg_status next_followed(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
+/* Behind a frame that is torn nothing on a pipe can be told apart: with keep-going the stream ends there, and
+ * what came before is finished. */
+static npg_status next_streamed(npg_worker *worker, npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    npg_status status = npg_stream_next(s->stream, frame, &npg_worker_facts(worker)->origin);
+    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going || !s->next) return status;
+    npg_worker_warn(worker, true, s->seen, "the stream is taken to end here: %s", npg_error_text());
+    return NPG_END;
+}
+
 static npg_status next_live(npg_worker *worker, npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
-    NPG_TRY(s->stream   ? npg_stream_next(s->stream, frame, &npg_worker_facts(worker)->origin)
+    NPG_TRY(s->stream   ? next_streamed(worker, frame)
             : s->follow ? next_followed(worker, frame)
                         : next_pushed(worker, frame));
     frame->cleaning.read = frame->point_count;

@@ -244,6 +244,7 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
     state->is_planned = true;
     npg_release(&state->cells);
+    npg_worker_announce_memory(worker);
     return NPG_OK;
 }
 
