@@ -239,7 +239,10 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
     for (size_t i = 0; i < state->held.count; i++)
         score_frame(state, facts, frame_count, &state->held.frames[i]);
-    NPG_TRY(set_plan(worker, frame_count));
+    npg_status status = set_plan(worker, frame_count);
+    if (status && is_open)
+        return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
+    NPG_TRY(status);
     if (is_open) facts->plan = (npg_plan){NPG_FRAMES_OPEN, facts->plan.key, state->window, state->overlap};
     json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
     state->is_planned = true;

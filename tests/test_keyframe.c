@@ -317,6 +317,8 @@ static void one_window_over_more_than_the_look_ahead_is_refused(void **state)
     assert_int_equal(s.seen_count, 0);
     assert_int_equal(npg_memory_used(), before);
     assert_int_equal(run_live(&s, 0, "8", "-1"), NPG_BAD_INPUT);
+    assert_int_equal(run_live_windows(&s, 30, "8", "25", "6"), NPG_USAGE);
+    assert_non_null(strstr(npg_error_text(), "look-ahead of 8 frames: keyframe 25"));
 }
 
 static void no_memory_is_said(void **state)
