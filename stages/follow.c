@@ -33,11 +33,12 @@ struct npg_follow {
     char *folder, *pattern, *last; /* owned; pattern may be NULL; last: the name that was taken last */
     char ending[16];               /* of all frames, once one was taken */
     int watch;                     /* inotify, -1 without */
-    file *files;                   /* not taken yet, in natural order; owned */
-    size_t count, capacity;
+    file *files;                   /* files[begin .. count): not taken yet, in natural order; owned */
+    size_t begin, count, capacity;
     size_t taken_count, late_count;
     size_t number_place; /* which run of digits is the number, from the end of the name */
     int64_t number, step;
+    int64_t gap_before; /* the last number before which some were left out */
     bool is_ended, is_changed;
     double idle_since_s;
 };
@@ -203,8 +204,21 @@ static bool end_is_there(const npg_follow *follow, npg_status *status)
     return is_there;
 }
 
+static size_t left(const npg_follow *follow)
+{
+    return follow->count - follow->begin;
+}
+
+static void forget_taken(npg_follow *follow)
+{
+    if (follow->begin) memmove(follow->files, follow->files + follow->begin, left(follow) * sizeof(file));
+    follow->count -= follow->begin;
+    follow->begin = 0;
+}
+
 static npg_status look(npg_follow *follow)
 {
+    forget_taken(follow);
     size_t known = follow->count, passed = 0;
     npg_status status = NPG_OK;
     bool is_end = end_is_there(follow, &status); /* before the names: all of them are there then */
@@ -297,11 +311,20 @@ static void settle_names(npg_follow *follow)
     if (npg_name_number(first, follow->number_place) < 0) follow->number_place = 0;
 }
 
-static bool waits_for_number(const npg_follow *follow, const file *head)
+static bool leaves_numbers_out(const npg_follow *follow, const file *head)
 {
-    if (!follow->settings.finds_gaps || follow->is_ended || !follow->taken_count) return false;
     int64_t expected = follow->number + (follow->step ? follow->step : 1);
-    return number_of(follow, head) > expected && follow->count <= NPG_FOLLOW_LATE;
+    return follow->settings.finds_gaps && follow->taken_count && number_of(follow, head) > expected;
+}
+
+/* Before a number counts as missing the folder is looked at once more. */
+static bool waits_for_number(npg_follow *follow, const file *head)
+{
+    if (!leaves_numbers_out(follow, head)) return false;
+    if (!follow->is_ended && left(follow) <= NPG_FOLLOW_LATE) return true;
+    bool is_looked_for = follow->gap_before == number_of(follow, head);
+    follow->gap_before = number_of(follow, head);
+    return !is_looked_for;
 }
 
 static npg_status read_file(npg_follow *follow, const file *head, npg_frame *frame, npg_origin *origin)
@@ -327,7 +350,7 @@ static int64_t common_divisor(int64_t a, int64_t b)
 /* The head becomes *frame. */
 static npg_status take(npg_follow *follow, npg_frame *frame)
 {
-    file head = follow->files[0];
+    file head = follow->files[follow->begin];
     int64_t number = number_of(follow, &head);
     if (follow->taken_count && number <= follow->number)
         return npg_error(NPG_BAD_INPUT, "%s/%s: has the number %lld, and the frame before it %lld",
@@ -337,15 +360,14 @@ static npg_status take(npg_follow *follow, npg_frame *frame)
     follow->taken_count++;
     npg_release(&follow->last);
     follow->last = head.name;
-    follow->files[0].name = NULL;
-    memmove(follow->files, follow->files + 1, --follow->count * sizeof head);
+    follow->files[follow->begin++].name = NULL;
     return NPG_OK;
 }
 
 /* Whether a file that was refused as it is now will not get better. */
 static bool is_broken(const npg_follow *follow, const file *head)
 {
-    bool has_follower = follow->count > 1 || follow->is_ended;
+    bool has_follower = left(follow) > 1 || follow->is_ended;
     return has_follower && npg_clock_s() - head->since_s >= follow->settings.settle_s;
 }
 
@@ -353,7 +375,7 @@ static bool is_broken(const npg_follow *follow, const file *head)
 static npg_status try_head(npg_follow *follow, npg_frame *frame, npg_origin *origin, bool *is_taken)
 {
     if (!follow->last) settle_names(follow);
-    file *head = &follow->files[0];
+    file *head = &follow->files[follow->begin];
     *is_taken = false;
     if (waits_for_number(follow, head) || !(head->is_closed || head->is_stable)) return NPG_OK;
     bool is_known_bad = head->was_refused && head->refused_size == head->size;
@@ -377,10 +399,10 @@ npg_status npg_follow_next(npg_follow *follow, npg_frame *frame, npg_origin *ori
     bool is_taken = false;
     follow->idle_since_s = npg_clock_s();
     for (;;) {
-        npg_status status = follow->count ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
+        npg_status status = left(follow) ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
         if (status < 0) npg_frame_clear(frame);
         if (status || is_taken) return status;
-        if (follow->is_ended && !follow->count) return NPG_END;
+        if (follow->is_ended && !left(follow)) return NPG_END;
         NPG_TRY(wait_and_look(follow));
     }
 }
