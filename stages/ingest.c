@@ -42,7 +42,7 @@ static const npg_option ingest_options[] = {
      "the points of the frame before it, ignore takes numbers for mere names",
      NPG_OPTION_CHOICE, OFFSET(missing), "error", 0, 0, "error|skip|hold|ignore", NULL},
     {"cache-mib", "Memory for clouds that were read, so that the later passes need not parse files again",
-     NPG_OPTION_INT, OFFSET(cache_mib), "8", 0, 1048576, NULL, "MIB"},
+     NPG_OPTION_INT, OFFSET(cache_mib), "4", 0, 1048576, NULL, "MIB"},
     {"follow-end", "Name of the file that ends a folder that is followed, once it is there; empty: none does",
      NPG_OPTION_TEXT, OFFSET(follow_end), "capture.end", 0, 0, NULL, "NAME"},
     {"follow-idle", "Seconds without any change that end a folder that is followed; 0: wait for the end file",
