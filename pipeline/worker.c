@@ -99,7 +99,11 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     json_object_set_new(entry, "message", npg_json_text(text));
     if (frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
     pthread_mutex_lock(&worker->run->lock);
-    json_array_append_new(worker->run->warnings, entry);
+    if (json_array_size(worker->run->warnings) < NPG_WARNINGS_MAX)
+        json_array_append_new(worker->run->warnings, entry);
+    else
+        json_decref(entry);
+    worker->run->warning_count++;
     worker->run->is_partial |= partial;
     pthread_mutex_unlock(&worker->run->lock);
 }
@@ -126,6 +130,11 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     now.left_s = time_left(run, &now);
     run->hooks.progress(run->hooks.user, &now);
     pthread_mutex_unlock(&run->lock);
+}
+
+void npg_worker_announce_memory(npg_worker *worker)
+{
+    npg_run_announce_memory(worker->run);
 }
 
 /* ---- the thread ---- */

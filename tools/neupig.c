@@ -8,8 +8,9 @@ const npg_verb npg_verbs[] = {
     {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",
      "Reads the point clouds of INPUT (a folder, a pattern like frame_%04d.ply, a list file, or - for "
      "standard "
-     "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
-     "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.",
+     "input; or --follow a folder that grows) in time order and writes one mesh per frame, all with the same "
+     "faces, to DIR/meshes, with reference.ply, report.json, frames.jsonl and, last of all, done.json beside "
+     "them.",
      npg_run_verb_options, true, npg_verb_run},
     {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
      "Reads every frame of INPUT and says what is in it, what a run would trip over, and what it would cost "
