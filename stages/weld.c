@@ -24,7 +24,7 @@
 #define PATCH_MOST    0.2  /* of the faces: more is no weld but a surface that fits nowhere */
 
 static const npg_tracker_settings weld_tracking = {
-    .nodes = 250, .samples = 2000, .steps = 12, .stiffness = 0.01, .along = 0.1};
+    .nodes = 250, .samples = 2000, .steps = 12, .stiffness = 0.0005, .along = 0.1};
 
 typedef struct hearing {
     const npg_weld_settings *settings;
