@@ -92,7 +92,8 @@ npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_cou
     for (size_t i = 0, next; i < count; i = next) {
         for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
         bool is_pair = next - i == 2 && halves[i].forward != halves[i + 1].forward;
-        for (size_t k = i; k < next; k++) twin[halves[k].at] = is_pair ? halves[2 * i + 1 - k].at : UINT32_MAX;
+        for (size_t k = i; k < next; k++)
+            twin[halves[k].at] = is_pair ? halves[2 * i + 1 - k].at : UINT32_MAX;
     }
     npg_release(&halves);
     return NPG_OK;
@@ -226,7 +227,8 @@ npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh)
     npg_release(&component);
     NPG_TRY(status);
     int64_t unused = (int64_t)manifold.unused_vertices;
-    int64_t euler = (int64_t)mesh->vert_count - unused - (int64_t)manifold.edge_count + (int64_t)mesh->face_count;
+    int64_t euler =
+        (int64_t)mesh->vert_count - unused - (int64_t)manifold.edge_count + (int64_t)mesh->face_count;
     *handles = (2 * ((int64_t)components - unused) - euler - (int64_t)loops) / 2;
     return NPG_OK;
 }
