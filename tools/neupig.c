@@ -40,8 +40,8 @@ const npg_verb npg_verbs[] = {
      "machine.",
      npg_bench_options, false, npg_verb_bench},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
-     "Lists the OpenCL devices and the versions of the libraries in use and computes a small known result on "
-     "each device.  Exit code 4 when there is no device or one computes wrong.",
+     "Lists the OpenCL devices and the versions of the libraries in use and compares every kernel on "
+     "each device with its plain twin.  Exit code 4 when there is no device or one computes wrong.",
      npg_doctor_options, false, npg_verb_doctor},
     {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
      "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},

@@ -1,6 +1,4 @@
 /* neupig doctor: what this machine offers, and whether its devices compute right. */
-#define CL_TARGET_OPENCL_VERSION 120
-#include <CL/cl.h>
 #include <embree3/rtcore.h>
 #include <jansson.h>
 #include <meshoptimizer.h>
@@ -13,6 +11,7 @@
 #include <zstd.h>
 
 #include "cli.h"
+#include "kernels.h"
 
 typedef struct settings {
     bool json;
@@ -22,114 +21,29 @@ const npg_option npg_doctor_options[] = {{"json", "Print one JSON object instead
                                           offsetof(settings, json), "no", 0, 0, NULL, NULL},
                                          {0}};
 
-enum { DEVICES_MAX = 64, PLATFORMS_MAX = 16 };
-
-/* ---- a small known result ---- */
-
-enum { TEST_ITEMS = 1000 };
-
-static const char test_source[] = "kernel void check(global const float *x, global float *y, float a)\n"
-                                  "{\n"
-                                  "    size_t i = get_global_id(0);\n"
-                                  "    y[i] = fma(a, x[i], (float)i);\n"
-                                  "}\n";
-
-static const char *launch(cl_context context, cl_device_id device, cl_command_queue queue, cl_kernel kernel,
-                          const float *x, float *y)
-{
-    cl_int code = CL_SUCCESS, code_y = CL_SUCCESS;
-    const float a = 3;
-    size_t bytes = TEST_ITEMS * sizeof(float), items = TEST_ITEMS;
-    (void)device;
-    cl_mem in =
-        clCreateBuffer(context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, bytes, (void *)(uintptr_t)x, &code);
-    cl_mem out = clCreateBuffer(context, CL_MEM_WRITE_ONLY, bytes, NULL, &code_y);
-    const char *fault = NULL;
-    if (code || code_y)
-        fault = "no buffers";
-    else if (clSetKernelArg(kernel, 0, sizeof in, &in) || clSetKernelArg(kernel, 1, sizeof out, &out) ||
-             clSetKernelArg(kernel, 2, sizeof a, &a) ||
-             clEnqueueNDRangeKernel(queue, kernel, 1, NULL, &items, NULL, 0, NULL, NULL) ||
-             clEnqueueReadBuffer(queue, out, CL_TRUE, 0, bytes, y, 0, NULL, NULL))
-        fault = "the kernel did not run";
-    if (in) clReleaseMemObject(in);
-    if (out) clReleaseMemObject(out);
-    return fault;
-}
-
-static const char *build_and_launch(cl_context context, cl_device_id device, const float *x, float *y)
-{
-    const char *source = test_source, *fault = NULL;
-    cl_int code;
-    cl_command_queue queue = clCreateCommandQueue(context, device, 0, &code);
-    if (code) return "no command queue";
-    cl_program program = clCreateProgramWithSource(context, 1, &source, NULL, &code);
-    if (code || clBuildProgram(program, 1, &device, "", NULL, NULL)) fault = "the compiler failed";
-    cl_kernel kernel = fault ? NULL : clCreateKernel(program, "check", &code);
-    if (!fault) fault = code ? "no kernel" : launch(context, device, queue, kernel, x, y);
-    if (kernel) clReleaseKernel(kernel);
-    if (program) clReleaseProgram(program);
-    clReleaseCommandQueue(queue);
-    return fault;
-}
-
-/* NULL when the device computed what it should, else what went wrong. */
-static const char *test_device(cl_device_id device)
-{
-    static float x[TEST_ITEMS], y[TEST_ITEMS];
-    cl_int code;
-    cl_context context = clCreateContext(NULL, 1, &device, NULL, NULL, &code);
-    if (code) return "no context";
-    for (int i = 0; i < TEST_ITEMS; i++) {
-        x[i] = (float)i * 0.5f;
-        y[i] = -1;
-    }
-    const char *fault = build_and_launch(context, device, x, y);
-    clReleaseContext(context);
-    for (int i = 0; i < TEST_ITEMS && !fault; i++)
-        if (y[i] != (float)i * 2.5f) fault = "a wrong result";
-    return fault;
-}
-
 /* ---- devices ---- */
 
-static void device_text(char *out, size_t size, cl_device_id device, cl_device_info what)
+/* The self-test compares every kernel on the device with its plain twin. */
+static json_t *json_of_device(size_t i, const npg_device_info *info)
 {
-    out[0] = 0;
-    if (clGetDeviceInfo(device, what, size, out, NULL) != CL_SUCCESS) snprintf(out, size, "?");
+    npg_device *device;
+    char number[24];
+    snprintf(number, sizeof number, "%zu", i);
+    npg_status status = npg_device_open(&device, number);
+    if (!status) status = npg_kernels_self_test(device);
+    npg_device_close(&device);
+    return json_pack("{s:s,s:s,s:s,s:i,s:I,s:s}", "name", info->name, "platform", info->platform, "version",
+                     info->version, "compute_units", info->units, "memory_bytes",
+                     (json_int_t)info->memory_bytes, "self_test", status ? npg_error_text() : "ok");
 }
 
-static json_t *json_of_device(cl_device_id device)
-{
-    char name[256], version[256], driver[256];
-    cl_uint units = 0;
-    cl_ulong memory = 0;
-    device_text(name, sizeof name, device, CL_DEVICE_NAME);
-    device_text(version, sizeof version, device, CL_DEVICE_VERSION);
-    device_text(driver, sizeof driver, device, CL_DRIVER_VERSION);
-    clGetDeviceInfo(device, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL);
-    clGetDeviceInfo(device, CL_DEVICE_GLOBAL_MEM_SIZE, sizeof memory, &memory, NULL);
-    const char *fault = test_device(device);
-    return json_pack("{s:s,s:s,s:s,s:i,s:I,s:s}", "name", name, "version", version, "driver", driver,
-                     "compute_units", (int)units, "memory_bytes", (json_int_t)memory, "self_test",
-                     fault ? fault : "ok");
-}
-
+/* Empty when there is no driver at all. */
 static json_t *list_devices(void)
 {
     json_t *list = json_array();
-    cl_platform_id platforms[PLATFORMS_MAX];
-    cl_uint platform_count = 0;
-    if (clGetPlatformIDs(PLATFORMS_MAX, platforms, &platform_count) != CL_SUCCESS) platform_count = 0;
-    for (cl_uint p = 0; p < platform_count && p < PLATFORMS_MAX; p++) {
-        cl_device_id devices[DEVICES_MAX];
-        cl_uint device_count = 0;
-        if (clGetDeviceIDs(platforms[p], CL_DEVICE_TYPE_ALL, DEVICES_MAX, devices, &device_count) !=
-            CL_SUCCESS)
-            continue;
-        for (cl_uint d = 0; d < device_count && d < DEVICES_MAX; d++)
-            json_array_append_new(list, json_of_device(devices[d]));
-    }
+    npg_device_info info;
+    for (size_t i = 0; npg_device_describe(i, &info) == NPG_OK; i++)
+        json_array_append_new(list, json_of_device(i, &info));
     return list;
 }
 
@@ -182,14 +96,14 @@ static void print_text(const json_t *machine, const json_t *libraries, json_t *d
            (double)json_integer_value(json_object_get(machine, "memory_bytes")) / 0x1p30);
     json_object_foreach((json_t *)(uintptr_t)libraries, name, value)
         printf("library: %-14s %s\n", name, json_string_value(value));
-    json_array_foreach(devices, i, value) printf(
-        "device %zu: %s\n          %s, driver %s, %d compute units, %.1f GiB\n          self-test: %s\n", i,
-        json_string_value(json_object_get(value, "name")),
-        json_string_value(json_object_get(value, "version")),
-        json_string_value(json_object_get(value, "driver")),
-        (int)json_integer_value(json_object_get(value, "compute_units")),
-        (double)json_integer_value(json_object_get(value, "memory_bytes")) / 0x1p30,
-        json_string_value(json_object_get(value, "self_test")));
+    json_array_foreach(devices, i, value)
+        printf("device %zu: %s\n          %s, %s, %d compute units, %.1f GiB\n          self-test: %s\n", i,
+               json_string_value(json_object_get(value, "name")),
+               json_string_value(json_object_get(value, "version")),
+               json_string_value(json_object_get(value, "platform")),
+               (int)json_integer_value(json_object_get(value, "compute_units")),
+               (double)json_integer_value(json_object_get(value, "memory_bytes")) / 0x1p30,
+               json_string_value(json_object_get(value, "self_test")));
 }
 
 static npg_status judge(const json_t *devices)
