@@ -84,7 +84,8 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
                              settings->keep_going, cache_limit(worker)));
     npg_worker_keep(worker, capture, release_capture);
-    npg_worker_facts(worker)->frame_count = (int64_t)capture->list->count;
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     tell_list(worker, capture->list);
     return NPG_OK;
 }
@@ -119,9 +120,10 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    while (s->next < facts->frame_count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
+    bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
+    int64_t end = is_solving ? npg_plan_read_count(&facts->plan) : facts->frame_count;
+    while (s->next < end && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
         npg_frame frame;
-        bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
         int64_t index = is_solving ? npg_plan_frame(&facts->plan, s->next) : s->next;
         if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
         NPG_TRY(read_frame(worker, &frame, index));
@@ -259,7 +261,10 @@ static npg_status next_from_live(npg_worker *worker, npg_chunk *chunk)
 
 static npg_status init(npg_worker *worker)
 {
-    return npg_worker_facts(worker)->is_live ? open_live(worker) : open_capture(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    state *s = npg_worker_state(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) s->next = facts->resumed_read;
+    return facts->is_live ? open_live(worker) : open_capture(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)

@@ -172,7 +172,8 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     NPG_TRY(choose(state, &key));
     int64_t window = state->window && state->window < frame_count ? state->window : frame_count;
     int64_t overlap = window < frame_count ? state->overlap : 0;
-    facts->plan = (npg_plan){frame_count, key.index, window, overlap};
+    facts->plan =
+        (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
     json_t *report = npg_worker_report(worker), *scores = json_array();
     for (size_t i = 0; i < state->best_count; i++) json_array_append_new(scores, json_of(&state->best[i]));
     json_object_set_new(report, "key", json_of(&key));
@@ -189,7 +190,7 @@ static npg_status mark_key(npg_worker *worker, npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     int64_t key = npg_worker_facts(worker)->plan.key;
-    bool is_first = state->passed_count++ == 0;
+    bool is_first = state->passed_count++ == 0 && !npg_worker_facts(worker)->is_resumed;
     frame->is_key = frame->index == key;
     frame->fields |= NPG_FIELD_KEY;
     if (is_first != frame->is_key)
