@@ -18,7 +18,7 @@ const npg_stage *const npg_chain[] = {
 
 static const npg_preset_value paper[] = {{"align", "no"},   {"window", "0"},
                                          {"epochs", "250"}, {"confidence", "cumulative"},
-                                         {"rate-end", "1"}, {NULL, NULL}};
+                                         {"rate-end", "1"}, {"feature-start", "0"}, {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
 
 const npg_preset npg_presets[] = {

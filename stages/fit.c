@@ -135,6 +135,21 @@ static npg_status open_grid_adam(npg_fit *fit)
     return status;
 }
 
+/* Features that differ from place to place from the start; with a head of zero the motion still begins at rest. */
+static npg_status draw_features(npg_fit *fit)
+{
+    float *values;
+    size_t count = fit->levels.row_count * NPG_LATENT_CHANNELS;
+    npg_random random = npg_random_stream(fit->seed, 2, 0);
+    if (fit->settings.feature_start <= 0) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_FIT, count, sizeof *values));
+    for (size_t i = 0; i < count; i++)
+        values[i] = (float)(fit->settings.feature_start * (2 * npg_random_real(&random) - 1));
+    npg_status status = npg_buffer_write(&fit->u, 0, values, count * sizeof *values);
+    npg_release(&values);
+    return status;
+}
+
 static npg_status open_grids(npg_fit *fit, const float *normals)
 {
     npg_samples samples;
@@ -147,6 +162,7 @@ static npg_status open_grids(npg_fit *fit, const float *normals)
     NPG_TRY(npg_buffer_open(&fit->u, fit->device, bytes));
     NPG_TRY(npg_buffer_open(&fit->nodes, fit->device, bytes));
     NPG_TRY(npg_buffer_open(&fit->dnodes, fit->device, bytes));
+    NPG_TRY(draw_features(fit));
     return open_grid_adam(fit);
 }
 

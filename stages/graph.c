@@ -126,13 +126,16 @@ static void walk_from(walk *w, uint32_t from, float reach)
 
 /* ---- nodes and weights ---- */
 
-/* Keep the nearest nodes of a vertex, nearest first; vert_weight holds distances meanwhile. */
-static void offer_node(npg_graph *graph, uint32_t vertex, uint32_t node, float dist)
+/* Keep the nearest nodes of a vertex, nearest first; vert_weight holds distances meanwhile, `beyond` that of
+ * the nearest node which is not kept. */
+static void offer_node(npg_graph *graph, float *beyond, uint32_t vertex, uint32_t node, float dist)
 {
     uint32_t *nodes = graph->vert_node + (size_t)vertex * NPG_GRAPH_BIND;
     float *dists = graph->vert_weight + (size_t)vertex * NPG_GRAPH_BIND;
     int at = NPG_GRAPH_BIND;
     while (at > 0 && (nodes[at - 1] == UINT32_MAX || dist < dists[at - 1])) at--;
+    bool is_full = nodes[NPG_GRAPH_BIND - 1] != UINT32_MAX;
+    if (is_full) beyond[vertex] = fminf(beyond[vertex], fmaxf(dist, dists[NPG_GRAPH_BIND - 1]));
     if (at == NPG_GRAPH_BIND) return;
     for (int i = NPG_GRAPH_BIND - 1; i > at; i--) {
         nodes[i] = nodes[i - 1];
@@ -142,14 +145,16 @@ static void offer_node(npg_graph *graph, uint32_t vertex, uint32_t node, float d
     dists[at] = dist;
 }
 
-static void turn_to_weights(npg_graph *graph)
+/* w = (1 - d / d_5)^2, d_5 the distance of the nearest node that does not carry the vertex: weights go to 0,
+ * with their slope, before a node drops out, so that the surface gets no kinks there. */
+static void turn_to_weights(npg_graph *graph, const float *beyond)
 {
     for (size_t v = 0; v < graph->vert_count; v++) {
         float *w = graph->vert_weight + v * NPG_GRAPH_BIND, sum = 0;
         for (int i = 0; i < NPG_GRAPH_BIND; i++) {
-            float share = w[i] / (float)(REACH * 1.01 * graph->radius);
-            bool bound = graph->vert_node[v * NPG_GRAPH_BIND + (size_t)i] != UINT32_MAX;
-            w[i] = bound ? (1 - share * share) * (1 - share * share) : 0;
+            float share = 1 - w[i] / (beyond[v] * 1.001f);
+            bool is_bound = graph->vert_node[v * NPG_GRAPH_BIND + (size_t)i] != UINT32_MAX;
+            w[i] = is_bound ? share * share : 0;
             sum += w[i];
         }
         for (int i = 0; i < NPG_GRAPH_BIND; i++) w[i] /= sum;
@@ -158,7 +163,7 @@ static void turn_to_weights(npg_graph *graph)
 
 /* Vertices in order become nodes unless an earlier node is within a radius; every node then offers itself
  * around. */
-static npg_status choose_nodes(npg_graph *graph, walk *w, const npg_mesh *mesh)
+static npg_status choose_nodes(npg_graph *graph, float *beyond, walk *w, const npg_mesh *mesh)
 {
     size_t capacity = 0;
     uint8_t *covered;
@@ -174,7 +179,7 @@ static npg_status choose_nodes(npg_graph *graph, walk *w, const npg_mesh *mesh)
         for (size_t i = 0; i < w->seen_count; i++) {
             uint32_t u = w->seen[i];
             if (w->dist[u] <= (float)graph->radius) covered[u] = 1;
-            offer_node(graph, u, (uint32_t)graph->node_count, w->dist[u]);
+            offer_node(graph, beyond, u, (uint32_t)graph->node_count, w->dist[u]);
         }
         graph->node_count++;
     }
@@ -216,6 +221,7 @@ static npg_status connect_nodes(npg_graph *graph)
 npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_target)
 {
     npg_graph *graph;
+    float *beyond = NULL;
     walk w = {0};
     *out = NULL;
     NPG_REQUIRE(mesh && mesh->vert_count && node_target);
@@ -227,9 +233,12 @@ npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_tar
     if (!status) status = npg_alloc_array(&graph->vert_weight, NPG_FOR_MESH, bound, sizeof(float));
     for (size_t i = 0; !status && i < bound; i++) graph->vert_node[i] = UINT32_MAX;
     if (!status) status = open_walk(&w, mesh);
-    if (!status) status = choose_nodes(graph, &w, mesh);
+    if (!status) status = npg_alloc_array(&beyond, NPG_FOR_MESH, mesh->vert_count, sizeof *beyond);
+    for (size_t v = 0; !status && v < mesh->vert_count; v++) beyond[v] = (float)(REACH * graph->radius);
+    if (!status) status = choose_nodes(graph, beyond, &w, mesh);
     if (!status) status = connect_nodes(graph);
-    if (!status) turn_to_weights(graph);
+    if (!status) turn_to_weights(graph, beyond);
+    npg_release(&beyond);
     close_walk(&w);
     if (status) npg_graph_close(&graph);
     *out = graph;

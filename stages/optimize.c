@@ -70,6 +70,8 @@ static const npg_option options[] = {
      AT(confidence), "constant", 0, 0, "cumulative|single|delta|constant", NULL},
     {"catch-up", "how the confidence opens with the epochs", CHOICE_OPTION, AT(catch_up), "root", 0, 0,
      "root|constant|linear|exponential|interpolated", NULL},
+    {"feature-start", "grid features begin spread over +- this; 0 as in the paper", REAL_OPTION, AT(feature_start), "3",
+     0, 1e3, NULL, NULL},
     {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
      AT(rate_end), "0.1", 0, 1, NULL, NULL},
     {"samples", "vertices of aligned frames that are fitted and carry the others, 0: all", INT_OPTION,
