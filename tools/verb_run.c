@@ -7,6 +7,7 @@
 
 #include "cli.h"
 #include "progress.h"
+#include "run_job.h"
 
 typedef struct settings {
     const char *config;
@@ -30,10 +31,23 @@ const npg_option npg_run_verb_options[] = {
 
 static npg_run *volatile signalled_run; /* the run that a signal stops */
 
+#define STOP_SECONDS 4 /* a run that has not stopped by then is ended */
+
 static void on_signal(int number)
 {
     (void)number;
     npg_run_stop(signalled_run);
+    alarm(STOP_SECONDS);
+}
+
+/* Something that can't be interrupted took too long.  All that is on disk is whole at every moment, so that
+ * the process may end here. */
+static void on_alarm(int number)
+{
+    static const char text[] = "neupig: stopped on request; run again to go on\n";
+    (void)number;
+    if (write(STDERR_FILENO, text, sizeof text - 1) < 0) _exit(75);
+    _exit(75);
 }
 
 /* The first signal stops the run in good order; the second ends the process the usual way. */
@@ -42,6 +56,7 @@ static void catch_signals(npg_run *run)
     struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESETHAND | SA_RESTART};
     signalled_run = run;
     sigemptyset(&action.sa_mask);
+    signal(SIGALRM, on_alarm);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGHUP, &action, NULL);
@@ -57,17 +72,16 @@ static void release_signals(void)
 
 /* ---- the verb ---- */
 
-static void print_results(const char *output, npg_status status)
+void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
     static const char *const names[] = {"meshes", "reference.ply", "frames.jsonl", "report.json",
                                         "done.json"};
     char path[4096];
-    if (status == NPG_STOPPED) fprintf(stderr, "neupig run: stopped on request\n");
+    if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
-        fprintf(
-            stderr,
-            "neupig run: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
-            output);
+        fprintf(stderr,
+                "neupig %s: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
+                verb, output);
     if (status < 0 || status == NPG_STOPPED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
@@ -75,16 +89,18 @@ static void print_results(const char *output, npg_status status)
     }
 }
 
-static npg_status do_run(const npg_options *options, npg_reporter *reporter)
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
     NPG_TRY(npg_run_open(&run, options, &hooks));
     catch_signals(run);
     npg_status status = npg_run_wait(run);
-    release_signals();
     npg_reporter_end(reporter, status, npg_options_get(options, "output"));
+    release_signals();
     npg_run_close(&run);
+    alarm(0); /* closing had its time, too */
+    signal(SIGALRM, SIG_DFL);
     return status;
 }
 
@@ -112,8 +128,9 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
-        status = do_run(options, &reporter);
-        if (reporter.show != NPG_SHOW_JSON) print_results(npg_options_get(options, "output"), status);
+        status = npg_run_job(options, &reporter);
+        if (reporter.show != NPG_SHOW_JSON)
+            npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }
     npg_options_close(&options);
     return npg_cli_end(argv[0], status);
