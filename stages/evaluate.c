@@ -318,7 +318,8 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
     json_object_set_new(report, "bad", bad);
-    if (state->bad_count > WARNINGS_MAX)
+    /* a run that goes on has not warned of all of them itself */
+    if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))
         npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
                         state->bad_count);
     if (state->skipped_count)

@@ -56,10 +56,21 @@ static npg_status write_grids(uint64_t *hash, const char *path, const npg_levels
     return status;
 }
 
-static bool has_hashed(const npg_levels *levels)
+static bool is_of_grid(const npg_level *level, int channel)
+{
+    return level->kind != NPG_LEVEL_HASHED && channel >= level->channel_first && channel < level->channel_end;
+}
+
+/* Whether the table holds more than its dense grids: hashed levels, or values in channels that a level does
+ * not fill. */
+static bool has_rest(const npg_levels *levels, const float *rows)
 {
     for (int l = 0; l < levels->count; l++)
-        if (levels->level[l].kind == NPG_LEVEL_HASHED) return true;
+        for (size_t i = 0; i < levels->level[l].row_count; i++)
+            for (int c = 0; c < NPG_LATENT_CHANNELS; c++) {
+                size_t at = (levels->level[l].first_row + i) * NPG_LATENT_CHANNELS + (size_t)c;
+                if (!is_of_grid(&levels->level[l], c) && rows[at] != 0) return true;
+            }
     return false;
 }
 
@@ -72,7 +83,7 @@ static npg_status save_grids(const npg_fit_parts *parts, npg_archive_writer *arc
     npg_status status = npg_buffer_read(parts->u, 0, rows, parts->u->size);
     if (!status) status = write_grids(&hash, path, parts->levels, rows, place);
     if (!status) status = npg_archive_put(archive, "grids.hash", &hash, sizeof hash);
-    if (!status && has_hashed(parts->levels))
+    if (!status && has_rest(parts->levels, rows))
         status = npg_archive_put(archive, "fit.rows", rows, parts->u->size);
     npg_release(&rows);
     return status;
@@ -82,8 +93,10 @@ static npg_status restore_grids(const npg_fit_parts *parts, const npg_archive *a
 {
     float *rows;
     NPG_TRY(npg_alloc(&rows, NPG_FOR_FILES, parts->u->size));
+    size_t size;
     npg_status status = NPG_OK;
-    if (has_hashed(parts->levels)) status = npg_archive_get(archive, "fit.rows", rows, parts->u->size);
+    if (npg_archive_find(archive, "fit.rows", &size))
+        status = npg_archive_get(archive, "fit.rows", rows, parts->u->size);
     if (!status) status = npg_vdb_load_levels(path, parts->levels, rows);
     if (!status) status = npg_buffer_write(parts->u, 0, rows, parts->u->size);
     npg_release(&rows);

@@ -7,7 +7,8 @@
 #include "vdb_grids.h"
 
 /* Optimiser, decoder and time code go into the archive (blocks "fit.*"), the latent grids into an OpenVDB
- * file at grids_path whose checksum becomes the block "grids.hash"; hashed levels go into the archive too. */
+ * file at grids_path whose checksum becomes the block "grids.hash".  A table that holds more than dense grids
+ * (hashed levels) goes into the archive whole, too. */
 npg_status npg_fit_save(npg_fit *fit, npg_archive_writer *archive, const char *grids_path,
                         const npg_vdb_place *place);
 
