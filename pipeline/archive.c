@@ -10,7 +10,7 @@
 
 #include "file.h"
 
-static const char magic[8] = "NPGARCH1", end_name[] = "end";
+static const char magic[8] = "NPGARCH1", end_name[NPG_BLOCK_NAME] = "end";
 
 typedef struct block_head {
     char name[NPG_BLOCK_NAME];
