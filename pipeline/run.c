@@ -4,8 +4,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "clock.h"
+#include "file.h"
 #include "run_internal.h"
 
 #define OFFSET(member) offsetof(npg_settings, member)
@@ -14,6 +16,10 @@ const npg_option npg_run_options[] = {
     {"input",
      "Folder, pattern (frame_%04d.ply), list file, or - for standard input; empty: frames are pushed",
      NPG_OPTION_TEXT, OFFSET(input), "", 0, 0, NULL, "PATH"},
+    {"follow",
+     "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): its files are frames as they are "
+     "complete; takes the place of the input",
+     NPG_OPTION_TEXT, OFFSET(follow), "", 0, 0, NULL, "DIR"},
     {"output", "Folder for the results; empty: results are only pulled", NPG_OPTION_TEXT, OFFSET(output), "",
      0, 0, NULL, "DIR"},
     {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "default", 0, 0,
@@ -159,14 +165,12 @@ static npg_status start_threads(npg_run *run)
     return NPG_OK;
 }
 
-static void announce_memory(npg_run *run);
-
 static npg_status do_pass(npg_run *run, npg_pass pass)
 {
     run->pass = pass;
     atomic_store(&run->ended_count, 0);
     npg_status status = open_worker_states(run);
-    if (!status && pass == NPG_PASS_SOLVE && !run->facts.is_live) announce_memory(run);
+    if (!status && pass == NPG_PASS_SOLVE && !run->facts.is_live) npg_run_announce_memory(run);
     if (!status) status = open_rings(run);
     if (!status) status = start_threads(run);
     if (status) npg_run_fail(run, "run", status);
@@ -176,7 +180,7 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
 
 /* ---- memory formula ---- */
 
-static void announce_memory(npg_run *run)
+void npg_run_announce_memory(npg_run *run)
 {
     const npg_facts *facts = &run->facts;
     size_t verts = npg_worker_verts_at_most(&run->workers[0]);
@@ -212,6 +216,7 @@ static npg_status conclude(npg_run *run)
 {
     json_t *r = run->report;
     json_object_set_new(r, "status", json_string(run->is_partial ? "partial" : "ok"));
+    json_object_set_new(r, "warning_count", json_integer((json_int_t)run->warning_count));
     json_object_set_new(r, "exit_code", json_integer(run->is_partial ? 7 : 0));
     json_object_set_new(r, "wall_s", json_real(npg_clock_s() - run->opened_s));
     json_object_set_new(r, "process_cpu_s", json_real(npg_clock_process_s()));
@@ -289,6 +294,45 @@ static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
     return check_chain(run);
 }
 
+static bool is_same_folder(const struct stat *a, const char *path)
+{
+    struct stat b;
+    return !stat(path, &b) && a->st_dev == b.st_dev && a->st_ino == b.st_ino;
+}
+
+/* A run that takes its own meshes for frames would never end, and would clear them away first. */
+static npg_status check_followed(const npg_settings *settings)
+{
+    struct stat followed;
+    char *meshes, *folder;
+    NPG_TRY(npg_copy_text(&folder, settings->follow));
+    char *slash = strrchr(folder, '/');
+    if (stat(folder, &followed) && slash) *slash = 0; /* a pattern */
+    bool is_there = !stat(folder, &followed), is_own = false;
+    npg_release(&folder);
+    if (!settings->output[0] || !is_there) return NPG_OK; /* ingest says what is not there */
+    NPG_TRY(npg_join_path(&meshes, settings->output, "meshes"));
+    is_own = is_same_folder(&followed, settings->output) || is_same_folder(&followed, meshes);
+    npg_release(&meshes);
+    if (is_own)
+        return npg_error(NPG_USAGE, "the folder %s that is followed is also where this run writes",
+                         settings->follow);
+    return NPG_OK;
+}
+
+/* Files, or a live source: standard input, a folder that grows, frames that are pushed. */
+static npg_status open_source(npg_run *run)
+{
+    const char *input = run->settings.input, *follow = run->settings.follow;
+    if (input[0] && follow[0])
+        return npg_error(NPG_USAGE,
+                         "frames come either from the input %s or from the folder %s that is followed", input,
+                         follow);
+    if (follow[0]) NPG_TRY(check_followed(&run->settings));
+    run->facts.is_live = follow[0] || !input[0] || !strcmp(input, "-");
+    return input[0] || follow[0] ? NPG_OK : npg_ring_open(&run->feed, (size_t)run->settings.ring_capacity);
+}
+
 static npg_status fill_run(npg_run *run, const npg_options *options, const npg_hooks *hooks,
                            const npg_stage *const *chain)
 {
@@ -304,10 +348,9 @@ static npg_status fill_run(npg_run *run, const npg_options *options, const npg_h
     json_object_set(run->report, "warnings", run->warnings);
     run->facts.frame_count = -1;
     run->facts.bounds_local = npg_bounds_empty();
-    run->facts.is_live = !run->settings.input[0] || !strcmp(run->settings.input, "-");
+    NPG_TRY(open_source(run));
     if (!run->settings.output[0] && !run->settings.pull)
         return npg_error(NPG_USAGE, "neither an output folder nor pull = yes: the results would be lost");
-    if (!run->settings.input[0]) NPG_TRY(npg_ring_open(&run->feed, (size_t)run->settings.ring_capacity));
     if (run->settings.pull) NPG_TRY(npg_ring_open(&run->results, (size_t)run->settings.ring_capacity));
     npg_memory_set_limit((size_t)run->settings.max_memory_mib << 20);
     return open_chain(run, chain);
@@ -417,13 +460,20 @@ static npg_status frame_of_cloud(npg_frame *frame, npg_run *run, const npg_cloud
     return NPG_OK;
 }
 
+static npg_status refuse_push(const npg_run *run)
+{
+    const npg_settings *settings = &run->settings;
+    return npg_error(NPG_USAGE, "this run reads its frames from %s",
+                     settings->input[0] ? settings->input : settings->follow);
+}
+
 npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
 {
     npg_frame frame = {0};
     npg_chunk *chunk = NULL;
     NPG_REQUIRE(run && cloud && cloud->struct_size >= sizeof *cloud &&
                 (cloud->points || !cloud->point_count));
-    if (!run->feed) return npg_error(NPG_USAGE, "this run reads its frames from %s", run->settings.input);
+    if (!run->feed) return refuse_push(run);
     if (cloud->number <= run->pushed_number)
         return npg_error(NPG_USAGE, "frame %lld was pushed after frame %lld", (long long)cloud->number,
                          (long long)run->pushed_number);
@@ -442,7 +492,7 @@ npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
 npg_status npg_run_finish(npg_run *run)
 {
     NPG_REQUIRE(run);
-    if (!run->feed) return npg_error(NPG_USAGE, "this run reads its frames from %s", run->settings.input);
+    if (!run->feed) return refuse_push(run);
     npg_ring_end(run->feed);
     return NPG_OK;
 }

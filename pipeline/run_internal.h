@@ -9,7 +9,8 @@
 #include "ring.h"
 #include "stage.h"
 
-#define NPG_STAGES_MAX 16
+#define NPG_STAGES_MAX   16
+#define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */
 
 struct npg_worker {
     npg_run *run;
@@ -35,6 +36,7 @@ struct npg_run {
     npg_status first_failure;
     char failure_text[1024], failure_stage[32];
     bool is_partial;
+    int64_t warning_count;
     npg_progress progress;     /* the first word of it: what is left is told from the pace since */
     json_t *report, *warnings; /* owned */
     json_t *told;              /* the stages' reports before the solving pass, owned */
@@ -71,6 +73,9 @@ void npg_run_fail(npg_run *run, const char *stage, npg_status status);
 /* The body of a stage's thread: init, process until the end, flush, uninit.  The argument is the npg_worker.
  */
 void *npg_worker_main(void *worker);
+
+/* The bound on memory to the log and the report. */
+void npg_run_announce_memory(npg_run *run);
 
 /* A log record through the run's hook. */
 void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t frame, const char *message);

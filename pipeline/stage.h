@@ -6,6 +6,7 @@
 #define NPG_STAGE_H
 
 #include <jansson.h>
+#include <stdatomic.h>
 
 #include "chunk.h"
 #include "frame_box.h"
@@ -23,13 +24,15 @@ typedef enum npg_pass {
 
 /* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
  * it passes on the first chunk (or ends the pass) that depends on it; the rings' locks publish it downstream.
+ * Where a live source goes on behind the look-ahead, number_min, number_max, point_count_max and bounds_local
+ * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h).
  */
 typedef struct npg_facts {
     /* ingest */
-    bool is_live;          /* frames can't be read a second time                            */
-    npg_origin origin;     /* world; a point of the first frame                             */
-    int64_t frame_count;   /* T, gaps included; -1 while a live source is open              */
-    int64_t skipped_count; /* frames left out under --missing skip or --keep-going          */
+    bool is_live;                /* frames can't be read a second time                            */
+    npg_origin origin;           /* world; a point of the first frame                             */
+    _Atomic int64_t frame_count; /* T, gaps included; -1 while a live source is open         */
+    int64_t skipped_count;       /* frames left out under --missing skip or --keep-going          */
     /* keyframe */
     size_t point_count_max;         /* of all frames, as read                                        */
     int64_t number_min, number_max; /* of all frames                                          */
@@ -132,6 +135,11 @@ json_t *npg_json_text(const char *text);
 
 /* A JSON number, or null for one that is not finite. */
 json_t *npg_json_real(double value);
+
+/* Log and report the bound on memory.  The run itself does so before the solving pass of files; in a live one
+ * the stage that makes the plan does, as soon as it is made.  Asks all stages' memory(), which then read
+ * nothing but options and facts. */
+void npg_worker_announce_memory(npg_worker *worker);
 
 /* The whole report, for conclude(). */
 json_t *npg_worker_whole_report(npg_worker *worker);

@@ -107,8 +107,11 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     if (frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
     pthread_mutex_lock(&worker->run->lock);
     /* what a run that goes on was told before it stopped may come again */
-    if (!worker->run->facts.is_resumed || !is_listed(worker->run->warnings, entry))
-        json_array_append(worker->run->warnings, entry);
+    if (!worker->run->facts.is_resumed || !is_listed(worker->run->warnings, entry)) {
+        if (json_array_size(worker->run->warnings) < NPG_WARNINGS_MAX)
+            json_array_append(worker->run->warnings, entry);
+        worker->run->warning_count++;
+    }
     json_decref(entry);
     worker->run->is_partial |= partial;
     pthread_mutex_unlock(&worker->run->lock);
@@ -136,6 +139,7 @@ void npg_worker_retell(npg_worker *worker, const json_t *story)
         json_object_update(run->workers[i].report,
                            json_object_get(json_object_get(story, "stages"), run->workers[i].stage->name));
     json_array_extend(run->warnings, json_object_get(story, "warnings"));
+    run->warning_count += json_array_size(json_object_get(story, "warnings"));
     run->is_partial |= json_is_true(json_object_get(story, "partial"));
     pthread_mutex_unlock(&run->lock);
 }
@@ -162,6 +166,11 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     now.left_s = time_left(run, &now);
     run->hooks.progress(run->hooks.user, &now);
     pthread_mutex_unlock(&run->lock);
+}
+
+void npg_worker_announce_memory(npg_worker *worker)
+{
+    npg_run_announce_memory(worker->run);
 }
 
 /* ---- the thread ---- */

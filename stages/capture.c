@@ -35,11 +35,17 @@ fail:
     return status;
 }
 
+static void drop_cached(npg_capture *c, int64_t index)
+{
+    if (c->cached[index]) npg_frame_clear(c->cached[index]);
+    npg_release(&c->cached[index]);
+}
+
 void npg_capture_close(npg_capture **slot)
 {
     npg_capture *c = *slot;
     if (!c) return;
-    for (size_t i = 0; c->cached && i < c->list->count; i++) npg_frame_clear(&c->cached[i]);
+    for (size_t i = 0; c->cached && i < c->list->count; i++) drop_cached(c, (int64_t)i);
     npg_release(&c->cached);
     npg_release(&c->is_bad);
     npg_frame_files_close(&c->list);
@@ -58,20 +64,24 @@ static size_t bytes_of(const npg_frame *frame)
 static void cache(npg_capture *c, int64_t index, const npg_frame *frame)
 {
     size_t bytes = bytes_of(frame);
-    if (c->cached[index].path || bytes > c->cache_limit - c->cache_bytes) return;
-    if (npg_frame_copy(&c->cached[index], frame)) return;
+    if (c->cached[index] || bytes > c->cache_limit - c->cache_bytes) return;
+    if (npg_alloc(&c->cached[index], NPG_FOR_FRAMES, sizeof **c->cached)) return;
+    if (npg_frame_copy(c->cached[index], frame)) {
+        npg_release(&c->cached[index]);
+        return;
+    }
     c->cache_bytes += bytes;
 }
 
 static bool take_cached(npg_status *status, npg_capture *c, npg_frame *frame, int64_t index, bool gives_away)
 {
-    npg_frame *cached = &c->cached[index];
-    if (!cached->path) return false;
+    npg_frame *cached = c->cached[index];
+    if (!cached) return false;
     *status = NPG_OK;
     if (gives_away) {
         c->cache_bytes -= bytes_of(cached);
         *frame = *cached;
-        *cached = (npg_frame){0};
+        npg_release(&c->cached[index]);
     } else {
         *status = npg_frame_copy(frame, cached);
     }

@@ -100,3 +100,9 @@ npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *pa
     for (size_t i = 0; i < count && !*is_numbered; i++) numbers[i] = (int64_t)i;
     return NPG_OK;
 }
+
+int64_t npg_name_number(const char *name, size_t from_end)
+{
+    size_t runs;
+    return run_value(name, from_end, &runs);
+}

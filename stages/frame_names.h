@@ -17,4 +17,8 @@ int npg_natural_compare(const char *a, const char *b);
 npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *paths, size_t count,
                             bool is_sorted);
 
+/* The value of the run of digits that stands `from_end` runs before the last one of a name, its ending aside;
+ * -1 where there is none or it is too long for a number. */
+int64_t npg_name_number(const char *name, size_t from_end);
+
 #endif

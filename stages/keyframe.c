@@ -7,7 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "stage.h"
+#include "live_plan.h"
+#include "look_ahead.h"
 
 #define GRID         512 /* cells per axis */
 #define CELL_WORDS   ((size_t)GRID * GRID * GRID / 64)
@@ -23,6 +24,7 @@ typedef struct candidate {
 
 typedef struct keyframe_state {
     int64_t number, window, overlap, look_ahead; /* options */
+    double box_margin;                           /* option */
     uint64_t *cells;                             /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
     candidate best[SHOWN_SCORES];                /* best first */
     size_t best_count;
@@ -30,8 +32,8 @@ typedef struct keyframe_state {
     bool is_chosen, is_chosen_skipped;
     int64_t usable_count; /* frames that were not skipped                    */
     int64_t passed_count; /* frames of the solving pass so far               */
-    npg_frame *held;      /* a live run's frames until the key is known; owned */
-    size_t held_count, held_capacity;
+    npg_look_ahead held;  /* a live run's frames until it is their turn    */
+    bool is_planned;      /* live: the key is known                       */
 } keyframe_state;
 
 /* ---- measuring ---- */
@@ -202,77 +204,81 @@ static npg_status mark_key(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* ---- solving pass of a live run: hold everything until the end, then key first ---- */
+/* ---- solving pass of a live run: hold the look-ahead, then pass on in the plan's order ---- */
 
-static npg_status hold(npg_worker *worker, npg_frame *frame)
+/* The source goes on: what comes later needs room, too. */
+static void widen_box(const keyframe_state *state, npg_bounds *bounds)
 {
-    keyframe_state *state = npg_worker_state(worker);
-    if (state->held_count >= (size_t)state->look_ahead)
-        return npg_error(
-            NPG_USAGE,
-            "the live capture is longer than the look-ahead of %lld frames, in which the keyframe "
-            "is chosen: raise the option look-ahead (each frame is held in memory), or write "
-            "the frames to files and give those as input",
-            (long long)state->look_ahead);
-    NPG_TRY(npg_grow(&state->held, &state->held_capacity, state->held_count + 1, sizeof *state->held,
-                     NPG_FOR_FRAMES));
-    measure_frame(state, npg_worker_facts(worker), frame);
-    state->held[state->held_count++] = *frame;
-    *frame = (npg_frame){0};
-    return NPG_OK;
-}
-
-static int64_t held_frame_count(const keyframe_state *state)
-{
-    int64_t count = 0;
-    for (size_t i = 0; i < state->held_count; i++)
-        if (state->held[i].index >= count) count = state->held[i].index + 1;
-    return count;
-}
-
-/* Where in `held` each index is, SIZE_MAX for an index that never came. */
-static npg_status place_held(const keyframe_state *state, size_t **out, int64_t frame_count)
-{
-    NPG_TRY(npg_alloc_array(out, NPG_FOR_RUN, (size_t)frame_count, sizeof **out));
-    memset(*out, 0xff, (size_t)frame_count * sizeof **out);
-    for (size_t i = 0; i < state->held_count; i++) (*out)[state->held[i].index] = i;
-    return NPG_OK;
-}
-
-static npg_status emit_held(npg_worker *worker, const size_t *place, const npg_plan *plan)
-{
-    keyframe_state *state = npg_worker_state(worker);
-    size_t capacity = (size_t)npg_worker_settings(worker)->chunk_frames;
-    npg_chunk *chunk = NULL;
-    npg_status status = NPG_OK;
-    for (int64_t i = 0; i < plan->frame_count && !status; i++) {
-        size_t at = place[npg_plan_frame(plan, i)];
-        if (at == SIZE_MAX) continue;
-        if (!chunk) status = npg_chunk_open(&chunk, capacity);
-        if (!status) status = mark_key(worker, &state->held[at]);
-        if (status) break;
-        npg_chunk_add(chunk, &state->held[at]);
-        if (npg_chunk_count(chunk) == capacity) status = npg_worker_push(worker, &chunk);
+    double longest = 0;
+    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds->hi[a] - bounds->lo[a]);
+    for (int a = 0; a < 3; a++) {
+        bounds->lo[a] -= state->box_margin / 100 * longest;
+        bounds->hi[a] += state->box_margin / 100 * longest;
     }
-    if (!status && chunk) status = npg_worker_push(worker, &chunk);
-    npg_chunk_unref(&chunk);
-    return status;
 }
 
-static npg_status release_held(npg_worker *worker)
+static npg_status refuse_one_window(const keyframe_state *state)
+{
+    return npg_error(NPG_USAGE,
+                     "the live capture is longer than the look-ahead of %lld frames, and one window over all "
+                     "frames needs all of them: set the option window, raise look-ahead (each frame is held "
+                     "in memory), or write the frames to files and give those as input",
+                     (long long)state->look_ahead);
+}
+
+/* Box, keyframe and plan from the frames held.  is_open: the source goes on behind them. */
+static npg_status plan_live(npg_worker *worker, bool is_open)
 {
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
-    int64_t frame_count = held_frame_count(state);
-    size_t *place;
+    int64_t frame_count = npg_look_ahead_frame_count(&state->held);
+    double diagonal = npg_bounds_diagonal(&facts->bounds_local); /* figures don't depend on the margin */
+    if (is_open && !state->window) return refuse_one_window(state);
+    if (is_open && state->usable_count) widen_box(state, &facts->bounds_local);
     NPG_TRY(close_measuring(worker));
-    if (facts->frame_count < frame_count) facts->frame_count = frame_count;
-    for (size_t i = 0; i < state->held_count; i++) score_frame(state, facts, frame_count, &state->held[i]);
-    NPG_TRY(set_plan(worker, frame_count));
-    NPG_TRY(place_held(state, &place, frame_count));
-    npg_status status = emit_held(worker, place, &facts->plan);
-    npg_release(&place);
-    return status;
+    facts->box.diagonal = diagonal;
+    if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
+    for (size_t i = 0; i < state->held.count; i++)
+        score_frame(state, facts, frame_count, &state->held.frames[i]);
+    npg_status status = set_plan(worker, frame_count);
+    if (status && is_open)
+        return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
+    NPG_TRY(status);
+    if (is_open) facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
+                                               .key = facts->plan.key,
+                                               .window = state->window,
+                                               .overlap = state->overlap};
+    json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
+    state->is_planned = true;
+    npg_release(&state->cells);
+    npg_worker_announce_memory(worker);
+    return NPG_OK;
+}
+
+/* Facts may not change behind the plan: other stages read them. */
+static npg_status take_live(npg_worker *worker, npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    size_t limit = (size_t)state->look_ahead;
+    if (!state->is_planned && state->held.count < limit) {
+        measure_frame(state, npg_worker_facts(worker), frame);
+        return npg_look_ahead_add(&state->held, frame);
+    }
+    if (!state->is_planned) NPG_TRY(plan_live(worker, true));
+    npg_look_ahead_watch(worker, &state->held, frame);
+    NPG_TRY(npg_look_ahead_add(&state->held, frame));
+    return npg_look_ahead_release(worker, &state->held, limit + (size_t)state->window, false);
+}
+
+static npg_status end_live(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (!state->is_planned) NPG_TRY(plan_live(worker, false));
+    json_object_set_new(npg_worker_report(worker), "windows",
+                        json_integer((json_int_t)npg_live_window_count(&facts->plan, facts->frame_count)));
+    npg_look_ahead_tell_outside(worker, &state->held);
+    return npg_look_ahead_release(worker, &state->held, 0, true);
 }
 
 /* ---- the stage ---- */
@@ -308,7 +314,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         else if (pass == NPG_PASS_SCORE)
             score_frame(state, facts, facts->frame_count, frame);
         else
-            NPG_TRY(facts->is_live ? hold(worker, frame) : mark_key(worker, frame));
+            NPG_TRY(facts->is_live ? take_live(worker, frame) : mark_key(worker, frame));
     }
     if (pass == NPG_PASS_SOLVE && facts->is_live) npg_chunk_unref(chunk);
     return NPG_OK;
@@ -322,14 +328,13 @@ static npg_status flush(npg_worker *worker)
     case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
     case NPG_PASS_SOLVE: break;
     }
-    return facts->is_live ? release_held(worker) : NPG_OK;
+    return facts->is_live ? end_live(worker) : NPG_OK;
 }
 
 static void uninit(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
-    for (size_t i = 0; i < state->held_count; i++) npg_frame_clear(&state->held[i]);
-    npg_release(&state->held);
+    npg_look_ahead_clear(&state->held);
     npg_release(&state->cells);
 }
 
@@ -338,7 +343,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const keyframe_state *state = npg_worker_state(worker);
     if (!npg_worker_facts(worker)->is_live) return 0;
     int64_t per_chunk = npg_worker_settings(worker)->chunk_frames;
-    *chunks_held = (size_t)((state->look_ahead + per_chunk - 1) / per_chunk) + 1;
+    *chunks_held =
+        (size_t)((state->look_ahead + per_chunk - 1) / per_chunk) + 1; /* live chunks hold a frame */
     return CELL_WORDS * sizeof(uint64_t);
 }
 
@@ -351,8 +357,11 @@ static const npg_option options[] = {
      OFFSET(window), "24", 0, 1e6, NULL, NULL},
     {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
      1e6, NULL, NULL},
-    {"look-ahead", "Live runs: frames that may be held while the keyframe is chosen", NPG_OPTION_INT,
-     OFFSET(look_ahead), "64", 1, 1e6, NULL, NULL},
+    {"look-ahead", "Live runs: frames that are held while box and keyframe are chosen among them",
+     NPG_OPTION_INT, OFFSET(look_ahead), "64", 1, 1e6, NULL, NULL},
+    {"box-margin",
+     "Live runs that go on behind the look-ahead: room left around its box, in per cent of its longest side",
+     NPG_OPTION_REAL, OFFSET(box_margin), "10", 0, 1000, NULL, "PERCENT"},
     {0}};
 
 extern const npg_stage npg_stage_keyframe;

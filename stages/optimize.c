@@ -33,7 +33,7 @@ typedef struct state {
 #define CHOICE_OPTION NPG_OPTION_CHOICE
 
 static const npg_option options[] = {
-    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "60", 1, 1e6, NULL, "N"},
+    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "60", 0, 1e6, NULL, "N"},
     {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
      0, "quaternion|cayley|exponential", NULL},
     {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,

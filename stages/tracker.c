@@ -10,6 +10,9 @@
 #include "query.h"
 
 #define STIFF_START 10.0 /* times the final stiffness at the first step */
+#define NOISE_UNIT 0.0012 /* mean distance of points at which the stiffness has doubled */
+#define WIDTH_START 0.08 /* of the robust weight, in units: what may move between two frames */
+#define WIDTH_END   0.01 /* at the last step, more where the points are noisy               */
 #define REVERSE     0.5  /* weight of surface -> points against points -> surface */
 
 struct npg_tracker {
@@ -311,10 +314,10 @@ static npg_status find_pairs(npg_tracker *t, const double *pose, const npg_kdtre
 static npg_status do_step(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_kdtree *tree,
                           const float *points, const float *normals, double progress)
 {
-    double radius = t->graph->radius;
-    /* from several radii down to a part of one; stiffness from STIFF_START down to 1 */
-    double width = radius * (2 * pow(0.15, progress)),
-           stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress);
+    /* the noisier the points, the more of them must agree before the surface gives way */
+    double noise = tracked->point_dist_mean / NOISE_UNIT;
+    double stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress) * (1 + noise * noise);
+    double width = fmax(WIDTH_START * pow(WIDTH_END / WIDTH_START, progress), 2.5 * tracked->point_dist_mean);
     NPG_TRY(find_pairs(t, pose, tree));
     npg_block_clear(t->system);
     tracked->point_dist_mean = add_targets(t, pose, normals != NULL, width);

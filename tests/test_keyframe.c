@@ -264,7 +264,8 @@ static npg_status push_scene(npg_run *run, const scene *s, int64_t frame_count)
     return status;
 }
 
-static npg_status run_live(scene *s, int64_t frame_count, const char *look_ahead, const char *keyframe)
+static npg_status run_live_windows(scene *s, int64_t frame_count, const char *look_ahead,
+                                   const char *keyframe, const char *window)
 {
     npg_options *options;
     npg_run *run = NULL;
@@ -273,6 +274,7 @@ static npg_status run_live(scene *s, int64_t frame_count, const char *look_ahead
     if (!status) status = npg_options_set(options, "output", "any");
     if (!status) status = npg_options_set(options, "look-ahead", look_ahead);
     if (!status) status = npg_options_set(options, "keyframe", keyframe);
+    if (!status) status = npg_options_set(options, "window", window);
     if (!status) status = npg_run_open_chain(&run, options, NULL, chain);
     if (!status) status = push_scene(run, s, frame_count);
     if (!status) status = npg_run_finish(run);
@@ -280,6 +282,11 @@ static npg_status run_live(scene *s, int64_t frame_count, const char *look_ahead
     npg_run_close(&run);
     npg_options_close(&options);
     return status;
+}
+
+static npg_status run_live(scene *s, int64_t frame_count, const char *look_ahead, const char *keyframe)
+{
+    return run_live_windows(s, frame_count, look_ahead, keyframe, "24");
 }
 
 static void a_live_run_finds_the_same_key_and_order(void **state)
@@ -300,16 +307,18 @@ static void a_live_run_finds_the_same_key_and_order(void **state)
     assert_int_equal(live.order[0], 3);
 }
 
-static void a_live_run_longer_than_the_look_ahead_is_refused(void **state)
+static void one_window_over_more_than_the_look_ahead_is_refused(void **state)
 {
     (void)state;
     size_t before = npg_memory_used();
     scene s = scene_of(20);
-    assert_int_equal(run_live(&s, 30, "8", "-1"), NPG_USAGE);
+    assert_int_equal(run_live_windows(&s, 30, "8", "-1", "0"), NPG_USAGE);
     assert_non_null(strstr(npg_error_text(), "look-ahead"));
     assert_int_equal(s.seen_count, 0);
     assert_int_equal(npg_memory_used(), before);
     assert_int_equal(run_live(&s, 0, "8", "-1"), NPG_BAD_INPUT);
+    assert_int_equal(run_live_windows(&s, 30, "8", "25", "6"), NPG_USAGE);
+    assert_non_null(strstr(npg_error_text(), "look-ahead of 8 frames: keyframe 25"));
 }
 
 static void no_memory_is_said(void **state)
@@ -342,7 +351,7 @@ int main(void)
         cmocka_unit_test(captures_without_extent_are_refused),
         cmocka_unit_test(an_overlap_must_fit),
         cmocka_unit_test(a_live_run_finds_the_same_key_and_order),
-        cmocka_unit_test(a_live_run_longer_than_the_look_ahead_is_refused),
+        cmocka_unit_test(one_window_over_more_than_the_look_ahead_is_refused),
         cmocka_unit_test(no_memory_is_said),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,9 +8,9 @@ const npg_verb npg_verbs[] = {
     {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",
      "Reads the point clouds of INPUT (a folder, a pattern like frame_%04d.ply, a list file, or - for "
      "standard "
-     "input) in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, with "
-     "reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.  A run that was "
-     "stopped or killed goes on where it was when it is started again.",
+     "input; or --follow a folder that grows) in time order and writes one mesh per frame, all with the same "
+     "faces, to DIR/meshes, with reference.ply, report.json, frames.jsonl and, last of all, done.json beside "
+     "them.  A run that was stopped or killed goes on where it was when it is started again.",
      npg_run_verb_options, true, npg_verb_run},
     {"append", "DIR", 1, 1, "Go on with frames that came since a job was done",
      "DIR is the output folder of a run.  Frames that its input has after the last one of then are solved "

@@ -107,7 +107,7 @@ npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 static npg_status check_paths(npg_options *options, const npg_cli *cli)
 {
     if (cli->operand_count) NPG_TRY(npg_options_set(options, "input", cli->operands[0]));
-    if (!npg_options_get(options, "input")[0])
+    if (!npg_options_get(options, "input")[0] && !npg_options_get(options, "follow")[0])
         return npg_error(NPG_USAGE, "no input; usage: neupig run %s", cli->verb->operands);
     if (!strcmp(npg_options_get(options, "pull"), "yes"))
         return npg_error(NPG_USAGE,

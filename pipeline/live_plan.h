@@ -1,0 +1,45 @@
+/* Live plan: the windows of a capture whose end is not known yet.
+ *
+ * A live source gets an ordinary plan when it ends inside the look-ahead (its results are then those of the
+ * same frames from files), else an open one: plan.frame_count is NPG_FRAMES_OPEN.  Under an open plan the
+ * windows are
+ *   0                 around the keyframe; later frames than the look-ahead's may belong to it
+ *   1 .. B            backward to frame 0; all their frames came before the plan was made
+ *   B + 1, B + 2, ..  forward for as long as frames come; the first of them starts from window 0
+ * so that a stage that solves window after window holds two windows of frames at most (the look-ahead and a
+ * window where the source ends inside window 0), however long the source goes on.  A forward window begins
+ * `overlap` frames before its new ones even where the source ends inside it, so nothing older has to be kept;
+ * that last window is then shorter.  The functions take both kinds of plans; an ordinary one gives what
+ * pipeline/plan.h gives.
+ *
+ * `total` is the number of frames of the capture, -1 while the source is open; it matters to open plans only.
+ * Once it is known (in a stage's flush: npg_facts.frame_count) the windows that reach beyond the end are
+ * shorter: a stage that waits for a window asks for it again and finds that it has all its frames. */
+#ifndef NPG_LIVE_PLAN_H
+#define NPG_LIVE_PLAN_H
+
+#include <stdbool.h>
+
+#include "plan.h"
+
+#define NPG_FRAMES_OPEN (INT64_MAX / 4)
+
+static inline bool npg_plan_is_open(const npg_plan *plan)
+{
+    return plan->frame_count == NPG_FRAMES_OPEN;
+}
+
+/* INT64_MAX for an open plan whose total is not known. */
+int64_t npg_live_window_count(const npg_plan *plan, int64_t total);
+
+/* Window i < npg_live_window_count(). */
+npg_window npg_live_window(const npg_plan *plan, int64_t i, int64_t total);
+
+/* The i-th frame that the solving pass brings: the keyframe, the others of window 0, then each window's new
+ * frames.  Under an open plan every i >= 0 has one; those beyond the end never come. */
+int64_t npg_live_frame(const npg_plan *plan, int64_t i);
+
+/* Whether a window after window i holds the frame: until then it must be kept. */
+bool npg_live_is_needed_after(const npg_plan *plan, int64_t index, int64_t i, int64_t total);
+
+#endif

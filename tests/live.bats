@@ -1,0 +1,148 @@
+# Live captures through the command: standard input and a folder that grows, longer than the look-ahead.
+
+small=(--epochs 2 --width-1 32 --width-2 32 --faces 300 --poisson-depth 6 --quiet --max-residual 100
+       --min-coverage 0 --max-stretched 100 --max-flipped 100 --window 8 --overlap 2 --look-ahead 10
+       --align-nodes 60 --samples 200)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 30 --points 600 -o capture >synth.log
+    cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" >piped.log
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+same_meshes() {
+    [ "$(ls "$1/meshes" | wc -l)" -eq 30 ]
+    for mesh in piped/meshes/*.ply; do cmp "$mesh" "$1/meshes/$(basename "$mesh")"; done
+}
+
+# Wait until a file is there, as long as process $2 lives.
+await() {
+    until [ -e "$1" ]; do
+        kill -0 "$2"
+        sleep 0.05
+    done
+}
+
+@test "standard input may be longer than the look-ahead" {
+    [ "$(ls piped/meshes | wc -l)" -eq 30 ]
+    [ "$(wc -l <piped/frames.jsonl)" -eq 30 ]
+    grep -q '"status": "ok"' piped/done.json
+    grep -q '"open": true' piped/report.json
+}
+
+@test "a folder that grows gives the same meshes, until its end file is there" {
+    mkdir -p grows
+    "$NEUPIG" run --follow grows -o followed --follow-idle 0 "${small[@]}" >followed.log &
+    pid=$!
+    for file in capture/points/*.ply; do
+        name=$(basename "$file")
+        head -c 3000 "$file" >"grows/$name" # one part, then the rest
+        tail -c +3001 "$file" >>"grows/$name"
+    done
+    : >grows/capture.end
+    wait $pid
+    same_meshes followed
+    rm -r grows
+}
+
+@test "without frames for a while it ends, too, and an incomplete last file is an error" {
+    cp -r capture/points idle
+    "$NEUPIG" run --follow idle -o idled --follow-idle 1 "${small[@]}" >idled.log
+    same_meshes idled
+    head -c 3000 capture/points/frame_0029.ply >idle/frame_0030.ply
+    status=0
+    "$NEUPIG" run --follow idle -o cut --follow-idle 1 --follow-settle 0 "${small[@]}" 2>cut.log || status=$?
+    cat cut.log
+    [ "$status" -eq 3 ]
+    grep -q 'idle/frame_0030.ply' cut.log
+    [ ! -e cut/done.json ]
+    status=0
+    "$NEUPIG" run --follow idle -o kept --follow-idle 1 --follow-settle 0 --keep-going "${small[@]}" \
+        2>kept.log || status=$?
+    [ "$status" -eq 7 ]
+    grep -q 'frame_0030.ply' kept.log
+    [ -e kept/meshes/frame_0029.ply ]
+    rm -r idle
+}
+
+@test "the first finished frame is on disk before the next window is read" {
+    mkfifo fifo
+    "$NEUPIG" run - -o early "${small[@]}" <fifo >early.log &
+    pid=$!
+    exec 7>fifo
+    cat $(ls capture/points/*.ply | head -$((10 + 8 + 2 - 1))) >&7 # look-ahead + window + overlap - 1
+    await early/frames.partial.jsonl $pid
+    until [ -s early/frames.partial.jsonl ]; do
+        kill -0 $pid
+        sleep 0.05
+    done
+    [ "$(ls early/meshes/*.ply | wc -l)" -ge 1 ]
+    cat $(ls capture/points/*.ply | tail -n +$((10 + 8 + 2))) >&7
+    exec 7>&-
+    wait $pid
+    same_meshes early
+}
+
+@test "a source that stops in the middle of a frame: exit 3, the frames before it are safe" {
+    cat capture/points/*.ply | head -c $((24 * $(stat -c %s capture/points/frame_0000.ply) + 5000)) >cut-stream
+    status=0
+    "$NEUPIG" run - -o torn "${small[@]}" <cut-stream 2>torn.log || status=$?
+    cat torn.log
+    [ "$status" -eq 3 ]
+    grep -q 'frame 2[0-9]: standard input' torn.log
+    [ ! -e torn/done.json ]
+    [ ! -e torn/frames.jsonl ]
+    # In one gulp the cut may overtake the first window: with a pause between, the finished frames stay.
+    (cat $(ls capture/points/*.ply | head -24); until [ -s paused/frames.partial.jsonl ]; do sleep 0.05; done
+     head -c 5000 capture/points/frame_0024.ply) |
+        "$NEUPIG" run - -o paused "${small[@]}" 2>paused.log || status=$?
+    [ "$status" -eq 3 ]
+    grep -q 'frame 24: standard input' paused.log
+    [ ! -e paused/done.json ]
+    sed -n 's/.*"file":"\([^"]*\)".*/\1/p' paused/frames.partial.jsonl >finished
+    [ -s finished ]
+    while read -r file; do cmp "paused/$file" "piped/$file"; done <finished
+}
+
+@test "with keep-going a stream that is torn ends there, and all frames before it are finished" {
+    status=0
+    "$NEUPIG" run - -o mended --keep-going "${small[@]}" <cut-stream 2>mended.log || status=$?
+    cat mended.log
+    [ "$status" -eq 7 ]
+    grep -q 'taken to end here' mended.log
+    frames=$(ls mended/meshes | wc -l)
+    [ "$frames" -ge 24 ]
+    [ "$frames" -eq "$(wc -l <mended/frames.jsonl)" ]
+    grep -q '"status": "partial"' mended/done.json
+}
+
+@test "a run does not follow its own results" {
+    mkdir -p own/meshes
+    for followed in own own/meshes 'own/meshes/*.ply'; do
+        status=0
+        "$NEUPIG" run --follow "$followed" -o own --quiet 2>own.log || status=$?
+        [ "$status" -eq 2 ]
+        grep -q 'where this run writes' own.log
+    done
+}
+
+@test "the bound on memory is said once the plan is known" {
+    grep -q '"memory_bound_bytes"' piped/report.json
+}
+
+@test "memory does not grow with the length of the source" {
+    "$NEUPIG" synth --body bar --frames 24 --points 600 -o loop >loop.log
+    for times in 1 5; do # there and back, so that nothing leaps
+        for i in $(seq $times); do cat loop/points/*.ply $(ls -r loop/points/*.ply); done |
+            "$NEUPIG" run - -o "long$times" "${small[@]}" --epochs 1 --align=no >long.log
+    done
+    short=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long1/report.json)
+    long=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long5/report.json)
+    echo "$short $long"
+    [ $((100 * long)) -le $((105 * short)) ]
+    [ "$(ls long5/meshes | wc -l)" -eq 240 ]
+}
