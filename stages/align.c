@@ -9,6 +9,8 @@
 #include "job.h"
 #include "tracker.h"
 
+#define RESTART_AT 3.0 /* times the mean distance of the frames before */
+
 /* The two last poses on one side of the key. */
 typedef struct side {
     double *now, *before; /* K x 12, owned */
@@ -143,16 +145,29 @@ static void step_on(state *s, side *at, int64_t index)
     at->index = index;
 }
 
-static npg_status fit_pose(npg_worker *worker, double *pose, const npg_frame *frame)
+static npg_status fit_pose(npg_worker *worker, npg_tracked *tracked, double *pose, const npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    NPG_TRY(npg_tracker_fit(s->tracker, tracked, pose, s->points, frame->normals, frame->point_count));
+    npg_worker_log(worker, NPG_LOG_DEBUG, frame->number, "coarse alignment: mean distance %.5f in %d steps",
+                   tracked->point_dist_mean, tracked->steps);
+    return NPG_OK;
+}
+
+/* Where the motion did not go on as before, start once more from where the surface was. */
+static npg_status fit_side(npg_worker *worker, side *at, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     npg_tracked tracked;
     if (!frame->point_count) return NPG_OK; /* nothing to see: the motion goes on as before */
     NPG_TRY(npg_grow(&s->points, &s->points_capacity, frame->point_count, 3 * sizeof(float), NPG_FOR_FIT));
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, s->points, frame->pos_local, frame->point_count);
-    NPG_TRY(npg_tracker_fit(s->tracker, &tracked, pose, s->points, frame->normals, frame->point_count));
-    npg_worker_log(worker, NPG_LOG_DEBUG, frame->number, "coarse alignment: mean distance %.5f in %d steps",
-                   tracked.point_dist_mean, tracked.steps);
+    NPG_TRY(fit_pose(worker, &tracked, at->now, frame));
+    double usual = s->sum.frames ? s->sum.dist_sum / (double)s->sum.frames : tracked.point_dist_mean;
+    if (at->has_before && tracked.point_dist_mean > RESTART_AT * usual) {
+        memcpy(at->now, at->before, npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double));
+        NPG_TRY(fit_pose(worker, &tracked, at->now, frame));
+    }
     s->sum.frames++;
     s->sum.dist_sum += tracked.point_dist_mean;
     if (tracked.point_dist_mean > s->sum.worst_dist) {
@@ -170,7 +185,7 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     size_t bytes = npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
     side *at = &s->sides[frame->index < facts->plan.key];
     if (frame->index != facts->plan.key) step_on(s, at, frame->index);
-    NPG_TRY(fit_pose(worker, at->now, frame));
+    NPG_TRY(fit_side(worker, at, frame));
     if (frame->index == facts->plan.key) memcpy(s->sides[1].now, at->now, bytes);
     NPG_TRY(npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
     frame->vert_count = reference->vert_count;

@@ -16,9 +16,14 @@ const npg_stage *const npg_chain[] = {
     &npg_stage_export,   /* meshes, report, the last word                                 */
     NULL};
 
-static const npg_preset_value paper[] = {{"align", "no"},   {"window", "0"},
-                                         {"epochs", "250"}, {"confidence", "cumulative"},
-                                         {"rate-end", "1"}, {"feature-start", "0"}, {NULL, NULL}};
+static const npg_preset_value paper[] = {{"align", "no"},
+                                         {"window", "0"},
+                                         {"epochs", "250"},
+                                         {"isometry", "100"},
+                                         {"confidence", "cumulative"},
+                                         {"rate-end", "1"},
+                                         {"feature-start", "0"},
+                                         {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
 
 const npg_preset npg_presets[] = {

@@ -135,7 +135,8 @@ static npg_status open_grid_adam(npg_fit *fit)
     return status;
 }
 
-/* Features that differ from place to place from the start; with a head of zero the motion still begins at rest. */
+/* Features that differ from place to place from the start; with a head of zero the motion still begins at
+ * rest. */
 static npg_status draw_features(npg_fit *fit)
 {
     float *values;

@@ -244,10 +244,11 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     if (status && is_open)
         return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
     NPG_TRY(status);
-    if (is_open) facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
-                                               .key = facts->plan.key,
-                                               .window = state->window,
-                                               .overlap = state->overlap};
+    if (is_open)
+        facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
+                                 .key = facts->plan.key,
+                                 .window = state->window,
+                                 .overlap = state->overlap};
     json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
     state->is_planned = true;
     npg_release(&state->cells);

@@ -9,6 +9,7 @@
 #include "checkpoint.h"
 #include "fit_state.h"
 #include "kernels.h"
+#include "live_plan.h"
 #include "window.h"
 
 typedef struct state {
@@ -20,6 +21,7 @@ typedef struct state {
     npg_window window;
     int64_t window_at, window_count;
     bool is_aligned;
+    int64_t total; /* frames of the capture, -1 until the stream has ended */
     double last_chamfer, last_isometry;
     int64_t emitted;
 } state;
@@ -33,7 +35,7 @@ typedef struct state {
 #define CHOICE_OPTION NPG_OPTION_CHOICE
 
 static const npg_option options[] = {
-    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "60", 0, 1e6, NULL, "N"},
+    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "30", 0, 1e6, NULL, "N"},
     {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
      0, "quaternion|cayley|exponential", NULL},
     {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,
@@ -62,22 +64,21 @@ static const npg_option options[] = {
     {"width-2", "units of the second hidden layer", INT_OPTION, AT(width_2), "512", 32, 4096, NULL, "N"},
     {"mlp-rate", "learning rate of the decoder", REAL_OPTION, AT(mlp_rate), "0.001", 0, 1, NULL, NULL},
     {"slope", "slope of the leaky rectifier below 0", REAL_OPTION, AT(slope), "0.01", 0, 1, NULL, NULL},
-    {"isometry", "weight of the change of edge lengths", REAL_OPTION, AT(isometry), "100", 0, 1e6, NULL,
-     NULL},
+    {"isometry", "weight of the change of edge lengths", REAL_OPTION, AT(isometry), "5", 0, 1e6, NULL, NULL},
     {"welsch", "width of the robust weight on squared unit distances, 0 for none", REAL_OPTION, AT(alpha),
      "0.3", 0, 1e3, NULL, NULL},
     {"confidence", "weight of a frame by how well it and those nearer the key fit", CHOICE_OPTION,
      AT(confidence), "constant", 0, 0, "cumulative|single|delta|constant", NULL},
     {"catch-up", "how the confidence opens with the epochs", CHOICE_OPTION, AT(catch_up), "root", 0, 0,
      "root|constant|linear|exponential|interpolated", NULL},
-    {"feature-start", "grid features begin spread over +- this; 0 as in the paper", REAL_OPTION, AT(feature_start), "3",
-     0, 1e3, NULL, NULL},
+    {"feature-start", "grid features begin spread over +- this; 0 as in the paper", REAL_OPTION,
+     AT(feature_start), "3", 0, 1e3, NULL, NULL},
     {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
      AT(rate_end), "0.1", 0, 1, NULL, NULL},
     {"samples", "vertices of aligned frames that are fitted and carry the others, 0: all", INT_OPTION,
-     offsetof(state, window_settings.samples), "2500", 0, 1e6, NULL, "N"},
+     offsetof(state, window_settings.samples), "1500", 0, 1e6, NULL, "N"},
     {"rounds", "times in a window's fit that aligned frames are matched with their points", INT_OPTION,
-     offsetof(state, window_settings.rounds), "3", 1, 1000, NULL, "N"},
+     offsetof(state, window_settings.rounds), "2", 1, 1000, NULL, "N"},
     {"match-points", "most points of an aligned frame that pull at the surface", INT_OPTION, MATCH(points),
      "5000", 10, 1e7, NULL, "N"},
     {"match-along", "share of distances along the surface, 0 to 1", REAL_OPTION, MATCH(along), "0.02", 0, 1,
@@ -114,6 +115,7 @@ static npg_status go_on(npg_worker *worker);
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
+    s->total = -1;
     NPG_TRY(check_widths(&s->window_settings.fit));
     NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
@@ -146,8 +148,8 @@ static npg_status open_solver(npg_worker *worker, bool is_aligned)
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     s->is_aligned = is_aligned;
-    s->window_count = npg_plan_window_count(&facts->plan);
-    s->window = npg_plan_window(&facts->plan, 0);
+    s->window_count = npg_live_window_count(&facts->plan, s->total);
+    s->window = npg_live_window(&facts->plan, 0, s->total);
     NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
                                    (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
     json_object_set_new(npg_worker_report(worker), "samples",
@@ -218,11 +220,7 @@ static bool is_needed_later(npg_worker *worker, int64_t index)
 {
     state *s = npg_worker_state(worker);
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    for (int64_t w = s->window_at + 1; w < s->window_count; w++) {
-        npg_window window = npg_plan_window(plan, w);
-        if (index >= window.first && index <= window.last) return true;
-    }
-    return false;
+    return npg_live_is_needed_after(plan, index, s->window_at, s->total);
 }
 
 /* Pass a solved frame on; its vertices are now the solved ones. */
@@ -294,7 +292,7 @@ static npg_status go_on(npg_worker *worker)
     if (status) return npg_error_prefix(status, "the state to go on from");
     s->window_at = hand.window_at;
     if (s->window_at >= 0) NPG_TRY(emit_done(worker));
-    if (++s->window_at < s->window_count) s->window = npg_plan_window(&facts->plan, s->window_at);
+    if (++s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
     return NPG_OK;
 }
 
@@ -306,9 +304,21 @@ static npg_status solve_complete_windows(npg_worker *worker)
         NPG_TRY(save_state(worker));
         NPG_TRY(emit_done(worker));
         if (++s->window_at < s->window_count)
-            s->window = npg_plan_window(&npg_worker_facts(worker)->plan, s->window_at);
+            s->window = npg_live_window(&npg_worker_facts(worker)->plan, s->window_at, s->total);
     }
     return NPG_OK;
+}
+
+/* The last window of an open plan is as long as what came; frames that waited for one more go on. */
+static npg_status solve_the_rest(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    s->total = facts->frame_count;
+    s->window_count = npg_live_window_count(&facts->plan, s->total);
+    if (s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
+    NPG_TRY(solve_complete_windows(worker));
+    return emit_done(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
@@ -332,6 +342,7 @@ static npg_status flush(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
+    if (npg_plan_is_open(&npg_worker_facts(worker)->plan)) NPG_TRY(solve_the_rest(worker));
     if (s->held_count)
         return npg_error(NPG_FAILED, "window %lld (frames %lld to %lld) did not get all its frames",
                          (long long)s->window_at, (long long)s->window.first, (long long)s->window.last);
@@ -348,7 +359,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_plan *plan = &facts->plan;
-    npg_window window = npg_plan_key_window(plan);
+    npg_window window = npg_live_window(plan, 0, -1);
     size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;

@@ -9,11 +9,13 @@
 #include "mesh_tools.h"
 #include "query.h"
 
-#define STIFF_START 10.0 /* times the final stiffness at the first step */
-#define NOISE_UNIT 0.0012 /* mean distance of points at which the stiffness has doubled */
-#define WIDTH_START 0.08 /* of the robust weight, in units: what may move between two frames */
-#define WIDTH_END   0.01 /* at the last step, more where the points are noisy               */
-#define REVERSE     0.5  /* weight of surface -> points against points -> surface */
+#define STIFF_START 10.0  /* times the final stiffness at the first step */
+#define NOISE_UNIT  0.003 /* mean distance of points at which the stiffness has doubled */
+#define WIDTH_START 0.08  /* of the robust weight, in units: what may move between two frames */
+#define WIDTH_END   0.01  /* at the last step, more where the points are noisy               */
+#define TURN_MAX    0.6   /* of a node in one step, radians */
+#define MOVE_MAX    0.15  /* units */
+#define REVERSE     0.5   /* weight of surface -> points against points -> surface */
 
 struct npg_tracker {
     npg_tracker_settings settings;
@@ -278,13 +280,27 @@ static void turn(double rotation[9], const double omega[3])
     memcpy(rotation, out, sizeof out);
 }
 
-static double move_nodes(npg_tracker *t, double *pose)
+/* The share of a step that turns and moves no node by more than the largest allowed: a linearised turn means
+ * nothing beyond. */
+static double share_of_step(const npg_tracker *t)
 {
     double largest = 0;
+    for (size_t k = 0; k < t->graph->node_count; k++)
+        for (size_t half = 0; half < 2; half++) {
+            const double *d = t->step + 6 * k + 3 * half;
+            largest =
+                fmax(largest, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (half ? MOVE_MAX : TURN_MAX));
+        }
+    return largest > 1 ? 1 / largest : 1;
+}
+
+static double move_nodes(npg_tracker *t, double *pose)
+{
+    double largest = 0, share = share_of_step(t);
     for (size_t k = 0; k < t->graph->node_count; k++) {
-        const double *d = t->step + 6 * k;
+        double *d = t->step + 6 * k, moved = 0;
+        for (int i = 0; i < 6; i++) d[i] *= share;
         turn(pose + k * NPG_POSE_SIZE, d);
-        double moved = 0;
         for (int i = 0; i < 3; i++) {
             pose[k * NPG_POSE_SIZE + 9 + (size_t)i] += d[3 + i];
             moved += d[3 + i] * d[3 + i];
