@@ -231,6 +231,7 @@ static npg_status conclude(npg_run *run)
 static npg_status begin(npg_run *run)
 {
     npg_status status = open_worker_states(run);
+    if (status) npg_run_fail(run, "run", status);
     for (size_t i = 0; i < run->worker_count && !status; i++) {
         npg_worker *worker = &run->workers[i];
         if (worker->stage->begin) status = worker->stage->begin(worker);
