@@ -1,4 +1,6 @@
 /* neupig run: the main job. */
+#include <errno.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -29,45 +31,74 @@ const npg_option npg_run_verb_options[] = {
 
 /* ---- signals ---- */
 
-static npg_run *volatile signalled_run; /* the run that a signal stops */
-
 #define STOP_SECONDS 4 /* a run that has not stopped by then is ended */
 
-static void on_signal(int number)
+typedef struct watcher {
+    npg_run *run;         /* loan */
+    sigset_t all, before; /* what it waits for, and the mask to go back to */
+    pthread_t thread;
+    bool started;
+} watcher;
+
+/* Signals are blocked in every thread and waited for in one, so that no handler ever runs: the OpenCL
+ * compiler brings one of its own, which takes away files that other threads are at work on. */
+static void block_signals(watcher *w)
 {
-    (void)number;
-    npg_run_stop(signalled_run);
-    alarm(STOP_SECONDS);
+    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+    sigemptyset(&w->all);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction now;
+        if (!sigaction(numbers[i], NULL, &now) && now.sa_handler != SIG_IGN) sigaddset(&w->all, numbers[i]);
+    }
+    sigaddset(&w->all, SIGUSR1); /* the run has ended */
+    pthread_sigmask(SIG_BLOCK, &w->all, &w->before);
 }
 
-/* Something that can't be interrupted took too long.  All that is on disk is whole at every moment, so that
- * the process may end here. */
-static void on_alarm(int number)
+/* The next signal, or -1 when none came in time. */
+static int next_signal(const watcher *w, const struct timespec *limit)
+{
+    int number;
+    do number = limit ? sigtimedwait(&w->all, NULL, limit) : sigwaitinfo(&w->all, NULL);
+    while (number < 0 && errno == EINTR);
+    return number;
+}
+
+/* The first signal stops the run in good order; the second ends the process the usual way.  Where something
+ * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
+ * moment. */
+static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to go on\n";
-    (void)number;
-    if (write(STDERR_FILENO, text, sizeof text - 1) < 0) _exit(75);
-    _exit(75);
+    const watcher *w = argument;
+    const struct timespec limit = {.tv_sec = STOP_SECONDS};
+    if (next_signal(w, NULL) == SIGUSR1) return NULL;
+    npg_run_stop(w->run);
+    int number = next_signal(w, &limit);
+    if (number == SIGUSR1) return NULL;
+    if (number < 0) {
+        ssize_t written = write(STDERR_FILENO, text, sizeof text - 1);
+        _exit(written < 0 ? 75 : npg_status_exit_code(NPG_STOPPED));
+    }
+    signal(number, SIG_DFL);
+    pthread_sigmask(SIG_UNBLOCK, &w->all, NULL);
+    raise(number);
+    return NULL;
 }
 
-/* The first signal stops the run in good order; the second ends the process the usual way. */
-static void catch_signals(npg_run *run)
+static npg_status start_watching(watcher *w, npg_run *run)
 {
-    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESETHAND | SA_RESTART};
-    signalled_run = run;
-    sigemptyset(&action.sa_mask);
-    signal(SIGALRM, on_alarm);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGHUP, &action, NULL);
+    w->run = run;
+    w->started = !pthread_create(&w->thread, NULL, watch_signals, w);
+    return w->started ? NPG_OK : npg_error(NPG_FAILED, "can't start a thread");
 }
 
-static void release_signals(void)
+static void end_watching(watcher *w)
 {
-    signal(SIGINT, SIG_DFL);
-    signal(SIGTERM, SIG_DFL);
-    signal(SIGHUP, SIG_DFL);
-    signalled_run = NULL;
+    if (w->started) {
+        pthread_kill(w->thread, SIGUSR1);
+        pthread_join(w->thread, NULL);
+    }
+    pthread_sigmask(SIG_SETMASK, &w->before, NULL);
 }
 
 /* ---- the verb ---- */
@@ -93,14 +124,15 @@ npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
-    NPG_TRY(npg_run_open(&run, options, &hooks));
-    catch_signals(run);
-    npg_status status = npg_run_wait(run);
-    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
-    release_signals();
+    watcher signals = {.run = NULL};
+    block_signals(&signals);
+    npg_status status = npg_run_open(&run, options, &hooks);
+    bool is_open = !status;
+    if (is_open) status = start_watching(&signals, run);
+    if (!status) status = npg_run_wait(run);
+    end_watching(&signals);
+    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     npg_run_close(&run);
-    alarm(0); /* closing had its time, too */
-    signal(SIGALRM, SIG_DFL);
     return status;
 }
 
