@@ -248,6 +248,7 @@ static npg_status do_passes(npg_run *run)
     if (!run->facts.is_live && !run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
+        if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
     }
     run->told = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));

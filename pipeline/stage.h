@@ -19,8 +19,19 @@
 typedef enum npg_pass {
     NPG_PASS_MEASURE = 1, /* files: find count, box and sizes                 */
     NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe    */
-    NPG_PASS_SOLVE = 4    /* the work itself; the only pass of a live source  */
+    NPG_PASS_SOLVE = 4,   /* the work itself; the only pass of a live source  */
+    NPG_PASS_CHOOSE = 8   /* files, after SCORE: look closer at a few frames  */
 } npg_pass;
+
+/* The frames that the choosing pass reads, in time order. */
+#define NPG_CHOICE_FRAMES 25
+#define NPG_CHOICE_MAX    4 /* candidates among them */
+typedef struct npg_choice {
+    size_t count, candidate_count; /* count 0: there is no choosing pass                   */
+    int64_t frames[NPG_CHOICE_FRAMES];
+    bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
+    bool cut_welds;                       /* cut from the reference what the other frames contradict      */
+} npg_choice;
 
 /* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
  * it passes on the first chunk (or ends the pass) that depends on it; the rings' locks publish it downstream.
@@ -38,8 +49,9 @@ typedef struct npg_facts {
     int64_t number_min, number_max; /* of all frames                                          */
     npg_bounds bounds_local;        /* of all usable points                                          */
     npg_frame_box box;
-    npg_plan plan; /* with the keyframe                                             */
-    /* mesh */
+    npg_plan plan;     /* with the keyframe by score                                    */
+    npg_choice choice; /* what the choosing pass should look at                        */
+    /* mesh; it also sets plan.key at the end of the choosing pass */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
     double unseen_share; /* share of the reference's area that no point of its frame saw  */
     /* job, before the first pass */

@@ -17,6 +17,8 @@ const npg_stage *const npg_chain[] = {
     NULL};
 
 static const npg_preset_value paper[] = {{"align", "no"},
+                                         {"keyframe-choice", "paper"},
+                                         {"welds", "keep"},
                                          {"window", "0"},
                                          {"epochs", "250"},
                                          {"isometry", "100"},

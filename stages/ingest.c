@@ -1,5 +1,5 @@
-/* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan), from
- * standard input, from a folder that grows, or from those that are pushed. */
+/* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
+ * from standard input, from a folder that grows, or from those that are pushed. */
 #include <string.h>
 #include <unistd.h>
 
@@ -131,11 +131,14 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
-    int64_t end = is_solving ? npg_plan_read_count(&facts->plan) : facts->frame_count;
-    while (s->next < end && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
+    npg_pass pass = npg_worker_pass(worker);
+    int64_t count = pass == NPG_PASS_CHOOSE ? (int64_t)facts->choice.count : facts->frame_count;
+    if (pass == NPG_PASS_SOLVE) count = npg_plan_read_count(&facts->plan);
+    while (s->next < count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
         npg_frame frame;
-        int64_t index = is_solving ? npg_plan_frame(&facts->plan, s->next) : s->next;
+        int64_t index = s->next;
+        if (pass == NPG_PASS_SOLVE) index = npg_plan_frame(&facts->plan, s->next);
+        if (pass == NPG_PASS_CHOOSE) index = facts->choice.frames[s->next];
         if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
         NPG_TRY(read_frame(worker, &frame, index));
         npg_chunk_add(chunk, &frame);
@@ -410,7 +413,8 @@ const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .help = "reads the frames",
                                     .options = ingest_options,
                                     .state_size = sizeof(state),
-                                    .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_SOLVE,
+                                    .passes =
+                                        NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
                                     .gives = NPG_FIELD_POINTS,
                                     .init = init,
                                     .process = process,

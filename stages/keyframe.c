@@ -3,18 +3,25 @@
  *
  * Based on: the keyframe selection of the Neu-PiG paper.  The score of frame t of T is the number of cells of
  * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
- * surface, near the middle in time. */
+ * surface, near the middle in time.
+ *
+ * Not in the paper: the score hardly tells frames apart, so the frame it finds is only the first of several
+ * candidates (shortlist.h), of which the choosing pass takes the one whose surface fares best (choose.h). */
 #include <math.h>
 #include <string.h>
 
 #include "live_plan.h"
 #include "look_ahead.h"
+#include "shortlist.h"
 
 #define GRID         512 /* cells per axis */
 #define CELL_WORDS   ((size_t)GRID * GRID * GRID / 64)
 #define BLOCK        1024 /* points turned into unit coordinates at a time */
 #define SHOWN_SCORES 5
 #define NO_NUMBER    (-1)
+
+enum { CHOICE_PAPER, CHOICE_APART };
+enum { WELDS_KEEP, WELDS_CUT };
 
 typedef struct candidate {
     int64_t index, number;
@@ -24,9 +31,11 @@ typedef struct candidate {
 
 typedef struct keyframe_state {
     int64_t number, window, overlap, look_ahead; /* options */
-    double box_margin;                           /* option */
-    uint64_t *cells;                             /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
-    candidate best[SHOWN_SCORES];                /* best first */
+    int choice, welds;                           /* options */
+    npg_shortlist shortlist;
+    double box_margin;            /* option */
+    uint64_t *cells;              /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
+    candidate best[SHOWN_SCORES]; /* best first */
     size_t best_count;
     candidate chosen; /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
@@ -129,12 +138,18 @@ static void offer(keyframe_state *state, candidate new)
     state->best[at] = new;
 }
 
-static void score_frame(keyframe_state *state, const npg_facts *facts, int64_t frame_count,
-                        const npg_frame *frame)
+/* Whether there is a choosing pass, which takes files, and a keyframe that is not named. */
+static bool has_candidates(const keyframe_state *state)
+{
+    return state->choice == CHOICE_APART && state->number == NO_NUMBER;
+}
+
+static npg_status score_frame(keyframe_state *state, const npg_facts *facts, int64_t frame_count,
+                              const npg_frame *frame)
 {
     bool is_named = frame->number == state->number && state->number != NO_NUMBER;
     if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
-    if (frame->is_skipped) return;
+    if (frame->is_skipped) return NPG_OK;
     size_t cell_count = mark_cells(state->cells, &facts->box, frame, true);
     mark_cells(state->cells, &facts->box, frame, false);
     double from_middle = (double)frame->index - (double)frame_count / 2;
@@ -145,6 +160,9 @@ static void score_frame(keyframe_state *state, const npg_facts *facts, int64_t f
         state->chosen = new;
         state->is_chosen = true;
     }
+    if (facts->is_live || !has_candidates(state) || !npg_shortlist_wants(frame->index, frame_count))
+        return NPG_OK;
+    return npg_shortlist_add(&state->shortlist, frame, cell_count);
 }
 
 static json_t *json_of(const candidate *c)
@@ -176,12 +194,18 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     int64_t overlap = window < frame_count ? state->overlap : 0;
     facts->plan =
         (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
+    if (!facts->is_live && frame_count > 1 && (has_candidates(state) || state->welds == WELDS_CUT)) {
+        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count,
+                             !has_candidates(state));
+        facts->choice.cut_welds = state->welds == WELDS_CUT;
+    }
     json_t *report = npg_worker_report(worker), *scores = json_array();
     for (size_t i = 0; i < state->best_count; i++) json_array_append_new(scores, json_of(&state->best[i]));
     json_object_set_new(report, "key", json_of(&key));
     json_object_set_new(report, "best", scores);
     json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
-    npg_worker_log(worker, NPG_LOG_INFO, key.number, "is the keyframe of %lld frames (%zu cells, score %.1f)",
+    npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.1f)",
+                   facts->choice.candidate_count > 1 ? "has the best score" : "is the keyframe",
                    (long long)frame_count, key.cell_count, key.score);
     return NPG_OK;
 }
@@ -239,7 +263,7 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     facts->box.diagonal = diagonal;
     if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
     for (size_t i = 0; i < state->held.count; i++)
-        score_frame(state, facts, frame_count, &state->held.frames[i]);
+        NPG_TRY(score_frame(state, facts, frame_count, &state->held.frames[i]));
     npg_status status = set_plan(worker, frame_count);
     if (status && is_open)
         return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
@@ -313,7 +337,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         if (pass == NPG_PASS_MEASURE)
             measure_frame(state, facts, frame);
         else if (pass == NPG_PASS_SCORE)
-            score_frame(state, facts, facts->frame_count, frame);
+            NPG_TRY(score_frame(state, facts, facts->frame_count, frame));
         else
             NPG_TRY(facts->is_live ? take_live(worker, frame) : mark_key(worker, frame));
     }
@@ -327,6 +351,7 @@ static npg_status flush(npg_worker *worker)
     switch (npg_worker_pass(worker)) {
     case NPG_PASS_MEASURE: return close_measuring(worker);
     case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
+    case NPG_PASS_CHOOSE:
     case NPG_PASS_SOLVE: break;
     }
     return facts->is_live ? end_live(worker) : NPG_OK;
@@ -354,6 +379,17 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 static const npg_option options[] = {
     {"keyframe", "Number of the frame whose surface is the reference, as in the file names; -1: by score",
      NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
+    {"keyframe-choice",
+     "Take the frame with the best score (paper), or the one of several good frames whose surface fares best "
+     "in the "
+     "others, so that limbs which touch in one frame are not joined for the whole capture (apart; not for "
+     "live runs)",
+     NPG_OPTION_CHOICE, OFFSET(choice), "apart", 0, 0, "paper|apart", NULL},
+    {"welds",
+     "Surface of the reference that other frames stretch far from all points: cut it and close the holes, or "
+     "keep it "
+     "(live runs keep it)",
+     NPG_OPTION_CHOICE, OFFSET(welds), "cut", 0, 0, "keep|cut", NULL},
     {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
      OFFSET(window), "24", 0, 1e6, NULL, NULL},
     {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,

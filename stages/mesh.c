@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "choose.h"
 #include "clock.h"
 #include "denoise.h"
 #include "mesh_clean.h"
@@ -11,6 +12,7 @@
 #include "resurface.h"
 #include "stage.h"
 #include "vdb.h"
+#include "weld.h"
 
 #define POINTS_MAX        80000
 #define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
@@ -133,6 +135,17 @@ static npg_status measure_points(making *m)
     return NPG_OK;
 }
 
+static npg_poisson_settings poisson_settings(npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    return (npg_poisson_settings){.depth = (int)s->depth,
+                                  .point_weight = s->point_weight,
+                                  .time_limit_s = (double)s->time_limit_s,
+                                  .memory_limit = (size_t)s->memory_limit_mib << 20,
+                                  .should_stop = should_stop,
+                                  .user = worker};
+}
+
 /* Noise would become bumps of the surface that every frame then carries. */
 static npg_status smooth(making *m)
 {
@@ -149,19 +162,15 @@ static npg_status smooth(making *m)
 
 static npg_status reconstruct(making *m)
 {
-    const mesh_state *s = m->state;
-    npg_poisson_settings settings = {.depth = (int)s->depth,
-                                     .point_weight = s->point_weight,
-                                     .time_limit_s = (double)s->time_limit_s,
-                                     .memory_limit = (size_t)s->memory_limit_mib << 20,
-                                     .should_stop = should_stop,
-                                     .user = m->worker};
+    npg_poisson_settings settings = poisson_settings(m->worker);
     if (!m->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
-    size_t n = m->count, turned;
+    size_t n = m->count, turned, moved;
     int rounds;
     NPG_TRY(smooth(m));
-    NPG_TRY(npg_resurface(&m->mesh, &turned, &rounds, m->normals, m->points, n, &settings));
+    NPG_TRY(npg_resurface_apart(&m->mesh, &moved, &turned, &rounds, m->normals, m->points, n, m->spacing,
+                                &settings));
+    note_count(m, "points_held_apart", moved);
     note_count(m, "poisson_rounds", (size_t)rounds);
     note_count(m, "normals_turned", turned);
     note(m, "poisson_s", npg_clock_s() - since);
@@ -324,6 +333,44 @@ static npg_status make(making *m)
     return status;
 }
 
+/* ---- welds ---- */
+
+static void tell_welds(making *m, const npg_weld_cut *cut)
+{
+    note(m, "handles", (double)cut->handles);
+    note_count(m, "weld_frames", cut->frames);
+    note_count(m, "welds_cut", cut->patches);
+    note_count(m, "weld_faces_cut", cut->faces);
+    note(m, "weld_area_share", cut->area_share);
+    note_count(m, "welds_refused", cut->refused);
+    if (cut->patches)
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                       "%zu welds that other frames pull apart were cut: %zu faces, %.2f %% of the area",
+                       cut->patches, cut->faces, 100 * cut->area_share);
+    if (cut->refused)
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                       "%zu patches that other frames stretch could not be cut cleanly and stay",
+                       cut->refused);
+}
+
+/* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
+static npg_status cut_welds(making *m)
+{
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    npg_sights *sights = npg_worker_kept(m->worker);
+    npg_weld_settings settings = {.spacing_unit = m->spacing, .should_stop = should_stop, .user = m->worker};
+    npg_weld_cut done;
+    if (!sights || !facts->choice.cut_welds) return NPG_OK;
+    size_t at = npg_sights_find(sights, m->frame->index);
+    double since = npg_clock_s();
+    npg_status status =
+        at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
+    if (!status && at < sights->count) tell_welds(m, &done);
+    note(m, "welds_s", npg_clock_s() - since);
+    npg_sights_clear(sights);
+    return status == NPG_DIVERGED ? NPG_OK : status;
+}
+
 /* ---- the user's own mesh ---- */
 
 static npg_status read_reference(making *m)
@@ -375,6 +422,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
     npg_status status = take_points(&m);
     if (!status) status = measure_points(&m);
     if (!status) status = *m.state->reference ? read_reference(&m) : make(&m);
+    if (!status && !*m.state->reference) status = cut_welds(&m);
     if (!status) status = finish(&m);
     note(&m, "seconds", npg_clock_s() - since);
     npg_release(&m.points);
@@ -385,11 +433,75 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
                             frame->path ? frame->path : "pushed");
 }
 
+/* ---- the choosing pass ---- */
+
+static void release_sights(void *thing)
+{
+    npg_sights_clear(thing);
+    npg_release(&thing);
+}
+
+static npg_status look_at(npg_worker *worker, npg_chunk *chunk)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_sights *sights = npg_worker_kept(worker);
+    if (!sights) {
+        NPG_TRY(npg_alloc(&sights, NPG_FOR_RUN, sizeof *sights));
+        npg_worker_keep(worker, sights, release_sights);
+    }
+    for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
+        const npg_frame *frame = npg_chunk_frame(chunk, i);
+        const npg_choice *choice = &facts->choice;
+        bool is_candidate = false;
+        for (size_t k = 0; k < choice->count; k++)
+            if (choice->frames[k] == frame->index) is_candidate = choice->is_candidate[k];
+        NPG_TRY(npg_sights_add(sights, frame, &facts->box, is_candidate));
+    }
+    return NPG_OK;
+}
+
+static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count, size_t best, double seconds)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < count; i++)
+        json_array_append_new(list,
+                              json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number,
+                                        "made", fares[i].is_made, "point_dist_unit", fares[i].point_dist_unit,
+                                        "vert_dist_unit", fares[i].vert_dist_unit, "stretched_share",
+                                        fares[i].stretched_share, "contact", fares[i].contact, "handles",
+                                        (json_int_t)fares[i].handles, "cost", fares[i].cost));
+    json_object_set_new(npg_worker_report(worker), "candidates", list);
+    json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
+    npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
+                   "is the keyframe, of %zu candidates (cost %.5f; %.2f %% of its points in contact)", count,
+                   fares[best].cost, 100 * fares[best].contact);
+}
+
+/* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */
+static npg_status choose_key(npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_fare fares[NPG_CHOICE_MAX];
+    size_t count, best;
+    double since = npg_clock_s();
+    if (npg_worker_pass(worker) != NPG_PASS_CHOOSE || facts->choice.candidate_count < 2) return NPG_OK;
+    if (*s->reference || !npg_worker_kept(worker)) return NPG_OK;
+    const npg_poisson_settings settings = poisson_settings(worker);
+    NPG_TRY(npg_choose(fares, &count, &best, npg_worker_kept(worker), facts->plan.key, facts->frame_count,
+                       &settings));
+    if (!count) return NPG_OK;
+    facts->plan.key = fares[best].index;
+    tell_choice(worker, fares, count, best, npg_clock_s() - since);
+    return NPG_OK;
+}
+
 /* ---- the stage ---- */
 
 static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     const npg_facts *facts = npg_worker_facts(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) return look_at(worker, *chunk);
     for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
@@ -412,8 +524,9 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
                                   .state_size = sizeof(mesh_state),
-                                  .passes = NPG_PASS_SOLVE,
+                                  .passes = NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,
+                                  .flush = choose_key,
                                   .memory = mesh_memory};

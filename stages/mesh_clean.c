@@ -11,8 +11,8 @@
 
 #define SPACING_NEIGHBOUR 8
 
-static npg_status nearest_dist(float *dist, const float *queries, size_t query_count, const float *points,
-                               size_t point_count)
+npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
+                           size_t point_count)
 {
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
@@ -29,7 +29,7 @@ done:
 
 npg_status npg_mesh_point_dist(float *dist, const npg_mesh *mesh, const float *points, size_t point_count)
 {
-    return nearest_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
+    return npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
 }
 
 static int by_value(const void *a, const void *b)
@@ -128,7 +128,7 @@ static npg_status find_near(uint8_t *is_near, const npg_mesh *mesh, const uint32
     for (size_t i = 0; i < mesh->vert_count; i++)
         if (component_of[i] == largest)
             memcpy(main_pos + 3 * main_count++, mesh->vert_pos + 3 * i, 3 * sizeof *main_pos);
-    NPG_TRY_OR(done, status, nearest_dist(dist, mesh->vert_pos, mesh->vert_count, main_pos, main_count));
+    NPG_TRY_OR(done, status, npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, main_pos, main_count));
     for (size_t i = 0; i < mesh->vert_count; i++)
         if ((double)dist[i] <= dist_max && area[component_of[i]] >= area_min) is_near[component_of[i]] = 1;
 done:

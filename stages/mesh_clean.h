@@ -13,6 +13,10 @@
 /* Distance of every vertex to the nearest of N points.  dist: V. */
 npg_status npg_mesh_point_dist(float *dist, const npg_mesh *mesh, const float *points, size_t point_count);
 
+/* The same for any V places.  dist: V. */
+npg_status npg_points_dist(float *dist, const float *places, size_t place_count, const float *points,
+                           size_t point_count);
+
 /* Median distance to the 8th neighbour, over the points: how dense a cloud is. */
 npg_status npg_cloud_spacing(double *spacing, const float *points, size_t point_count);
 

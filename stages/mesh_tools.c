@@ -42,7 +42,7 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
 
 /* A directed edge of a face, ordered by its undirected key. */
 typedef struct half_edge {
-    uint32_t lo, hi;
+    uint32_t lo, hi, at; /* at: the number of its corner, 3 f + k */
     int forward;
 } half_edge;
 
@@ -59,7 +59,7 @@ static npg_status sorted_half_edges(half_edge **out, const uint32_t *faces, size
     NPG_TRY(npg_alloc_array(&halves, NPG_FOR_MESH, face_count, 3 * sizeof *halves));
     for (size_t i = 0; i < 3 * face_count; i++) {
         uint32_t a = faces[i], b = faces[i - i % 3 + (i + 1) % 3];
-        halves[i] = (half_edge){a < b ? a : b, a < b ? b : a, a < b};
+        halves[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i, a < b};
     }
     if (face_count) qsort(halves, 3 * face_count, sizeof *halves, by_key);
     *out = halves;
@@ -82,6 +82,21 @@ npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint3
     }
     npg_release(&halves);
     return status;
+}
+
+npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count)
+{
+    half_edge *halves;
+    size_t count = 3 * face_count;
+    NPG_TRY(sorted_half_edges(&halves, faces, face_count));
+    for (size_t i = 0, next; i < count; i = next) {
+        for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
+        bool is_pair = next - i == 2 && halves[i].forward != halves[i + 1].forward;
+        for (size_t k = i; k < next; k++)
+            twin[halves[k].at] = is_pair ? halves[2 * i + 1 - k].at : UINT32_MAX;
+    }
+    npg_release(&halves);
+    return NPG_OK;
 }
 
 static uint32_t root_of(uint32_t *parent, uint32_t i)
@@ -167,6 +182,55 @@ npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh)
     npg_release(&is_used);
     if (!status) npg_release(&halves);
     return status;
+}
+
+/* Border loops: what the border's edges, as flat faces, are connected to. */
+static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
+{
+    uint32_t *twin = NULL, *flat = NULL, *component = NULL;
+    size_t count = 0, pieces, border_verts = 0, n = mesh->vert_count;
+    npg_status status;
+    *loops = 0;
+    NPG_TRY_OR(done, status, npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
+    NPG_TRY_OR(done, status, npg_alloc_array(&flat, NPG_FOR_MESH, 3 * mesh->face_count, 3 * sizeof *flat));
+    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, n, sizeof *component));
+    NPG_TRY_OR(done, status, npg_mesh_twins(twin, mesh->faces, mesh->face_count));
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (twin[i] != UINT32_MAX) continue;
+        flat[3 * count] = flat[3 * count + 1] = mesh->faces[i];
+        flat[3 * count++ + 2] = mesh->faces[i - i % 3 + (i + 1) % 3];
+    }
+    NPG_TRY_OR(done, status, npg_mesh_components(component, &pieces, n, flat, count));
+    memset(component, 0, n * sizeof *component);
+    for (size_t i = 0; i < 3 * count; i++) {
+        border_verts += component[flat[i]] == 0;
+        component[flat[i]] = 1;
+    }
+    *loops = pieces + border_verts - n; /* every other vertex is a piece of its own */
+done:
+    npg_release(&twin);
+    npg_release(&flat);
+    npg_release(&component);
+    return status;
+}
+
+npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    uint32_t *component;
+    size_t components, loops;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(count_border_loops(&loops, mesh));
+    NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
+    npg_status status =
+        npg_mesh_components(component, &components, mesh->vert_count, mesh->faces, mesh->face_count);
+    npg_release(&component);
+    NPG_TRY(status);
+    int64_t unused = (int64_t)manifold.unused_vertices;
+    int64_t euler =
+        (int64_t)mesh->vert_count - unused - (int64_t)manifold.edge_count + (int64_t)mesh->face_count;
+    *handles = (2 * ((int64_t)components - unused) - euler - (int64_t)loops) / 2;
+    return NPG_OK;
 }
 
 static void copy_vertex(npg_mesh *out, size_t to, const npg_mesh *mesh, size_t from)

@@ -2,8 +2,8 @@
  * or mends normals.
  *
  * The cheap cleaning takes part in every pass, so that box and keyframe are those of clean points; it gives
- * the same points each time.  Normals are made in the solving pass only, and only for the frame that needs
- * them. */
+ * the same points each time.  Normals are made for the keyframe alone (or all, if asked), and in the choosing
+ * pass for the frames that may become it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -208,6 +208,12 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
+    const npg_choice *choice = &facts->choice;
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) {
+        for (size_t i = 0; i < choice->count; i++)
+            if (choice->frames[i] == frame->index) return choice->is_candidate[i];
+        return false;
+    }
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return false;
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
     return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || is_planned_key;
@@ -308,7 +314,8 @@ const npg_stage npg_stage_outlier = {.name = "outlier",
                                      .help = "Cleans points, makes and mends normals",
                                      .options = outlier_options,
                                      .state_size = sizeof(outlier_state),
-                                     .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_SOLVE,
+                                     .passes =
+                                         NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
                                      .needs = NPG_FIELD_POINTS,
                                      .gives = NPG_FIELD_CLEAN,
                                      .init = outlier_init,

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "apart.h"
 #include "mesh_tools.h"
 #include "query.h"
 
@@ -11,6 +12,7 @@
 #define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
 #define CLEARLY     (-0.3f)
 #define SETTLED     0.0005 /* share of turned normals that ends it */
+#define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
 
 /* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */
 static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const float *n)
@@ -66,13 +68,36 @@ static npg_status draft(size_t *turned, float *normals, const float *points, siz
 npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *normals, const float *points,
                          size_t point_count, const npg_poisson_settings *settings)
 {
-    size_t now = point_count;
+    size_t now = point_count, before = SIZE_MAX;
+    int rounds_max = settings->rounds_max ? settings->rounds_max : ROUNDS_MAX;
     *mesh = NULL;
     *turned = 0;
-    for (*rounds = 0; *rounds < ROUNDS_MAX && (double)now > SETTLED * (double)point_count; ++*rounds) {
+    for (*rounds = 0; *rounds < rounds_max && (double)now > SETTLED * (double)point_count; ++*rounds) {
+        if (now >= before && (double)now < RESTLESS * (double)point_count) break;
+        before = now;
         NPG_TRY(draft(&now, normals, points, point_count, settings));
         *turned += now;
     }
     ++*rounds;
     return npg_poisson(mesh, points, normals, point_count, settings);
+}
+
+npg_status npg_resurface_apart(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
+                               const float *points, size_t n, double spacing,
+                               const npg_poisson_settings *settings)
+{
+    float *shift = NULL, *shifted = NULL;
+    npg_status status;
+    *mesh = NULL;
+    NPG_TRY_OR(done, status, npg_alloc_array(&shift, NPG_FOR_MESH, n, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&shifted, NPG_FOR_MESH, n, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_cloud_apart(shift, moved, points, normals, n, spacing));
+    for (size_t i = 0; i < 3 * n; i++) shifted[i] = points[i] + shift[i];
+    NPG_TRY_OR(done, status, npg_resurface(mesh, turned, rounds, normals, shifted, n, settings));
+    if (*moved) status = npg_mesh_move_back(*mesh, shifted, shift, n);
+    if (status) npg_mesh_unref(mesh);
+done:
+    npg_release(&shift);
+    npg_release(&shifted);
+    return status;
 }

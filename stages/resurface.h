@@ -14,4 +14,10 @@
 npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *normals, const float *points,
                          size_t point_count, const npg_poisson_settings *settings);
 
+/* The same, with parts that nearly touch kept from being joined (apart.h); *moved counts the points that were
+ * moved for it.  spacing: npg_cloud_spacing(). */
+npg_status npg_resurface_apart(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
+                               const float *points, size_t point_count, double spacing,
+                               const npg_poisson_settings *settings);
+
 #endif

@@ -39,12 +39,15 @@ static npg_status source_process(npg_worker *worker, npg_chunk **chunk)
     npg_facts *facts = npg_worker_facts(worker);
     if (facts->is_live) return source_from_feed(worker, chunk);
     if (!state->next) facts->frame_count = script.frame_count; /* written once, before the first chunk */
-    if (state->next >= script.frame_count) return NPG_END;
+    bool is_choosing = npg_worker_pass(worker) == NPG_PASS_CHOOSE;
+    int64_t count = is_choosing ? (int64_t)facts->choice.count : script.frame_count;
+    if (state->next >= count) return NPG_END;
     NPG_TRY(npg_chunk_open(chunk, (size_t)npg_worker_settings(worker)->chunk_frames));
-    while (npg_chunk_count(*chunk) < npg_chunk_capacity(*chunk) && state->next < script.frame_count) {
+    while (npg_chunk_count(*chunk) < npg_chunk_capacity(*chunk) && state->next < count) {
         npg_frame frame = {0};
         bool is_planned = npg_worker_pass(worker) == NPG_PASS_SOLVE && facts->plan.frame_count;
         frame.index = frame.number = is_planned ? npg_plan_frame(&facts->plan, state->next) : state->next;
+        if (is_choosing) frame.index = frame.number = facts->choice.frames[state->next];
         frame.fields = NPG_FIELD_POINTS;
         state->next++;
         npg_status status = script.make ? script.make(&frame, facts, frame.index, script.user) : NPG_OK;
@@ -67,7 +70,8 @@ static npg_status sink_process(npg_worker *worker, npg_chunk **chunk)
 static const npg_stage test_source = {.name = "source",
                                       .help = "",
                                       .state_size = sizeof(source_state),
-                                      .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_SOLVE,
+                                      .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
+                                                NPG_PASS_SOLVE,
                                       .gives = NPG_FIELD_POINTS,
                                       .process = source_process};
 

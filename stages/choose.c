@@ -1,0 +1,166 @@
+/* Choose: drafts of the candidates and what becomes of them in the other frames. */
+#include "choose.h"
+
+#include <math.h>
+
+#include "contact.h"
+#include "mesh_clean.h"
+#include "mesh_tools.h"
+#include "resurface.h"
+
+#define DRAFT_DEPTH     7
+#define DRAFT_ROUNDS    1
+#define DRAFT_FACES     4000
+#define PIECE_SHARE     0.01 /* of the area, and units from the main piece: what belongs to the body */
+#define PIECE_DIST_UNIT 0.1
+#define STRETCHED       3.0  /* times its area in the candidate's frame */
+#define STRETCH_COST    0.2  /* unit lengths that a stretched area counts for */
+#define CONTACT_COST    0.1  /* unit lengths that a point in contact counts for */
+#define HANDLE_COST     0.05 /* share of the cost that a needless handle adds */
+#define MIDDLE_COST     0.3  /* share of the cost that the capture's whole length from the middle adds */
+#define CLEARLY_LESS    0.97 /* of the cost of the best-scored frame */
+
+static const npg_tracker_settings draft_tracking = {
+    .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
+
+/* ---- the draft ---- */
+
+static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
+                             const npg_poisson_settings *settings)
+{
+    size_t moved, turned;
+    double spacing;
+    npg_pieces pieces;
+    int rounds;
+    npg_mending mending;
+    NPG_TRY(npg_cloud_spacing(&spacing, sight->points, sight->point_count));
+    NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, sight->points, sight->point_count,
+                                spacing, settings));
+    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
+    NPG_TRY(npg_mesh_handles(handles, *mesh));
+    NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
+    NPG_TRY(npg_mesh_mend(mesh, &mending));
+    npg_mesh *m = *mesh;
+    NPG_TRY(npg_alloc_array(&m->vert_normals, NPG_FOR_MESH, m->vert_count, 3 * sizeof(float)));
+    npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
+    return NPG_OK;
+}
+
+static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight *sight,
+                             const npg_poisson_settings *settings)
+{
+    npg_poisson_settings quick = *settings;
+    float *normals;
+    *mesh = NULL;
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    quick.rounds_max = DRAFT_ROUNDS;
+    NPG_TRY(npg_alloc_array(&normals, NPG_FOR_MESH, sight->point_count, 3 * sizeof(float)));
+    for (size_t i = 0; i < 3 * sight->point_count; i++) normals[i] = sight->normals[i];
+    npg_status status = draft_from(mesh, handles, sight, normals, &quick);
+    npg_release(&normals);
+    if (status) npg_mesh_unref(mesh);
+    return status;
+}
+
+/* ---- how it fares ---- */
+
+typedef struct faring {
+    const npg_mesh *mesh;
+    const npg_poisson_settings *settings; /* for the wish to stop */
+    double point_dist, vert_dist, stretched;
+    size_t frames;
+    float *dist; /* V, owned */
+} faring;
+
+static npg_status see(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
+{
+    faring *f = user;
+    double area = 0, stretched = 0, dist = 0;
+    if (f->settings->should_stop && f->settings->should_stop(f->settings->user))
+        return npg_error(NPG_STOPPED, "stopped while the keyframe was chosen");
+    for (size_t i = 0; i < f->mesh->face_count; i++) {
+        const uint32_t *face = f->mesh->faces + 3 * i;
+        double rest = npg_face_area(f->mesh->vert_pos, face), now = npg_face_area(vert_unit, face);
+        area += now;
+        if (now > STRETCHED * rest) stretched += now;
+    }
+    NPG_TRY(npg_points_dist(f->dist, vert_unit, f->mesh->vert_count, sight->points, sight->point_count));
+    for (size_t v = 0; v < f->mesh->vert_count; v++) dist += (double)f->dist[v];
+    f->vert_dist += dist / (double)f->mesh->vert_count;
+    f->point_dist += tracked->point_dist_mean;
+    f->stretched += area > 0 ? stretched / area : 0;
+    f->frames++;
+    return NPG_OK;
+}
+
+static npg_status rate(npg_fare *fare, const npg_sights *sights, size_t at,
+                       const npg_poisson_settings *settings)
+{
+    npg_mesh *mesh;
+    const npg_sight *own = &sights->list[at];
+    NPG_TRY(npg_cloud_contact(&fare->contact, own->points, own->normals, own->point_count));
+    NPG_TRY(make_draft(&mesh, &fare->handles, own, settings));
+    faring f = {.mesh = mesh, .settings = settings};
+    npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, mesh->vert_count, sizeof *f.dist);
+    if (!status) status = npg_sights_follow(sights, at, mesh, &draft_tracking, see, &f);
+    npg_release(&f.dist);
+    npg_mesh_unref(&mesh);
+    NPG_TRY(status);
+    fare->is_made = true;
+    fare->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
+    fare->vert_dist_unit = f.vert_dist / fmax(1, (double)f.frames);
+    fare->stretched_share = f.stretched / fmax(1, (double)f.frames);
+    return NPG_OK;
+}
+
+/* A frame of which no surface can be made is no keyframe; that is no failure of the run. */
+static bool is_fatal(npg_status status)
+{
+    return status && status != NPG_BAD_INPUT && status != NPG_FAILED && status != NPG_DIVERGED;
+}
+
+/* ---- the choice ---- */
+
+static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
+{
+    int64_t fewest = INT64_MAX;
+    for (size_t i = 0; i < count; i++)
+        if (fares[i].is_made && fares[i].handles < fewest) fewest = fares[i].handles;
+    for (size_t i = 0; i < count; i++) {
+        double off = (double)fares[i].index / (double)frame_count - 0.5;
+        fares[i].cost = (fares[i].point_dist_unit + fares[i].vert_dist_unit +
+                         STRETCH_COST * fares[i].stretched_share + CONTACT_COST * fares[i].contact) *
+                        (1 + HANDLE_COST * (double)(fares[i].handles - fewest)) *
+                        (1 + MIDDLE_COST * off * off);
+    }
+}
+
+static size_t cheapest(const npg_fare *fares, size_t count, int64_t best_scored)
+{
+    size_t best = count, scored = count;
+    for (size_t i = 0; i < count; i++) {
+        if (fares[i].index == best_scored) scored = i;
+        if (fares[i].is_made && (best == count || fares[i].cost < fares[best].cost)) best = i;
+    }
+    if (scored == count) return best == count ? 0 : best;
+    if (best == count) return scored;
+    bool stays = fares[scored].is_made && fares[best].cost > CLEARLY_LESS * fares[scored].cost;
+    return stays ? scored : best;
+}
+
+npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
+                      int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings)
+{
+    *count = *best = 0;
+    for (size_t i = 0; i < sights->count; i++) {
+        const npg_sight *sight = &sights->list[i];
+        if (!sight->is_candidate || !sight->normals) continue;
+        npg_fare *fare = &fares[(*count)++];
+        *fare = (npg_fare){.index = sight->index, .number = sight->number};
+        npg_status status = rate(fare, sights, i, settings);
+        if (is_fatal(status)) return status;
+    }
+    add_up(fares, *count, frame_count);
+    *best = cheapest(fares, *count, best_scored);
+    return NPG_OK;
+}

@@ -1,0 +1,175 @@
+/* The parts of choosing and cutting: contact, holding apart, twins, handles, filling of loops. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#include "apart.h"
+#include "contact.h"
+#include "legs.h"
+#include "loop_fill.h"
+#include "mesh_tools.h"
+
+/* ---- a torus of n x n quads, with `holes` faces left out at its end ---- */
+
+static npg_mesh *torus(uint32_t n, size_t holes)
+{
+    npg_mesh *mesh;
+    assert_int_equal(npg_mesh_open(&mesh, (size_t)n * n, 2 * (size_t)n * n - holes), NPG_OK);
+    size_t face_count = 0;
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t j = 0; j < n; j++) {
+            double u = 6.283185307 * i / n, v = 6.283185307 * j / n;
+            float *p = mesh->vert_pos + 3 * ((size_t)i * n + j);
+            p[0] = (float)((1 + 0.3 * cos(v)) * cos(u));
+            p[1] = (float)((1 + 0.3 * cos(v)) * sin(u));
+            p[2] = (float)(0.3 * sin(v));
+            uint32_t a = i * n + j, b = (i + 1) % n * n + j, c = (i + 1) % n * n + (j + 1) % n,
+                     d = i * n + (j + 1) % n;
+            const uint32_t faces[2][3] = {{a, b, c}, {a, c, d}};
+            for (int k = 0; k < 2 && face_count < mesh->face_count; k++)
+                memcpy(mesh->faces + 3 * face_count++, faces[k], sizeof faces[k]);
+        }
+    return mesh;
+}
+
+static void handles_are_counted_with_and_without_a_border(void **state)
+{
+    (void)state;
+    for (size_t holes = 0; holes < 3; holes++) {
+        int64_t handles;
+        npg_mesh *mesh = torus(8, holes);
+        assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
+        assert_int_equal(handles, 1);
+        npg_mesh_unref(&mesh);
+    }
+}
+
+static void twins_lie_across_their_edge(void **state)
+{
+    (void)state;
+    npg_mesh *mesh = torus(8, 1);
+    uint32_t twin[3 * 2 * 64];
+    size_t borders = 0;
+    assert_int_equal(npg_mesh_twins(twin, mesh->faces, mesh->face_count), NPG_OK);
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (twin[i] == UINT32_MAX) {
+            borders++;
+            continue;
+        }
+        size_t t = twin[i];
+        assert_int_equal(twin[t], i);
+        assert_int_equal(mesh->faces[i], mesh->faces[t - t % 3 + (t + 1) % 3]);
+    }
+    assert_int_equal(borders, 3);
+    npg_mesh_unref(&mesh);
+}
+
+/* ---- loops ---- */
+
+static void a_loop_is_filled_with_least_area(void **state)
+{
+    (void)state;
+    /* a folded square: the diagonal 0-2 makes two flat faces, 1-3 two that bulge */
+    const float pos[12] = {0, 0, 0, 1, 0, 0.9f, 1, 1, 0, 0, 1, 0.9f};
+    const uint32_t verts[4] = {0, 1, 2, 3};
+    const uint32_t edge[1][2] = {{0, 2}};
+    uint32_t faces[6];
+    double free_area, bound_area;
+    bool is_filled;
+    assert_int_equal(npg_loop_fill(faces, &free_area, &is_filled, (npg_loop){verts, 4}, pos, edge, 0),
+                     NPG_OK);
+    assert_true(is_filled);
+    double sum = npg_face_area(pos, faces) + npg_face_area(pos, faces + 3);
+    assert_true(fabs(sum - free_area) < 1e-6);
+    assert_int_equal(npg_loop_fill(faces, &bound_area, &is_filled, (npg_loop){verts, 4}, pos, edge, 1),
+                     NPG_OK);
+    assert_true(is_filled); /* the edge 0-2 exists: the other diagonal */
+    for (int f = 0; f < 2; f++) {
+        bool has_1 = false, has_3 = false;
+        for (int k = 0; k < 3; k++) {
+            has_1 |= faces[3 * f + k] == 1;
+            has_3 |= faces[3 * f + k] == 3;
+        }
+        assert_true(has_1 && has_3);
+    }
+    assert_true(bound_area >= free_area);
+}
+
+static void a_loop_that_cannot_be_filled_is_said(void **state)
+{
+    (void)state;
+    const float pos[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+    const uint32_t verts[4] = {0, 1, 2, 3};
+    const uint32_t edges[2][2] = {{0, 2}, {1, 3}};
+    uint32_t faces[6];
+    double area;
+    bool is_filled = true;
+    assert_int_equal(npg_loop_fill(faces, &area, &is_filled, (npg_loop){verts, 4}, pos, edges, 2), NPG_OK);
+    assert_false(is_filled);
+    npg_memory_fail_at(1, true);
+    assert_int_equal(npg_loop_fill(faces, &area, &is_filled, (npg_loop){verts, 4}, pos, edges, 2),
+                     NPG_MEMORY);
+    npg_memory_fail_at(0, false);
+}
+
+/* ---- contact ---- */
+
+static double contact_of(double feet)
+{
+    npg_frame frame = {0};
+    double share;
+    assert_int_equal(legs_frame(&frame, feet, 5), NPG_OK);
+    assert_int_equal(npg_cloud_contact(&share, frame.pos_local, frame.normals, frame.point_count), NPG_OK);
+    npg_frame_clear(&frame);
+    return share;
+}
+
+static void feet_that_nearly_touch_are_in_contact(void **state)
+{
+    (void)state;
+    double apart = contact_of(0.45), near = contact_of(0.17);
+    assert_true(near > apart + 0.01);
+}
+
+static void points_go_apart_and_the_surface_comes_back(void **state)
+{
+    (void)state;
+    npg_frame frame = {0};
+    size_t moved, n = LEGS_POINTS;
+    static float shift[3 * LEGS_POINTS], shifted[3 * LEGS_POINTS];
+    assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK); /* a gap of 0.02 at the feet */
+    assert_int_equal(npg_cloud_apart(shift, &moved, frame.pos_local, frame.normals, n, 0.05), NPG_OK);
+    assert_in_range(moved, 20, n / 3);
+    for (size_t i = 0; i < n; i++)
+        for (size_t a = 0; a < 3; a++) shifted[3 * i + a] = frame.pos_local[3 * i + a] + shift[3 * i + a];
+    for (size_t i = 0; i < n; i++) { /* nobody crosses over, and the feet go outward */
+        bool is_inner = frame.normals[3 * i] * frame.pos_local[3 * i] < 0;
+        if (frame.pos_local[3 * i + 1] > -0.5f || shift[3 * i] == 0 || !is_inner) continue;
+        assert_true((shift[3 * i] > 0) == (frame.pos_local[3 * i] > 0));
+    }
+    npg_mesh *mesh;
+    assert_int_equal(npg_mesh_open(&mesh, n, 0), NPG_OK);
+    memcpy(mesh->vert_pos, shifted, sizeof shifted);
+    assert_int_equal(npg_mesh_move_back(mesh, shifted, shift, n), NPG_OK);
+    double error = 0;
+    for (size_t i = 0; i < 3 * n; i++)
+        error = fmax(error, fabs((double)mesh->vert_pos[i] - (double)frame.pos_local[i]));
+    assert_true(error < 0.02);
+    npg_mesh_unref(&mesh);
+    npg_frame_clear(&frame);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(handles_are_counted_with_and_without_a_border),
+        cmocka_unit_test(twins_lie_across_their_edge),
+        cmocka_unit_test(a_loop_is_filled_with_least_area),
+        cmocka_unit_test(a_loop_that_cannot_be_filled_is_said),
+        cmocka_unit_test(feet_that_nearly_touch_are_in_contact),
+        cmocka_unit_test(points_go_apart_and_the_surface_comes_back),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
