@@ -12,10 +12,20 @@ static int64_t max_of(int64_t a, int64_t b)
     return a > b ? a : b;
 }
 
-static npg_window key_window(const npg_plan *plan)
+npg_plan npg_plan_append(const npg_plan *plan, int64_t frame_count)
 {
-    int64_t size = min_of(plan->window, plan->frame_count);
-    int64_t first = min_of(max_of(plan->key - size / 2, 0), plan->frame_count - size);
+    npg_plan longer = *plan;
+    longer.appended_at = plan->frame_count;
+    longer.first_count = plan->first_count ? plan->first_count : plan->frame_count;
+    longer.frame_count = frame_count;
+    return longer;
+}
+
+npg_window npg_plan_key_window(const npg_plan *plan)
+{
+    int64_t count = plan->first_count ? plan->first_count : plan->frame_count;
+    int64_t size = min_of(plan->window, count);
+    int64_t first = min_of(max_of(plan->key - size / 2, 0), count - size);
     return (npg_window){first, first + size - 1, -1, first, first + size - 1, 0};
 }
 
@@ -26,24 +36,33 @@ static int64_t step_of(const npg_plan *plan)
 
 static int64_t forward_count(const npg_plan *plan)
 {
-    int64_t rest = plan->frame_count - 1 - key_window(plan).last;
+    int64_t rest = plan->frame_count - 1 - npg_plan_key_window(plan).last;
     return (rest + step_of(plan) - 1) / step_of(plan);
 }
 
 static int64_t backward_count(const npg_plan *plan)
 {
-    return (key_window(plan).first + step_of(plan) - 1) / step_of(plan);
+    return (npg_plan_key_window(plan).first + step_of(plan) - 1) / step_of(plan);
 }
 
 int64_t npg_plan_window_count(const npg_plan *plan)
 {
+    if (plan->appended_at) return (plan->frame_count - plan->appended_at + step_of(plan) - 1) / step_of(plan);
     return 1 + forward_count(plan) + backward_count(plan);
+}
+
+static npg_window appended_window(const npg_plan *plan, int64_t i)
+{
+    int64_t new_first = plan->appended_at + i * step_of(plan);
+    int64_t new_last = min_of(new_first + step_of(plan), plan->frame_count) - 1;
+    return (npg_window){max_of(new_first - plan->overlap, 0), new_last, i - 1, new_first, new_last, 1};
 }
 
 npg_window npg_plan_window(const npg_plan *plan, int64_t i)
 {
-    npg_window key = key_window(plan);
+    npg_window key = npg_plan_key_window(plan);
     int64_t forward = forward_count(plan), step = step_of(plan);
+    if (plan->appended_at) return appended_window(plan, i);
     if (i == 0) return key;
     if (i <= forward) {
         int64_t new_first = key.last + 1 + (i - 1) * step;
@@ -57,10 +76,30 @@ npg_window npg_plan_window(const npg_plan *plan, int64_t i)
     return (npg_window){new_first, last, i == forward + 1 ? 0 : i - 1, new_first, new_last, -1};
 }
 
+int64_t npg_plan_read_count(const npg_plan *plan)
+{
+    return plan->frame_count - plan->appended_at;
+}
+
+int64_t npg_plan_read_before(const npg_plan *plan, int64_t i)
+{
+    npg_window window = npg_plan_window(plan, i), key = npg_plan_key_window(plan);
+    if (plan->appended_at) return window.new_last + 1 - plan->appended_at;
+    if (window.direction < 0) return plan->frame_count - window.new_first;
+    return window.new_last + 1 - key.first;
+}
+
+bool npg_plan_is_last_forward(const npg_plan *plan, int64_t i)
+{
+    npg_window window = npg_plan_window(plan, i);
+    return window.direction >= 0 && window.new_last == plan->frame_count - 1;
+}
+
 int64_t npg_plan_frame(const npg_plan *plan, int64_t i)
 {
-    npg_window key = key_window(plan);
-    assert(i >= 0 && i < plan->frame_count);
+    npg_window key = npg_plan_key_window(plan);
+    assert(i >= 0 && i < npg_plan_read_count(plan));
+    if (plan->appended_at) return plan->appended_at + i;
     int64_t in_key = key.last - key.first + 1;
     if (i == 0) return plan->key;
     if (plan->key + i <= key.last) return plan->key + i;

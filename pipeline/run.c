@@ -228,13 +228,29 @@ static npg_status conclude(npg_run *run)
     return status;
 }
 
+static npg_status begin(npg_run *run)
+{
+    npg_status status = open_worker_states(run);
+    if (status) npg_run_fail(run, "run", status);
+    for (size_t i = 0; i < run->worker_count && !status; i++) {
+        npg_worker *worker = &run->workers[i];
+        if (worker->stage->begin) status = worker->stage->begin(worker);
+        if (status && status != NPG_END) npg_run_fail(run, worker->stage->name, status);
+    }
+    for (size_t i = 0; i < run->worker_count; i++) npg_release(&run->workers[i].state);
+    return status;
+}
+
 static npg_status do_passes(npg_run *run)
 {
-    if (!run->facts.is_live) {
+    npg_status begun = begin(run);
+    if (begun) return begun == NPG_END ? NPG_OK : begun;
+    if (!run->facts.is_live && !run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
         if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
     }
+    run->told = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));
     npg_status status = conclude(run);
     if (status) npg_run_fail(run, "run", status);
@@ -416,6 +432,7 @@ void npg_run_close(npg_run **slot)
     npg_ring_close(&run->results);
     npg_mesh_unref(&run->facts.reference);
     json_decref(run->warnings);
+    json_decref(run->told);
     json_decref(run->report);
     npg_options_close(&run->options);
     sem_destroy(&run->event);

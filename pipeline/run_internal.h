@@ -39,6 +39,7 @@ struct npg_run {
     int64_t warning_count;
     npg_progress progress;     /* the first word of it: what is left is told from the pace since */
     json_t *report, *warnings; /* owned */
+    json_t *told;              /* the stages' reports before the solving pass, owned */
 
     atomic_bool stop;
     atomic_size_t ended_count; /* workers of the pass that have ended */

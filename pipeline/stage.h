@@ -54,6 +54,10 @@ typedef struct npg_facts {
     /* mesh; it also sets plan.key at the end of the choosing pass */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
     double unseen_share; /* share of the reference's area that no point of its frame saw  */
+    /* job, before the first pass */
+    struct npg_job *job;  /* what is kept on disk to go on from; NULL: nothing (live, or no output)  */
+    bool is_resumed;      /* all facts above are known; only the solving pass is walked              */
+    int64_t resumed_read; /* frames of the plan that need not be read again                          */
 } npg_facts;
 
 typedef struct npg_worker npg_worker;
@@ -65,6 +69,9 @@ typedef struct npg_stage {
     unsigned passes;   /* NPG_PASS_* it takes part in                                                    */
     uint32_t needs, gives; /* NPG_FIELD_*, in the solving pass */
 
+    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run
+     * ends well at once; with facts.is_resumed only the solving pass is walked.  May be NULL. */
+    npg_status (*begin)(npg_worker *worker);
     /* Take what the pass needs.  Called on the stage's own thread.  May be NULL. */
     npg_status (*init)(npg_worker *worker);
     /* Take one chunk.  Left in *chunk, it is passed on; nulled, the stage kept it (or pushed it itself).
@@ -127,6 +134,12 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
 
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
 json_t *npg_worker_report(npg_worker *worker);
+
+/* What a run that goes on must say again of what came before: the stages' reports, the warnings, and whether
+ * it is partial, as one JSON object (a new reference).  The reports are those of the moment before the
+ * solving pass, but for the stage named, which must not change its own any more. */
+json_t *npg_worker_whole_story(npg_worker *worker, const char *finished_stage);
+void npg_worker_retell(npg_worker *worker, const json_t *story);
 
 /* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never lost.  NULL
  * gives null. */

@@ -86,6 +86,13 @@ void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, cons
     npg_run_log(worker->run, level, worker->stage->name, frame, text);
 }
 
+static bool is_listed(const json_t *warnings, const json_t *entry)
+{
+    for (size_t i = 0; i < json_array_size(warnings); i++)
+        if (json_equal(json_array_get(warnings, i), entry)) return true;
+    return false;
+}
+
 void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
 {
     char text[1024];
@@ -99,13 +106,42 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     json_object_set_new(entry, "message", npg_json_text(text));
     if (frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
     pthread_mutex_lock(&worker->run->lock);
-    if (json_array_size(worker->run->warnings) < NPG_WARNINGS_MAX)
-        json_array_append_new(worker->run->warnings, entry);
-    else
-        json_decref(entry);
-    worker->run->warning_count++;
+    /* what a run that goes on was told before it stopped may come again */
+    if (!worker->run->facts.is_resumed || !is_listed(worker->run->warnings, entry)) {
+        if (json_array_size(worker->run->warnings) < NPG_WARNINGS_MAX)
+            json_array_append(worker->run->warnings, entry);
+        worker->run->warning_count++;
+    }
+    json_decref(entry);
     worker->run->is_partial |= partial;
     pthread_mutex_unlock(&worker->run->lock);
+}
+
+json_t *npg_worker_whole_story(npg_worker *worker, const char *finished_stage)
+{
+    npg_run *run = worker->run;
+    pthread_mutex_lock(&run->lock);
+    json_t *stages = json_deep_copy(run->told);
+    for (size_t i = 0; i < run->worker_count; i++)
+        if (!strcmp(run->workers[i].stage->name, finished_stage))
+            json_object_set_new(stages, finished_stage, json_deep_copy(run->workers[i].report));
+    json_t *story = json_pack("{so so sb}", "stages", stages, "warnings", json_deep_copy(run->warnings),
+                              "partial", (int)run->is_partial);
+    pthread_mutex_unlock(&run->lock);
+    return story;
+}
+
+void npg_worker_retell(npg_worker *worker, const json_t *story)
+{
+    npg_run *run = worker->run;
+    pthread_mutex_lock(&run->lock);
+    for (size_t i = 0; i < run->worker_count; i++)
+        json_object_update(run->workers[i].report,
+                           json_object_get(json_object_get(story, "stages"), run->workers[i].stage->name));
+    json_array_extend(run->warnings, json_object_get(story, "warnings"));
+    run->warning_count += json_array_size(json_object_get(story, "warnings"));
+    run->is_partial |= json_is_true(json_object_get(story, "partial"));
+    pthread_mutex_unlock(&run->lock);
 }
 
 /* Seconds left by the pace since the run's first word of progress; -1 while there is no pace yet.  Called

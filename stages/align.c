@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "stage.h"
+#include "job.h"
 #include "tracker.h"
 
 #define RESTART_AT 3.0 /* times the mean distance of the frames before */
@@ -26,8 +26,11 @@ typedef struct state {
     side sides[2]; /* forward, backward */
     float *points; /* of the frame at work, owned */
     size_t points_capacity;
-    double worst_dist, dist_sum;
-    int64_t worst_frame, frames;
+    int64_t read; /* frames of the plan so far */
+    struct figures {
+        double worst_dist, dist_sum;
+        int64_t worst_frame, frames;
+    } sum;
 } state;
 
 static const npg_option options[] = {
@@ -56,6 +59,61 @@ static void uninit(npg_worker *worker)
     npg_release(&s->points);
 }
 
+/* ---- what a run that goes on needs: both sides and the figures so far ---- */
+
+static size_t pose_bytes(const state *s)
+{
+    return npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
+}
+
+/* After the last frame that a window waits for. */
+static npg_status leave(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    size_t bytes = pose_bytes(s), at = 0;
+    unsigned char *all;
+    NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum));
+    for (int i = 0; i < 2; i++) {
+        const side plain = {.index = s->sides[i].index, .has_before = s->sides[i].has_before};
+        memcpy(all + at, &plain, sizeof plain);
+        memcpy(all + at + sizeof plain, s->sides[i].now, bytes);
+        memcpy(all + at + sizeof plain + bytes, s->sides[i].before, bytes);
+        at += sizeof plain + 2 * bytes;
+    }
+    memcpy(all + at, &s->sum, sizeof s->sum);
+    npg_status status = npg_job_leave_poses(npg_worker_facts(worker)->job, s->read, all, at + sizeof s->sum);
+    npg_release(&all);
+    return status;
+}
+
+static npg_status take_up(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    size_t bytes = pose_bytes(s), size, at = 0;
+    const unsigned char *all =
+        npg_archive_find(npg_job_archive(npg_worker_facts(worker)->job), "poses", &size);
+    if (!all || size != 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum)
+        return npg_error(NPG_BAD_INPUT, "the state to go on from has no poses for this reference");
+    for (int i = 0; i < 2; i++) {
+        side plain;
+        memcpy(&plain, all + at, sizeof plain);
+        s->sides[i].index = plain.index;
+        s->sides[i].has_before = plain.has_before;
+        memcpy(s->sides[i].now, all + at + sizeof plain, bytes);
+        memcpy(s->sides[i].before, all + at + sizeof plain + bytes, bytes);
+        at += sizeof plain + 2 * bytes;
+    }
+    memcpy(&s->sum, all + at, sizeof s->sum);
+    return NPG_OK;
+}
+
+static bool closes_window(const npg_plan *plan, int64_t read)
+{
+    for (int64_t w = 0; w < npg_plan_window_count(plan); w++)
+        if (npg_plan_read_before(plan, w) == read) return true;
+    return false;
+}
+
 static npg_status open_tracker(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -69,7 +127,7 @@ static npg_status open_tracker(npg_worker *worker)
         npg_pose_rest(s->sides[i].now, nodes);
     }
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
-    return NPG_OK;
+    return npg_worker_facts(worker)->is_resumed ? take_up(worker) : NPG_OK;
 }
 
 /* The pose to start from becomes `now`, the last one `before`. */
@@ -105,16 +163,16 @@ static npg_status fit_side(npg_worker *worker, side *at, const npg_frame *frame)
     NPG_TRY(npg_grow(&s->points, &s->points_capacity, frame->point_count, 3 * sizeof(float), NPG_FOR_FIT));
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, s->points, frame->pos_local, frame->point_count);
     NPG_TRY(fit_pose(worker, &tracked, at->now, frame));
-    double usual = s->frames ? s->dist_sum / (double)s->frames : tracked.point_dist_mean;
+    double usual = s->sum.frames ? s->sum.dist_sum / (double)s->sum.frames : tracked.point_dist_mean;
     if (at->has_before && tracked.point_dist_mean > RESTART_AT * usual) {
         memcpy(at->now, at->before, npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double));
         NPG_TRY(fit_pose(worker, &tracked, at->now, frame));
     }
-    s->frames++;
-    s->dist_sum += tracked.point_dist_mean;
-    if (tracked.point_dist_mean > s->worst_dist) {
-        s->worst_dist = tracked.point_dist_mean;
-        s->worst_frame = frame->number;
+    s->sum.frames++;
+    s->sum.dist_sum += tracked.point_dist_mean;
+    if (tracked.point_dist_mean > s->sum.worst_dist) {
+        s->sum.worst_dist = tracked.point_dist_mean;
+        s->sum.worst_frame = frame->number;
     }
     return NPG_OK;
 }
@@ -139,11 +197,17 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
     state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     if (!s->is_on) return NPG_OK;
-    if (!s->tracker) NPG_TRY(open_tracker(worker));
+    if (!s->tracker) {
+        s->read = facts->resumed_read;
+        NPG_TRY(open_tracker(worker));
+    }
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)frame->number));
+        s->read++;
+        if (facts->job && closes_window(&facts->plan, s->read)) NPG_TRY(leave(worker));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     return NPG_OK;
@@ -153,10 +217,10 @@ static npg_status flush(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
-    if (!s->frames) return NPG_OK;
-    json_object_set_new(report, "mean_distance_unit", json_real(s->dist_sum / (double)s->frames));
-    json_object_set_new(report, "worst_distance_unit", json_real(s->worst_dist));
-    json_object_set_new(report, "worst_frame", json_integer(s->worst_frame));
+    if (!s->sum.frames) return NPG_OK;
+    json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
+    json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));
+    json_object_set_new(report, "worst_frame", json_integer(s->sum.worst_frame));
     return NPG_OK;
 }
 

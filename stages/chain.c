@@ -2,9 +2,10 @@
 #include "stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
-    npg_stage_align, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
+    npg_stage_align, npg_stage_optimize, npg_stage_evaluate, npg_stage_export, npg_stage_job;
 
 const npg_stage *const npg_chain[] = {
+    &npg_stage_job,      /* what an earlier run left is gone on from                      */
     &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points          */
     &npg_stage_outlier,  /* drops what is no surface, makes or mends normals               */
     &npg_stage_keyframe, /* box, keyframe, plan of the windows                            */

@@ -5,6 +5,9 @@
 #include <stdlib.h>
 
 #include "evaluate.h"
+#include "export.h"
+#include "file.h"
+#include "job.h"
 #include "kdtree.h"
 #include "stage.h"
 
@@ -45,6 +48,7 @@ typedef struct evaluate_state {
     npg_surface *surface;
     npg_shape *shape;
     npg_truth *truth;
+    bool is_tied;          /* the truth, in a frame */
     float *points, *dists; /* N x 3 and max(N, V), of the frame at hand, in units; owned */
     npg_surface_hit *hits; /* N; owned */
     uint32_t *nearest;     /* V; owned */
@@ -180,6 +184,25 @@ static npg_figures no_figures(void)
     return figures;
 }
 
+/* The truth is tied in the first frame that is compared; a run that goes on ties it in the same one. */
+static npg_status compare_truth(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    uint64_t seed = (uint64_t)npg_worker_settings(worker)->seed;
+    int64_t number;
+    size_t vert_count;
+    const float *tied = facts->job ? npg_job_tied(facts->job, &number, &vert_count) : NULL;
+    if (facts->job && !tied)
+        NPG_TRY(npg_job_leave_tied(facts->job, frame->number, frame->vert_unit, frame->vert_count));
+    if (tied && !state->is_tied) {
+        npg_frame first = {.number = number, .vert_count = vert_count, .vert_unit = (float *)tied};
+        NPG_TRY(npg_truth_compare(state->truth, &first, facts, seed));
+    }
+    state->is_tied = true;
+    return npg_truth_compare(state->truth, frame, facts, seed);
+}
+
 static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
@@ -190,8 +213,7 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference));
     NPG_TRY(check_vertices(frame, facts->reference));
     npg_shape_measure(state->shape, figures, frame->vert_unit);
-    if (state->truth)
-        NPG_TRY(npg_truth_compare(state->truth, frame, facts, (uint64_t)npg_worker_settings(worker)->seed));
+    if (state->truth) NPG_TRY(compare_truth(worker, frame));
     if (!frame->is_skipped) NPG_TRY(take_points(state, &facts->box, frame, &point_count));
     if (!point_count) return NPG_OK;
     NPG_TRY(npg_surface_move(state->surface, frame->vert_unit));
@@ -239,6 +261,14 @@ static void add_up(evaluate_state *state, const npg_frame *frame)
     }
 }
 
+static npg_status note_bad(evaluate_state *state, int64_t number)
+{
+    NPG_TRY(
+        npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
+    state->bad[state->bad_count++] = number;
+    return NPG_OK;
+}
+
 static npg_status judge(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
@@ -249,9 +279,7 @@ static npg_status judge(npg_worker *worker, npg_frame *frame)
     add_up(state, frame);
     state->good_count += frame->figures.good;
     if (frame->is_skipped || !fault) return NPG_OK;
-    NPG_TRY(
-        npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
-    state->bad[state->bad_count++] = frame->number;
+    NPG_TRY(note_bad(state, frame->number));
     if (state->bad_count <= WARNINGS_MAX)
         npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g", fault, value,
                         bound);
@@ -290,7 +318,8 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
     json_object_set_new(report, "bad", bad);
-    if (state->bad_count > WARNINGS_MAX)
+    /* a run that goes on has not warned of all of them itself */
+    if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))
         npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
                         state->bad_count);
     if (state->skipped_count)
@@ -298,11 +327,46 @@ static npg_status flush(npg_worker *worker)
     return NPG_OK;
 }
 
+/* ---- what an earlier run of the same job has measured ---- */
+
+static npg_status take_line(void *user, const json_t *line, const char *text, size_t size)
+{
+    evaluate_state *state = user;
+    const json_t *figures = json_object_get(line, "figures");
+    npg_frame frame = {.number = (int64_t)json_integer_value(json_object_get(line, "number")),
+                       .figures = no_figures()};
+    (void)text, (void)size;
+    if (!figures) return NPG_OK;
+    for (size_t i = 0; i < SUMMED; i++) {
+        const json_t *value = json_object_get(figures, summed[i].name);
+        if (json_is_number(value))
+            *(double *)((char *)&frame.figures + summed[i].offset) = json_number_value(value);
+    }
+    bool is_good = json_is_true(json_object_get(line, "good"));
+    bool is_skipped = json_is_true(json_object_get(line, "skipped"));
+    add_up(state, &frame);
+    state->good_count += is_good;
+    state->skipped_count += is_skipped;
+    return is_good || is_skipped ? NPG_OK : note_bad(state, frame.number);
+}
+
+static npg_status take_up(npg_worker *worker)
+{
+    char *path;
+    int64_t count, bytes;
+    npg_job_exported(npg_worker_facts(worker)->job, &count, &bytes);
+    NPG_TRY(npg_join_path(&path, npg_worker_settings(worker)->output, "frames.partial.jsonl"));
+    npg_status status = npg_frame_lines_each(path, bytes, take_line, npg_worker_state(worker));
+    npg_release(&path);
+    return status;
+}
+
 /* ---- the stage ---- */
 
 static npg_status init(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
+    if (npg_worker_facts(worker)->is_resumed) NPG_TRY(take_up(worker));
     return state->truth_folder[0] ? npg_truth_open(&state->truth, state->truth_folder) : NPG_OK;
 }
 

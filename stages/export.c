@@ -6,6 +6,7 @@
 
 #include "export.h"
 #include "file.h"
+#include "job.h"
 #include "mesh_tools.h"
 #include "writer.h"
 
@@ -181,7 +182,23 @@ static npg_status prepare_folder(npg_worker *worker)
     npg_status status = npg_make_folder(meshes);
     npg_release(&meshes);
     NPG_TRY(status);
-    return npg_frame_log_open(&state->list, output);
+    NPG_TRY(npg_frame_log_open(&state->list, output));
+    npg_job *job = npg_worker_facts(worker)->job;
+    return job ? npg_job_write(job) : NPG_OK;
+}
+
+/* What an earlier run of the same job wrote stays. */
+static npg_status take_up_folder(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    const char *output = output_of(worker);
+    npg_job *job = npg_worker_facts(worker)->job;
+    int64_t count, bytes;
+    NPG_TRY(npg_folder_probe(output));
+    NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
+    npg_job_exported(job, &count, &bytes);
+    NPG_TRY(npg_frame_log_resume(&state->list, output, bytes, &state->mesh_count, &state->skipped_count));
+    return npg_job_write(job);
 }
 
 static void place_vertices(double *vert_world, const npg_facts *facts, const export_state *state,
@@ -245,6 +262,17 @@ static npg_status begin_meshes(npg_worker *worker)
     return write_mesh(worker, "reference.ply", reference->vert_pos, true);
 }
 
+static npg_status list_frame(npg_worker *worker, const npg_frame *frame, const char *file)
+{
+    export_state *state = npg_worker_state(worker);
+    npg_job *job = npg_worker_facts(worker)->job;
+    int64_t lines, bytes;
+    NPG_TRY(npg_frame_log_add(state->list, frame, output_of(worker), file));
+    npg_frame_log_size(state->list, &lines, &bytes);
+    if (job) npg_job_note_exported(job, lines, bytes);
+    return NPG_OK;
+}
+
 static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
 {
     export_state *state = npg_worker_state(worker);
@@ -252,7 +280,7 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
     char file[NPG_MESH_NAME_SIZE + 8] = "meshes/";
     bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit && frame->vert_count;
     state->skipped_count += frame->is_skipped;
-    if (!has_mesh) return npg_frame_log_add(state->list, frame, output_of(worker), NULL);
+    if (!has_mesh) return list_frame(worker, frame, NULL);
     if (!reference || frame->vert_count != reference->vert_count)
         return npg_error(NPG_FAILED, "frame %lld has %zu vertices, the reference %zu",
                          (long long)frame->number, frame->vert_count, reference ? reference->vert_count : 0);
@@ -260,7 +288,7 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
     npg_mesh_name(file + strlen(file), &state->names, number_of(state, frame));
     NPG_TRY(write_mesh(worker, file, frame->vert_unit, state->with_normals));
     state->mesh_count++;
-    return npg_frame_log_add(state->list, frame, output_of(worker), file);
+    return list_frame(worker, frame, file);
 }
 
 static void report_settings(json_t *object, const export_state *state)
@@ -342,7 +370,8 @@ static npg_status init(npg_worker *worker)
     if (!output_of(worker)[0]) return NPG_OK;
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
         NPG_TRY(npg_folder_probe(output_of(worker)));
-    return npg_worker_pass(worker) == NPG_PASS_SOLVE ? prepare_folder(worker) : NPG_OK;
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
+    return facts->is_resumed ? take_up_folder(worker) : prepare_folder(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)

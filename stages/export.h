@@ -50,6 +50,24 @@ typedef struct npg_frame_log npg_frame_log;
 /* Begin OUT/frames.partial.jsonl. */
 npg_status npg_frame_log_open(npg_frame_log **list, const char *output);
 
+/* Called with each line's object, and its bytes with their newline. */
+typedef npg_status npg_visit_line(void *user, const json_t *frame, const char *line, size_t size);
+
+/* The lines in the first `bytes` bytes of a list.  NPG_DISK, NPG_BAD_INPUT where they are no such lines. */
+npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line *visit, void *user);
+
+/* Take up OUT/frames.partial.jsonl where it has `bytes` bytes; what comes after them goes.  Every mesh that
+ * the lines name must be as it was written: NPG_BAD_INPUT.  *mesh_count and *skipped_count: of the lines. */
+npg_status npg_frame_log_resume(npg_frame_log **list, const char *output, int64_t bytes, int64_t *mesh_count,
+                                int64_t *skipped_count);
+
+/* Make OUT/frames.partial.jsonl of the frames before index `below` from the whole list of a run that is done
+ * (or from the partial one, where this was broken off), which goes. */
+npg_status npg_frame_log_go_back(const char *output, int64_t below, int64_t *lines, int64_t *bytes);
+
+/* Lines so far and their bytes. */
+void npg_frame_log_size(const npg_frame_log *list, int64_t *lines, int64_t *bytes);
+
 /* Append one line for a frame.  file: its mesh relative to OUT, NULL if it has none. */
 npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
                              const char *file);
@@ -62,6 +80,9 @@ void npg_frame_log_close(npg_frame_log **list);
 
 /* {"bytes": n, "xxh3": "16 hex digits"} added to entry for the file OUT/<file>. */
 npg_status npg_file_facts(json_t *entry, const char *output, const char *file);
+
+/* NPG_BAD_INPUT when OUT/<file> is not the file that entry ({"bytes", "xxh3"}) tells of. */
+npg_status npg_file_check(const json_t *entry, const char *output, const char *file);
 
 /* OUT/done.json: version, status, settings, and every file of the run.  head is consumed. */
 npg_status npg_done_write(const char *output, json_t *head);

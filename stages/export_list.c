@@ -66,6 +66,19 @@ npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
     return NPG_OK;
 }
 
+npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
+{
+    json_t *now = json_object();
+    npg_status status = npg_file_facts(now, output, file);
+    if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
+                    !json_equal(json_object_get(now, "xxh3"), json_object_get(entry, "xxh3"))))
+        status = npg_error(NPG_BAD_INPUT,
+                           "%s/%s was changed since it was written; --restart discards what is there", output,
+                           file);
+    json_decref(now);
+    return status == NPG_DISK ? NPG_BAD_INPUT : status;
+}
+
 /* ---- one line ---- */
 
 static json_t *json_of_cleaning(const npg_cleaning *c)
@@ -122,7 +135,7 @@ static json_t *json_of_frame(const npg_frame *frame, const char *file)
 
 /* ---- the list ---- */
 
-npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
+static npg_status open_list(npg_frame_log **out, const char *output, int flags)
 {
     npg_frame_log *list;
     npg_status status;
@@ -130,7 +143,7 @@ npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
     list->fd = -1;
     NPG_TRY_OR(fail, status, npg_copy_text(&list->output, output));
     NPG_TRY_OR(fail, status, npg_join_path(&list->partial_path, output, "frames.partial.jsonl"));
-    list->fd = open(list->partial_path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    list->fd = open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
     if (list->fd < 0) {
         status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
         goto fail;
@@ -140,6 +153,11 @@ npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
 fail:
     npg_frame_log_close(&list);
     return status;
+}
+
+npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
+{
+    return open_list(out, output, O_CREAT | O_TRUNC);
 }
 
 void npg_frame_log_close(npg_frame_log **slot)
@@ -153,10 +171,17 @@ void npg_frame_log_close(npg_frame_log **slot)
     npg_release(slot);
 }
 
-static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
+static npg_status add_place(npg_frame_log *list, int64_t index, size_t size)
 {
     NPG_TRY(npg_grow(&list->lines, &list->line_capacity, list->line_count + 1, sizeof *list->lines,
                      NPG_FOR_FILES));
+    list->lines[list->line_count++] = (line_place){index, list->size, size};
+    list->size += (off_t)size;
+    return NPG_OK;
+}
+
+static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
+{
     for (size_t at = 0; at < size;) {
         ssize_t written = pwrite(list->fd, text + at, size - at, list->size + (off_t)at);
         if (written < 0 && errno == EINTR) continue;
@@ -164,9 +189,44 @@ static npg_status append(npg_frame_log *list, int64_t index, const char *text, s
         if (written <= 0) return npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
         at += (size_t)written;
     }
-    list->lines[list->line_count++] = (line_place){index, list->size, size};
-    list->size += (off_t)size;
-    return NPG_OK;
+    return add_place(list, index, size);
+}
+
+void npg_frame_log_size(const npg_frame_log *list, int64_t *lines, int64_t *bytes)
+{
+    *lines = (int64_t)list->line_count;
+    *bytes = (int64_t)list->size;
+}
+
+typedef struct resuming {
+    npg_frame_log *list;
+    int64_t mesh_count, skipped_count;
+} resuming;
+
+static npg_status take_line(void *user, const json_t *frame, const char *line, size_t size)
+{
+    resuming *r = user;
+    const char *file = json_string_value(json_object_get(frame, "file"));
+    (void)line;
+    r->mesh_count += file != NULL;
+    r->skipped_count += json_is_true(json_object_get(frame, "skipped"));
+    if (file) NPG_TRY(npg_file_check(frame, r->list->output, file));
+    return add_place(r->list, (int64_t)json_integer_value(json_object_get(frame, "index")), size);
+}
+
+npg_status npg_frame_log_resume(npg_frame_log **out, const char *output, int64_t bytes, int64_t *mesh_count,
+                                int64_t *skipped_count)
+{
+    resuming r = {0};
+    NPG_TRY(open_list(out, output, 0));
+    r.list = *out;
+    npg_status status = npg_frame_lines_each(r.list->partial_path, bytes, take_line, &r);
+    if (!status && ftruncate(r.list->fd, (off_t)bytes))
+        status = npg_error_errno(NPG_DISK, "can't shorten %s", r.list->partial_path);
+    if (status) npg_frame_log_close(out);
+    *mesh_count = r.mesh_count;
+    *skipped_count = r.skipped_count;
+    return status;
 }
 
 npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,

@@ -525,6 +525,14 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
     return NPG_OK;
 }
 
+npg_fit_parts npg_fit_open_parts(npg_fit *fit)
+{
+    npg_mlp_shape shape = shape_of(&fit->settings);
+    return (npg_fit_parts){&fit->levels,   &fit->u,     &fit->grid_adam,
+                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape),
+                           fit->time_code};
+}
+
 double npg_fit_frame_loss(const npg_fit *fit, size_t i)
 {
     size_t k = fit->rank[i];

@@ -90,6 +90,18 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
 /* The last epoch's unweighted Chamfer sum of the i-th frame; NaN without points. */
 double npg_fit_frame_loss(const npg_fit *fit, size_t i);
 
+/* What goes from window to window, for saving and restoring: loans of the fit's own. */
+typedef struct npg_fit_parts {
+    const struct npg_levels *levels;
+    npg_buffer *u; /* [row_count][32] */
+    struct npg_adam *grid_adam, *mlp_adam;
+    float *params;
+    size_t param_count;
+    npg_time_code *time_code;
+} npg_fit_parts;
+
+npg_fit_parts npg_fit_open_parts(npg_fit *fit);
+
 /* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
 size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points,
                       int units);

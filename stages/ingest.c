@@ -95,7 +95,8 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
                              settings->keep_going, cache_limit(worker)));
     npg_worker_keep(worker, capture, release_capture);
-    npg_worker_facts(worker)->frame_count = (int64_t)capture->list->count;
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     tell_list(worker, capture->list);
     return NPG_OK;
 }
@@ -132,6 +133,7 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
     const npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
     int64_t count = pass == NPG_PASS_CHOOSE ? (int64_t)facts->choice.count : facts->frame_count;
+    if (pass == NPG_PASS_SOLVE) count = npg_plan_read_count(&facts->plan);
     while (s->next < count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
         npg_frame frame;
         int64_t index = s->next;
@@ -373,7 +375,10 @@ static npg_status next_from_live(npg_worker *worker, npg_chunk *chunk)
 
 static npg_status init(npg_worker *worker)
 {
-    return npg_worker_facts(worker)->is_live ? open_live(worker) : open_capture(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    state *s = npg_worker_state(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) s->next = facts->resumed_read;
+    return facts->is_live ? open_live(worker) : open_capture(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)

@@ -192,7 +192,8 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     NPG_TRY(choose(state, &key));
     int64_t window = state->window && state->window < frame_count ? state->window : frame_count;
     int64_t overlap = window < frame_count ? state->overlap : 0;
-    facts->plan = (npg_plan){frame_count, key.index, window, overlap};
+    facts->plan =
+        (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
     if (!facts->is_live && frame_count > 1 && (has_candidates(state) || state->welds == WELDS_CUT)) {
         npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count,
                              !has_candidates(state));
@@ -215,7 +216,7 @@ static npg_status mark_key(npg_worker *worker, npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     int64_t key = npg_worker_facts(worker)->plan.key;
-    bool is_first = state->passed_count++ == 0;
+    bool is_first = state->passed_count++ == 0 && !npg_worker_facts(worker)->is_resumed;
     frame->is_key = frame->index == key;
     frame->fields |= NPG_FIELD_KEY;
     if (is_first != frame->is_key)
@@ -267,7 +268,11 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     if (status && is_open)
         return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
     NPG_TRY(status);
-    if (is_open) facts->plan = (npg_plan){NPG_FRAMES_OPEN, facts->plan.key, state->window, state->overlap};
+    if (is_open)
+        facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
+                                 .key = facts->plan.key,
+                                 .window = state->window,
+                                 .overlap = state->overlap};
     json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
     state->is_planned = true;
     npg_release(&state->cells);

@@ -6,9 +6,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "checkpoint.h"
+#include "fit_state.h"
 #include "kernels.h"
 #include "live_plan.h"
-#include "stage.h"
 #include "window.h"
 
 typedef struct state {
@@ -19,6 +20,7 @@ typedef struct state {
     size_t held_count, held_capacity;
     npg_window window;
     int64_t window_at, window_count;
+    bool is_aligned;
     int64_t total; /* frames of the capture, -1 until the stream has ended */
     double last_chamfer, last_isometry;
     int64_t emitted;
@@ -108,6 +110,8 @@ static npg_status check_widths(const npg_fit_settings *s)
     return NPG_OK;
 }
 
+static npg_status go_on(npg_worker *worker);
+
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -115,12 +119,13 @@ static npg_status init(npg_worker *worker)
     NPG_TRY(check_widths(&s->window_settings.fit));
     NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
-    if (npg_worker_facts(worker)->is_live) NPG_TRY(npg_kernels_self_test(s->device));
+    bool is_resumed = npg_worker_facts(worker)->is_resumed;
+    if (npg_worker_facts(worker)->is_live || is_resumed) NPG_TRY(npg_kernels_self_test(s->device));
     const npg_device_info *info = npg_device_facts(s->device);
     npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
                    info->units);
     json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
-    return NPG_OK;
+    return is_resumed ? go_on(worker) : NPG_OK;
 }
 
 static void clear_held(npg_held *held)
@@ -142,6 +147,7 @@ static npg_status open_solver(npg_worker *worker, bool is_aligned)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
+    s->is_aligned = is_aligned;
     s->window_count = npg_live_window_count(&facts->plan, s->total);
     s->window = npg_live_window(&facts->plan, 0, s->total);
     NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
@@ -255,11 +261,47 @@ static npg_status emit_done(npg_worker *worker)
     return status;
 }
 
+/* ---- states on disk ---- */
+
+static npg_status save_state(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    if (!npg_worker_facts(worker)->job) return NPG_OK;
+    const npg_hand hand = {s->held,    s->held_count,   s->held_capacity, s->window_at,
+                           s->emitted, s->last_chamfer, s->last_isometry, s->is_aligned};
+    return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));
+}
+
+/* Where the state on disk was taken: the window is solved, its frames are not passed on. */
+static npg_status go_on(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_hand hand = {0};
+    npg_status status = npg_checkpoint_restore_hand(worker, &hand);
+    s->held = hand.held;
+    s->held_count = hand.held_count;
+    s->held_capacity = hand.held_capacity;
+    s->emitted = hand.emitted;
+    s->last_chamfer = hand.last_chamfer;
+    s->last_isometry = hand.last_isometry;
+    if (!status) status = open_solver(worker, hand.is_aligned);
+    if (!status)
+        status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(facts->job),
+                                 npg_job_grids_path(facts->job));
+    if (status) return npg_error_prefix(status, "the state to go on from");
+    s->window_at = hand.window_at;
+    if (s->window_at >= 0) NPG_TRY(emit_done(worker));
+    if (++s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
+    return NPG_OK;
+}
+
 static npg_status solve_complete_windows(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     while (s->window_at < s->window_count && window_is_complete(s)) {
         NPG_TRY(solve_window(worker));
+        NPG_TRY(save_state(worker));
         NPG_TRY(emit_done(worker));
         if (++s->window_at < s->window_count)
             s->window = npg_live_window(&npg_worker_facts(worker)->plan, s->window_at, s->total);

@@ -92,6 +92,13 @@ void npg_time_code_fill(const npg_time_code *code, float *codes, const double *t
     for (size_t i = 0; i < count; i++) fill_one(code, codes + i * code->size, times[i]);
 }
 
+double *npg_time_code_parts(npg_time_code *code, size_t *count, int64_t **step)
+{
+    *count = 3 * code->param_count; /* the gradient after them is made anew */
+    *step = &code->step;
+    return code->params;
+}
+
 int npg_time_code_learns(const npg_time_code *code)
 {
     return code->kind == NPG_TIME_LEARNED;

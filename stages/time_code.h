@@ -24,6 +24,10 @@ void npg_time_code_close(npg_time_code **code);
 /* codes [count][2 M] of the times [count] (0 is the first frame, 1 the last). */
 void npg_time_code_fill(const npg_time_code *code, float *codes, const double *times, size_t count);
 
+/* Parameters and moments of a learned code (*count doubles) and its steps so far, for saving and restoring;
+ * NULL and 0 for the others. */
+double *npg_time_code_parts(npg_time_code *code, size_t *count, int64_t **step);
+
 /* Whether the code has parameters to train; and one step of Adam for them with dcodes [count][2 M]. */
 int npg_time_code_learns(const npg_time_code *code);
 npg_status npg_time_code_step(npg_time_code *code, const float *dcodes, const double *times, size_t count,

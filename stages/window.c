@@ -26,6 +26,11 @@ size_t npg_window_sample_count(const npg_window_solver *solver)
     return solver->carry ? solver->carry->mesh->vert_count : solver->facts->reference->vert_count;
 }
 
+npg_fit *npg_window_fit(npg_window_solver *solver)
+{
+    return solver->fit;
+}
+
 static void close_frames(npg_window_solver *s)
 {
     void *all[] = {&s->points, &s->point_start, &s->bases,      &s->now,
@@ -83,7 +88,7 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
  * frames which two windows share mean the same to both. */
 static double time_of(const npg_window_solver *s, int64_t index)
 {
-    npg_window first = npg_plan_window(&s->facts->plan, 0);
+    npg_window first = npg_plan_key_window(&s->facts->plan);
     int64_t length = first.last - first.first;
     return length ? (double)(index - first.first) / (double)length : 0;
 }

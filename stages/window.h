@@ -31,6 +31,7 @@ npg_status npg_window_solver_open(npg_window_solver **solver, npg_device *device
                                   const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
                                   bool is_aligned);
 void npg_window_solver_close(npg_window_solver **solver);
+npg_fit *npg_window_fit(npg_window_solver *solver); /* a loan */
 size_t npg_window_sample_count(const npg_window_solver *solver);
 
 /* Solve a window: held[i] are its frames in order of time; fills `solved` of each. */

@@ -151,6 +151,7 @@ run_bad() {
 
 @test "results of another numbering are not mixed in" {
     cp -r first mixed
+    rm -r mixed/job
     cp mixed/meshes/frame_0000.ply mixed/meshes/frame_0077.ply
     run "$NEUPIG" run capture/points -o mixed "${small[@]}"
     [ "$status" -eq 2 ]

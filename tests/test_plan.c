@@ -41,7 +41,8 @@ static void windows_cover_the_capture(void **state)
         for (int64_t key = 0; key < frames; key++)
             for (int64_t window = 2; window <= 41; window += 3)
                 for (int64_t overlap = 0; overlap < window; overlap += 3)
-                    check_plan((npg_plan){frames, key, window, overlap});
+                    check_plan(
+                        (npg_plan){.frame_count = frames, .key = key, .window = window, .overlap = overlap});
 }
 
 int main(void)

@@ -10,8 +10,15 @@ const npg_verb npg_verbs[] = {
      "standard "
      "input; or --follow a folder that grows) in time order and writes one mesh per frame, all with the same "
      "faces, to DIR/meshes, with reference.ply, report.json, frames.jsonl and, last of all, done.json beside "
-     "them.",
+     "them.  A run that was stopped or killed goes on where it was when it is started again.",
      npg_run_verb_options, true, npg_verb_run},
+    {"append", "DIR", 1, 1, "Go on with frames that came since a job was done",
+     "DIR is the output folder of a run.  Frames that its input has after the last one of then are solved "
+     "with "
+     "the same options, going on from the last forward window; the frames of the overlap before them are "
+     "solved "
+     "again, all other meshes stay as they are.  A job that was broken off is first brought to its end.",
+     npg_append_options, false, npg_verb_append},
     {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
      "Reads every frame of INPUT and says what is in it, what a run would trip over, and what it would cost "
      "in "

@@ -1,4 +1,6 @@
 /* neupig run: the main job. */
+#include <errno.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -7,6 +9,7 @@
 
 #include "cli.h"
 #include "progress.h"
+#include "run_job.h"
 
 typedef struct settings {
     const char *config;
@@ -28,46 +31,88 @@ const npg_option npg_run_verb_options[] = {
 
 /* ---- signals ---- */
 
-static npg_run *volatile signalled_run; /* the run that a signal stops */
+#define STOP_SECONDS 4 /* a run that has not stopped by then is ended */
 
-static void on_signal(int number)
+typedef struct watcher {
+    npg_run *run;         /* loan */
+    sigset_t all, before; /* what it waits for, and the mask to go back to */
+    pthread_t thread;
+    bool started;
+} watcher;
+
+/* Signals are blocked in every thread and waited for in one, so that no handler ever runs: the OpenCL
+ * compiler brings one of its own, which takes away files that other threads are at work on. */
+static void block_signals(watcher *w)
 {
-    (void)number;
-    npg_run_stop(signalled_run);
+    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+    sigemptyset(&w->all);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction now;
+        if (!sigaction(numbers[i], NULL, &now) && now.sa_handler != SIG_IGN) sigaddset(&w->all, numbers[i]);
+    }
+    sigaddset(&w->all, SIGUSR1); /* the run has ended */
+    pthread_sigmask(SIG_BLOCK, &w->all, &w->before);
 }
 
-/* The first signal stops the run in good order; the second ends the process the usual way. */
-static void catch_signals(npg_run *run)
+/* The next signal, or -1 when none came in time. */
+static int next_signal(const watcher *w, const struct timespec *limit)
 {
-    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESETHAND | SA_RESTART};
-    signalled_run = run;
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGHUP, &action, NULL);
+    int number;
+    do number = limit ? sigtimedwait(&w->all, NULL, limit) : sigwaitinfo(&w->all, NULL);
+    while (number < 0 && errno == EINTR);
+    return number;
 }
 
-static void release_signals(void)
+/* The first signal stops the run in good order; the second ends the process the usual way.  Where something
+ * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
+ * moment. */
+static void *watch_signals(void *argument)
 {
-    signal(SIGINT, SIG_DFL);
-    signal(SIGTERM, SIG_DFL);
-    signal(SIGHUP, SIG_DFL);
-    signalled_run = NULL;
+    static const char text[] = "neupig: stopped on request; run again to go on\n";
+    const watcher *w = argument;
+    const struct timespec limit = {.tv_sec = STOP_SECONDS};
+    if (next_signal(w, NULL) == SIGUSR1) return NULL;
+    npg_run_stop(w->run);
+    int number = next_signal(w, &limit);
+    if (number == SIGUSR1) return NULL;
+    if (number < 0) {
+        ssize_t written = write(STDERR_FILENO, text, sizeof text - 1);
+        _exit(written < 0 ? 75 : npg_status_exit_code(NPG_STOPPED));
+    }
+    signal(number, SIG_DFL);
+    pthread_sigmask(SIG_UNBLOCK, &w->all, NULL);
+    raise(number);
+    return NULL;
+}
+
+static npg_status start_watching(watcher *w, npg_run *run)
+{
+    w->run = run;
+    w->started = !pthread_create(&w->thread, NULL, watch_signals, w);
+    return w->started ? NPG_OK : npg_error(NPG_FAILED, "can't start a thread");
+}
+
+static void end_watching(watcher *w)
+{
+    if (w->started) {
+        pthread_kill(w->thread, SIGUSR1);
+        pthread_join(w->thread, NULL);
+    }
+    pthread_sigmask(SIG_SETMASK, &w->before, NULL);
 }
 
 /* ---- the verb ---- */
 
-static void print_results(const char *output, npg_status status)
+void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
     static const char *const names[] = {"meshes", "reference.ply", "frames.jsonl", "report.json",
                                         "done.json"};
     char path[4096];
-    if (status == NPG_STOPPED) fprintf(stderr, "neupig run: stopped on request\n");
+    if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
-        fprintf(
-            stderr,
-            "neupig run: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
-            output);
+        fprintf(stderr,
+                "neupig %s: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
+                verb, output);
     if (status < 0 || status == NPG_STOPPED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
@@ -75,15 +120,18 @@ static void print_results(const char *output, npg_status status)
     }
 }
 
-static npg_status do_run(const npg_options *options, npg_reporter *reporter)
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
-    NPG_TRY(npg_run_open(&run, options, &hooks));
-    catch_signals(run);
-    npg_status status = npg_run_wait(run);
-    release_signals();
-    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
+    watcher signals = {.run = NULL};
+    block_signals(&signals);
+    npg_status status = npg_run_open(&run, options, &hooks);
+    bool is_open = !status;
+    if (is_open) status = start_watching(&signals, run);
+    if (!status) status = npg_run_wait(run);
+    end_watching(&signals);
+    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     npg_run_close(&run);
     return status;
 }
@@ -112,8 +160,9 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
-        status = do_run(options, &reporter);
-        if (reporter.show != NPG_SHOW_JSON) print_results(npg_options_get(options, "output"), status);
+        status = npg_run_job(options, &reporter);
+        if (reporter.show != NPG_SHOW_JSON)
+            npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }
     npg_options_close(&options);
     return npg_cli_end(argv[0], status);

@@ -22,6 +22,7 @@ extern const npg_verb npg_verbs[];
 const npg_verb *npg_verb_find(const char *name);
 
 int npg_verb_run(int argc, char **argv);
+int npg_verb_append(int argc, char **argv);
 int npg_verb_probe(int argc, char **argv);
 int npg_verb_eval(int argc, char **argv);
 int npg_verb_synth(int argc, char **argv);
@@ -33,6 +34,7 @@ int npg_verb_man(int argc, char **argv);
 int npg_verb_version(int argc, char **argv);
 
 extern const npg_option npg_run_verb_options[];
+extern const npg_option npg_append_options[];
 extern const npg_option npg_probe_options[];
 extern const npg_option npg_eval_options[];
 extern const npg_option npg_synth_options[];

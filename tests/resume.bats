@@ -1,0 +1,197 @@
+# Runs that are killed, stopped, damaged, out of room, changed, or continued with more frames.
+
+small=(--epochs 10 --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --window 5 --overlap 2 --samples 100
+    --align-nodes 40 --align-steps 6 --grid-levels 3 --max-residual 100 --max-flipped 100 --quiet)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 14 --points 500 -o capture >synth.log
+    "$NEUPIG" run capture/points -o whole "${small[@]}" >whole.log
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# Start a run into $1 and kill it with signal $2 once it has $3 states; the arguments after that are its options.
+kill_at() {
+    local out=$1 signal=$2 states=$3
+    shift 3
+    rm -rf "$out"
+    "$NEUPIG" run capture/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ "$(ls "$out/job" 2>/dev/null | grep -c '^window.*npg$')" -lt "$states" ]; do
+        sleep 0.02
+    done
+    kill "-$signal" $pid 2>/dev/null || true
+    killed_status=0
+    wait $pid || killed_status=$?
+}
+
+go_on() {
+    run "$NEUPIG" run capture/points -o "$1" "${small[@]}" "${@:2}"
+    echo "$output"
+    [ "$status" -eq 0 ]
+}
+
+same() {
+    cmp whole/reference.ply "$1/reference.ply"
+    cmp whole/frames.jsonl "$1/frames.jsonl"
+    diff -r whole/meshes "$1/meshes"
+}
+
+newest() {
+    ls "$1"/job/window_*."$2" | tail -1
+}
+
+@test "a killed run goes on and gives the same bytes" {
+    for states in 1 2; do
+        kill_at killed KILL $states
+        [ ! -e killed/done.json ]
+        go_on killed
+        grep -q resumed_frames killed/report.json
+        same killed
+    done
+}
+
+@test "a run killed at random moments gives the same bytes" {
+    NEUPIG=$NEUPIG "$BATS_TEST_DIRNAME/kill_and_resume.sh" 2 14 5 capture/points "${small[@]}"
+}
+
+@test "SIGTERM ends with 75 within 5 s, and the next run goes on" {
+    kill_at stopped TERM 1 --epochs 500
+    [ $killed_status -eq 75 ]
+    grep -q "run again to go on" stopped.log
+    go_on stopped --epochs 500
+    grep -q resumed_frames stopped/report.json
+}
+
+@test "a finished job says so and does nothing" {
+    before=$(stat -c %Y.%Z whole/done.json whole/meshes/frame_0003.ply)
+    run "$NEUPIG" run capture/points -o whole "${small[@]}" --no-quiet
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"done already"* ]]
+    [ "$before" = "$(stat -c %Y.%Z whole/done.json whole/meshes/frame_0003.ply)" ]
+}
+
+@test "damaged and truncated states are said, and the window before is taken" {
+    kill_at hurt KILL 2
+    cp -r hurt cut
+    cp -r hurt grids
+    printf '\x5a\xa5' | dd of="$(newest hurt npg)" bs=1 seek=3000 conv=notrunc status=none
+    truncate -s 2000 "$(newest cut npg)"
+    printf '\x5a\xa5' | dd of="$(newest grids vdb)" bs=1 seek=3000 conv=notrunc status=none
+    for out in hurt cut grids; do
+        go_on $out
+        [[ "$output" == *"is damaged"*"goes on from the window before"* ]]
+        same $out
+    done
+}
+
+@test "without any state that is whole the job starts over" {
+    kill_at none KILL 1
+    for state in none/job/window*; do truncate -s 100 "$state"; done
+    go_on none
+    [[ "$output" == *"starts over"* ]]
+    same none
+}
+
+@test "a changed option, input or result is named, and --restart discards" {
+    cp -r whole changed
+    run "$NEUPIG" run capture/points -o changed "${small[@]}" --epochs 11
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'option epochs was "10" and is "11"'*--restart* ]]
+    cp -r capture/points other
+    touch other/*
+    run "$NEUPIG" run other -o changed "${small[@]}"
+    [ "$status" -eq 0 ]
+    cp other/frame_0005.ply other/frame_0004.ply
+    run "$NEUPIG" run other -o changed "${small[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *frame_0004.ply*--restart* ]]
+    rm changed/meshes/frame_0002.ply
+    run "$NEUPIG" run capture/points -o changed "${small[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *frame_0002.ply*missing*--restart* ]]
+    run "$NEUPIG" run capture/points -o changed "${small[@]}" --restart
+    [ "$status" -eq 0 ]
+    same changed
+}
+
+@test "a second run on the same job refuses" {
+    cp -r whole twice
+    exec 9>twice/job/lock
+    flock 9
+    run "$NEUPIG" run capture/points -o twice "${small[@]}" --restart
+    flock -u 9
+    exec 9>&-
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"another run is at work"* ]]
+    [ -e twice/done.json ]
+    go_on twice
+}
+
+@test "a full disk ends with 5, and the run goes on when there is room" {
+    unshare -rm true 2>/dev/null || skip "no file systems can be mounted here"
+    mkdir -p disk
+    NEUPIG=$NEUPIG unshare -rm bash -ec '
+        mount -t tmpfs -o size=2400k none disk
+        status=0
+        "$NEUPIG" run capture/points -o disk/full "$@" 2>disk.log || status=$?
+        cat disk.log
+        [ $status -eq 5 ]
+        grep -q "No space left" disk.log
+        ls disk/full/job/window*.npg
+        mount -o remount,size=100m disk
+        "$NEUPIG" run capture/points -o disk/full "$@"
+        grep -q resumed_frames disk/full/report.json
+        diff -r whole/meshes disk/full/meshes' bash "${small[@]}"
+}
+
+@test "append solves the frames that came later and leaves the old meshes alone" {
+    mkdir growing
+    cp capture/points/frame_000?.ply growing
+    "$NEUPIG" run growing -o grown "${small[@]}"
+    cp -r grown/meshes before
+    run "$NEUPIG" append grown
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"done already"* ]]
+    cp capture/points/frame_001?.ply growing
+    run "$NEUPIG" run growing -o grown "${small[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"4 frames more"*"neupig append"* ]]
+    cp -r grown again
+    "$NEUPIG" append grown
+    [ "$(ls grown/meshes | wc -l)" -eq 14 ]
+    [ "$(wc -l <grown/frames.jsonl)" -eq 14 ]
+    grep -q '"frames": 14' grown/done.json
+    for mesh in before/frame_000[0-7].ply; do cmp $mesh grown/meshes/"$(basename $mesh)"; done
+    # broken off and started again it is the same
+    "$NEUPIG" append again -q >again.log 2>&1 &
+    pid=$!
+    while kill -0 $pid 2>/dev/null && ! grep -q frame_0013 again/job/job.json; do sleep 0.02; done
+    sleep 0.5
+    kill -KILL $pid || true
+    wait $pid || true
+    "$NEUPIG" append again
+    diff -r grown/meshes again/meshes
+    cmp grown/frames.jsonl again/frames.jsonl
+}
+
+@test "a list of frames or a mesh that was changed in between is noticed" {
+    kill_at list KILL 2
+    sed -i '1s/"index":[0-9]*/"index":99/' list/frames.partial.jsonl
+    go_on list
+    [[ "$output" == *frames.partial.jsonl* ]]
+    same list
+    kill_at mesh KILL 2
+    first=$(head -1 mesh/frames.partial.jsonl | sed 's/.*"file":"\([^"]*\)".*/\1/')
+    printf 'x' | dd of="mesh/$first" bs=1 seek=300 conv=notrunc status=none
+    run "$NEUPIG" run capture/points -o mesh "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"$first"*--restart* ]]
+}

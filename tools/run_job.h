@@ -1,0 +1,14 @@
+/* What the verbs that start runs share. */
+#ifndef NPG_RUN_JOB_H
+#define NPG_RUN_JOB_H
+
+#include "progress.h"
+
+/* A run from its start to its end.  SIGINT, SIGTERM and SIGHUP stop it; when it does not end in time the
+ * process does, with exit code 75: what is on disk can be gone on from at any moment. */
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter);
+
+/* Where the results are, on standard output; how it ended, on standard error. */
+void npg_run_job_results(const char *verb, const char *output, npg_status status);
+
+#endif
