@@ -144,8 +144,13 @@ static npg_status draw_features(npg_fit *fit)
     npg_random random = npg_random_stream(fit->seed, 2, 0);
     if (fit->settings.feature_start <= 0) return NPG_OK;
     NPG_TRY(npg_alloc_array(&values, NPG_FOR_FIT, count, sizeof *values));
-    for (size_t i = 0; i < count; i++)
-        values[i] = (float)(fit->settings.feature_start * (2 * npg_random_real(&random) - 1));
+    for (int l = 0; l < fit->levels.count; l++) {
+        const npg_level *level = &fit->levels.level[l];
+        for (size_t row = level->first_row; row < level->first_row + level->row_count; row++)
+            for (int c = level->channel_first; c < level->channel_end; c++)
+                values[row * NPG_LATENT_CHANNELS + (size_t)c] =
+                    (float)(fit->settings.feature_start * (2 * npg_random_real(&random) - 1));
+    }
     npg_status status = npg_buffer_write(&fit->u, 0, values, count * sizeof *values);
     npg_release(&values);
     return status;

@@ -82,7 +82,7 @@ static npg_status run(const char *const (*options)[2])
 {
     memset(seen, 0, sizeof seen);
     facts_at_end = (npg_facts){0};
-    wanted_plan = (npg_plan){0, 1, 100, 0};
+    wanted_plan = (npg_plan){.key = 1, .window = 100};
     return run_chain(chain, options, failure);
 }
 

@@ -101,13 +101,17 @@ static void open_plans_cover_what_comes(void **state)
             for (int64_t window = 2; window <= 30; window += 4)
                 for (int64_t overlap = 0; overlap < window; overlap += 3)
                     for (int64_t total = look_ahead + 1; total <= FRAMES_MAX; total += 7)
-                        check((npg_plan){NPG_FRAMES_OPEN, key, window, overlap}, total);
+                        check((npg_plan){.frame_count = NPG_FRAMES_OPEN,
+                                         .key = key,
+                                         .window = window,
+                                         .overlap = overlap},
+                              total);
 }
 
 static void ordinary_plans_are_as_they_were(void **state)
 {
     (void)state;
-    npg_plan plan = {50, 20, 12, 4};
+    npg_plan plan = {.frame_count = 50, .key = 20, .window = 12, .overlap = 4};
     assert_int_equal(npg_live_window_count(&plan, -1), npg_plan_window_count(&plan));
     for (int64_t i = 0; i < plan.frame_count; i++)
         assert_int_equal(npg_live_frame(&plan, i), npg_plan_frame(&plan, i));
