@@ -382,8 +382,8 @@ static npg_status finish(applying *a)
                               (json_int_t)a->frame_count, "fps_scale", (json_int_t)a->s.fps_scale,
                               "points_far", (json_int_t)a->far_count, "fps", a->fps * (double)a->s.fps_scale,
                               "exit_code", npg_status_exit_code(a->far_count ? NPG_PARTIAL : NPG_OK));
-    json_object_set_new(facts, "job", json_string(a->job));
-    json_object_set_new(facts, "mesh", json_string(a->s.mesh));
+    json_object_set_new(facts, "job", npg_json_text(a->job));
+    json_object_set_new(facts, "mesh", npg_json_text(a->s.mesh));
     char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(facts);
     if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
