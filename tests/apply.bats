@@ -52,7 +52,7 @@ first_x() { awk '$1 == "v" { print $2 + 0; exit }' "$1"; }
 
 @test "the reference itself is carried as the run's own meshes" {
     "$NEUPIG" apply job --mesh job/reference.ply -o same
-    run "$NEUPIG" eval same job --samples 1000
+    run "$NEUPIG" eval same job/meshes --samples 1000
     [ "$(figure Corr)" = "0.00000" ]
     grep -q '"exit_code": 0' same/done.json
     [ "$(grep -c '"xxh3"' same/done.json)" -eq 5 ]
@@ -60,7 +60,7 @@ first_x() { awk '$1 == "v" { print $2 + 0; exit }' "$1"; }
 
 @test "the true mesh of the key frame keeps its faces, starts as itself and follows like the run" {
     "$NEUPIG" apply job --mesh capture/truth/frame_0000.ply -o truth
-    run "$NEUPIG" eval truth capture --frames 0:1 --samples 20000
+    run "$NEUPIG" eval truth capture --frames 0:1
     awk -v f="$(figure 'F-0.5%')" 'BEGIN { exit !(f > 0.999) }'
     run "$NEUPIG" eval truth capture --samples 20000
     [[ "$output" == *"constant topology yes"* ]]
