@@ -89,13 +89,40 @@ first_x() { awk '$1 == "v" { print $2 + 0; exit }' "$1"; }
     [ "$(first_x curve-out/step_0003.obj)" = 2.25 ]
     [ "$(first_x curve-out/step_0001.obj)" = 0.375 ]
     [ "$(first_x curve-out/step_0006.obj)" = 9 ]
-    grep -q '^vt 0.0* 1.0*$' curve-out/step_0004.obj
+    grep -q '^vt 0 1$' curve-out/step_0004.obj
     [ "$(grep -c '^vn' curve-out/step_0004.obj)" -eq 3 ]
-    grep -q '^v .* 0.0* 1.0* 0.0*$' curve-out/step_0004.obj
+    grep -q '^v .* 0 1 0$' curve-out/step_0004.obj
+    "$NEUPIG" apply curve --mesh three.obj -o curve-ply --format ply
+    sed '/^end_header/q' curve-ply/frame_0003.ply >header
+    grep -q 'property uchar red' header
+    grep -q 'property float s' header
+    grep -q 'element face 1' header
     "$NEUPIG" apply gap --mesh three.obj -o gap-out
     [ "$(ls gap-out | tr '\n' ' ')" = "done.json frame_0000.obj frame_0001.obj frame_0003.obj " ]
     "$NEUPIG" apply gap --mesh three.obj -o gap-all --fps-scale 2
     [ "$(ls gap-all | grep -c obj)" -eq 7 ]
+}
+
+@test "an OBJ file keeps its seams, polygons and materials" {
+    rm -rf seam
+    hand_made seam 0 1
+    {
+        printf 'mtllib a.mtl\no first\nv 0 0 0 1 0 0\nv 0.5 0 0 0 1 0\nv 0.5 0.5 0 0 0 1\nv 0 0.5 0 1 1 1\n'
+        printf 'vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 -1\nusemtl skin\nf 1/1/1 4/4/1 3/3/1 2/2/1\n'
+        printf 'o second\nv 0 0 0.5\nvt 0.5 0.5\nf -1/-1 1/2 -4/3\nf 1//1 5//1 4//1\n'
+    } >seam.obj
+    "$NEUPIG" apply seam --mesh seam.obj -o seam-out
+    cat seam-out/frame_0001.obj
+    [ "$(grep -c '^v ' seam-out/frame_0001.obj)" -eq 5 ]
+    [ "$(grep -c '^vn ' seam-out/frame_0001.obj)" -eq 5 ]
+    grep -v '^v ' seam-out/frame_0001.obj | grep -v '^vn' >kept
+    printf '%s\n' 'mtllib a.mtl' 'o first' 'vt 0 0' 'vt 1 0' 'vt 1 1' 'vt 0 1' 'usemtl skin' \
+        'f 1/1/1 4/4/4 3/3/3 2/2/2' 'o second' 'vt 0.5 0.5' 'f -1/-1/-1 1/2/1 -4/3/-4' 'f 1//1 5//5 4//4' |
+        cmp - kept
+    grep -q '^v 1.5[0]* 0.5[0]* [-]*0.0* 0 0 1$' seam-out/frame_0001.obj
+    # what was written is a mesh like the first, moved by 1
+    "$NEUPIG" apply seam --mesh seam-out/frame_0000.obj -o seam-again
+    cmp seam-out/frame_0001.obj seam-again/frame_0001.obj
 }
 
 @test "a file's own normals turn, points of any format are carried" {

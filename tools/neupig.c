@@ -23,7 +23,9 @@ const npg_verb npg_verbs[] = {
      "JOB is the output folder of a run that is done.  FILE (a mesh, or points alone) lies on or near the "
      "reference.ply of the run; it is tied to that surface and written once per frame, OUT/frame_0000.ply "
      "and so on, with its own faces, colours, texture coordinates and turned normals, and OUT/done.json last "
-     "of all.  With --fps-scale K there are K steps from each frame to the next: the vertices of the solved "
+     "of all.  An OBJ file written as OBJ keeps all its other lines: seams, polygons, groups and material "
+     "names (put the material files beside).  With --fps-scale K there are K steps from each frame to the "
+     "next: the vertices of the solved "
      "meshes follow cubic curves through time (Catmull-Rom), which pass through every solved frame.  Exit "
      "code 7 when points lie far from the reference.",
      npg_apply_options, false, npg_verb_apply},

@@ -69,6 +69,7 @@ typedef struct applying {
     float *pos_float;   /* the same, where normals are made from it                              */
     float *normals;     /* carried's V x 3, or NULL                                              */
     bool turns_normals; /* they are the file's own                                               */
+    bool is_like;       /* OBJ from OBJ: the file's lines are kept                               */
     npg_mesh_names names;
     npg_file *done; /* collects OUT/done.json; appears last */
     size_t frame_count, written, far_count;
@@ -248,6 +249,8 @@ static void name_files(applying *a)
 {
     const char *dot = strrchr(a->s.mesh, '.');
     bool is_obj = a->s.format == AS_MESH ? dot && !strcasecmp(dot, ".obj") : a->s.format == AS_OBJ;
+    const char *read_as = npg_reader_for(a->s.mesh);
+    a->is_like = is_obj && read_as && !strcmp(read_as, "obj");
     int64_t steps = (a->last_index - a->first_index) * a->s.fps_scale;
     a->names = (npg_mesh_names){.prefix = a->s.prefix,
                                 .ending = is_obj ? "obj" : "ply",
@@ -304,7 +307,7 @@ static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
                           .vert_uvs = mesh->vert_uvs};
     npg_mesh_name(name, &a->names, number);
     NPG_TRY(path_of(path, a->s.output, name));
-    NPG_TRY(npg_write_mesh(path, &view));
+    NPG_TRY(a->is_like ? npg_write_obj_like(path, a->s.mesh, &view) : npg_write_mesh(path, &view));
     NPG_TRY(list_file(a, name));
     a->written++;
     return NPG_OK;
