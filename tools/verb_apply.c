@@ -225,6 +225,7 @@ static bool is_own_name(const applying *a, const char *name)
     return count && (!strcmp(digits + count, ".ply") || !strcmp(digits + count, ".obj"));
 }
 
+/* Remove the mesh files of this prefix, or without overwrite refuse the first. */
 static npg_status clear_files(const applying *a)
 {
     char path[PATH_SIZE];
@@ -265,8 +266,9 @@ static npg_status open_output(applying *a)
     if (is_in(a->s.output, "frames.jsonl") || is_in(a->s.output, "job"))
         return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", a->s.output);
     NPG_TRY(path_of(path, a->s.output, "done.json"));
-    NPG_TRY(clear_files(a));
+    if (!a->s.overwrite) NPG_TRY(clear_files(a));
     if (unlink(path) && errno != ENOENT) return npg_error_errno(NPG_DISK, "can't remove %s", path);
+    if (a->s.overwrite) NPG_TRY(clear_files(a)); /* after done.json: what is left can't pass for whole */
     return npg_file_open(&a->done, path);
 }
 
