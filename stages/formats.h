@@ -9,12 +9,12 @@
 #include "source.h"
 
 /* One PLY with all its elements.  NPG_END when the source has no byte left; what follows the last element is
- * left there. */
+ * left there.  may_be_points: a mesh may be without faces. */
 npg_status npg_ply_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin);
-npg_status npg_ply_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin);
+npg_status npg_ply_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin, bool may_be_points);
 
 npg_status npg_obj_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin);
-npg_status npg_obj_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin);
+npg_status npg_obj_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin, bool may_be_points);
 
 /* wants_normals: columns 4 to 6 are normals whatever their length (.xyzn). */
 npg_status npg_xyz_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin, bool wants_normals);

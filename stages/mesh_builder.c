@@ -37,7 +37,8 @@ npg_status npg_builder_polygon(npg_mesh_builder *b, const uint32_t *corners, siz
 static npg_status check(const npg_mesh_builder *b, const char *name)
 {
     if (!b->vert_count) return npg_error(NPG_BAD_INPUT, "%s: the mesh has no vertices", name);
-    if (!b->face_count) return npg_error(NPG_BAD_INPUT, "%s: no faces, so it is not a mesh", name);
+    if (!b->face_count && !b->may_be_points)
+        return npg_error(NPG_BAD_INPUT, "%s: no faces, so it is not a mesh", name);
     for (size_t i = 0; i < 3 * b->face_count; i++)
         if (b->faces[i] >= b->vert_count)
             return npg_error(NPG_BAD_INPUT, "%s: triangle %zu uses vertex %u, but there are only %zu", name,

@@ -290,9 +290,10 @@ npg_status npg_obj_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     return status;
 }
 
-npg_status npg_obj_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin)
+npg_status npg_obj_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin, bool may_be_points)
 {
-    reader r = {.source = source, .wants_faces = true, .builder = {.origin = origin}};
+    reader r = {
+        .source = source, .wants_faces = true, .builder = {.origin = origin, .may_be_points = may_be_points}};
     npg_status status = read_lines(&r);
     if (!status) status = attach(&r);
     if (!status) status = npg_builder_finish(mesh, &r.builder, source->name);

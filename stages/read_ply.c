@@ -400,6 +400,7 @@ static npg_status find_corner_list(reader *r)
 {
     const char *name = r->source->name;
     r->face = find_element(r->header, "face");
+    if (!r->face && r->builder->may_be_points) return NPG_OK;
     if (!r->face) return npg_error(NPG_BAD_INPUT, "%s: no faces, so it is not a mesh", name);
     for (size_t p = 0; p < r->face->property_count; p++)
         if (is_corner_list(&r->face->properties[p])) return NPG_OK;
@@ -418,9 +419,9 @@ npg_status npg_ply_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     return status;
 }
 
-npg_status npg_ply_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin)
+npg_status npg_ply_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin, bool may_be_points)
 {
-    npg_mesh_builder builder = {.origin = origin};
+    npg_mesh_builder builder = {.origin = origin, .may_be_points = may_be_points};
     reader r = {.source = source, .builder = &builder};
     NPG_TRY(npg_alloc(&r.header, NPG_FOR_FILES, sizeof *r.header));
     npg_status status = npg_ply_header_read(r.header, source);

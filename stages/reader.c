@@ -147,7 +147,7 @@ npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin
     return NPG_OK;
 }
 
-npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
+static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin, bool may_be_points)
 {
     npg_source *source = NULL;
     const struct format *format;
@@ -155,10 +155,10 @@ npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
     npg_status status = npg_source_open_file(&source, path);
     if (!status) status = find_format(&format, source);
     if (!status && format == &formats[PLY]) {
-        status = npg_ply_read_mesh(mesh, source, origin);
+        status = npg_ply_read_mesh(mesh, source, origin, may_be_points);
         if (!status) status = expect_end(source);
     } else if (!status && format == &formats[OBJ]) {
-        status = npg_obj_read_mesh(mesh, source, origin);
+        status = npg_obj_read_mesh(mesh, source, origin, may_be_points);
     } else if (!status) {
         status = npg_error(NPG_BAD_INPUT, "%s: a mesh must be PLY or OBJ", path);
     }
@@ -166,4 +166,34 @@ npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
     npg_source_close(&source);
     if (status) npg_mesh_unref(mesh);
     return status;
+}
+
+npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    return read_mesh(mesh, path, origin, false);
+}
+
+/* The points of a format that knows no faces. */
+static npg_status read_bare_points(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    npg_frame frame = {0};
+    NPG_TRY(npg_read_cloud(&frame, path, origin));
+    npg_status status = frame.point_count ? npg_mesh_open(mesh, 0, 0)
+                                          : npg_error(NPG_BAD_INPUT, "%s: there are no points", path);
+    if (!status) {
+        (*mesh)->vert_count = frame.point_count;
+        (*mesh)->vert_pos = frame.pos_local;
+        (*mesh)->vert_normals = frame.normals;
+        frame.pos_local = frame.normals = NULL;
+    }
+    npg_frame_clear(&frame);
+    return status;
+}
+
+npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    const char *format = npg_reader_for(path);
+    *mesh = NULL;
+    bool has_faces = !format || !strcmp(format, "ply") || !strcmp(format, "obj");
+    return has_faces ? read_mesh(mesh, path, origin, true) : read_bare_points(mesh, path, origin);
 }

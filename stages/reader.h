@@ -24,6 +24,10 @@ npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin
  * kept where given.  vert_pos is local.  Indices are checked; a mesh without faces is NPG_BAD_INPUT. */
 npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin);
 
+/* The same for any of the formats, faces or not: points alone become a mesh with face_count 0.  NPG_BAD_INPUT
+ * where there is not even a point. */
+npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin);
+
 /* Frames concatenated on a stream (a pipe will do): PLY or NPY files one after the other.  NPG_END at a clean
  * end between two frames; a stream that stops inside a frame is NPG_BAD_INPUT. */
 typedef struct npg_stream npg_stream;

@@ -5,10 +5,10 @@
 #include <string.h>
 
 #include "file.h"
-#include "writer.h"
+#include "write_obj.h"
 
 /* Digits after the point that keep 1e-7 of the extent, and 9 digits at least where the extent is unknown. */
-static int decimals_for(const npg_mesh_view *mesh)
+int npg_obj_decimals_for(const npg_mesh_view *mesh)
 {
     double extent = 0;
     for (size_t i = 3; i < 3 * mesh->vert_count; i++)
@@ -20,7 +20,7 @@ static int decimals_for(const npg_mesh_view *mesh)
 
 /* Append numbers to a line.  printf writes the decimal sign of the process's locale; OBJ knows only the
  * point. */
-static void add_numbers(char *line, size_t size, int decimals, const double *values, int count)
+void npg_obj_add_numbers(char *line, size_t size, int decimals, const double *values, int count)
 {
     const char *sign = localeconv()->decimal_point;
     size_t used = strlen(line);
@@ -38,14 +38,14 @@ static void add_numbers(char *line, size_t size, int decimals, const double *val
 
 static void write_vertices(npg_file *file, const npg_mesh_view *mesh)
 {
-    int decimals = decimals_for(mesh);
+    int decimals = npg_obj_decimals_for(mesh);
     for (size_t i = 0; i < mesh->vert_count; i++) {
         char line[512] = "v";
         double colour[3];
-        add_numbers(line, sizeof line, decimals, mesh->vert_world + 3 * i, 3);
+        npg_obj_add_numbers(line, sizeof line, decimals, mesh->vert_world + 3 * i, 3);
         for (size_t c = 0; c < 3 && mesh->vert_colours; c++)
             colour[c] = (double)mesh->vert_colours[4 * i + c] / 255;
-        if (mesh->vert_colours) add_numbers(line, sizeof line, 4, colour, 3);
+        if (mesh->vert_colours) npg_obj_add_numbers(line, sizeof line, 4, colour, 3);
         npg_file_print(file, "%s\n", line);
     }
 }
@@ -57,7 +57,7 @@ static void write_rows(npg_file *file, const char *word, const float *rows, size
         char line[512];
         snprintf(line, sizeof line, "%s", word);
         for (int a = 0; a < width; a++) row[a] = (double)rows[i * (size_t)width + (size_t)a];
-        add_numbers(line, sizeof line, 7, row, width);
+        npg_obj_add_numbers(line, sizeof line, 7, row, width);
         npg_file_print(file, "%s\n", line);
     }
 }

@@ -21,4 +21,10 @@ npg_status npg_write_mesh(const char *path, const npg_mesh_view *mesh);
 npg_status npg_write_ply(const char *path, const npg_mesh_view *mesh);
 npg_status npg_write_obj(const char *path, const npg_mesh_view *mesh);
 
+/* An OBJ that is the OBJ file `like` with other positions and normals (one per vertex; without, none): all
+ * its other lines stay, so texture coordinates per corner, groups, polygons and materials are kept.  Of mesh
+ * only vert_count, vert_world and vert_normals are used.  NPG_BAD_INPUT when `like` has another number of
+ * vertices, NPG_DISK. */
+npg_status npg_write_obj_like(const char *path, const char *like, const npg_mesh_view *mesh);
+
 #endif

@@ -19,6 +19,16 @@ const npg_verb npg_verbs[] = {
      "solved "
      "again, all other meshes stay as they are.  A job that was broken off is first brought to its end.",
      npg_append_options, false, npg_verb_append},
+    {"apply", "JOB --mesh FILE -o OUT", 1, 1, "Carry another mesh or points through a finished run",
+     "JOB is the output folder of a run that is done.  FILE (a mesh, or points alone) lies on or near the "
+     "reference.ply of the run; it is tied to that surface and written once per frame, OUT/frame_0000.ply "
+     "and so on, with its own faces, colours, texture coordinates and turned normals, and OUT/done.json last "
+     "of all.  An OBJ file written as OBJ keeps all its other lines: seams, polygons, groups and material "
+     "names (put the material files beside).  With --fps-scale K there are K steps from each frame to the "
+     "next: the vertices of the solved "
+     "meshes follow cubic curves through time (Catmull-Rom), which pass through every solved frame.  Exit "
+     "code 7 when points lie far from the reference.",
+     npg_apply_options, false, npg_verb_apply},
     {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
      "Reads every frame of INPUT and says what is in it, what a run would trip over, and what it would cost "
      "in "
