@@ -18,6 +18,7 @@
 #define CONTACT_COST    0.1  /* unit lengths that a point in contact counts for */
 #define HANDLE_COST     0.05 /* share of the cost that a needless handle adds */
 #define MIDDLE_COST     0.3  /* share of the cost that the capture's whole length from the middle adds */
+#define LESS_CONTACT    0.7  /* times the contact of the best-scored frame */
 #define CLEARLY_LESS    0.97 /* of the cost of the best-scored frame */
 
 static const npg_tracker_settings draft_tracking = {
@@ -135,17 +136,27 @@ static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
     }
 }
 
+/* Whether parts are further apart in a candidate than in another: what the choice is for.  Distances alone
+ * say little. */
+static bool is_more_apart(const npg_fare *a, const npg_fare *b)
+{
+    return a->handles < b->handles || a->contact < LESS_CONTACT * b->contact;
+}
+
+/* The best-scored frame, unless another costs clearly less and has its parts more apart. */
 static size_t cheapest(const npg_fare *fares, size_t count, int64_t best_scored)
 {
     size_t best = count, scored = count;
+    for (size_t i = 0; i < count; i++)
+        if (fares[i].index == best_scored && fares[i].is_made) scored = i;
     for (size_t i = 0; i < count; i++) {
-        if (fares[i].index == best_scored) scored = i;
-        if (fares[i].is_made && (best == count || fares[i].cost < fares[best].cost)) best = i;
+        if (!fares[i].is_made || (best < count && fares[i].cost >= fares[best].cost)) continue;
+        bool may_be =
+            scored == count || i == scored ||
+            (fares[i].cost < CLEARLY_LESS * fares[scored].cost && is_more_apart(&fares[i], &fares[scored]));
+        if (may_be) best = i;
     }
-    if (scored == count) return best == count ? 0 : best;
-    if (best == count) return scored;
-    bool stays = fares[scored].is_made && fares[best].cost > CLEARLY_LESS * fares[scored].cost;
-    return stays ? scored : best;
+    return best == count ? 0 : best;
 }
 
 npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,

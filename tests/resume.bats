@@ -138,7 +138,7 @@ newest() {
     unshare -rm true 2>/dev/null || skip "no file systems can be mounted here"
     mkdir -p disk
     NEUPIG=$NEUPIG unshare -rm bash -ec '
-        mount -t tmpfs -o size=2400k none disk
+        mount -t tmpfs -o size=1700k none disk
         status=0
         "$NEUPIG" run capture/points -o disk/full "$@" 2>disk.log || status=$?
         cat disk.log
