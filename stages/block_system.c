@@ -180,7 +180,9 @@ int npg_block_solve(npg_block_system *s, double *x, double tolerance, int iterat
     int step = 0;
     for (; step < iterations && dot(r, r, n) > stop; step++) {
         multiply(s, q, p);
-        double alpha = rz / dot(p, q, n);
+        double curvature = dot(p, q, n);
+        if (!(curvature > 0)) break; /* nothing more to gain in double */
+        double alpha = rz / curvature;
         for (size_t i = 0; i < n; i++) {
             x[i] += alpha * p[i];
             r[i] -= alpha * q[i];

@@ -341,8 +341,10 @@ static npg_status do_step(npg_tracker *t, npg_tracked *tracked, double *pose, co
     add_edges(t, pose, stiffness);
     npg_block_damp(t->system, 1e-9);
     npg_block_solve(t->system, t->step, 1e-3, 60);
+    for (size_t i = 0; i < 6 * t->graph->node_count; i++)
+        if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
     tracked->change = move_nodes(t, pose);
-    return isfinite(tracked->change) ? NPG_OK : npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
+    return NPG_OK;
 }
 
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
@@ -367,6 +369,22 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
 
 /* ---- extrapolation ---- */
 
+/* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt): products of
+ * products would else triple their rounding errors with every frame. */
+static void straighten(double m[9])
+{
+    double along = 0, size = 0;
+    for (int i = 0; i < 3; i++) size += m[i] * m[i];
+    for (int i = 0; i < 3; i++) m[i] /= sqrt(size);
+    for (int i = 0; i < 3; i++) along += m[i] * m[3 + i];
+    for (int i = 0; i < 3; i++) m[3 + i] -= along * m[i];
+    size = m[3] * m[3] + m[4] * m[4] + m[5] * m[5];
+    for (int i = 3; i < 6; i++) m[i] /= sqrt(size);
+    m[6] = m[1] * m[5] - m[2] * m[4];
+    m[7] = m[2] * m[3] - m[0] * m[5];
+    m[8] = m[0] * m[4] - m[1] * m[3];
+}
+
 void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)
 {
     for (size_t k = 0; k < node_count;
@@ -380,6 +398,7 @@ void npg_pose_extrapolate(double *next, const double *now, const double *before,
             next[i] = 0;
             for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
         }
+        straighten(next);
         for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
     }
 }
