@@ -13,7 +13,7 @@ typedef struct motion_data {
     float *rest, *out, *points[FRAMES];
     double *rest_wide, *out_wide, *points_wide[FRAMES], *edge_rest;
     double *x, *g, *dout; /* of all frames: real x 3, real x 3, rows x 8 */
-    uint32_t (*edges)[2], *order;
+    uint32_t (*edges)[2];
     size_t *to_points, *to_verts; /* of one frame */
 } motion_data;
 
@@ -76,8 +76,8 @@ static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
 
 static void close_motion_data(motion_data *d)
 {
-    void *all[] = {&d->rest, &d->out,  &d->rest_wide, &d->out_wide, &d->edge_rest, &d->x,
-                   &d->g,    &d->dout, &d->edges,     &d->order,    &d->to_points, &d->to_verts};
+    void *all[] = {&d->rest, &d->out,  &d->rest_wide, &d->out_wide,  &d->edge_rest, &d->x,
+                   &d->g,    &d->dout, &d->edges,     &d->to_points, &d->to_verts};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     for (size_t t = 0; t < FRAMES; t++) {
         npg_release(&d->points[t]);

@@ -538,12 +538,6 @@ npg_fit_parts npg_fit_open_parts(npg_fit *fit)
                            fit->time_code};
 }
 
-double npg_fit_frame_loss(const npg_fit *fit, size_t i)
-{
-    size_t k = fit->rank[i];
-    return fit->has_points[k] ? (double)fit->cd[k] : (double)NAN;
-}
-
 size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frames, size_t points, int units)
 {
     npg_levels levels = {0};

@@ -87,9 +87,6 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
 /* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
 
-/* The last epoch's unweighted Chamfer sum of the i-th frame; NaN without points. */
-double npg_fit_frame_loss(const npg_fit *fit, size_t i);
-
 /* What goes from window to window, for saving and restoring: loans of the fit's own. */
 typedef struct npg_fit_parts {
     const struct npg_levels *levels;

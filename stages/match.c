@@ -68,17 +68,6 @@ size_t npg_matcher_most(const npg_matcher *m)
     return (size_t)m->settings.points + 2 * m->carry->mesh->vert_count;
 }
 
-static void choose_targets(npg_matcher *m, const float *points, const float *normals, size_t count)
-{
-    size_t most = (size_t)m->settings.points;
-    m->target_count = count < most ? count : most;
-    for (size_t i = 0; i < m->target_count; i++) {
-        size_t from = i * count / m->target_count;
-        memcpy(m->targets + 3 * i, points + 3 * from, 3 * sizeof(float));
-        if (normals) memcpy(m->normals + 3 * i, normals + 3 * from, 3 * sizeof(float));
-    }
-}
-
 static int by_value(const void *a, const void *b)
 {
     float x = *(const float *)a, y = *(const float *)b;
@@ -182,7 +171,8 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
 {
     const npg_mesh *mesh = m->reference;
     if (!point_count) return NPG_OK;
-    choose_targets(m, points, normals, point_count);
+    m->target_count =
+        npg_points_spread(m->targets, m->normals, (size_t)m->settings.points, points, normals, point_count);
     npg_mesh_vertex_normals(m->vert_normals, vert_unit, mesh->vert_count, mesh->faces, mesh->face_count);
     NPG_TRY(npg_surface_move(m->surface, vert_unit));
     NPG_TRY(npg_surface_closest(m->surface, m->hits, m->targets, m->target_count));

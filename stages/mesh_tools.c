@@ -284,3 +284,15 @@ done:
     npg_release(&number);
     return status;
 }
+
+size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
+                         const float *normals, size_t point_count)
+{
+    size_t count = point_count < most ? point_count : most;
+    for (size_t i = 0; i < count; i++) {
+        size_t from = i * point_count / count;
+        memcpy(out + 3 * i, points + 3 * from, 3 * sizeof(float));
+        if (normals) memcpy(out_normals + 3 * i, normals + 3 * from, 3 * sizeof(float));
+    }
+    return count;
+}

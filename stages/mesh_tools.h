@@ -44,4 +44,9 @@ npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
  */
 npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
 
+/* Copy at most `most` of the points (N x 3), evenly by their order, and of their normals where there are any.
+ * Returns how many. */
+size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
+                         const float *normals, size_t point_count);
+
 #endif

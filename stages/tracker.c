@@ -93,18 +93,6 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     return status;
 }
 
-/* At most settings.samples of the points, evenly by their order. */
-static void choose_targets(npg_tracker *t, const float *points, const float *normals, size_t count)
-{
-    size_t most = t->settings.samples;
-    t->target_count = count < most ? count : most;
-    for (size_t i = 0; i < t->target_count; i++) {
-        size_t from = i * count / t->target_count;
-        memcpy(t->targets + 3 * i, points + 3 * from, 3 * sizeof(float));
-        if (normals) memcpy(t->target_normals + 3 * i, normals + 3 * from, 3 * sizeof(float));
-    }
-}
-
 /* ---- one term ---- */
 
 /* A point that nodes carry and where it should go. */
@@ -352,7 +340,8 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
 {
     npg_kdtree *tree;
     NPG_REQUIRE(point_count);
-    choose_targets(t, points, normals, point_count);
+    t->target_count =
+        npg_points_spread(t->targets, t->target_normals, t->settings.samples, points, normals, point_count);
     NPG_TRY(npg_kdtree_open(&tree, points, point_count));
     *tracked = (npg_tracked){0};
     npg_status status = NPG_OK;
