@@ -1,5 +1,4 @@
-/* Kernel cache: a few folders per version, each behind a lock, so that processes at work at the same time
- * keep what they compile without sharing it; private folders for those beyond. */
+/* Kernel cache: one folder per version behind a lock, private folders for everybody else. */
 #include "kernel_cache.h"
 
 #include <errno.h>
@@ -15,8 +14,6 @@
 
 #include "file.h"
 #include "kernel_sources.h"
-
-#define SLOTS 16 /* processes at a time that find their kernels compiled */
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int users, lock_fd = -1;
@@ -41,34 +38,22 @@ static void name_base(char *out, size_t size)
         snprintf(out, size, "/tmp/neupig-%ld", (long)getuid());
 }
 
-/* Lock a folder for as long as the process lives; false where another process has it. */
-static bool take_folder(const char *folder, npg_status *status)
-{
-    char path[4200];
-    *status = npg_make_folder(folder);
-    if (*status) return false;
-    snprintf(path, sizeof path, "%.4096s/lock", folder);
-    lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-    if (lock_fd < 0) *status = npg_error_errno(NPG_DISK, "%s", path);
-    if (lock_fd < 0) return false;
-    if (!flock(lock_fd, LOCK_EX | LOCK_NB)) return true;
-    close(lock_fd);
-    lock_fd = -1;
-    return false;
-}
-
-/* The first folder of this version that nobody uses; "" when all are in use. */
+/* The folder of this version, or "" when another process uses it. */
 static npg_status take_shared(char *folder, size_t size)
 {
-    char base[2048];
-    npg_status status = NPG_OK;
+    char base[2048], path[4200];
     name_base(base, sizeof base);
-    for (int slot = 0; slot < SLOTS && !status; slot++) {
-        snprintf(folder, size, "%s/%s-%016llx/%d", base, npg_version(), hash_of_sources(), slot);
-        if (take_folder(folder, &status)) return NPG_OK;
-    }
+    snprintf(folder, size, "%s/%s-%016llx", base, npg_version(), hash_of_sources());
+    npg_status status = npg_make_folder(folder);
+    if (status) return status;
+    snprintf(path, sizeof path, "%.4096s/lock", folder);
+    lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (lock_fd < 0) return npg_error_errno(NPG_DISK, "%s", path);
+    if (!flock(lock_fd, LOCK_EX | LOCK_NB)) return NPG_OK;
+    close(lock_fd);
+    lock_fd = -1;
     folder[0] = 0;
-    return status;
+    return NPG_OK;
 }
 
 static npg_status make_private(void)

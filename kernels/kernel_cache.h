@@ -1,6 +1,6 @@
 /* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
- * between versions, so each version of neupig has a few folders of its own; a process takes the first that no
- * other one has locked.  With all of them in use it works in a private folder that is removed at the end. */
+ * between versions, so each version of neupig has a folder of its own, used by the process that holds its
+ * lock; any other process works in a private folder that is removed at the end. */
 #ifndef NPG_KERNEL_CACHE_H
 #define NPG_KERNEL_CACHE_H
 

@@ -288,32 +288,22 @@ static npg_status set_from_json(npg_options *options, const char *name, const js
     return npg_options_set(options, name, number);
 }
 
-static npg_status read_whole(char **text, FILE *file, const char *path)
-{
-    enum { LIMIT = 1 << 20 };
-    size_t capacity = 0, size = 0, got;
-    do {
-        NPG_TRY(npg_grow(text, &capacity, size + 4096, 1, NPG_FOR_FILES));
-        got = fread(*text + size, 1, capacity - 1 - size, file);
-        size += got;
-    } while (got && size <= LIMIT);
-    if (ferror(file)) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    if (size > LIMIT) return npg_error(NPG_USAGE, "%s: larger than 1 MiB, not a configuration", path);
-    (*text)[size] = 0;
-    if (strlen(*text) < size)
-        return npg_error(NPG_USAGE, "%s: zero byte at byte %zu, not a configuration", path, strlen(*text));
-    return NPG_OK;
-}
-
-/* The text of a small file, ended by 0. */
 static npg_status read_text_file(char **text, const char *path)
 {
+    enum { LIMIT = 1 << 20 };
     *text = NULL;
     FILE *file = fopen(path, "rb");
     if (!file) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    npg_status status = read_whole(text, file, path);
+    npg_status status = npg_alloc(text, NPG_FOR_FILES, LIMIT + 1);
+    size_t size = status ? 0 : fread(*text, 1, LIMIT + 1, file);
+    if (!status && ferror(file)) status = npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
+    if (!status && size > LIMIT)
+        status = npg_error(NPG_USAGE, "%s: larger than 1 MiB, not a configuration", path);
     fclose(file);
-    if (status) npg_release(text);
+    if (status)
+        npg_release(text);
+    else
+        (*text)[size] = 0;
     return status;
 }
 
