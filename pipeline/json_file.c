@@ -36,7 +36,8 @@ static npg_status read_all(char **text, FILE *file, const char *path, size_t lim
         if (size > limit) return npg_error(NPG_USAGE, "%s: larger than %zu MiB", path, limit >> 20);
     }
     (*text)[size] = 0;
-    return NPG_OK;
+    if (strlen(*text) == size) return NPG_OK;
+    return npg_error(NPG_USAGE, "%s: zero byte at %zu", path, strlen(*text));
 }
 
 static npg_status read_text(char **text, const char *path, size_t limit)

@@ -1,9 +1,9 @@
 #!/bin/bash
 # What the system can do to a run: writes that fail, processes that compete for the kernel cache.
 #
-#   tests/faults.sh writes [KINDS [FIRST [STRIDE]]]   every (STRIDE-th) write, fsync and rename fails in turn
-#   tests/faults.sh allocations [FIRST [STRIDE]]      every (STRIDE-th) request for memory fails in turn
-#   tests/faults.sh cache [ROUNDS [PROCESSES]]        8 processes at once on a cold kernel cache, 20 rounds
+#   tests/faults.sh writes [KINDS [FIRST [STRIDE [LAST]]]]  every (STRIDE-th) write, fsync and rename fails in turn
+#   tests/faults.sh allocations [FIRST [STRIDE [LAST]]]     every (STRIDE-th) request for memory fails in turn
+#   tests/faults.sh cache [ROUNDS [PROCESSES]]              8 processes at once on a cold kernel cache, 20 rounds
 #
 # NEUPIG names the command (build/neupig); fault_shim.so and fault_run lie beside it.  Ends with 0 when all is as
 # it should be.
@@ -77,14 +77,14 @@ one_write() { # KIND N; 1 once there are not that many calls
 }
 
 writes() {
-    local kinds=${1:-ENOSPC EIO SHORT EINTR SYNC RENAME} first=${2:-1} stride=${3:-1} kind n
+    local kinds=${1:-ENOSPC EIO SHORT EINTR SYNC RENAME} first=${2:-1} stride=${3:-1} last=${4:-1000000} kind n
     capture
     work whole
     [ $status -eq 0 ] || { cat whole.log && exit 1; }
     for kind in $kinds; do
         n=$first
-        while one_write "$kind" "$n"; do n=$((n + stride)); done
-        echo "$kind: $(((n - first) / stride)) failures, before call $n of the run"
+        while [ $n -le "$last" ] && one_write "$kind" "$n"; do n=$((n + stride)); done
+        echo "$kind: $(((n - first) / stride)) failures below call $n of the run"
         [ $n -gt "$first" ] || complain "$kind: nothing failed"
     done
 }

@@ -36,5 +36,5 @@ fuzz() { # PARSER
 export -f fuzz
 export build seconds runs LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0" \
     ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1
-[ $# -gt 0 ] || set -- ply obj xyz npy pcd config archive
+[ $# -gt 0 ] || set -- $(cd $build && ls fuzz_* | sed 's/^fuzz_//')
 printf '%s\n' "$@" | xargs -P "$(nproc)" -I{} bash -c 'fuzz {}'

@@ -2,21 +2,8 @@
  * stage that has one of every type. */
 #include <string.h>
 
+#include "fuzz_chain.h"
 #include "fuzz_target.h"
-#include "stage.h"
-
-static const npg_option options[] = {{"whole", "", NPG_OPTION_INT, 0, "1", -5, 1e6, NULL, NULL},
-                                     {"real", "", NPG_OPTION_REAL, 0, "0.5", -1e9, 1e9, NULL, NULL},
-                                     {"flag", "", NPG_OPTION_FLAG, 0, "no", 0, 0, NULL, NULL},
-                                     {"choice", "", NPG_OPTION_CHOICE, 0, "one", 0, 0, "one|two|three", NULL},
-                                     {"text", "", NPG_OPTION_TEXT, 0, "", 0, 0, NULL, NULL},
-                                     {0}};
-
-static const npg_stage stage = {.name = "fuzz", .options = options};
-const npg_stage *const npg_chain[] = {&stage, NULL};
-
-static const npg_preset_value paper[] = {{"whole", "7"}, {0}};
-const npg_preset npg_presets[] = {{"paper", "", paper}, {0}};
 
 /* What was accepted can be asked for, and is still acceptable. */
 static void ask_all(const npg_options *loaded)
