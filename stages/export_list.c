@@ -360,10 +360,12 @@ npg_status npg_done_write(const char *output, json_t *head)
     npg_status status = npg_join_path(&path, output, "done.json");
     if (!status) status = npg_file_open(&file, path);
     if (!status) status = write_done(file, output, head);
-    if (!status)
+    if (!status) {
         status = npg_file_commit(&file);
-    else
+        if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */
+    } else {
         npg_file_discard(&file);
+    }
     npg_release(&path);
     json_decref(head);
     return status;
