@@ -338,12 +338,22 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     return NPG_OK;
 }
 
+/* Waits on it are by the clock that nobody sets. */
+static void init_changed(pthread_cond_t *changed)
+{
+    pthread_condattr_t plain;
+    pthread_condattr_init(&plain);
+    pthread_condattr_setclock(&plain, CLOCK_MONOTONIC);
+    pthread_cond_init(changed, &plain);
+    pthread_condattr_destroy(&plain);
+}
+
 static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, bool restart, bool append)
 {
     job->lock_fd = -1;
     job->serial = job->forward_serial = -1;
     pthread_mutex_init(&job->lock, NULL);
-    pthread_cond_init(&job->changed, NULL);
+    init_changed(&job->changed);
     NPG_TRY(npg_copy_text(&job->output, npg_worker_settings(worker)->output));
     NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
@@ -529,7 +539,7 @@ npg_status npg_job_wait_exported(npg_job *job, const npg_worker *worker, int64_t
     pthread_mutex_lock(&job->lock);
     while (!status && (!job->is_written || job->exported_count < count)) {
         struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
+        clock_gettime(CLOCK_MONOTONIC, &until);
         until.tv_nsec += 100000000; /* looks for a stop ten times a second */
         if (until.tv_nsec >= 1000000000) {
             until.tv_nsec -= 1000000000;
