@@ -195,14 +195,16 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
-/* Points -> surface.  Returns the mean distance. */
-static double add_targets(npg_tracker *t, const double *pose, bool with_normals, double width)
+/* Points -> surface.  tracked: the mean distance, and its part of the Chamfer distance. */
+static void add_targets(npg_tracker *t, npg_tracked *tracked, const double *pose, bool with_normals,
+                        double width)
 {
-    double sum = 0, share = 1 / (double)t->target_count;
+    double sum = 0, squares = 0, share = 1 / (double)t->target_count;
     for (size_t i = 0; i < t->target_count; i++) {
         const npg_surface_hit *hit = &t->hits[i];
         pull p;
         sum += sqrt((double)hit->dist_sq);
+        squares += (double)hit->dist_sq;
         hit_normal(p.normal, t, hit);
         double facing = 0;
         for (size_t c = 0; c < 3 && with_normals; c++)
@@ -212,7 +214,8 @@ static double add_targets(npg_tracker *t, const double *pose, bool with_normals,
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
         add_pull(t->system, t, &p, pose, share, width);
     }
-    return sum * share;
+    tracked->point_dist_mean = sum * share;
+    tracked->chamfer = squares * share;
 }
 
 /* Surface -> points, for samples whose nearest point is close enough to be theirs. */
@@ -324,8 +327,9 @@ typedef struct step {
     const double *pose;
     const npg_kdtree *tree;
     const float *points, *normals;
-    double width, stiffness, point_dist_mean;
-    bool is_first;
+    double width, stiffness, reverse_chamfer;
+    npg_tracked tracked;
+    bool is_first, is_settling;
     npg_status status[2];
     char error[2][256]; /* error texts belong to threads */
 } step;
@@ -338,7 +342,7 @@ static npg_status to_surface(step *s)
     NPG_TRY(npg_surface_closest_near(t->surface, t->hits, t->targets, t->target_count,
                                      s->is_first ? NULL : t->start_face, NULL, 1));
     npg_block_clear(t->system);
-    s->point_dist_mean = add_targets(t, s->pose, s->normals != NULL, s->width);
+    add_targets(t, &s->tracked, s->pose, s->normals != NULL, s->width);
     return NPG_OK;
 }
 
@@ -348,6 +352,9 @@ static npg_status to_points(step *s)
     for (size_t i = 0; i < t->sample_count; i++)
         memcpy(t->sample_pos + 3 * i, t->vert_pos + 3 * (size_t)t->samples[i], 3 * sizeof(float));
     NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
+    s->reverse_chamfer = 0;
+    for (size_t i = 0; i < t->sample_count; i++) s->reverse_chamfer += (double)t->near_sq[i];
+    s->reverse_chamfer /= (double)t->sample_count;
     npg_block_clear(t->reverse);
     add_samples(t, s->pose, s->points, s->normals, s->width);
     add_edges(t, s->pose, s->stiffness);
@@ -374,28 +381,39 @@ static npg_status gather(step *s)
     return NPG_OK;
 }
 
-static npg_status do_step(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_kdtree *tree,
-                          const float *points, const float *normals, double progress)
+/* How far a fit has come, 0..1 before the last steps; the noisier the points, the more of them must agree
+ * before the surface gives way. */
+static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_effort *effort)
 {
-    /* the noisier the points, the more of them must agree before the surface gives way */
+    int last = effort->steps - 1;
+    double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
     double noise = tracked->point_dist_mean / NOISE_UNIT;
-    step s = {.t = t, .pose = pose, .tree = tree, .points = points, .normals = normals};
-    s.is_first = !tracked->steps;
-    s.stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress) * (1 + noise * noise);
-    s.width = fmax(WIDTH_START * pow(WIDTH_END / WIDTH_START, progress), 2.5 * tracked->point_dist_mean);
-    NPG_TRY(gather(&s));
-    tracked->point_dist_mean = s.point_dist_mean;
+    s->is_first = !tracked->steps;
+    s->is_settling = progress >= 1;
+    s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
+    s->width = effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
+    s->width = fmax(s->width, 2.5 * tracked->point_dist_mean);
+}
+
+static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
+{
+    npg_tracker *t = s->t;
+    NPG_TRY(gather(s));
+    tracked->point_dist_mean = s->tracked.point_dist_mean;
+    tracked->chamfer = s->tracked.chamfer + s->reverse_chamfer;
     npg_block_damp(t->system, 1e-9);
     npg_block_solve(t->system, t->step, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
     tracked->change = move_nodes(t, pose);
+    tracked->steps++;
     return NPG_OK;
 }
 
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
-                           const float *normals, size_t point_count)
+                           const float *normals, size_t point_count, const npg_tracker_effort *effort)
 {
+    const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START};
     npg_kdtree *tree;
     NPG_REQUIRE(point_count);
     t->target_count =
@@ -403,12 +421,12 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     NPG_TRY(npg_kdtree_open(&tree, points, point_count));
     *tracked = (npg_tracked){0};
     npg_status status = NPG_OK;
-    int last = t->settings.steps - 1;
-    while (tracked->steps < t->settings.steps && !status) {
-        double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
-        status = do_step(t, tracked, pose, tree, points, normals, progress);
-        tracked->steps++;
-        if (progress >= 1 && tracked->change < 0.01 * t->graph->radius) break;
+    step s = {.t = t, .pose = pose, .tree = tree, .points = points, .normals = normals};
+    if (!effort) effort = &usual;
+    while (tracked->steps < effort->steps && !status) {
+        set_schedule(&s, tracked, effort);
+        status = do_step(&s, tracked, pose);
+        if (s.is_settling && tracked->change < 0.01 * t->graph->radius) break;
     }
     npg_kdtree_close(&tree);
     return status;
