@@ -98,14 +98,14 @@ enum { PEAK_ROUNDS = 4000000, COPY_VECTORS = 1 << 20 };
 static npg_status multiply_add(void *user)
 {
     peak *p = user;
-    return NPG_LAUNCH_SINGLE(p->program, "peak_multiply_add", p->items, NPG_BUF(&p->a), NPG_INT(PEAK_ROUNDS),
-                             NPG_REAL(0.999), NPG_REAL(1e-3));
+    return NPG_LAUNCH_GROUPS(p->program, "peak_multiply_add", p->items, 1, NPG_BUF(&p->a),
+                             NPG_INT(PEAK_ROUNDS), NPG_REAL(0.999), NPG_REAL(1e-3));
 }
 
 static npg_status copy(void *user)
 {
     peak *p = user;
-    return NPG_LAUNCH_SINGLE(p->program, "peak_copy", p->items, NPG_BUF(&p->a), NPG_BUF(&p->b),
+    return NPG_LAUNCH_GROUPS(p->program, "peak_copy", p->items, 1, NPG_BUF(&p->a), NPG_BUF(&p->b),
                              NPG_INT(COPY_VECTORS));
 }
 
@@ -355,7 +355,7 @@ static npg_status do_bench(bench *b, json_t *root)
     NPG_TRY(npg_device_open(&b->device, b->s.device));
     NPG_TRY(npg_bench_body_open(&b->body, (size_t)b->s.vertices, (size_t)b->s.points, (size_t)b->s.frames));
     NPG_TRY(measure_peaks(b));
-    size_t rows = (b->body.mesh->vert_count + NPG_MLP_ROWS - 1) / NPG_MLP_ROWS * NPG_MLP_ROWS;
+    size_t rows = npg_mlp_rows(b->device, b->body.mesh->vert_count);
     const npg_device_info *info = npg_device_facts(b->device);
     json_object_set_new(root, "version", json_string(npg_version()));
     json_object_set_new(
