@@ -115,6 +115,9 @@ void npg_tuning_constants(char *out, size_t size, const npg_tuning *t, const cha
         snprintf(out, size, "-DQUERIES=%d -DLOCAL=%d", t->nearest_queries, t->frame_local);
     if (!strcmp(program, "chamfer") || !strcmp(program, "pull"))
         snprintf(out, size, "-DLOCAL=%d", t->frame_local);
+    if (!strcmp(program, "peak"))
+        snprintf(out, size, "-DVW=%d -DCHAINS=%d -DLOCAL=%d", t->mlp_vector,
+                 t->mlp_tile_rows * t->mlp_tile_vectors, t->mlp_local);
     if (!strcmp(program, "adam")) snprintf(out, size, "-DSPAN=%d", t->span);
 }
 
