@@ -137,7 +137,8 @@ npg_status npg_tuning_save(const npg_tuning *tuning, const char *path, const cha
     if (!text) return npg_error(NPG_MEMORY, "%s: no memory", path);
     npg_status status = npg_file_open(&file, path);
     if (!status) {
-        npg_file_print(file, "%s\n", text);
+        npg_file_write(file, text, strlen(text));
+        npg_file_write(file, "\n", 1);
         status = npg_file_commit(&file);
     }
     free(text);

@@ -26,9 +26,19 @@ double npg_bench_share(const npg_bench_row *row, bool *by_bytes)
     return fmax(flops, bytes);
 }
 
+bool npg_bench_wants(const char *only, const char *name)
+{
+    for (const char *word = only; *word; word += strspn(word, ",")) {
+        size_t length = strcspn(word, ",");
+        if (!strncmp(name, word, length)) return true;
+        word += length;
+    }
+    return !*only;
+}
+
 static npg_status note_row(bench *b, npg_bench_row row, npg_work *call, void *user)
 {
-    if (strncmp(row.name, b->only, strlen(b->only)) != 0) return NPG_OK;
+    if (!npg_bench_wants(b->only, row.name)) return NPG_OK;
     NPG_TRY(npg_error_prefix(npg_meter_time(&row.timing, b->meter, call, user), "%s", row.name));
     return b->take(b->user, &row);
 }

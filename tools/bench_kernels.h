@@ -15,7 +15,10 @@ typedef struct npg_bench_row {
 
 typedef npg_status npg_bench_take(void *user, const npg_bench_row *row);
 
-/* Time all rows whose names begin with `only` ("": all) and hand them over one by one. */
+/* Whether a name begins with one of the words of `only`, which commas part; "": always. */
+bool npg_bench_wants(const char *only, const char *name);
+
+/* Time all rows that `only` wants and hand them over one by one. */
 npg_status npg_bench_kernels(npg_meter *meter, const npg_bench_body *body, const char *only,
                              npg_bench_take *take, void *user);
 

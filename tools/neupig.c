@@ -61,6 +61,17 @@ const npg_verb npg_verbs[] = {
      "noise, "
      "with exit code 7; with REPORT.json that report is compared and nothing is measured.",
      npg_bench_options, false, npg_verb_bench},
+    {"tune", "", 0, 0, "Find the kernels' parameters that suit this device",
+     "Tries register tiles, vector widths, work-groups and shares of work for each kernel on the device, "
+     "compares "
+     "each with the plain twins, prints a table and writes the fastest right set to a file of this device in "
+     "the "
+     "cache folder, which later runs take (run --tuning wide, narrow or gpu leaves it alone; remove the file "
+     "to be "
+     "rid of it).  The same set gives the same bytes; another set another order of sums.  A file that is "
+     "broken, or "
+     "of other kernels or another device, is not used, and the run says so.",
+     npg_tune_options, false, npg_verb_tune},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
      "Lists the OpenCL devices and the versions of the libraries in use and compares every kernel on "
      "each device with its plain twin.  Exit code 4 when there is no device or one computes wrong.",

@@ -28,8 +28,8 @@ const npg_option npg_bench_options[] = {
      NPG_OPTION_TEXT, offsetof(settings, compare), "", 0, 0, NULL, "FILE"},
     {"tolerance", "share by which the quartiles must lie apart for that", NPG_OPTION_REAL,
      offsetof(settings, tolerance), "0.05", 0, 10, NULL, NULL},
-    {"only", "time only rows whose names begin so", NPG_OPTION_TEXT, offsetof(settings, only), "", 0, 0, NULL,
-     "NAME"},
+    {"only", "time only rows whose names begin with one of these words, parted by commas", NPG_OPTION_TEXT,
+     offsetof(settings, only), "", 0, 0, NULL, "NAME"},
     {"vertices", "vertices of the mesh", NPG_OPTION_INT, offsetof(settings, vertices), "10000", 16, 1e6, NULL,
      NULL},
     {"points", "points of each frame", NPG_OPTION_INT, offsetof(settings, points), "5000", 1, 1e6, NULL,
@@ -129,7 +129,7 @@ static npg_status bench_fit(bench *b, json_t *root)
 {
     epochs e = {0};
     size_t n = (size_t)b->s.epochs;
-    if (strncmp("fit", b->s.only, strlen(b->s.only)) != 0) return NPG_OK;
+    if (!npg_bench_wants(b->s.only, "fit")) return NPG_OK;
     npg_status status = npg_alloc_array(&e.wall_s, NPG_FOR_RUN, 2 * n, sizeof *e.wall_s);
     e.cpu_s = e.wall_s + n;
     if (!status) status = run_epochs(b, &e);
@@ -221,7 +221,8 @@ static npg_status write_report(const json_t *root, const char *path)
     if (!text) return npg_error(NPG_MEMORY, "%s: no memory", path);
     npg_status status = npg_file_open(&file, path);
     if (!status) {
-        npg_file_print(file, "%s\n", text);
+        npg_file_write(file, text, strlen(text));
+        npg_file_write(file, "\n", 1);
         status = npg_file_commit(&file);
     }
     free(text);
