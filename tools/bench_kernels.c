@@ -6,6 +6,7 @@
 
 #include "adam.h"
 #include "carry.h"
+#include "graph.h"
 #include "latent.h"
 #include "mesh_tools.h"
 #include "mlp.h"
@@ -229,10 +230,13 @@ npg_status npg_bench_kernels(npg_meter *meter, const npg_bench_body *body, const
 
 /* ---- dense surfaces ---- */
 
-enum { SAMPLES = 1500 };
+enum { SAMPLES = 1500, NODES = 1000 };
 
 typedef struct dense {
+    const npg_mesh *mesh; /* loan */
     npg_carry *carry;
+    npg_graph *graph;
+    double *pose;
     float *verts, *before, *samples;
     npg_mlp mlp;
     npg_motion motion;
@@ -242,6 +246,13 @@ static npg_status carry(void *user)
 {
     dense *d = user;
     npg_carry_move(d->carry, d->verts, d->before, d->samples);
+    return NPG_OK;
+}
+
+static npg_status pose(void *user)
+{
+    dense *d = user;
+    npg_pose_vertices(d->verts, d->graph, d->pose, d->mesh->vert_pos);
     return NPG_OK;
 }
 
@@ -257,6 +268,10 @@ static npg_status open_dense(dense *d, npg_device *device, const npg_mesh *mesh)
 {
     const npg_mlp_shape shape = {512, 512, 8, 0.01f};
     size_t rows = npg_mlp_rows(device, mesh->vert_count);
+    d->mesh = mesh;
+    NPG_TRY(npg_graph_open(&d->graph, mesh, NODES));
+    NPG_TRY(npg_alloc_array(&d->pose, NPG_FOR_RUN, d->graph->node_count, NPG_POSE_SIZE * sizeof(double)));
+    npg_pose_rest(d->pose, d->graph->node_count);
     NPG_TRY(npg_carry_open(&d->carry, mesh, SAMPLES));
     size_t count = d->carry->mesh->vert_count;
     NPG_TRY(npg_alloc_array(&d->verts, NPG_FOR_RUN, rows, 3 * sizeof(float)));
@@ -271,12 +286,21 @@ static npg_status open_dense(dense *d, npg_device *device, const npg_mesh *mesh)
 static npg_status note_dense(bench *b, dense *d)
 {
     const double V = (double)d->carry->vert_count, W = 512, S = (double)d->carry->mesh->vert_count;
-    npg_bench_row carried = {
-        .name = "dense_carry", .flops = 27 * V, .bytes = V * (24 + 24) + S * 24, .vertex_frames = V};
+    npg_bench_row posed = {.name = "dense_pose",
+                           .on_host = true,
+                           .flops = V * (4 * 24 + 18),
+                           .bytes = V * (24 + 32),
+                           .vertex_frames = V};
+    npg_bench_row carried = {.name = "dense_carry",
+                             .on_host = true,
+                             .flops = 27 * V,
+                             .bytes = V * (24 + 24) + S * 24,
+                             .vertex_frames = V};
     npg_bench_row decoded = {.name = "dense_decode",
                              .flops = 2 * V * (W * W + 7 * W),
                              .bytes = 4 * V * (W + 8 + 9),
                              .vertex_frames = V};
+    NPG_TRY(note_row(b, posed, pose, d));
     NPG_TRY(note_row(b, carried, carry, d));
     return note_row(b, decoded, decode, d);
 }
@@ -291,6 +315,8 @@ npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, 
     npg_status status = open_dense(&d, meter->device, body.mesh);
     if (!status) status = note_dense(&b, &d);
     npg_carry_close(&d.carry);
+    npg_graph_close(&d.graph);
+    npg_release(&d.pose);
     npg_release(&d.verts);
     npg_release(&d.before);
     npg_release(&d.samples);

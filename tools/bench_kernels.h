@@ -10,6 +10,7 @@ typedef struct npg_bench_row {
     const char *name;
     double flops, bytes;  /* of one call, at least; flops 0: not counted */
     double vertex_frames; /* decoded by one call, 0: none                */
+    bool on_host;         /* in this thread, not on the device           */
     npg_timing timing;
 } npg_bench_row;
 

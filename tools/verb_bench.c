@@ -62,6 +62,13 @@ static json_t *json_of_spread(npg_spread spread)
     return json_pack("{s:f, s:f, s:f}", "low", spread.low, "median", spread.median, "high", spread.high);
 }
 
+/* What runs in one thread of the host keeps one unit of a processor busy. */
+static double units_of(const bench *b)
+{
+    const npg_device_info *info = npg_device_facts(b->device);
+    return info->is_cpu ? info->units : 1;
+}
+
 static npg_status take_row(void *user, const npg_bench_row *row)
 {
     bench *b = user;
@@ -76,8 +83,8 @@ static npg_status take_row(void *user, const npg_bench_row *row)
     json_object_set_new(json, "relative",
                         json_of_spread(by_bytes ? row->timing.in_bytes : row->timing.in_flops));
     if (row->vertex_frames > 0)
-        json_object_set_new(json, "vertex_frames_per_wall_second",
-                            json_real(row->vertex_frames / row->timing.wall_s));
+        json_object_set_new(json, "vertex_frames_per_busy_second",
+                            json_real(row->vertex_frames / busy_s / (row->on_host ? units_of(b) : 1)));
     json_object_set_new(b->kernels, row->name, json);
     return NPG_OK;
 }
@@ -191,8 +198,8 @@ static void print_row(const char *name, const json_t *row)
            number_of(row, "bytes") / 1e6, 1e3 * number_of(json_object_get(row, "busy_s"), "median"),
            1e3 * number_of(row, "wall_s"), number_of(row, "gflops"), number_of(row, "gbytes"),
            100 * number_of(row, "share_of_bound"), json_string_value(json_object_get(row, "bound_by")));
-    if (json_object_get(row, "vertex_frames_per_wall_second"))
-        printf("%-28s %.3g vertex-frames/s\n", "", number_of(row, "vertex_frames_per_wall_second"));
+    if (json_object_get(row, "vertex_frames_per_busy_second"))
+        printf("%-28s %.3g vertex-frames/s\n", "", number_of(row, "vertex_frames_per_busy_second"));
 }
 
 static void print_table(const json_t *root)
