@@ -50,12 +50,28 @@ const npg_verb npg_verbs[] = {
      "tiles "
      "share one camera, so that motion shows.",
      npg_render_options, false, npg_verb_render},
-    {"bench", "", 0, 0, "Time the kernels and the fit on this machine",
-     "Prints one JSON object: operations and bytes per second of every kernel beside the machine's measured "
-     "peaks "
-     "for multiply-adds and memory, and how many frames per second the fit solves.  Take figures on an idle "
-     "machine.",
+    {"bench", "[REPORT.json]", 0, 1, "Time the kernels and the fit on this machine",
+     "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches of "
+     "the "
+     "limit that binds it, which is measured right beside (multiply-adds, or bytes copied); then how fast "
+     "dense "
+     "surfaces are carried and decoded, and the seconds of an epoch.  On processors times are processor "
+     "seconds, so "
+     "that other programs disturb little.  --compare says what is slower than in an earlier report, beyond "
+     "noise, "
+     "with exit code 7; with REPORT.json that report is compared and nothing is measured.",
      npg_bench_options, false, npg_verb_bench},
+    {"tune", "", 0, 0, "Find the kernels' parameters that suit this device",
+     "Tries register tiles, vector widths, work-groups and shares of work for each kernel on the device, "
+     "compares "
+     "each with the plain twins, prints a table and writes the fastest right set to a file of this device in "
+     "the "
+     "cache folder, which later runs take (run --tuning wide, narrow or gpu leaves it alone; remove the file "
+     "to be "
+     "rid of it).  The same set gives the same bytes; another set another order of sums.  A file that is "
+     "broken, or "
+     "of other kernels or another device, is not used, and the run says so.",
+     npg_tune_options, false, npg_verb_tune},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
      "Lists the OpenCL devices and the versions of the libraries in use and compares every kernel on "
      "each device with its plain twin.  Exit code 4 when there is no device or one computes wrong.",
