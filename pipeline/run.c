@@ -32,6 +32,10 @@ const npg_option npg_run_options[] = {
     {"seed", "Seed of all random numbers", NPG_OPTION_INT, OFFSET(seed), "0", 0, 4294967295.0, NULL, NULL},
     {"keep-going", "Skip frames that can't be used instead of stopping; ends with exit code 7",
      NPG_OPTION_FLAG, OFFSET(keep_going), "no", 0, 0, NULL, NULL},
+    {"confine",
+     "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), and "
+     "links in the place of the output's own folders",
+     NPG_OPTION_FLAG, OFFSET(confine), "no", 0, 0, NULL, NULL},
     {"ring", "Chunks that may wait between two stages", NPG_OPTION_INT, OFFSET(ring_capacity), "2", 1, 1024,
      NULL, NULL},
     {"chunk", "Frames per chunk", NPG_OPTION_INT, OFFSET(chunk_frames), "4", 1, 1024, NULL, NULL},

@@ -33,9 +33,8 @@ static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
     XXH3_state_t *state = XXH3_createState();
     if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
     XXH3_64bits_reset(state);
-    npg_status status = NPG_OK;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
     *size = 0;
     while (!status) {
         ssize_t got = read(fd, block, sizeof block);
@@ -68,6 +67,8 @@ npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
 
 npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
 {
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
     json_t *now = json_object();
     npg_status status = npg_file_facts(now, output, file);
     if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
@@ -329,6 +330,7 @@ static npg_status write_mesh_entries(npg_file *file, const char *output, bool *i
         }
         json_decref(frame);
     }
+    if (list && !status && ferror(list)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     if (list) fclose(list);
     free(line);
     npg_release(&path);
@@ -358,10 +360,12 @@ npg_status npg_done_write(const char *output, json_t *head)
     npg_status status = npg_join_path(&path, output, "done.json");
     if (!status) status = npg_file_open(&file, path);
     if (!status) status = write_done(file, output, head);
-    if (!status)
+    if (!status) {
         status = npg_file_commit(&file);
-    else
+        if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */
+    } else {
         npg_file_discard(&file);
+    }
     npg_release(&path);
     json_decref(head);
     return status;

@@ -11,9 +11,9 @@
 #include "job.h"
 
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
-static const char *const free_options[] = {"input",      "output", "ring",      "chunk",
-                                           "max-memory", "pull",   "cache-mib", "overwrite",
-                                           "restart",    "append", NULL};
+static const char *const free_options[] = {"input",      "output",  "ring",      "chunk",
+                                           "max-memory", "pull",    "cache-mib", "overwrite",
+                                           "confine",    "restart", "append",    NULL};
 
 static bool is_free(const char *name)
 {
@@ -82,8 +82,11 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     *out = NULL;
     NPG_TRY(npg_frame_files_open(&list, input, npg_options_get(options, "frames"),
                                  strcmp(missing, "ignore") != 0));
+    npg_settings settings;
+    npg_options_fill(options, npg_run_options, &settings);
     json_t *frames = json_array(), *mesh = json_object();
-    npg_status status = describe_frames(frames, list);
+    npg_status status = settings.confine ? npg_frame_files_confine(list, input) : NPG_OK;
+    if (!status) status = describe_frames(frames, list);
     npg_frame_files_close(&list);
     if (!status && reference[0]) status = describe_file(mesh, reference);
     json_t *description =

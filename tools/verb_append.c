@@ -7,6 +7,7 @@
 #include <jansson.h>
 
 #include "cli.h"
+#include "file.h"
 #include "progress.h"
 #include "run_job.h"
 
@@ -46,7 +47,11 @@ static npg_status load_job(npg_options *options, const char *folder, bool *is_do
     json_error_t error;
     if ((size_t)snprintf(path, sizeof path, "%s/job/job.json", folder) >= sizeof path)
         return npg_error(NPG_USAGE, "%s: the name is too long", folder);
-    json_t *job = json_load_file(path, 0, &error);
+    int fd;
+    if (npg_file_open_plain(&fd, path, NPG_USAGE))
+        return npg_error(NPG_USAGE, "%s holds no job (%s)", folder, npg_error_text());
+    json_t *job = json_loadfd(fd, 0, &error);
+    close(fd);
     if (!job) return npg_error(NPG_USAGE, "%s holds no job (%s: %s)", folder, path, error.text);
     npg_status status = set_from(options, job, folder);
     json_decref(job);
