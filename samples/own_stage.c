@@ -39,6 +39,17 @@ static npg_status note_height(void *user, npg_frame_view *frame)
     return NPG_OK;
 }
 
+/* A small reference and a small network: quick rather than good. */
+static npg_status open_options(npg_options **options, const char *input, const char *output)
+{
+    const char *const settings[][2] = {{"input", input}, {"output", output}, {"epochs", "10"},
+                                       {"faces", "800"}, {"width-1", "64"},  {"width-2", "64"}};
+    npg_status status = npg_options_open(options);
+    for (size_t i = 0; i < sizeof settings / sizeof *settings && !status; i++)
+        status = npg_options_set(*options, settings[i][0], settings[i][1]);
+    return status;
+}
+
 int main(int argc, char **argv)
 {
     double floor_y = argc > 3 ? atof(argv[3]) : 0;
@@ -51,11 +62,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: own_stage CAPTURE OUT FLOOR\n");
         return 2;
     }
-    npg_status status = npg_options_open(&options);
-    if (!status) status = npg_options_set(options, "input", argv[1]);
-    if (!status) status = npg_options_set(options, "output", argv[2]);
-    if (!status) status = npg_options_set(options, "epochs", "20");
-    if (!status) status = npg_options_set(options, "faces", "800");
+    npg_status status = open_options(&options, argv[1], argv[2]);
     /* Structs and texts are copied; what user points to must live until the run is closed. */
     if (!status) status = npg_options_add_stage(options, &floor_stage);
     if (!status) status = npg_options_add_stage(options, &watch_stage);
