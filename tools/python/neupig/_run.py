@@ -9,7 +9,8 @@ import os
 import pathlib
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from ctypes import POINTER, byref, c_double, c_float, c_uint32, c_void_p, sizeof
+from ctypes import POINTER, byref, c_double, c_float, c_void_p, sizeof
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, NamedTuple, TypeVar, Union
 
@@ -43,7 +44,8 @@ class Progress(NamedTuple):
     loss: float
 
 
-class Frame(NamedTuple):
+@dataclass(frozen=True)
+class Frame:
     """One frame of the moving mesh."""
 
     index: int  #: position in the sequence
@@ -295,7 +297,8 @@ def run(input: Path, output: Path, *, progress: Callable[[Progress], None] | Non
 
     Options are those of the command with _ for -: ``run("capture", "out", epochs=100, max_memory=2000)``.  A run that
     was stopped or killed goes on where it was when it is started again."""
-    return _wait_for_files(Run(input=input, output=output, progress=progress, stages=stages, **options), output)
+    chosen = Options({**options, "input": input, "output": output})
+    return _wait_for_files(Run(options=chosen, progress=progress, stages=stages), output)
 
 
 def append(output: Path, *, input: Path | None = None,
@@ -337,7 +340,7 @@ def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None]
     source: name a better one with ``keyframe=NUMBER``.  When the run fails this returns once ``frames`` has given its next
     frame."""
     failures: list[BaseException] = []
-    with Run(pull=True, progress=progress, stages=stages, **options) as run:
+    with Run(options=Options({**options, "pull": True}), progress=progress, stages=stages) as run:
         pusher = threading.Thread(target=_push_all, args=(run, frames, failures), daemon=True)
         pusher.start()
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from ctypes import POINTER, byref, c_float, c_uint32, c_void_p
 from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,8 +25,8 @@ class Hits(NamedTuple):
     distances: npt.NDArray[np.float32]  #: N
 
 
-def _rows(array: npt.ArrayLike, kind: type, what: str) -> npt.NDArray[np.generic]:
-    rows = np.ascontiguousarray(array, kind)
+def _rows(array: npt.ArrayLike, kind: type, what: str) -> npt.NDArray[Any]:
+    rows: npt.NDArray[Any] = np.ascontiguousarray(array, kind)
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise Error(Status.USAGE, f"{what} must be N x 3, not {rows.shape}")
     return rows
