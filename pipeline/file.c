@@ -20,6 +20,7 @@ struct npg_file {
     char *path, *hidden_path; /* owned */
     unsigned char *buffer;    /* BUFFER_SIZE, owned */
     size_t used;
+    uint64_t flushed; /* bytes that left the buffer */
 };
 
 npg_status npg_join_path(char **out, const char *folder, const char *name)
@@ -89,6 +90,7 @@ static npg_status keep_failure(npg_file *file, const char *verb)
 
 static npg_status write_through(npg_file *file, const unsigned char *data, size_t size)
 {
+    file->flushed += size;
     while (size) {
         ssize_t written = write(file->fd, data, size);
         if (written < 0 && errno == EINTR) continue;
@@ -115,6 +117,28 @@ npg_status npg_file_write(npg_file *file, const void *data, size_t size)
     memcpy(file->buffer + file->used, data, size);
     file->used += size;
     return NPG_OK;
+}
+
+uint64_t npg_file_size(const npg_file *file)
+{
+    return file->flushed + file->used;
+}
+
+npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size)
+{
+    const unsigned char *at = data;
+    NPG_REQUIRE(offset <= npg_file_size(file) && size <= npg_file_size(file) - offset);
+    if (!file->status && offset + size > file->flushed) NPG_TRY(flush_buffer(file));
+    while (size && !file->status) {
+        ssize_t written = pwrite(file->fd, at, size, (off_t)offset);
+        if (written < 0 && errno == EINTR) continue;
+        if (written == 0) errno = ENOSPC;
+        if (written <= 0) return keep_failure(file, "write");
+        at += written;
+        offset += (uint64_t)written;
+        size -= (size_t)written;
+    }
+    return file->status;
 }
 
 npg_status npg_file_print(npg_file *file, const char *format, ...)
