@@ -353,28 +353,22 @@ static npg_status write_done(npg_file *file, const char *output, const json_t *h
 }
 
 /* The partial list is what an interrupted run goes on from: it goes when nothing is left to go on with. */
-static npg_status remove_partial(const char *output)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, output, "frames.partial.jsonl"));
-    npg_status status = NPG_OK;
-    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    npg_release(&path);
-    return status;
-}
-
 npg_status npg_done_write(const char *output, json_t *head, bool has_forms)
 {
-    char *path;
+    char *path = NULL, *partial = NULL;
     npg_file *file = NULL;
     npg_status status = npg_join_path(&path, output, "done.json");
+    if (!status) status = npg_join_path(&partial, output, "frames.partial.jsonl");
     if (!status) status = npg_file_open(&file, path);
     if (!status) status = write_done(file, output, head, has_forms);
     if (!status)
         status = npg_file_commit(&file);
     else
         npg_file_discard(&file);
+    if (!status && unlink(partial) && errno != ENOENT)
+        status = npg_error_errno(NPG_DISK, "can't remove %s", partial);
     npg_release(&path);
+    npg_release(&partial);
     json_decref(head);
-    return status ? status : remove_partial(output);
+    return status;
 }
