@@ -6,7 +6,8 @@
 #define FLOAT_STEPS 16777216 /* float rounds by at most 1 / this of the largest coordinate */
 #define KEPT_SHARE  1e-6     /* of the box: what positions may lose                        */
 
-extern const npg_form npg_form_obj, npg_form_pc2, npg_form_mdd, npg_form_glb, npg_form_usda, npg_form_npz;
+extern const npg_form npg_form_obj, npg_form_pc2, npg_form_mdd, npg_form_glb, npg_form_usda, npg_form_npz,
+    npg_form_vdb;
 
 const npg_form *const npg_forms[] = {&npg_form_obj,  /* beside PLY                           */
                                      &npg_form_pc2,  /* 3ds Max, Blender, Marvelous Designer */
@@ -14,6 +15,7 @@ const npg_form *const npg_forms[] = {&npg_form_obj,  /* beside PLY              
                                      &npg_form_glb,  /* the web, Blender, Unreal */
                                      &npg_form_usda, /* USD tools, Unreal */
                                      &npg_form_npz,  /* NumPy                                */
+                                     &npg_form_vdb,  /* Houdini, Blender */
                                      NULL};
 
 /* ---- choosing ---- */

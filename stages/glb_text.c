@@ -127,7 +127,9 @@ static void add_mesh(builder *b)
         if (facts->has_normals) add(b, ",\"NORMAL\":%d", next++);
         add(b, "}");
     }
-    add(b, "%s}]}],", b->layout->pose_count > 1 ? "]" : "");
+    add(b, "%s}]", b->layout->pose_count > 1 ? "]" : "");
+    for (size_t t = 1; t < b->layout->pose_count; t++) add(b, "%s", t == 1 ? ",\"weights\":[0" : ",0");
+    add(b, "%s}],", b->layout->pose_count > 1 ? "]" : ""); /* weights at rest: VTK crashes without */
     if (b->layout->pose_count > 1)
         add(b,
             "\"animations\":[{\"name\":\"motion\",\"samplers\":[{\"input\":%d,\"output\":%d,"
