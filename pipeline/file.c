@@ -17,8 +17,8 @@ struct npg_file {
     int fd;
     npg_status status; /* of the first failure, with its text in `cause` */
     char cause[512];
-    char *path, *hidden_path; /* owned */
-    unsigned char *buffer;    /* BUFFER_SIZE, owned */
+    char *path, *hidden_path, *folder; /* owned */
+    unsigned char *buffer;             /* BUFFER_SIZE, owned */
     size_t used;
     uint64_t flushed; /* bytes that left the buffer */
 };
@@ -55,6 +55,7 @@ static void free_file(npg_file **slot)
 {
     npg_release(&(*slot)->path);
     npg_release(&(*slot)->hidden_path);
+    npg_release(&(*slot)->folder);
     npg_release(&(*slot)->buffer);
     npg_release(slot);
 }
@@ -67,6 +68,7 @@ npg_status npg_file_open(npg_file **out, const char *path)
     NPG_TRY(npg_alloc(&file, NPG_FOR_FILES, sizeof *file));
     NPG_TRY_OR(fail, status, npg_copy_text(&file->path, path));
     NPG_TRY_OR(fail, status, hide(&file->hidden_path, path));
+    NPG_TRY_OR(fail, status, folder_of(&file->folder, path));
     NPG_TRY_OR(fail, status, npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
     file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (file->fd < 0) {
@@ -156,10 +158,7 @@ npg_status npg_file_print(npg_file *file, const char *format, ...)
 /* The rename is on disk only once its folder is. */
 static npg_status sync_folder(npg_file *file)
 {
-    char *folder;
-    NPG_TRY(folder_of(&folder, file->path));
-    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    npg_release(&folder);
+    int fd = open(file->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return keep_failure(file, "sync the folder of");
     int failed = fsync(fd) && errno != EINVAL;
     if (failed) keep_failure(file, "sync the folder of");

@@ -40,6 +40,9 @@ static npg_status put_reference(npg_archive_writer *out, const npg_mesh *mesh)
     NPG_TRY(npg_archive_put(out, "reference.faces", mesh->faces, mesh->face_count * 3 * sizeof(uint32_t)));
     if (mesh->vert_colours) NPG_TRY(npg_archive_put(out, "reference.colours", mesh->vert_colours, v * 4));
     if (mesh->vert_uvs) NPG_TRY(npg_archive_put(out, "reference.uvs", mesh->vert_uvs, v * 2 * sizeof(float)));
+    if (mesh->corner_uvs)
+        NPG_TRY(npg_archive_put(out, "reference.corner_uvs", mesh->corner_uvs,
+                                mesh->face_count * 6 * sizeof(float)));
     return NPG_OK;
 }
 
@@ -229,6 +232,9 @@ static npg_status get_reference(npg_mesh **out, const npg_archive *in)
     if (!status) status = get_optional(in, "reference.normals", &mesh->vert_normals, v * 3 * sizeof(float));
     if (!status) status = get_optional(in, "reference.colours", &mesh->vert_colours, v * 4);
     if (!status) status = get_optional(in, "reference.uvs", &mesh->vert_uvs, v * 2 * sizeof(float));
+    if (!status)
+        status =
+            get_optional(in, "reference.corner_uvs", &mesh->corner_uvs, mesh->face_count * 6 * sizeof(float));
     if (status) npg_mesh_unref(&mesh);
     *out = mesh;
     return status;

@@ -331,27 +331,41 @@ static bool should_stop(void *worker)
     return npg_worker_stopping(worker);
 }
 
+/* What of the reference is the same in all poses. */
+static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, float **rest, float **corners)
+{
+    export_state *state = npg_worker_state(worker);
+    const npg_mesh *reference = npg_worker_facts(worker)->reference;
+    size_t v = reference->vert_count, f = reference->face_count;
+    NPG_TRY(npg_alloc_array(rest, NPG_FOR_FILES, v, 3 * sizeof **rest));
+    npg_place_points(&state->map, state->vert_world, &npg_worker_facts(worker)->box, reference->vert_pos, v);
+    for (size_t i = 0; i < 3 * v; i++) (*rest)[i] = (float)state->vert_world[i];
+    if (reference->corner_uvs) {
+        NPG_TRY(npg_alloc_array(corners, NPG_FOR_FILES, f, 6 * sizeof **corners));
+        npg_place_corners(&state->map, *corners, reference->corner_uvs, f);
+    }
+    facts->rest = *rest;
+    facts->corner_uvs = *corners;
+    facts->faces = state->faces;
+    facts->colours = reference->vert_colours;
+    facts->uvs = reference->vert_uvs;
+    return NPG_OK;
+}
+
 /* From the meshes on disk, in the order of time (forms.h says why). */
 static npg_status write_forms(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    const npg_mesh *reference = npg_worker_facts(worker)->reference;
     npg_form_watch watch = {.should_stop = should_stop, .user = worker};
-    npg_form_facts facts = form_facts(worker);
-    size_t v = reference->vert_count;
-    float *rest;
+    float *rest = NULL, *corners = NULL;
     if (!npg_forms_any(&state->choice)) return NPG_OK;
     if (!state->faces) NPG_TRY(begin_meshes(worker));
-    NPG_TRY(npg_alloc_array(&rest, NPG_FOR_FILES, v, 3 * sizeof *rest));
-    npg_place_points(&state->map, state->vert_world, &npg_worker_facts(worker)->box, reference->vert_pos, v);
-    for (size_t i = 0; i < 3 * v; i++) rest[i] = (float)state->vert_world[i];
-    facts.rest = rest;
-    facts.faces = state->faces;
-    facts.colours = reference->vert_colours;
-    facts.uvs = reference->vert_uvs;
-    npg_status status = npg_forms_write(&state->choice, &facts, &watch);
+    npg_form_facts facts = form_facts(worker);
+    npg_status status = place_reference(worker, &facts, &rest, &corners);
+    if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
     npg_release(&rest);
-    if (watch.repeated)
+    npg_release(&corners);
+    if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
                         "times",

@@ -183,6 +183,13 @@ static npg_status read_pose(forms_pass *p, const char *file)
     return status;
 }
 
+static bool has_steady(const npg_form_choice *choice)
+{
+    for (int i = 0; npg_forms[i]; i++)
+        if (choice->is_chosen[i] && npg_forms[i]->is_steady) return true;
+    return false;
+}
+
 static npg_status take_line(void *user, const json_t *frame, const char *line, size_t size)
 {
     forms_pass *p = user;
@@ -191,7 +198,7 @@ static npg_status take_line(void *user, const json_t *frame, const char *line, s
     (void)line, (void)size;
     if (p->watch->should_stop && p->watch->should_stop(p->watch->user)) return NPG_STOPPED;
     if (!file) return NPG_OK;
-    for (int64_t i = p->index + 1; p->mesh && i < index; i++) {
+    for (int64_t i = p->index + 1; p->mesh && has_steady(p->choice) && i < index; i++) {
         NPG_TRY(give(p, i, i, true));
         p->watch->repeated++;
     }

@@ -2,6 +2,7 @@
 #include "placement.h"
 
 #include <math.h>
+#include <string.h>
 
 npg_status npg_placement_parse(npg_placement *map, const char *axes)
 {
@@ -46,6 +47,13 @@ void npg_place_faces(const npg_placement *map, uint32_t *out, const uint32_t *fa
 {
     for (size_t f = 0; f < face_count; f++)
         for (size_t k = 0; k < 3; k++) out[3 * f + k] = faces[3 * f + (map->is_mirror ? 2 - k : k)];
+}
+
+void npg_place_corners(const npg_placement *map, float *out, const float *corners, size_t face_count)
+{
+    for (size_t f = 0; f < face_count; f++)
+        for (size_t k = 0; k < 3; k++)
+            memcpy(out + 6 * f + 2 * k, corners + 6 * f + 2 * (map->is_mirror ? 2 - k : k), 2 * sizeof *out);
 }
 
 double npg_place_largest(const npg_placement *map, const npg_frame_box *box)

@@ -24,6 +24,9 @@ void npg_place_normals(const npg_placement *placement, float *out, const float *
 /* F x 3, wound so that the surface still looks outward. */
 void npg_place_faces(const npg_placement *placement, uint32_t *out, const uint32_t *faces, size_t face_count);
 
+/* F x 3 x 2 values of the corners, in the order of those faces. */
+void npg_place_corners(const npg_placement *placement, float *out, const float *corners, size_t face_count);
+
 /* The largest coordinate that the box of the capture has as written, at most. */
 double npg_place_largest(const npg_placement *placement, const npg_frame_box *box);
 
