@@ -174,7 +174,9 @@ static npg_form_facts form_facts(const npg_worker *worker)
                             .largest = is_known ? npg_place_largest(&state->map, box) : 0,
                             .diagonal = is_known ? state->scale * box->diagonal : 0,
                             .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
-                            .voxel_share = state->voxel_share};
+                            .voxel_share = state->voxel_share,
+                            .has_grids = facts->job != NULL,
+                            .placement = &state->map};
 }
 
 /* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be

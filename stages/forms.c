@@ -58,6 +58,17 @@ npg_status npg_forms_choose(npg_form_choice *choice, const char *list, bool is_o
     return NPG_OK;
 }
 
+bool npg_forms_name(const char *list, const char *name)
+{
+    size_t length = strlen(name);
+    for (; *list; list += *list == ',') {
+        size_t size = strcspn(list, ",");
+        if (size == length && !strncmp(list, name, length)) return true;
+        list += size;
+    }
+    return false;
+}
+
 bool npg_forms_any(const npg_form_choice *choice)
 {
     for (int i = 0; npg_forms[i]; i++)

@@ -44,11 +44,13 @@ typedef struct npg_form_facts {
     int64_t first_index, last_index; /* of the poses                                         */
     double fps;
     double metres_per_unit;
-    bool is_z_up;             /* else y                                                    */
-    double largest, diagonal; /* coordinate, and of the box; 0: not known yet              */
-    double longest;           /* side of the box                                           */
-    double voxel_share;       /* a level set's voxel, in longest sides                     */
-    npg_form_log *log;        /* where files are noted                                     */
+    bool is_z_up;                          /* else y                                                    */
+    double largest, diagonal;              /* coordinate, and of the box; 0: not known yet              */
+    double longest;                        /* side of the box                                           */
+    double voxel_share;                    /* a level set's voxel, in longest sides                     */
+    bool has_grids;                        /* OUT/job holds the latent grids of this run's windows      */
+    const struct npg_placement *placement; /* the capture's coordinates to these; NULL: they are the same */
+    npg_form_log *log;                     /* where files are noted                                     */
 } npg_form_facts;
 
 typedef struct npg_pose {
@@ -87,6 +89,9 @@ typedef struct npg_form_choice {
 /* list: "ply,glb,..." or "".  is_obj: the sequence's format where the list names none; obj beside ply becomes
  * a sequence of its own.  NPG_USAGE names what is no form. */
 npg_status npg_forms_choose(npg_form_choice *choice, const char *list, bool is_obj);
+
+/* Whether a list that npg_forms_choose() takes has this name. */
+bool npg_forms_name(const char *list, const char *name);
 
 bool npg_forms_any(const npg_form_choice *choice);
 

@@ -4,6 +4,10 @@
 
 #include "frame_box.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* written[a] = scale * sign[a] * (world - centre)[from[a]] */
 typedef struct npg_placement {
     int from[3];
@@ -30,4 +34,7 @@ void npg_place_corners(const npg_placement *placement, float *out, const float *
 /* The largest coordinate that the box of the capture has as written, at most. */
 double npg_place_largest(const npg_placement *placement, const npg_frame_box *box);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -1,4 +1,5 @@
-/* VDB writer: OUT/volumes/<prefix>_0000.vdb, the level set of every frame.
+/* VDB writer: OUT/volumes/<prefix>_0000.vdb, the level set of every frame, and OUT/latents/window_000000.vdb,
+ * the latent grids of every window (write_latents.c).
  *
  * A level set needs a closed surface: openings are covered by fans over their rims, the same in every frame.
  * The voxel is a share of the longest side of the capture's box. */
@@ -11,6 +12,7 @@
 #include "forms.h"
 #include "vdb_file.h"
 #include "vdb_surface.h"
+#include "write_latents.h"
 
 typedef struct vdb_state {
     const npg_form_facts *facts;
@@ -82,8 +84,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 
 static npg_status finish(void *state)
 {
-    (void)state;
-    return NPG_OK;
+    return npg_latents_write(((vdb_state *)state)->facts);
 }
 
 static void close_vdb(void *state)
@@ -92,7 +93,7 @@ static void close_vdb(void *state)
 }
 
 const npg_form npg_form_vdb = {.name = "vdb",
-                               .help = "OpenVDB level set per frame",
+                               .help = "OpenVDB level set per frame, latent grids per window",
                                .state_size = sizeof(vdb_state),
                                .bytes = bytes,
                                .open = open_vdb,

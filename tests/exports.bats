@@ -67,6 +67,41 @@ find_modules() {
     grep -q '"metres_per_unit": 0.01' whole/done.json
 }
 
+@test "the latent grids of every window are there with their first component" {
+    [ "$(ls whole/latents | wc -l)" -eq "$(ls whole/job/*.vdb | wc -l)" ]
+    [ "$(ls whole/latents | wc -l)" -gt 1 ]
+    grep -aq position_L02_pc1 whole/latents/window_000000.vdb
+    grep -aq position_L00_c00 whole/latents/window_000000.vdb
+    if command -v vdb_print >/dev/null; then
+        vdb_print whole/latents/window_000000.vdb | grep pc1
+        vdb_print whole/volumes/frame_0000.vdb | grep surface
+    fi
+}
+
+@test "OBJ files keep colours and texture coordinates of the user's mesh" {
+    find_python
+    "$NEUPIG" run capture/points -o plain "${small[@]}" --keyframe 4 --format obj
+    "$python" - <<'END'
+lines, corner = [], 0
+for line in open("plain/meshes/frame_0004.obj"):
+    words = line.split()
+    if words[0] == "v":
+        lines.append(line.strip() + " 0.25 0.5 0.75")
+    if words[0] == "f":  # every corner has a texture coordinate of its own
+        lines += [f"vt {0.001 * (corner + k):.4f} {0.5 + 0.001 * k:.4f}" for k in range(3)]
+        lines.append("f " + " ".join(f"{words[1 + k]}/{corner + k + 1}" for k in range(3)))
+        corner += 3
+open("mine.obj", "w").write("# mine\nmtllib mine.mtl\nusemtl skin\n" + "\n".join(lines) + "\n")
+END
+    "$NEUPIG" run capture/points -o own "${small[@]}" --keyframe 4 --reference mine.obj --export ply,obj,glb,npz
+    "$python" "$BATS_TEST_DIRNAME/check_exports.py" obj own mine.obj
+    grep -aq "property float s" own/meshes/frame_0000.ply
+    grep -aq "property uchar red" own/meshes/frame_0000.ply
+    "$python" -c "import numpy as np; z = np.load('own/motion.npz'); assert z['corner_uvs'].shape == (len(z['faces']), 3, 2); assert (z['colours'][:, :3] == [64, 128, 191]).all()"
+    find_modules
+    node "$BATS_TEST_DIRNAME/check_exports.mjs" "$modules" glb own/motion.glb
+}
+
 @test "a run killed while it writes forms goes on and gives the same bytes" {
     "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}" >killed.log 2>&1 &
     pid=$!
@@ -76,7 +111,7 @@ find_modules() {
     [ ! -e killed/done.json ]
     "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}"
     grep -q resumed_frames killed/report.json
-    for name in motion.pc2 motion.mdd motion.glb motion.usda motion.npz reference.obj exports.jsonl obj volumes; do
+    for name in motion.pc2 motion.mdd motion.glb motion.usda motion.npz reference.obj exports.jsonl obj volumes latents; do
         diff -r whole/$name killed/$name
     done
     [ -z "$(find killed -name '.*.part')" ]

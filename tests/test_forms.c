@@ -15,9 +15,11 @@
 #include "border_caps.h"
 #include "corner_split.h"
 #include "forms.h"
+#include "latent_features.h"
 #include "mesh_tools.h"
 #include "reader.h"
 #include "rigid.h"
+#include "sobolev.h"
 #include "temp_folder.h"
 #include "vdb_surface.h"
 #include "writer.h"
@@ -412,6 +414,49 @@ static void a_rigid_motion_is_found(void **state)
     assert_true(fabs(det - 1) < 1e-12);
 }
 
+/* What the solve gives back must be what the matrix takes to the unknowns. */
+static void features_invert_the_grid_matrix(void **state)
+{
+    (void)state;
+    for (int screened = 0; screened < 2; screened++) {
+        npg_levels levels = {0};
+        npg_level level = {
+            .kind = NPG_LEVEL_POSITION, .nodes = 5, .channel_end = 32, .lambda = 3, .screened = screened};
+        npg_levels_add(&levels, level, 0);
+        size_t count = levels.row_count * NPG_LATENT_CHANNELS;
+        double *unknowns = calloc(count, sizeof *unknowns), *x = calloc(count, sizeof *x),
+               *again = calloc(count, sizeof *again);
+        for (size_t i = 0; i < count; i++) x[i] = unknowns[i] = sin(1.7 * (double)i) + (double)(i % 7);
+        assert_int_equal(npg_features_solve(x, 5, NPG_LATENT_CHANNELS, screened ? 19 : 1, 3), NPG_OK);
+        npg_sobolev_apply_ref(again, x, &levels);
+        for (size_t i = 0; i < count; i++) assert_true(fabs(again[i] - unknowns[i]) < 1e-10);
+        free(unknowns);
+        free(x);
+        free(again);
+    }
+}
+
+static void the_first_component_is_the_widest(void **state)
+{
+    enum { N = 500 };
+    static double rows[3 * N], out[N];
+    double direction[3], share;
+    (void)state;
+    for (int i = 0; i < N; i++) { /* wide along (0.6, -0.8, 0), narrow along z */
+        double wide = sin(0.7 * i) * 5, narrow = cos(1.1 * i) * 0.5;
+        rows[3 * i] = 2 + 0.6 * wide;
+        rows[3 * i + 1] = -0.8 * wide;
+        rows[3 * i + 2] = 1 + narrow;
+    }
+    assert_int_equal(npg_features_component(out, direction, &share, rows, N, 3), NPG_OK);
+    assert_true(fabs(direction[0] + 0.6) < 1e-2 && fabs(direction[1] - 0.8) < 1e-2);
+    assert_true(share > 0.98 && share < 1);
+    for (int i = 0; i < N; i++) assert_true(fabs(out[i] + 5 * sin(0.7 * i)) < 0.1);
+    for (int i = 0; i < 3 * N; i++) rows[i] = 1;
+    assert_int_equal(npg_features_component(out, direction, &share, rows, N, 3), NPG_OK);
+    assert_true(share == 0 && out[7] == 0);
+}
+
 /* ---- failures ---- */
 
 static void a_changed_mesh_is_noticed(void **state)
@@ -541,6 +586,8 @@ int main(void)
         cmocka_unit_test(large_archives_get_zip64),
         cmocka_unit_test(an_archive_that_is_not_full_is_no_file),
         cmocka_unit_test(a_rigid_motion_is_found),
+        cmocka_unit_test(features_invert_the_grid_matrix),
+        cmocka_unit_test(the_first_component_is_the_widest),
         cmocka_unit_test(a_changed_mesh_is_noticed),
         cmocka_unit_test(a_stop_leaves_nothing),
         cmocka_unit_test(a_full_disk_is_said),
