@@ -1,13 +1,17 @@
 /* Progress: how far a run is, as a bar on a terminal or as JSON lines, and the log on standard error. */
 #include "progress.h"
 
-#include <jansson.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
+
+#include "log_file.h"
+#include "stage.h"
 
 void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose)
 {
@@ -18,7 +22,22 @@ void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbos
                                         : verbose ? NPG_LOG_DEBUG
                                                   : NPG_LOG_INFO,
                                .colour = terminal && !getenv("NO_COLOR"),
-                               .drawn_s = -1};
+                               .drawn_s = -1,
+                               .log_fd = -1};
+}
+
+npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const char *output)
+{
+    if (!path[0]) return NPG_OK;
+    reporter->log_fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    if (reporter->log_fd < 0) {
+        npg_error_errno(NPG_DISK, "can't write %s", path);
+        return NPG_DISK;
+    }
+    npg_log_file_write(&reporter->log_fd,
+                       json_pack("{s:s,s:s,s:o,s:I}", "event", "start", "neupig", npg_version(), "output",
+                                 npg_json_text(output), "pid", (json_int_t)getpid()));
+    return NPG_OK;
 }
 
 /* ---- log ---- */
@@ -29,12 +48,24 @@ static void wipe_bar(npg_reporter *reporter)
     reporter->bar_drawn = false;
 }
 
+static json_t *json_of_record(const npg_log_record *record)
+{
+    static const char *const levels[] = {"error", "warning", "info", "debug"};
+    json_t *line =
+        json_pack("{s:s,s:s,s:s,s:f,s:o}", "event", "log", "level", levels[record->level], "stage",
+                  record->stage, "elapsed_s", record->time_s, "message", npg_json_text(record->message));
+    if (line && record->frame >= 0) json_object_set_new(line, "frame", json_integer(record->frame));
+    return line;
+}
+
 static void on_log(void *user, const npg_log_record *record)
 {
     static const char *const words[] = {"error: ", "warning: ", "", ""};
     static const char *const colours[] = {"\033[31m", "\033[33m", "", "\033[2m"};
     npg_reporter *reporter = user;
     char frame[40] = "";
+    if (record->level <= NPG_LOG_INFO || record->level <= reporter->level)
+        npg_log_file_write(&reporter->log_fd, json_of_record(record));
     if (record->level > reporter->level) return;
     wipe_bar(reporter);
     bool says_frame = !strncmp(record->message, "frame ", 6);
@@ -141,9 +172,14 @@ npg_hooks npg_reporter_hooks(npg_reporter *reporter)
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output)
 {
     wipe_bar(reporter);
-    if (reporter->show != NPG_SHOW_JSON) return;
-    json_t *line = json_pack("{s:s,s:s,s:i,s:s}", "event", "end", "status", npg_status_name(status),
-                             "exit_code", npg_status_exit_code(status), "output", output);
-    if (line && status < 0) json_object_set_new(line, "message", json_string(npg_error_text()));
-    if (line) print_line(line);
+    json_t *line = json_pack("{s:s,s:s,s:i,s:o}", "event", "end", "status", npg_status_name(status),
+                             "exit_code", npg_status_exit_code(status), "output", npg_json_text(output));
+    if (line && status < 0) json_object_set_new(line, "message", npg_json_text(npg_error_text()));
+    npg_log_file_write(&reporter->log_fd, json_incref(line));
+    if (line && reporter->show == NPG_SHOW_JSON)
+        print_line(line);
+    else
+        json_decref(line);
+    if (reporter->log_fd >= 0) close(reporter->log_fd);
+    reporter->log_fd = -1;
 }
