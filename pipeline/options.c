@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "json_file.h"
 #include "memory.h"
 #include "run_settings.h"
 #include "stage.h"
@@ -239,22 +240,6 @@ void npg_options_fill(const npg_options *options, const npg_option *table, void 
 
 /* ---- configuration file ---- */
 
-/* Blank out comments in place, so that line numbers stay. */
-static void blank_comments(char *text)
-{
-    bool in_string = false;
-    for (char *c = text; *c; c++) {
-        if (in_string && *c == '\\' && c[1]) {
-            c++;
-        } else if (*c == '"') {
-            in_string = !in_string;
-        } else if (!in_string && c[0] == '/' && c[1] == '/') {
-            for (; *c && *c != '\n'; c++) *c = ' ';
-            if (!*c) break;
-        }
-    }
-}
-
 /* The line of the key `name` of the outermost object, in text that is known to be good JSON. */
 static int line_of_key(const char *text, const char *name)
 {
@@ -274,7 +259,7 @@ static int line_of_key(const char *text, const char *name)
     return 0;
 }
 
-static npg_status set_from_json(npg_options *options, const char *name, const json_t *value)
+npg_status npg_options_set_json(npg_options *options, const char *name, const json_t *value)
 {
     char number[64];
     if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
@@ -288,25 +273,6 @@ static npg_status set_from_json(npg_options *options, const char *name, const js
     return npg_options_set(options, name, number);
 }
 
-static npg_status read_text_file(char **text, const char *path)
-{
-    enum { LIMIT = 1 << 20 };
-    *text = NULL;
-    FILE *file = fopen(path, "rb");
-    if (!file) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    npg_status status = npg_alloc(text, NPG_FOR_FILES, LIMIT + 1);
-    size_t size = status ? 0 : fread(*text, 1, LIMIT + 1, file);
-    if (!status && ferror(file)) status = npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    if (!status && size > LIMIT)
-        status = npg_error(NPG_USAGE, "%s: larger than 1 MiB, not a configuration", path);
-    fclose(file);
-    if (status)
-        npg_release(text);
-    else
-        (*text)[size] = 0;
-    return status;
-}
-
 static npg_status set_all_from_json(npg_options *options, json_t *root, const char *path, const char *text)
 {
     const char *name;
@@ -314,7 +280,7 @@ static npg_status set_all_from_json(npg_options *options, json_t *root, const ch
     if (!json_is_object(root)) return npg_error(NPG_USAGE, "%s: not a JSON object", path);
     json_object_foreach(root, name, value)
     {
-        npg_status status = set_from_json(options, name, value);
+        npg_status status = npg_options_set_json(options, name, value);
         if (status) return npg_error_prefix(status, "%s:%d", path, line_of_key(text, name));
     }
     return NPG_OK;
@@ -322,15 +288,12 @@ static npg_status set_all_from_json(npg_options *options, json_t *root, const ch
 
 npg_status npg_options_load(npg_options *options, const char *path)
 {
+    enum { LIMIT = 1 << 20 };
     char *text;
-    json_error_t error;
+    json_t *root;
     NPG_REQUIRE(options && path);
-    NPG_TRY(read_text_file(&text, path));
-    blank_comments(text);
-    json_t *root = json_loads(text, JSON_REJECT_DUPLICATES, &error);
-    npg_status status =
-        root ? set_all_from_json(options, root, path, text)
-             : npg_error(NPG_USAGE, "%s:%d:%d: %s", path, error.line, error.column, error.text);
+    NPG_TRY(npg_json_read(&root, &text, path, LIMIT));
+    npg_status status = set_all_from_json(options, root, path, text);
     npg_release(&text);
     json_decref(root);
     return status;

@@ -54,6 +54,10 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options);
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
 
+/* npg_options_set() from a JSON text, number or true/false. */
+struct json_t;
+npg_status npg_options_set_json(npg_options *options, const char *name, const struct json_t *value);
+
 /* Check `text` against an option; NPG_USAGE says what it takes. */
 npg_status npg_option_check(const npg_option *option, const char *text);
 
