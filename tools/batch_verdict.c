@@ -69,12 +69,12 @@ bool npg_verdict_is_done(const npg_verdict *v)
     return v->is_known && (v->exit_code == 0 || v->exit_code == 7);
 }
 
-int npg_batch_exit_code(const npg_batch *batch, bool stopped)
+int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
 {
     int code = 0;
     for (size_t i = 0; i < batch->count; i++) {
         const npg_verdict *v = &batch->captures[i].verdict;
-        if (!npg_batch_is_mine(batch, i)) continue;
+        if (!of_all && !npg_batch_is_mine(batch, i)) continue;
         if (!npg_verdict_is_done(v))
             code = 1;
         else if (v->exit_code == 7 && !code)

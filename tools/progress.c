@@ -42,7 +42,7 @@ npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const
 
 /* ---- log ---- */
 
-static void wipe_bar(npg_reporter *reporter)
+void npg_reporter_pause(npg_reporter *reporter)
 {
     if (reporter->bar_drawn) fputs("\r\033[K", stderr);
     reporter->bar_drawn = false;
@@ -67,7 +67,7 @@ static void on_log(void *user, const npg_log_record *record)
     if (record->level <= NPG_LOG_INFO || record->level <= reporter->level)
         npg_log_file_write(&reporter->log_fd, json_of_record(record));
     if (record->level > reporter->level) return;
-    wipe_bar(reporter);
+    npg_reporter_pause(reporter);
     bool says_frame = !strncmp(record->message, "frame ", 6);
     if (record->frame >= 0 && !says_frame)
         snprintf(frame, sizeof frame, "frame %lld: ", (long long)record->frame);
@@ -78,8 +78,7 @@ static void on_log(void *user, const npg_log_record *record)
 
 /* ---- progress ---- */
 
-/* "1:02:03", "2:03", or "?" while it can't be told. */
-static void spell_time(char *out, size_t size, double seconds)
+void npg_spell_time(char *out, size_t size, double seconds)
 {
     if (!(seconds >= 0) || seconds > 1e8) {
         snprintf(out, size, "?");
@@ -104,8 +103,8 @@ static void draw_bar(npg_reporter *reporter, const npg_progress *progress)
     if (reporter->drawn_s >= 0 && progress->elapsed_s - reporter->drawn_s < 0.1 && progress->share < 1)
         return;
     reporter->drawn_s = progress->elapsed_s;
-    spell_time(left, sizeof left, progress->left_s);
-    spell_time(elapsed, sizeof elapsed, progress->elapsed_s);
+    npg_spell_time(left, sizeof left, progress->left_s);
+    npg_spell_time(elapsed, sizeof elapsed, progress->elapsed_s);
     int at = snprintf(tail, sizeof tail, " %3.0f %% %s, left %s, %s", 100 * progress->share, elapsed, left,
                       progress->stage ? progress->stage : "");
     if (progress->steps > 0)
@@ -171,7 +170,7 @@ npg_hooks npg_reporter_hooks(npg_reporter *reporter)
 
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output)
 {
-    wipe_bar(reporter);
+    npg_reporter_pause(reporter);
     json_t *line = json_pack("{s:s,s:s,s:i,s:o}", "event", "end", "status", npg_status_name(status),
                              "exit_code", npg_status_exit_code(status), "output", npg_json_text(output));
     if (line && status < 0) json_object_set_new(line, "message", npg_json_text(npg_error_text()));

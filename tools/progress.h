@@ -5,6 +5,7 @@
 #include "status.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 
 enum { NPG_SHOW_AUTO, NPG_SHOW_BAR, NPG_SHOW_JSON, NPG_SHOW_NONE }; /* the words of --progress */
 
@@ -26,7 +27,13 @@ npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const
 /* Hooks for a run; the reporter is a loan until the run is closed. */
 npg_hooks npg_reporter_hooks(npg_reporter *reporter);
 
+/* Remove the bar before something else is printed. */
+void npg_reporter_pause(npg_reporter *reporter);
+
 /* Remove the bar, and write the closing record to the log file and in JSON mode to standard output. */
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output);
+
+/* "1:02:03", "2:03", or "?" where it can't be told. */
+void npg_spell_time(char *out, size_t size, double seconds);
 
 #endif
