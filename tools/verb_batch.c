@@ -11,7 +11,7 @@
 typedef struct settings {
     const char *config;
     int progress;
-    bool quiet, verbose, dry_run, list;
+    bool quiet, verbose, dry_run, list, report;
     int64_t jobs, task_index, task_count;
     double max_time_s;
 } settings;
@@ -34,6 +34,10 @@ const npg_option npg_batch_options[] = {
      AT(dry_run), "no", 0, 0, NULL, NULL},
     {"list", "Only print the names of the captures, one per line", NPG_OPTION_FLAG, AT(list), "no", 0, 0,
      NULL, NULL},
+    {"report",
+     "Only write batch.json and batch.html and print the table of what is there; the exit code is that of "
+     "all",
+     NPG_OPTION_FLAG, AT(report), "no", 0, 0, NULL, NULL},
     {"task-index", "With several processes or machines: the number of this one, from 0", NPG_OPTION_INT,
      AT(task_index), "0", 0, 1e6, NULL, "I"},
     {"task-count", "... of so many; each capture is done by exactly one", NPG_OPTION_INT, AT(task_count), "1",
@@ -83,6 +87,17 @@ static npg_status run(npg_batch *batch, const settings *s)
     return status;
 }
 
+/* Whatever process has run the captures. */
+static npg_status report(npg_batch *batch, const settings *s)
+{
+    batch->task_index = 0;
+    batch->task_count = 1;
+    for (size_t i = 0; i < batch->count; i++)
+        npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
+    NPG_TRY(npg_batch_report(batch, s->quiet ? NULL : stdout));
+    return status_of(batch, npg_batch_exit_code(batch, true, false));
+}
+
 static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settings *s)
 {
     const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s};
@@ -111,7 +126,7 @@ int npg_verb_batch(int argc, char **argv)
     else if (!status && s.dry_run)
         status = npg_batch_estimate(batch, s.progress == NPG_SHOW_JSON, &code);
     else if (!status)
-        status = run(batch, &s);
+        status = s.report ? report(batch, &s) : run(batch, &s);
     npg_batch_close(&batch);
     npg_options_close(&options);
     return status ? npg_cli_end(argv[0], status) : code;
