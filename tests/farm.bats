@@ -109,7 +109,7 @@ start_slurm() {
     head -c 128 /dev/urandom >"$folder/key"
     chmod 600 "$folder/key"
     munged --key-file="$folder/key" --socket="$folder/munge" --pid-file="$folder/munged.pid" \
-        --log-file="$folder/munged.log" --seed-file="$folder/seed" || return 1
+        --log-file="$folder/munged.log" --seed-file="$folder/seed" 3>&- || return 1
     cat >"$folder/slurm.conf" <<CONFIG
 ClusterName=neupig
 SlurmctldHost=$name(127.0.0.1)
@@ -139,7 +139,8 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 SlurmdParameters=config_overrides
 CONFIG
     export SLURM_CONF=$folder/slurm.conf
-    slurmctld -f "$SLURM_CONF" >"$folder/start.log" 2>&1 && slurmd -f "$SLURM_CONF" >>"$folder/start.log" 2>&1 || return 1
+    slurmctld -f "$SLURM_CONF" >"$folder/start.log" 2>&1 3>&- || return 1
+    slurmd -f "$SLURM_CONF" >>"$folder/start.log" 2>&1 3>&- || return 1
     for ((n = 0; n < 150; n++)); do
         sinfo -h -o %T 2>/dev/null | grep -q idle && return 0
         sleep 0.2
@@ -149,14 +150,16 @@ CONFIG
 
 teardown() {
     local daemon pid
+    [ -n "${slurm:-}" ] || return 0
     for daemon in slurmd slurmctld munged; do
-        pid=$(cat "$BATS_FILE_TMPDIR/slurm/$daemon.pid" 2>/dev/null) || continue
+        pid=$(cat "$slurm/$daemon.pid" 2>/dev/null) || continue
         kill "$pid" 2>/dev/null || continue
         for ((n = 0; n < 100; n++)); do
             kill -0 "$pid" 2>/dev/null || break
             sleep 0.1
         done
     done
+    rm -rf "$slurm"
 }
 
 @test "a Slurm array does each capture once, and goes on after SIGTERM and after a requeue" {
@@ -165,8 +168,10 @@ teardown() {
     done
     [ "$(id -u)" -eq 0 ] || skip "a Slurm of one's own is started as root"
     export PATH=$PATH:/usr/sbin:/sbin
-    if ! start_slurm "$BATS_FILE_TMPDIR/slurm"; then
-        tail -n 5 slurm/*.log
+    slurm=$(mktemp -d) # munged wants its socket where everybody can reach it
+    chmod 755 "$slurm"
+    if ! start_slurm "$slurm"; then
+        tail -n 5 "$slurm"/*.log >&3
         skip "slurmctld, slurmd or munged can't start here"
     fi
     echo "{\"output\": \"farm\", \"defaults\": {$tiny, $long}, \"captures\": [{\"input\": \"long\", \"name\": \"a\"},
@@ -174,12 +179,12 @@ teardown() {
     job=$(sbatch --parsable --array=1-2 --output="$PWD/task-%a.log" "$samples/batch.sbatch" "$PWD/farm.json" "$PWD/farm")
     is_idle() { [ -z "$(squeue -h -j "$job")" ]; }
     has_state() { ls "farm/$1/job/window_000000.npg" || is_idle; }
-    slurm=$(cat slurm/slurmctld.pid)
-    await "$slurm" has_state a >/dev/null
+    controller=$(cat "$slurm/slurmctld.pid")
+    await "$controller" has_state a >/dev/null
     scancel --batch --signal=TERM "${job}_1"
-    await "$slurm" has_state b >/dev/null
+    await "$controller" has_state b >/dev/null
     scontrol requeue "${job}_2"
-    await "$slurm" is_idle
+    await "$controller" is_idle
     cat task-*.log
     [ "$(cat task-*.log | grep -c 'stopped, queued again')" -eq 2 ]
     for capture in a b c; do
