@@ -22,7 +22,9 @@ mkdir -p "$out"
 # The second SIGTERM makes parallel pass it on to the runs, which write their states and end.
 stop() {
     stopped=yes
-    kill -TERM $parallel && sleep 0.2 && kill -TERM $parallel || true
+    kill -TERM $parallel 2>/dev/null || return 0
+    sleep 0.2
+    kill -TERM $parallel 2>/dev/null || true
 }
 
 stopped=no

@@ -1,6 +1,6 @@
 # Many captures at once: verdicts, limits, signals, manifests, the folders and configurations of the published code.
 
-tiny='"width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
+tiny='"keyframe": 1, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
     "align-steps": 3, "grid-levels": 2, "max-residual": 100, "max-flipped": 100, "max-stretched": 100, "min-coverage": 0'
 small="\"epochs\": 2, $tiny"
 endless='"epochs": 1000000, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "grid-levels": 2'
@@ -254,7 +254,7 @@ CONFIG
     run "$NEUPIG" batch ama -o ama --list
     [ "$output" = $'crane\njump' ]
     run "$NEUPIG" batch ama -o results --config fit.json --faces 200 --poisson-depth 5 --max-residual 100 \
-        --max-flipped 100 --max-stretched 100 --min-coverage 0
+        --max-flipped 100 --max-stretched 100 --min-coverage 0 --keyframe 1
     echo "$output"
     [ "$status" -eq 0 ]
     [[ "$output" == *'no counterpart here'*'normal_dim = 1, grid.neighbours, grid.solver'* ]]

@@ -1,6 +1,6 @@
 # Recipes for many captures: GNU parallel, a watch folder, a real Slurm on this machine.
 
-tiny='"width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
+tiny='"keyframe": 1, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
     "align-steps": 3, "grid-levels": 2, "max-residual": 100, "max-flipped": 100, "max-stretched": 100, "min-coverage": 0'
 small="\"epochs\": 2, $tiny"
 long='"epochs": 40, "window": 5, "overlap": 2'

@@ -136,12 +136,15 @@ static npg_status add_worst(npg_file *page, const npg_capture *capture, const np
 {
     char caption[128], *mesh = NULL;
     const npg_frame_figures *worst = f->worst < f->count ? &f->frames[f->worst] : NULL;
-    if (!worst || !worst->file) return NPG_OK;
-    NPG_TRY(npg_join_path(&mesh, capture->output, worst->file));
+    if (!worst) return NPG_OK;
     snprintf(caption, sizeof caption, "worst frame: %lld, %.3f %%", (long long)worst->number, worst->error);
+    if (!worst->file) {
+        npg_file_print(page, "<p class=\"none\">%s; it has no mesh file of its own</p>\n", caption);
+        return NPG_OK;
+    }
+    NPG_TRY(npg_join_path(&mesh, capture->output, worst->file));
     npg_status status = npg_page_picture(page, mesh, worst->source, caption);
-    snprintf(caption, sizeof caption, "its points");
-    if (!status && worst->source) status = npg_page_picture(page, worst->source, mesh, caption);
+    if (!status && worst->source) status = npg_page_picture(page, worst->source, mesh, "its points");
     npg_release(&mesh);
     return status;
 }
