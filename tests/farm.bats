@@ -151,6 +151,13 @@ CONFIG
 teardown() {
     local daemon pid
     [ -n "${slurm:-}" ] || return 0
+    if [ -n "${job:-}" ]; then
+        scancel --quiet "$job" 2>/dev/null || true
+        for ((n = 0; n < 400; n++)); do
+            [ -n "$(squeue -h -j "$job" 2>/dev/null)" ] || break
+            sleep 0.1
+        done
+    fi
     for daemon in slurmd slurmctld munged; do
         pid=$(cat "$slurm/$daemon.pid" 2>/dev/null) || continue
         kill "$pid" 2>/dev/null || continue
