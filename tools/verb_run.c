@@ -5,24 +5,30 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "cli.h"
+#include "clock.h"
 #include "progress.h"
 #include "run_job.h"
 
 typedef struct settings {
-    const char *config;
+    const char *config, *log_file;
     int progress;
     bool quiet, verbose;
 } settings;
 
 const npg_option npg_run_verb_options[] = {
-    {"config", "Read options from a JSON object in FILE; the command line wins (also -c)", NPG_OPTION_TEXT,
-     offsetof(settings, config), "", 0, 0, NULL, "FILE"},
+    {"config",
+     "Read options from a JSON object in FILE, or take a method configuration of the paper's published code; "
+     "the command line wins (also -c)",
+     NPG_OPTION_TEXT, offsetof(settings, config), "", 0, 0, NULL, "FILE"},
     {"progress",
      "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal",
      NPG_OPTION_CHOICE, offsetof(settings, progress), "auto", 0, 0, "auto|bar|json|none", NULL},
+    {"log-file", "Append the log to FILE, one JSON object per line", NPG_OPTION_TEXT,
+     offsetof(settings, log_file), "", 0, 0, NULL, "FILE"},
     {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, offsetof(settings, quiet), "no", 0,
      0, NULL, NULL},
     {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
@@ -31,7 +37,8 @@ const npg_option npg_run_verb_options[] = {
 
 /* ---- signals ---- */
 
-#define STOP_SECONDS 4 /* a run that has not stopped by then is ended */
+#define STOP_SECONDS  4 /* a run that has not stopped by then is ended */
+#define AGAIN_SECONDS 1 /* schedulers signal every process of a job, and who started us passes his on */
 
 typedef struct watcher {
     npg_run *run;         /* loan */
@@ -63,6 +70,19 @@ static int next_signal(const watcher *w, const struct timespec *limit)
     return number;
 }
 
+/* The second request: one that comes right after the first is the same one on another way. */
+static int wait_for_second(const watcher *w)
+{
+    double begin_s = npg_clock_s();
+    for (;;) {
+        double left_s = begin_s + STOP_SECONDS - npg_clock_s();
+        if (left_s < 0) left_s = 0;
+        const struct timespec limit = {(time_t)left_s, (long)(1e9 * (left_s - (double)(time_t)left_s))};
+        int number = next_signal(w, &limit);
+        if (number < 0 || number == SIGUSR1 || npg_clock_s() > begin_s + AGAIN_SECONDS) return number;
+    }
+}
+
 /* The first signal stops the run in good order; the second ends the process the usual way.  Where something
  * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
  * moment. */
@@ -70,10 +90,9 @@ static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to go on\n";
     const watcher *w = argument;
-    const struct timespec limit = {.tv_sec = STOP_SECONDS};
     if (next_signal(w, NULL) == SIGUSR1) return NULL;
     npg_run_stop(w->run);
-    int number = next_signal(w, &limit);
+    int number = wait_for_second(w);
     if (number == SIGUSR1) return NULL;
     if (number < 0) {
         ssize_t written = write(STDERR_FILENO, text, sizeof text - 1);
@@ -83,6 +102,15 @@ static void *watch_signals(void *argument)
     pthread_sigmask(SIG_UNBLOCK, &w->all, NULL);
     raise(number);
     return NULL;
+}
+
+/* A run that a batch started stops when the batch is gone, however that ended. */
+static void stop_with_parent(void)
+{
+    const char *parent = getenv(NPG_PARENT_VARIABLE);
+    if (!parent) return;
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != (pid_t)strtol(parent, NULL, 10)) kill(getpid(), SIGTERM);
 }
 
 static npg_status start_watching(watcher *w, npg_run *run)
@@ -126,12 +154,13 @@ npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
     npg_run *run = NULL;
     watcher signals = {.run = NULL};
     block_signals(&signals);
+    stop_with_parent();
     npg_status status = npg_run_open(&run, options, &hooks);
     bool is_open = !status;
     if (is_open) status = start_watching(&signals, run);
     if (!status) status = npg_run_wait(run);
     end_watching(&signals);
-    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
+    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     npg_run_close(&run);
     return status;
 }
@@ -160,7 +189,8 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
-        status = npg_run_job(options, &reporter);
+        status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
+        if (!status) status = npg_run_job(options, &reporter);
         if (reporter.show != NPG_SHOW_JSON)
             npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }
