@@ -9,12 +9,13 @@
 
 #include "cli.h"
 #include "progress.h"
-#include "run_job.h"
+#include "segments.h"
 
 typedef struct settings {
     const char *config;
     int progress;
     bool quiet, verbose;
+    int segments;
 } settings;
 
 const npg_option npg_run_verb_options[] = {
@@ -27,6 +28,10 @@ const npg_option npg_run_verb_options[] = {
      0, NULL, NULL},
     {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
      NULL},
+    {"segments",
+     "Where the topology changes: one reference all the same, with an alarm (one), or another reference from "
+     "there on, each with its frames in OUT/segment_* (auto)",
+     NPG_OPTION_CHOICE, offsetof(settings, segments), "one", 0, 0, "one|auto", NULL},
     {0}};
 
 /* ---- signals ---- */
@@ -105,13 +110,14 @@ static void end_watching(watcher *w)
 
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
-    static const char *const names[] = {"meshes", "reference.ply", "frames.jsonl", "report.json",
-                                        "done.json"};
+    static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl",
+                                        "report.json", "segments.json", "done.json"};
     char path[4096];
     if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig %s: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
+                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; see the "
+                "warnings, or %s/report.json\n",
                 verb, output);
     if (status < 0 || status == NPG_STOPPED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
@@ -120,19 +126,24 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
     }
 }
 
-npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
     watcher signals = {.run = NULL};
     block_signals(&signals);
     npg_status status = npg_run_open(&run, options, &hooks);
-    bool is_open = !status;
-    if (is_open) status = start_watching(&signals, run);
+    if (!status) status = start_watching(&signals, run);
     if (!status) status = npg_run_wait(run);
     end_watching(&signals);
-    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     npg_run_close(&run);
+    return status;
+}
+
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
+{
+    npg_status status = npg_run_once(options, reporter);
+    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }
 
@@ -149,6 +160,13 @@ static npg_status check_paths(npg_options *options, const npg_cli *cli)
     return NPG_OK;
 }
 
+static npg_status start(const npg_options *options, const settings *s, npg_reporter *reporter)
+{
+    if (s->segments == NPG_SEGMENTS_AUTO) return npg_segments_run(options, reporter);
+    NPG_TRY(npg_segments_make_way(options));
+    return npg_run_job(options, reporter);
+}
+
 int npg_verb_run(int argc, char **argv)
 {
     settings s;
@@ -160,7 +178,7 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
-        status = npg_run_job(options, &reporter);
+        status = start(options, &s, &reporter);
         if (reporter.show != NPG_SHOW_JSON)
             npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }
