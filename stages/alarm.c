@@ -17,7 +17,7 @@ static const struct {
     const char *name, *what;
     double floor;
 } kinds[NPG_MISFITS] = {{"far", "of the points are far from the surface in one place", 0.01},
-                        {"bare", "of the surface have no points near them in one place", 0.006},
+                        {"bare", "of the surface have no points near them in one place", 0.015},
                         {"torn", "of the surface are torn apart in one place", 0.003}};
 
 typedef struct record {

@@ -55,11 +55,10 @@ typedef struct evaluate_state {
     npg_truth *truth;
     bool is_tied;          /* the truth, in a frame */
     float *points, *dists; /* N x 3 and max(N, V), of the frame at hand, in units; owned */
-    float *point_dists;    /* N, in the points' order; owned */
     npg_surface_hit *hits; /* N; owned */
     uint32_t *nearest;     /* V; owned */
     double *vert_areas;    /* V; owned */
-    size_t points_capacity, dists_capacity, point_dists_capacity, hits_capacity;
+    size_t points_capacity, dists_capacity, hits_capacity;
     aggregate sums[SUMMED];
     int64_t *bad; /* numbers of the frames below the bar; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
@@ -78,8 +77,6 @@ static npg_status take_points(evaluate_state *state, const npg_frame_box *box, c
         npg_grow(&state->points, &state->points_capacity, count, 3 * sizeof *state->points, NPG_FOR_QUERY));
     NPG_TRY(npg_grow(&state->hits, &state->hits_capacity, count, sizeof *state->hits, NPG_FOR_QUERY));
     NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, count, sizeof *state->dists, NPG_FOR_QUERY));
-    NPG_TRY(npg_grow(&state->point_dists, &state->point_dists_capacity, count, sizeof *state->point_dists,
-                     NPG_FOR_QUERY));
     *taken = 0;
     for (size_t i = 0; i < frame->point_count; i += step) {
         const float *p = frame->pos_local + 3 * i;
@@ -114,7 +111,7 @@ static npg_status measure_points(evaluate_state *state, npg_figures *figures, si
         double dist_sq = (double)state->hits[i].dist_sq;
         sum_sq += dist_sq;
         sum += sqrt(dist_sq);
-        state->point_dists[i] = state->dists[i] = (float)sqrt(dist_sq);
+        state->dists[i] = (float)sqrt(dist_sq);
     }
     qsort(state->dists, count, sizeof *state->dists, by_size);
     figures->point_dist_median = quantile(state->dists, count, 0.5) * per_unit;
@@ -174,7 +171,7 @@ static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, 
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
     npg_misfit_frame frame = {.points = state->points,
-                              .point_dists = state->point_dists,
+                              .hits = state->hits,
                               .point_count = point_count,
                               .point_dist_median = figures->point_dist_median / per_unit,
                               .vert_unit = vert_unit,
@@ -188,11 +185,11 @@ static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, 
 
 /* ---- one frame ---- */
 
-static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference)
+static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference, double unseen_share)
 {
     size_t v = reference->vert_count;
     NPG_TRY(npg_shape_open(&state->shape, reference));
-    NPG_TRY(npg_misfit_open(&state->finder, reference));
+    NPG_TRY(npg_misfit_open(&state->finder, reference, unseen_share));
     NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, v, sizeof *state->nearest));
     NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, v, sizeof *state->vert_areas));
     return npg_surface_open(&state->surface, reference->vert_pos, v, reference->faces, reference->face_count);
@@ -246,7 +243,7 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     npg_figures *figures = &frame->figures;
     double per_unit = 1 / (facts->box.scale * facts->box.diagonal), points_sq, vertices_sq;
     size_t point_count = 0;
-    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference));
+    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference, facts->unseen_share));
     NPG_TRY(check_vertices(frame, facts->reference));
     npg_shape_measure(state->shape, figures, frame->vert_unit);
     if (state->truth) NPG_TRY(compare_truth(worker, frame));
@@ -447,7 +444,6 @@ static void uninit(npg_worker *worker)
     npg_topology_close(&state->topology);
     npg_truth_close(&state->truth);
     npg_release(&state->points);
-    npg_release(&state->point_dists);
     npg_release(&state->dists);
     npg_release(&state->hits);
     npg_release(&state->nearest);

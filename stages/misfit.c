@@ -10,14 +10,19 @@
 #define REACH_SPACINGS 3.0
 #define REACH_SIZE     0.015 /* of the reference's diagonal */
 #define REACH_MEDIANS  5.0
-#define LINK_SPACINGS  2.0 /* between neighbours in a cluster of far points */
-#define LINKS          6   /* neighbours that are looked at                 */
-#define TORN           1.5 /* times its length in the reference                */
-#define OFF_SHARE      0.6 /* of the reach: torn surface lies off the points   */
+#define REACH_MOST     2.0  /* times what it is without noise */
+#define LINK_SPACINGS  2.0  /* between neighbours in a cluster of far points */
+#define LINKS          6    /* neighbours that are looked at                 */
+#define UNSEEN_MOST    0.02 /* of the reference: more than that, and it is of cameras that see parts */
+#define BESIDE_SIZE    0.15 /* of the diagonal: as far beyond a border lies surface not seen before  */
+#define TORN           1.5  /* times its length in the reference                */
+#define OFF_SHARE      0.6  /* of the reach: torn surface lies off the points   */
 
 struct npg_misfit_finder {
     const npg_mesh *reference; /* loan */
-    double size;               /* its diagonal */
+    double size;               /* its diagonal                                       */
+    bool is_closed;            /* its frame saw all of it                            */
+    uint8_t *is_border;        /* V: on the border of what its frame saw; owned      */
     uint32_t (*edges)[2];      /* E x 2; owned */
     size_t edge_count;
     float *edge_lengths; /* E, of the reference; owned */
@@ -55,12 +60,29 @@ static npg_status take_reference(npg_misfit_finder *f)
     return NPG_OK;
 }
 
-npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference)
+static npg_status find_borders(npg_misfit_finder *f)
+{
+    const npg_mesh *mesh = f->reference;
+    uint32_t *twins;
+    NPG_TRY(npg_alloc_array(&f->is_border, NPG_FOR_MESH, mesh->vert_count, sizeof *f->is_border));
+    NPG_TRY(npg_alloc_array(&twins, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twins));
+    npg_status status = npg_mesh_twins(twins, mesh->faces, mesh->face_count);
+    for (size_t h = 0; h < 3 * mesh->face_count && !status; h++) {
+        if (twins[h] != UINT32_MAX) continue;
+        f->is_border[mesh->faces[h]] = f->is_border[mesh->faces[h - h % 3 + (h + 1) % 3]] = 1;
+    }
+    npg_release(&twins);
+    return status;
+}
+
+npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, double unseen_share)
 {
     npg_misfit_finder *finder;
     NPG_TRY(npg_alloc(&finder, NPG_FOR_MESH, sizeof *finder));
     finder->reference = reference;
+    finder->is_closed = unseen_share <= UNSEEN_MOST;
     npg_status status = take_reference(finder);
+    if (!status) status = find_borders(finder);
     if (status) npg_misfit_close(&finder);
     *out = finder;
     return status;
@@ -70,8 +92,8 @@ void npg_misfit_close(npg_misfit_finder **slot)
 {
     npg_misfit_finder *f = *slot;
     if (!f) return;
-    void *all[] = {&f->edges, &f->edge_lengths, &f->parents, &f->sums,
-                   &f->flags, &f->far,          &f->links,   &f->link_sq};
+    void *all[] = {&f->is_border, &f->edges, &f->edge_lengths, &f->parents, &f->sums,
+                   &f->flags,     &f->far,   &f->links,        &f->link_sq};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -132,18 +154,29 @@ static npg_status link_far(npg_misfit_finder *f, size_t count, double link)
     return status;
 }
 
+/* Points beyond the border of a reference that its frame saw in part are of what it did not see. */
+static bool is_far(const npg_misfit_finder *f, const npg_surface_hit *hit, double reach)
+{
+    double dist_sq = (double)hit->dist_sq, beside = BESIDE_SIZE * f->size, on_border = 0;
+    if (!(dist_sq > reach * reach)) return false;
+    const uint32_t *face = f->reference->faces + 3 * (size_t)hit->face;
+    for (int k = 0; k < 3; k++)
+        if (f->is_border[face[k]]) on_border += (double)hit->weights[k];
+    return on_border < 0.999 || dist_sq > beside * beside;
+}
+
 static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
                            double reach, double link)
 {
     size_t count = 0;
-    for (size_t i = 0; i < frame->point_count; i++) count += (double)frame->point_dists[i] > reach;
+    for (size_t i = 0; i < frame->point_count; i++) count += is_far(f, &frame->hits[i], reach);
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
     if (!count) return NPG_OK;
     NPG_TRY(npg_grow(&f->far, &f->far_room, count, 3 * sizeof *f->far, NPG_FOR_QUERY));
     NPG_TRY(begin_places(f, count));
     count = 0;
     for (size_t i = 0; i < frame->point_count; i++) {
-        if (!((double)frame->point_dists[i] > reach)) continue;
+        if (!is_far(f, &frame->hits[i], reach)) continue;
         for (size_t a = 0; a < 3; a++) f->far[3 * count + a] = frame->points[3 * i + a];
         count++;
     }
@@ -160,6 +193,13 @@ static void flag_off(npg_misfit_finder *f, const npg_misfit_frame *frame, double
         f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach;
 }
 
+static void join_flagged(npg_misfit_finder *f)
+{
+    for (size_t e = 0; e < f->edge_count; e++)
+        if (f->flags[f->edges[e][0]] && f->flags[f->edges[e][1]])
+            join(f->parents, f->edges[e][0], f->edges[e][1]);
+}
+
 static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
 {
     size_t v = f->reference->vert_count;
@@ -172,10 +212,10 @@ static npg_status find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_
                             double reach)
 {
     NPG_TRY(begin_places(f, f->reference->vert_count));
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!f->is_closed) return NPG_OK;
     flag_off(f, frame, reach);
-    for (size_t e = 0; e < f->edge_count; e++)
-        if (f->flags[f->edges[e][0]] && f->flags[f->edges[e][1]])
-            join(f->parents, f->edges[e][0], f->edges[e][1]);
+    join_flagged(f);
     add_flagged(f, misfit, frame);
     return NPG_OK;
 }
@@ -194,9 +234,9 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
         if (!(length_of(frame->vert_unit, f->edges[e]) > TORN * (double)f->edge_lengths[e])) continue;
         f->flags[a] |= ENDS_TORN;
         f->flags[b] |= ENDS_TORN;
-        join(f->parents, a, b);
     }
     for (size_t i = 0; i < v; i++) f->flags[i] &= ENDS_TORN;
+    join_flagged(f);
     add_flagged(f, misfit, frame);
     return NPG_OK;
 }
@@ -204,8 +244,8 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
 npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_misfit_frame *frame)
 {
     double spacing = frame->point_count ? sqrt(frame->area / (double)frame->point_count) : 0;
-    double reach =
-        fmax(fmax(REACH_SPACINGS * spacing, REACH_SIZE * f->size), REACH_MEDIANS * frame->point_dist_median);
+    double least = fmax(REACH_SPACINGS * spacing, REACH_SIZE * f->size);
+    double reach = fmin(fmax(least, REACH_MEDIANS * frame->point_dist_median), REACH_MOST * least);
     double link = fmax(LINK_SPACINGS * spacing, REACH_SIZE * f->size);
     NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
     NPG_TRY(find_bare(f, &misfits[NPG_MISFIT_BARE], frame, reach));

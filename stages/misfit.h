@@ -2,12 +2,13 @@
  * noise, outliers and a poor fit are spread all over.
  *
  *   far   points further from the surface than `reach`, near each other: something is there that the
- * reference does not have bare  connected surface further than `reach` from all points: something is gone
- *   torn  connected surface that is stretched, its edges more than 1.5 times as long as in the reference, and
- *         further than 0.6 x reach from all points: a web between parts that went apart
+ * reference does not have (what lies just beyond its border, where it has one, its frame did not see) bare
+ * connected surface further than `reach` from all points: something is gone torn  connected surface that is
+ * stretched, its edges more than 1.5 times as long as in the reference, and further than 0.6 x reach from all
+ * points: a web between parts that went apart
  *
- * reach = max(3 x spacing of the points on the surface, 1.5 % of the reference's diagonal, 5 x the median
- * distance of the points); the places are the largest ones. */
+ * reach = max(3 x spacing of the points on the surface, 1.5 % of the reference's diagonal), with noise 5 x
+ * the median distance of the points, but no more than twice as far; the places are the largest ones. */
 #ifndef NPG_MISFIT_H
 #define NPG_MISFIT_H
 
@@ -16,14 +17,15 @@
 
 typedef struct npg_misfit_finder npg_misfit_finder;
 
-/* The mesh is a loan that must outlive the finder. */
-npg_status npg_misfit_open(npg_misfit_finder **finder, const npg_mesh *reference);
+/* The mesh is a loan that must outlive the finder.  unseen_share: of its area that no point of its frame saw;
+ * above 2 % the capture is of cameras that see other parts in each frame, and bare surface says nothing. */
+npg_status npg_misfit_open(npg_misfit_finder **finder, const npg_mesh *reference, double unseen_share);
 void npg_misfit_close(npg_misfit_finder **finder);
 
 /* What is measured of a frame, in units. */
 typedef struct npg_misfit_frame {
-    const float *points;      /* N x 3                                  */
-    const float *point_dists; /* N, to the surface                      */
+    const float *points;         /* N x 3                                  */
+    const npg_surface_hit *hits; /* N, the closest surface              */
     size_t point_count;
     double point_dist_median;
     const float *vert_unit;    /* V x 3                                  */
