@@ -111,13 +111,14 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
                               npg_reporter *reporter)
 {
     npg_options *own;
+    bool is_open;
     NPG_TRY(npg_options_copy(&own, options));
     npg_status status = narrow(own, s, segment);
     if (!status && strcmp(segment->folder, ".") != 0)
         say(reporter, "%s: frames %lld to %lld", segment->folder,
             (long long)npg_segment_number(s, segment->first),
             (long long)npg_segment_number(s, segment->last));
-    if (!status) status = npg_run_once(own, reporter);
+    if (!status) status = npg_run_once(own, reporter, &is_open);
     npg_options_close(&own);
     return status;
 }

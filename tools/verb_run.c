@@ -119,20 +119,23 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
                 "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; see the "
                 "warnings, or %s/report.json\n",
                 verb, output);
-    if (status < 0 || status == NPG_STOPPED) return;
+    if (status == NPG_CHANGED)
+        fprintf(stderr, "neupig %s: ended where the topology changed; see %s/topology.json\n", verb, output);
+    if (status < 0 || status == NPG_STOPPED || status == NPG_CHANGED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
         if (access(path, F_OK) == 0) printf("%-14s %s\n", names[i], path);
     }
 }
 
-npg_status npg_run_once(const npg_options *options, npg_reporter *reporter)
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
     watcher signals = {.run = NULL};
     block_signals(&signals);
     npg_status status = npg_run_open(&run, options, &hooks);
+    *is_open = !status;
     if (!status) status = start_watching(&signals, run);
     if (!status) status = npg_run_wait(run);
     end_watching(&signals);
@@ -142,8 +145,9 @@ npg_status npg_run_once(const npg_options *options, npg_reporter *reporter)
 
 npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 {
-    npg_status status = npg_run_once(options, reporter);
-    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
+    bool is_open;
+    npg_status status = npg_run_once(options, reporter, &is_open);
+    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }
 
