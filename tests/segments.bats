@@ -59,7 +59,7 @@ same() {
 }
 
 @test "a hand that leaves the hip raises the alarm, unless the weld was cut" {
-    "$NEUPIG" synth --body hands --frames 14 --change 6 --points 1500 --cell 0.05 -o hands
+    "$NEUPIG" synth --body hands --frames 14 --change 6 --points 1500 --cell 0.04 -o hands
     run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --welds keep --faces 1500 --align-nodes 200
     echo "$output"
     [ "$status" -eq 7 ]
@@ -70,7 +70,7 @@ same() {
     quiet() {
         local name=$1
         shift
-        "$NEUPIG" synth --frames 10 --cell 0.06 -o "$name" "$@"
+        "$NEUPIG" synth --frames 10 --cell 0.04 -o "$name" "$@"
         "$NEUPIG" run "$name/points" -o "$name-out" "${small[@]}" --faces 1000 --align-nodes 150 || [ $? -eq 7 ]
         [ "$(alarm "$name-out" forward)" = null ]
         [ "$(alarm "$name-out" backward)" = null ]
