@@ -227,6 +227,8 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
     enum { OFF = 1, ENDS_TORN = 2 };
     size_t v = f->reference->vert_count;
     NPG_TRY(begin_places(f, v));
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!f->is_closed) return NPG_OK;
     flag_off(f, frame, reach);
     for (size_t e = 0; e < f->edge_count; e++) {
         uint32_t a = f->edges[e][0], b = f->edges[e][1];

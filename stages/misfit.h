@@ -18,7 +18,8 @@
 typedef struct npg_misfit_finder npg_misfit_finder;
 
 /* The mesh is a loan that must outlive the finder.  unseen_share: of its area that no point of its frame saw;
- * above 2 % the capture is of cameras that see other parts in each frame, and bare surface says nothing. */
+ * above 2 % the capture is of cameras that see other parts in each frame, and that surface is bare
+ * or torn says nothing. */
 npg_status npg_misfit_open(npg_misfit_finder **finder, const npg_mesh *reference, double unseen_share);
 void npg_misfit_close(npg_misfit_finder **finder);
 

@@ -78,6 +78,7 @@ same() {
     quiet noisy --points 1200 --noise 0.5 --outliers 5
     quiet holes --body bar --points 1000 --holes 3
     quiet ring --points 1200 --cameras 5 --width 64
+    quiet camera --points 1200 --cameras 1 --width 96
 }
 
 @test "each segment explains its frames, and the overlap is told" {
