@@ -56,7 +56,8 @@ typedef enum npg_status {
     NPG_OK = 0,
     NPG_END = 1,        /* no more: the stream ended                                       */
     NPG_STOPPED = 2,    /* npg_run_stop() was called; what is on disk can be gone on from  */
-    NPG_PARTIAL = 3,    /* done, but frames were skipped or fell below the quality bar     */
+    NPG_PARTIAL = 3,    /* done, but frames were skipped, unexplained or below the quality bar */
+    NPG_CHANGED = 4,    /* ended where the topology changed (option alarm = split)         */
     NPG_FAILED = -1,    /* an environment or library failed in a way of no class below     */
     NPG_USAGE = -2,     /* an option, a configuration or a call that makes no sense        */
     NPG_BAD_INPUT = -3, /* the data can't be used: the text names file, place and cause    */

@@ -428,7 +428,7 @@ npg_status npg_run_wait(npg_run *run)
 {
     NPG_REQUIRE(run && run->conductor_started);
     join_conductor(run);
-    if (run->end_status < 0 || run->end_status == NPG_STOPPED)
+    if (run->end_status < 0 || run->end_status == NPG_STOPPED || run->end_status == NPG_CHANGED)
         return npg_error(run->end_status, "%s: %s", run->failure_stage, run->failure_text);
     return run->end_status;
 }

@@ -383,7 +383,7 @@ static npg_status finish(npg_worker *worker)
     report_settings(report, state);
     json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
-    NPG_TRY(npg_frame_log_finish(state->list));
+    NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker)));
     return write_forms(worker);
 }
 

@@ -10,7 +10,9 @@ const npg_verb npg_verbs[] = {
      "standard "
      "input; or --follow a folder that grows) in time order and writes one mesh per frame, all with the same "
      "faces, to DIR/meshes, with reference.ply, report.json, frames.jsonl and, last of all, done.json beside "
-     "them.  A run that was stopped or killed goes on where it was when it is started again.",
+     "them.  A run that was stopped or killed goes on where it was when it is started again.  With "
+     "--segments auto, where the topology changes another reference takes over: DIR/segment_* are then runs "
+     "by themselves, and DIR/segments.json tells their frames, why they were cut, and their overlaps.",
      npg_run_verb_options, true, npg_verb_run},
     {"append", "DIR", 1, 1, "Go on with frames that came since a job was done",
      "DIR is the output folder of a run.  Frames that its input has after the last one of then are solved "

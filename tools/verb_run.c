@@ -11,12 +11,13 @@
 #include "cli.h"
 #include "clock.h"
 #include "progress.h"
-#include "run_job.h"
+#include "segments.h"
 
 typedef struct settings {
     const char *config, *log_file;
     int progress;
     bool quiet, verbose;
+    int segments;
 } settings;
 
 const npg_option npg_run_verb_options[] = {
@@ -33,6 +34,10 @@ const npg_option npg_run_verb_options[] = {
      0, NULL, NULL},
     {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
      NULL},
+    {"segments",
+     "Where the topology changes: one reference all the same, with an alarm (one), or another reference from "
+     "there on, each with its frames in OUT/segment_* (auto)",
+     NPG_OPTION_CHOICE, offsetof(settings, segments), "one", 0, 0, "one|auto", NULL},
     {0}};
 
 /* ---- signals ---- */
@@ -133,22 +138,25 @@ static void end_watching(watcher *w)
 
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
-    static const char *const names[] = {"meshes", "reference.ply", "frames.jsonl", "report.json",
-                                        "done.json"};
+    static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl",
+                                        "report.json", "segments.json", "done.json"};
     char path[4096];
     if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig %s: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
+                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; see the "
+                "warnings, or %s/report.json\n",
                 verb, output);
-    if (status < 0 || status == NPG_STOPPED) return;
+    if (status == NPG_CHANGED)
+        fprintf(stderr, "neupig %s: ended where the topology changed; see %s/topology.json\n", verb, output);
+    if (status < 0 || status == NPG_STOPPED || status == NPG_CHANGED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
         if (access(path, F_OK) == 0) printf("%-14s %s\n", names[i], path);
     }
 }
 
-npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
@@ -156,12 +164,19 @@ npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
     block_signals(&signals);
     stop_with_parent();
     npg_status status = npg_run_open(&run, options, &hooks);
-    bool is_open = !status;
-    if (is_open) status = start_watching(&signals, run);
+    *is_open = !status;
+    if (!status) status = start_watching(&signals, run);
     if (!status) status = npg_run_wait(run);
     end_watching(&signals);
-    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     npg_run_close(&run);
+    return status;
+}
+
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
+{
+    bool is_open;
+    npg_status status = npg_run_once(options, reporter, &is_open);
+    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }
 
@@ -178,6 +193,13 @@ static npg_status check_paths(npg_options *options, const npg_cli *cli)
     return NPG_OK;
 }
 
+static npg_status start(const npg_options *options, const settings *s, npg_reporter *reporter)
+{
+    if (s->segments == NPG_SEGMENTS_AUTO) return npg_segments_run(options, reporter);
+    NPG_TRY(npg_segments_make_way(options));
+    return npg_run_job(options, reporter);
+}
+
 int npg_verb_run(int argc, char **argv)
 {
     settings s;
@@ -190,7 +212,7 @@ int npg_verb_run(int argc, char **argv)
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
         status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
-        if (!status) status = npg_run_job(options, &reporter);
+        if (!status) status = start(options, &s, &reporter);
         if (reporter.show != NPG_SHOW_JSON)
             npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }
