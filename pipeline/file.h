@@ -6,6 +6,7 @@
 #define NPG_FILE_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "status.h"
 
@@ -17,6 +18,13 @@ npg_status npg_file_open(npg_file **file, const char *path);
 /* A failed write is remembered: later calls do nothing and commit returns it, so callers may check once. */
 npg_status npg_file_write(npg_file *file, const void *data, size_t size);
 npg_status npg_file_print(npg_file *file, const char *format, ...) NPG_PRINTF(2, 3);
+
+/* Bytes written so far. */
+uint64_t npg_file_size(const npg_file *file);
+
+/* Write over bytes that were written before, where a header tells of what comes after it.  Failures as with
+ * npg_file_write(). */
+npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size);
 
 /* Make the file appear under its name; closes it in any case. */
 npg_status npg_file_commit(npg_file **file);

@@ -13,13 +13,16 @@
 
 #include "json_file.h"
 #include "memory.h"
+#include "own_stage.h"
 #include "run_settings.h"
-#include "stage.h"
+#include "struct_size.h"
 
 struct npg_options {
     const npg_stage *const *chain; /* whose tables count */
     size_t count;
-    char **texts; /* count of them: what the user set, or NULL; owned */
+    char **texts;                          /* count of them: what the user set, or NULL; owned */
+    npg_own_stage own[NPG_OWN_STAGES_MAX]; /* own_count of them, their texts owned */
+    size_t own_count;
 };
 
 /* ---- the tables as one list ---- */
@@ -56,13 +59,14 @@ static const npg_option *find(const npg_options *options, const char *name, size
 npg_status npg_options_describe(size_t i, npg_option_info *info)
 {
     const char *stage;
-    NPG_REQUIRE(info && info->struct_size >= sizeof *info);
+    npg_option_info known = {.struct_size = sizeof known};
     const npg_option *option = npg_option_at(i, &stage);
-    if (!option) return NPG_END;
-    *info = (npg_option_info){sizeof *info,         stage,           option->name,       option->help,
-                              option->default_text, option->choices, option->value_name, option->type,
-                              option->min,          option->max};
-    return NPG_OK;
+    if (option)
+        known = (npg_option_info){sizeof known,         stage,           option->name,       option->help,
+                                  option->default_text, option->choices, option->value_name, option->type,
+                                  option->min,          option->max};
+    NPG_TRY(npg_struct_give(info, &known, sizeof known, NPG_SIZE_UP_TO(npg_option_info, max), "info"));
+    return option ? NPG_OK : NPG_END;
 }
 
 /* ---- values ---- */
@@ -150,11 +154,57 @@ npg_status npg_options_open_chain(npg_options **out, const npg_stage *const *cha
     return status;
 }
 
+/* ---- stages of a program's own ---- */
+
+/* The texts of a copied stage are ours, whatever the public struct says. */
+static void release_own(npg_own_stage *own)
+{
+    npg_release(&own->name);
+    npg_release(&own->after);
+}
+
+static npg_status copy_own(npg_options *options, const npg_own_stage *given)
+{
+    char *name, *after;
+    NPG_TRY(npg_copy_text(&name, given->name));
+    npg_status status = npg_copy_text(&after, given->after);
+    if (status) {
+        npg_release(&name);
+        return status;
+    }
+    npg_own_stage *own = &options->own[options->own_count++];
+    *own = *given;
+    own->name = name;
+    own->after = after;
+    return NPG_OK;
+}
+
+npg_status npg_options_add_stage(npg_options *options, const npg_own_stage *stage)
+{
+    npg_own_stage given;
+    NPG_REQUIRE(options);
+    NPG_TRY(npg_struct_take(&given, sizeof given, stage, NPG_SIZE_UP_TO(npg_own_stage, frame), "the stage"));
+    NPG_TRY(npg_own_check(&given, options->chain));
+    for (size_t i = 0; i < options->own_count; i++)
+        if (!strcmp(options->own[i].name, given.name))
+            return npg_error(NPG_USAGE, "stage %s: the name is taken", given.name);
+    if (options->own_count == NPG_OWN_STAGES_MAX)
+        return npg_error(NPG_USAGE, "stage %s: no more than %d stages can be added", given.name,
+                         NPG_OWN_STAGES_MAX);
+    return copy_own(options, &given);
+}
+
+const npg_own_stage *npg_options_own_stage(const npg_options *options, size_t i)
+{
+    return options && i < options->own_count ? &options->own[i] : NULL;
+}
+
 void npg_options_close(npg_options **slot)
 {
     if (!slot || !*slot) return;
     for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
     npg_release(&(*slot)->texts);
+    for (size_t i = 0; i < (*slot)->own_count; i++) release_own(&(*slot)->own[i]);
     npg_release(slot);
 }
 
@@ -165,6 +215,8 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options)
     NPG_TRY(npg_options_open_chain(&copy, options ? options->chain : npg_chain));
     for (size_t i = 0; i < copy->count && !status; i++)
         if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
+    for (size_t i = 0; options && i < options->own_count && !status; i++)
+        status = copy_own(copy, &options->own[i]);
     if (status) npg_options_close(&copy);
     *out = copy;
     return status;

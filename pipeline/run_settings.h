@@ -5,7 +5,7 @@
 #include "options.h"
 
 typedef struct npg_settings {
-    const char *input, *follow, *output, *device;
+    const char *input, *follow, *output, *device, *tuning;
     int preset;
     int64_t seed;
     int64_t ring_capacity;  /* chunks per ring                        */

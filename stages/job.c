@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "file.h"
+#include "forms.h"
 
 #define STATE_NAME "window_%06lld.%s"
 
@@ -31,7 +32,8 @@ struct npg_job {
     char *grids_path;     /* of the archive, owned */
     int64_t serial;       /* of the newest state in place, -1: none */
     int64_t forward_serial;
-    bool forgets; /* older states go when the job is written */
+    bool keeps_grids; /* of all windows, for the form vdb */
+    bool forgets;     /* older states go when the job is written */
 
     pthread_mutex_t lock; /* guards what follows */
     pthread_cond_t changed;
@@ -93,10 +95,11 @@ static npg_status remove_state(npg_job *job, const char *name, int64_t serial)
     return remove_file(job, name);
 }
 
-/* Keep the two newest and the one that later frames go on from. */
+/* Keep the two newest and the one that later frames go on from; grids that are to be exported stay, too. */
 static npg_status remove_old(npg_job *job, const char *name, int64_t serial)
 {
     bool stays = serial == job->serial || serial == job->serial - 1 || serial == job->forward_serial;
+    stays = stays || (job->keeps_grids && strstr(name, ".vdb"));
     return stays && name[0] != '.' ? NPG_OK : remove_file(job, name);
 }
 
@@ -350,7 +353,9 @@ static void init_changed(pthread_cond_t *changed)
 
 static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, bool restart, bool append)
 {
+    const char *exports = npg_options_get(npg_worker_options(worker), "export");
     job->lock_fd = -1;
+    job->keeps_grids = exports && npg_forms_name(exports, "vdb");
     job->serial = job->forward_serial = -1;
     pthread_mutex_init(&job->lock, NULL);
     init_changed(&job->changed);

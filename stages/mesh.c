@@ -483,17 +483,17 @@ static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count,
 {
     json_t *list = json_array();
     for (size_t i = 0; i < count; i++)
-        json_array_append_new(list,
-                              json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number,
-                                        "made", fares[i].is_made, "point_dist_unit", fares[i].point_dist_unit,
-                                        "vert_dist_unit", fares[i].vert_dist_unit, "stretched_share",
-                                        fares[i].stretched_share, "contact", fares[i].contact, "handles",
-                                        (json_int_t)fares[i].handles, "cost", fares[i].cost));
+        json_array_append_new(
+            list,
+            json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number, "followed",
+                      fares[i].is_followed, "point_dist_unit", fares[i].point_dist_unit, "vert_dist_unit",
+                      fares[i].vert_dist_unit, "stretched_share", fares[i].stretched_share, "contact",
+                      fares[i].contact, "handles", (json_int_t)fares[i].handles, "cost", fares[i].cost));
     json_object_set_new(npg_worker_report(worker), "candidates", list);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
     npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
-                   "is the keyframe, of %zu candidates (cost %.5f; %.2f %% of its points in contact)", count,
-                   fares[best].cost, 100 * fares[best].contact);
+                   "is the keyframe, of %zu candidates (%.2f %% of its points in contact)", count,
+                   100 * fares[best].contact);
 }
 
 /* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */
