@@ -65,6 +65,11 @@ npg_status npg_error_restore(npg_status status, const char *text)
     return npg_error(status, "%s", text);
 }
 
+npg_status npg_error_set(npg_status status, const char *text)
+{
+    return npg_error(status, "%s", text ? text : "");
+}
+
 int npg_status_exit_code(npg_status status)
 {
     switch (status) {

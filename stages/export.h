@@ -4,6 +4,7 @@
  *     OUT/reference.ply                      the reference mesh
  *     OUT/frames.jsonl                       one line per frame, in the order of time
  *     OUT/frames.partial.jsonl               the same while the run goes on, in the order of solving
+ *     OUT/exports.jsonl and what it lists     other forms (forms.h)
  *     OUT/report.json                        the run's report
  *     OUT/done.json                          last of all: what was made, with sizes and checksums */
 #ifndef NPG_EXPORT_H
@@ -75,8 +76,8 @@ void npg_frame_log_size(const npg_frame_log *list, int64_t *lines, int64_t *byte
 npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
                              const char *file);
 
-/* Write OUT/frames.jsonl in the order of the indices and remove the partial one.  Frames that the reference
- * does not explain (facts->changed_at) are marked. */
+/* Write OUT/frames.jsonl in the order of the indices; the partial one stays until the run is done.  Frames
+ * that the reference does not explain (facts->changed_at) are marked. */
 npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts);
 
 /* The partial file stays when finish has not been called.  NULL is fine. */
@@ -88,7 +89,8 @@ npg_status npg_file_facts(json_t *entry, const char *output, const char *file);
 /* NPG_BAD_INPUT when OUT/<file> is not the file that entry ({"bytes", "xxh3"}) tells of. */
 npg_status npg_file_check(const json_t *entry, const char *output, const char *file);
 
-/* OUT/done.json: version, status, settings, and every file of the run.  head is consumed. */
-npg_status npg_done_write(const char *output, json_t *head);
+/* OUT/done.json: version, status, settings, and every file of the run, with has_forms those that
+ * OUT/exports.jsonl lists too; the partial list of frames goes.  head is consumed. */
+npg_status npg_done_write(const char *output, json_t *head, bool has_forms);
 
 #endif

@@ -34,9 +34,8 @@ static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
     XXH3_state_t *state = XXH3_createState();
     if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
     XXH3_64bits_reset(state);
-    npg_status status = NPG_OK;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
     *size = 0;
     while (!status) {
         ssize_t got = read(fd, block, sizeof block);
@@ -69,6 +68,8 @@ npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
 
 npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
 {
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
     json_t *now = json_object();
     npg_status status = npg_file_facts(now, output, file);
     if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
@@ -331,8 +332,6 @@ npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts)
         npg_file_discard(&file);
     else
         status = npg_file_commit(&file);
-    if (!status && unlink(list->partial_path))
-        status = npg_error_errno(NPG_DISK, "can't remove %s", list->partial_path);
     return status;
 }
 
@@ -358,13 +357,14 @@ static npg_status write_file_entry(npg_file *file, const char *output, const cha
     return status;
 }
 
-/* The meshes' sizes and checksums, from the lines of frames.jsonl. */
-static npg_status write_mesh_entries(npg_file *file, const char *output, bool *is_first)
+/* Sizes and checksums of the meshes or of the other forms' files, from the lines of the list that has them.
+ */
+static npg_status write_entries(npg_file *file, const char *output, const char *list_name, bool *is_first)
 {
     char *path, *line = NULL;
     size_t capacity = 0;
     npg_status status = NPG_OK;
-    NPG_TRY(npg_join_path(&path, output, "frames.jsonl"));
+    NPG_TRY(npg_join_path(&path, output, list_name));
     FILE *list = fopen(path, "re");
     if (!list) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     while (!status && getline(&line, &capacity, list) > 0) {
@@ -379,13 +379,14 @@ static npg_status write_mesh_entries(npg_file *file, const char *output, bool *i
         }
         json_decref(frame);
     }
+    if (list && !status && ferror(list)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     if (list) fclose(list);
     free(line);
     npg_release(&path);
     return status;
 }
 
-static npg_status write_done(npg_file *file, const char *output, const json_t *head)
+static npg_status write_done(npg_file *file, const char *output, const json_t *head, bool has_forms)
 {
     static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
     bool is_first = true;
@@ -397,22 +398,31 @@ static npg_status write_done(npg_file *file, const char *output, const json_t *h
     if (!status) status = npg_file_print(file, ",\n  \"files\": [");
     for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++)
         status = write_file_entry(file, output, names[i], &is_first);
-    if (!status) status = write_mesh_entries(file, output, &is_first);
+    if (!status) status = write_entries(file, output, "frames.jsonl", &is_first);
+    if (!status && has_forms) status = write_file_entry(file, output, "exports.jsonl", &is_first);
+    if (!status && has_forms) status = write_entries(file, output, "exports.jsonl", &is_first);
     return status ? status : npg_file_print(file, "\n  ]\n}\n");
 }
 
-npg_status npg_done_write(const char *output, json_t *head)
+/* The partial list is what an interrupted run goes on from: it goes when nothing is left to go on with. */
+npg_status npg_done_write(const char *output, json_t *head, bool has_forms)
 {
-    char *path;
+    char *path = NULL, *partial = NULL;
     npg_file *file = NULL;
     npg_status status = npg_join_path(&path, output, "done.json");
+    if (!status) status = npg_join_path(&partial, output, "frames.partial.jsonl");
     if (!status) status = npg_file_open(&file, path);
-    if (!status) status = write_done(file, output, head);
-    if (!status)
+    if (!status) status = write_done(file, output, head, has_forms);
+    if (!status) {
         status = npg_file_commit(&file);
-    else
+        if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */
+    } else {
         npg_file_discard(&file);
+    }
+    if (!status && unlink(partial) && errno != ENOENT)
+        status = npg_error_errno(NPG_DISK, "can't remove %s", partial);
     npg_release(&path);
+    npg_release(&partial);
     json_decref(head);
     return status;
 }

@@ -4,6 +4,9 @@
 
 #include "progress.h"
 
+/* Holds the process id of the batch that a run belongs to. */
+#define NPG_PARENT_VARIABLE "NEUPIG_BATCH_PID"
+
 /* A run from its start to its end.  SIGINT, SIGTERM and SIGHUP stop it; when it does not end in time the
  * process does, with exit code 75: what is on disk can be gone on from at any moment. */
 npg_status npg_run_job(const npg_options *options, npg_reporter *reporter);

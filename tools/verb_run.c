@@ -5,25 +5,31 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "cli.h"
+#include "clock.h"
 #include "progress.h"
 #include "segments.h"
 
 typedef struct settings {
-    const char *config;
+    const char *config, *log_file;
     int progress;
     bool quiet, verbose;
     int segments;
 } settings;
 
 const npg_option npg_run_verb_options[] = {
-    {"config", "Read options from a JSON object in FILE; the command line wins (also -c)", NPG_OPTION_TEXT,
-     offsetof(settings, config), "", 0, 0, NULL, "FILE"},
+    {"config",
+     "Read options from a JSON object in FILE, or take a method configuration of the paper's published code; "
+     "the command line wins (also -c)",
+     NPG_OPTION_TEXT, offsetof(settings, config), "", 0, 0, NULL, "FILE"},
     {"progress",
      "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal",
      NPG_OPTION_CHOICE, offsetof(settings, progress), "auto", 0, 0, "auto|bar|json|none", NULL},
+    {"log-file", "Append the log to FILE, one JSON object per line", NPG_OPTION_TEXT,
+     offsetof(settings, log_file), "", 0, 0, NULL, "FILE"},
     {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, offsetof(settings, quiet), "no", 0,
      0, NULL, NULL},
     {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
@@ -36,7 +42,8 @@ const npg_option npg_run_verb_options[] = {
 
 /* ---- signals ---- */
 
-#define STOP_SECONDS 4 /* a run that has not stopped by then is ended */
+#define STOP_SECONDS  4 /* a run that has not stopped by then is ended */
+#define AGAIN_SECONDS 1 /* schedulers signal every process of a job, and who started us passes his on */
 
 typedef struct watcher {
     npg_run *run;         /* loan */
@@ -68,6 +75,19 @@ static int next_signal(const watcher *w, const struct timespec *limit)
     return number;
 }
 
+/* The second request: one that comes right after the first is the same one on another way. */
+static int wait_for_second(const watcher *w)
+{
+    double begin_s = npg_clock_s();
+    for (;;) {
+        double left_s = begin_s + STOP_SECONDS - npg_clock_s();
+        if (left_s < 0) left_s = 0;
+        const struct timespec limit = {(time_t)left_s, (long)(1e9 * (left_s - (double)(time_t)left_s))};
+        int number = next_signal(w, &limit);
+        if (number < 0 || number == SIGUSR1 || npg_clock_s() > begin_s + AGAIN_SECONDS) return number;
+    }
+}
+
 /* The first signal stops the run in good order; the second ends the process the usual way.  Where something
  * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
  * moment. */
@@ -75,10 +95,9 @@ static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to go on\n";
     const watcher *w = argument;
-    const struct timespec limit = {.tv_sec = STOP_SECONDS};
     if (next_signal(w, NULL) == SIGUSR1) return NULL;
     npg_run_stop(w->run);
-    int number = next_signal(w, &limit);
+    int number = wait_for_second(w);
     if (number == SIGUSR1) return NULL;
     if (number < 0) {
         ssize_t written = write(STDERR_FILENO, text, sizeof text - 1);
@@ -88,6 +107,15 @@ static void *watch_signals(void *argument)
     pthread_sigmask(SIG_UNBLOCK, &w->all, NULL);
     raise(number);
     return NULL;
+}
+
+/* A run that a batch started stops when the batch is gone, however that ended. */
+static void stop_with_parent(void)
+{
+    const char *parent = getenv(NPG_PARENT_VARIABLE);
+    if (!parent) return;
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != (pid_t)strtol(parent, NULL, 10)) kill(getpid(), SIGTERM);
 }
 
 static npg_status start_watching(watcher *w, npg_run *run)
@@ -134,6 +162,7 @@ npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool
     npg_run *run = NULL;
     watcher signals = {.run = NULL};
     block_signals(&signals);
+    stop_with_parent();
     npg_status status = npg_run_open(&run, options, &hooks);
     *is_open = !status;
     if (!status) status = start_watching(&signals, run);
@@ -147,7 +176,7 @@ npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 {
     bool is_open;
     npg_status status = npg_run_once(options, reporter, &is_open);
-    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
+    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }
 
@@ -182,7 +211,8 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
-        status = start(options, &s, &reporter);
+        status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
+        if (!status) status = start(options, &s, &reporter);
         if (reporter.show != NPG_SHOW_JSON)
             npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }
