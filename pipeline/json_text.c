@@ -1,7 +1,9 @@
-/* JSON values from data that JSON can't hold as it is. */
+/* JSON: values from data that it can't hold as it is, and files. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "file.h"
 #include "stage.h"
 
 /* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
@@ -42,4 +44,21 @@ json_t *npg_json_text(const char *text)
 json_t *npg_json_real(double value)
 {
     return isfinite(value) ? json_real(value) : json_null();
+}
+
+npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
+{
+    char *path = NULL, *text = json_dumps(value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    npg_file *file = NULL;
+    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", name);
+    npg_status status = npg_join_path(&path, folder, name);
+    if (!status) status = npg_file_open(&file, path);
+    npg_release(&path);
+    if (!status) {
+        npg_file_write(file, text, strlen(text));
+        npg_file_write(file, "\n", 1);
+        status = npg_file_commit(&file);
+    }
+    free(text);
+    return status;
 }

@@ -389,24 +389,6 @@ static npg_status finish(npg_worker *worker)
 
 /* ---- the last files ---- */
 
-static npg_status write_report(npg_worker *worker)
-{
-    char *path;
-    npg_file *file;
-    char *text = json_dumps(npg_worker_whole_report(worker), JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-    if (!text) return npg_error(NPG_MEMORY, "no memory for the report");
-    npg_status status = npg_join_path(&path, output_of(worker), "report.json");
-    if (!status) status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
-    npg_release(&path);
-    free(text);
-    return status;
-}
-
 static json_t *json_of_options(const npg_options *options)
 {
     json_t *values = json_object();
@@ -426,7 +408,7 @@ static npg_status conclude(npg_worker *worker)
     }
     npg_status status = read_options(worker);
     set_centre(npg_worker_state(worker), &npg_worker_facts(worker)->box);
-    if (!status) status = write_report(worker);
+    if (!status) status = npg_json_write(output_of(worker), "report.json", whole);
     json_object_set_new(head, "neupig", json_string(npg_version()));
     json_object_set(head, "status", json_object_get(whole, "status"));
     json_object_set(head, "exit_code", json_object_get(whole, "exit_code"));

@@ -1,11 +1,7 @@
 /* Topology: what a run does when its reference stops to explain the capture. */
 #include "topology.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 #include "alarm.h"
-#include "file.h"
 
 static const char *const directions[NPG_DIRECTIONS] = {"forward", "backward"};
 
@@ -58,28 +54,12 @@ static bool may_split(const npg_topology *t, const npg_facts *facts, int directi
 
 /* ---- the file that tells where ---- */
 
-static npg_status write_json(npg_worker *worker, const char *name, const json_t *value)
-{
-    char *path, *text = json_dumps(value, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-    npg_file *file = NULL;
-    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", name);
-    npg_status status = npg_join_path(&path, npg_worker_settings(worker)->output, name);
-    if (!status) status = npg_file_open(&file, path);
-    npg_release(&path);
-    if (!status) {
-        npg_file_print(file, "%s\n", text);
-        status = npg_file_commit(&file);
-    }
-    free(text);
-    return status;
-}
-
 static npg_status split(npg_topology *t, npg_worker *worker, int direction)
 {
     const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, direction);
     json_t *told = json_pack("{ss sI so}", "direction", directions[direction], "key_index",
                              (json_int_t)t->key, "alarm", npg_alarm_json(cause));
-    npg_status status = write_json(worker, "topology.json", told);
+    npg_status status = npg_json_write(npg_worker_settings(worker)->output, "topology.json", told);
     json_decref(told);
     return status
                ? status

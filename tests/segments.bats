@@ -1,12 +1,12 @@
 # Captures whose topology changes: the alarm, a reference per segment, their overlap, and going on after a kill.
 
-small=(--epochs 10 --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --window 6 --overlap 2 --samples 100
-    --align-nodes 60 --align-steps 6 --grid-levels 3 --max-residual 100 --max-flipped 100 --min-coverage 0
+small=(--epochs 10 --width-1 64 --width-2 64 --faces 2000 --poisson-depth 6 --window 10 --overlap 2 --samples 200
+    --align-nodes 300 --align-steps 8 --grid-levels 4 --max-residual 100 --max-flipped 100 --min-coverage 0
     --segment-min 4 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body two --frames 14 --change 7 --points 700 --cell 0.06 -o two >synth.log
+    "$NEUPIG" synth --body two --frames 14 --change 7 --points 1500 --cell 0.05 -o two >synth.log
     "$NEUPIG" run two/points -o whole "${small[@]}" --segments auto >whole.log 2>&1
 }
 
@@ -60,7 +60,7 @@ same() {
 
 @test "a hand that leaves the hip raises the alarm, unless the weld was cut" {
     "$NEUPIG" synth --body hands --frames 14 --change 6 --points 1500 --cell 0.04 -o hands
-    run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --welds keep --faces 1500 --align-nodes 200
+    run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --welds keep
     echo "$output"
     [ "$status" -eq 7 ]
     within "$(alarm welded forward)" 6
@@ -71,7 +71,7 @@ same() {
         local name=$1
         shift
         "$NEUPIG" synth --frames 10 --cell 0.04 -o "$name" "$@"
-        "$NEUPIG" run "$name/points" -o "$name-out" "${small[@]}" --faces 1000 --align-nodes 150 || [ $? -eq 7 ]
+        "$NEUPIG" run "$name/points" -o "$name-out" "${small[@]}" || [ $? -eq 7 ]
         [ "$(alarm "$name-out" forward)" = null ]
         [ "$(alarm "$name-out" backward)" = null ]
     }

@@ -11,6 +11,7 @@
 #include "export.h"
 #include "file.h"
 #include "segments.h"
+#include "stage.h"
 
 #define WHOLE   "segments.json"
 #define PARTIAL "segments.partial.json"
@@ -128,27 +129,10 @@ static json_t *json_of_all(const npg_segments *s)
                      "segments", list);
 }
 
-static npg_status write_json(const char *folder, const char *name, const json_t *value)
-{
-    char *path = NULL, *text = json_dumps(value, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-    npg_file *file = NULL;
-    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", name);
-    npg_status status = npg_join_path(&path, folder, name);
-    if (!status) status = npg_file_open(&file, path);
-    npg_release(&path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
-    free(text);
-    return status;
-}
-
 npg_status npg_segments_save(const npg_segments *s)
 {
     json_t *told = json_of_all(s);
-    npg_status status = write_json(s->output, PARTIAL, told);
+    npg_status status = npg_json_write(s->output, PARTIAL, told);
     json_decref(told);
     return status;
 }
@@ -235,7 +219,7 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
     json_t *done = json_pack("{ss ss si sI sI so}", "neupig", npg_version(), "status",
                              is_partial ? "partial" : "ok", "exit_code", is_partial ? 7 : 0, "frames",
                              (json_int_t)s->frames->count, "segments", (json_int_t)s->count, "files", files);
-    if (!status) status = write_json(s->output, "done.json", done);
+    if (!status) status = npg_json_write(s->output, "done.json", done);
     json_decref(done);
     return status;
 }
@@ -248,7 +232,7 @@ npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool i
         status = add_report(json_array_get(list, i), s, &s->list[i]);
     json_object_set(told, "overlaps", overlaps);
     json_object_set_new(told, "status", json_string(is_partial ? "partial" : "ok"));
-    if (!status) status = write_json(s->output, WHOLE, told);
+    if (!status) status = npg_json_write(s->output, WHOLE, told);
     json_decref(told);
     if (!status && s->count > 1) status = write_done(s, is_partial);
     return status ? status : remove_in(s->output, PARTIAL);
