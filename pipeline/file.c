@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -17,9 +18,10 @@ struct npg_file {
     int fd;
     npg_status status; /* of the first failure, with its text in `cause` */
     char cause[512];
-    char *path, *hidden_path; /* owned */
-    unsigned char *buffer;    /* BUFFER_SIZE, owned */
+    char *path, *hidden_path, *folder; /* owned */
+    unsigned char *buffer;             /* BUFFER_SIZE, owned */
     size_t used;
+    uint64_t flushed; /* bytes that left the buffer */
 };
 
 npg_status npg_join_path(char **out, const char *folder, const char *name)
@@ -54,6 +56,7 @@ static void free_file(npg_file **slot)
 {
     npg_release(&(*slot)->path);
     npg_release(&(*slot)->hidden_path);
+    npg_release(&(*slot)->folder);
     npg_release(&(*slot)->buffer);
     npg_release(slot);
 }
@@ -66,6 +69,7 @@ npg_status npg_file_open(npg_file **out, const char *path)
     NPG_TRY(npg_alloc(&file, NPG_FOR_FILES, sizeof *file));
     NPG_TRY_OR(fail, status, npg_copy_text(&file->path, path));
     NPG_TRY_OR(fail, status, hide(&file->hidden_path, path));
+    NPG_TRY_OR(fail, status, folder_of(&file->folder, path));
     NPG_TRY_OR(fail, status, npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
     file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (file->fd < 0) {
@@ -89,6 +93,7 @@ static npg_status keep_failure(npg_file *file, const char *verb)
 
 static npg_status write_through(npg_file *file, const unsigned char *data, size_t size)
 {
+    file->flushed += size;
     while (size) {
         ssize_t written = write(file->fd, data, size);
         if (written < 0 && errno == EINTR) continue;
@@ -117,6 +122,28 @@ npg_status npg_file_write(npg_file *file, const void *data, size_t size)
     return NPG_OK;
 }
 
+uint64_t npg_file_size(const npg_file *file)
+{
+    return file->flushed + file->used;
+}
+
+npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size)
+{
+    const unsigned char *at = data;
+    NPG_REQUIRE(offset <= npg_file_size(file) && size <= npg_file_size(file) - offset);
+    if (!file->status && offset + size > file->flushed) NPG_TRY(flush_buffer(file));
+    while (size && !file->status) {
+        ssize_t written = pwrite(file->fd, at, size, (off_t)offset);
+        if (written < 0 && errno == EINTR) continue;
+        if (written == 0) errno = ENOSPC;
+        if (written <= 0) return keep_failure(file, "write");
+        at += written;
+        offset += (uint64_t)written;
+        size -= (size_t)written;
+    }
+    return file->status;
+}
+
 npg_status npg_file_print(npg_file *file, const char *format, ...)
 {
     char text[4096];
@@ -132,10 +159,7 @@ npg_status npg_file_print(npg_file *file, const char *format, ...)
 /* The rename is on disk only once its folder is. */
 static npg_status sync_folder(npg_file *file)
 {
-    char *folder;
-    NPG_TRY(folder_of(&folder, file->path));
-    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    npg_release(&folder);
+    int fd = open(file->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return keep_failure(file, "sync the folder of");
     int failed = fsync(fd) && errno != EINVAL;
     if (failed) keep_failure(file, "sync the folder of");
@@ -170,6 +194,55 @@ void npg_file_discard(npg_file **slot)
     if (file->fd >= 0) close(file->fd);
     unlink(file->hidden_path);
     free_file(slot);
+}
+
+/* ---- reading ---- */
+
+npg_status npg_file_open_plain(int *out, const char *path, npg_status failure)
+{
+    struct stat info;
+    *out = -1;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd >= 0 && !fstat(fd, &info) && S_ISREG(info.st_mode)) {
+        *out = fd;
+        return NPG_OK;
+    }
+    int cause = fd >= 0 && S_ISDIR(info.st_mode) ? EISDIR : errno;
+    bool is_other = fd >= 0 && !S_ISDIR(info.st_mode);
+    if (fd >= 0) close(fd);
+    return npg_error(cause == ENOMEM && !is_other ? NPG_MEMORY : failure, "%s: can't be read: %s", path,
+                     is_other ? "a pipe or a device, not a file" : strerror(cause));
+}
+
+bool npg_path_stays(const char *name)
+{
+    if (!*name || *name == '/') return false;
+    for (const char *part = name; part; part = strchr(part, '/')) {
+        part += *part == '/';
+        if (!strncmp(part, "..", 2) && (!part[2] || part[2] == '/')) return false;
+    }
+    return true;
+}
+
+bool npg_path_is_inside(const char *path, const char *folder)
+{
+    char *real_path = realpath(path, NULL), *real_folder = realpath(folder, NULL);
+    size_t size = real_folder ? strlen(real_folder) : 0;
+    bool is_root = size == 1;
+    bool inside = real_path && real_folder && !strncmp(real_path, real_folder, size) &&
+                  (is_root || real_path[size] == '/');
+    free(real_path);
+    free(real_folder);
+    return inside;
+}
+
+/* ---- folders ---- */
+
+npg_status npg_folder_is_own(const char *folder)
+{
+    struct stat info;
+    if (lstat(folder, &info) || !S_ISLNK(info.st_mode)) return NPG_OK;
+    return npg_error(NPG_USAGE, "%s is a link, and option confine is set", folder);
 }
 
 npg_status npg_make_folder(const char *path)

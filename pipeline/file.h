@@ -5,6 +5,9 @@
 #ifndef NPG_FILE_H
 #define NPG_FILE_H
 
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "status.h"
 
 typedef struct npg_file npg_file;
@@ -16,11 +19,32 @@ npg_status npg_file_open(npg_file **file, const char *path);
 npg_status npg_file_write(npg_file *file, const void *data, size_t size);
 npg_status npg_file_print(npg_file *file, const char *format, ...) NPG_PRINTF(2, 3);
 
+/* Bytes written so far. */
+uint64_t npg_file_size(const npg_file *file);
+
+/* Write over bytes that were written before, where a header tells of what comes after it.  Failures as with
+ * npg_file_write(). */
+npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size);
+
 /* Make the file appear under its name; closes it in any case. */
 npg_status npg_file_commit(npg_file **file);
 
 /* Give up: nothing remains.  NULL is fine. */
 void npg_file_discard(npg_file **file);
+
+/* Open a plain file for reading; *fd is the caller's, -1 on failure.  Never waits: a pipe or a device in the
+ * place of a file is refused.  `failure` is what a file that can't be opened means (NPG_BAD_INPUT, NPG_DISK).
+ */
+npg_status npg_file_open_plain(int *fd, const char *path, npg_status failure);
+
+/* Whether a name from a file can be added to a folder without leading out of it: not absolute, no "..". */
+bool npg_path_stays(const char *name);
+
+/* Whether the file is in the folder after all links are followed, at any depth. */
+bool npg_path_is_inside(const char *path, const char *folder);
+
+/* NPG_USAGE where a link stands in the place of a folder. */
+npg_status npg_folder_is_own(const char *folder);
 
 /* Make a folder and its parents. */
 npg_status npg_make_folder(const char *path);

@@ -38,6 +38,7 @@ void npg_mesh_unref(npg_mesh **slot)
     npg_release(&mesh->faces);
     npg_release(&mesh->vert_colours);
     npg_release(&mesh->vert_uvs);
+    npg_release(&mesh->corner_uvs);
     npg_release(&mesh);
 }
 
@@ -60,6 +61,8 @@ npg_status npg_mesh_copy(npg_mesh **out, const npg_mesh *mesh)
     NPG_TRY_OR(fail, status, copy_bytes(&copy->vert_normals, mesh->vert_normals, v, 3 * sizeof(float)));
     NPG_TRY_OR(fail, status, copy_bytes(&copy->vert_colours, mesh->vert_colours, v, 4));
     NPG_TRY_OR(fail, status, copy_bytes(&copy->vert_uvs, mesh->vert_uvs, v, 2 * sizeof(float)));
+    NPG_TRY_OR(fail, status,
+               copy_bytes(&copy->corner_uvs, mesh->corner_uvs, mesh->face_count, 6 * sizeof(float)));
     *out = copy;
     return NPG_OK;
 fail:

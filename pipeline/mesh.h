@@ -14,6 +14,7 @@ typedef struct npg_mesh {
     uint32_t *faces;               /* F x 3, owned; counter-clockwise seen from outside                   */
     uint8_t *vert_colours;         /* V x 4 RGBA, owned, or NULL                                          */
     float *vert_uvs;               /* V x 2, owned, or NULL                                               */
+    float *corner_uvs;             /* F x 3 x 2, owned, or NULL: where vertices have more than one uv      */
     int references;                /* for npg_mesh_ref / unref alone                                      */
 } npg_mesh;
 

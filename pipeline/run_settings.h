@@ -12,6 +12,7 @@ typedef struct npg_settings {
     int64_t chunk_frames;   /* frames per chunk                       */
     int64_t max_memory_mib; /* 0: no limit                            */
     bool keep_going;        /* skip frames that can't be used         */
+    bool confine;           /* refuse what lies outside its folder    */
     bool pull;              /* finished frames are also to be pulled  */
 } npg_settings;
 

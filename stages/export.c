@@ -6,28 +6,26 @@
 
 #include "export.h"
 #include "file.h"
+#include "forms.h"
 #include "job.h"
 #include "mesh_tools.h"
+#include "placement.h"
+#include "reader.h"
 #include "writer.h"
-
-/* out[a] = sign[a] * in[from[a]] */
-typedef struct axis_map {
-    int from[3];
-    double sign[3];
-    bool is_mirror; /* turns a surface inside out, so faces are wound the other way */
-} axis_map;
 
 typedef enum numbering { NUMBER_OF_FILE, NUMBER_OF_INDEX } numbering;
 
 typedef struct export_state {
     /* options */
-    int format, numbering;
-    const char *prefix, *axes;
-    double scale, fps;
-    bool overwrite, with_normals;
+    int format, numbering, up, unit;
+    const char *prefix, *axes, *exports;
+    double scale, fps, voxel_share;
+    bool overwrite, with_normals, is_centred;
     /* of a pass */
-    axis_map map;
+    npg_placement map;
     npg_mesh_names names;
+    npg_form_choice choice;
+    const char *like; /* the user's own reference where it is OBJ: its lines are kept in OBJ files */
     int64_t *numbers; /* of all frames, while measuring; owned */
     size_t number_count, number_capacity;
     npg_frame_log *list;
@@ -44,25 +42,6 @@ static const char *output_of(const npg_worker *worker)
 
 /* ---- options ---- */
 
-static npg_status parse_axes(axis_map *map, const char *text)
-{
-    const char *c = text;
-    bool is_used[3] = {false, false, false};
-    for (int a = 0; a < 3; a++) {
-        map->sign[a] = *c == '-' ? -1 : 1;
-        if (*c == '-' || *c == '+') c++;
-        if (*c < 'x' || *c > 'z' || is_used[*c - 'x'])
-            return npg_error(
-                NPG_USAGE, "option axes: \"%s\" does not name x, y and z once each, as xyz or xz-y do", text);
-        map->from[a] = *c++ - 'x';
-        is_used[map->from[a]] = true;
-    }
-    if (*c) return npg_error(NPG_USAGE, "option axes: \"%s\" goes on after the third axis", text);
-    bool is_cyclic = map->from[1] == (map->from[0] + 1) % 3;
-    map->is_mirror = is_cyclic != (map->sign[0] * map->sign[1] * map->sign[2] > 0);
-    return NPG_OK;
-}
-
 static npg_status check_prefix(const char *prefix)
 {
     json_t *text = json_string(prefix);
@@ -78,10 +57,22 @@ static npg_status check_prefix(const char *prefix)
 static npg_status read_options(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    NPG_TRY(parse_axes(&state->map, state->axes));
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference"), *format = NULL;
+    NPG_TRY(npg_placement_parse(&state->map, state->axes));
+    state->map.scale = state->scale;
     NPG_TRY(check_prefix(state->prefix));
-    state->names = (npg_mesh_names){state->prefix, state->format ? "obj" : "ply", 4};
+    NPG_TRY(npg_forms_choose(&state->choice, state->exports, state->format));
+    if (reference && reference[0]) format = npg_reader_for(reference);
+    state->like = format && !strcmp(format, "obj") ? reference : NULL;
+    state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
     return NPG_OK;
+}
+
+/* Once the box is known. */
+static void set_centre(export_state *state, const npg_frame_box *box)
+{
+    for (int a = 0; a < 3 && state->is_centred && box->scale > 0; a++)
+        state->map.centre[a] = box->origin[a] + box->centre[a];
 }
 
 static int64_t number_of(const export_state *state, const npg_frame *frame)
@@ -157,16 +148,60 @@ static npg_status check_numbers(npg_worker *worker)
 
 /* ---- solving pass ---- */
 
-/* About what the meshes take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be told. */
+static const double metres_per_unit[] = {1, 0.1, 0.01, 0.001, 1000, 0.0254, 0.3048};
+
+/* What forms may know; before the reference is there, counts are those that the run will have at most. */
+static npg_form_facts form_facts(const npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_frame_box *box = &facts->box;
+    size_t verts = facts->reference ? facts->reference->vert_count : npg_worker_verts_at_most(worker);
+    bool is_known = box->scale > 0;
+    return (npg_form_facts){.output = output_of(worker),
+                            .prefix = state->prefix,
+                            .width = state->names.width,
+                            .vert_count = verts,
+                            .face_count = facts->reference ? facts->reference->face_count : 2 * verts,
+                            .like = state->like,
+                            .turns_faces = state->map.is_mirror,
+                            .has_normals = state->with_normals,
+                            .pose_count = facts->frame_count,
+                            .last_index = facts->frame_count > 0 ? facts->frame_count - 1 : 0,
+                            .fps = state->fps,
+                            .metres_per_unit = metres_per_unit[state->unit],
+                            .is_z_up = state->up,
+                            .largest = is_known ? npg_place_largest(&state->map, box) : 0,
+                            .diagonal = is_known ? state->scale * box->diagonal : 0,
+                            .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
+                            .voxel_share = state->voxel_share,
+                            .has_grids = facts->job != NULL,
+                            .placement = &state->map};
+}
+
+/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be
+ * told. */
 static uint64_t bytes_of_meshes(const npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const char *reference = npg_options_get(npg_worker_options(worker), "reference");
-    uint64_t verts = npg_worker_verts_at_most(worker), per_vert = state->format ? 30 : 12;
+    bool is_obj = state->choice.is_obj;
+    uint64_t verts = npg_worker_verts_at_most(worker), per_vert = is_obj ? 30 : 12;
     if (facts->frame_count < 0 || (reference && reference[0])) return 0;
     if (state->with_normals) per_vert *= 2;
-    return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (state->format ? 20 : 13));
+    npg_form_facts of_forms = form_facts(worker);
+    return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (is_obj ? 20 : 13)) +
+           npg_forms_bytes(&state->choice, &of_forms);
+}
+
+/* What a form can't hold is said before the fit starts; of a live source as soon as its box is known. */
+static npg_status check_forms(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    set_centre(state, &npg_worker_facts(worker)->box);
+    npg_form_facts of_forms = form_facts(worker);
+    return npg_forms_check(&state->choice, &of_forms);
 }
 
 static npg_status prepare_folder(npg_worker *worker)
@@ -176,6 +211,7 @@ static npg_status prepare_folder(npg_worker *worker)
     char *meshes;
     if (npg_worker_facts(worker)->is_live && !state->overwrite)
         NPG_TRY(npg_folder_check(output, &state->names, NULL, 0));
+    NPG_TRY(check_forms(worker));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     NPG_TRY(npg_folder_clear(output));
     NPG_TRY(npg_join_path(&meshes, output, "meshes"));
@@ -194,6 +230,7 @@ static npg_status take_up_folder(npg_worker *worker)
     const char *output = output_of(worker);
     npg_job *job = npg_worker_facts(worker)->job;
     int64_t count, bytes;
+    NPG_TRY(check_forms(worker));
     NPG_TRY(npg_folder_probe(output));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     npg_job_exported(job, &count, &bytes);
@@ -201,36 +238,18 @@ static npg_status take_up_folder(npg_worker *worker)
     return npg_job_write(job);
 }
 
-static void place_vertices(double *vert_world, const npg_facts *facts, const export_state *state,
-                           const float *vert_unit, size_t vert_count)
-{
-    npg_box_unit_to_world(&facts->box, vert_world, vert_unit, vert_count);
-    for (size_t i = 0; i < vert_count; i++) {
-        double *p = vert_world + 3 * i, q[3] = {p[0], p[1], p[2]};
-        for (int a = 0; a < 3; a++) p[a] = state->scale * state->map.sign[a] * q[state->map.from[a]];
-    }
-}
-
-static void turn_normals(float *out, const export_state *state, const float *normals, size_t vert_count)
-{
-    for (size_t i = 0; i < vert_count; i++) {
-        const float n[3] = {normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]};
-        for (size_t a = 0; a < 3; a++)
-            out[3 * i + a] = state->map.sign[a] < 0 ? -n[state->map.from[a]] : n[state->map.from[a]];
-    }
-}
-
-static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit, bool with_normals)
+static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit, bool with_normals,
+                             const char *like)
 {
     export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_mesh *reference = facts->reference;
     char *path;
-    place_vertices(state->vert_world, facts, state, vert_unit, reference->vert_count);
+    npg_place_points(&state->map, state->vert_world, &facts->box, vert_unit, reference->vert_count);
     if (with_normals) {
         npg_mesh_vertex_normals(state->vert_normals, vert_unit, reference->vert_count, reference->faces,
                                 reference->face_count);
-        turn_normals(state->vert_normals, state, state->vert_normals, reference->vert_count);
+        npg_place_normals(&state->map, state->vert_normals, state->vert_normals, reference->vert_count);
     }
     npg_mesh_view view = {.vert_count = reference->vert_count,
                           .face_count = reference->face_count,
@@ -238,9 +257,10 @@ static npg_status write_mesh(npg_worker *worker, const char *file, const float *
                           .vert_normals = with_normals ? state->vert_normals : NULL,
                           .faces = state->faces,
                           .vert_colours = reference->vert_colours,
-                          .vert_uvs = reference->vert_uvs};
+                          .vert_uvs = reference->vert_uvs,
+                          .turns_faces = state->map.is_mirror};
     NPG_TRY(npg_join_path(&path, output_of(worker), file));
-    npg_status status = npg_write_mesh(path, &view);
+    npg_status status = like ? npg_write_obj_like(path, like, &view) : npg_write_mesh(path, &view);
     npg_release(&path);
     return status;
 }
@@ -253,13 +273,12 @@ static npg_status begin_meshes(npg_worker *worker)
     const npg_mesh *reference = facts->reference;
     size_t v = reference->vert_count, f = reference->face_count;
     set_width(state, facts);
+    NPG_TRY(check_forms(worker));
     NPG_TRY(npg_alloc_array(&state->vert_world, NPG_FOR_FILES, v, 3 * sizeof *state->vert_world));
     NPG_TRY(npg_alloc_array(&state->vert_normals, NPG_FOR_FILES, v, 3 * sizeof *state->vert_normals));
     NPG_TRY(npg_alloc_array(&state->faces, NPG_FOR_FILES, f, 3 * sizeof *state->faces));
-    for (size_t i = 0; i < f; i++)
-        for (size_t k = 0; k < 3; k++)
-            state->faces[3 * i + k] = reference->faces[3 * i + (state->map.is_mirror ? 2 - k : k)];
-    return write_mesh(worker, "reference.ply", reference->vert_pos, true);
+    npg_place_faces(&state->map, state->faces, reference->faces, f);
+    return write_mesh(worker, "reference.ply", reference->vert_pos, true, NULL);
 }
 
 static npg_status list_frame(npg_worker *worker, const npg_frame *frame, const char *file)
@@ -286,7 +305,8 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
                          (long long)frame->number, frame->vert_count, reference ? reference->vert_count : 0);
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_mesh_name(file + strlen(file), &state->names, number_of(state, frame));
-    NPG_TRY(write_mesh(worker, file, frame->vert_unit, state->with_normals));
+    NPG_TRY(write_mesh(worker, file, frame->vert_unit, state->with_normals,
+                       state->choice.is_obj ? state->like : NULL));
     state->mesh_count++;
     return list_frame(worker, frame, file);
 }
@@ -297,6 +317,62 @@ static void report_settings(json_t *object, const export_state *state)
     json_object_set_new(object, "scale", json_real(state->scale));
     json_object_set_new(object, "axes", json_string(state->axes));
     json_object_set_new(object, "fps", json_real(state->fps));
+    json_object_set_new(object, "up", json_string(state->up ? "z" : "y"));
+    json_object_set_new(object, "metres_per_unit", json_real(metres_per_unit[state->unit]));
+    json_object_set_new(object, "forms", npg_forms_json(&state->choice));
+    if (state->is_centred)
+        json_object_set_new(
+            object, "centre",
+            json_pack("[fff]", state->map.centre[0], state->map.centre[1], state->map.centre[2]));
+}
+
+/* ---- the other forms ---- */
+
+static bool should_stop(void *worker)
+{
+    return npg_worker_stopping(worker);
+}
+
+/* What of the reference is the same in all poses. */
+static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, float **rest, float **corners)
+{
+    export_state *state = npg_worker_state(worker);
+    const npg_mesh *reference = npg_worker_facts(worker)->reference;
+    size_t v = reference->vert_count, f = reference->face_count;
+    NPG_TRY(npg_alloc_array(rest, NPG_FOR_FILES, v, 3 * sizeof **rest));
+    npg_place_points(&state->map, state->vert_world, &npg_worker_facts(worker)->box, reference->vert_pos, v);
+    for (size_t i = 0; i < 3 * v; i++) (*rest)[i] = (float)state->vert_world[i];
+    if (reference->corner_uvs) {
+        NPG_TRY(npg_alloc_array(corners, NPG_FOR_FILES, f, 6 * sizeof **corners));
+        npg_place_corners(&state->map, *corners, reference->corner_uvs, f);
+    }
+    facts->rest = *rest;
+    facts->corner_uvs = *corners;
+    facts->faces = state->faces;
+    facts->colours = reference->vert_colours;
+    facts->uvs = reference->vert_uvs;
+    return NPG_OK;
+}
+
+/* From the meshes on disk, in the order of time (forms.h says why). */
+static npg_status write_forms(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    npg_form_watch watch = {.should_stop = should_stop, .user = worker};
+    float *rest = NULL, *corners = NULL;
+    if (!npg_forms_any(&state->choice)) return NPG_OK;
+    if (!state->faces) NPG_TRY(begin_meshes(worker));
+    npg_form_facts facts = form_facts(worker);
+    npg_status status = place_reference(worker, &facts, &rest, &corners);
+    if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
+    npg_release(&rest);
+    npg_release(&corners);
+    if (!status && watch.repeated)
+        npg_worker_warn(worker, false, -1,
+                        "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
+                        "times",
+                        (long long)watch.repeated);
+    return status;
 }
 
 static npg_status finish(npg_worker *worker)
@@ -307,7 +383,8 @@ static npg_status finish(npg_worker *worker)
     report_settings(report, state);
     json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
-    return npg_frame_log_finish(state->list);
+    NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker)));
+    return write_forms(worker);
 }
 
 /* ---- the last files ---- */
@@ -348,6 +425,7 @@ static npg_status conclude(npg_worker *worker)
         return NPG_OK;
     }
     npg_status status = read_options(worker);
+    set_centre(npg_worker_state(worker), &npg_worker_facts(worker)->box);
     if (!status) status = write_report(worker);
     json_object_set_new(head, "neupig", json_string(npg_version()));
     json_object_set(head, "status", json_object_get(whole, "status"));
@@ -356,18 +434,28 @@ static npg_status conclude(npg_worker *worker)
     json_object_set(head, "meshes", json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
     json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
-    if (!status) return npg_done_write(output_of(worker), head);
+    if (!status) return npg_done_write(output_of(worker), head, npg_forms_any(&state->choice));
     json_decref(head);
     return status;
 }
 
 /* ---- the stage ---- */
 
+static npg_status check_own(const npg_worker *worker)
+{
+    char *meshes;
+    NPG_TRY(npg_join_path(&meshes, output_of(worker), "meshes"));
+    npg_status status = npg_folder_is_own(meshes);
+    npg_release(&meshes);
+    return status;
+}
+
 static npg_status init(npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     NPG_TRY(read_options(worker));
     if (!output_of(worker)[0]) return NPG_OK;
+    if (npg_worker_settings(worker)->confine) NPG_TRY(check_own(worker));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
         NPG_TRY(npg_folder_probe(output_of(worker)));
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
@@ -406,15 +494,22 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     int64_t frame_count = npg_worker_facts(worker)->frame_count;
     *chunks_held = 1;
-    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + 60 * npg_worker_verts_at_most(worker) +
-           (512 << 10);
+    size_t verts = npg_worker_verts_at_most(worker);
+    bool has_forms = npg_options_get(npg_worker_options(worker), "export")[0];
+    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + (60 + (has_forms ? 200 : 0)) * verts +
+           (has_forms ? 4 << 20 : 512 << 10);
 }
 
 #define OFFSET(member) offsetof(export_state, member)
 
 static const npg_option options[] = {
-    {"format", "Format of the mesh sequence", NPG_OPTION_CHOICE, OFFSET(format), "ply", 0, 0, "ply|obj",
-     NULL},
+    {"export",
+     "What to write, any of ply, obj (sequences), pc2, mdd (point caches), glb, usda, npz, vdb, with commas; "
+     "a "
+     "sequence is always there (see format)",
+     NPG_OPTION_TEXT, OFFSET(exports), "", 0, 0, NULL, "LIST"},
+    {"format", "Format of the mesh sequence where export names none", NPG_OPTION_CHOICE, OFFSET(format),
+     "ply", 0, 0, "ply|obj", NULL},
     {"prefix", "First part of the mesh files' names", NPG_OPTION_TEXT, OFFSET(prefix), "frame", 0, 0, NULL,
      "NAME"},
     {"numbering", "Number of a mesh file: as in the input's name, or the place in the sequence",
@@ -425,6 +520,17 @@ static const npg_option options[] = {
      OFFSET(axes), "xyz", 0, 0, NULL, "AXES"},
     {"fps", "Frames per second of the capture, for the report and formats that carry time", NPG_OPTION_REAL,
      OFFSET(fps), "30", 1e-3, 1e6, NULL, NULL},
+    {"up", "Axis that points up in the written coordinates, for forms that can say it", NPG_OPTION_CHOICE,
+     OFFSET(up), "y", 0, 0, "y|z", NULL},
+    {"unit", "Unit of the written coordinates, for forms that can say it", NPG_OPTION_CHOICE, OFFSET(unit),
+     "m", 0, 0, "m|dm|cm|mm|km|in|ft", NULL},
+    {"centre",
+     "Write coordinates relative to the middle of the capture's box, which done.json then names: for "
+     "captures "
+     "far from 0",
+     NPG_OPTION_FLAG, OFFSET(is_centred), "no", 0, 0, NULL, NULL},
+    {"vdb-voxel", "Voxel of the level sets, as a share of the longest side of the capture's box",
+     NPG_OPTION_REAL, OFFSET(voxel_share), "0.005", 1e-4, 0.25, NULL, "SHARE"},
     {"mesh-normals", "Write vertex normals into every mesh", NPG_OPTION_FLAG, OFFSET(with_normals), "no", 0,
      0, NULL, NULL},
     {"overwrite", "Remove meshes that an earlier run left in the output folder", NPG_OPTION_FLAG,

@@ -1,59 +1,26 @@
 /* What a fit knows after a window, to a file and back. */
 #include "fit_state.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
-#include <xxhash.h>
 
 #include "adam.h"
 #include "file.h"
 #include "levels.h"
+#include "vdb_file.h"
 
 /* ---- the grids' file ---- */
 
-static npg_status copy_bytes(npg_file *file, uint64_t *hash, int fd, const char *path)
-{
-    unsigned char block[16 << 10];
-    XXH3_state_t *state = XXH3_createState();
-    if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
-    XXH3_64bits_reset(state);
-    npg_status status = NPG_OK;
-    for (off_t at = 0; !status;) {
-        ssize_t got = pread(fd, block, sizeof block, at);
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) status = npg_error_errno(NPG_FAILED, "can't read back the grids of %s", path);
-        if (got <= 0) break;
-        XXH3_64bits_update(state, block, (size_t)got);
-        npg_file_write(file, block, (size_t)got);
-        at += got;
-    }
-    *hash = XXH3_64bits_digest(state);
-    XXH3_freeState(state);
-    return status;
-}
+typedef struct grids {
+    const npg_levels *levels;
+    const float *rows;
+    const npg_vdb_place *place;
+} grids;
 
-/* OpenVDB does not tell when a disk is full: it writes to memory, and the bytes go to disk with every check.
- */
-static npg_status write_grids(uint64_t *hash, const char *path, const npg_levels *levels, const float *rows,
-                              const npg_vdb_place *place)
+static npg_status save_levels(void *user, const char *path)
 {
-    char memory_path[64];
-    npg_file *file = NULL;
-    int fd = memfd_create("neupig-grids", MFD_CLOEXEC);
-    if (fd < 0) return npg_error_errno(NPG_FAILED, "can't make a file in memory");
-    snprintf(memory_path, sizeof memory_path, "/proc/self/fd/%d", fd);
-    npg_status status = npg_vdb_save_levels(memory_path, levels, rows, place);
-    if (!status) status = npg_file_open(&file, path);
-    if (!status) status = copy_bytes(file, hash, fd, path);
-    if (!status)
-        status = npg_file_commit(&file);
-    else
-        npg_file_discard(&file);
-    close(fd);
-    return status;
+    const grids *g = user;
+    return npg_vdb_save_levels(path, g->levels, g->rows, g->place);
 }
 
 static bool is_of_grid(const npg_level *level, int channel)
@@ -81,7 +48,7 @@ static npg_status save_grids(const npg_fit_parts *parts, npg_archive_writer *arc
     uint64_t hash;
     NPG_TRY(npg_alloc(&rows, NPG_FOR_FILES, parts->u->size));
     npg_status status = npg_buffer_read(parts->u, 0, rows, parts->u->size);
-    if (!status) status = write_grids(&hash, path, parts->levels, rows, place);
+    if (!status) status = npg_vdb_file_write(path, &hash, save_levels, &(grids){parts->levels, rows, place});
     if (!status) status = npg_archive_put(archive, "grids.hash", &hash, sizeof hash);
     if (!status && has_rest(parts->levels, rows))
         status = npg_archive_put(archive, "fit.rows", rows, parts->u->size);

@@ -7,9 +7,10 @@
  * optimiser, the coarse alignment's poses and the frames that the next windows share
  *     OUT/job/window_000012.vdb    the latent grids of the same moment (stages/shims/vdb_grids.h)
  *
- * The two newest windows stay, and the one that later frames go on from (neupig append).  Each file appears
- * whole or not at all; the archive names the checksum of its grids and of the list of frames, so that a
- * damaged one is noticed and the one before it taken.  No file says that a run is at work.
+ * The two newest windows stay, and the one that later frames go on from (neupig append); where grids are to
+ * be exported, those of all.  Each file appears whole or not at all; the archive names the checksum of its
+ * grids and of the list of frames, so that a damaged one is noticed and the one before it taken.  No file
+ * says that a run is at work.
  *
  * Threads: the functions marked so may be called from any stage's thread; the others are called by one stage
  * alone. */

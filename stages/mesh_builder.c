@@ -57,6 +57,7 @@ npg_status npg_builder_finish(npg_mesh **out, npg_mesh_builder *b, const char *n
     mesh->vert_normals = b->vert_normals;
     mesh->vert_colours = b->vert_colours;
     mesh->vert_uvs = b->vert_uvs;
+    mesh->corner_uvs = b->corner_uvs;
     mesh->faces = b->faces;
     *b = (npg_mesh_builder){0};
     *out = mesh;
@@ -69,6 +70,7 @@ void npg_builder_clear(npg_mesh_builder *b)
     npg_release(&b->vert_normals);
     npg_release(&b->vert_colours);
     npg_release(&b->vert_uvs);
+    npg_release(&b->corner_uvs);
     npg_release(&b->faces);
     *b = (npg_mesh_builder){0};
 }

@@ -13,6 +13,7 @@ typedef struct npg_mesh_builder {
     size_t pos_capacity, normal_capacity, colour_capacity, uv_capacity, face_capacity;
     float *vert_pos, *vert_normals, *vert_uvs; /* owned */
     uint8_t *vert_colours;                     /* owned */
+    float *corner_uvs;                         /* F x 3 x 2 or NULL, owned */
     uint32_t *faces;                           /* owned */
 } npg_mesh_builder;
 

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -114,3 +115,20 @@ const char *npg_number_parse(const char *token, const char *end, double *value)
     *value = negative ? -(double)result : (double)result;
     return text;
 }
+
+/* The formats come from this library's own writers. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+size_t npg_number_print(char *out, size_t size, const char *format, double value)
+{
+    const char *sign = localeconv()->decimal_point;
+    int length = snprintf(out, size, format, value);
+    char *at = *sign && strcmp(sign, ".") != 0 ? strstr(out, sign) : NULL;
+    if (at) {
+        *at = '.';
+        memmove(at + 1, at + strlen(sign), strlen(at + strlen(sign)) + 1);
+        length -= (int)strlen(sign) - 1;
+    }
+    return (size_t)length < size ? (size_t)length : size - 1;
+}
+#pragma GCC diagnostic pop

@@ -19,7 +19,10 @@ typedef struct reader {
     size_t total[KINDS]; /* of the whole file; of what was read so far where it can't be read twice */
     size_t triangles;
     size_t normal_count, normal_capacity, uv_count, uv_capacity, link_capacity[KINDS];
-    float *normals, *uvs;  /* vn and vt lines in their own order; owned */
+    float *normals, *uvs; /* vn and vt lines in their own order; owned */
+    size_t corner_capacity;
+    uint32_t *corner_uv;   /* 3 per triangle: 1 + its vt, 0: none; owned */
+    bool has_seams;        /* some vertex has more than one vt */
     uint32_t *link[KINDS]; /* [UV] and [NORMAL]: 1 + the one a vertex takes, 0: none yet; owned */
 } reader;
 
@@ -174,13 +177,16 @@ static npg_status link_vertex(reader *r, int kind, uint32_t vertex, uint32_t to)
 {
     size_t need = r->total[POSITION] > vertex ? r->total[POSITION] : (size_t)vertex + 1;
     NPG_TRY(npg_grow(&r->link[kind], &r->link_capacity[kind], need, sizeof(uint32_t), NPG_FOR_FILES));
+    if (kind == UV && r->link[kind][vertex] && r->link[kind][vertex] != to + 1) r->has_seams = true;
     if (!r->link[kind][vertex]) r->link[kind][vertex] = to + 1;
     return NPG_OK;
 }
 
-static npg_status take_corner(reader *r, uint32_t *vertex, const char **at, const char *end)
+/* *uv: 1 + the vt it names, 0: none. */
+static npg_status take_corner(reader *r, uint32_t *vertex, uint32_t *uv, const char **at, const char *end)
 {
     uint32_t other;
+    *uv = 0;
     NPG_TRY(take_index(r, vertex, POSITION, at, end));
     for (int kind = UV; kind <= NORMAL && *at < end && **at == '/'; kind++) {
         ++*at;
@@ -195,6 +201,7 @@ static npg_status take_corner(reader *r, uint32_t *vertex, const char **at, cons
         }
         NPG_TRY(take_index(r, &other, kind, at, end));
         NPG_TRY(link_vertex(r, kind, *vertex, other));
+        if (kind == UV) *uv = other + 1;
     }
     if (*at < end && **at != ' ' && **at != '\t')
         return npg_source_bad_line(r->source, "a corner that is not v, v/vt, v//vn or v/vt/vn");
@@ -202,14 +209,31 @@ static npg_status take_corner(reader *r, uint32_t *vertex, const char **at, cons
     return NPG_OK;
 }
 
+/* The corners' texture coordinates, cut into the triangles of the fan that the builder makes next. */
+static npg_status note_corners(reader *r, const uint32_t *uvs, size_t count)
+{
+    size_t first = r->builder.face_count, faces = first + count - 2;
+    size_t need = r->triangles > faces ? r->triangles : faces;
+    if (!r->uv_count) return NPG_OK;
+    NPG_TRY(npg_grow(&r->corner_uv, &r->corner_capacity, need, 3 * sizeof(uint32_t), NPG_FOR_FILES));
+    for (size_t i = 2; i < count; i++) {
+        const uint32_t triangle[3] = {uvs[0], uvs[i - 1], uvs[i]};
+        memcpy(r->corner_uv + 3 * (first + i - 2), triangle, sizeof triangle);
+    }
+    return NPG_OK;
+}
+
 static npg_status add_face(reader *r, const char *at, const char *end)
 {
-    uint32_t corners[CORNERS_MAX];
+    uint32_t corners[CORNERS_MAX], uvs[CORNERS_MAX];
     size_t count = 0;
-    while (at < end && count < CORNERS_MAX) NPG_TRY(take_corner(r, &corners[count++], &at, end));
+    for (; at < end && count < CORNERS_MAX; count++)
+        NPG_TRY(take_corner(r, &corners[count], &uvs[count], &at, end));
     if (at < end) return npg_source_bad_line(r->source, "a face of more than %d corners", CORNERS_MAX);
     if (count < 3) return npg_source_bad_line(r->source, "a face of %zu corners", count);
-    return r->wants_faces ? npg_builder_polygon(&r->builder, corners, count) : NPG_OK;
+    if (!r->wants_faces) return NPG_OK;
+    NPG_TRY(note_corners(r, uvs, count));
+    return npg_builder_polygon(&r->builder, corners, count);
 }
 
 /* ---- the whole ---- */
@@ -253,11 +277,23 @@ static npg_status gather(float **out, const reader *r, int kind, const float *ro
     return NPG_OK;
 }
 
+/* One row per corner of a triangle, 0 where it has none. */
+static npg_status gather_corners(reader *r)
+{
+    npg_mesh_builder *b = &r->builder;
+    NPG_TRY(npg_alloc_array(&b->corner_uvs, NPG_FOR_MESH, b->face_count, 6 * sizeof(float)));
+    for (size_t i = 0; i < 3 * b->face_count && i < 3 * r->corner_capacity; i++)
+        if (r->corner_uv[i])
+            memcpy(b->corner_uvs + 2 * i, r->uvs + 2 * (size_t)(r->corner_uv[i] - 1), 2 * sizeof(float));
+    return NPG_OK;
+}
+
 /* Without faces the i-th vn belongs to the i-th v when there are as many. */
 static npg_status attach(reader *r)
 {
     npg_mesh_builder *b = &r->builder;
     if (r->link[UV]) NPG_TRY(gather(&b->vert_uvs, r, UV, r->uvs, 2));
+    if (r->has_seams) NPG_TRY(gather_corners(r));
     if (r->link[NORMAL]) return gather(&b->vert_normals, r, NORMAL, r->normals, 3);
     if (r->normal_count && r->normal_count == b->vert_count) {
         b->vert_normals = r->normals;
@@ -271,6 +307,7 @@ static void clear(reader *r)
     npg_builder_clear(&r->builder);
     npg_release(&r->normals);
     npg_release(&r->uvs);
+    npg_release(&r->corner_uv);
     npg_release(&r->link[UV]);
     npg_release(&r->link[NORMAL]);
 }

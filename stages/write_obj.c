@@ -1,10 +1,10 @@
 /* OBJ writer. */
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "file.h"
+#include "number.h"
 #include "write_obj.h"
 
 /* Digits after the point that keep 1e-7 of the extent, and 9 digits at least where the extent is unknown. */
@@ -18,20 +18,13 @@ int npg_obj_decimals_for(const npg_mesh_view *mesh)
     return decimals < 1 ? 1 : decimals > 30 ? 30 : decimals;
 }
 
-/* Append numbers to a line.  printf writes the decimal sign of the process's locale; OBJ knows only the
- * point. */
 void npg_obj_add_numbers(char *line, size_t size, int decimals, const double *values, int count)
 {
-    const char *sign = localeconv()->decimal_point;
     size_t used = strlen(line);
     for (int i = 0; i < count && used < size; i++) {
-        char number[360];
-        snprintf(number, sizeof number, fabs(values[i]) < 1e15 ? "%.*f" : "%.*e", decimals, values[i]);
-        char *at = strcmp(sign, ".") != 0 && *sign ? strstr(number, sign) : NULL;
-        if (at) {
-            *at = '.';
-            memmove(at + 1, at + strlen(sign), strlen(at + strlen(sign)) + 1);
-        }
+        char format[16], number[360];
+        snprintf(format, sizeof format, "%%.%d%c", decimals, fabs(values[i]) < 1e15 ? 'f' : 'e');
+        npg_number_print(number, sizeof number, format, values[i]);
         used += (size_t)snprintf(line + used, size - used, " %s", number);
     }
 }

@@ -57,11 +57,33 @@ static void copy_corner(const copying *c, const char *at, const char *end)
     npg_file_write(c->file, at, (size_t)(index_end - at));
 }
 
+static bool is_gap(char c)
+{
+    return c == ' ' || c == '\t' || c == '\r';
+}
+
+/* The corners after the first one, from the last on: the face looks the other way and is cut into the same
+ * triangles. */
+static void copy_backwards(const copying *c, const char *at, const char *end)
+{
+    while (at < end) {
+        while (at < end && is_gap(end[-1])) end--;
+        const char *word = end;
+        while (word > at && !is_gap(word[-1])) word--;
+        if (word < end) copy_corner(c, word, end);
+        end = word;
+    }
+}
+
 static void copy_face(const copying *c, const char *at, const char *end)
 {
     npg_file_write(c->file, "f", 1);
-    while (at < end) {
+    for (bool is_first = true; at < end; is_first = false) {
         const char *after = word_end(at, end);
+        if (!is_first && c->mesh->turns_faces) {
+            copy_backwards(c, at, end);
+            break;
+        }
         copy_corner(c, at, after);
         at = npg_skip_blanks(after, end);
     }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "bytes.h"
 #include "file.h"
 #include "writer.h"
 
@@ -38,37 +39,19 @@ static void write_header(npg_file *file, const npg_mesh_view *mesh, const char *
     npg_file_print(file, "end_header\n");
 }
 
-static size_t put(unsigned char *out, uint64_t bits, size_t size)
-{
-    for (size_t i = 0; i < size; i++) out[i] = (unsigned char)(bits >> (8 * i));
-    return size;
-}
-
-static size_t put_float(unsigned char *out, float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return put(out, bits, sizeof bits);
-}
-
-static size_t put_double(unsigned char *out, double value)
-{
-    uint64_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return put(out, bits, sizeof bits);
-}
-
 static void write_vertex(npg_file *file, const npg_mesh_view *mesh, size_t i, bool as_float)
 {
     unsigned char row[64];
     size_t size = 0;
     for (size_t a = 0; a < 3; a++) {
         double x = mesh->vert_world[3 * i + a];
-        size += as_float ? put_float(row + size, (float)x) : put_double(row + size, x);
+        size += as_float ? npg_put_little(row + size, npg_float_bits((float)x), 4)
+                         : npg_put_little(row + size, npg_double_bits(x), 8);
     }
     for (size_t a = 0; a < 3 && mesh->vert_normals; a++)
-        size += put_float(row + size, mesh->vert_normals[3 * i + a]);
-    for (size_t a = 0; a < 2 && mesh->vert_uvs; a++) size += put_float(row + size, mesh->vert_uvs[2 * i + a]);
+        size += npg_put_little(row + size, npg_float_bits(mesh->vert_normals[3 * i + a]), 4);
+    for (size_t a = 0; a < 2 && mesh->vert_uvs; a++)
+        size += npg_put_little(row + size, npg_float_bits(mesh->vert_uvs[2 * i + a]), 4);
     if (mesh->vert_colours) {
         memcpy(row + size, mesh->vert_colours + 4 * i, 4);
         size += 4;
@@ -79,7 +62,7 @@ static void write_vertex(npg_file *file, const npg_mesh_view *mesh, size_t i, bo
 static void write_face(npg_file *file, const uint32_t *face)
 {
     unsigned char row[13] = {3};
-    for (size_t k = 0; k < 3; k++) put(row + 1 + 4 * k, face[k], 4);
+    for (size_t k = 0; k < 3; k++) npg_put_little(row + 1 + 4 * k, face[k], 4);
     npg_file_write(file, row, sizeof row);
 }
 

@@ -13,6 +13,7 @@ typedef struct npg_mesh_view {
     const uint32_t *faces;       /* F x 3; face_count 0 writes a cloud */
     const uint8_t *vert_colours; /* V x 4 or NULL */
     const float *vert_uvs;       /* V x 2 or NULL */
+    bool turns_faces;            /* for npg_write_obj_like(): the faces of `like` are turned over */
 } npg_mesh_view;
 
 /* By the name's ending, .ply (binary little-endian) or .obj.  PLY positions are float when float keeps 1e-6

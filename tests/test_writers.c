@@ -46,7 +46,8 @@ static npg_mesh_view make_view(double offset, double size, int parts)
         uvs[2 * i + 1] = 1 - uvs[2 * i];
     }
     return (npg_mesh_view){
-        V, F, world, parts & 1 ? normals : NULL, faces, parts & 2 ? colours : NULL, parts & 4 ? uvs : NULL};
+        V,    F, world, parts & 1 ? normals : NULL, faces, parts & 2 ? colours : NULL, parts & 4 ? uvs : NULL,
+        false};
 }
 
 static void compare(const npg_mesh *mesh, const npg_origin *origin, const npg_mesh_view *view, double extent)

@@ -23,6 +23,7 @@ const npg_verb *npg_verb_find(const char *name);
 
 int npg_verb_run(int argc, char **argv);
 int npg_verb_append(int argc, char **argv);
+int npg_verb_batch(int argc, char **argv);
 int npg_verb_apply(int argc, char **argv);
 int npg_verb_probe(int argc, char **argv);
 int npg_verb_eval(int argc, char **argv);
@@ -37,6 +38,7 @@ int npg_verb_version(int argc, char **argv);
 
 extern const npg_option npg_run_verb_options[];
 extern const npg_option npg_append_options[];
+extern const npg_option npg_batch_options[];
 extern const npg_option npg_apply_options[];
 extern const npg_option npg_probe_options[];
 extern const npg_option npg_eval_options[];
