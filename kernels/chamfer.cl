@@ -24,10 +24,10 @@ inline float weight_of(float dist_sq, float falloff)
  * points: targets; to_points / to_verts: nearest indices; forward / reverse: the slots (op nearest) of the searches
  * vertex -> point and point -> vertex.  falloff = 1 / (2 alpha^2), 0 for plain squared distances.
  * Global size: one group of LOCAL items per frame, frames first ... */
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void chamfer_frame(global float *cd, global float *g, global const float *x, global const float *points,
-                          global const int *to_points, global const int *to_verts, global const int *forward,
-                          global const int *reverse, float falloff, int rows, int first,
-                          int count)
+__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
+chamfer_frame(global float *cd, global float *g, global const float *x, global const float *points,
+              global const int *to_points, global const int *to_verts, global const int *forward,
+              global const int *reverse, float falloff, int rows, int first, int count)
 {
     local float sums[LOCAL];
     size_t frame = first + get_group_id(0);

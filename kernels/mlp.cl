@@ -312,7 +312,8 @@ GROUP_KERNEL mlp_backward(global float *dp, global float *sums, global float *dc
             {
                 TILE_GRAD(sum + AT_W2 + COLUMN(W1, col), h1, d2 + COLUMN(ROWS, col), W1)
             }
-            second_back(dp + block * BLOCK(W1), dc + (group * all_frames + first_frame + frame) * W1, d2, h1, transposed);
+            second_back(dp + block * BLOCK(W1), dc + (group * all_frames + first_frame + frame) * W1, d2, h1,
+                        transposed);
             SYNC
         }
 }

@@ -41,8 +41,8 @@ inline float highest(float16 v)
 }
 
 /* Boxes of all levels of the tree of each frame, from its points.  Global size: one group of LOCAL items per frame. */
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void nearest_refit(global float *boxes, global const float *points, global const int *slots, int first,
-                          int count)
+__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
+nearest_refit(global float *boxes, global const float *points, global const int *slots, int first, int count)
 {
     if (get_group_id(0) >= (size_t)count) return;
     global const int *slot = slots + (first + get_group_id(0)) * SLOT;

@@ -19,8 +19,9 @@
 #endif
 #define IS_MINE(v) ((v) / 16 % LOCAL == ITEM)
 
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void pull_frame(global float *loss, global float *g, global const float *x, global const float *pulls,
-                       global const int *start, int rows, int first, int count)
+__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
+pull_frame(global float *loss, global float *g, global const float *x, global const float *pulls,
+           global const int *start, int rows, int first, int count)
 {
     local float sums[LOCAL];
     size_t frame = first + get_group_id(0);
