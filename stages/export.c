@@ -386,6 +386,10 @@ static npg_status write_forms(npg_worker *worker)
     if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
     npg_release(&rest);
     npg_release(&corners);
+    if (!status && npg_forms_name(state->exports, "vdb") && !facts.has_grids)
+        npg_worker_warn(
+            worker, false, -1,
+            "vdb has no latent grids: a run without a job folder (live, or pulled from) keeps none");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
