@@ -7,7 +7,13 @@ npg_status npg_adam_open(npg_adam *adam, npg_device *device, const float *rates,
 {
     npg_status status;
     size_t rate_count = (count + row - 1) / row;
-    *adam = (npg_adam){.count = count, .row = row, .beta1 = 0.9, .beta2 = 0.999, .epsilon = 1e-8, .scale = 1};
+    *adam = (npg_adam){.count = count,
+                       .row = row,
+                       .beta1 = 0.9,
+                       .beta2 = 0.999,
+                       .epsilon = 1e-8,
+                       .scale = 1,
+                       .span = (size_t)npg_device_tuning(device)->span};
     NPG_TRY_OR(failed, status, npg_program_open(&adam->program, device, "adam", ""));
     NPG_TRY_OR(failed, status, npg_buffer_open(&adam->first, device, count * sizeof(float)));
     NPG_TRY_OR(failed, status, npg_buffer_open(&adam->second, device, count * sizeof(float)));
@@ -30,8 +36,8 @@ npg_status npg_adam_step(npg_adam *adam, const npg_buffer *parameters, const npg
 {
     double step = (double)++adam->step;
     double c1 = adam->scale / (1 - pow(adam->beta1, step)), c2 = 1 / sqrt(1 - pow(adam->beta2, step));
-    return NPG_LAUNCH(adam->program, "adam_step", (adam->count + 15) / 16, 1, NPG_BUF(parameters),
-                      NPG_BUF(&adam->first), NPG_BUF(&adam->second), NPG_BUF(gradient), NPG_BUF(&adam->rate),
-                      NPG_INT(adam->count), NPG_INT(adam->row), NPG_REAL(adam->beta1), NPG_REAL(adam->beta2),
-                      NPG_REAL(adam->epsilon), NPG_REAL(c1), NPG_REAL(c2));
+    return NPG_LAUNCH(adam->program, "adam_step", (adam->count + adam->span - 1) / adam->span, 1,
+                      NPG_BUF(parameters), NPG_BUF(&adam->first), NPG_BUF(&adam->second), NPG_BUF(gradient),
+                      NPG_BUF(&adam->rate), NPG_INT(adam->count), NPG_INT(adam->row), NPG_REAL(adam->beta1),
+                      NPG_REAL(adam->beta2), NPG_REAL(adam->epsilon), NPG_REAL(c1), NPG_REAL(c2));
 }

@@ -8,7 +8,7 @@
 typedef struct npg_adam {
     npg_program *program;
     npg_buffer first, second, rate; /* moments [count], learning rates [ceil(count / row)] */
-    size_t count, row;
+    size_t count, row, span;        /* span: values of a work-item, from the tuning */
     double beta1, beta2, epsilon;
     double scale; /* of all learning rates, 1 at first */
     int64_t step; /* steps done */

@@ -2,10 +2,18 @@
  *
  *     cd = sum_v w d_v^2 + sum_p w d_p^2,   w = exp(-(d^2)^2 / (2 alpha^2)), held constant in the gradient
  *
- * d_v: vertex to its nearest target point, d_p: target point to its nearest vertex.  Sums, not means.  One work-item
- * per frame walks both lists in order: no atomics, equal input gives equal bits. */
+ * d_v: vertex to its nearest target point, d_p: target point to its nearest vertex.  Sums, not means.  A frame
+ * has LOCAL work-items; each owns every LOCAL-th block of 16 vertices, walks both lists in order and adds what pulls at
+ * its own: no atomics, equal input gives equal bits. */
 
 #define SLOT 8
+
+/* LOCAL: build constant, from the tuning of the device. */
+#if LOCAL == 1
+#define ITEM 0
+#else
+#define ITEM ((int)get_local_id(0))
+#endif
 
 inline float weight_of(float dist_sq, float falloff)
 {
@@ -15,20 +23,21 @@ inline float weight_of(float dist_sq, float falloff)
 /* cd: [frames].  g: dL/dx per frame like x, overwritten.  x: moving vertices ([rows / 16][3][16] per frame);
  * points: targets; to_points / to_verts: nearest indices; forward / reverse: the slots (op nearest) of the searches
  * vertex -> point and point -> vertex.  falloff = 1 / (2 alpha^2), 0 for plain squared distances.
- * Global size: (count), frames first ... */
-kernel void chamfer_frame(global float *cd, global float *g, global const float *x, global const float *points,
+ * Global size: one group of LOCAL items per frame, frames first ... */
+__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void chamfer_frame(global float *cd, global float *g, global const float *x, global const float *points,
                           global const int *to_points, global const int *to_verts, global const int *forward,
                           global const int *reverse, float falloff, int rows, int first,
                           int count)
 {
-    size_t frame = first + get_global_id(0);
+    local float sums[LOCAL];
+    size_t frame = first + get_group_id(0);
     if (frame >= (size_t)(first + count)) return;
     global const int *f = forward + frame * SLOT, *r = reverse + frame * SLOT;
     global float *grad = g + (size_t)f[1] * 48;
     x += (size_t)f[1] * 48;
     points += (size_t)f[3] * 48;
     float sum_v = 0.0f, sum_p = 0.0f;
-    for (int block = 0; block < rows / 16; block++) {
+    for (int block = ITEM; block < rows / 16; block += LOCAL) {
         float part = 0.0f;
         for (int lane = 0; lane < 16; lane++) {
             int v = block * 16 + lane, p = v < f[0] ? to_points[f[5] + v] : 0;
@@ -47,6 +56,7 @@ kernel void chamfer_frame(global float *cd, global float *g, global const float 
         float part = 0.0f;
         for (int p = start; p < min(start + 16, r[0]); p++) {
             int v = to_verts[r[5] + p];
+            if (v / 16 % LOCAL != ITEM) continue;
             size_t at = (size_t)(v / 16) * 48 + v % 16, to = (size_t)(p / 16) * 48 + p % 16;
             float3 d = (float3)(x[at] - points[to], x[at + 16] - points[to + 16], x[at + 32] - points[to + 32]);
             float dist_sq = d.x * d.x + d.y * d.y + d.z * d.z;
@@ -58,5 +68,10 @@ kernel void chamfer_frame(global float *cd, global float *g, global const float 
         }
         sum_p += part;
     }
-    cd[frame] = sum_v + sum_p;
+    sums[ITEM] = sum_v + sum_p;
+    if (LOCAL > 1) barrier(CLK_LOCAL_MEM_FENCE);
+    if (ITEM != 0) return;
+    float total = sums[0];
+    for (int i = 1; i < LOCAL; i++) total += sums[i];
+    cd[frame] = total;
 }

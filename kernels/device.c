@@ -1,32 +1,15 @@
-/* Device: opening OpenCL devices, buffers, programs, launches. */
+/* Device: opening OpenCL devices, buffers. */
 #include "device.h"
 
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #include "cl_error.h"
+#include "device_internal.h"
 #include "kernel_cache.h"
-#include "kernel_sources.h"
-
-#define KERNELS_MAX 16
-
-struct npg_device {
-    npg_device_info info;
-    cl_device_id id;
-    cl_context context;
-    cl_command_queue queue;
-};
-
-struct npg_program {
-    npg_device *device; /* loan */
-    const char *name;   /* of the source, static */
-    cl_program program;
-    cl_kernel kernels[KERNELS_MAX];
-    char kernel_names[KERNELS_MAX][48];
-    cl_uint kernel_count;
-};
 
 #define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
 
@@ -56,7 +39,7 @@ static npg_status read_facts(npg_device_info *info, cl_device_id id)
 {
     cl_platform_id platform;
     cl_device_type type;
-    cl_uint units;
+    cl_uint units, vector;
     cl_ulong memory;
     memset(info, 0, sizeof *info);
     CL_TRY(clGetDeviceInfo(id, CL_DEVICE_NAME, sizeof info->name - 1, info->name, NULL));
@@ -64,10 +47,13 @@ static npg_status read_facts(npg_device_info *info, cl_device_id id)
     CL_TRY(clGetDeviceInfo(id, CL_DEVICE_TYPE, sizeof type, &type, NULL));
     CL_TRY(clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL));
     CL_TRY(clGetDeviceInfo(id, CL_DEVICE_GLOBAL_MEM_SIZE, sizeof memory, &memory, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DRIVER_VERSION, sizeof info->driver - 1, info->driver, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, sizeof vector, &vector, NULL));
     CL_TRY(clGetDeviceInfo(id, CL_DEVICE_PLATFORM, sizeof platform, &platform, NULL));
     CL_TRY(clGetPlatformInfo(platform, CL_PLATFORM_NAME, sizeof info->platform - 1, info->platform, NULL));
     info->is_cpu = type & CL_DEVICE_TYPE_CPU;
     info->units = (int)units;
+    info->vector = (int)vector;
     info->memory_bytes = memory;
     return NPG_OK;
 }
@@ -118,7 +104,88 @@ static npg_status choose_device(npg_device *device, const char *spec)
     return npg_error(NPG_DEVICE, "no OpenCL device fits \"%s\"; there is:%s", spec, *list ? list : " none");
 }
 
+/* ---- tuning ---- */
+
+static const struct {
+    const char *name;
+    const npg_tuning *tuning;
+} sets[] = {{"wide", &npg_tuning_wide}, {"narrow", &npg_tuning_narrow}, {"gpu", &npg_tuning_gpu}};
+
+static void take_set(npg_device *device, size_t i)
+{
+    device->tuning = *sets[i].tuning;
+    snprintf(device->tuning_source, sizeof device->tuning_source, "%s", sets[i].name);
+}
+
+npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *device)
+{
+    const npg_device_info *info = &device->info;
+    XXH64_hash_t hash = XXH64(info->platform, strlen(info->platform), (XXH64_hash_t)info->units);
+    char name[64];
+    hash = XXH64(info->driver, strlen(info->driver), XXH64(info->name, strlen(info->name), hash));
+    snprintf(name, sizeof name, "tuning-%016llx.json", (unsigned long long)hash);
+    if (npg_kernel_cache_path(out, size, name)) return NPG_OK;
+    return npg_error(NPG_DISK, "there is no folder for the cache (XDG_CACHE_HOME, HOME)");
+}
+
+/* The set of this kind of device, and over it what was tuned. */
+static void tune_by_kind(npg_device *device)
+{
+    char path[4200];
+    take_set(device, !device->info.is_cpu ? 2 : device->info.vector >= 16 ? 0 : 1);
+    if (npg_device_tuning_path(path, sizeof path, device)) return;
+    npg_status status = npg_tuning_load(&device->tuning, path, device->info.name);
+    if (!status) snprintf(device->tuning_source, sizeof device->tuning_source, "%s", path);
+    if (status < 0) {
+        size_t used = strlen(device->tuning_source);
+        snprintf(device->tuning_source + used, sizeof device->tuning_source - used, " (not used: %.2000s)",
+                 npg_error_text());
+    }
+}
+
+static npg_status choose_tuning(npg_device *device, const char *tuning)
+{
+    for (size_t i = 0; i < sizeof sets / sizeof *sets; i++)
+        if (!strcmp(sets[i].name, tuning)) {
+            take_set(device, i);
+            return NPG_OK;
+        }
+    if (!*tuning || !strcmp(tuning, "auto")) {
+        tune_by_kind(device);
+        return NPG_OK;
+    }
+    npg_status status = npg_tuning_load(&device->tuning, tuning, device->info.name);
+    if (status == NPG_END) return npg_error(NPG_BAD_INPUT, "tuning %s: there is no such file or set", tuning);
+    snprintf(device->tuning_source, sizeof device->tuning_source, "%s", tuning);
+    return npg_error_prefix(status, "tuning");
+}
+
+const npg_tuning *npg_device_tuning(const npg_device *device)
+{
+    return &device->tuning;
+}
+
+const char *npg_device_tuning_source(const npg_device *device)
+{
+    return device->tuning_source;
+}
+
+npg_status npg_device_set_tuning(npg_device *device, const npg_tuning *tuning)
+{
+    NPG_TRY(npg_tuning_check(tuning));
+    device->tuning = *tuning;
+    snprintf(device->tuning_source, sizeof device->tuning_source, "given");
+    return NPG_OK;
+}
+
+/* ---- opening ---- */
+
 npg_status npg_device_open(npg_device **out, const char *spec)
+{
+    return npg_device_open_tuned(out, spec, "auto");
+}
+
+npg_status npg_device_open_tuned(npg_device **out, const char *spec, const char *tuning)
 {
     npg_device *device;
     cl_int code = 0;
@@ -130,6 +197,7 @@ npg_status npg_device_open(npg_device **out, const char *spec)
         return status;
     }
     status = choose_device(device, spec && strcmp(spec, "auto") != 0 ? spec : "");
+    if (!status) status = choose_tuning(device, tuning);
     if (!status) {
         device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
         status = npg_cl_status(code, "clCreateContext");
@@ -148,6 +216,7 @@ void npg_device_close(npg_device **slot)
     if (!slot || !*slot) return;
     npg_device *device = *slot;
     if (device->queue) clFinish(device->queue);
+    npg_programs_close(device);
     if (device->queue) clReleaseCommandQueue(device->queue);
     if (device->context) clReleaseContext(device->context);
     npg_release(slot);
@@ -220,104 +289,4 @@ npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *d
 {
     NPG_TRY(npg_buffer_open(buffer, device, size));
     return npg_buffer_write(buffer, 0, data, size);
-}
-
-/* ---- programs ---- */
-
-static const char *source_of(const char *name, const char **static_name)
-{
-    for (const npg_kernel_source *source = npg_kernel_sources; source->name; source++)
-        if (!strcmp(source->name, name)) {
-            *static_name = source->name;
-            return source->text;
-        }
-    return NULL;
-}
-
-static npg_status build_failure(const npg_program *program, cl_int code)
-{
-    char log[800] = "";
-    size_t size = 0;
-    clGetProgramBuildInfo(program->program, program->device->id, CL_PROGRAM_BUILD_LOG, 0, NULL, &size);
-    if (size && size <= sizeof log)
-        clGetProgramBuildInfo(program->program, program->device->id, CL_PROGRAM_BUILD_LOG, sizeof log, log,
-                              NULL);
-    return npg_error_prefix(npg_cl_status(code, "clBuildProgram"), "kernels/%s.cl on %s: %s", program->name,
-                            program->device->info.name, log);
-}
-
-static npg_status make_kernels(npg_program *program)
-{
-    CL_TRY(clCreateKernelsInProgram(program->program, KERNELS_MAX, program->kernels, &program->kernel_count));
-    for (cl_uint i = 0; i < program->kernel_count; i++)
-        CL_TRY(clGetKernelInfo(program->kernels[i], CL_KERNEL_FUNCTION_NAME, sizeof program->kernel_names[i],
-                               program->kernel_names[i], NULL));
-    return NPG_OK;
-}
-
-static npg_status build_program(npg_program *program, const char *text, const char *constants)
-{
-    char flags[512];
-    cl_int code;
-    snprintf(flags, sizeof flags, "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros %s", constants);
-    program->program = clCreateProgramWithSource(program->device->context, 1, &text, NULL, &code);
-    NPG_TRY(npg_cl_status(code, "clCreateProgramWithSource"));
-    code = clBuildProgram(program->program, 1, &program->device->id, flags, NULL, NULL);
-    if (code) return build_failure(program, code);
-    return make_kernels(program);
-}
-
-npg_status npg_program_open(npg_program **out, npg_device *device, const char *name, const char *constants)
-{
-    npg_program *program;
-    const char *static_name, *text = source_of(name, &static_name);
-    *out = NULL;
-    if (!text) return npg_error(NPG_USAGE, "there are no kernels named %s", name);
-    NPG_TRY(npg_alloc(&program, NPG_FOR_DEVICE, sizeof *program));
-    program->device = device;
-    program->name = static_name;
-    npg_status status = build_program(program, text, constants);
-    if (status) npg_program_close(&program);
-    *out = program;
-    return status;
-}
-
-void npg_program_close(npg_program **slot)
-{
-    if (!slot || !*slot) return;
-    for (cl_uint i = 0; i < (*slot)->kernel_count; i++) clReleaseKernel((*slot)->kernels[i]);
-    if ((*slot)->program) clReleaseProgram((*slot)->program);
-    npg_release(slot);
-}
-
-/* ---- launches ---- */
-
-static cl_int set_argument(cl_kernel kernel, cl_uint i, const npg_argument *argument)
-{
-    cl_mem memory;
-    switch (argument->kind) {
-    case 0: memory = argument->buffer->memory; return clSetKernelArg(kernel, i, sizeof memory, &memory);
-    case 1: return clSetKernelArg(kernel, i, sizeof argument->number, &argument->number);
-    default: return clSetKernelArg(kernel, i, sizeof argument->real, &argument->real);
-    }
-}
-
-npg_status npg_launch_on(npg_program *program, const char *name, size_t x, size_t y, size_t local,
-                         const npg_argument *arguments, size_t argument_count)
-{
-    cl_uint k = 0;
-    while (k < program->kernel_count && strcmp(program->kernel_names[k], name)) k++;
-    if (k == program->kernel_count)
-        return npg_error(NPG_USAGE, "kernels/%s.cl has no kernel %s", program->name, name);
-    if (!x || !y) return NPG_OK;
-    cl_kernel kernel = program->kernels[k];
-    for (cl_uint i = 0; i < argument_count; i++)
-        NPG_TRY(npg_error_prefix(npg_cl_status(set_argument(kernel, i, arguments + i), "clSetKernelArg"),
-                                 "kernel %s, argument %u", name, i));
-    if (!local) local = program->device->info.is_cpu ? 1 : 64;
-    size_t global[2] = {(x + local - 1) / local * local, y}, groups[2] = {local, 1};
-    cl_int code = clEnqueueNDRangeKernel(program->device->queue, kernel, y > 1 ? 2 : 1, NULL, global, groups,
-                                         0, NULL, NULL);
-    return npg_error_prefix(npg_cl_status(code, "clEnqueueNDRangeKernel"), "kernel %s over %zu x %zu", name,
-                            x, y);
 }

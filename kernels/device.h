@@ -8,14 +8,16 @@
 #include <stdbool.h>
 
 #include "memory.h"
+#include "tuning.h"
 
 typedef struct npg_device npg_device;
 typedef struct npg_program npg_program;
 
 typedef struct npg_device_info {
-    char name[128], platform[128], version[128];
+    char name[128], platform[128], version[128], driver[128];
     bool is_cpu;
     int units;           /* compute units         */
+    int vector;          /* floats in a vector    */
     size_t memory_bytes; /* global memory         */
 } npg_device_info;
 
@@ -27,8 +29,25 @@ npg_status npg_device_describe(size_t i, npg_device_info *info);
  * cached on disk in a folder that one process uses at a time; a second process gets a folder of its own that
  * goes away at close. */
 npg_status npg_device_open(npg_device **device, const char *spec);
+
+/* The same with a choice of tuning: "auto" (the file that `neupig tune` made for this device and these
+ * kernels if there is one, else by kind of device), "wide", "narrow", "gpu", or the path of a file.  A file
+ * that can't be used: NPG_BAD_INPUT; with "auto" it is left alone and npg_device_tuning_source says so. */
+npg_status npg_device_open_tuned(npg_device **device, const char *spec, const char *tuning);
 void npg_device_close(npg_device **device);
 const npg_device_info *npg_device_facts(const npg_device *device);
+
+/* The set in use, and where it comes from: "wide", "narrow", "gpu", a path, or what was wrong with the file.
+ */
+const npg_tuning *npg_device_tuning(const npg_device *device);
+const char *npg_device_tuning_source(const npg_device *device);
+
+/* Change the set for what is opened on the device from now on; nothing that was opened before may be in use.
+ */
+npg_status npg_device_set_tuning(npg_device *device, const npg_tuning *tuning);
+
+/* Where `neupig tune` keeps this device's set; NPG_DISK when no cache folder can be made. */
+npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *device);
 
 /* Wait for everything launched so far; reports what failed on the device. */
 npg_status npg_device_finish(npg_device *device);
@@ -51,7 +70,8 @@ npg_status npg_buffer_zero(npg_buffer *buffer);
 /* An open buffer with these contents. */
 npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *data, size_t size);
 
-/* Build kernels/<name>.cl with the given build constants ("-DROWS=192 ...", may be ""). */
+/* Build kernels/<name>.cl with the given build constants ("-DW1=512 ...", may be "") and those of the tuning.
+ * The device owns the program; opened twice it is the same one, and lasts until the device is closed. */
 npg_status npg_program_open(npg_program **program, npg_device *device, const char *name,
                             const char *constants);
 void npg_program_close(npg_program **program);
@@ -80,8 +100,8 @@ typedef struct npg_argument {
         .kind = 2, .real = (float)(x)                                                                        \
     }
 
-/* Queue a kernel over x (by y) work-items.  local is the work-group's extent in x: 0 lets a CPU take
- * groups of one work-item and a GPU groups of 64 (x is rounded up: kernels check their bounds). */
+/* Queue a kernel over x (by y) work-items.  local is the work-group's extent in x: 0 takes that
+ * of the tuning (x is rounded up: kernels check their bounds). */
 npg_status npg_launch_on(npg_program *program, const char *kernel, size_t x, size_t y, size_t local,
                          const npg_argument *arguments, size_t argument_count);
 
@@ -89,9 +109,9 @@ npg_status npg_launch_on(npg_program *program, const char *kernel, size_t x, siz
     npg_launch_on(program, kernel, x, y, 0, (npg_argument[]){__VA_ARGS__},                                   \
                   sizeof((npg_argument[]){__VA_ARGS__}) / sizeof(npg_argument))
 
-/* The same for kernels whose work-group is one work-item on every device. */
-#define NPG_LAUNCH_SINGLE(program, kernel, x, ...)                                                           \
-    npg_launch_on(program, kernel, x, 1, 1, (npg_argument[]){__VA_ARGS__},                                   \
+/* The same for kernels that share their work out to groups of so many work-items. */
+#define NPG_LAUNCH_GROUPS(program, kernel, groups, items, ...)                                               \
+    npg_launch_on(program, kernel, (groups) * (items), 1, items, (npg_argument[]){__VA_ARGS__},              \
                   sizeof((npg_argument[]){__VA_ARGS__}) / sizeof(npg_argument))
 
 #endif

@@ -17,6 +17,7 @@
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int users, lock_fd = -1;
+static char shared_folder[4096];  /* of this version; "" when there can be none */
 static char private_folder[2048]; /* "" while the shared folder is ours */
 
 static unsigned long long hash_of_sources(void)
@@ -38,22 +39,21 @@ static void name_base(char *out, size_t size)
         snprintf(out, size, "/tmp/neupig-%ld", (long)getuid());
 }
 
-/* The folder of this version, or "" when another process uses it. */
-static npg_status take_shared(char *folder, size_t size)
+/* The folder of this version, and its lock unless another process has it.  A home that can't be written to is
+ * no obstacle. */
+static void take_shared(void)
 {
     char base[2048], path[4200];
     name_base(base, sizeof base);
-    snprintf(folder, size, "%s/%s-%016llx", base, npg_version(), hash_of_sources());
-    npg_status status = npg_make_folder(folder);
-    if (status) return status;
-    snprintf(path, sizeof path, "%.4096s/lock", folder);
-    lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-    if (lock_fd < 0) return npg_error_errno(NPG_DISK, "%s", path);
-    if (!flock(lock_fd, LOCK_EX | LOCK_NB)) return NPG_OK;
-    close(lock_fd);
-    lock_fd = -1;
-    folder[0] = 0;
-    return NPG_OK;
+    snprintf(shared_folder, sizeof shared_folder, "%s/%s-%016llx", base, npg_version(), hash_of_sources());
+    snprintf(path, sizeof path, "%s/lock", shared_folder);
+    if (!npg_make_folder(shared_folder)) lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (lock_fd < 0) {
+        shared_folder[0] = 0;
+    } else if (flock(lock_fd, LOCK_EX | LOCK_NB)) {
+        close(lock_fd);
+        lock_fd = -1;
+    }
 }
 
 static npg_status make_private(void)
@@ -69,13 +69,22 @@ static npg_status make_private(void)
 
 static npg_status choose_folder(void)
 {
-    char folder[4096];
+    take_shared();
     if (getenv("POCL_CACHE_DIR")) return NPG_OK;
-    if (take_shared(folder, sizeof folder))
-        folder[0] = 0; /* a home that can't be written to is no obstacle */
-    if (!folder[0]) NPG_TRY(make_private());
-    setenv("POCL_CACHE_DIR", folder[0] ? folder : private_folder, 1);
+    if (lock_fd < 0) NPG_TRY(make_private());
+    setenv("POCL_CACHE_DIR", lock_fd < 0 ? private_folder : shared_folder, 1);
     return NPG_OK;
+}
+
+bool npg_kernel_cache_path(char *out, size_t size, const char *name)
+{
+    out[0] = 0;
+    return shared_folder[0] && (size_t)snprintf(out, size, "%s/%s", shared_folder, name) < size;
+}
+
+bool npg_kernel_cache_is_ours(void)
+{
+    return lock_fd >= 0;
 }
 
 npg_status npg_kernel_cache_enter(void)

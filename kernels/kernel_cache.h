@@ -13,4 +13,9 @@
 npg_status npg_kernel_cache_enter(void);
 void npg_kernel_cache_leave(void);
 
+/* Path of a file of ours in this version's folder, whether it is there or not; false when there is no such
+ * folder.  Only the process that holds the folder may write binaries there. */
+bool npg_kernel_cache_path(char *out, size_t size, const char *name);
+bool npg_kernel_cache_is_ours(void);
+
 #endif

@@ -46,7 +46,7 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     const size_t f = sizeof(float);
     const npg_mlp_shape *s = &m->shape;
     size_t wide = s->w1 > s->w2 ? s->w1 : s->w2,
-           kept = m->batch ? m->batch * m->rows : m->groups * NPG_MLP_ROWS;
+           kept = m->batch ? m->batch * m->rows : m->groups * m->rows / m->blocks;
     NPG_TRY(npg_buffer_open(&m->params, d, npg_mlp_param_count(s) * f));
     NPG_TRY(npg_buffer_open(&m->code, d, m->frames * s->code_size * f));
     NPG_TRY(npg_buffer_open(&m->z, d, m->rows * CHANNELS * f));
@@ -54,7 +54,7 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     NPG_TRY(npg_buffer_open(&m->p, d, m->rows * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->c, d, m->frames * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->h2, d, kept * s->w2 * f));
-    NPG_TRY(npg_buffer_open(&m->scratch, d, m->groups * 2 * NPG_MLP_ROWS * wide * f));
+    NPG_TRY(npg_buffer_open(&m->scratch, d, m->groups * 2 * (m->rows / m->blocks) * wide * f));
     if (!m->batch) return NPG_OK;
     NPG_TRY(npg_buffer_open(&m->grad, d, npg_mlp_param_count(s) * f));
     NPG_TRY(npg_buffer_open(&m->dz, d, m->rows * CHANNELS * f));
@@ -65,18 +65,27 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     return npg_buffer_open(&m->transposed, d, (s->w1 * s->w2 + s->w1 * CHANNELS + 7 * s->w2) * f);
 }
 
+size_t npg_mlp_rows(const npg_device *device, size_t vertices)
+{
+    size_t block = (size_t)npg_device_tuning(device)->mlp_rows;
+    return (vertices + block - 1) / block * block;
+}
+
 npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
                         size_t frames, size_t batch)
 {
     char constants[128];
-    NPG_REQUIRE(rows && rows % NPG_MLP_ROWS == 0 && frames && shape->w1 % 32 == 0 && shape->w2 % 32 == 0);
+    const npg_tuning *tuning = npg_device_tuning(device);
+    const size_t block = (size_t)tuning->mlp_rows;
+    NPG_REQUIRE(rows && rows % block == 0 && frames && shape->w1 % 32 == 0 && shape->w2 % 32 == 0);
     NPG_REQUIRE(shape->w1 >= 32 && shape->w2 >= 32);
-    *mlp = (npg_mlp){
-        .shape = *shape, .rows = rows, .blocks = rows / NPG_MLP_ROWS, .frames = frames, .batch = batch};
-    mlp->groups = 2 * (size_t)npg_device_facts(device)->units;
+    *mlp = (npg_mlp){.shape = *shape, .rows = rows, .blocks = rows / block, .frames = frames, .batch = batch};
+    mlp->local = (size_t)tuning->mlp_local;
+    mlp->span = (size_t)tuning->span;
+    mlp->groups = (size_t)(tuning->mlp_groups * npg_device_facts(device)->units);
     if (mlp->groups > mlp->blocks) mlp->groups = mlp->blocks;
-    snprintf(constants, sizeof constants, "-DROWS=%d -DMR=12 -DCZ=%zu -DW1=%zu -DW2=%zu -DSLOPE=%.9gf",
-             NPG_MLP_ROWS, CHANNELS, shape->w1, shape->w2, (double)shape->slope);
+    snprintf(constants, sizeof constants, "-DCZ=%zu -DW1=%zu -DW2=%zu -DSLOPE=%.9gf", CHANNELS, shape->w1,
+             shape->w2, (double)shape->slope);
     npg_status status = npg_program_open(&mlp->program, device, "mlp", constants);
     if (!status) status = npg_program_open(&mlp->time, device, "time", "");
     if (!status) status = open_buffers(mlp, device);
@@ -100,7 +109,7 @@ npg_status npg_mlp_begin(npg_mlp *m)
     NPG_TRY(NPG_LAUNCH(m->time, "time_rows", m->shape.w1, m->frames, NPG_BUF(&m->c), NPG_BUF(&m->code),
                        NPG_BUF(&m->params), NPG_INT(npg_mlp_at_w1t(&m->shape)), NPG_INT(m->shape.code_size),
                        NPG_INT(m->shape.w1), NPG_INT(m->frames)));
-    NPG_TRY(NPG_LAUNCH_SINGLE(m->program, "mlp_input", m->groups, NPG_BUF(&m->p), NPG_BUF(&m->z),
+    NPG_TRY(NPG_LAUNCH_GROUPS(m->program, "mlp_input", m->groups, m->local, NPG_BUF(&m->p), NPG_BUF(&m->z),
                               NPG_BUF(&m->params), NPG_INT(m->blocks)));
     if (!m->batch) return NPG_OK;
     NPG_TRY(npg_buffer_zero(&m->sums));
@@ -112,26 +121,28 @@ npg_status npg_mlp_begin(npg_mlp *m)
 
 npg_status npg_mlp_forward(npg_mlp *m, size_t first, size_t count)
 {
-    return NPG_LAUNCH_SINGLE(m->program, "mlp_forward", m->groups, NPG_BUF(&m->out), NPG_BUF(&m->h2),
-                             NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->params), NPG_BUF(&m->scratch),
-                             NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first), NPG_INT(m->batch > 0));
+    return NPG_LAUNCH_GROUPS(m->program, "mlp_forward", m->groups, m->local, NPG_BUF(&m->out),
+                             NPG_BUF(&m->h2), NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->params),
+                             NPG_BUF(&m->scratch), NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first),
+                             NPG_INT(m->batch > 0));
 }
 
 npg_status npg_mlp_backward(npg_mlp *m, size_t first, size_t count)
 {
-    return NPG_LAUNCH_SINGLE(m->program, "mlp_backward", m->groups, NPG_BUF(&m->dp), NPG_BUF(&m->sums),
-                             NPG_BUF(&m->dc), NPG_BUF(&m->dout), NPG_BUF(&m->h2), NPG_BUF(&m->p),
-                             NPG_BUF(&m->c), NPG_BUF(&m->transposed), NPG_BUF(&m->scratch),
+    return NPG_LAUNCH_GROUPS(m->program, "mlp_backward", m->groups, m->local, NPG_BUF(&m->dp),
+                             NPG_BUF(&m->sums), NPG_BUF(&m->dc), NPG_BUF(&m->dout), NPG_BUF(&m->h2),
+                             NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->transposed), NPG_BUF(&m->scratch),
                              NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first), NPG_INT(m->frames));
 }
 
 npg_status npg_mlp_end(npg_mlp *m)
 {
     size_t at_w1t = npg_mlp_at_w1t(&m->shape);
-    NPG_TRY(NPG_LAUNCH_SINGLE(m->program, "mlp_input_back", m->groups, NPG_BUF(&m->dz), NPG_BUF(&m->sums),
-                              NPG_BUF(&m->dp), NPG_BUF(&m->z), NPG_BUF(&m->transposed), NPG_INT(m->blocks)));
-    NPG_TRY(NPG_LAUNCH(m->program, "mlp_reduce", (at_w1t + 15) / 16, 1, NPG_BUF(&m->grad), NPG_BUF(&m->sums),
-                       NPG_INT(m->groups)));
+    NPG_TRY(NPG_LAUNCH_GROUPS(m->program, "mlp_input_back", m->groups, m->local, NPG_BUF(&m->dz),
+                              NPG_BUF(&m->sums), NPG_BUF(&m->dp), NPG_BUF(&m->z), NPG_BUF(&m->transposed),
+                              NPG_INT(m->blocks)));
+    NPG_TRY(NPG_LAUNCH(m->program, "mlp_reduce", (at_w1t + m->span - 1) / m->span, 1, NPG_BUF(&m->grad),
+                       NPG_BUF(&m->sums), NPG_INT(m->groups)));
     return NPG_LAUNCH(m->time, "time_back", m->shape.w1, 1, NPG_BUF(&m->grad), NPG_BUF(&m->dc),
                       NPG_BUF(&m->code), NPG_INT(at_w1t), NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1),
                       NPG_INT(m->frames), NPG_INT(m->groups));

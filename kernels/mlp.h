@@ -9,8 +9,7 @@
 
 #include "device.h"
 
-#define NPG_MLP_ROWS 192 /* vertices per block */
-#define NPG_MLP_OUT  8   /* floats of output per vertex, 7 used */
+#define NPG_MLP_OUT 8 /* floats of output per vertex, 7 used */
 
 typedef struct npg_mlp_shape {
     size_t w1, w2;    /* widths of the hidden layers, multiples of 32       */
@@ -32,7 +31,7 @@ size_t npg_mlp_packed(size_t rows, size_t row, size_t column);
 typedef struct npg_mlp {
     npg_program *program, *time;
     npg_mlp_shape shape;
-    size_t rows, blocks, groups, frames, batch;
+    size_t rows, blocks, frames, batch, span, local, groups; /* groups of local work-items */
     npg_buffer params, grad; /* [param count]                                         */
     npg_buffer code;         /* [frames][M]                                           */
     npg_buffer z, dz;        /* [rows][32]: input of all frames and its gradient       */
@@ -43,7 +42,10 @@ typedef struct npg_mlp {
     npg_buffer sums, transposed, scratch;
 } npg_mlp;
 
-/* rows: a multiple of NPG_MLP_ROWS; frames: T; batch: frames whose second layer is kept between forward and
+/* The rows that so many vertices take: whole blocks of the device's tuning. */
+size_t npg_mlp_rows(const npg_device *device, size_t vertices);
+
+/* rows: from npg_mlp_rows; frames: T; batch: frames whose second layer is kept between forward and
  * backward (0: forward only).  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
 npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
                         size_t frames, size_t batch);

@@ -17,11 +17,11 @@ typedef struct mlp_data {
 } mlp_data;
 
 /* Some sizes have one block, some several frames in several batches, some uneven widths. */
-static npg_status open_mlp_data(mlp_data *d, int size, uint64_t seed)
+static npg_status open_mlp_data(mlp_data *d, size_t block, int size, uint64_t seed)
 {
     npg_random random = npg_random_stream(seed, 12, (uint64_t)size);
     d->shape = (npg_mlp_shape){32 * (size_t)size, size > 1 ? 64 : 32, size == 2 ? 2 : 8, 0.01f};
-    d->rows = NPG_MLP_ROWS * (size > 2 ? 3 : 1);
+    d->rows = block * (size > 2 ? 3 : 1);
     d->frames = size == 1 ? 1 : 5;
     size_t n = d->param_count = npg_mlp_param_count(&d->shape), samples = d->rows * d->frames;
     NPG_TRY(npg_check_values(&d->params, &d->params_wide, n, 1 / sqrt((double)d->shape.w1), &random));
@@ -91,7 +91,7 @@ npg_status npg_check_mlp(npg_device *device, int size, uint64_t seed, double *er
     npg_mlp mlp = {0};
     npg_buffer dcode = {0};
     *error = 0;
-    npg_status status = open_mlp_data(&d, size, seed);
+    npg_status status = open_mlp_data(&d, npg_mlp_rows(device, 1), size, seed);
     if (!status) status = compare_mlp(device, &d, &mlp, &dcode, error);
     npg_mlp_close(&mlp);
     npg_buffer_close(&dcode);
@@ -113,7 +113,7 @@ npg_status npg_slope_mlp(uint64_t seed, double *error)
 {
     mlp_data d = {0};
     *error = 0;
-    npg_status status = open_mlp_data(&d, 2, seed);
+    npg_status status = open_mlp_data(&d, 16, 2, seed);
     if (!status) {
         npg_mlp_backward_ref(d.grad, d.dz, d.dcode, d.dout_wide, d.z_wide, d.code_wide, d.params_wide,
                              &d.shape);

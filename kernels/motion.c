@@ -221,8 +221,8 @@ static npg_status open_moving(npg_motion *m, npg_device *device)
 static npg_status refit(npg_motion *m, npg_buffer *boxes, npg_buffer *points, npg_buffer *slots, size_t first,
                         size_t count)
 {
-    return NPG_LAUNCH(m->nearest, "nearest_refit", count, 1, NPG_BUF(boxes), NPG_BUF(points), NPG_BUF(slots),
-                      NPG_INT(first), NPG_INT(count));
+    return NPG_LAUNCH_GROUPS(m->nearest, "nearest_refit", count, m->local, NPG_BUF(boxes), NPG_BUF(points),
+                             NPG_BUF(slots), NPG_INT(first), NPG_INT(count));
 }
 
 npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotation, const float *vertices,
@@ -230,7 +230,11 @@ npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotat
                            const npg_target *targets, size_t frames)
 {
     NPG_REQUIRE(real && real <= rows && rows % 16 == 0);
-    *m = (npg_motion){.rows = rows, .real = real, .frames = frames};
+    *m = (npg_motion){.rows = rows,
+                      .real = real,
+                      .frames = frames,
+                      .local = (size_t)npg_device_tuning(device)->frame_local,
+                      .queries = (size_t)npg_device_tuning(device)->nearest_queries};
     npg_status status = open_programs(m, device, rotation);
     if (!status) status = upload_rest(m, device, vertices);
     if (!status) status = upload_edges(m, device, vertices, edges, edge_count);
@@ -293,24 +297,24 @@ npg_status npg_motion_apply(npg_motion *m, const npg_buffer *out, size_t first, 
 npg_status npg_motion_chamfer(npg_motion *m, double alpha, size_t first, size_t count)
 {
     NPG_TRY(refit(m, &m->vert_boxes, &m->x, &m->reverse, first, count));
-    NPG_TRY(NPG_LAUNCH(m->nearest, "nearest_find", (m->real + 63) / 64, count, NPG_BUF(&m->to_points),
-                       NPG_BUF(&m->x), NPG_BUF(&m->points), NPG_BUF(&m->point_boxes), NPG_BUF(&m->forward),
-                       NPG_INT(first), NPG_INT(count)));
-    NPG_TRY(NPG_LAUNCH(m->nearest, "nearest_find", (m->most_points + 63) / 64, count, NPG_BUF(&m->to_verts),
-                       NPG_BUF(&m->points), NPG_BUF(&m->x), NPG_BUF(&m->vert_boxes), NPG_BUF(&m->reverse),
-                       NPG_INT(first), NPG_INT(count)));
-    return NPG_LAUNCH(m->chamfer, "chamfer_frame", count, 1, NPG_BUF(&m->cd), NPG_BUF(&m->g), NPG_BUF(&m->x),
-                      NPG_BUF(&m->points), NPG_BUF(&m->to_points), NPG_BUF(&m->to_verts),
-                      NPG_BUF(&m->forward), NPG_BUF(&m->reverse),
-                      NPG_REAL(alpha > 0 ? 1 / (2 * alpha * alpha) : 0), NPG_INT(m->rows), NPG_INT(first),
-                      NPG_INT(count));
+    NPG_TRY(NPG_LAUNCH(m->nearest, "nearest_find", (m->real + m->queries - 1) / m->queries, count,
+                       NPG_BUF(&m->to_points), NPG_BUF(&m->x), NPG_BUF(&m->points), NPG_BUF(&m->point_boxes),
+                       NPG_BUF(&m->forward), NPG_INT(first), NPG_INT(count)));
+    NPG_TRY(NPG_LAUNCH(m->nearest, "nearest_find", (m->most_points + m->queries - 1) / m->queries, count,
+                       NPG_BUF(&m->to_verts), NPG_BUF(&m->points), NPG_BUF(&m->x), NPG_BUF(&m->vert_boxes),
+                       NPG_BUF(&m->reverse), NPG_INT(first), NPG_INT(count)));
+    return NPG_LAUNCH_GROUPS(m->chamfer, "chamfer_frame", count, m->local, NPG_BUF(&m->cd), NPG_BUF(&m->g),
+                             NPG_BUF(&m->x), NPG_BUF(&m->points), NPG_BUF(&m->to_points),
+                             NPG_BUF(&m->to_verts), NPG_BUF(&m->forward), NPG_BUF(&m->reverse),
+                             NPG_REAL(alpha > 0 ? 1 / (2 * alpha * alpha) : 0), NPG_INT(m->rows),
+                             NPG_INT(first), NPG_INT(count));
 }
 
 npg_status npg_motion_pull(npg_motion *m, size_t first, size_t count)
 {
-    return NPG_LAUNCH(m->pull, "pull_frame", count, 1, NPG_BUF(&m->cd), NPG_BUF(&m->g), NPG_BUF(&m->x),
-                      NPG_BUF(&m->pulls), NPG_BUF(&m->pull_start), NPG_INT(m->rows), NPG_INT(first),
-                      NPG_INT(count));
+    return NPG_LAUNCH_GROUPS(m->pull, "pull_frame", count, m->local, NPG_BUF(&m->cd), NPG_BUF(&m->g),
+                             NPG_BUF(&m->x), NPG_BUF(&m->pulls), NPG_BUF(&m->pull_start), NPG_INT(m->rows),
+                             NPG_INT(first), NPG_INT(count));
 }
 
 npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buffer *out, const float *gains,

@@ -52,6 +52,7 @@ typedef struct npg_motion {
     npg_buffer start, neighbour, edge_rest; /* half-edges by vertex                         */
     npg_buffer cd, part, gain;
     size_t most_points, half_edges;
+    size_t local, queries; /* from the tuning: work-items of a frame, searches of a work-item */
 } npg_motion;
 
 /* A target of one frame: points in Morton order; a loan during npg_motion_open. */

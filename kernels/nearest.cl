@@ -12,6 +12,15 @@
 #define SLOT 8
 #define FAR 1e18f
 
+/* Build constants from the tuning of the device: QUERIES, LOCAL. */
+#if LOCAL == 1
+#define ITEM 0
+#define SYNC
+#else
+#define ITEM ((int)get_local_id(0))
+#define SYNC barrier(CLK_GLOBAL_MEM_FENCE);
+#endif
+
 /* Box blocks of the level over `count` children. */
 inline int blocks_over(int count)
 {
@@ -31,18 +40,18 @@ inline float highest(float16 v)
     return -lowest(-v);
 }
 
-/* Boxes of all levels of the tree of each frame, from its points.  Global size: (count). */
-kernel void nearest_refit(global float *boxes, global const float *points, global const int *slots, int first,
+/* Boxes of all levels of the tree of each frame, from its points.  Global size: one group of LOCAL items per frame. */
+__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void nearest_refit(global float *boxes, global const float *points, global const int *slots, int first,
                           int count)
 {
-    if (get_global_id(0) >= (size_t)count) return;
-    global const int *slot = slots + (first + get_global_id(0)) * SLOT;
+    if (get_group_id(0) >= (size_t)count) return;
+    global const int *slot = slots + (first + get_group_id(0)) * SLOT;
     int children = (slot[2] + 15) / 16;
     global const float *from = points + (size_t)slot[3] * 48;
     global float *to = boxes + (size_t)slot[4] * 96;
     for (int level = 0;; level++) {
         int blocks = blocks_over(children), size = level ? 96 : 48;
-        for (int i = 0; i < blocks * 16; i++) {
+        for (int i = ITEM; i < blocks * 16; i += LOCAL) {
             global float *box = to + (size_t)(i / 16) * 96 + i % 16;
             for (int axis = 0; axis < 3; axis++) {
                 global const float *child = from + (size_t)i * size + 16 * axis;
@@ -52,6 +61,7 @@ kernel void nearest_refit(global float *boxes, global const float *points, globa
             }
         }
         if (blocks == 1) return;
+        SYNC
         from = to;
         to += (size_t)blocks * 96;
         children = blocks;
@@ -126,15 +136,15 @@ inline found candidate(global const float *points, int index, float3 q)
     return (found){index, d.x * d.x + d.y * d.y + d.z * d.z};
 }
 
-/* index: [results], the candidates on entry, the nearest on return.  A work-item answers 64 queries.
- * Global size: (ceil(most queries / 64), count). */
+/* index: [results], the candidates on entry, the nearest on return.  A work-item answers QUERIES queries.
+ * Global size: (ceil(most queries / QUERIES), count). */
 kernel void nearest_find(global int *index, global const float *queries, global const float *points,
                          global const float *boxes, global const int *slots, int first_frame,
                          int count)
 {
     if (get_global_id(1) >= (size_t)count) return;
     global const int *slot = slots + (first_frame + get_global_id(1)) * SLOT;
-    int first = get_global_id(0) * 64, last = min(first + 64, slot[0]), starts[8], levels = 0;
+    int first = get_global_id(0) * QUERIES, last = min(first + QUERIES, slot[0]), starts[8], levels = 0;
     for (int children = (slot[2] + 15) / 16, start = 0;; levels++) {
         starts[levels] = start;
         children = blocks_over(children);

@@ -8,20 +8,37 @@
  * together (stages/tracker.h). */
 
 /* pulls: [..][16] floats = v0 v1 v2 (as int bits) w | b0 b1 b2 a | q x y z 0 | n x y z 0, those of frame f from
- * start[f] to start[f + 1].  x, g: [frames][rows / 16][3][16]; g is overwritten.  loss: [frames].  One work-item per
- * frame walks its list in order: equal input gives equal bits.  Global size: (count), frames first ... */
-kernel void pull_frame(global float *loss, global float *g, global const float *x, global const float *pulls,
+ * start[f] to start[f + 1].  x, g: [frames][rows / 16][3][16]; g is overwritten.  loss: [frames].  A frame has
+ * LOCAL work-items (build constant, from the tuning of the device); each owns every LOCAL-th block of 16 vertices, walks
+ * the list in order and adds what pulls at its own: equal input gives equal bits.
+ * Global size: one group of LOCAL items per frame, frames first ... */
+#if LOCAL == 1
+#define ITEM 0
+#else
+#define ITEM ((int)get_local_id(0))
+#endif
+#define IS_MINE(v) ((v) / 16 % LOCAL == ITEM)
+
+__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void pull_frame(global float *loss, global float *g, global const float *x, global const float *pulls,
                        global const int *start, int rows, int first, int count)
 {
-    size_t frame = first + get_global_id(0);
+    local float sums[LOCAL];
+    size_t frame = first + get_group_id(0);
     if (frame >= (size_t)(first + count)) return;
     x += frame * rows * 3;
     g += frame * rows * 3;
-    for (int i = 0; i < rows * 3; i++) g[i] = 0.0f;
+    for (int block = ITEM; block < rows / 16; block += LOCAL)
+        for (int i = block * 48; i < block * 48 + 48; i++) g[i] = 0.0f;
     float total = 0.0f, part = 0.0f;
     for (int k = start[frame]; k < start[frame + 1]; k++) {
         global const float *p = pulls + (size_t)k * 16;
         int3 v = as_int3((float3)(p[0], p[1], p[2]));
+        bool mine0 = IS_MINE(v.x), mine1 = IS_MINE(v.y), mine2 = IS_MINE(v.z);
+        if (k % 64 == 0) { /* short partial sums keep the digits */
+            total += part;
+            part = 0.0f;
+        }
+        if (!mine0 && !mine1 && !mine2) continue;
         size_t a0 = (size_t)(v.x / 16) * 48 + v.x % 16, a1 = (size_t)(v.y / 16) * 48 + v.y % 16;
         size_t a2 = (size_t)(v.z / 16) * 48 + v.z % 16;
         float3 r = p[4] * (float3)(x[a0], x[a0 + 16], x[a0 + 32]) + p[5] * (float3)(x[a1], x[a1 + 16], x[a1 + 32]) +
@@ -29,17 +46,18 @@ kernel void pull_frame(global float *loss, global float *g, global const float *
         float3 n = (float3)(p[12], p[13], p[14]);
         float along = p[7], w = p[3], over = dot(n, r);
         float3 pull = 2.0f * w * ((1.0f - along) * over * n + along * r);
-        part += w * ((1.0f - along) * over * over + along * dot(r, r));
+        if (mine0) part += w * ((1.0f - along) * over * over + along * dot(r, r));
         for (int axis = 0; axis < 3; axis++) {
             float d = axis == 0 ? pull.x : axis == 1 ? pull.y : pull.z;
-            g[a0 + 16 * axis] += p[4] * d;
-            g[a1 + 16 * axis] += p[5] * d;
-            g[a2 + 16 * axis] += p[6] * d;
-        }
-        if (k % 64 == 63) { /* short partial sums keep the digits */
-            total += part;
-            part = 0.0f;
+            if (mine0) g[a0 + 16 * axis] += p[4] * d;
+            if (mine1) g[a1 + 16 * axis] += p[5] * d;
+            if (mine2) g[a2 + 16 * axis] += p[6] * d;
         }
     }
-    loss[frame] = total + part;
+    sums[ITEM] = total + part;
+    if (LOCAL > 1) barrier(CLK_LOCAL_MEM_FENCE);
+    if (ITEM != 0) return;
+    total = sums[0];
+    for (int i = 1; i < LOCAL; i++) total += sums[i];
+    loss[frame] = total;
 }

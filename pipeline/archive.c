@@ -131,9 +131,9 @@ npg_status npg_archive_open(npg_archive **out, const char *path)
     struct stat info;
     *out = NULL;
     NPG_TRY(npg_alloc(&a, NPG_FOR_FILES, sizeof *a));
-    npg_status status = NPG_OK;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0 || fstat(fd, &info)) status = npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_BAD_INPUT);
+    if (!status && fstat(fd, &info)) status = npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
     if (!status) a->size = (size_t)info.st_size;
     if (!status) status = npg_alloc(&a->bytes, NPG_FOR_FILES, a->size);
     if (!status) status = read_all(fd, a->bytes, a->size, path);
@@ -202,9 +202,9 @@ npg_status npg_hash_file(uint64_t *hash, const char *path, uint64_t limit)
 {
     XXH3_state_t *state = XXH3_createState();
     if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    npg_status status =
-        fd < 0 ? npg_error_errno(NPG_DISK, "can't read %s", path) : hash_bytes(state, fd, path, limit);
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
+    if (!status) status = hash_bytes(state, fd, path, limit);
     if (fd >= 0) close(fd);
     *hash = XXH3_64bits_digest(state);
     XXH3_freeState(state);

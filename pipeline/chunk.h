@@ -29,6 +29,13 @@ typedef struct npg_cleaning {
     size_t normals_given, normals_flipped, normals_estimated;
 } npg_cleaning;
 
+/* Where the surface fails in one place, and not a little everywhere (stages/misfit.h). */
+enum { NPG_MISFIT_FAR, NPG_MISFIT_BARE, NPG_MISFIT_TORN, NPG_MISFITS };
+typedef struct npg_misfit {
+    double share; /* of the points, or of the surface, in the largest such place; NaN: not measured */
+    double at[3]; /* its middle, in world coordinates; NaN where there is none                      */
+} npg_misfit;
+
 /* How well a frame's surface explains its points.  Distances are in diagonals of the frame box. */
 typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
@@ -39,6 +46,7 @@ typedef struct npg_figures {
     double edge_change;     /* mean |length / reference length - 1|     */
     double chamfer; /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5                   */
     double truth_cd, truth_nc, truth_f, truth_corr; /* against a ground truth; NaN without */
+    npg_misfit misfits[NPG_MISFITS];
     bool good; /* the frame is above the quality bar                                                  */
 } npg_figures;
 
@@ -48,6 +56,7 @@ typedef struct npg_frame {
     char *path;     /* where it came from, for messages; owned, may be NULL                                 */
     uint32_t fields; /* NPG_FIELD_* of this frame */
     bool is_key, is_skipped, is_held;
+    bool is_shared;     /* belongs to a neighbouring segment: measured, not judged */
     size_t point_count; /* N                                                                               */
     float *pos_local;   /* N x 3, owned; world - origin                                                    */
     float *normals;     /* N x 3, owned, unit length, or NULL                                              */

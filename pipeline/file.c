@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -193,6 +194,55 @@ void npg_file_discard(npg_file **slot)
     if (file->fd >= 0) close(file->fd);
     unlink(file->hidden_path);
     free_file(slot);
+}
+
+/* ---- reading ---- */
+
+npg_status npg_file_open_plain(int *out, const char *path, npg_status failure)
+{
+    struct stat info;
+    *out = -1;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd >= 0 && !fstat(fd, &info) && S_ISREG(info.st_mode)) {
+        *out = fd;
+        return NPG_OK;
+    }
+    int cause = fd >= 0 && S_ISDIR(info.st_mode) ? EISDIR : errno;
+    bool is_other = fd >= 0 && !S_ISDIR(info.st_mode);
+    if (fd >= 0) close(fd);
+    return npg_error(cause == ENOMEM && !is_other ? NPG_MEMORY : failure, "%s: can't be read: %s", path,
+                     is_other ? "a pipe or a device, not a file" : strerror(cause));
+}
+
+bool npg_path_stays(const char *name)
+{
+    if (!*name || *name == '/') return false;
+    for (const char *part = name; part; part = strchr(part, '/')) {
+        part += *part == '/';
+        if (!strncmp(part, "..", 2) && (!part[2] || part[2] == '/')) return false;
+    }
+    return true;
+}
+
+bool npg_path_is_inside(const char *path, const char *folder)
+{
+    char *real_path = realpath(path, NULL), *real_folder = realpath(folder, NULL);
+    size_t size = real_folder ? strlen(real_folder) : 0;
+    bool is_root = size == 1;
+    bool inside = real_path && real_folder && !strncmp(real_path, real_folder, size) &&
+                  (is_root || real_path[size] == '/');
+    free(real_path);
+    free(real_folder);
+    return inside;
+}
+
+/* ---- folders ---- */
+
+npg_status npg_folder_is_own(const char *folder)
+{
+    struct stat info;
+    if (lstat(folder, &info) || !S_ISLNK(info.st_mode)) return NPG_OK;
+    return npg_error(NPG_USAGE, "%s is a link, and option confine is set", folder);
 }
 
 npg_status npg_make_folder(const char *path)

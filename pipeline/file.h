@@ -5,6 +5,7 @@
 #ifndef NPG_FILE_H
 #define NPG_FILE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "status.h"
@@ -30,6 +31,20 @@ npg_status npg_file_commit(npg_file **file);
 
 /* Give up: nothing remains.  NULL is fine. */
 void npg_file_discard(npg_file **file);
+
+/* Open a plain file for reading; *fd is the caller's, -1 on failure.  Never waits: a pipe or a device in the
+ * place of a file is refused.  `failure` is what a file that can't be opened means (NPG_BAD_INPUT, NPG_DISK).
+ */
+npg_status npg_file_open_plain(int *fd, const char *path, npg_status failure);
+
+/* Whether a name from a file can be added to a folder without leading out of it: not absolute, no "..". */
+bool npg_path_stays(const char *name);
+
+/* Whether the file is in the folder after all links are followed, at any depth. */
+bool npg_path_is_inside(const char *path, const char *folder);
+
+/* NPG_USAGE where a link stands in the place of a folder. */
+npg_status npg_folder_is_own(const char *folder);
 
 /* Make a folder and its parents. */
 npg_status npg_make_folder(const char *path);

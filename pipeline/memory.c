@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "struct_size.h"
+
 #define ALIGN 64
 
 typedef struct head { /* sits in the 64 bytes before every block */
@@ -42,8 +44,11 @@ npg_status npg_memory_set_allocator(const npg_allocator *chosen)
         allocator = (npg_allocator){sizeof allocator, NULL, default_alloc, default_release};
         return NPG_OK;
     }
-    NPG_REQUIRE(chosen->struct_size >= sizeof *chosen && chosen->alloc && chosen->release);
-    allocator = *chosen;
+    npg_allocator taken;
+    NPG_TRY(npg_struct_take(&taken, sizeof taken, chosen, NPG_SIZE_UP_TO(npg_allocator, release),
+                            "the allocator"));
+    NPG_REQUIRE(taken.alloc && taken.release);
+    allocator = taken;
     return NPG_OK;
 }
 

@@ -18,8 +18,15 @@
  * Conventions.  Functions that can fail return npg_status: 0 is success, a positive value steers the flow
  * (NPG_END), a negative value is a failure whose text npg_error_text() gives on the same thread.  A function
  * that takes T ** consumes the reference and nulls the pointer; T * is a loan until the call returns. Closers
- * accept NULL.  Structs that cross the border begin with struct_size: set it to sizeof the struct. Arrays are
- * row-major; letters: T frames, N points, V vertices, F faces.
+ * accept NULL.  Arrays are row-major; letters: T frames, N points, V vertices, F faces.
+ *
+ * Versions.  Structs that cross the border begin with struct_size: whoever fills one sets it to the sizeof he
+ * was compiled with.  Later versions only add members at the end, so that a program and a library of
+ * different age understand each other: what one side does not know reads as zero, or is left out.  The one
+ * exception is npg_surface_hit, an element of arrays, which stays as it is.
+ *
+ * Threads.  A handle belongs to one thread at a time unless its functions say otherwise; different handles
+ * have nothing in common.
  */
 #ifndef NEUPIG_H
 #define NEUPIG_H
@@ -49,7 +56,8 @@ typedef enum npg_status {
     NPG_OK = 0,
     NPG_END = 1,        /* no more: the stream ended                                       */
     NPG_STOPPED = 2,    /* npg_run_stop() was called; what is on disk can be gone on from  */
-    NPG_PARTIAL = 3,    /* done, but frames were skipped or fell below the quality bar     */
+    NPG_PARTIAL = 3,    /* done, but frames were skipped, unexplained or below the quality bar */
+    NPG_CHANGED = 4,    /* ended where the topology changed (option alarm = split)         */
     NPG_FAILED = -1,    /* an environment or library failed in a way of no class below     */
     NPG_USAGE = -2,     /* an option, a configuration or a call that makes no sense        */
     NPG_BAD_INPUT = -3, /* the data can't be used: the text names file, place and cause    */
@@ -69,6 +77,9 @@ NPG_API const char *npg_status_name(npg_status status);
 
 /* The text of the last failure on this thread; "" when there was none.  Valid until the next failure. */
 NPG_API const char *npg_error_text(void);
+
+/* For callbacks that fail (npg_own_stage): make text the calling thread's failure and return status. */
+NPG_API npg_status npg_error_set(npg_status status, const char *text);
 
 /* "0.1.0". */
 NPG_API const char *npg_version(void);
@@ -122,12 +133,68 @@ NPG_API npg_status npg_options_set(npg_options *options, const char *name, const
  * NPG_USAGE names file, line and option. */
 NPG_API npg_status npg_options_load(npg_options *options, const char *path);
 
+/* The options that the job in the folder was begun with, its input and its output: with append = yes a run
+ * then goes on with frames that came since, without it with what is left.  NPG_USAGE when the folder holds no
+ * job.
+ */
+NPG_API npg_status npg_options_load_job(npg_options *options, const char *folder);
+
 /* The value an option has now, after presets, as text; NULL for a name that does not exist.  Valid until the
  * options change. */
 NPG_API const char *npg_options_get(const npg_options *options, const char *name);
 
-/* The i-th option of all stages, in the order of the chain; NPG_END after the last. */
+/* The i-th option of all stages, in the order of the chain; NPG_END after the last.  The texts stay for good.
+ */
 NPG_API npg_status npg_options_describe(size_t i, npg_option_info *info);
+
+/* ---- a stage of one's own ---- */
+
+/* A frame on its way through the chain.  All pointers are loans until the callback returns.  Points, normals
+ * and vertices may be changed in place, never their number; coordinates are kept small for floats:
+ *
+ *     point in the world  = points_origin + points[i]
+ *     vertex in the world = vertices_origin + vertices_unit * vertices[v]
+ */
+typedef struct npg_frame_view {
+    size_t struct_size;
+    int64_t index, number; /* position in the sequence, and the number in the file's name            */
+    const char *path;      /* of its file; NULL for a frame that was pushed                          */
+    size_t point_count;    /* N                                                                      */
+    float *points;         /* N x 3                                                                  */
+    float *normals;        /* N x 3, unit length; NULL where there are none (yet)                    */
+    uint8_t *keep;         /* N, all 1: what is set to 0 is dropped with its normal                  */
+    double points_origin[3];
+    size_t vertex_count, face_count; /* V, F; 0 before align                                         */
+    float *vertices;                 /* V x 3, NULL before align                                     */
+    const uint32_t *faces;           /* F x 3, the same in every frame; NULL before align            */
+    double vertices_origin[3], vertices_unit;
+    double residual, coverage; /* as in npg_result; NaN before evaluate                               */
+} npg_frame_view;
+
+typedef struct npg_own_stage {
+    size_t struct_size;
+    const char *name;  /* for log and report: small letters, digits and dashes; no other stage's      */
+    const char *after; /* the stage it follows: ingest, outlier, keyframe, mesh, align, optimize, evaluate or
+                          export (then it only looks: what is on disk was written before)             */
+    void *user;        /* handed to the callback                                                      */
+    /* One frame.  NPG_OK passes it on; a failure ends the run with this status and the text of
+     * npg_error_set(); NPG_STOPPED stops it. */
+    npg_status (*frame)(void *user, npg_frame_view *frame);
+} npg_own_stage;
+
+/* Put a stage into the chain of every run opened with these options; the struct and its texts are copied,
+ * what user points to must outlive the runs.  Several after the same stage work in the order they were added.
+ *
+ * Every run calls the callback from one thread at a time, a thread of the stage's own, so it works beside the
+ * other stages; it must not call functions of the same run but npg_run_stop().  After ingest and outlier it
+ * sees each frame up to four times (the capture is measured, scored, looked at and solved) and must do the
+ * same each time, or the result is undefined; after the others once.  Frames do not come in time order but as
+ * they are solved, outwards from the keyframe.  Points after outlier and vertices must stay finite, and a
+ * frame that has been cleaned must keep a point (NPG_USAGE, NPG_BAD_INPUT).
+ *
+ * A run that goes on where an earlier one was needs the same stages (by name and place).
+ * NPG_USAGE: a name that is taken, a place that is not there, too many stages. */
+NPG_API npg_status npg_options_add_stage(npg_options *options, const npg_own_stage *stage);
 
 /* ---- logs and progress ---- */
 

@@ -11,14 +11,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "json_file.h"
 #include "memory.h"
+#include "own_stage.h"
 #include "run_settings.h"
-#include "stage.h"
+#include "struct_size.h"
 
 struct npg_options {
     const npg_stage *const *chain; /* whose tables count */
     size_t count;
-    char **texts; /* count of them: what the user set, or NULL; owned */
+    char **texts;                          /* count of them: what the user set, or NULL; owned */
+    npg_own_stage own[NPG_OWN_STAGES_MAX]; /* own_count of them, their texts owned */
+    size_t own_count;
 };
 
 /* ---- the tables as one list ---- */
@@ -55,13 +59,14 @@ static const npg_option *find(const npg_options *options, const char *name, size
 npg_status npg_options_describe(size_t i, npg_option_info *info)
 {
     const char *stage;
-    NPG_REQUIRE(info && info->struct_size >= sizeof *info);
+    npg_option_info known = {.struct_size = sizeof known};
     const npg_option *option = npg_option_at(i, &stage);
-    if (!option) return NPG_END;
-    *info = (npg_option_info){sizeof *info,         stage,           option->name,       option->help,
-                              option->default_text, option->choices, option->value_name, option->type,
-                              option->min,          option->max};
-    return NPG_OK;
+    if (option)
+        known = (npg_option_info){sizeof known,         stage,           option->name,       option->help,
+                                  option->default_text, option->choices, option->value_name, option->type,
+                                  option->min,          option->max};
+    NPG_TRY(npg_struct_give(info, &known, sizeof known, NPG_SIZE_UP_TO(npg_option_info, max), "info"));
+    return option ? NPG_OK : NPG_END;
 }
 
 /* ---- values ---- */
@@ -149,11 +154,57 @@ npg_status npg_options_open_chain(npg_options **out, const npg_stage *const *cha
     return status;
 }
 
+/* ---- stages of a program's own ---- */
+
+/* The texts of a copied stage are ours, whatever the public struct says. */
+static void release_own(npg_own_stage *own)
+{
+    npg_release(&own->name);
+    npg_release(&own->after);
+}
+
+static npg_status copy_own(npg_options *options, const npg_own_stage *given)
+{
+    char *name, *after;
+    NPG_TRY(npg_copy_text(&name, given->name));
+    npg_status status = npg_copy_text(&after, given->after);
+    if (status) {
+        npg_release(&name);
+        return status;
+    }
+    npg_own_stage *own = &options->own[options->own_count++];
+    *own = *given;
+    own->name = name;
+    own->after = after;
+    return NPG_OK;
+}
+
+npg_status npg_options_add_stage(npg_options *options, const npg_own_stage *stage)
+{
+    npg_own_stage given;
+    NPG_REQUIRE(options);
+    NPG_TRY(npg_struct_take(&given, sizeof given, stage, NPG_SIZE_UP_TO(npg_own_stage, frame), "the stage"));
+    NPG_TRY(npg_own_check(&given, options->chain));
+    for (size_t i = 0; i < options->own_count; i++)
+        if (!strcmp(options->own[i].name, given.name))
+            return npg_error(NPG_USAGE, "stage %s: the name is taken", given.name);
+    if (options->own_count == NPG_OWN_STAGES_MAX)
+        return npg_error(NPG_USAGE, "stage %s: no more than %d stages can be added", given.name,
+                         NPG_OWN_STAGES_MAX);
+    return copy_own(options, &given);
+}
+
+const npg_own_stage *npg_options_own_stage(const npg_options *options, size_t i)
+{
+    return options && i < options->own_count ? &options->own[i] : NULL;
+}
+
 void npg_options_close(npg_options **slot)
 {
     if (!slot || !*slot) return;
     for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
     npg_release(&(*slot)->texts);
+    for (size_t i = 0; i < (*slot)->own_count; i++) release_own(&(*slot)->own[i]);
     npg_release(slot);
 }
 
@@ -164,6 +215,8 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options)
     NPG_TRY(npg_options_open_chain(&copy, options ? options->chain : npg_chain));
     for (size_t i = 0; i < copy->count && !status; i++)
         if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
+    for (size_t i = 0; options && i < options->own_count && !status; i++)
+        status = copy_own(copy, &options->own[i]);
     if (status) npg_options_close(&copy);
     *out = copy;
     return status;
@@ -239,22 +292,6 @@ void npg_options_fill(const npg_options *options, const npg_option *table, void 
 
 /* ---- configuration file ---- */
 
-/* Blank out comments in place, so that line numbers stay. */
-static void blank_comments(char *text)
-{
-    bool in_string = false;
-    for (char *c = text; *c; c++) {
-        if (in_string && *c == '\\' && c[1]) {
-            c++;
-        } else if (*c == '"') {
-            in_string = !in_string;
-        } else if (!in_string && c[0] == '/' && c[1] == '/') {
-            for (; *c && *c != '\n'; c++) *c = ' ';
-            if (!*c) break;
-        }
-    }
-}
-
 /* The line of the key `name` of the outermost object, in text that is known to be good JSON. */
 static int line_of_key(const char *text, const char *name)
 {
@@ -274,7 +311,7 @@ static int line_of_key(const char *text, const char *name)
     return 0;
 }
 
-static npg_status set_from_json(npg_options *options, const char *name, const json_t *value)
+npg_status npg_options_set_json(npg_options *options, const char *name, const json_t *value)
 {
     char number[64];
     if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
@@ -288,25 +325,6 @@ static npg_status set_from_json(npg_options *options, const char *name, const js
     return npg_options_set(options, name, number);
 }
 
-static npg_status read_text_file(char **text, const char *path)
-{
-    enum { LIMIT = 1 << 20 };
-    *text = NULL;
-    FILE *file = fopen(path, "rb");
-    if (!file) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    npg_status status = npg_alloc(text, NPG_FOR_FILES, LIMIT + 1);
-    size_t size = status ? 0 : fread(*text, 1, LIMIT + 1, file);
-    if (!status && ferror(file)) status = npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    if (!status && size > LIMIT)
-        status = npg_error(NPG_USAGE, "%s: larger than 1 MiB, not a configuration", path);
-    fclose(file);
-    if (status)
-        npg_release(text);
-    else
-        (*text)[size] = 0;
-    return status;
-}
-
 static npg_status set_all_from_json(npg_options *options, json_t *root, const char *path, const char *text)
 {
     const char *name;
@@ -314,7 +332,7 @@ static npg_status set_all_from_json(npg_options *options, json_t *root, const ch
     if (!json_is_object(root)) return npg_error(NPG_USAGE, "%s: not a JSON object", path);
     json_object_foreach(root, name, value)
     {
-        npg_status status = set_from_json(options, name, value);
+        npg_status status = npg_options_set_json(options, name, value);
         if (status) return npg_error_prefix(status, "%s:%d", path, line_of_key(text, name));
     }
     return NPG_OK;
@@ -322,15 +340,12 @@ static npg_status set_all_from_json(npg_options *options, json_t *root, const ch
 
 npg_status npg_options_load(npg_options *options, const char *path)
 {
+    enum { LIMIT = 1 << 20 };
     char *text;
-    json_error_t error;
+    json_t *root;
     NPG_REQUIRE(options && path);
-    NPG_TRY(read_text_file(&text, path));
-    blank_comments(text);
-    json_t *root = json_loads(text, JSON_REJECT_DUPLICATES, &error);
-    npg_status status =
-        root ? set_all_from_json(options, root, path, text)
-             : npg_error(NPG_USAGE, "%s:%d:%d: %s", path, error.line, error.column, error.text);
+    NPG_TRY(npg_json_read(&root, &text, path, LIMIT));
+    npg_status status = set_all_from_json(options, root, path, text);
     npg_release(&text);
     json_decref(root);
     return status;

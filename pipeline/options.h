@@ -51,8 +51,15 @@ void npg_option_store(const npg_option *option, const char *text, void *state);
 /* A copy that owns its texts. */
 npg_status npg_options_copy(npg_options **out, const npg_options *options);
 
+/* The i-th stage that a program added, a loan; NULL after the last. */
+const npg_own_stage *npg_options_own_stage(const npg_options *options, size_t i);
+
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
+
+/* npg_options_set() from a JSON text, number or true/false. */
+struct json_t;
+npg_status npg_options_set_json(npg_options *options, const char *name, const struct json_t *value);
 
 /* Check `text` against an option; NPG_USAGE says what it takes. */
 npg_status npg_option_check(const npg_option *option, const char *text);

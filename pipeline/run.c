@@ -9,6 +9,7 @@
 #include "clock.h"
 #include "file.h"
 #include "run_internal.h"
+#include "struct_size.h"
 
 #define OFFSET(member) offsetof(npg_settings, member)
 
@@ -26,9 +27,16 @@ const npg_option npg_run_options[] = {
      "default|paper", NULL},
     {"device", "OpenCL device: part of its name, its number, or auto (neupig doctor lists them)",
      NPG_OPTION_TEXT, OFFSET(device), "auto", 0, 0, NULL, "DEVICE"},
+    {"tuning",
+     "parameters of the kernels: auto (what neupig tune found, else by device), wide, narrow, gpu, or a file",
+     NPG_OPTION_TEXT, OFFSET(tuning), "auto", 0, 0, NULL, "SET"},
     {"seed", "Seed of all random numbers", NPG_OPTION_INT, OFFSET(seed), "0", 0, 4294967295.0, NULL, NULL},
     {"keep-going", "Skip frames that can't be used instead of stopping; ends with exit code 7",
      NPG_OPTION_FLAG, OFFSET(keep_going), "no", 0, 0, NULL, NULL},
+    {"confine",
+     "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), and "
+     "links in the place of the output's own folders",
+     NPG_OPTION_FLAG, OFFSET(confine), "no", 0, 0, NULL, NULL},
     {"ring", "Chunks that may wait between two stages", NPG_OPTION_INT, OFFSET(ring_capacity), "2", 1, 1024,
      NULL, NULL},
     {"chunk", "Frames per chunk", NPG_OPTION_INT, OFFSET(chunk_frames), "4", 1, 1024, NULL, NULL},
@@ -283,15 +291,37 @@ static npg_status check_chain(const npg_run *run)
     return NPG_OK;
 }
 
+static npg_status add_worker(npg_run *run, const npg_stage *stage)
+{
+    json_t *stages = json_object_get(run->report, "stages");
+    if (run->worker_count == NPG_STAGES_MAX)
+        return npg_error(NPG_USAGE, "more than %d stages", NPG_STAGES_MAX);
+    npg_worker *worker = &run->workers[run->worker_count++];
+    *worker = (npg_worker){.run = run, .stage = stage, .report = json_object()};
+    json_object_set_new(stages, stage->name, worker->report);
+    return NPG_OK;
+}
+
+/* The stages that the program wants right after this one. */
+static npg_status add_own(npg_run *run, const npg_stage *before, uint32_t fields)
+{
+    const npg_own_stage *given;
+    for (size_t i = 0; (given = npg_options_own_stage(run->options, i)); i++) {
+        if (strcmp(given->after, before->name) != 0) continue;
+        run->own[i] = npg_own_make(given, before, fields);
+        NPG_TRY(add_worker(run, &run->own[i].stage));
+    }
+    return NPG_OK;
+}
+
 static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
 {
-    json_t *stages = json_object();
-    json_object_set_new(run->report, "stages", stages);
-    for (size_t i = 0; chain[i]; i++) {
-        if (i == NPG_STAGES_MAX) return npg_error(NPG_USAGE, "more than %d stages", NPG_STAGES_MAX);
-        run->workers[i] = (npg_worker){.run = run, .stage = chain[i], .report = json_object()};
-        json_object_set_new(stages, chain[i]->name, run->workers[i].report);
-        run->worker_count++;
+    uint32_t fields = 0;
+    json_object_set_new(run->report, "stages", json_object());
+    for (; *chain; chain++) {
+        fields |= (*chain)->gives;
+        NPG_TRY(add_worker(run, *chain));
+        NPG_TRY(add_own(run, *chain, fields));
     }
     return check_chain(run);
 }
@@ -341,10 +371,9 @@ static npg_status fill_run(npg_run *run, const npg_options *options, const npg_h
     NPG_TRY(options ? npg_options_copy(&run->options, options)
                     : npg_options_open_chain(&run->options, chain));
     npg_options_fill(run->options, npg_run_options, &run->settings);
-    if (hooks) {
-        NPG_REQUIRE(hooks->struct_size >= sizeof *hooks);
-        run->hooks = *hooks;
-    }
+    if (hooks)
+        NPG_TRY(npg_struct_take(&run->hooks, sizeof run->hooks, hooks, NPG_SIZE_UP_TO(npg_hooks, progress),
+                                "hooks"));
     run->report = json_object();
     run->warnings = json_array();
     json_object_set(run->report, "warnings", run->warnings);
@@ -399,7 +428,7 @@ npg_status npg_run_wait(npg_run *run)
 {
     NPG_REQUIRE(run && run->conductor_started);
     join_conductor(run);
-    if (run->end_status < 0 || run->end_status == NPG_STOPPED)
+    if (run->end_status < 0 || run->end_status == NPG_STOPPED || run->end_status == NPG_CHANGED)
         return npg_error(run->end_status, "%s: %s", run->failure_stage, run->failure_text);
     return run->end_status;
 }
@@ -469,23 +498,25 @@ static npg_status refuse_push(const npg_run *run)
                      settings->input[0] ? settings->input : settings->follow);
 }
 
-npg_status npg_run_push(npg_run *run, const npg_cloud *cloud)
+npg_status npg_run_push(npg_run *run, const npg_cloud *given)
 {
+    npg_cloud cloud;
     npg_frame frame = {0};
     npg_chunk *chunk = NULL;
-    NPG_REQUIRE(run && cloud && cloud->struct_size >= sizeof *cloud &&
-                (cloud->points || !cloud->point_count));
+    NPG_REQUIRE(run);
+    NPG_TRY(npg_struct_take(&cloud, sizeof cloud, given, NPG_SIZE_UP_TO(npg_cloud, normals), "the cloud"));
+    NPG_REQUIRE(cloud.points || !cloud.point_count);
     if (!run->feed) return refuse_push(run);
-    if (cloud->number <= run->pushed_number)
-        return npg_error(NPG_USAGE, "frame %lld was pushed after frame %lld", (long long)cloud->number,
+    if (cloud.number <= run->pushed_number)
+        return npg_error(NPG_USAGE, "frame %lld was pushed after frame %lld", (long long)cloud.number,
                          (long long)run->pushed_number);
-    npg_status status = frame_of_cloud(&frame, run, cloud);
+    npg_status status = frame_of_cloud(&frame, run, &cloud);
     if (!status) status = npg_chunk_open(&chunk, 1);
     if (!status) {
         npg_chunk_add(chunk, &frame);
         status = npg_ring_push(run->feed, &chunk);
     }
-    if (!status) run->pushed_number = cloud->number;
+    if (!status) run->pushed_number = cloud.number;
     npg_frame_clear(&frame);
     npg_chunk_unref(&chunk);
     return status == NPG_ABORTED ? why_closed(run) : status;

@@ -6,8 +6,8 @@
 #include <semaphore.h>
 #include <stdatomic.h>
 
+#include "own_stage.h"
 #include "ring.h"
-#include "stage.h"
 
 #define NPG_STAGES_MAX   16
 #define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */
@@ -47,6 +47,7 @@ struct npg_run {
     npg_pass pass;
     npg_worker workers[NPG_STAGES_MAX];
     size_t worker_count;
+    npg_own own[NPG_OWN_STAGES_MAX]; /* what some of the workers' stages point to */
     npg_ring *
         rings[NPG_STAGES_MAX]; /* rings[i] leads from worker i to i + 1 of the pass; owned; only under lock */
     size_t ring_count;

@@ -5,13 +5,14 @@
 #include "options.h"
 
 typedef struct npg_settings {
-    const char *input, *follow, *output, *device;
+    const char *input, *follow, *output, *device, *tuning;
     int preset;
     int64_t seed;
     int64_t ring_capacity;  /* chunks per ring                        */
     int64_t chunk_frames;   /* frames per chunk                       */
     int64_t max_memory_mib; /* 0: no limit                            */
     bool keep_going;        /* skip frames that can't be used         */
+    bool confine;           /* refuse what lies outside its folder    */
     bool pull;              /* finished frames are also to be pulled  */
 } npg_settings;
 

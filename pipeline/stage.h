@@ -54,6 +54,9 @@ typedef struct npg_facts {
     /* mesh; it also sets plan.key at the end of the choosing pass */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
     double unseen_share; /* share of the reference's area that no point of its frame saw  */
+    /* evaluate, at the end of the solving pass; forward and backward from the keyframe */
+    bool has_changed[2];   /* the reference does not explain the capture any more ...               */
+    int64_t changed_at[2]; /* ... from the frame of this index on                                   */
     /* job, before the first pass */
     struct npg_job *job;  /* what is kept on disk to go on from; NULL: nothing (live, or no output)  */
     bool is_resumed;      /* all facts above are known; only the solving pass is walked              */

@@ -65,13 +65,19 @@ npg_status npg_error_restore(npg_status status, const char *text)
     return npg_error(status, "%s", text);
 }
 
+npg_status npg_error_set(npg_status status, const char *text)
+{
+    return npg_error(status, "%s", text ? text : "");
+}
+
 int npg_status_exit_code(npg_status status)
 {
     switch (status) {
     case NPG_OK:
     case NPG_END: return 0;
     case NPG_STOPPED: return 75;
-    case NPG_PARTIAL: return 7;
+    case NPG_PARTIAL:
+    case NPG_CHANGED: return 7;
     case NPG_USAGE: return 2;
     case NPG_BAD_INPUT: return 3;
     case NPG_DEVICE: return 4;
@@ -91,6 +97,7 @@ const char *npg_status_name(npg_status status)
     case NPG_END: return "end";
     case NPG_STOPPED: return "stopped";
     case NPG_PARTIAL: return "partial";
+    case NPG_CHANGED: return "changed";
     case NPG_FAILED: return "failed";
     case NPG_USAGE: return "usage";
     case NPG_BAD_INPUT: return "bad input";

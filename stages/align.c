@@ -9,13 +9,16 @@
 #include "job.h"
 #include "tracker.h"
 
-#define RESTART_AT 3.0 /* times the mean distance of the frames before */
+#define LOST       1.5 /* times the usual Chamfer distance, at which a frame is tried again */
+#define HOPE       3   /* lost frames in a row that are all tried again                     */
+#define LAST_HOPES 4   /* after them every so many                                          */
 
 /* The two last poses on one side of the key. */
 typedef struct side {
     double *now, *before; /* K x 12, owned */
     int64_t index;        /* of now        */
     bool has_before;
+    int lost_in_row;
 } side;
 
 typedef struct state {
@@ -26,10 +29,11 @@ typedef struct state {
     side sides[2]; /* forward, backward */
     float *points; /* of the frame at work, owned */
     size_t points_capacity;
-    int64_t read; /* frames of the plan so far */
+    double *start, *trial; /* K x 12 each, owned */
+    int64_t read;          /* frames of the plan so far */
     struct figures {
-        double worst_dist, dist_sum;
-        int64_t worst_frame, frames;
+        double worst_dist, dist_sum, chamfer_sum;
+        int64_t worst_frame, frames, tried_again;
     } sum;
 } state;
 
@@ -57,6 +61,8 @@ static void uninit(npg_worker *worker)
         npg_release(&s->sides[i].before);
     }
     npg_release(&s->points);
+    npg_release(&s->start);
+    npg_release(&s->trial);
 }
 
 /* ---- what a run that goes on needs: both sides and the figures so far ---- */
@@ -74,7 +80,9 @@ static npg_status leave(npg_worker *worker)
     unsigned char *all;
     NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum));
     for (int i = 0; i < 2; i++) {
-        const side plain = {.index = s->sides[i].index, .has_before = s->sides[i].has_before};
+        const side plain = {.index = s->sides[i].index,
+                            .has_before = s->sides[i].has_before,
+                            .lost_in_row = s->sides[i].lost_in_row};
         memcpy(all + at, &plain, sizeof plain);
         memcpy(all + at + sizeof plain, s->sides[i].now, bytes);
         memcpy(all + at + sizeof plain + bytes, s->sides[i].before, bytes);
@@ -99,6 +107,7 @@ static npg_status take_up(npg_worker *worker)
         memcpy(&plain, all + at, sizeof plain);
         s->sides[i].index = plain.index;
         s->sides[i].has_before = plain.has_before;
+        s->sides[i].lost_in_row = plain.lost_in_row;
         memcpy(s->sides[i].now, all + at + sizeof plain, bytes);
         memcpy(s->sides[i].before, all + at + sizeof plain + bytes, bytes);
         at += sizeof plain + 2 * bytes;
@@ -126,6 +135,8 @@ static npg_status open_tracker(npg_worker *worker)
         NPG_TRY(npg_alloc_array(&s->sides[i].before, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
         npg_pose_rest(s->sides[i].now, nodes);
     }
+    NPG_TRY(npg_alloc_array(&s->start, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
+    NPG_TRY(npg_alloc_array(&s->trial, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
     return npg_worker_facts(worker)->is_resumed ? take_up(worker) : NPG_OK;
 }
@@ -145,16 +156,64 @@ static void step_on(state *s, side *at, int64_t index)
     at->index = index;
 }
 
-static npg_status fit_pose(npg_worker *worker, npg_tracked *tracked, double *pose, const npg_frame *frame)
+static npg_status fit_pose(npg_worker *worker, npg_tracked *tracked, double *pose, const npg_frame *frame,
+                           const npg_tracker_effort *effort)
 {
     state *s = npg_worker_state(worker);
-    NPG_TRY(npg_tracker_fit(s->tracker, tracked, pose, s->points, frame->normals, frame->point_count));
-    npg_worker_log(worker, NPG_LOG_DEBUG, frame->number, "coarse alignment: mean distance %.5f in %d steps",
-                   tracked->point_dist_mean, tracked->steps);
+    NPG_TRY(
+        npg_tracker_fit(s->tracker, tracked, pose, s->points, frame->normals, frame->point_count, effort));
+    npg_worker_log(worker, NPG_LOG_DEBUG, frame->number,
+                   "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps", tracked->point_dist_mean,
+                   tracked->chamfer, tracked->steps);
     return NPG_OK;
 }
 
-/* Where the motion did not go on as before, start once more from where the surface was. */
+static bool is_lost(const state *s, const npg_tracked *tracked)
+{
+    return s->sum.frames && tracked->chamfer > LOST * s->sum.chamfer_sum / (double)s->sum.frames;
+}
+
+/* Where the usual way lost the surface: with more patience, from where the motion should have led and from
+ * where the surface was.  The pose that explains the frame best stays. */
+static npg_status try_again(npg_worker *worker, npg_tracked *best, side *at, const npg_frame *frame)
+{
+    static const npg_tracker_effort patience[] = {{40, 100, 0.2}, {80, 100, 0.4}};
+    state *s = npg_worker_state(worker);
+    const double *starts[] = {at->before, s->start};
+    s->sum.tried_again++;
+    for (int i = 0; i < 4 && is_lost(s, best); i++) {
+        npg_tracked tracked;
+        if (i % 2 == 0 && !at->has_before) continue; /* both starts are the same */
+        memcpy(s->trial, starts[i % 2], pose_bytes(s));
+        NPG_TRY(fit_pose(worker, &tracked, s->trial, frame, &patience[i / 2]));
+        if (npg_worker_stopping(worker)) return NPG_STOPPED;
+        if (tracked.chamfer >= best->chamfer) continue;
+        *best = tracked;
+        memcpy(at->now, s->trial, pose_bytes(s));
+    }
+    return NPG_OK;
+}
+
+/* A capture that the reference does not explain at all is not worth the patience in every frame. */
+static npg_status find_again(npg_worker *worker, npg_tracked *tracked, side *at, const npg_frame *frame)
+{
+    const state *s = npg_worker_state(worker);
+    if (is_lost(s, tracked) && (at->lost_in_row < HOPE || at->lost_in_row % LAST_HOPES == 0))
+        NPG_TRY(try_again(worker, tracked, at, frame));
+    at->lost_in_row = is_lost(s, tracked) ? at->lost_in_row + 1 : 0;
+    return NPG_OK;
+}
+
+static void count(state *s, const npg_tracked *tracked, const npg_frame *frame)
+{
+    s->sum.frames++;
+    s->sum.dist_sum += tracked->point_dist_mean;
+    s->sum.chamfer_sum += tracked->chamfer;
+    if (tracked->point_dist_mean <= s->sum.worst_dist) return;
+    s->sum.worst_dist = tracked->point_dist_mean;
+    s->sum.worst_frame = frame->number;
+}
+
 static npg_status fit_side(npg_worker *worker, side *at, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
@@ -162,18 +221,10 @@ static npg_status fit_side(npg_worker *worker, side *at, const npg_frame *frame)
     if (!frame->point_count) return NPG_OK; /* nothing to see: the motion goes on as before */
     NPG_TRY(npg_grow(&s->points, &s->points_capacity, frame->point_count, 3 * sizeof(float), NPG_FOR_FIT));
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, s->points, frame->pos_local, frame->point_count);
-    NPG_TRY(fit_pose(worker, &tracked, at->now, frame));
-    double usual = s->sum.frames ? s->sum.dist_sum / (double)s->sum.frames : tracked.point_dist_mean;
-    if (at->has_before && tracked.point_dist_mean > RESTART_AT * usual) {
-        memcpy(at->now, at->before, npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double));
-        NPG_TRY(fit_pose(worker, &tracked, at->now, frame));
-    }
-    s->sum.frames++;
-    s->sum.dist_sum += tracked.point_dist_mean;
-    if (tracked.point_dist_mean > s->sum.worst_dist) {
-        s->sum.worst_dist = tracked.point_dist_mean;
-        s->sum.worst_frame = frame->number;
-    }
+    memcpy(s->start, at->now, pose_bytes(s));
+    NPG_TRY(fit_pose(worker, &tracked, at->now, frame, NULL));
+    NPG_TRY(find_again(worker, &tracked, at, frame));
+    count(s, &tracked, frame);
     return NPG_OK;
 }
 
@@ -221,6 +272,7 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
     json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));
     json_object_set_new(report, "worst_frame", json_integer(s->sum.worst_frame));
+    json_object_set_new(report, "frames_tried_again", json_integer(s->sum.tried_again));
     return NPG_OK;
 }
 

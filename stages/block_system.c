@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "parallel.h"
+
 struct npg_block_system {
     size_t n, pair_count;
     uint32_t (*pairs)[2]; /* owned, sorted                        */
@@ -71,7 +73,7 @@ static double *block_of(npg_block_system *s, uint32_t a, uint32_t b)
 }
 
 /* block += a^T b for 3 x 6 matrices. */
-static void add_product(double *block, const double *a, const double *b)
+NPG_WIDE static void add_product(double *restrict block, const double *restrict a, const double *restrict b)
 {
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < 6; j++)
@@ -96,6 +98,18 @@ void npg_block_add(npg_block_system *s, const uint32_t *nodes, const double (*ja
             if (block) add_product(block, jacobians[i], wj);
         }
     }
+}
+
+static void add_all(double *to, const double *from, size_t count)
+{
+    for (size_t i = 0; i < count; i++) to[i] += from[i];
+}
+
+void npg_block_merge(npg_block_system *s, const npg_block_system *other)
+{
+    add_all(s->diagonal, other->diagonal, s->n * 36);
+    add_all(s->off, other->off, s->pair_count * 36);
+    add_all(s->right, other->right, s->n * 6);
 }
 
 void npg_block_damp(npg_block_system *s, double damping)
@@ -131,7 +145,7 @@ static void apply_factor(double *x, const double *l, const double *b)
     }
 }
 
-static void multiply(const npg_block_system *s, double *y, const double *x)
+NPG_WIDE static void multiply(const npg_block_system *s, double *restrict y, const double *restrict x)
 {
     for (size_t k = 0; k < s->n; k++)
         for (size_t i = 0; i < 6; i++) {

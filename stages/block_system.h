@@ -22,6 +22,9 @@ void npg_block_clear(npg_block_system *system);
 void npg_block_add(npg_block_system *system, const uint32_t *nodes, const double (*jacobians)[18],
                    size_t count, const double w[9], const double r[3]);
 
+/* Add what another system over the same nodes and pairs has gathered. */
+void npg_block_merge(npg_block_system *system, const npg_block_system *other);
+
 /* Add `damping` times the identity to every node. */
 void npg_block_damp(npg_block_system *system, double damping);
 

@@ -9,6 +9,7 @@
 
 #include "file.h"
 #include "fit_state.h"
+#include "state_mesh.h"
 
 /* A held frame but for its arrays. */
 typedef struct saved_frame {
@@ -29,22 +30,6 @@ static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t inde
 }
 
 /* ---- saving: facts ---- */
-
-static npg_status put_reference(npg_archive_writer *out, const npg_mesh *mesh)
-{
-    const uint64_t counts[2] = {mesh->vert_count, mesh->face_count};
-    size_t v = mesh->vert_count;
-    NPG_TRY(npg_archive_put(out, "reference", counts, sizeof counts));
-    NPG_TRY(npg_archive_put(out, "reference.vertices", mesh->vert_pos, v * 3 * sizeof(float)));
-    NPG_TRY(npg_archive_put(out, "reference.normals", mesh->vert_normals, v * 3 * sizeof(float)));
-    NPG_TRY(npg_archive_put(out, "reference.faces", mesh->faces, mesh->face_count * 3 * sizeof(uint32_t)));
-    if (mesh->vert_colours) NPG_TRY(npg_archive_put(out, "reference.colours", mesh->vert_colours, v * 4));
-    if (mesh->vert_uvs) NPG_TRY(npg_archive_put(out, "reference.uvs", mesh->vert_uvs, v * 2 * sizeof(float)));
-    if (mesh->corner_uvs)
-        NPG_TRY(npg_archive_put(out, "reference.corner_uvs", mesh->corner_uvs,
-                                mesh->face_count * 6 * sizeof(float)));
-    return NPG_OK;
-}
 
 static npg_status put_story(npg_archive_writer *out, npg_worker *worker)
 {
@@ -74,7 +59,7 @@ static npg_status put_facts(npg_archive_writer *out, npg_worker *worker)
     if (tied) NPG_TRY(npg_archive_put(out, "tied", tied, tied_count * 3 * sizeof(float)));
     if (tied) NPG_TRY(npg_archive_put(out, "tied.number", &tied_number, sizeof tied_number));
     NPG_TRY(put_story(out, worker));
-    return put_reference(out, facts->reference);
+    return npg_state_put_mesh(out, facts->reference);
 }
 
 /* ---- saving: frames ---- */
@@ -211,35 +196,6 @@ npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit
 
 /* ---- restoring: facts ---- */
 
-static npg_status get_optional(const npg_archive *in, const char *name, void *array, size_t size)
-{
-    size_t found;
-    if (!npg_archive_find(in, name, &found)) return NPG_OK;
-    NPG_TRY(npg_alloc(array, NPG_FOR_MESH, size));
-    return npg_archive_get(in, name, *(void **)array, size);
-}
-
-static npg_status get_reference(npg_mesh **out, const npg_archive *in)
-{
-    uint64_t counts[2];
-    npg_mesh *mesh;
-    NPG_TRY(npg_archive_get(in, "reference", counts, sizeof counts));
-    size_t v = counts[0];
-    NPG_TRY(npg_mesh_open(&mesh, v, counts[1]));
-    npg_status status = npg_archive_get(in, "reference.vertices", mesh->vert_pos, v * 3 * sizeof(float));
-    if (!status)
-        status = npg_archive_get(in, "reference.faces", mesh->faces, mesh->face_count * 3 * sizeof(uint32_t));
-    if (!status) status = get_optional(in, "reference.normals", &mesh->vert_normals, v * 3 * sizeof(float));
-    if (!status) status = get_optional(in, "reference.colours", &mesh->vert_colours, v * 4);
-    if (!status) status = get_optional(in, "reference.uvs", &mesh->vert_uvs, v * 2 * sizeof(float));
-    if (!status)
-        status =
-            get_optional(in, "reference.corner_uvs", &mesh->corner_uvs, mesh->face_count * 6 * sizeof(float));
-    if (status) npg_mesh_unref(&mesh);
-    *out = mesh;
-    return status;
-}
-
 static npg_status get_story(npg_worker *worker, const npg_archive *in)
 {
     size_t size;
@@ -272,7 +228,7 @@ npg_status npg_checkpoint_restore_facts(npg_worker *worker)
     NPG_TRY(npg_archive_get(in, "progress", &progress, sizeof progress));
     NPG_TRY(npg_archive_get(in, "list", &list, sizeof list));
     NPG_TRY(get_story(worker, in));
-    NPG_TRY(get_reference(&restored.reference, in));
+    NPG_TRY(npg_state_get_mesh(&restored.reference, in));
     *facts = restored; /* the run owns the reference now */
     facts->job = job;
     facts->is_resumed = true;
@@ -287,7 +243,10 @@ static npg_status get_array(const npg_archive *in, const char *what, int64_t ind
                             size_t count)
 {
     char name[NPG_BLOCK_NAME];
+    size_t size;
     block_name(name, what, index);
+    if (!npg_archive_find(in, name, &size) || size / (3 * sizeof(float)) != count)
+        return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu points", name, count);
     NPG_TRY(npg_alloc_array(values, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
     return npg_archive_get(in, name, *values, count * 3 * sizeof(float));
 }

@@ -7,6 +7,7 @@
 #include "mesh_clean.h"
 #include "mesh_tools.h"
 #include "resurface.h"
+#include "stage.h"
 
 #define DRAFT_DEPTH     7
 #define DRAFT_ROUNDS    1
@@ -94,20 +95,16 @@ static npg_status see(void *user, const npg_sight *sight, const float *vert_unit
     return NPG_OK;
 }
 
-static npg_status rate(npg_fare *fare, const npg_sights *sights, size_t at,
-                       const npg_poisson_settings *settings)
+/* Follow the candidate's draft through the other frames. */
+static npg_status follow(npg_fare *fare, const npg_sights *sights, size_t at, npg_mesh *draft,
+                         const npg_poisson_settings *settings)
 {
-    npg_mesh *mesh;
-    const npg_sight *own = &sights->list[at];
-    NPG_TRY(npg_cloud_contact(&fare->contact, own->points, own->normals, own->point_count));
-    NPG_TRY(make_draft(&mesh, &fare->handles, own, settings));
-    faring f = {.mesh = mesh, .settings = settings};
-    npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, mesh->vert_count, sizeof *f.dist);
-    if (!status) status = npg_sights_follow(sights, at, mesh, &draft_tracking, see, &f);
+    faring f = {.mesh = draft, .settings = settings};
+    npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, draft->vert_count, sizeof *f.dist);
+    if (!status) status = npg_sights_follow(sights, at, draft, &draft_tracking, see, &f);
     npg_release(&f.dist);
-    npg_mesh_unref(&mesh);
     NPG_TRY(status);
-    fare->is_made = true;
+    fare->is_followed = true;
     fare->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
     fare->vert_dist_unit = f.vert_dist / fmax(1, (double)f.frames);
     fare->stretched_share = f.stretched / fmax(1, (double)f.frames);
@@ -122,13 +119,97 @@ static bool is_fatal(npg_status status)
 
 /* ---- the choice ---- */
 
+typedef struct candidate {
+    npg_fare *fare;
+    size_t at;       /* in the sights */
+    npg_mesh *draft; /* NULL where none was needed or could be made; owned */
+} candidate;
+
+typedef struct choosing {
+    const npg_sights *sights;
+    const npg_poisson_settings *settings;
+    candidate list[NPG_CHOICE_MAX];
+    size_t count, scored; /* scored: place of the best-scored frame, count when it is not there */
+} choosing;
+
+/* Whether parts are further apart in a candidate than in another: what the choice is for.  Distances alone
+ * say little. */
+static bool is_less_touching(const npg_fare *a, const npg_fare *b)
+{
+    return a->contact < LESS_CONTACT * b->contact;
+}
+
+static bool is_more_apart(const npg_fare *a, const npg_fare *b)
+{
+    return a->handles < b->handles || is_less_touching(a, b);
+}
+
+static npg_status list_candidates(choosing *c, npg_fare *fares, int64_t best_scored)
+{
+    for (size_t i = 0; i < c->sights->count && c->count < NPG_CHOICE_MAX; i++) {
+        const npg_sight *sight = &c->sights->list[i];
+        if (!sight->is_candidate || !sight->normals) continue;
+        npg_fare *fare = &fares[c->count];
+        *fare = (npg_fare){.index = sight->index, .number = sight->number};
+        NPG_TRY(npg_cloud_contact(&fare->contact, sight->points, sight->normals, sight->point_count));
+        c->list[c->count++] = (candidate){.fare = fare, .at = i};
+    }
+    c->scored = 0;
+    while (c->scored < c->count && c->list[c->scored].fare->index != best_scored) c->scored++;
+    return NPG_OK;
+}
+
+static npg_status draft_of(choosing *c, candidate *one)
+{
+    npg_status status = make_draft(&one->draft, &one->fare->handles, &c->sights->list[one->at], c->settings);
+    return is_fatal(status) ? status : NPG_OK;
+}
+
+static npg_status follow_one(choosing *c, candidate *one)
+{
+    if (!one->draft) return NPG_OK;
+    npg_status status = follow(one->fare, c->sights, one->at, one->draft, c->settings);
+    return is_fatal(status) ? status : NPG_OK;
+}
+
+/* Drafts are made only of candidates that could be more apart than the best-scored frame: a closed draft
+ * without handles has none to lose. */
+static npg_status make_drafts(choosing *c)
+{
+    const candidate *scored = c->scored < c->count ? &c->list[c->scored] : NULL;
+    if (scored) NPG_TRY(draft_of(c, &c->list[c->scored]));
+    bool may_lose_handles = scored && scored->draft && scored->fare->handles > 0;
+    for (size_t i = 0; i < c->count; i++) {
+        if (i == c->scored) continue;
+        if (scored && scored->draft && !may_lose_handles && !is_less_touching(c->list[i].fare, scored->fare))
+            continue;
+        NPG_TRY(draft_of(c, &c->list[i]));
+        if (scored && scored->draft && c->list[i].draft && !is_more_apart(c->list[i].fare, scored->fare))
+            npg_mesh_unref(&c->list[i].draft);
+    }
+    return NPG_OK;
+}
+
+/* Followed is nobody when the best-scored frame is alone in the running. */
+static npg_status compare(choosing *c)
+{
+    size_t running = 0;
+    for (size_t i = 0; i < c->count; i++) running += c->list[i].draft != NULL;
+    for (size_t i = 0; i < c->count; i++) {
+        if (running < 2 && i == c->scored) continue;
+        NPG_TRY(follow_one(c, &c->list[i]));
+    }
+    return NPG_OK;
+}
+
 static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
 {
     int64_t fewest = INT64_MAX;
     for (size_t i = 0; i < count; i++)
-        if (fares[i].is_made && fares[i].handles < fewest) fewest = fares[i].handles;
+        if (fares[i].is_followed && fares[i].handles < fewest) fewest = fares[i].handles;
     for (size_t i = 0; i < count; i++) {
         double off = (double)fares[i].index / (double)frame_count - 0.5;
+        if (!fares[i].is_followed) continue;
         fares[i].cost = (fares[i].point_dist_unit + fares[i].vert_dist_unit +
                          STRETCH_COST * fares[i].stretched_share + CONTACT_COST * fares[i].contact) *
                         (1 + HANDLE_COST * (double)(fares[i].handles - fewest)) *
@@ -136,42 +217,31 @@ static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
     }
 }
 
-/* Whether parts are further apart in a candidate than in another: what the choice is for.  Distances alone
- * say little. */
-static bool is_more_apart(const npg_fare *a, const npg_fare *b)
+/* The best-scored frame, unless another costs clearly less (and has its parts more apart, or it would not
+ * have been followed). */
+static size_t cheapest(const npg_fare *fares, size_t count, size_t scored)
 {
-    return a->handles < b->handles || a->contact < LESS_CONTACT * b->contact;
-}
-
-/* The best-scored frame, unless another costs clearly less and has its parts more apart. */
-static size_t cheapest(const npg_fare *fares, size_t count, int64_t best_scored)
-{
-    size_t best = count, scored = count;
-    for (size_t i = 0; i < count; i++)
-        if (fares[i].index == best_scored && fares[i].is_made) scored = i;
+    bool has_scored = scored < count && fares[scored].is_followed;
+    size_t best = scored < count ? scored : 0;
     for (size_t i = 0; i < count; i++) {
-        if (!fares[i].is_made || (best < count && fares[i].cost >= fares[best].cost)) continue;
-        bool may_be =
-            scored == count || i == scored ||
-            (fares[i].cost < CLEARLY_LESS * fares[scored].cost && is_more_apart(&fares[i], &fares[scored]));
-        if (may_be) best = i;
+        if (!fares[i].is_followed || i == best) continue;
+        double bar = fares[best].is_followed ? fares[best].cost : (double)INFINITY;
+        if (has_scored) bar = fmin(bar, CLEARLY_LESS * fares[scored].cost);
+        if (fares[i].cost < bar) best = i;
     }
-    return best == count ? 0 : best;
+    return best;
 }
 
 npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
                       int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings)
 {
-    *count = *best = 0;
-    for (size_t i = 0; i < sights->count; i++) {
-        const npg_sight *sight = &sights->list[i];
-        if (!sight->is_candidate || !sight->normals) continue;
-        npg_fare *fare = &fares[(*count)++];
-        *fare = (npg_fare){.index = sight->index, .number = sight->number};
-        npg_status status = rate(fare, sights, i, settings);
-        if (is_fatal(status)) return status;
-    }
-    add_up(fares, *count, frame_count);
-    *best = cheapest(fares, *count, best_scored);
-    return NPG_OK;
+    choosing c = {.sights = sights, .settings = settings};
+    npg_status status = list_candidates(&c, fares, best_scored);
+    if (!status) status = make_drafts(&c);
+    if (!status) status = compare(&c);
+    for (size_t i = 0; i < c.count; i++) npg_mesh_unref(&c.list[i].draft);
+    *count = c.count;
+    add_up(fares, c.count, frame_count);
+    *best = cheapest(fares, c.count, c.scored);
+    return status;
 }

@@ -13,7 +13,9 @@
  * lengths in units; the first three are means over the other frames, contact is that of its own points
  * (contact.h).  A weld keeps surface away from points, stretches where limbs part, and often makes a handle;
  * contact tells of welds that the coarse tracker does not feel.  The frame with the best score stays the
- * keyframe unless another is clearly cheaper. */
+ * keyframe unless another is clearly cheaper and has its parts more apart: fewer handles, or clearly less
+ * contact.  Candidates that are not more apart are neither drafted nor followed; where there is none, the
+ * choice costs one draft. */
 #ifndef NPG_CHOOSE_H
 #define NPG_CHOOSE_H
 
@@ -22,13 +24,13 @@
 
 typedef struct npg_fare {
     int64_t index, number;
-    bool is_made;           /* false: no surface could be made or followed; the rest is 0 */
+    bool is_followed;       /* false: not in the running, or no surface could be made; the distances are 0 */
     double point_dist_unit; /* points -> surface, mean over the other frames           */
     double vert_dist_unit;  /* vertices -> points, mean over the other frames          */
     double stretched_share; /* of the area, mean over the other frames                 */
     double contact;         /* share of its own points                                 */
-    int64_t handles;        /* of the closed draft                                   */
-    double cost;
+    int64_t handles;        /* of the closed draft; 0 where none was made              */
+    double cost;            /* 0 when not followed                                     */
 } npg_fare;
 
 /* frame_count: of the capture.  fares: room for as many as there are candidates; *count gets how many, *best

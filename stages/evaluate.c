@@ -9,7 +9,9 @@
 #include "file.h"
 #include "job.h"
 #include "kdtree.h"
+#include "misfit.h"
 #include "stage.h"
+#include "topology.h"
 
 #define WARNINGS_MAX 10 /* frames below the bar that get a warning of their own */
 
@@ -44,9 +46,12 @@ typedef struct evaluate_state {
     double residual_max, coverage_min, flipped_max, stretched_max, cover_dist;
     int64_t point_limit;
     const char *truth_folder;
+    npg_topology_settings watch;
     /* of the run */
     npg_surface *surface;
     npg_shape *shape;
+    npg_misfit_finder *finder;
+    npg_topology *topology;
     npg_truth *truth;
     bool is_tied;          /* the truth, in a frame */
     float *points, *dists; /* N x 3 and max(N, V), of the frame at hand, in units; owned */
@@ -126,10 +131,25 @@ static double cover_radius(const evaluate_state *state, double area, size_t poin
     return fmax(state->cover_dist / 100 / per_unit, 2 * spacing);
 }
 
-static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_mesh *reference,
+/* Misfits as they are written down, so that a run which reads them back decides as this one. */
+static void place_misfits(npg_figures *figures, const npg_frame_box *box)
+{
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        npg_misfit *misfit = &figures->misfits[i];
+        float at[3] = {(float)misfit->at[0], (float)misfit->at[1], (float)misfit->at[2]};
+        double world[3];
+        npg_box_unit_to_world(box, world, at, 1);
+        misfit->share = (double)(float)misfit->share;
+        for (int a = 0; a < 3; a++) misfit->at[a] = (double)(float)world[a];
+    }
+}
+
+/* After measure_points() of the same frame. */
+static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_facts *facts,
                                    const float *vert_unit, size_t point_count, double per_unit,
                                    double *mean_sq)
 {
+    const npg_mesh *reference = facts->reference;
     size_t v = reference->vert_count;
     npg_kdtree *tree;
     NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, v, sizeof *state->dists, NPG_FOR_QUERY));
@@ -150,15 +170,26 @@ static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, 
     figures->coverage = whole > 0 ? covered / whole : 0;
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
+    npg_misfit_frame frame = {.points = state->points,
+                              .hits = state->hits,
+                              .point_count = point_count,
+                              .point_dist_median = figures->point_dist_median / per_unit,
+                              .vert_unit = vert_unit,
+                              .vert_dist_sq = state->dists,
+                              .vert_areas = state->vert_areas,
+                              .area = area};
+    NPG_TRY(npg_misfit_find(state->finder, figures->misfits, &frame));
+    place_misfits(figures, &facts->box);
     return NPG_OK;
 }
 
 /* ---- one frame ---- */
 
-static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference)
+static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference, double unseen_share)
 {
     size_t v = reference->vert_count;
     NPG_TRY(npg_shape_open(&state->shape, reference));
+    NPG_TRY(npg_misfit_open(&state->finder, reference, unseen_share));
     NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, v, sizeof *state->nearest));
     NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, v, sizeof *state->vert_areas));
     return npg_surface_open(&state->surface, reference->vert_pos, v, reference->faces, reference->face_count);
@@ -180,6 +211,8 @@ static npg_figures no_figures(void)
 {
     npg_figures figures;
     for (size_t i = 0; i < SUMMED; i++) *(double *)((char *)&figures + summed[i].offset) = (double)NAN;
+    for (int i = 0; i < NPG_MISFITS; i++)
+        figures.misfits[i] = (npg_misfit){(double)NAN, {(double)NAN, (double)NAN, (double)NAN}};
     figures.good = false;
     return figures;
 }
@@ -210,7 +243,7 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     npg_figures *figures = &frame->figures;
     double per_unit = 1 / (facts->box.scale * facts->box.diagonal), points_sq, vertices_sq;
     size_t point_count = 0;
-    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference));
+    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference, facts->unseen_share));
     NPG_TRY(check_vertices(frame, facts->reference));
     npg_shape_measure(state->shape, figures, frame->vert_unit);
     if (state->truth) NPG_TRY(compare_truth(worker, frame));
@@ -218,8 +251,7 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     if (!point_count) return NPG_OK;
     NPG_TRY(npg_surface_move(state->surface, frame->vert_unit));
     NPG_TRY(measure_points(state, figures, point_count, per_unit, &points_sq));
-    NPG_TRY(measure_vertices(state, figures, facts->reference, frame->vert_unit, point_count, per_unit,
-                             &vertices_sq));
+    NPG_TRY(measure_vertices(state, figures, facts, frame->vert_unit, point_count, per_unit, &vertices_sq));
     figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5;
     return NPG_OK;
 }
@@ -276,6 +308,7 @@ static npg_status judge(npg_worker *worker, npg_frame *frame)
     const char *fault =
         fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share, &value, &bound);
     frame->figures.good = !fault && !frame->is_skipped;
+    if (frame->is_shared) return NPG_OK;
     add_up(state, frame);
     state->good_count += frame->figures.good;
     if (frame->is_skipped || !fault) return NPG_OK;
@@ -324,19 +357,32 @@ static npg_status flush(npg_worker *worker)
                         state->bad_count);
     if (state->skipped_count)
         npg_worker_warn(worker, true, -1, "%zu frames were skipped", state->skipped_count);
-    return NPG_OK;
+    return state->topology ? npg_topology_finish(state->topology, worker) : NPG_OK;
+}
+
+/* ---- the alarm ---- */
+
+static npg_status watch(npg_worker *worker, const npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    if (!state->topology)
+        NPG_TRY(npg_topology_open(&state->topology, &state->watch, npg_worker_facts(worker)->plan.key));
+    return npg_topology_add(state->topology, worker, frame);
 }
 
 /* ---- what an earlier run of the same job has measured ---- */
 
 static npg_status take_line(void *user, const json_t *line, const char *text, size_t size)
 {
-    evaluate_state *state = user;
+    npg_worker *worker = user;
+    evaluate_state *state = npg_worker_state(worker);
     const json_t *figures = json_object_get(line, "figures");
-    npg_frame frame = {.number = (int64_t)json_integer_value(json_object_get(line, "number")),
+    npg_frame frame = {.index = (int64_t)json_integer_value(json_object_get(line, "index")),
+                       .number = (int64_t)json_integer_value(json_object_get(line, "number")),
+                       .is_shared = json_is_true(json_object_get(line, "shared")),
                        .figures = no_figures()};
     (void)text, (void)size;
-    if (!figures) return NPG_OK;
+    if (!figures || frame.is_shared) return NPG_OK;
     for (size_t i = 0; i < SUMMED; i++) {
         const json_t *value = json_object_get(figures, summed[i].name);
         if (json_is_number(value))
@@ -347,7 +393,9 @@ static npg_status take_line(void *user, const json_t *line, const char *text, si
     add_up(state, &frame);
     state->good_count += is_good;
     state->skipped_count += is_skipped;
-    return is_good || is_skipped ? NPG_OK : note_bad(state, frame.number);
+    if (!is_good && !is_skipped) NPG_TRY(note_bad(state, frame.number));
+    npg_misfits_take(&frame.figures, json_object_get(line, "misfits"));
+    return watch(worker, &frame);
 }
 
 static npg_status take_up(npg_worker *worker)
@@ -356,7 +404,7 @@ static npg_status take_up(npg_worker *worker)
     int64_t count, bytes;
     npg_job_exported(npg_worker_facts(worker)->job, &count, &bytes);
     NPG_TRY(npg_join_path(&path, npg_worker_settings(worker)->output, "frames.partial.jsonl"));
-    npg_status status = npg_frame_lines_each(path, bytes, take_line, npg_worker_state(worker));
+    npg_status status = npg_frame_lines_each(path, bytes, take_line, worker);
     npg_release(&path);
     return status;
 }
@@ -378,9 +426,11 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit;
         frame->figures = no_figures();
         frame->fields |= NPG_FIELD_FIGURES;
-        state->skipped_count += frame->is_skipped;
+        frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
+        state->skipped_count += frame->is_skipped && !frame->is_shared;
         if (has_mesh) NPG_TRY(measure_frame(worker, frame));
         NPG_TRY(judge(worker, frame));
+        NPG_TRY(watch(worker, frame));
     }
     return NPG_OK;
 }
@@ -390,6 +440,8 @@ static void uninit(npg_worker *worker)
     evaluate_state *state = npg_worker_state(worker);
     npg_surface_close(&state->surface);
     npg_shape_close(&state->shape);
+    npg_misfit_close(&state->finder);
+    npg_topology_close(&state->topology);
     npg_truth_close(&state->truth);
     npg_release(&state->points);
     npg_release(&state->dists);
@@ -409,7 +461,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     if (limit && points > limit) points = limit;
     *chunks_held = 1;
     return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
-           600 * npg_worker_verts_at_most(worker);
+           points * 120 + /* misfits: were all points far, with their links */
+           720 * npg_worker_verts_at_most(worker);
 }
 
 #define OFFSET(member) offsetof(evaluate_state, member)
@@ -433,6 +486,18 @@ static const npg_option options[] = {
      NPG_OPTION_INT, OFFSET(point_limit), "100000", 0, 1e12, NULL, NULL},
     {"truth", "Folder with the true meshes, numbered as the frames: their figures go into the report",
      NPG_OPTION_TEXT, OFFSET(truth_folder), "", 0, 0, NULL, "DIR"},
+    {"alarm",
+     "Where the reference no longer explains the points: say so and go on, or end there (what --segments "
+     "auto "
+     "asks for)",
+     NPG_OPTION_CHOICE, OFFSET(watch.mode), "report", 0, 0, "report|split", NULL},
+    {"segment-min",
+     "Frames that a segment has at least; shorter ones are left to their neighbour, with exit code 7",
+     NPG_OPTION_INT, OFFSET(watch.segment_min), "8", 1, 1e9, NULL, NULL},
+    {"shared-first", "Frames at the beginning that another segment explains: solved, but not judged",
+     NPG_OPTION_INT, OFFSET(watch.shared_first), "0", 0, 1e9, NULL, NULL},
+    {"shared-last", "The same at the end", NPG_OPTION_INT, OFFSET(watch.shared_last), "0", 0, 1e9, NULL,
+     NULL},
     {0}};
 
 extern const npg_stage npg_stage_evaluate;

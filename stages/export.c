@@ -406,7 +406,7 @@ static npg_status finish(npg_worker *worker)
     report_settings(report, state);
     json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
-    NPG_TRY(npg_frame_log_finish(state->list));
+    NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker)));
     return write_forms(worker);
 }
 
@@ -464,12 +464,22 @@ static npg_status conclude(npg_worker *worker)
 
 /* ---- the stage ---- */
 
+static npg_status check_own(const npg_worker *worker)
+{
+    char *meshes;
+    NPG_TRY(npg_join_path(&meshes, output_of(worker), "meshes"));
+    npg_status status = npg_folder_is_own(meshes);
+    npg_release(&meshes);
+    return status;
+}
+
 static npg_status init(npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     NPG_TRY(read_options(worker));
     if (!output_of(worker)[0]) return NPG_OK;
     NPG_TRY(check_reference(worker));
+    if (npg_worker_settings(worker)->confine) NPG_TRY(check_own(worker));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
         NPG_TRY(npg_folder_probe(output_of(worker)));
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;

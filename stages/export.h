@@ -54,6 +54,9 @@ npg_status npg_frame_log_open(npg_frame_log **list, const char *output);
 /* Called with each line's object, and its bytes with their newline. */
 typedef npg_status npg_visit_line(void *user, const json_t *frame, const char *line, size_t size);
 
+/* The misfits of a line, exactly as they were; NaN where it has none. */
+void npg_misfits_take(npg_figures *figures, const json_t *misfits);
+
 /* The lines in the first `bytes` bytes of a list.  NPG_DISK, NPG_BAD_INPUT where they are no such lines. */
 npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line *visit, void *user);
 
@@ -73,8 +76,9 @@ void npg_frame_log_size(const npg_frame_log *list, int64_t *lines, int64_t *byte
 npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
                              const char *file);
 
-/* Write OUT/frames.jsonl in the order of the indices; the partial one stays until the run is done. */
-npg_status npg_frame_log_finish(npg_frame_log *list);
+/* Write OUT/frames.jsonl in the order of the indices; the partial one stays until the run is done.  Frames
+ * that the reference does not explain (facts->changed_at) are marked. */
+npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts);
 
 /* The partial file stays when finish has not been called.  NULL is fine. */
 void npg_frame_log_close(npg_frame_log **list);

@@ -164,8 +164,8 @@ static npg_status remove_mesh(void *user, const char *folder, const char *name, 
 
 npg_status npg_folder_clear(const char *output)
 {
-    static const char *const names[] = {"done.json", "report.json", "frames.jsonl", "frames.partial.jsonl",
-                                        "reference.ply"};
+    static const char *const names[] = {
+        "done.json", "report.json", "frames.jsonl", "frames.partial.jsonl", "reference.ply", "topology.json"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(remove_file(output, names[i]));
     NPG_TRY(npg_forms_clear(output));
     return each_mesh(output, remove_mesh, NULL);

@@ -1,6 +1,7 @@
 /* The list of frames and the last file of a run. */
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,9 +34,8 @@ static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
     XXH3_state_t *state = XXH3_createState();
     if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
     XXH3_64bits_reset(state);
-    npg_status status = NPG_OK;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
     *size = 0;
     while (!status) {
         ssize_t got = read(fd, block, sizeof block);
@@ -68,6 +68,8 @@ npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
 
 npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
 {
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
     json_t *now = json_object();
     npg_status status = npg_file_facts(now, output, file);
     if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
@@ -114,6 +116,36 @@ static json_t *json_of_figures(const npg_figures *f)
     return figures;
 }
 
+static const char *const misfit_names[NPG_MISFITS] = {"far", "bare", "torn"};
+
+static json_t *json_of_misfits(const npg_figures *f)
+{
+    json_t *misfits = json_object();
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        const npg_misfit *misfit = &f->misfits[i];
+        json_t *at = json_array();
+        for (int a = 0; a < 3; a++) json_array_append_new(at, npg_json_real(misfit->at[a]));
+        json_object_set_new(misfits, misfit_names[i],
+                            json_pack("{so so}", "share", npg_json_real(misfit->share), "at", at));
+    }
+    return misfits;
+}
+
+static double real_of(const json_t *value)
+{
+    return json_is_number(value) ? (double)(float)json_number_value(value) : (double)NAN;
+}
+
+void npg_misfits_take(npg_figures *figures, const json_t *misfits)
+{
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        const json_t *misfit = json_object_get(misfits, misfit_names[i]);
+        figures->misfits[i].share = real_of(json_object_get(misfit, "share"));
+        for (size_t a = 0; a < 3; a++)
+            figures->misfits[i].at[a] = real_of(json_array_get(json_object_get(misfit, "at"), a));
+    }
+}
+
 static json_t *json_of_frame(const npg_frame *frame, const char *file)
 {
     json_t *line = json_object();
@@ -123,11 +155,13 @@ static json_t *json_of_frame(const npg_frame *frame, const char *file)
     json_object_set_new(line, "key", json_boolean(frame->is_key));
     json_object_set_new(line, "skipped", json_boolean(frame->is_skipped));
     json_object_set_new(line, "held", json_boolean(frame->is_held));
+    if (frame->is_shared) json_object_set_new(line, "shared", json_true());
     json_object_set_new(line, "points", json_integer((json_int_t)frame->point_count));
     json_object_set_new(line, "cleaning", json_of_cleaning(&frame->cleaning));
     if (frame->fields & NPG_FIELD_FIGURES) {
         json_object_set_new(line, "good", json_boolean(frame->figures.good));
         json_object_set_new(line, "figures", json_of_figures(&frame->figures));
+        json_object_set_new(line, "misfits", json_of_misfits(&frame->figures));
     }
     json_object_set_new(line, "file", npg_json_text(file));
     return line;
@@ -251,7 +285,24 @@ static int by_index(const void *left, const void *right)
     return a->index < b->index ? -1 : a->index > b->index;
 }
 
-static npg_status copy_lines(npg_frame_log *list, npg_file *file)
+static bool is_unexplained(const npg_facts *facts, int64_t index)
+{
+    return (facts->has_changed[0] && index >= facts->changed_at[0]) ||
+           (facts->has_changed[1] && index <= facts->changed_at[1]);
+}
+
+/* A line, with the word that the reference does not explain its frame where it has none yet. */
+static npg_status write_line(npg_file *file, const char *line, size_t size, bool is_unexplained)
+{
+    static const char word[] = ",\"unexplained\":true";
+    bool has = memmem(line, size, word, sizeof word - 1) != NULL;
+    if (!is_unexplained || has || size < 2) return npg_file_write(file, line, size);
+    NPG_TRY(npg_file_write(file, line, size - 2)); /* without brace and newline */
+    NPG_TRY(npg_file_write(file, word, sizeof word - 1));
+    return npg_file_write(file, "}\n", 2);
+}
+
+static npg_status copy_lines(npg_frame_log *list, npg_file *file, const npg_facts *facts)
 {
     char *line = NULL;
     size_t capacity = 0;
@@ -261,13 +312,13 @@ static npg_status copy_lines(npg_frame_log *list, npg_file *file)
         status = npg_grow(&line, &capacity, place->size, 1, NPG_FOR_FILES);
         if (!status && pread(list->fd, line, place->size, place->offset) != (ssize_t)place->size)
             status = npg_error_errno(NPG_DISK, "can't read back %s", list->partial_path);
-        if (!status) status = npg_file_write(file, line, place->size);
+        if (!status) status = write_line(file, line, place->size, is_unexplained(facts, place->index));
     }
     npg_release(&line);
     return status;
 }
 
-npg_status npg_frame_log_finish(npg_frame_log *list)
+npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts)
 {
     npg_file *file;
     char *path;
@@ -276,7 +327,7 @@ npg_status npg_frame_log_finish(npg_frame_log *list)
     npg_status status = npg_file_open(&file, path);
     npg_release(&path);
     NPG_TRY(status);
-    status = copy_lines(list, file);
+    status = copy_lines(list, file, facts);
     if (status)
         npg_file_discard(&file);
     else
@@ -328,6 +379,7 @@ static npg_status write_entries(npg_file *file, const char *output, const char *
         }
         json_decref(frame);
     }
+    if (list && !status && ferror(list)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     if (list) fclose(list);
     free(line);
     npg_release(&path);
@@ -361,10 +413,12 @@ npg_status npg_done_write(const char *output, json_t *head, bool has_forms)
     if (!status) status = npg_join_path(&partial, output, "frames.partial.jsonl");
     if (!status) status = npg_file_open(&file, path);
     if (!status) status = write_done(file, output, head, has_forms);
-    if (!status)
+    if (!status) {
         status = npg_file_commit(&file);
-    else
+        if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */
+    } else {
         npg_file_discard(&file);
+    }
     if (!status && unlink(partial) && errno != ENOENT)
         status = npg_error_errno(NPG_DISK, "can't remove %s", partial);
     npg_release(&path);

@@ -14,8 +14,14 @@ npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line 
     char *line = NULL;
     size_t capacity = 0;
     npg_status status = NPG_OK;
-    FILE *list = fopen(path, "re");
-    if (!list) return npg_error_errno(NPG_DISK, "can't read back %s", path);
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_DISK));
+    FILE *list = fdopen(fd, "r");
+    if (!list) {
+        status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+        close(fd);
+        return status;
+    }
     for (int64_t at = 0; at < bytes && !status;) {
         ssize_t size = getline(&line, &capacity, list);
         json_t *frame = size > 0 ? json_loadb(line, (size_t)size, 0, NULL) : NULL;

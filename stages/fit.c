@@ -209,7 +209,7 @@ npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_setting
     fit->device = device;
     fit->seed = seed;
     fit->real = reference->vert_count;
-    fit->rows = (fit->real + NPG_MLP_ROWS - 1) / NPG_MLP_ROWS * NPG_MLP_ROWS;
+    fit->rows = npg_mlp_rows(device, fit->real);
     choose_levels(&fit->levels, settings);
     npg_status status = sort_vertices(fit, reference, &normals);
     if (!status) status = open_grids(fit, normals);
@@ -543,12 +543,13 @@ size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frame
     npg_levels levels = {0};
     npg_mlp_shape shape = shape_of(s);
     choose_levels(&levels, s);
-    size_t rows = (vert_count + NPG_MLP_ROWS - 1) / NPG_MLP_ROWS * NPG_MLP_ROWS, groups = 2 * (size_t)units;
+    const npg_tuning *tuning = &npg_tuning_wide; /* a processor: elsewhere the device has memory of its own */
+    size_t block = (size_t)tuning->mlp_rows, groups = (size_t)(tuning->mlp_groups * units);
+    size_t rows = (vert_count + block - 1) / block * block;
     size_t batch = (size_t)s->batch < frames ? (size_t)s->batch : frames;
     size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
     size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
-    size_t per_group =
-        npg_mlp_param_count(&shape) + 2 * NPG_MLP_ROWS * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
+    size_t per_group = npg_mlp_param_count(&shape) + 2 * block * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
     size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 7, decoder = npg_mlp_param_count(&shape) * 6;
     return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
 }

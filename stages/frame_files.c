@@ -3,7 +3,9 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
+#include "file.h"
 #include "frame_inputs.h"
 #include "frame_names.h"
 #include "memory.h"
@@ -130,6 +132,24 @@ npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const 
     }
     npg_paths_clear(&paths);
     npg_selection_clear(&selection);
+    return status;
+}
+
+npg_status npg_frame_files_confine(const npg_frame_files *list, const char *input)
+{
+    char *folder;
+    struct stat info;
+    NPG_TRY(npg_copy_text(&folder, input));
+    char *slash = strrchr(folder, '/');
+    bool is_folder = !stat(input, &info) && S_ISDIR(info.st_mode);
+    if (!is_folder && slash) slash[slash == folder] = 0;
+    const char *place = is_folder || slash ? folder : ".";
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < list->count && !status; i++)
+        if (list->slots[i].path && !npg_path_is_inside(list->slots[i].path, place))
+            status = npg_error(NPG_BAD_INPUT, "%s: leads out of %s, and option confine is set",
+                               list->slots[i].path, place);
+    npg_release(&folder);
     return status;
 }
 

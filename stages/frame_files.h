@@ -31,6 +31,9 @@ typedef struct npg_frame_files {
  * selection that is malformed or chooses nothing.  NPG_MEMORY. */
 npg_status npg_frame_files_open(npg_frame_files **list, const char *input, const char *selection,
                                 bool finds_gaps);
+/* Refuse a list with a file that is not in the input's folder (of a pattern, list or file: the one it lies
+ * in) after all links are followed.  NPG_BAD_INPUT names it; nothing has been opened then. */
+npg_status npg_frame_files_confine(const npg_frame_files *list, const char *input);
 void npg_frame_files_close(npg_frame_files **list);
 
 /* The numbers of the gaps as text, "3, 7-9", ended by "..." where it does not fit. */

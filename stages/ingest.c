@@ -95,6 +95,7 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
                              settings->keep_going, cache_limit(worker)));
     npg_worker_keep(worker, capture, release_capture);
+    if (settings->confine) NPG_TRY(npg_frame_files_confine(capture->list, settings->input));
     npg_facts *facts = npg_worker_facts(worker);
     if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     tell_list(worker, capture->list);
@@ -163,6 +164,7 @@ static npg_status open_follow(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_follow_settings settings = {.where = npg_worker_settings(worker)->follow,
+                                          .confine = npg_worker_settings(worker)->confine,
                                           .end_name = s->follow_end,
                                           .idle_s = s->follow_idle_s,
                                           .settle_s = s->follow_settle_s,

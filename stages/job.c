@@ -133,8 +133,11 @@ static npg_status read_json(json_t **value, const char *folder, const char *name
     NPG_TRY(npg_join_path(&path, folder, name));
     npg_status status = NPG_OK;
     if (access(path, F_OK) == 0) {
-        *value = json_load_file(path, 0, &error);
-        if (!json_is_object(*value))
+        int fd;
+        status = npg_file_open_plain(&fd, path, NPG_USAGE);
+        *value = status ? NULL : json_loadfd(fd, 0, &error);
+        if (fd >= 0) close(fd);
+        if (!status && !json_is_object(*value))
             status = npg_error(NPG_USAGE, "%s is damaged (line %d: %s)", path, error.line, error.text);
     } else if (errno != ENOENT) {
         status = npg_error_errno(NPG_DISK, "can't look for %s", path);
@@ -153,8 +156,8 @@ static npg_status check_listed(const npg_job *job, const json_t *files)
         struct stat info;
         char *path;
         NPG_TRY(npg_join_path(&path, job->output, name ? name : ""));
-        bool is_there =
-            !stat(path, &info) && info.st_size == (off_t)json_integer_value(json_object_get(entry, "bytes"));
+        bool is_there = name && npg_path_stays(name) && !stat(path, &info) &&
+                        info.st_size == (off_t)json_integer_value(json_object_get(entry, "bytes"));
         npg_release(&path);
         if (!is_there)
             return npg_error(NPG_USAGE, "%s/%s is missing or has another size than when it was done",
@@ -338,6 +341,16 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     return NPG_OK;
 }
 
+/* Waits on it are by the clock that nobody sets. */
+static void init_changed(pthread_cond_t *changed)
+{
+    pthread_condattr_t plain;
+    pthread_condattr_init(&plain);
+    pthread_condattr_setclock(&plain, CLOCK_MONOTONIC);
+    pthread_cond_init(changed, &plain);
+    pthread_condattr_destroy(&plain);
+}
+
 static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, bool restart, bool append)
 {
     const char *exports = npg_options_get(npg_worker_options(worker), "export");
@@ -345,10 +358,11 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     job->keeps_grids = exports && npg_forms_name(exports, "vdb");
     job->serial = job->forward_serial = -1;
     pthread_mutex_init(&job->lock, NULL);
-    pthread_cond_init(&job->changed, NULL);
+    init_changed(&job->changed);
     NPG_TRY(npg_copy_text(&job->output, npg_worker_settings(worker)->output));
     NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
+    if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
     NPG_TRY(npg_make_folder(job->folder));
     NPG_TRY(take_lock(job));
     *start = NPG_JOB_FRESH;
@@ -530,7 +544,7 @@ npg_status npg_job_wait_exported(npg_job *job, const npg_worker *worker, int64_t
     pthread_mutex_lock(&job->lock);
     while (!status && (!job->is_written || job->exported_count < count)) {
         struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
+        clock_gettime(CLOCK_MONOTONIC, &until);
         until.tv_nsec += 100000000; /* looks for a stop ten times a second */
         if (until.tv_nsec >= 1000000000) {
             until.tv_nsec -= 1000000000;

@@ -8,12 +8,13 @@
 #include <unistd.h>
 
 #include "capture.h"
+#include "file.h"
 #include "job.h"
 
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
-static const char *const free_options[] = {"input",      "output", "ring",      "chunk",
-                                           "max-memory", "pull",   "cache-mib", "overwrite",
-                                           "restart",    "append", NULL};
+static const char *const free_options[] = {"input",  "output",    "ring",        "chunk",   "max-memory",
+                                           "pull",   "cache-mib", "overwrite",   "confine", "restart",
+                                           "append", "alarm",     "segment-min", NULL};
 
 static bool is_free(const char *name)
 {
@@ -32,6 +33,16 @@ static json_t *describe_options(const npg_options *options)
         if (!is_free(info.name))
             json_object_set_new(values, info.name, npg_json_text(npg_options_get(options, info.name)));
     return values;
+}
+
+/* The stages that a program added, "name after place" each; their code can't be told from other code. */
+static json_t *describe_own_stages(const npg_options *options)
+{
+    json_t *list = json_array();
+    const npg_own_stage *own;
+    for (size_t i = 0; (own = npg_options_own_stage(options, i)); i++)
+        json_array_append_new(list, json_sprintf("%s after %s", own->name, own->after));
+    return list;
 }
 
 static npg_status describe_file(json_t *entry, const char *path)
@@ -82,13 +93,16 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     *out = NULL;
     NPG_TRY(npg_frame_files_open(&list, input, npg_options_get(options, "frames"),
                                  strcmp(missing, "ignore") != 0));
+    npg_settings settings;
+    npg_options_fill(options, npg_run_options, &settings);
     json_t *frames = json_array(), *mesh = json_object();
-    npg_status status = describe_frames(frames, list);
+    npg_status status = settings.confine ? npg_frame_files_confine(list, input) : NPG_OK;
+    if (!status) status = describe_frames(frames, list);
     npg_frame_files_close(&list);
     if (!status && reference[0]) status = describe_file(mesh, reference);
-    json_t *description =
-        json_pack("{ss so so so so}", "neupig", npg_version(), "input", absolute(input), "options",
-                  describe_options(options), "reference", mesh, "frames", frames);
+    json_t *description = json_pack("{ss so so so so so}", "neupig", npg_version(), "input", absolute(input),
+                                    "options", describe_options(options), "own_stages",
+                                    describe_own_stages(options), "reference", mesh, "frames", frames);
     if (!status && !description) status = npg_error(NPG_MEMORY, "no memory for the list of inputs");
     if (status) json_decref(description);
     if (!status) *out = description;
@@ -153,7 +167,45 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
         return npg_error(NPG_USAGE, "it was begun by neupig %s, and this is %s", text_of(then, "neupig"),
                          text_of(now, "neupig"));
     NPG_TRY(compare_options(json_object_get(then, "options"), json_object_get(now, "options")));
+    const json_t *own_then = json_object_get(then, "own_stages"),
+                 *own_now = json_object_get(now, "own_stages");
+    if ((json_array_size(own_then) || json_array_size(own_now)) && !json_equal(own_then, own_now))
+        return npg_error(NPG_USAGE, "the stages that the program added are not those that it had");
     if (!is_same_file(json_object_get(then, "reference"), json_object_get(now, "reference")))
         return npg_error(NPG_USAGE, "the reference mesh is not the one it was");
     return compare_frames(added, json_object_get(then, "frames"), json_object_get(now, "frames"));
+}
+
+/* ---- taking up ---- */
+
+static npg_status set_from(npg_options *options, const json_t *job, const char *path)
+{
+    const char *name, *input = json_string_value(json_object_get(job, "input"));
+    json_t *value;
+    if (!input) return npg_error(NPG_USAGE, "%s names no input", path);
+    json_object_foreach(json_object_get(job, "options"), name, value)
+        NPG_TRY(npg_options_set(options, name, json_string_value(value) ? json_string_value(value) : ""));
+    return npg_options_set(options, "input", input);
+}
+
+npg_status npg_options_load_job(npg_options *options, const char *folder)
+{
+    char *path;
+    json_error_t error;
+    json_t *job = NULL;
+    int fd;
+    NPG_REQUIRE(options && folder);
+    NPG_TRY(npg_join_path(&path, folder, "job/job.json"));
+    npg_status status = npg_file_open_plain(&fd, path, NPG_USAGE);
+    if (!status) job = json_loadfd(fd, 0, &error);
+    if (fd >= 0) close(fd);
+    if (status)
+        status = npg_error(NPG_USAGE, "%s holds no job (%s)", folder, npg_error_text());
+    else
+        status = job ? set_from(options, job, path)
+                     : npg_error(NPG_USAGE, "%s holds no job (%s: %s)", folder, path, error.text);
+    if (!status) status = npg_options_set(options, "output", folder);
+    json_decref(job);
+    npg_release(&path);
+    return status;
 }

@@ -33,7 +33,7 @@ typedef struct mesh_state {
     const char *reference;
     int mesher, unseen, pieces;
     int64_t depth, face_max, time_limit_s, memory_limit_mib;
-    double point_weight, trim;
+    double point_weight, trim, invented_max;
     bool smooth;
 } mesh_state;
 
@@ -69,6 +69,10 @@ static const npg_option mesh_options[] = {
      "when "
      "it is more than a quarter of the area; it is reported in any case",
      NPG_OPTION_CHOICE, OFFSET(unseen), "auto", 0, 0, "auto|keep|trim", NULL},
+    {"max-invented",
+     "The reference is good when at most this share of its area is surface that no point of the keyframe saw "
+     "and that was kept, in per cent; above it the run ends with exit code 7",
+     NPG_OPTION_REAL, OFFSET(invented_max), "10", 0, 100, NULL, "PERCENT"},
     {0}};
 
 #define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
@@ -82,6 +86,7 @@ typedef struct making { /* what is known while the reference is made */
     float *normals;  /* N x 3 or NULL, owned */
     double spacing;  /* of the points */
     double diagonal; /* of the points */
+    double invented; /* share of the mesh that no point saw, once it is trimmed */
     npg_mesh *mesh;  /* owned */
 } making;
 
@@ -198,11 +203,9 @@ static npg_status keep_main(making *m, const char *when)
 static npg_status judge_unseen(making *m, bool *trim_unseen)
 {
     double share, seen_dist = SEEN_SPACINGS * m->spacing;
-    npg_facts *facts = npg_worker_facts(m->worker);
     NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->count, seen_dist));
     *trim_unseen =
         m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
-    facts->unseen_share = share;
     note(m, "unseen_share", share);
     json_object_set_new(npg_worker_report(m->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
@@ -223,6 +226,7 @@ static npg_status trim(making *m)
     NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->count, limit));
     note(m, "trimmed_share", share);
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
+    NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
     if (!trim_unseen && share > LOST_TOLERATED)
         npg_worker_warn(
             m->worker, false, m->frame->number,
@@ -313,6 +317,20 @@ static npg_status make_again(making *m, npg_mesh **whole, bool *sound)
     return shape(m, sound);
 }
 
+/* Surface that stays although nothing was seen there is the mesher's invention: a run that carries much of it
+ * through all frames is not a good one.  What was trimmed off is reported and is not in the result. */
+static void judge_invented(making *m)
+{
+    npg_worker_facts(m->worker)->unseen_share = m->invented;
+    note(m, "invented_share", m->invented);
+    if (100 * m->invented > m->state->invented_max)
+        npg_worker_warn(
+            m->worker, true, m->frame->number,
+            "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, and it "
+            "was kept (the bar is %g %%; --unseen trim leaves it out)",
+            100 * m->invented, m->state->invented_max);
+}
+
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
  * through a level set and the same is done again. */
 static npg_status make(making *m)
@@ -329,6 +347,7 @@ static npg_status make(making *m)
     if (!status && !sound)
         npg_worker_warn(m->worker, false, m->frame->number,
                         "the reference mesh still has flipped or degenerate faces after all mending");
+    if (!status) judge_invented(m);
     npg_mesh_unref(&whole);
     return status;
 }
@@ -464,17 +483,17 @@ static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count,
 {
     json_t *list = json_array();
     for (size_t i = 0; i < count; i++)
-        json_array_append_new(list,
-                              json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number,
-                                        "made", fares[i].is_made, "point_dist_unit", fares[i].point_dist_unit,
-                                        "vert_dist_unit", fares[i].vert_dist_unit, "stretched_share",
-                                        fares[i].stretched_share, "contact", fares[i].contact, "handles",
-                                        (json_int_t)fares[i].handles, "cost", fares[i].cost));
+        json_array_append_new(
+            list,
+            json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number, "followed",
+                      fares[i].is_followed, "point_dist_unit", fares[i].point_dist_unit, "vert_dist_unit",
+                      fares[i].vert_dist_unit, "stretched_share", fares[i].stretched_share, "contact",
+                      fares[i].contact, "handles", (json_int_t)fares[i].handles, "cost", fares[i].cost));
     json_object_set_new(npg_worker_report(worker), "candidates", list);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
     npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
-                   "is the keyframe, of %zu candidates (cost %.5f; %.2f %% of its points in contact)", count,
-                   fares[best].cost, 100 * fares[best].contact);
+                   "is the keyframe, of %zu candidates (%.2f %% of its points in contact)", count,
+                   100 * fares[best].contact);
 }
 
 /* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */

@@ -112,12 +112,23 @@ static npg_status check_widths(const npg_fit_settings *s)
 
 static npg_status go_on(npg_worker *worker);
 
+/* Which parameters the kernels have; a file that could not be used is a warning. */
+static void note_tuning(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const char *source = npg_device_tuning_source(s->device);
+    json_object_set_new(npg_worker_report(worker), "tuning", npg_json_text(source));
+    npg_worker_log(worker, strstr(source, "(not used") ? NPG_LOG_WARNING : NPG_LOG_INFO, -1, "tuning %s",
+                   source);
+}
+
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     s->total = -1;
     NPG_TRY(check_widths(&s->window_settings.fit));
-    NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));
+    NPG_TRY(npg_device_open_tuned(&s->device, npg_worker_settings(worker)->device,
+                                  npg_worker_settings(worker)->tuning));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
     bool is_resumed = npg_worker_facts(worker)->is_resumed;
     if (npg_worker_facts(worker)->is_live || is_resumed) NPG_TRY(npg_kernels_self_test(s->device));
@@ -125,6 +136,7 @@ static npg_status init(npg_worker *worker)
     npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
                    info->units);
     json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
+    note_tuning(worker);
     return is_resumed ? go_on(worker) : NPG_OK;
 }
 

@@ -96,12 +96,13 @@ static double total_winding(const npg_sided_cloud *c)
     return sum;
 }
 
-static void face_out(npg_sided_cloud *c)
+static npg_status face_out(npg_sided_cloud *c)
 {
-    npg_sided_winding(c);
-    if (total_winding(c) >= 0) return;
+    NPG_TRY(npg_sided_winding(c));
+    if (total_winding(c) >= 0) return NPG_OK;
     for (size_t i = 0; i < c->count; i++) turn(c, i);
     for (size_t i = 0; i < c->count; i++) c->winding[i] = -c->winding[i];
+    return NPG_OK;
 }
 
 /* What neighbours and winding number say about one point's side: negative means the other. */
@@ -138,13 +139,13 @@ static size_t turn_points(npg_sided_cloud *c)
 }
 
 /* Single points against their surroundings, and the sign of the whole. */
-static void settle_points(npg_sided_cloud *c)
+static npg_status settle_points(npg_sided_cloud *c)
 {
     for (int round = 0; round < MEND_ROUNDS; round++) {
-        npg_sided_winding(c);
+        NPG_TRY(npg_sided_winding(c));
         if (!turn_points(c)) break;
     }
-    face_out(c);
+    return face_out(c);
 }
 
 /* Sides from directions alone. */
@@ -155,12 +156,12 @@ static npg_status orient_from_nothing(npg_sided_cloud *c)
     NPG_TRY(npg_alloc_array(&patch_of, NPG_FOR_FRAMES, c->count, sizeof *patch_of));
     npg_status status = make_links(c);
     if (!status) status = npg_sided_grow_tree(c);
-    if (!status) face_out(c);
+    if (!status) status = face_out(c);
     for (size_t i = 0; i < sizeof sure / sizeof *sure && !status; i++) {
         status = npg_sided_patches(patch_of, c, NULL, sure[i]);
         if (!status) status = npg_sided_turn_patches(c, patch_of, 0);
     }
-    if (!status) settle_points(c);
+    if (!status) status = settle_points(c);
     npg_release(&patch_of);
     return status;
 }
@@ -175,7 +176,7 @@ static npg_status orient_from_given(npg_sided_cloud *c)
     uint32_t *patch_of = NULL;
     npg_status status;
     size_t n = c->count;
-    face_out(c);
+    NPG_TRY(face_out(c));
     NPG_TRY_OR(done, status, npg_alloc_array(&given, NPG_FOR_FRAMES, n, 3 * sizeof *given));
     NPG_TRY_OR(done, status, npg_alloc_array(&patch_of, NPG_FOR_FRAMES, n, sizeof *patch_of));
     NPG_TRY_OR(done, status, npg_alloc(&in_doubt, NPG_FOR_FRAMES, n));
@@ -186,7 +187,7 @@ static npg_status orient_from_given(npg_sided_cloud *c)
     memcpy(c->normals, given, n * 3 * sizeof *given);
     NPG_TRY_OR(done, status, npg_sided_patches(patch_of, c, in_doubt, 0.5f));
     NPG_TRY_OR(done, status, npg_sided_turn_patches(c, patch_of, GIVEN_TRUST));
-    settle_points(c);
+    status = settle_points(c);
 done:
     npg_release(&given);
     npg_release(&in_doubt);
@@ -196,23 +197,24 @@ done:
 
 /* How well the sides fit together, larger is better: agreement of neighbours less the misfit of the winding
  * number.  Its weight is such that a limb turned inside out costs more than rough normals. */
-static double score_of(npg_sided_cloud *c)
+static npg_status score_of(double *score, npg_sided_cloud *c)
 {
     double lost = 0, area = 0, votes = 0;
-    npg_sided_winding(c);
+    NPG_TRY(npg_sided_winding(c));
     for (uint32_t i = 0; i < c->count; i++) {
         lost += (double)c->area[i] * misfit(c->winding[i]);
         area += (double)c->area[i];
         votes += vote(c, i);
     }
-    return votes / (double)c->count - MISFIT_WEIGHT * lost / area;
+    *score = votes / (double)c->count - MISFIT_WEIGHT * lost / area;
+    return NPG_OK;
 }
 
 static npg_status orient_core(npg_sided_cloud *c, bool from_given, double *score)
 {
     npg_status status = find_neighbours(c);
     if (!status) status = from_given ? orient_from_given(c) : orient_from_nothing(c);
-    if (!status && score) *score = score_of(c);
+    if (!status && score) status = score_of(score, c);
     close_cloud(c);
     return status;
 }

@@ -4,15 +4,13 @@
 
 #include <embree3/rtcore.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "memory.h"
+#include "parallel.h"
 
-#define BATCH_MIN   512 /* fewer queries are not worth a thread */
-#define THREADS_MAX 64
+#define BATCH_MIN 512 /* fewer queries are not worth a thread */
 
 struct npg_surface {
     RTCDevice device;
@@ -150,35 +148,21 @@ typedef struct job {
     npg_ray_hit *ray_hits;
 } job;
 
-typedef struct part {
+typedef struct split {
     const job *job;
-    size_t first, last;
-    pthread_t thread;
-    bool started;
-} part;
+    size_t count, parts;
+} split;
 
-static void *do_part(void *argument)
+static void do_part(void *user, size_t part)
 {
-    const part *p = argument;
-    p->job->body(p->job, p->first, p->last);
-    return NULL;
+    const split *s = user;
+    s->job->body(s->job, s->count * part / s->parts, s->count * (part + 1) / s->parts);
 }
 
-/* A part whose thread can't be started is done here: only the time suffers. */
 static void do_job(const job *j, size_t count, int threads)
 {
-    part parts[THREADS_MAX];
-    long cores = threads > 0 ? threads : sysconf(_SC_NPROCESSORS_ONLN);
-    size_t part_count = cores < 1 ? 1 : cores > THREADS_MAX ? THREADS_MAX : (size_t)cores;
-    if (part_count > count / BATCH_MIN + 1) part_count = count / BATCH_MIN + 1;
-    for (size_t i = 0; i < part_count; i++) {
-        parts[i] = (part){.job = j, .first = count * i / part_count, .last = count * (i + 1) / part_count};
-        if (i) parts[i].started = !pthread_create(&parts[i].thread, NULL, do_part, &parts[i]);
-    }
-    for (size_t i = 0; i < part_count; i++)
-        if (!parts[i].started) do_part(&parts[i]);
-    for (size_t i = 1; i < part_count; i++)
-        if (parts[i].started) pthread_join(parts[i].thread, NULL);
+    split s = {j, count, npg_parallel_parts(count, BATCH_MIN, threads > 0 ? (size_t)threads : 0)};
+    npg_parallel(do_part, &s, s.parts);
 }
 
 /* ---- closest points ---- */

@@ -54,8 +54,8 @@ static inline double misfit(float winding)
 
 /* The winding number at every point:
  * w(p_i) = 1/4pi sum_j A_j (p_j - p_i) . n_j / (|p_j - p_i|^2 + soft^2)^(3/2): about +1/2 on a closed surface
- * that faces out, -1/2 on one that faces in. */
-void npg_sided_winding(npg_sided_cloud *c);
+ * that faces out, -1/2 on one that faces in.  NPG_MEMORY. */
+npg_status npg_sided_winding(npg_sided_cloud *c);
 
 /* Sides by the spanning tree of c->links, the surest links first. */
 npg_status npg_sided_grow_tree(npg_sided_cloud *c);

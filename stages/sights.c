@@ -98,7 +98,7 @@ static npg_status follow_to(follower *f, const npg_sight *sight)
     f->pose = f->next;
     f->next = oldest;
     NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, sight->points,
-                            f->with_normals ? sight->normals : NULL, sight->point_count));
+                            f->with_normals ? sight->normals : NULL, sight->point_count, NULL));
     npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
     return f->seen(f->user, sight, f->vert_unit, &tracked);
 }

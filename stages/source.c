@@ -2,7 +2,6 @@
 #include "source.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -10,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "file.h"
 #include "memory.h"
 
 #define WINDOW_SIZE  ((size_t)256 << 10)
@@ -50,8 +50,8 @@ npg_status npg_source_open_fd(npg_source **out, int fd, const char *name)
 npg_status npg_source_open_file(npg_source **out, const char *path)
 {
     *out = NULL;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return unreadable(path, errno);
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
     npg_status status = npg_source_open_fd(out, fd, path);
     if (status)
         close(fd);

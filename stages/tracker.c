@@ -2,11 +2,13 @@
 #include "tracker.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "block_system.h"
 #include "kdtree.h"
 #include "mesh_tools.h"
+#include "parallel.h"
 #include "query.h"
 
 #define STIFF_START 10.0  /* times the final stiffness at the first step */
@@ -21,7 +23,8 @@ struct npg_tracker {
     npg_tracker_settings settings;
     npg_mesh *mesh; /* counted reference */
     npg_graph *graph;
-    npg_block_system *system;
+    npg_block_system *system;  /* points -> surface, then all terms */
+    npg_block_system *reverse; /* surface -> points, and the edges  */
     npg_surface *surface;
     float *vert_pos, *vert_normals; /* V x 3: the pose at work */
     uint32_t *samples;              /* vertices, spread over the surface */
@@ -31,6 +34,7 @@ struct npg_tracker {
     float *targets, *target_normals; /* M x 3 */
     size_t target_count, target_capacity;
     npg_surface_hit *hits; /* M */
+    uint32_t *start_face;  /* M: where the step before found each point's nearest */
     uint32_t *near;        /* samples: nearest target */
     float *near_sq, *sample_pos;
 };
@@ -46,10 +50,12 @@ void npg_tracker_close(npg_tracker **slot)
     npg_tracker *t = *slot;
     npg_graph_close(&t->graph);
     npg_block_close(&t->system);
+    npg_block_close(&t->reverse);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->mesh);
-    void *all[] = {&t->vert_pos,       &t->vert_normals, &t->samples, &t->step,    &t->targets,
-                   &t->target_normals, &t->hits,         &t->near,    &t->near_sq, &t->sample_pos};
+    void *all[] = {&t->vert_pos, &t->vert_normals,   &t->samples,   &t->step,
+                   &t->targets,  &t->target_normals, &t->hits,      &t->start_face,
+                   &t->near,     &t->near_sq,        &t->sample_pos};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -62,6 +68,14 @@ static void choose_samples(npg_tracker *t)
     for (size_t v = 0; v < t->mesh->vert_count; v += step) t->samples[t->sample_count++] = (uint32_t)v;
 }
 
+static npg_status open_systems(npg_tracker *t)
+{
+    const npg_graph *graph = t->graph;
+    const uint32_t(*edges)[2] = (const uint32_t(*)[2])graph->edges;
+    NPG_TRY(npg_block_open(&t->system, graph->node_count, edges, graph->edge_count));
+    return npg_block_open(&t->reverse, graph->node_count, edges, graph->edge_count);
+}
+
 npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tracker_settings *settings)
 {
     npg_tracker *t;
@@ -71,9 +85,7 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     t->mesh = npg_mesh_ref(reference);
     size_t v = reference->vert_count, m = settings->samples;
     npg_status status = npg_graph_open(&t->graph, reference, settings->nodes);
-    if (!status)
-        status = npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->graph->edges,
-                                t->graph->edge_count);
+    if (!status) status = open_systems(t);
     if (!status)
         status =
             npg_surface_open(&t->surface, reference->vert_pos, v, reference->faces, reference->face_count);
@@ -84,6 +96,7 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     if (!status) status = npg_alloc_array(&t->targets, NPG_FOR_FIT, m, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->target_normals, NPG_FOR_FIT, m, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->hits, NPG_FOR_FIT, m, sizeof *t->hits);
+    if (!status) status = npg_alloc_array(&t->start_face, NPG_FOR_FIT, m, sizeof *t->start_face);
     if (!status) choose_samples(t);
     if (!status) status = npg_alloc_array(&t->near, NPG_FOR_FIT, t->sample_count, sizeof(uint32_t));
     if (!status) status = npg_alloc_array(&t->near_sq, NPG_FOR_FIT, t->sample_count, sizeof(float));
@@ -137,7 +150,8 @@ static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit
 }
 
 /* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
-static void add_pull(npg_tracker *t, const pull *p, const double *pose, double weight, double width)
+static void add_pull(npg_block_system *to, const npg_tracker *t, const pull *p, const double *pose,
+                     double weight, double width)
 {
     double x[3], d[3], dist_sq = 0, jacobians[NPG_GRAPH_BIND][18], w[9];
     size_t count = 0;
@@ -163,7 +177,7 @@ static void add_pull(npg_tracker *t, const pull *p, const double *pose, double w
     for (int i = 0; i < 9; i++)
         w[i] = weight * ((1 - t->settings.along) * p->normal[i / 3] * p->normal[i % 3] +
                          (i % 4 == 0 ? t->settings.along : 0));
-    npg_block_add(t->system, p->nodes, (const double(*)[18])jacobians, count, w, d);
+    npg_block_add(to, p->nodes, (const double(*)[18])jacobians, count, w, d);
 }
 
 /* ---- the terms of a step ---- */
@@ -181,14 +195,16 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
-/* Points -> surface.  Returns the mean distance. */
-static double add_targets(npg_tracker *t, const double *pose, bool with_normals, double width)
+/* Points -> surface.  tracked: the mean distance, and its part of the Chamfer distance. */
+static void add_targets(npg_tracker *t, npg_tracked *tracked, const double *pose, bool with_normals,
+                        double width)
 {
-    double sum = 0, share = 1 / (double)t->target_count;
+    double sum = 0, squares = 0, share = 1 / (double)t->target_count;
     for (size_t i = 0; i < t->target_count; i++) {
         const npg_surface_hit *hit = &t->hits[i];
         pull p;
         sum += sqrt((double)hit->dist_sq);
+        squares += (double)hit->dist_sq;
         hit_normal(p.normal, t, hit);
         double facing = 0;
         for (size_t c = 0; c < 3 && with_normals; c++)
@@ -196,9 +212,10 @@ static double add_targets(npg_tracker *t, const double *pose, bool with_normals,
         if (facing < -0.2) continue;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
-        add_pull(t, &p, pose, share, width);
+        add_pull(t->system, t, &p, pose, share, width);
     }
-    return sum * share;
+    tracked->point_dist_mean = sum * share;
+    tracked->chamfer = squares * share;
 }
 
 /* Surface -> points, for samples whose nearest point is close enough to be theirs. */
@@ -219,7 +236,7 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
         if (facing < -0.2 || (double)t->near_sq[s] > 9 * width * width) continue;
         memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
         memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
-        add_pull(t, &p, pose, share, width);
+        add_pull(t->reverse, t, &p, pose, share, width);
     }
 }
 
@@ -243,7 +260,7 @@ static void add_edges(npg_tracker *t, const double *pose, double stiffness)
             {0, y[2], -y[1], 1, 0, 0, -y[2], 0, y[0], 0, 1, 0, y[1], -y[0], 0, 0, 0, 1},
             {0, 0, 0, -1, 0, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 0, -1}};
         const uint32_t nodes[2] = {j, k};
-        npg_block_add(t->system, nodes, jacobians, 2, w, r);
+        npg_block_add(t->reverse, nodes, jacobians, 2, w, r);
     }
 }
 
@@ -303,41 +320,100 @@ void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const do
     npg_pose_vertices(vert_unit, tracker->graph, pose, tracker->mesh->vert_pos);
 }
 
-static npg_status find_pairs(npg_tracker *t, const double *pose, const npg_kdtree *tree)
+/* ---- a step: each direction finds its pairs and gathers its terms in a thread of its own ---- */
+
+typedef struct step {
+    npg_tracker *t;
+    const double *pose;
+    const npg_kdtree *tree;
+    const float *points, *normals;
+    double width, stiffness, reverse_chamfer;
+    npg_tracked tracked;
+    bool is_first, is_settling;
+    npg_status status[2];
+    char error[2][256]; /* error texts belong to threads */
+} step;
+
+static npg_status to_surface(step *s)
 {
-    npg_tracker_vertices(t, t->vert_pos, pose);
-    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
-                            t->mesh->face_count);
+    npg_tracker *t = s->t;
+    for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
     NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
-    NPG_TRY(npg_surface_closest(t->surface, t->hits, t->targets, t->target_count));
-    for (size_t s = 0; s < t->sample_count; s++)
-        memcpy(t->sample_pos + 3 * s, t->vert_pos + 3 * (size_t)t->samples[s], 3 * sizeof(float));
-    return npg_kdtree_nearest(tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1);
+    NPG_TRY(npg_surface_closest_near(t->surface, t->hits, t->targets, t->target_count,
+                                     s->is_first ? NULL : t->start_face, NULL, 1));
+    npg_block_clear(t->system);
+    add_targets(t, &s->tracked, s->pose, s->normals != NULL, s->width);
+    return NPG_OK;
 }
 
-static npg_status do_step(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_kdtree *tree,
-                          const float *points, const float *normals, double progress)
+static npg_status to_points(step *s)
 {
-    /* the noisier the points, the more of them must agree before the surface gives way */
+    npg_tracker *t = s->t;
+    for (size_t i = 0; i < t->sample_count; i++)
+        memcpy(t->sample_pos + 3 * i, t->vert_pos + 3 * (size_t)t->samples[i], 3 * sizeof(float));
+    NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
+    s->reverse_chamfer = 0;
+    for (size_t i = 0; i < t->sample_count; i++) s->reverse_chamfer += (double)t->near_sq[i];
+    s->reverse_chamfer /= (double)t->sample_count;
+    npg_block_clear(t->reverse);
+    add_samples(t, s->pose, s->points, s->normals, s->width);
+    add_edges(t, s->pose, s->stiffness);
+    return NPG_OK;
+}
+
+static void one_direction(void *user, size_t part)
+{
+    step *s = user;
+    s->status[part] = part ? to_points(s) : to_surface(s);
+    if (s->status[part]) snprintf(s->error[part], sizeof s->error[part], "%s", npg_error_text());
+}
+
+static npg_status gather(step *s)
+{
+    npg_tracker *t = s->t;
+    npg_tracker_vertices(t, t->vert_pos, s->pose);
+    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                            t->mesh->face_count);
+    npg_parallel(one_direction, s, 2);
+    for (int i = 0; i < 2; i++)
+        if (s->status[i]) return npg_error(s->status[i], "%s", s->error[i]);
+    npg_block_merge(t->system, t->reverse);
+    return NPG_OK;
+}
+
+/* How far a fit has come, 0..1 before the last steps; the noisier the points, the more of them must agree
+ * before the surface gives way. */
+static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_effort *effort)
+{
+    int last = effort->steps - 1;
+    double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
     double noise = tracked->point_dist_mean / NOISE_UNIT;
-    double stiffness = t->settings.stiffness * pow(STIFF_START, 1 - progress) * (1 + noise * noise);
-    double width = fmax(WIDTH_START * pow(WIDTH_END / WIDTH_START, progress), 2.5 * tracked->point_dist_mean);
-    NPG_TRY(find_pairs(t, pose, tree));
-    npg_block_clear(t->system);
-    tracked->point_dist_mean = add_targets(t, pose, normals != NULL, width);
-    add_samples(t, pose, points, normals, width);
-    add_edges(t, pose, stiffness);
+    s->is_first = !tracked->steps;
+    s->is_settling = progress >= 1;
+    s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
+    s->width = effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
+    s->width = fmax(s->width, 2.5 * tracked->point_dist_mean);
+}
+
+static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
+{
+    npg_tracker *t = s->t;
+    NPG_TRY(gather(s));
+    tracked->point_dist_mean = s->tracked.point_dist_mean;
+    tracked->chamfer = s->tracked.chamfer + s->reverse_chamfer;
     npg_block_damp(t->system, 1e-9);
     npg_block_solve(t->system, t->step, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
     tracked->change = move_nodes(t, pose);
+    tracked->steps++;
     return NPG_OK;
 }
 
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
-                           const float *normals, size_t point_count)
+                           const float *normals, size_t point_count, const npg_tracker_effort *effort)
 {
+    const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START};
     npg_kdtree *tree;
     NPG_REQUIRE(point_count);
     t->target_count =
@@ -345,12 +421,12 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     NPG_TRY(npg_kdtree_open(&tree, points, point_count));
     *tracked = (npg_tracked){0};
     npg_status status = NPG_OK;
-    int last = t->settings.steps - 1;
-    while (tracked->steps < t->settings.steps && !status) {
-        double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
-        status = do_step(t, tracked, pose, tree, points, normals, progress);
-        tracked->steps++;
-        if (progress >= 1 && tracked->change < 0.01 * t->graph->radius) break;
+    step s = {.t = t, .pose = pose, .tree = tree, .points = points, .normals = normals};
+    if (!effort) effort = &usual;
+    while (tracked->steps < effort->steps && !status) {
+        set_schedule(&s, tracked, effort);
+        status = do_step(&s, tracked, pose);
+        if (s.is_settling && tracked->change < 0.01 * t->graph->radius) break;
     }
     npg_kdtree_close(&tree);
     return status;

@@ -29,6 +29,7 @@ typedef struct npg_tracker_settings {
 /* How well it went, lengths in units. */
 typedef struct npg_tracked {
     double point_dist_mean; /* target points -> surface, mean of distances              */
+    double chamfer;         /* mean of squared distances, points -> surface and surface -> points   */
     double change;          /* the last step's largest movement of a node               */
     int steps;
 } npg_tracked;
@@ -38,10 +39,17 @@ npg_status npg_tracker_open(npg_tracker **tracker, npg_mesh *reference, const np
 void npg_tracker_close(npg_tracker **tracker);
 size_t npg_tracker_node_count(const npg_tracker *tracker);
 
+/* How a fit goes about it. */
+typedef struct npg_tracker_effort {
+    int steps;         /* at most                                                            */
+    double stiffness;  /* of the first step, in final stiffnesses                             */
+    double width_unit; /* of the first step's robust weight: what may move                    */
+} npg_tracker_effort;
+
 /* Improve pose (K x 12) to explain the points (N x 3, unit; normals N x 3 or NULL: points whose normal speaks
- * against the surface's are left out). */
+ * against the surface's are left out).  effort: NULL for the usual one. */
 npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose, const float *points,
-                           const float *normals, size_t point_count);
+                           const float *normals, size_t point_count, const npg_tracker_effort *effort);
 
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);

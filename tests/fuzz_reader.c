@@ -1,34 +1,6 @@
-/* Fuzz target of the readers, for libFuzzer: whatever the bytes, they are read or refused, leave nothing
- * behind and take no more memory than the bound allows.  NPG_FUZZ_NAME ("a.ply") says which reader. */
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <sys/mman.h>
-#include <unistd.h>
-
+/* Fuzz target of the readers, for libFuzzer.  NPG_FUZZ_NAME ("a.ply") says which reader. */
+#include "fuzz_target.h"
 #include "reader.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void expect(int condition, const char *what)
-{
-    if (condition) return;
-    fprintf(stderr, "%s: %s\n", what, npg_error_text());
-    abort();
-}
-
-/* A file that has the wanted ending and lives in memory: a link to a memfd. */
-static const char *open_file(int *fd, const uint8_t *data, size_t size)
-{
-    static char path[128], target[64];
-    *fd = memfd_create("fuzz", MFD_CLOEXEC);
-    expect(*fd >= 0 && write(*fd, data, size) == (ssize_t)size, "memfd");
-    snprintf(path, sizeof path, "/tmp/npg-fuzz-%d-" NPG_FUZZ_NAME, (int)getpid());
-    snprintf(target, sizeof target, "/proc/self/fd/%d", *fd);
-    unlink(path);
-    expect(symlink(target, path) == 0, "symlink");
-    return path;
-}
 
 static void read_as_cloud(const char *path)
 {
@@ -65,14 +37,11 @@ static void read_as_stream(int fd)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     int fd;
-    const char *path = open_file(&fd, data, size);
-    npg_memory_set_limit(4 * size + ((size_t)1 << 20));
+    const char *path = fuzz_file(&fd, NPG_FUZZ_NAME, data, size);
+    fuzz_bound(size);
     read_as_cloud(path);
-    npg_memory_set_limit(0);
     read_as_mesh(path);
     read_as_stream(fd);
-    expect(npg_memory_used() == 0, "memory is still in use");
-    unlink(path);
-    close(fd);
+    fuzz_end();
     return 0;
 }

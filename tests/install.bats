@@ -11,6 +11,7 @@ setup_file() {
 setup() {
     [ -n "${prefix:-}" ] || skip "a build with a sanitizer is not for installing"
     consumer="$BATS_TEST_DIRNAME/consumer"
+    build=$(dirname "$NEUPIG")
     libdir=$(dirname "$(find "$prefix" -name libneupig.so)")
     export LD_LIBRARY_PATH="$libdir" PKG_CONFIG_PATH="$libdir/pkgconfig"
     cd "$BATS_TEST_TMPDIR" || return 1
@@ -19,7 +20,7 @@ setup() {
 @test "with pkg-config" {
     # shellcheck disable=SC2046
     cc -std=c11 -Wall -Werror "$consumer/consumer.c" -o consumer \
-        $(pkg-config --define-variable=prefix="$prefix" --cflags --libs neupig)
+        $(pkg-config --cflags --libs neupig)
     run ./consumer
     [ "$status" -eq 0 ]
     [[ "$output" == "neupig "* ]]
@@ -28,7 +29,7 @@ setup() {
 @test "with pkg-config, statically" {
     # shellcheck disable=SC2046
     cc -std=c11 "$consumer/consumer.c" -o consumer \
-        $(pkg-config --define-variable=prefix="$prefix" --static --cflags --libs neupig | sed 's/-lneupig/-l:libneupig.a/')
+        $(pkg-config --static --cflags --libs neupig | sed 's/-lneupig/-l:libneupig.a/')
     unset LD_LIBRARY_PATH
     run ./consumer
     [ "$status" -eq 0 ]
@@ -46,16 +47,21 @@ setup() {
     [ "$status" -eq 0 ]
     [ -s "$prefix/share/man/man1/neupig.1" ]
     bash -n "$prefix/share/bash-completion/completions/neupig"
+    [ "$(head -n 1 "$prefix/share/zsh/site-functions/_neupig")" = "#compdef neupig" ]
 }
 
-@test "the shared library shows nothing but npg_ names" {
-    run bash -c "nm -D --defined-only '$libdir/libneupig.so' | awk '{ print \$3 }' | grep -v '^npg_'"
+@test "the installed library finds its helper program and runs, from a program that lies elsewhere" {
+    "$prefix/bin/neupig" synth --body bar --frames 2 --points 600 -o capture >/dev/null
+    # shellcheck disable=SC2046
+    cc -std=c11 -Wall -Werror "$(dirname "$BATS_TEST_DIRNAME")/samples/run_folder.c" -o run_folder \
+        $(pkg-config --cflags --libs neupig)
+    run ./run_folder capture/points out epochs=2 faces=300 width-1=32 width-2=32
+    echo "$output"
+    [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
+    [ -s out/done.json ]
+}
+
+@test "nothing that is installed names the folder it was built in" {
+    run grep -rlF "$build" "$prefix/bin" "$prefix/include" "$prefix/share" "$libdir/cmake" "$libdir/pkgconfig"
     [ -z "$output" ]
-}
-
-@test "the public header compiles alone as C and as C++" {
-    echo '#include <neupig.h>' >alone.c
-    cc -std=c11 -pedantic -Wall -Wextra -Werror -I"$prefix/include" -c alone.c -o /dev/null
-    cp alone.c alone.cpp
-    c++ -std=c++17 -pedantic -Wall -Wextra -Werror -I"$prefix/include" -c alone.cpp -o /dev/null
 }

@@ -1,6 +1,7 @@
 #!/bin/bash
 # All tests: release build with warnings as errors, everything again with the address and undefined-behaviour
-# sanitizers, ring and run with the thread sanitizer, and the formatting.  Installs what is missing (as root, or
+# sanitizers, ring and run with the thread sanitizer, every parser under libFuzzer for half a minute, and the
+# formatting.  Installs what is missing (as root, or
 # through sudo).  Stops at the first part that fails; the output ends with CTest's summary of the last part run.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -33,6 +34,9 @@ ctest --preset asan
 build tsan threaded_tests
 echo "== Tests: threads"
 ctest --preset tsan -L tsan
+
+echo "== Fuzz"
+tests/fuzz.sh 30
 
 echo "== Tests: release"
 ctest --preset release

@@ -60,3 +60,17 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     run "$NEUPIG" synth
     [ "$status" -eq 2 ]
 }
+
+@test "bodies that change do so at their frame and not else" {
+    faces() { grep -a "^element face" "$1"; }
+    for body in hands two; do
+        "$NEUPIG" synth -o $body --body $body --frames 6 --change 4 --points 200 --cell 0.04 | grep -q "changes at frame 4"
+        [ "$(faces $body/truth/frame_0000.ply)" = "$(faces $body/truth/frame_0003.ply)" ]
+        [ "$(faces $body/truth/frame_0004.ply)" = "$(faces $body/truth/frame_0005.ply)" ]
+        [ "$(faces $body/truth/frame_0003.ply)" != "$(faces $body/truth/frame_0004.ply)" ]
+        "$NEUPIG" eval $body/truth $body/truth --frames 0:4 --samples 1000 | grep -q "constant topology yes"
+    done
+    "$NEUPIG" synth -o bar --body bar --frames 4 --points 200 --cell 0.06
+    "$NEUPIG" synth -o early --body two --frames 4 --change 4 --points 200 --cell 0.06
+    diff -r bar early
+}

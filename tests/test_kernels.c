@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -29,17 +30,69 @@ static int close_device(void **state)
     return 0;
 }
 
+static void check_all(npg_device *on, const int *sizes, size_t size_count)
+{
+    for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++)
+        for (size_t i = 0; i < size_count; i++) {
+            double error = 1;
+            if (c->check(on, sizes[i], 100 + i, &error)) fail_msg("%s: %s", c->op, npg_error_text());
+            print_message("%-24s size %d: error %.2g, allowed %.2g\n", c->op, sizes[i], error, c->tolerance);
+            if (!(error <= c->tolerance)) fail_msg("%s of size %d is off by %g", c->op, sizes[i], error);
+        }
+}
+
 static void ops_agree_with_their_twins(void **state)
 {
     const int sizes[] = {1, 2, 3, 5, 8};
     (void)state;
-    for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++)
-        for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-            double error = 1;
-            if (c->check(device, sizes[i], 100 + i, &error)) fail_msg("%s: %s", c->op, npg_error_text());
-            print_message("%-24s size %d: error %.2g, allowed %.2g\n", c->op, sizes[i], error, c->tolerance);
-            if (!(error <= c->tolerance)) fail_msg("%s of size %d is off by %g", c->op, sizes[i], error);
-        }
+    check_all(device, sizes, 5);
+}
+
+/* The parameters of other devices compute right on this one: work-groups of many items, other vectors and
+ * tiles. */
+static void ops_agree_with_the_parameters_of_other_devices(void **state)
+{
+    const char *const sets[] = {"wide", "narrow", "gpu"};
+    const int sizes[] = {1, 3, 8};
+    (void)state;
+    for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
+        npg_device *other;
+        if (npg_device_open_tuned(&other, "auto", sets[i])) fail_msg("%s: %s", sets[i], npg_error_text());
+        assert_string_equal(npg_device_tuning_source(other), sets[i]);
+        print_message("%s:\n", sets[i]);
+        check_all(other, sizes, 3);
+        npg_device_close(&other);
+    }
+}
+
+/* A set of parameters on disk: read back whole, refused when broken, foreign or senseless. */
+static void tuning_files_are_checked(void **state)
+{
+    const char *path = "test_kernels_tuning.json";
+    npg_tuning set = npg_tuning_gpu, read;
+    (void)state;
+    remove(path);
+    assert_int_equal(npg_tuning_load(&read, path, "a device"), NPG_END);
+    set.mlp_groups = 3;
+    assert_int_equal(npg_tuning_save(&set, path, "a device"), 0);
+    assert_int_equal(npg_tuning_load(&read, path, "a device"), 0);
+    assert_memory_equal(&read, &set, sizeof set);
+    assert_int_equal(npg_tuning_load(&read, path, "another device"), NPG_BAD_INPUT);
+    assert_non_null(strstr(npg_error_text(), "another device"));
+    set.mlp_tile_rows = 7; /* does not divide the block */
+    assert_int_equal(npg_tuning_check(&set), NPG_USAGE);
+    assert_int_equal(npg_tuning_save(&set, path, "a device"), 0);
+    assert_int_equal(npg_tuning_load(&read, path, "a device"), NPG_BAD_INPUT);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs("{\"kind\": \"neupig tun", file);
+    fclose(file);
+    assert_int_equal(npg_tuning_load(&read, path, "a device"), NPG_BAD_INPUT);
+    assert_non_null(strstr(npg_error_text(), path));
+    npg_device *none;
+    assert_int_equal(npg_device_open_tuned(&none, "auto", path), NPG_BAD_INPUT);
+    assert_null(none);
+    remove(path);
 }
 
 static void gradients_of_twins_are_slopes(void **state)
@@ -120,6 +173,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(self_test_passes),
         cmocka_unit_test(ops_agree_with_their_twins),
+        cmocka_unit_test(ops_agree_with_the_parameters_of_other_devices),
+        cmocka_unit_test(tuning_files_are_checked),
         cmocka_unit_test(gradients_of_twins_are_slopes),
         cmocka_unit_test(sampling_gives_equal_bytes),
         cmocka_unit_test(unknown_device_is_named),

@@ -367,6 +367,7 @@ static void the_first_bad_edge_is_named(void **state)
 typedef struct outcome {
     int cut; /* only the half that a sensor at z = -5 sees */
     int no_normals;
+    int kept;       /* unseen = keep */
     npg_mesh *mesh; /* a copy */
     double unseen;
 } outcome;
@@ -417,8 +418,10 @@ static npg_status run_stage(outcome *o, const char *name, const char *value, cha
     key.process = pass_on;
     const npg_stage *const chain[] = {&test_source,    &npg_stage_outlier, &key,
                                       &npg_stage_mesh, &test_sink,         NULL};
-    const char *const settings[][2] = {{"input", "none"}, {"output", "none"}, {"poisson-depth", "7"},
-                                       {"faces", "3000"}, {name, value},      {NULL, NULL}};
+    const char *const settings[][2] = {
+        {"input", "none"}, {"output", "none"}, {"poisson-depth", "7"},
+        {"faces", "3000"}, {name, value},      {o->kept ? "unseen" : NULL, "keep"},
+        {NULL, NULL}};
     script = (test_script){1, make_frame, see_frame, o};
     return run_chain(chain, settings, text);
 }
@@ -462,13 +465,24 @@ static void the_unseen_side_is_told_and_trimmed(void **state)
     npg_manifold m;
     for (int keep = 0; keep < 2; keep++) {
         outcome o = {.cut = 1};
-        assert_int_equal(run_stage(&o, "unseen", keep ? "keep" : "auto", text), NPG_OK);
+        assert_int_equal(run_stage(&o, "unseen", keep ? "keep" : "auto", text), keep ? NPG_PARTIAL : NPG_OK);
         check_reference(&o);
-        assert_true(o.unseen > 0.25);
+        if (keep) assert_true(o.unseen > 0.25);
+        if (!keep) assert_true(o.unseen < 0.02); /* what is left of the surface was seen */
         assert_int_equal(npg_mesh_manifold(&m, o.mesh), NPG_OK);
         if (!keep) assert_true(m.border_edges > 20);
         npg_mesh_unref(&o.mesh);
     }
+}
+
+static void a_bar_for_invented_surface(void **state)
+{
+    (void)state;
+    char text[1024];
+    outcome o = {.cut = 1, .kept = 1};
+    assert_int_equal(run_stage(&o, "max-invented", "100", text), NPG_OK);
+    assert_true(o.unseen > 0.25);
+    npg_mesh_unref(&o.mesh);
 }
 
 static void failures_name_the_keyframe(void **state)
@@ -508,6 +522,7 @@ int main(void)
         cmocka_unit_test(the_first_bad_edge_is_named),
         cmocka_unit_test(the_stage_makes_the_reference),
         cmocka_unit_test(the_unseen_side_is_told_and_trimmed),
+        cmocka_unit_test(a_bar_for_invented_surface),
         cmocka_unit_test(failures_name_the_keyframe)
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "method_config.h"
 #include "stage.h"
 
 enum { NAME_LIMIT = 64, HELP_INDENT = 28, HELP_WIDTH = 100 };
@@ -131,9 +132,9 @@ static npg_status load_config(npg_cli *cli, int argc, char **argv)
 {
     if (!cli->options || !own_option(cli->verb, "config")) return NPG_OK;
     for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
-        if (!strncmp(argv[i], "--config=", 9)) NPG_TRY(npg_options_load(cli->options, argv[i] + 9));
+        if (!strncmp(argv[i], "--config=", 9)) NPG_TRY(npg_config_load(cli->options, argv[i] + 9));
         if (strcmp(argv[i], "--config") != 0 && strcmp(argv[i], "-c") != 0) continue;
-        if (i + 1 < argc) NPG_TRY(npg_options_load(cli->options, argv[i + 1]));
+        if (i + 1 < argc) NPG_TRY(npg_config_load(cli->options, argv[i + 1]));
     }
     return NPG_OK;
 }

@@ -1,13 +1,17 @@
 /* Progress: how far a run is, as a bar on a terminal or as JSON lines, and the log on standard error. */
 #include "progress.h"
 
-#include <jansson.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
+
+#include "log_file.h"
+#include "stage.h"
 
 void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose)
 {
@@ -18,15 +22,40 @@ void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbos
                                         : verbose ? NPG_LOG_DEBUG
                                                   : NPG_LOG_INFO,
                                .colour = terminal && !getenv("NO_COLOR"),
-                               .drawn_s = -1};
+                               .drawn_s = -1,
+                               .log_fd = -1};
+}
+
+npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const char *output)
+{
+    if (!path[0]) return NPG_OK;
+    reporter->log_fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    if (reporter->log_fd < 0) {
+        npg_error_errno(NPG_DISK, "can't write %s", path);
+        return NPG_DISK;
+    }
+    npg_log_file_write(&reporter->log_fd,
+                       json_pack("{s:s,s:s,s:o,s:I}", "event", "start", "neupig", npg_version(), "output",
+                                 npg_json_text(output), "pid", (json_int_t)getpid()));
+    return NPG_OK;
 }
 
 /* ---- log ---- */
 
-static void wipe_bar(npg_reporter *reporter)
+void npg_reporter_pause(npg_reporter *reporter)
 {
     if (reporter->bar_drawn) fputs("\r\033[K", stderr);
     reporter->bar_drawn = false;
+}
+
+static json_t *json_of_record(const npg_log_record *record)
+{
+    static const char *const levels[] = {"error", "warning", "info", "debug"};
+    json_t *line =
+        json_pack("{s:s,s:s,s:s,s:f,s:o}", "event", "log", "level", levels[record->level], "stage",
+                  record->stage, "elapsed_s", record->time_s, "message", npg_json_text(record->message));
+    if (line && record->frame >= 0) json_object_set_new(line, "frame", json_integer(record->frame));
+    return line;
 }
 
 static void on_log(void *user, const npg_log_record *record)
@@ -35,8 +64,10 @@ static void on_log(void *user, const npg_log_record *record)
     static const char *const colours[] = {"\033[31m", "\033[33m", "", "\033[2m"};
     npg_reporter *reporter = user;
     char frame[40] = "";
+    if (record->level <= NPG_LOG_INFO || record->level <= reporter->level)
+        npg_log_file_write(&reporter->log_fd, json_of_record(record));
     if (record->level > reporter->level) return;
-    wipe_bar(reporter);
+    npg_reporter_pause(reporter);
     bool says_frame = !strncmp(record->message, "frame ", 6);
     if (record->frame >= 0 && !says_frame)
         snprintf(frame, sizeof frame, "frame %lld: ", (long long)record->frame);
@@ -47,8 +78,7 @@ static void on_log(void *user, const npg_log_record *record)
 
 /* ---- progress ---- */
 
-/* "1:02:03", "2:03", or "?" while it can't be told. */
-static void spell_time(char *out, size_t size, double seconds)
+void npg_spell_time(char *out, size_t size, double seconds)
 {
     if (!(seconds >= 0) || seconds > 1e8) {
         snprintf(out, size, "?");
@@ -73,8 +103,8 @@ static void draw_bar(npg_reporter *reporter, const npg_progress *progress)
     if (reporter->drawn_s >= 0 && progress->elapsed_s - reporter->drawn_s < 0.1 && progress->share < 1)
         return;
     reporter->drawn_s = progress->elapsed_s;
-    spell_time(left, sizeof left, progress->left_s);
-    spell_time(elapsed, sizeof elapsed, progress->elapsed_s);
+    npg_spell_time(left, sizeof left, progress->left_s);
+    npg_spell_time(elapsed, sizeof elapsed, progress->elapsed_s);
     int at = snprintf(tail, sizeof tail, " %3.0f %% %s, left %s, %s", 100 * progress->share, elapsed, left,
                       progress->stage ? progress->stage : "");
     if (progress->steps > 0)
@@ -140,10 +170,15 @@ npg_hooks npg_reporter_hooks(npg_reporter *reporter)
 
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output)
 {
-    wipe_bar(reporter);
-    if (reporter->show != NPG_SHOW_JSON) return;
-    json_t *line = json_pack("{s:s,s:s,s:i,s:s}", "event", "end", "status", npg_status_name(status),
-                             "exit_code", npg_status_exit_code(status), "output", output);
-    if (line && status < 0) json_object_set_new(line, "message", json_string(npg_error_text()));
-    if (line) print_line(line);
+    npg_reporter_pause(reporter);
+    json_t *line = json_pack("{s:s,s:s,s:i,s:o}", "event", "end", "status", npg_status_name(status),
+                             "exit_code", npg_status_exit_code(status), "output", npg_json_text(output));
+    if (line && status < 0) json_object_set_new(line, "message", npg_json_text(npg_error_text()));
+    npg_log_file_write(&reporter->log_fd, json_incref(line));
+    if (line && reporter->show == NPG_SHOW_JSON)
+        print_line(line);
+    else
+        json_decref(line);
+    if (reporter->log_fd >= 0) close(reporter->log_fd);
+    reporter->log_fd = -1;
 }

@@ -5,6 +5,7 @@
 #include "status.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 
 enum { NPG_SHOW_AUTO, NPG_SHOW_BAR, NPG_SHOW_JSON, NPG_SHOW_NONE }; /* the words of --progress */
 
@@ -12,16 +13,27 @@ typedef struct npg_reporter {
     int show;            /* NPG_SHOW_*, never AUTO once set up         */
     npg_log_level level; /* records above it are not shown             */
     bool colour, bar_drawn;
-    double drawn_s; /* when the bar was last drawn, in run seconds */
+    double drawn_s; /* when the bar was last drawn, in run seconds           */
+    int log_fd;     /* of the log file; -1: none, or it could not be written */
 } npg_reporter;
 
 /* AUTO is a bar when standard error is a terminal, else nothing. */
 void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose);
 
+/* Every log record, the start and the end also as a line of JSON at the end of a file, in whole lines, so
+ * that several runs may share it.  "" for none.  NPG_DISK.  Closed by npg_reporter_end(). */
+npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const char *output);
+
 /* Hooks for a run; the reporter is a loan until the run is closed. */
 npg_hooks npg_reporter_hooks(npg_reporter *reporter);
 
-/* Remove the bar, and in JSON mode write the closing record. */
+/* Remove the bar before something else is printed. */
+void npg_reporter_pause(npg_reporter *reporter);
+
+/* Remove the bar, and write the closing record to the log file and in JSON mode to standard output. */
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output);
+
+/* "1:02:03", "2:03", or "?" where it can't be told. */
+void npg_spell_time(char *out, size_t size, double seconds);
 
 #endif

@@ -181,21 +181,32 @@ void npg_image_close(npg_image *image)
     npg_release(&image->pixels);
 }
 
-npg_status npg_image_write(const npg_image *image, const char *path)
+npg_status npg_image_encode(const npg_image *image, void *out, size_t *size)
 {
+    void **bytes = out;
     png_image png = {.version = PNG_IMAGE_VERSION,
                      .width = (png_uint_32)image->width,
                      .height = (png_uint_32)image->height,
                      .format = PNG_FORMAT_RGB};
-    png_alloc_size_t size = 0;
+    png_alloc_size_t room = 0;
+    *bytes = NULL;
+    if (!png_image_write_to_memory(&png, NULL, &room, 0, image->pixels, 0, NULL))
+        return npg_error(NPG_FAILED, "libpng: %s", png.message);
+    NPG_TRY(npg_alloc(bytes, NPG_FOR_FILES, room));
+    if (!png_image_write_to_memory(&png, *bytes, &room, 0, image->pixels, 0, NULL)) {
+        npg_release(bytes);
+        return npg_error(NPG_FAILED, "libpng: %s", png.message);
+    }
+    *size = room;
+    return NPG_OK;
+}
+
+npg_status npg_image_write(const npg_image *image, const char *path)
+{
+    size_t size = 0;
     void *bytes;
     npg_file *file;
-    if (!png_image_write_to_memory(&png, NULL, &size, 0, image->pixels, 0, NULL))
-        return npg_error(NPG_FAILED, "%s: libpng: %s", path, png.message);
-    NPG_TRY(npg_alloc(&bytes, NPG_FOR_FILES, size));
-    npg_status status = NPG_OK;
-    if (!png_image_write_to_memory(&png, bytes, &size, 0, image->pixels, 0, NULL))
-        status = npg_error(NPG_FAILED, "%s: libpng: %s", path, png.message);
+    npg_status status = npg_error_prefix(npg_image_encode(image, &bytes, &size), "%s", path);
     if (!status) status = npg_file_open(&file, path);
     if (!status) {
         npg_file_write(file, bytes, size);

@@ -30,6 +30,10 @@ void npg_image_close(npg_image *image);
 npg_status npg_image_draw(npg_image *image, const npg_scene *scene, const npg_eye *eye, int64_t left,
                           int64_t top, int64_t width, int64_t height, int64_t samples);
 
+/* The picture as the bytes of a PNG file; *bytes (a pointer variable's address) is to be given to
+ * npg_release(). */
+npg_status npg_image_encode(const npg_image *image, void *bytes, size_t *size);
+
 /* NPG_DISK with path and cause. */
 npg_status npg_image_write(const npg_image *image, const char *path);
 

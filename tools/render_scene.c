@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 
+#include "file.h"
 #include "mesh_tools.h"
 #include "reader.h"
 
@@ -20,8 +22,13 @@ npg_status npg_file_has_faces(bool *faces, const char *path)
     bool ply = dot && !strcasecmp(dot, ".ply"), obj = dot && !strcasecmp(dot, ".obj");
     *faces = false;
     if (!ply && !obj) return NPG_OK;
-    FILE *file = fopen(path, "rb");
-    if (!file) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
+    FILE *file = fdopen(fd, "rb");
+    if (!file) {
+        close(fd);
+        return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
+    }
     while (!*faces && fgets(line, sizeof line, file)) {
         if (ply && !strncmp(line, "element face ", 13)) *faces = strtoll(line + 13, NULL, 10) > 0;
         if (ply && !strncmp(line, "end_header", 10)) break;

@@ -1,4 +1,4 @@
-/* Synthetic bodies: a closed surface of fixed topology and its exact motion. */
+/* Synthetic bodies: a closed surface and its exact motion; some change their topology once. */
 #include "synth_body.h"
 
 #include <math.h>
@@ -10,8 +10,12 @@
 
 struct npg_body {
     int kind;
+    bool is_changed;
     npg_mesh *rest;
-    float *weights; /* V x NPG_BONES, rows sum to 1; walker only */
+    float *weights; /* V x NPG_BONES, rows sum to 1; walking figures only */
+    bool is_welded; /* the surface at rest lies in the pose `weld`        */
+    npg_rigid weld[NPG_BONES];
+    size_t bar_verts; /* of the body TWO; the ball's come after them */
 };
 
 /* ---- skin of the walker ---- */
@@ -32,7 +36,8 @@ static npg_status open_weights(npg_body *body, double cell)
     if (!status) status = npg_alloc_array(&degree, NPG_FOR_MESH, rest->vert_count, sizeof *degree);
     for (size_t v = 0; v < rest->vert_count && !status; v++) {
         const float *p = rest->vert_pos + 3 * v;
-        int bone = npg_walker_nearest_bone((double[3]){(double)p[0], (double)p[1], (double)p[2]});
+        int bone = npg_walker_nearest_bone((double[3]){(double)p[0], (double)p[1], (double)p[2]},
+                                           body->is_welded ? body->weld : NULL);
         body->weights[v * NPG_BONES + (size_t)bone] = 1;
     }
     for (size_t e = 0; e < edge_count && !status; e++) {
@@ -55,10 +60,23 @@ static npg_status open_weights(npg_body *body, double cell)
     return status;
 }
 
-static void pose_walker(const npg_body *body, float *vert_pos, double phase, double travel)
+/* The hand leaves the hip within so many frames. */
+#define FRAMES_TO_LEAVE 5
+
+static double share_at_hip(const npg_body *body, double since)
+{
+    if (body->kind != NPG_BODY_HANDS) return -1;
+    return body->is_changed ? fmax(1 - (since + 1) / FRAMES_TO_LEAVE, 0) : 1;
+}
+
+static void pose_walker(const npg_body *body, float *vert_pos, const npg_moment *moment)
 {
     npg_rigid bones[NPG_BONES];
-    npg_walker_pose(bones, phase, travel);
+    npg_walker_pose(bones, moment->phase, moment->travel, share_at_hip(body, moment->since));
+    for (int b = 0; b < NPG_BONES && body->is_welded; b++) {
+        const npg_rigid motion = bones[b];
+        npg_rigid_between(&bones[b], &body->weld[b], &motion);
+    }
     for (size_t v = 0; v < body->rest->vert_count; v++) {
         const float *p = body->rest->vert_pos + 3 * v, *weights = body->weights + v * NPG_BONES;
         double moved[3] = {0}, sum = 0;
@@ -94,7 +112,7 @@ static double bar_distance(const double p[3], const void *user)
 static void pose_bar(const npg_body *body, float *vert_pos, double phase)
 {
     double curvature = 1.1 * sin(2 * PI * phase), twist = 0.35 * sin(4 * PI * phase);
-    for (size_t v = 0; v < body->rest->vert_count; v++) {
+    for (size_t v = 0; v < body->bar_verts; v++) {
         const float *p = body->rest->vert_pos + 3 * v;
         double y = (double)p[1], turn = twist * y, angle = curvature * y;
         double x = cos(turn) * (double)p[0] + sin(turn) * (double)p[2];
@@ -109,22 +127,83 @@ static void pose_bar(const npg_body *body, float *vert_pos, double phase)
     }
 }
 
+/* ---- the ball that comes to the bar ---- */
+
+static const double ball_radius = 0.22;
+
+static double ball_distance(const double p[3], const void *user)
+{
+    (void)user;
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - ball_radius;
+}
+
+/* It rolls along in front of the bar, out of reach of its bending. */
+static void pose_ball(const npg_body *body, float *vert_pos, double since)
+{
+    const double shift[3] = {0.1, -0.5 + 0.03 * since, 0.55};
+    for (size_t v = body->bar_verts; v < body->rest->vert_count; v++)
+        for (size_t k = 0; k < 3; k++)
+            vert_pos[3 * v + k] = (float)((double)body->rest->vert_pos[3 * v + k] + shift[k]);
+}
+
+static npg_status join(npg_mesh **joined, const npg_mesh *a, const npg_mesh *b)
+{
+    NPG_TRY(npg_mesh_open(joined, a->vert_count + b->vert_count, a->face_count + b->face_count));
+    npg_mesh *mesh = *joined;
+    memcpy(mesh->vert_pos, a->vert_pos, a->vert_count * 3 * sizeof(float));
+    memcpy(mesh->vert_pos + 3 * a->vert_count, b->vert_pos, b->vert_count * 3 * sizeof(float));
+    memcpy(mesh->faces, a->faces, a->face_count * 3 * sizeof *mesh->faces);
+    for (size_t i = 0; i < 3 * b->face_count; i++)
+        mesh->faces[3 * a->face_count + i] = b->faces[i] + (uint32_t)a->vert_count;
+    return NPG_OK;
+}
+
+static npg_status open_bar(npg_body *body, double cell)
+{
+    static const double lo[3] = {-0.3, -1.1, -0.25}, hi[3] = {0.3, 1.1, 0.25};
+    static const double ball_lo[3] = {-0.3, -0.3, -0.3}, ball_hi[3] = {0.3, 0.3, 0.3};
+    npg_mesh *ball = NULL, *bar = NULL;
+    NPG_TRY(npg_body_mesh(&body->rest, bar_distance, NULL, lo, hi, cell));
+    body->bar_verts = body->rest->vert_count;
+    if (body->kind != NPG_BODY_TWO || !body->is_changed) return NPG_OK;
+    NPG_TRY(npg_body_mesh(&ball, ball_distance, NULL, ball_lo, ball_hi, cell));
+    bar = body->rest;
+    body->rest = NULL;
+    npg_status status = join(&body->rest, bar, ball);
+    npg_mesh_unref(&bar);
+    npg_mesh_unref(&ball);
+    return status;
+}
+
 /* ---- any body ---- */
 
-npg_status npg_body_open(npg_body **out, int kind, double cell)
+bool npg_body_changes(int kind)
 {
-    static const double walker_lo[3] = {-0.75, -0.1, -0.35}, walker_hi[3] = {0.75, 1.9, 0.35};
-    static const double bar_lo[3] = {-0.3, -1.1, -0.25}, bar_hi[3] = {0.3, 1.1, 0.25};
+    return kind == NPG_BODY_HANDS || kind == NPG_BODY_TWO;
+}
+
+static bool is_walking(const npg_body *body)
+{
+    return body->kind == NPG_BODY_WALKER || body->kind == NPG_BODY_HANDS;
+}
+
+static npg_status open_walker(npg_body *body, double cell)
+{
+    static const double lo[3] = {-0.75, -0.1, -0.35}, hi[3] = {0.75, 1.9, 0.35};
+    body->is_welded = body->kind == NPG_BODY_HANDS && !body->is_changed;
+    npg_walker_pose(body->weld, 0, 0, 1);
+    NPG_TRY(
+        npg_body_mesh(&body->rest, npg_walker_distance, body->is_welded ? body->weld : NULL, lo, hi, cell));
+    return open_weights(body, cell);
+}
+
+npg_status npg_body_open(npg_body **out, int kind, bool is_changed, double cell)
+{
     npg_body *body;
     NPG_TRY(npg_alloc(&body, NPG_FOR_MESH, sizeof *body));
     body->kind = kind;
-    npg_status status;
-    if (kind == NPG_BODY_WALKER) {
-        status = npg_body_mesh(&body->rest, npg_walker_distance, NULL, walker_lo, walker_hi, cell);
-        if (!status) status = open_weights(body, cell);
-    } else {
-        status = npg_body_mesh(&body->rest, bar_distance, NULL, bar_lo, bar_hi, cell);
-    }
+    body->is_changed = is_changed;
+    npg_status status = is_walking(body) ? open_walker(body, cell) : open_bar(body, cell);
     if (status) npg_body_close(&body);
     *out = body;
     return status;
@@ -143,10 +222,12 @@ const npg_mesh *npg_body_rest(const npg_body *body)
     return body->rest;
 }
 
-void npg_body_pose(const npg_body *body, float *vert_pos, double phase, double travel)
+void npg_body_pose(const npg_body *body, float *vert_pos, const npg_moment *moment)
 {
-    if (body->kind == NPG_BODY_WALKER)
-        pose_walker(body, vert_pos, phase, travel);
-    else
-        pose_bar(body, vert_pos, phase);
+    if (is_walking(body)) {
+        pose_walker(body, vert_pos, moment);
+    } else {
+        pose_bar(body, vert_pos, moment->phase);
+        pose_ball(body, vert_pos, moment->since);
+    }
 }

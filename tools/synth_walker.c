@@ -31,9 +31,20 @@ static const bone bones[NPG_BONES] = {
 
 /* ---- shape ---- */
 
-static double bone_distance(const bone *b, const double p[3])
+static void move(double out[3], const npg_rigid *pose, const double p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        const double *row = pose->rotation + 3 * k;
+        out[k] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + pose->shift[k];
+    }
+}
+
+static double bone_distance(const bone *rest, const npg_rigid *pose, const double p[3])
 {
     double along = 0, length_sq = 0, dist_sq = 0;
+    bone moved = *rest, *b = &moved;
+    if (pose) move(moved.from, pose, rest->from);
+    if (pose) move(moved.to, pose, rest->to);
     for (int k = 0; k < 3; k++) {
         along += (p[k] - b->from[k]) * (b->to[k] - b->from[k]);
         length_sq += (b->to[k] - b->from[k]) * (b->to[k] - b->from[k]);
@@ -51,18 +62,19 @@ double npg_walker_distance(const double p[3], const void *user)
 {
     const double softness = 0.018;
     double sum = 0, distances[NPG_BONES], least = INFINITY;
-    (void)user;
-    for (int b = 0; b < NPG_BONES; b++) least = fmin(least, distances[b] = bone_distance(&bones[b], p));
+    const npg_rigid *pose = user;
+    for (int b = 0; b < NPG_BONES; b++)
+        least = fmin(least, distances[b] = bone_distance(&bones[b], pose ? &pose[b] : NULL, p));
     for (int b = 0; b < NPG_BONES; b++) sum += exp((least - distances[b]) / softness);
     return least - softness * log(sum);
 }
 
-int npg_walker_nearest_bone(const double p[3])
+int npg_walker_nearest_bone(const double p[3], const npg_rigid *pose)
 {
     int nearest = 0;
     double least = INFINITY;
     for (int b = 0; b < NPG_BONES; b++) {
-        double distance = bone_distance(&bones[b], p);
+        double distance = bone_distance(&bones[b], pose ? &pose[b] : NULL, p);
         if (distance >= least) continue;
         least = distance;
         nearest = b;
@@ -117,12 +129,41 @@ static void bone_angles(double angles[3], int b, double phase)
     }
 }
 
-void npg_walker_pose(npg_rigid out[NPG_BONES], double phase, double travel)
+/* The same of the body HANDS.  What bears the arm is stiff, so that the hand can stay where it is on the hip:
+ * with the upper arm as at rest, the lower arm turned in by this angle ends inside the pelvis. */
+static void hands_angles(double angles[3], int b, double phase, double at_hip)
+{
+    const double turned_in = 1.55;
+    bone_angles(angles, b, phase);
+    if (b != 1 && (b < 3 || b > 6)) return;
+    angles[0] = angles[1] = angles[2] = 0;
+    if (b == 3) angles[0] = 0.35 * sin(2 * PI * phase);
+    if (b == 4) angles[0] = 0.5 * (1 - at_hip) * sin(2 * PI * phase);
+    if (b == 6) angles[2] = turned_in * at_hip;
+}
+
+void npg_rigid_between(npg_rigid *at, const npg_rigid *rest, const npg_rigid *motion)
+{
+    double back[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) back[3 * i + j] = rest->rotation[3 * j + i];
+    multiply(at->rotation, motion->rotation, back);
+    for (int k = 0; k < 3; k++) {
+        const double *row = at->rotation + 3 * k;
+        at->shift[k] =
+            motion->shift[k] - (row[0] * rest->shift[0] + row[1] * rest->shift[1] + row[2] * rest->shift[2]);
+    }
+}
+
+void npg_walker_pose(npg_rigid out[NPG_BONES], double phase, double travel, double at_hip)
 {
     for (int b = 0; b < NPG_BONES; b++) {
         const bone *it = &bones[b];
         double angles[3], turn[9], local[9], moved_joint[3];
-        bone_angles(angles, b, phase);
+        if (at_hip >= 0)
+            hands_angles(angles, b, phase, at_hip);
+        else
+            bone_angles(angles, b, phase);
         turn_about(local, 0, angles[0]);
         for (int axis = 1; axis < 3; axis++) {
             turn_about(turn, axis, angles[axis]);

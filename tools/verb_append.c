@@ -1,10 +1,7 @@
 /* neupig append: goes on with frames that came after a job was done. */
 #include <stddef.h>
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
-
-#include <jansson.h>
 
 #include "cli.h"
 #include "progress.h"
@@ -28,42 +25,20 @@ const npg_option npg_append_options[] = {
      NULL},
     {0}};
 
-static npg_status set_from(npg_options *options, const json_t *job, const char *folder)
-{
-    const char *name, *input = json_string_value(json_object_get(job, "input"));
-    json_t *value;
-    if (!input) return npg_error(NPG_USAGE, "%s/job/job.json names no input", folder);
-    json_object_foreach(json_object_get(job, "options"), name, value)
-        NPG_TRY(npg_options_set(options, name, json_string_value(value) ? json_string_value(value) : ""));
-    NPG_TRY(npg_options_set(options, "input", input));
-    return npg_options_set(options, "output", folder);
-}
-
-/* The options that the job was begun with. */
-static npg_status load_job(npg_options *options, const char *folder, bool *is_done)
+static bool is_done(const char *folder)
 {
     char path[4096];
-    json_error_t error;
-    if ((size_t)snprintf(path, sizeof path, "%s/job/job.json", folder) >= sizeof path)
-        return npg_error(NPG_USAGE, "%s: the name is too long", folder);
-    json_t *job = json_load_file(path, 0, &error);
-    if (!job) return npg_error(NPG_USAGE, "%s holds no job (%s: %s)", folder, path, error.text);
-    npg_status status = set_from(options, job, folder);
-    json_decref(job);
-    snprintf(path, sizeof path, "%s/done.json", folder);
-    *is_done = access(path, F_OK) == 0;
-    return status;
+    return (size_t)snprintf(path, sizeof path, "%s/done.json", folder) < sizeof path && !access(path, F_OK);
 }
 
 /* A job that is not done yet is first brought to its end as it was begun. */
 static npg_status append(npg_options *options, const npg_cli *cli, const settings *s)
 {
     npg_reporter reporter;
-    bool is_done;
-    NPG_TRY(load_job(options, cli->operands[0], &is_done));
+    NPG_TRY(npg_options_load_job(options, cli->operands[0]));
     if (s->input[0]) NPG_TRY(npg_options_set(options, "input", s->input));
     npg_reporter_init(&reporter, s->progress, s->quiet, s->verbose);
-    npg_status status = is_done ? NPG_OK : npg_run_job(options, &reporter);
+    npg_status status = is_done(cli->operands[0]) ? NPG_OK : npg_run_job(options, &reporter);
     if (status != NPG_OK && status != NPG_PARTIAL) return status;
     NPG_TRY(npg_options_set(options, "append", "yes"));
     status = npg_run_job(options, &reporter);

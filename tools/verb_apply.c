@@ -105,7 +105,10 @@ static npg_status check_job(applying *a)
                          a->job, is_in(a->job, "done.json") ? "frames.jsonl" : "done.json");
     NPG_TRY(path_of(path, a->job, "done.json"));
     json_error_t error;
-    json_t *done = json_load_file(path, 0, &error);
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
+    json_t *done = json_loadfd(fd, 0, &error);
+    close(fd);
     if (!done) return npg_error(NPG_BAD_INPUT, "%s:%d: %s", path, error.line, error.text);
     a->fps = json_number_value(json_object_get(done, "fps"));
     json_decref(done);
@@ -150,6 +153,8 @@ static npg_status read_moment(const applying *a, moment *m, const char *file)
     char path[PATH_SIZE];
     npg_origin origin = a->origin;
     const npg_mesh *reference = a->reference;
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names %s, which is not in the job", a->job, file);
     NPG_TRY(path_of(path, a->job, file));
     NPG_TRY(npg_read_mesh(&m->mesh, path, &origin));
     for (size_t i = 0; i < 3 * m->mesh->vert_count; i++)

@@ -5,12 +5,15 @@
 #include "cli.h"
 #include "stage.h"
 
+typedef enum completion { COMPLETION_NONE, COMPLETION_BASH, COMPLETION_ZSH } completion;
+
 typedef struct settings {
-    bool completion;
+    int completion;
 } settings;
 
-const npg_option npg_man_options[] = {{"completion", "Print completion for bash instead", NPG_OPTION_FLAG,
-                                       offsetof(settings, completion), "no", 0, 0, NULL, NULL},
+const npg_option npg_man_options[] = {{"completion", "Print completion for a shell instead",
+                                       NPG_OPTION_CHOICE, offsetof(settings, completion), "none", 0, 0,
+                                       "none|bash|zsh", NULL},
                                       {0}};
 
 /* Text as roff shows it letter by letter. */
@@ -99,10 +102,10 @@ static void print_manual(void)
         printf(".TP\n.B %s\n%s\n", codes[i][0], codes[i][1]);
 }
 
-static void print_completion(void)
+static void print_bash(void)
 {
     npg_option_info info;
-    fputs("# bash completion for neupig, made by: neupig man --completion\n_neupig()\n{\n"
+    fputs("# bash completion for neupig, made by: neupig man --completion bash\n_neupig()\n{\n"
           "    local word=${COMP_WORDS[COMP_CWORD]} words=\n"
           "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n        COMPREPLY=($(compgen -W '",
           stdout);
@@ -120,12 +123,83 @@ static void print_completion(void)
           stdout);
 }
 
+/* Text inside single quotes, where _arguments and _describe read it. */
+static void put_zsh(const char *text)
+{
+    for (const char *c = text; *c; c++) {
+        if (strchr("[]:\\", *c)) putchar('\\');
+        fputs(*c == '\'' ? "'\\''" : (char[]){*c, 0}, stdout);
+    }
+}
+
+/* What a value looks like: one of some words, a path, or anything. */
+static void put_zsh_value(const npg_option_info *option)
+{
+    fputs(":", stdout);
+    put_zsh(option->value_name ? option->value_name : "value");
+    fputs(":", stdout);
+    if (option->type == NPG_OPTION_CHOICE) {
+        putchar('(');
+        for (const char *c = option->choices; *c; c++) putchar(*c == '|' ? ' ' : *c);
+        putchar(')');
+    } else if (option->value_name && !strcmp(option->value_name, "DIR")) {
+        fputs("_files -/", stdout);
+    } else if (option->type == NPG_OPTION_TEXT) {
+        fputs("_files", stdout);
+    }
+}
+
+static void put_zsh_option(const npg_option_info *option, const char *spelled)
+{
+    printf("            '%s[", spelled);
+    put_zsh(option->help);
+    putchar(']');
+    if (option->type != NPG_OPTION_FLAG) put_zsh_value(option);
+    fputs("'\n", stdout);
+}
+
+static void put_zsh_verb(const npg_verb *verb)
+{
+    npg_option_info info;
+    char spelled[128];
+    printf("    %s)\n        options=(\n            '--help[Show the options]'\n", verb->name);
+    for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
+        snprintf(spelled, sizeof spelled, "--%s", info.name);
+        put_zsh_option(&info, spelled);
+        if (!strcmp(info.name, "output")) put_zsh_option(&info, "-o");
+        if (info.type != NPG_OPTION_FLAG) continue;
+        snprintf(spelled, sizeof spelled, "--no-%s", info.name);
+        put_zsh_option(&info, spelled);
+    }
+    fputs("        )\n        ;;\n", stdout);
+}
+
+static void print_zsh(void)
+{
+    fputs("#compdef neupig\n# zsh completion for neupig, made by: neupig man --completion zsh\n_neupig()\n{\n"
+          "    local -a verbs options\n    verbs=(\n",
+          stdout);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) {
+        printf("        '%s:", verb->name);
+        put_zsh(verb->help);
+        fputs("'\n", stdout);
+    }
+    fputs("    )\n    if (( CURRENT == 2 )); then\n        _describe verb verbs\n        return\n    fi\n"
+          "    case $words[2] in\n",
+          stdout);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) put_zsh_verb(verb);
+    fputs("    esac\n    shift words\n    (( CURRENT-- ))\n    _arguments $options '*:file:_files'\n}\n"
+          "_neupig \"$@\"\n",
+          stdout);
+}
+
 int npg_verb_man(int argc, char **argv)
 {
     settings s;
     npg_cli cli;
     npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status && s.completion) print_completion();
-    if (!status && !s.completion) print_manual();
+    if (!status && s.completion == COMPLETION_BASH) print_bash();
+    if (!status && s.completion == COMPLETION_ZSH) print_zsh();
+    if (!status && s.completion == COMPLETION_NONE) print_manual();
     return npg_cli_end(argv[0], status);
 }

@@ -6,9 +6,7 @@
 
 #include "cli.h"
 #include "clock.h"
-#include "frame_files.h"
-#include "listing.h"
-#include "probe_facts.h"
+#include "probe_capture.h"
 #include "reader.h"
 
 typedef struct settings {
@@ -27,15 +25,6 @@ typedef struct job {
     npg_probe probe;
 } job;
 
-/* The value of a run's option as a number, or `otherwise` where it is not one. */
-static int64_t option_number(const npg_options *options, const char *name, int64_t otherwise)
-{
-    const char *text = npg_options_get(options, name);
-    char *end = NULL;
-    long long value = text ? strtoll(text, &end, 10) : 0;
-    return text && end != text && value > 0 ? value : otherwise;
-}
-
 static bool option_on(const npg_options *options, const char *name)
 {
     const char *text = npg_options_get(options, name);
@@ -44,42 +33,6 @@ static bool option_on(const npg_options *options, const char *name)
 }
 
 /* ---- reading ---- */
-
-/* Bad data is noted and looked past; anything else ends the probe. */
-static npg_status note(job *j, npg_status status, npg_frame *frame, const char *format, int64_t number)
-{
-    if (status == NPG_BAD_INPUT) {
-        npg_probe_add_fault(&j->probe, number);
-        status = NPG_OK;
-    } else if (!status) {
-        status = npg_probe_add(&j->probe, frame, format, number);
-    }
-    npg_frame_clear(frame);
-    return status;
-}
-
-static npg_status read_files(job *j)
-{
-    const char *selection = npg_options_get(j->options, "frames");
-    NPG_TRY(npg_frame_files_open(&j->list, j->input, selection ? selection : "", true));
-    for (size_t i = 0; i < j->list->count; i++) {
-        const npg_frame_slot *slot = &j->list->slots[i];
-        npg_frame frame = {0};
-        if (!slot->path) continue;
-        const char *format = npg_reader_for(slot->path);
-        j->probe.bytes += npg_file_bytes(slot->path);
-        npg_status status = npg_read_cloud(&frame, slot->path, &j->probe.origin);
-        NPG_TRY(note(j, status, &frame, format ? format : "unknown", slot->number));
-    }
-    if (j->list->gap_count) {
-        char gaps[256];
-        npg_frame_files_gaps(gaps, sizeof gaps, j->list);
-        npg_probe_attend(&j->probe, "%zu frames are missing in the numbering: %s", j->list->gap_count, gaps);
-    }
-    if (j->list->left_out)
-        npg_probe_attend(&j->probe, "%zu files with other endings were left out", j->list->left_out);
-    return NPG_OK;
-}
 
 static npg_status read_stream(job *j)
 {
@@ -91,7 +44,7 @@ static npg_status read_stream(job *j)
         status = npg_stream_next(stream, &frame, &j->probe.origin);
         if (status == NPG_END) break;
         bool broken = status == NPG_BAD_INPUT; /* nothing behind it can be found again */
-        status = note(j, status, &frame, "stream", number);
+        status = npg_probe_note(&j->probe, status, &frame, "stream", number);
         if (broken) break;
     }
     npg_stream_close(&stream);
@@ -101,24 +54,11 @@ static npg_status read_stream(job *j)
 static npg_status read_all(job *j)
 {
     double begin_s = npg_clock_s();
-    npg_status status = strcmp(j->input, "-") ? read_files(j) : read_stream(j);
+    npg_status status =
+        strcmp(j->input, "-") ? npg_probe_files(&j->probe, &j->list, j->input, j->options) : read_stream(j);
     j->probe.read_s = npg_clock_s() - begin_s;
     if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
     return status;
-}
-
-static void judge_whole(npg_probe *probe)
-{
-    size_t readable = probe->frames - probe->unreadable;
-    npg_probe_spread counts = npg_probe_counts(probe);
-    if (probe->not_finite)
-        npg_probe_attend(probe, "%zu points have coordinates that are not finite", probe->not_finite);
-    if (probe->zero_normals) npg_probe_attend(probe, "%zu normals have no direction", probe->zero_normals);
-    if (probe->with_normals && probe->with_normals < readable)
-        npg_probe_attend(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
-    if (counts.most > 10 * counts.least)
-        npg_probe_attend(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
-                         counts.most);
 }
 
 /* ---- output ---- */
@@ -188,12 +128,8 @@ static npg_status do_probe(job *j)
 {
     npg_estimate estimate;
     NPG_TRY(read_all(j));
-    judge_whole(&j->probe);
-    /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
-    size_t faces = (size_t)option_number(j->options, "faces", 20000), most = npg_probe_counts(&j->probe).most;
-    npg_probe_estimate(&estimate, &j->probe, (faces < 4 * most ? faces : 4 * most) / 2,
-                       (size_t)option_number(j->options, "epochs", 250),
-                       (size_t)option_number(j->options, "window", INT64_MAX));
+    npg_probe_judge(&j->probe);
+    npg_probe_estimate_run(&estimate, &j->probe, j->options);
     if (j->s.json)
         print_json(j, &estimate);
     else

@@ -5,33 +5,45 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "cli.h"
+#include "clock.h"
 #include "progress.h"
-#include "run_job.h"
+#include "segments.h"
 
 typedef struct settings {
-    const char *config;
+    const char *config, *log_file;
     int progress;
     bool quiet, verbose;
+    int segments;
 } settings;
 
 const npg_option npg_run_verb_options[] = {
-    {"config", "Read options from a JSON object in FILE; the command line wins (also -c)", NPG_OPTION_TEXT,
-     offsetof(settings, config), "", 0, 0, NULL, "FILE"},
+    {"config",
+     "Read options from a JSON object in FILE, or take a method configuration of the paper's published code; "
+     "the command line wins (also -c)",
+     NPG_OPTION_TEXT, offsetof(settings, config), "", 0, 0, NULL, "FILE"},
     {"progress",
      "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal",
      NPG_OPTION_CHOICE, offsetof(settings, progress), "auto", 0, 0, "auto|bar|json|none", NULL},
+    {"log-file", "Append the log to FILE, one JSON object per line", NPG_OPTION_TEXT,
+     offsetof(settings, log_file), "", 0, 0, NULL, "FILE"},
     {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, offsetof(settings, quiet), "no", 0,
      0, NULL, NULL},
     {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
      NULL},
+    {"segments",
+     "Where the topology changes: one reference all the same, with an alarm (one), or another reference from "
+     "there on, each with its frames in OUT/segment_* (auto)",
+     NPG_OPTION_CHOICE, offsetof(settings, segments), "one", 0, 0, "one|auto", NULL},
     {0}};
 
 /* ---- signals ---- */
 
-#define STOP_SECONDS 4 /* a run that has not stopped by then is ended */
+#define STOP_SECONDS  4 /* a run that has not stopped by then is ended */
+#define AGAIN_SECONDS 1 /* schedulers signal every process of a job, and who started us passes his on */
 
 typedef struct watcher {
     npg_run *run;         /* loan */
@@ -63,6 +75,19 @@ static int next_signal(const watcher *w, const struct timespec *limit)
     return number;
 }
 
+/* The second request: one that comes right after the first is the same one on another way. */
+static int wait_for_second(const watcher *w)
+{
+    double begin_s = npg_clock_s();
+    for (;;) {
+        double left_s = begin_s + STOP_SECONDS - npg_clock_s();
+        if (left_s < 0) left_s = 0;
+        const struct timespec limit = {(time_t)left_s, (long)(1e9 * (left_s - (double)(time_t)left_s))};
+        int number = next_signal(w, &limit);
+        if (number < 0 || number == SIGUSR1 || npg_clock_s() > begin_s + AGAIN_SECONDS) return number;
+    }
+}
+
 /* The first signal stops the run in good order; the second ends the process the usual way.  Where something
  * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
  * moment. */
@@ -70,10 +95,9 @@ static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to go on\n";
     const watcher *w = argument;
-    const struct timespec limit = {.tv_sec = STOP_SECONDS};
     if (next_signal(w, NULL) == SIGUSR1) return NULL;
     npg_run_stop(w->run);
-    int number = next_signal(w, &limit);
+    int number = wait_for_second(w);
     if (number == SIGUSR1) return NULL;
     if (number < 0) {
         ssize_t written = write(STDERR_FILENO, text, sizeof text - 1);
@@ -83,6 +107,15 @@ static void *watch_signals(void *argument)
     pthread_sigmask(SIG_UNBLOCK, &w->all, NULL);
     raise(number);
     return NULL;
+}
+
+/* A run that a batch started stops when the batch is gone, however that ended. */
+static void stop_with_parent(void)
+{
+    const char *parent = getenv(NPG_PARENT_VARIABLE);
+    if (!parent) return;
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != (pid_t)strtol(parent, NULL, 10)) kill(getpid(), SIGTERM);
 }
 
 static npg_status start_watching(watcher *w, npg_run *run)
@@ -105,34 +138,45 @@ static void end_watching(watcher *w)
 
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
-    static const char *const names[] = {"meshes",        "reference.ply", "frames.jsonl",
-                                        "exports.jsonl", "report.json",   "done.json"};
+    static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl", "exports.jsonl",
+                                        "report.json", "segments.json", "done.json"};
     char path[4096];
     if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig %s: finished, but with frames skipped or below the quality bar; see %s/report.json\n",
+                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; see the "
+                "warnings, or %s/report.json\n",
                 verb, output);
-    if (status < 0 || status == NPG_STOPPED) return;
+    if (status == NPG_CHANGED)
+        fprintf(stderr, "neupig %s: ended where the topology changed; see %s/topology.json\n", verb, output);
+    if (status < 0 || status == NPG_STOPPED || status == NPG_CHANGED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
         if (access(path, F_OK) == 0) printf("%-14s %s\n", names[i], path);
     }
 }
 
-npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
     watcher signals = {.run = NULL};
     block_signals(&signals);
+    stop_with_parent();
     npg_status status = npg_run_open(&run, options, &hooks);
-    bool is_open = !status;
-    if (is_open) status = start_watching(&signals, run);
+    *is_open = !status;
+    if (!status) status = start_watching(&signals, run);
     if (!status) status = npg_run_wait(run);
     end_watching(&signals);
-    if (is_open) npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     npg_run_close(&run);
+    return status;
+}
+
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
+{
+    bool is_open;
+    npg_status status = npg_run_once(options, reporter, &is_open);
+    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }
 
@@ -149,6 +193,13 @@ static npg_status check_paths(npg_options *options, const npg_cli *cli)
     return NPG_OK;
 }
 
+static npg_status start(const npg_options *options, const settings *s, npg_reporter *reporter)
+{
+    if (s->segments == NPG_SEGMENTS_AUTO) return npg_segments_run(options, reporter);
+    NPG_TRY(npg_segments_make_way(options));
+    return npg_run_job(options, reporter);
+}
+
 int npg_verb_run(int argc, char **argv)
 {
     settings s;
@@ -160,7 +211,8 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
-        status = npg_run_job(options, &reporter);
+        status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
+        if (!status) status = start(options, &s, &reporter);
         if (reporter.show != NPG_SHOW_JSON)
             npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }

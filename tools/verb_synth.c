@@ -15,7 +15,7 @@
 typedef struct settings {
     const char *output;
     int body, format;
-    int64_t frames, points, holes, cameras, width, seed;
+    int64_t frames, change, points, holes, cameras, width, seed;
     double cell, cycles, travel, noise, outliers;
     bool vary, normals;
 } settings;
@@ -24,8 +24,12 @@ typedef struct settings {
 
 const npg_option npg_synth_options[] = {
     {"output", "Folder for points/ and truth/ (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "DIR"},
-    {"body", "What moves: a walking figure or a bending bar", NPG_OPTION_CHOICE, AT(body), "walker", 0, 0,
-     "walker|bar", NULL},
+    {"body",
+     "What moves: a walking figure, a bending bar, a figure whose hand has grown into its hip and leaves it, "
+     "or the bar that a ball comes to",
+     NPG_OPTION_CHOICE, AT(body), "walker", 0, 0, "walker|bar|hands|two", NULL},
+    {"change", "The first frame in which the hand is off the hip, or the ball there; -1: the middle one",
+     NPG_OPTION_INT, AT(change), "-1", -1, 1e6, NULL, "FRAME"},
     {"frames", "Frames", NPG_OPTION_INT, AT(frames), "24", 1, 1e6, NULL, NULL},
     {"points", "Points per frame", NPG_OPTION_INT, AT(points), "5000", 1, 1e8, NULL, NULL},
     {"cycles", "Cycles of the motion over all frames", NPG_OPTION_REAL, AT(cycles), "1", 0, 1e4, NULL, NULL},
@@ -99,12 +103,43 @@ static npg_scan capture_of(const settings *s, const npg_mesh *first)
     return capture;
 }
 
-static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh *mesh, npg_scanned *points,
-                              size_t *total)
+/* The body before its change or from it on, and a mesh to pose. */
+typedef struct figure {
+    npg_body *body;
+    npg_mesh *mesh;
+} figure;
+
+static void close_figure(figure *f)
+{
+    npg_mesh_unref(&f->mesh);
+    npg_body_close(&f->body);
+}
+
+static npg_status open_figure(figure *f, const settings *s, bool is_changed)
+{
+    close_figure(f);
+    NPG_TRY(npg_body_open(&f->body, s->body, is_changed, s->cell));
+    NPG_TRY(npg_mesh_copy(&f->mesh, npg_body_rest(f->body)));
+    if (f->mesh->vert_normals) return NPG_OK;
+    return npg_alloc_array(&f->mesh->vert_normals, NPG_FOR_MESH, f->mesh->vert_count, 3 * sizeof(float));
+}
+
+/* The frame of the change; behind the last one for bodies that have none. */
+static int64_t change_of(const settings *s)
+{
+    if (!npg_body_changes(s->body)) return s->frames;
+    return s->change < 0 ? s->frames / 2 : s->change;
+}
+
+static npg_status make_frames(const settings *s, figure *f, npg_scanned *points, size_t *total)
 {
     npg_scan capture = {0};
+    int64_t change = change_of(s);
     for (int64_t t = 0; t < s->frames; t++) {
-        npg_body_pose(body, mesh->vert_pos, s->cycles * (double)t / (double)s->frames, s->travel);
+        npg_moment moment = {s->cycles * (double)t / (double)s->frames, s->travel, (double)(t - change)};
+        if (t == 0 || t == change) NPG_TRY(open_figure(f, s, t >= change));
+        npg_mesh *mesh = f->mesh;
+        npg_body_pose(f->body, mesh->vert_pos, &moment);
         npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
                                 mesh->face_count);
         if (t == 0) capture = capture_of(s, mesh);
@@ -120,26 +155,21 @@ static npg_status make_frames(const settings *s, const npg_body *body, npg_mesh 
 
 static npg_status make_capture(const settings *s)
 {
-    npg_body *body = NULL;
-    npg_mesh *mesh = NULL;
+    figure f = {0};
     npg_scanned points = {0};
     size_t total = 0;
     if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
     npg_status status = make_folders(s);
-    if (!status) status = npg_body_open(&body, s->body, s->cell);
-    if (!status) status = npg_mesh_copy(&mesh, npg_body_rest(body));
-    if (!status && !mesh->vert_normals)
-        status = npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float));
-    if (!status) status = make_frames(s, body, mesh, &points, &total);
+    if (!status) status = make_frames(s, &f, &points, &total);
     if (!status)
         printf(
             "%lld frames, %.0f points each, truth of %zu vertices and %zu faces\npoints  %s/points\ntruth   "
             "%s/truth\n",
-            (long long)s->frames, (double)total / (double)s->frames, mesh->vert_count, mesh->face_count,
+            (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count, f.mesh->face_count,
             s->output, s->output);
+    if (!status && change_of(s) < s->frames) printf("changes at frame %lld\n", (long long)change_of(s));
     npg_scanned_close(&points);
-    npg_mesh_unref(&mesh);
-    npg_body_close(&body);
+    close_figure(&f);
     return status;
 }
 

@@ -23,12 +23,14 @@ const npg_verb *npg_verb_find(const char *name);
 
 int npg_verb_run(int argc, char **argv);
 int npg_verb_append(int argc, char **argv);
+int npg_verb_batch(int argc, char **argv);
 int npg_verb_apply(int argc, char **argv);
 int npg_verb_probe(int argc, char **argv);
 int npg_verb_eval(int argc, char **argv);
 int npg_verb_synth(int argc, char **argv);
 int npg_verb_render(int argc, char **argv);
 int npg_verb_bench(int argc, char **argv);
+int npg_verb_tune(int argc, char **argv);
 int npg_verb_doctor(int argc, char **argv);
 int npg_verb_help(int argc, char **argv);
 int npg_verb_man(int argc, char **argv);
@@ -36,12 +38,14 @@ int npg_verb_version(int argc, char **argv);
 
 extern const npg_option npg_run_verb_options[];
 extern const npg_option npg_append_options[];
+extern const npg_option npg_batch_options[];
 extern const npg_option npg_apply_options[];
 extern const npg_option npg_probe_options[];
 extern const npg_option npg_eval_options[];
 extern const npg_option npg_synth_options[];
 extern const npg_option npg_render_options[];
 extern const npg_option npg_bench_options[];
+extern const npg_option npg_tune_options[];
 extern const npg_option npg_doctor_options[];
 extern const npg_option npg_man_options[];
 

@@ -1,0 +1,30 @@
+/* Parallel: one piece of work split into parts that run at the same time. */
+#ifndef NPG_PARALLEL_H
+#define NPG_PARALLEL_H
+
+#include <stddef.h>
+
+#define NPG_PARALLEL_MAX 64
+
+/* Code that gcc builds for several widths of x86 processor; which one runs is settled when the program is
+ * loaded (the sanitizers' start-up code can't do that).  For small loops over plain arrays. */
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define NPG_WIDE __attribute__((target_clones("default", "avx2", "arch=skylake-avx512")))
+#else
+#define NPG_WIDE
+#endif
+
+/* What one part does; parts may not touch what another writes. */
+typedef void (*npg_part)(void *user, size_t part);
+
+/* Call part(user, 0) .. part(user, count - 1), count <= NPG_PARALLEL_MAX, each in a thread of its own but the
+ * first, and return when all are done.  A part whose thread can't be started is done by the caller: only the
+ * time suffers.  What comes out must not depend on how many threads there are: split by what the work is, or
+ * let no part's result depend on the split. */
+void npg_parallel(npg_part part, void *user, size_t count);
+
+/* Parts that are worth their threads: one per core, each of at least `least` of `count` items, no more than
+ * `most` (0: as many as there are cores). */
+size_t npg_parallel_parts(size_t count, size_t least, size_t most);
+
+#endif

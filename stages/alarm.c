@@ -1,0 +1,244 @@
+/* Alarm: notices from which frame on the reference no longer explains the capture. */
+#include "alarm.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "stage.h"
+
+#define HISTORY 64 /* explained frames that the usual level is taken from */
+#define SPREADS 6.0
+#define NORMAL  1.4826 /* standard deviations of normal noise per median deviation */
+#define SUSPECT 0.5    /* of the bound */
+
+static const struct {
+    const char *name, *what;
+    double floor;
+} kinds[NPG_MISFITS] = {{"far", "of the points are far from the surface in one place", 0.01},
+                        {"bare", "of the surface have no points near them in one place", 0.015},
+                        {"torn", "of the surface are torn apart in one place", 0.003}};
+
+typedef struct record {
+    int64_t index, number;
+    npg_misfit misfits[NPG_MISFITS];
+} record;
+
+typedef struct side {
+    int64_t next;    /* the index whose turn it is                     */
+    record *waiting; /* came ahead of their turn; owned                */
+    size_t waiting_count, waiting_room;
+    double history[NPG_MISFITS][HISTORY];
+    size_t history_count; /* ever */
+    record run[NPG_ALARM_BACK +
+               NPG_ALARM_FRAMES]; /* the suspect frames since the last explained one, the last of them */
+    bool is_unexplained[NPG_ALARM_BACK + NPG_ALARM_FRAMES];
+    npg_alarm_cause causes[NPG_ALARM_BACK + NPG_ALARM_FRAMES]; /* the clearest misfit of each */
+    size_t run_count;
+    bool is_raised;
+    npg_alarm_cause cause;
+} side;
+
+struct npg_alarm {
+    int64_t key;
+    side sides[NPG_DIRECTIONS];
+};
+
+npg_status npg_alarm_open(npg_alarm **out, int64_t key)
+{
+    npg_alarm *alarm;
+    NPG_TRY(npg_alloc(&alarm, NPG_FOR_RUN, sizeof *alarm));
+    alarm->key = key;
+    alarm->sides[NPG_FORWARD].next = key;
+    alarm->sides[NPG_BACKWARD].next = key;
+    *out = alarm;
+    return NPG_OK;
+}
+
+void npg_alarm_close(npg_alarm **slot)
+{
+    if (!*slot) return;
+    for (int d = 0; d < NPG_DIRECTIONS; d++) npg_release(&(*slot)->sides[d].waiting);
+    npg_release(slot);
+}
+
+/* ---- the usual level ---- */
+
+static int by_value(const void *left, const void *right)
+{
+    double a = *(const double *)left, b = *(const double *)right;
+    return a < b ? -1 : a > b;
+}
+
+static double median_of(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, by_value);
+    return count ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : 0;
+}
+
+static void usual_level(const side *s, int kind, double *usual, double *bound)
+{
+    double values[HISTORY];
+    size_t count = s->history_count < HISTORY ? s->history_count : HISTORY;
+    memcpy(values, s->history[kind], count * sizeof *values);
+    *usual = median_of(values, count);
+    for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - *usual);
+    *bound = fmax(fmax(kinds[kind].floor, SPREADS * NORMAL * median_of(values, count)), *usual);
+}
+
+static void remember(side *s, const record *r)
+{
+    for (int k = 0; k < NPG_MISFITS; k++) s->history[k][s->history_count % HISTORY] = r->misfits[k].share;
+    s->history_count++;
+}
+
+/* ---- one frame in its turn ---- */
+
+/* The clearest misfit of a frame; the result is how many times its bound it lies above the usual. */
+static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
+{
+    double most = -1;
+    for (int k = 0; k < NPG_MISFITS; k++) {
+        double usual, bound;
+        usual_level(s, k, &usual, &bound);
+        double times = (r->misfits[k].share - usual) / bound;
+        if (!(times > most)) continue;
+        most = times;
+        *cause = (npg_alarm_cause){.seen_index = r->index,
+                                   .seen_number = r->number,
+                                   .misfit = k,
+                                   .value = r->misfits[k].share,
+                                   .usual = usual,
+                                   .bound = bound};
+        memcpy(cause->at, r->misfits[k].at, sizeof cause->at);
+    }
+    return most;
+}
+
+static double times_bound(const npg_alarm_cause *cause)
+{
+    return (cause->value - cause->usual) / cause->bound;
+}
+
+/* The last frames of the run are unexplained: it dates from the first suspect one. */
+static void raise_alarm(side *s)
+{
+    size_t first_unexplained = s->run_count - NPG_ALARM_FRAMES, best = first_unexplained;
+    size_t first = first_unexplained > NPG_ALARM_BACK ? first_unexplained - NPG_ALARM_BACK : 0;
+    for (size_t i = first_unexplained; i < s->run_count; i++)
+        if (times_bound(&s->causes[i]) > times_bound(&s->causes[best])) best = i;
+    s->cause = s->causes[best];
+    s->cause.index = s->run[first].index;
+    s->cause.number = s->run[first].number;
+    s->is_raised = true;
+}
+
+static void end_run(side *s)
+{
+    for (size_t i = 0; i < s->run_count; i++) remember(s, &s->run[i]);
+    s->run_count = 0;
+}
+
+/* The oldest suspect frame makes room: a long run of merely suspect frames becomes usual. */
+static void make_room(side *s)
+{
+    size_t most = sizeof s->run / sizeof *s->run;
+    if (s->run_count < most) return;
+    remember(s, &s->run[0]);
+    memmove(s->run, s->run + 1, (most - 1) * sizeof *s->run);
+    memmove(s->causes, s->causes + 1, (most - 1) * sizeof *s->causes);
+    memmove(s->is_unexplained, s->is_unexplained + 1, (most - 1) * sizeof *s->is_unexplained);
+    s->run_count--;
+}
+
+static void take(side *s, const record *r)
+{
+    npg_alarm_cause cause;
+    if (s->is_raised || !isfinite(r->misfits[NPG_MISFIT_FAR].share)) return;
+    double times = clearest(&cause, s, r);
+    if (!s->history_count || !(times > SUSPECT)) { /* the keyframe is what is usual */
+        end_run(s);
+        remember(s, r);
+        return;
+    }
+    make_room(s);
+    s->run[s->run_count] = *r;
+    s->causes[s->run_count] = cause;
+    s->is_unexplained[s->run_count++] = times > 1;
+    size_t row = 0;
+    while (row < s->run_count && s->is_unexplained[s->run_count - 1 - row]) row++;
+    if (row >= NPG_ALARM_FRAMES) raise_alarm(s);
+}
+
+/* ---- order ---- */
+
+static int64_t step_of(int direction)
+{
+    return direction == NPG_FORWARD ? 1 : -1;
+}
+
+static void take_waiting(side *s, int direction, bool is_end)
+{
+    size_t done = 0;
+    while (done < s->waiting_count && (is_end || s->waiting[done].index == s->next)) {
+        s->next = s->waiting[done].index + step_of(direction);
+        take(s, &s->waiting[done++]);
+    }
+    s->waiting_count -= done;
+    memmove(s->waiting, s->waiting + done, s->waiting_count * sizeof *s->waiting);
+}
+
+/* Those nearest the keyframe come first. */
+static npg_status add(side *s, int direction, const record *r)
+{
+    NPG_TRY(npg_grow(&s->waiting, &s->waiting_room, s->waiting_count + 1, sizeof *s->waiting, NPG_FOR_RUN));
+    size_t at = s->waiting_count++;
+    for (; at > 0 && (s->waiting[at - 1].index - r->index) * step_of(direction) > 0; at--)
+        s->waiting[at] = s->waiting[at - 1];
+    s->waiting[at] = *r;
+    take_waiting(s, direction, false);
+    return NPG_OK;
+}
+
+npg_status npg_alarm_add(npg_alarm *alarm, const npg_frame *frame)
+{
+    record r = {.index = frame->index, .number = frame->number};
+    memcpy(r.misfits, frame->figures.misfits, sizeof r.misfits);
+    if (frame->index >= alarm->key) NPG_TRY(add(&alarm->sides[NPG_FORWARD], NPG_FORWARD, &r));
+    if (frame->index <= alarm->key) NPG_TRY(add(&alarm->sides[NPG_BACKWARD], NPG_BACKWARD, &r));
+    return NPG_OK;
+}
+
+void npg_alarm_finish(npg_alarm *alarm)
+{
+    for (int d = 0; d < NPG_DIRECTIONS; d++) take_waiting(&alarm->sides[d], d, true);
+}
+
+const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction)
+{
+    const side *s = &alarm->sides[direction];
+    return s->is_raised ? &s->cause : NULL;
+}
+
+/* ---- telling ---- */
+
+void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause)
+{
+    snprintf(text, size, "%.3g %% %s, around (%.4g, %.4g, %.4g) in frame %lld; usual is %.3g %%",
+             100 * cause->value, kinds[cause->misfit].what, cause->at[0], cause->at[1], cause->at[2],
+             (long long)cause->seen_number, 100 * cause->usual);
+}
+
+json_t *npg_alarm_json(const npg_alarm_cause *cause)
+{
+    char text[256];
+    if (!cause) return json_null();
+    json_t *at = json_array();
+    npg_alarm_text(text, sizeof text, cause);
+    for (int a = 0; a < 3; a++) json_array_append_new(at, npg_json_real(cause->at[a]));
+    return json_pack("{sI sI ss sf sf sf sI so ss}", "from_frame", (json_int_t)cause->number, "from_index",
+                     (json_int_t)cause->index, "figure", kinds[cause->misfit].name, "value", cause->value,
+                     "usual", cause->usual, "bound", cause->bound, "frame", (json_int_t)cause->seen_number,
+                     "at", at, "cause", text);
+}

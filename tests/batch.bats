@@ -1,0 +1,282 @@
+# Many captures at once: verdicts, limits, signals, manifests, the folders and configurations of the published code.
+
+tiny='"keyframe": 1, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
+    "align-steps": 3, "grid-levels": 2, "max-residual": 100, "max-flipped": 100, "max-stretched": 100, "min-coverage": 0'
+small="\"epochs\": 2, $tiny"
+endless='"epochs": 1000000, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "grid-levels": 2'
+
+# Two captures that go well, one whose second frame is cut off.
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    export XDG_CACHE_HOME=$BATS_FILE_TMPDIR/cache
+    mkdir set
+    "$NEUPIG" synth --body bar --frames 3 --points 300 -o set/one >synth.log
+    cp -r set/one set/two
+    cp -r set/one/points set/broken
+    truncate -s 3000 set/broken/frame_0001.ply
+    echo "{\"output\": \"out\", // beside this file
+        \"defaults\": {$small},
+        \"captures\": [{\"input\": \"set/one\"}, {\"input\": \"set/broken\", \"name\": \"bad & <cut>\"},
+                       {\"input\": \"set/two/points/frame_%04d.ply\", \"format\": \"obj\", \"max-residual\": 0}]}" >three.json
+    status=0
+    "$NEUPIG" batch three.json >first.table 2>first.log || status=$?
+    echo $status >first.status
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+    export XDG_CACHE_HOME=$BATS_FILE_TMPDIR/cache
+}
+
+# await PID COMMAND...: until the command succeeds, as long as the process lives
+await() {
+    until "${@:2}" 2>/dev/null; do
+        kill -0 "$1"
+        sleep 0.05
+    done
+}
+
+@test "one broken capture of three: the others are done, and the table says all" {
+    cat first.log first.table
+    [ "$(cat first.status)" -eq 1 ]
+    [ -e out/one/done.json ]
+    [ -e out/two/done.json ]
+    [ ! -e "out/bad & <cut>/done.json" ]
+    grep -Eq '^one +done +3 of 3 ' first.table
+    grep -Eq '^two +partial +0 of 3 ' first.table
+    grep -Eq '^bad & <cut> +bad input .*frame_0001.ply' first.table
+    grep -q '1 of 3 captures are not done' first.log
+    grep -q '"verdict": "bad input"' "out/bad & <cut>/verdict.json"
+    grep -q '"exit_code": 3' "out/bad & <cut>/verdict.json"
+    [ "$(grep -c '"verdict":' out/batch.json)" -eq 3 ]
+    grep -q '"worst_frame": [012]' out/batch.json
+    for record in command start log end verdict; do
+        grep -q "^{\"time\":\"20[^\"]*Z\",\"event\":\"$record\"" out/one/log.jsonl
+    done
+    [ "$(grep -vc '^{.*}$' out/one/log.jsonl)" -eq 0 ]
+}
+
+@test "the page is well-formed, needs no other file and has its pictures" {
+    xmllint --noout out/batch.html
+    [ "$(grep -o 'data:image/png;base64,' out/batch.html | wc -l)" -eq 6 ]
+    [ "$(grep -c '<svg ' out/batch.html)" -eq 2 ]
+    [ "$(grep -c '<circle class="bad"' out/batch.html)" -eq 3 ]
+    grep -q 'bad &amp; &lt;cut&gt;' out/batch.html
+    run grep -E '(src|href)="?(http|/|[a-z]+\.)' out/batch.html
+    [ "$status" -eq 1 ]
+    grep -o 'base64,[^"]*' out/batch.html | cut -d, -f2 | while read -r picture; do
+        base64 -d <<<"$picture" >picture.png
+        [ "$(head -c 8 picture.png | od -An -tx1 | tr -d ' ')" = 89504e470d0a1a0a ]
+        [ "$(tail -c 8 picture.png | head -c 4)" = IEND ]
+    done
+}
+
+@test "what is done is left alone, what failed is tried again" {
+    before=$(stat -c %Y.%Z out/*/done.json out/one/meshes/*)
+    peak=$(grep peak_memory out/one/verdict.json)
+    cp "out/bad & <cut>/verdict.json" verdict.before
+    run "$NEUPIG" batch three.json --progress json
+    echo "$output"
+    [ "$status" -eq 1 ]
+    [[ "$output" == *'one: was done already'*'two: warning: was done already'* ]]
+    [ "$(grep -c '"event":"verdict".*"was_done":true' <<<"$output")" -eq 2 ]
+    grep -q '"event":"end".*"exit_code":1' <<<"$output"
+    [ "$before" = "$(stat -c %Y.%Z out/*/done.json out/one/meshes/*)" ]
+    [ "$peak" = "$(grep peak_memory out/one/verdict.json)" ]
+    run cmp -s verdict.before "out/bad & <cut>/verdict.json"
+    [ "$status" -eq 1 ]
+}
+
+@test "with frames below the bar and nothing worse the exit code is 7; a changed option is named" {
+    echo "{\"output\": \"out\", \"defaults\": {$small}, \"captures\": [{\"input\": \"set/one\"},
+        {\"input\": \"set/two/points/frame_%04d.ply\", \"format\": \"obj\", \"max-residual\": 0}]}" >two.json
+    run "$NEUPIG" batch two.json --jobs 2
+    echo "$output"
+    [ "$status" -eq 7 ]
+    run "$NEUPIG" batch two.json --task-count 2
+    [ "$status" -eq 0 ]
+    run "$NEUPIG" batch two.json --seed 5
+    echo "$output"
+    [ "$status" -eq 1 ]
+    [[ "$output" == *'option seed was "0" and is "5"'* ]]
+    [ -e out/one/done.json ]
+}
+
+@test "a dry run estimates and leaves nothing behind" {
+    cp -r set/one/points gap
+    cp gap/frame_0001.ply gap/frame_0004.ply
+    echo "{\"output\": \"dry-out\", \"captures\": [{\"input\": \"set/one\"}, {\"input\": \"gap\"}]}" >dry.json
+    run "$NEUPIG" batch dry.json --dry-run
+    echo "$output"
+    [ "$status" -eq 7 ]
+    grep -Eq '^one +3 +0 +300 +[1-9][0-9]* MiB' <<<"$output"
+    grep -Eq '^gap +4 +1 ' <<<"$output"
+    [[ "$output" == *'2 captures, '*'are free'* ]]
+    run "$NEUPIG" batch three.json --dry-run --progress json
+    echo "$output"
+    [ "$status" -eq 1 ]
+    [ "$(grep -c '"event":"estimate"' <<<"$output")" -eq 3 ]
+    grep -q '"would_fail":"[^"]*frame_0001.ply' <<<"$output"
+    [ ! -e dry-out ]
+}
+
+@test "bad manifests: file, place and cause" {
+    check() { # EXIT WORDS TEXT
+        echo "$3" >bad.json
+        run "$NEUPIG" batch bad.json -o bad-out
+        echo "$output"
+        [ "$status" -eq "$1" ]
+        [[ "$output" == *"bad.json$2"* ]]
+        [ ! -e bad-out ]
+    }
+    check 2 ':2:1: ' $'{"captures": [\n}'
+    check 2 ':1:' '{"captures": [{"input": "set/one"}], "captures": []}'
+    check 2 ': not a JSON object' '[]'
+    check 2 ': captures: not a list' '{}'
+    check 2 ': captures: the list is empty' '{"captures": []}'
+    check 2 ': epochs: a manifest has' '{"epochs": 3, "captures": []}'
+    check 2 ': captures[0]: has no "input"' '{"captures": [{}]}'
+    check 2 ': captures[0]: not an object' '{"captures": ["set/one"]}'
+    check 2 ': captures[1].epochs: option epochs: "many" is not a whole number' \
+        '{"captures": [{"input": "set/one"}, {"input": "set/two", "epochs": "many"}]}'
+    check 2 ': captures[0].epoch: there is no option epoch' '{"captures": [{"input": "set/one", "epoch": 3}]}'
+    check 2 ': defaults.max-time: not a number of seconds' '{"defaults": {"max-time": "1h"}, "captures": [{"input": "a"}]}'
+    check 2 ': captures[1]: two captures have the name one' '{"captures": [{"input": "set/one"}, {"input": "other/one"}]}'
+    check 2 ': captures[0]: the name x/../up has a slash' '{"captures": [{"input": "set/one", "name": "x/../up"}]}'
+    check 2 ': captures[0]: the name .. begins' '{"captures": [{"input": "set/one", "name": ".."}]}'
+    check 2 ': captures[0]: option follow is not for a batch' '{"captures": [{"input": "set/one", "follow": "set"}]}'
+    check 2 ': captures[0].config: ' '{"captures": [{"input": "set/one", "config": "nowhere.json"}]}'
+    run "$NEUPIG" batch nowhere.json -o bad-out
+    [ "$status" -eq 3 ]
+    [[ "$output" == *nowhere.json* ]]
+    echo '{"captures": [{"input": "set/one"}]}' >bad.json
+    run "$NEUPIG" batch bad.json
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'no "output"'* ]]
+    mkdir -p empty
+    run "$NEUPIG" batch empty -o bad-out
+    [ "$status" -eq 3 ]
+}
+
+@test "a capture that takes too long is stopped, one that takes too much memory too, and no process is left" {
+    echo "{\"output\": \"limits\", \"defaults\": {$endless}, \"captures\": [
+        {\"input\": \"set/one\", \"name\": \"slow\", \"max-time\": 2},
+        {\"input\": \"set/one\", \"name\": \"fat\", \"max-memory\": 60},
+        {\"input\": \"set/one\", \"name\": \"counted\", \"max-memory\": 1}]}" >limits.json
+    run "$NEUPIG" batch limits.json --jobs 3
+    echo "$output"
+    [ "$status" -eq 1 ]
+    grep -q '"verdict": "time"' limits/slow/verdict.json
+    grep -q '"exit_code": 75' limits/slow/verdict.json
+    grep -q 'not done after 2 s' limits/slow/verdict.json
+    grep -q '"verdict": "memory"' limits/fat/verdict.json
+    grep -q '"exit_code": 6' limits/fat/verdict.json
+    grep -q 'took more than 60 MiB' limits/fat/verdict.json
+    grep -q '"verdict": "memory"' limits/counted/verdict.json
+    for pid in $(sed -n 's/.*"event":"start".*"pid":\([0-9]*\).*/\1/p' limits/*/log.jsonl); do
+        run kill -0 "$pid"
+        [ "$status" -ne 0 ]
+    done
+}
+
+@test "SIGTERM: the runs write their states, the exit code is 75, and the next start goes on" {
+    "$NEUPIG" synth --body bar --frames 14 --points 500 -o long >synth.log
+    echo "{\"output\": \"stopped\", \"defaults\": {$tiny, \"epochs\": 60, \"window\": 5, \"overlap\": 2}, \"captures\": [
+        {\"input\": \"long\"}, {\"input\": \"set/one\", \"name\": \"later\"}]}" >stopped.json
+    "$NEUPIG" batch stopped.json >stopped.table 2>stopped.log &
+    pid=$!
+    await $pid ls stopped/long/job/window_000000.npg
+    kill -TERM $pid
+    kill -TERM $pid
+    status=0
+    wait $pid || status=$?
+    cat stopped.log
+    [ "$status" -eq 75 ]
+    grep -q '"verdict": "stopped"' stopped/long/verdict.json
+    grep -Eq '^later +not run' stopped.table
+    [ ! -e stopped/later ]
+    run "$NEUPIG" batch stopped.json
+    echo "$output"
+    [ "$status" -eq 0 ]
+    grep -q resumed_frames stopped/long/report.json
+    [ -e stopped/later/done.json ]
+}
+
+@test "when the batch itself is killed its runs end" {
+    echo "{\"output\": \"orphan\", \"captures\": [{\"input\": \"set/one\", $endless}]}" >orphan.json
+    "$NEUPIG" batch orphan.json >orphan.log 2>&1 &
+    pid=$!
+    await $pid grep -q '"event":"start"' orphan/one/log.jsonl
+    child=$(sed -n 's/.*"event":"start".*"pid":\([0-9]*\).*/\1/p' orphan/one/log.jsonl)
+    kill -0 "$child"
+    kill -9 $pid
+    wait $pid || true
+    for ((n = 0; n < 200; n++)); do
+        kill -0 "$child" 2>/dev/null || break
+        sleep 0.1
+    done
+    run kill -0 "$child"
+    [ "$status" -ne 0 ]
+}
+
+@test "tasks split a batch so that each capture is done exactly once, and each writes the whole table" {
+    for n in 1 2 3 4 5 6 7; do echo "{\"input\": \"set/one\", \"name\": \"c$n\"}"; done | paste -sd, >list
+    echo "{\"output\": \"split\", \"captures\": [$(cat list)]}" >split.json
+    "$NEUPIG" batch split.json --list >all
+    [ "$(wc -l <all)" -eq 7 ]
+    for task in 0 1 2; do "$NEUPIG" batch split.json --list --task-index $task --task-count 3; done | sort | diff - all
+    run "$NEUPIG" batch split.json --list --task-index 3 --task-count 3
+    [ "$status" -eq 2 ]
+    rm out/batch.json
+    for task in 0 1 2; do
+        run "$NEUPIG" batch three.json --task-index $task --task-count 3
+        echo "$output"
+        [ "$status" -eq $((task == 1 ? 1 : task == 2 ? 7 : 0)) ]
+        [ "$(grep -c '"verdict": "[a-z ]*"' out/batch.json)" -eq 3 ]
+    done
+    [ "$(grep -c '"not run"' out/batch.json)" -eq 0 ]
+}
+
+@test "the published code's folders and method configuration are understood" {
+    mkdir -p ama/crane/gt ama/crane/point_clouds ama/crane/pcl_seqs ama/jump/gt
+    for n in 0 1 2; do
+        cp set/one/points/frame_000$n.ply ama/crane/point_clouds/000$n.ply
+        cp out/two/meshes/frame_000$n.obj ama/crane/gt/000$n.obj
+        cp out/two/meshes/frame_000$n.obj ama/jump/gt/000$n.obj
+    done
+    cat >fit.json <<'CONFIG'
+{"descriptor": "surface", "time_encoding": "fourier_features2", "rotation_method": "cayley",
+ "optimization": {"epochs": 2, "edgeloss": 50, "time_smoothing": "direct", "catchup_scaling": "pdg"},
+ "grid": {"base_res": 2, "increase_per_level": 3, "n_level": 2, "lr_adapt": 2.5, "local_lambda_adapt": 1.25,
+          "neighbours": 3, "smoothness": 0.25, "lr": 0.004, "solver": "CG"},
+ "mlp": {"hidden": 64, "layers": 3, "point_dim": 30, "time_dim": 6, "normal_dim": 1}}
+CONFIG
+    run "$NEUPIG" batch ama -o ama --list
+    [ "$output" = $'crane\njump' ]
+    run "$NEUPIG" batch ama -o results --config fit.json --faces 200 --poisson-depth 5 --max-residual 100 \
+        --max-flipped 100 --max-stretched 100 --min-coverage 0 --keyframe 1
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *'no counterpart here'*'normal_dim = 1, grid.neighbours, grid.solver'* ]]
+    [[ "$output" == *'jump: warning: '*'their vertices are the points'* ]]
+    for option in '"preset": "paper"' '"epochs": "2"' '"isometry": "50"' '"confidence": "single"' '"catch-up": "root"' \
+        '"rotation": "cayley"' '"time-frequencies": "3"' '"grid-levels": "2"' '"lambda-growth": "1.25"' \
+        '"lambda": "0.25"' '"grid-rate": "0.004"' '"width-1": "64"' '"width-2": "64"'; do
+        grep -q "$option" results/crane/done.json
+    done
+    grep -q 'point_clouds/0000.ply' results/crane/frames.jsonl
+    grep -Eq '"truth_cd":[0-9]' results/crane/frames.jsonl
+    grep -q 'gt/0000.obj' results/jump/frames.jsonl
+}
+
+@test "a method configuration with a value that makes no sense names file and key" {
+    echo '{"grid": {"n_level": 99}}' >wrong.json
+    run "$NEUPIG" run set/one/points -o wrong --config wrong.json
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'wrong.json: grid.n_level: option grid-levels: 99 is outside'* ]]
+    echo '{"mlp": {"hidden": "wide"}}' >wrong.json
+    run "$NEUPIG" run set/one/points -o wrong --config wrong.json
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'wrong.json: mlp.hidden: not a number'* ]]
+}

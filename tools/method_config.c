@@ -1,0 +1,167 @@
+/* Method configurations of the paper's published code, as options of a run.
+ *
+ * That code solves (I + lambda L) u = z by conjugate gradients and names the choice and its neighbourhood;
+ * the solve is exact here, so these keys have no counterpart.  Features have a fixed width of 30 + 2. */
+#include "method_config.h"
+
+#include <jansson.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct word {
+    const char *theirs, *option, *ours; /* option NULL: what we do anyway */
+} word;
+
+static const word rotations[] = {{"quaternions", "rotation", "quaternion"},
+                                 {"cayley", "rotation", "cayley"},
+                                 {"exp", "rotation", "exponential"},
+                                 {0}};
+static const word time_codes[] = {{"fourier_features2", "time-code", "fourier"},
+                                  {"gaussian_fourier", "time-code", "gaussian"},
+                                  {"poly", "time-code", "polynomial"},
+                                  {"mlp", "time-code", "learned"},
+                                  {0}};
+static const word confidences[] = {{"pdg", "confidence", "cumulative"},
+                                   {"direct", "confidence", "single"},
+                                   {"delta_based", "confidence", "delta"},
+                                   {"constant", "confidence", "constant"},
+                                   {0}};
+/* "none" leaves every frame its full weight, whatever the confidence is */
+static const word catch_ups[] = {
+    {"pdg", "catch-up", "root"},          {"exponential", "catch-up", "exponential"},
+    {"lerp", "catch-up", "interpolated"}, {"linear", "catch-up", "linear"},
+    {"none", "confidence", "constant"},   {0}};
+static const word descriptors[] = {{"surface", NULL, NULL}, {0}};
+
+typedef struct rule {
+    const char *section, *key; /* section NULL: on top */
+    const word *words;         /* for keys that hold a word */
+    const char *options[2];    /* for keys that hold a number */
+    double divide_by;          /* 0: the number as it stands */
+    double fixed;              /* the only number that we can do, where there are no options */
+} rule;
+
+static const rule rules[] = {
+    {NULL, "descriptor", descriptors, {0}, 0, 0},
+    {NULL, "time_encoding", time_codes, {0}, 0, 0},
+    {NULL, "rotation_method", rotations, {0}, 0, 0},
+    {"optimization", "epochs", NULL, {"epochs"}, 0, 0},
+    {"optimization", "edgeloss", NULL, {"isometry"}, 0, 0},
+    {"optimization", "time_smoothing", confidences, {0}, 0, 0},
+    {"optimization", "catchup_scaling", catch_ups, {0}, 0, 0},
+    {"grid", "base_res", NULL, {"grid-base"}, 0, 0},
+    {"grid", "increase_per_level", NULL, {"grid-step"}, 0, 0},
+    {"grid", "n_level", NULL, {"grid-levels"}, 0, 0},
+    {"grid", "lr_adapt", NULL, {"grid-rate-growth"}, 0, 0},
+    {"grid", "local_lambda_adapt", NULL, {"lambda-growth"}, 0, 0},
+    {"grid", "smoothness", NULL, {"lambda"}, 0, 0},
+    {"grid", "lr", NULL, {"grid-rate"}, 0, 0},
+    {"mlp", "hidden", NULL, {"width-1", "width-2"}, 0, 0},
+    {"mlp", "layers", NULL, {0}, 0, 3},
+    {"mlp", "point_dim", NULL, {0}, 0, 30},
+    {"mlp", "normal_dim", NULL, {0}, 0, 2},
+    {"mlp", "time_dim", NULL, {"time-frequencies"}, 2, 0},
+};
+enum { RULES = sizeof rules / sizeof *rules };
+
+typedef struct unmatched {
+    char text[512];
+    size_t count;
+} unmatched;
+
+static void name_unmatched(unmatched *u, const char *section, const char *key, const json_t *value)
+{
+    size_t used = strlen(u->text);
+    char *shown = json_is_string(value) || json_is_number(value)
+                      ? json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(6))
+                      : NULL;
+    snprintf(u->text + used, sizeof u->text - used, "%s%s%s%s%s%s", u->count ? ", " : "",
+             section ? section : "", section ? "." : "", key, shown ? " = " : "", shown ? shown : "");
+    free(shown);
+    u->count++;
+}
+
+static npg_status set_number(npg_options *options, const rule *r, double value)
+{
+    char text[64];
+    if (r->divide_by > 0) value /= r->divide_by;
+    snprintf(text, sizeof text, "%.15g", value);
+    for (size_t i = 0; i < 2 && r->options[i]; i++) NPG_TRY(npg_options_set(options, r->options[i], text));
+    return NPG_OK;
+}
+
+static npg_status apply(npg_options *options, const rule *r, const json_t *value, unmatched *u)
+{
+    if (r->words && !json_is_string(value)) return npg_error(NPG_USAGE, "not a word");
+    if (!r->words && !json_is_number(value)) return npg_error(NPG_USAGE, "not a number");
+    if (r->words) {
+        const word *w = r->words;
+        while (w->theirs && strcmp(w->theirs, json_string_value(value)) != 0) w++;
+        if (!w->theirs) name_unmatched(u, r->section, r->key, value);
+        return w->option ? npg_options_set(options, w->option, w->ours) : NPG_OK;
+    }
+    if (r->options[0]) return set_number(options, r, json_number_value(value));
+    if (json_number_value(value) != r->fixed) name_unmatched(u, r->section, r->key, value);
+    return NPG_OK;
+}
+
+static const json_t *section_of(const json_t *root, const rule *r)
+{
+    return r->section ? json_object_get(root, r->section) : root;
+}
+
+/* Everything in one object that no rule knows. */
+static void find_unknown(unmatched *u, json_t *object, const char *section)
+{
+    const char *key;
+    const json_t *value;
+    json_object_foreach(object, key, value)
+    {
+        bool known = !section && json_is_object(value) &&
+                     (!strcmp(key, "optimization") || !strcmp(key, "grid") || !strcmp(key, "mlp"));
+        for (size_t i = 0; i < RULES && !known; i++) {
+            const char *in = rules[i].section;
+            known = !strcmp(rules[i].key, key) && (in && section ? !strcmp(in, section) : in == section);
+        }
+        if (!known) name_unmatched(u, section, key, NULL);
+    }
+}
+
+static npg_status apply_all(npg_options *options, json_t *root, const char *path)
+{
+    unmatched u = {.count = 0};
+    NPG_TRY(npg_options_set(options, "preset", "paper"));
+    for (size_t i = 0; i < RULES; i++) {
+        const rule *r = &rules[i];
+        const json_t *value = json_object_get(section_of(root, r), r->key);
+        npg_status status = value ? apply(options, r, value, &u) : NPG_OK;
+        if (status)
+            return npg_error_prefix(status, "%s: %s%s%s", path, r->section ? r->section : "",
+                                    r->section ? "." : "", r->key);
+    }
+    find_unknown(&u, root, NULL);
+    find_unknown(&u, json_object_get(root, "optimization"), "optimization");
+    find_unknown(&u, json_object_get(root, "grid"), "grid");
+    find_unknown(&u, json_object_get(root, "mlp"), "mlp");
+    if (u.count)
+        fprintf(stderr, "neupig: warning: %s: no counterpart here, so without effect: %s\n", path, u.text);
+    return NPG_OK;
+}
+
+static bool is_method_config(const json_t *root)
+{
+    return json_is_object(json_object_get(root, "optimization")) ||
+           json_is_object(json_object_get(root, "grid")) || json_is_object(json_object_get(root, "mlp"));
+}
+
+npg_status npg_config_load(npg_options *options, const char *path)
+{
+    json_error_t error;
+    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &error);
+    npg_status status =
+        is_method_config(root) ? apply_all(options, root, path) : npg_options_load(options, path);
+    json_decref(root);
+    return status;
+}

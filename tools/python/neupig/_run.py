@@ -1,0 +1,361 @@
+"""Runs: from files to files, or arrays in and arrays out."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import logging
+import os
+import pathlib
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from ctypes import POINTER, byref, c_double, c_float, c_void_p, sizeof
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, NamedTuple, TypeVar, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _library as native
+from ._library import Error, Status, check, lib
+from ._options import Options
+
+Path = Union[str, "os.PathLike[str]"]
+Result = TypeVar("Result")
+
+_log = logging.getLogger("neupig")
+_LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
+
+
+class Progress(NamedTuple):
+    """How far a run is.  ``left_s`` and ``frames`` are negative while they can't be told."""
+
+    stage: str
+    share: float
+    elapsed_s: float
+    left_s: float
+    frames_done: int
+    frames: int
+    step: int
+    steps: int
+    window: int
+    windows: int
+    loss: float
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of the moving mesh."""
+
+    index: int  #: position in the sequence
+    number: int  #: the number in its file's name, or pushed
+    vertices: npt.NDArray[np.float64]  #: V x 3, world coordinates
+    faces: npt.NDArray[np.uint32]  #: F x 3, the same in every frame
+    residual: float  #: median distance points -> surface, in diagonals of the box
+    coverage: float  #: share of the surface that has points near it
+
+
+class Motion(NamedTuple):
+    """A moving mesh in the order of time."""
+
+    numbers: npt.NDArray[np.int64]  #: T
+    vertices: npt.NDArray[np.float64]  #: T x V x 3
+    faces: npt.NDArray[np.uint32]  #: F x 3
+    residuals: npt.NDArray[np.float64]  #: T
+    coverages: npt.NDArray[np.float64]  #: T
+
+
+class Outcome(NamedTuple):
+    """How a run over files ended: OK, or PARTIAL with frames skipped or below the quality bar."""
+
+    status: Status
+    output: pathlib.Path
+    done: dict[str, Any]  #: what done.json says: files with checksums, options, figures
+
+
+class FrameView:
+    """A frame on its way through the chain, for a Stage.  Arrays are views of the run's own memory, good until the
+    callback returns: change them in place, set ``keep`` to False to drop points.
+
+    A point in the world is ``points_origin + points[i]``, a vertex ``vertices_origin + vertices_unit * vertices[v]``.
+    """
+
+    def __init__(self, view: native.FrameViewStruct) -> None:
+        n, v, f = view.point_count, view.vertex_count, view.face_count
+        self.index: int = view.index
+        self.number: int = view.number
+        self.path: str | None = os.fsdecode(view.path) if view.path else None
+        self.points: npt.NDArray[np.float32] = _view(view.points, n)
+        self.normals: npt.NDArray[np.float32] | None = _view(view.normals, n) if view.normals else None
+        self.keep: npt.NDArray[np.bool_] = (
+            np.ctypeslib.as_array(view.keep, (n,)).view(np.bool_) if n else np.zeros(0, np.bool_))
+        self.points_origin: npt.NDArray[np.float64] = np.array(view.points_origin)
+        self.vertices: npt.NDArray[np.float32] | None = _view(view.vertices, v) if view.vertices else None
+        self.faces: npt.NDArray[np.uint32] | None = (
+            np.ctypeslib.as_array(view.faces, (f, 3)) if view.faces else None)
+        self.vertices_origin: npt.NDArray[np.float64] = np.array(view.vertices_origin)
+        self.vertices_unit: float = view.vertices_unit
+        self.residual: float = view.residual
+        self.coverage: float = view.coverage
+
+
+def _view(pointer: Any, count: int) -> npt.NDArray[np.float32]:
+    return np.ctypeslib.as_array(pointer, (count, 3)) if count else np.zeros((0, 3), np.float32)
+
+
+class Stage(NamedTuple):
+    """A stage of one's own, after one of ingest, outlier, keyframe, mesh, align, optimize, evaluate, export.
+
+    ``frame`` is called on a thread of the run.  After ingest and outlier it sees every frame up to four times and must
+    do the same each time.  An exception in it ends the run and is raised again by ``wait``.
+    """
+
+    name: str
+    after: str
+    frame: Callable[[FrameView], None]
+
+
+class Run:
+    """A run: frames come from files (``input``), or are pushed; results go to a folder (``output``), are pulled
+    (``pull=True``), or both.
+
+    >>> with Run(pull=True, epochs=100) as run:
+    ...     # push from one thread, pull in another: each waits for the other
+    ...     for mesh in run: ...
+
+    The log goes to the logger "neupig"; ``progress`` is called with a Progress on a thread of the run.
+    """
+
+    def __init__(self, *, progress: Callable[[Progress], None] | None = None, stages: Sequence[Stage] = (),
+                 options: Options | None = None, **values: object) -> None:
+        self._handle = c_void_p()
+        self._failure: BaseException | None = None
+        self._closing = threading.Lock()
+        chosen = options or Options()
+        for name, value in values.items():
+            chosen.set(name, value)
+        self._callbacks: list[Any] = []  # must live as long as the run
+        for stage in stages:
+            self._add_stage(chosen, stage)
+        self._hooks = self._make_hooks(progress)
+        check(lib.npg_run_open(byref(self._handle), chosen.handle, byref(self._hooks)))
+
+    def _patiently(self, work: Callable[[], Result]) -> Result:
+        """Call a function of the library that blocks so that Ctrl-C still reaches Python's main thread: it stops the run,
+        and the call is over before the exception goes on."""
+        if threading.current_thread() is not threading.main_thread():
+            return work()
+        outcome: list[Result] = []
+        failure: list[BaseException] = []
+
+        def body() -> None:
+            try:
+                outcome.append(work())
+            except BaseException as error:  # handed to the caller's thread
+                failure.append(error)
+
+        thread = threading.Thread(target=body, daemon=True)
+        thread.start()
+        try:
+            thread.join()
+        except BaseException:
+            self.stop()
+            thread.join()
+            raise
+        if failure:
+            raise failure[0]
+        return outcome[0]
+
+    # ---- callbacks ----
+
+    def _add_stage(self, options: Options, stage: Stage) -> None:
+        def frame(_user: object, view: Any) -> int:
+            try:
+                stage.frame(FrameView(view.contents))
+                return Status.OK
+            except BaseException as failure:  # nothing may pass through C
+                self._failure = failure
+                words = f"{type(failure).__name__}: {failure}"
+                return int(lib.npg_error_set(Status.FAILED, words.encode(errors="replace")))
+
+        function = native.FrameFunction(frame)
+        self._callbacks.append(function)
+        given = native.OwnStageStruct(sizeof(native.OwnStageStruct), stage.name.encode(), stage.after.encode(), None,
+                                      function)
+        check(lib.npg_options_add_stage(options.handle, byref(given)))
+
+    def _make_hooks(self, progress: Callable[[Progress], None] | None) -> native.HooksStruct:
+        def log(_user: object, record: Any) -> None:
+            r = record.contents
+            _log.log(_LEVELS[r.level], "%s: %s", r.stage.decode(), r.message.decode(errors="replace"))
+
+        def tell(_user: object, record: Any) -> None:
+            p = record.contents
+            if progress:
+                progress(Progress(p.stage.decode(), p.share, p.elapsed_s, p.left_s, p.frames_done, p.frames, p.step,
+                                  p.steps, p.window, p.windows, p.loss))
+
+        functions = (native.LogFunction(log), native.ProgressFunction(tell))
+        return native.HooksStruct(sizeof(native.HooksStruct), None, *functions)
+
+    def _check(self, status: int) -> Status:
+        """As check(), but what a stage of one's own raised is raised again."""
+        try:
+            return check(status)
+        except Error as error:
+            if self._failure is not None:
+                raise self._failure from error
+            raise
+
+    def _open(self) -> c_void_p:
+        if not self._handle:
+            raise Error(Status.USAGE, "the run is closed")
+        return self._handle
+
+    # ---- frames in, meshes out ----
+
+    def push(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None, *, number: int) -> None:
+        """Give the run its next frame: N x 3 points in the world, N x 3 normals.  Waits while the run is busy.  Numbers
+        must grow.  Copies."""
+        p = np.ascontiguousarray(points, np.float64)
+        n = None if normals is None else np.ascontiguousarray(normals, np.float32)
+        if p.ndim != 2 or p.shape[1] != 3 or (n is not None and n.shape != p.shape):
+            raise Error(Status.USAGE, f"points must be N x 3 and normals the same, not {p.shape}"
+                                      + ("" if n is None else f" and {n.shape}"))
+        cloud = native.CloudStruct(sizeof(native.CloudStruct), number, len(p), p.ctypes.data_as(POINTER(c_double)),
+                                   None if n is None else n.ctypes.data_as(POINTER(c_float)))
+        handle = self._open()
+        self._patiently(lambda: self._check(lib.npg_run_push(handle, byref(cloud))))
+
+    def finish(self) -> None:
+        """Say that no more frames will be pushed."""
+        self._check(lib.npg_run_finish(self._open()))
+
+    def pull(self) -> Frame | None:
+        """The next finished frame, None after the last.  Frames come as windows close, not in time order."""
+        handle = self._open()
+        result = POINTER(native.ResultStruct)()
+        status = self._patiently(lambda: self._check(lib.npg_run_pull(handle, byref(result))))
+        if status is not Status.OK:
+            if status is Status.STOPPED:
+                raise Error(status, "stopped on request")
+            return None
+        r = result.contents
+        try:
+            return Frame(r.index, r.number, np.ctypeslib.as_array(r.vertices, (r.vertex_count, 3)).copy(),
+                         np.ctypeslib.as_array(r.faces, (r.face_count, 3)).copy(), r.residual, r.coverage)
+        finally:
+            lib.npg_result_close(byref(result))
+
+    def __iter__(self) -> Iterator[Frame]:
+        while (frame := self.pull()) is not None:
+            yield frame
+
+    # ---- the end ----
+
+    def wait(self) -> Status:
+        """Wait for the end: OK, PARTIAL or STOPPED; a failure is raised."""
+        handle = self._open()
+        return self._patiently(lambda: self._check(lib.npg_run_wait(handle)))
+
+    def stop(self) -> None:
+        """Ask the run to stop soon; from any thread."""
+        if self._handle:
+            lib.npg_run_stop(self._handle)
+
+    def close(self) -> None:
+        """Stop the run if it is going on and free everything.  No other thread may be in push, pull or wait."""
+        with self._closing:
+            if self._handle:
+                lib.npg_run_close(byref(self._handle))
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None):
+            self.close()
+
+
+def _wait_for_files(run: Run, output: Path) -> Outcome:
+    with run:
+        status = run.wait()
+    if status is Status.STOPPED:
+        raise Error(status, "stopped on request")
+    folder = pathlib.Path(os.fsdecode(output))
+    return Outcome(status, folder, json.loads((folder / "done.json").read_text(encoding="utf-8")))
+
+
+def run(input: Path, output: Path, *, progress: Callable[[Progress], None] | None = None,
+        stages: Sequence[Stage] = (), **options: object) -> Outcome:
+    """Turn a capture (folder, pattern, list file) into a folder of meshes, as ``neupig run`` does.
+
+    Options are those of the command with _ for -: ``run("capture", "out", epochs=100, max_memory=2000)``.  A run that
+    was stopped or killed goes on where it was when it is started again."""
+    chosen = Options({**options, "input": input, "output": output})
+    return _wait_for_files(Run(options=chosen, progress=progress, stages=stages), output)
+
+
+def append(output: Path, *, input: Path | None = None,
+           progress: Callable[[Progress], None] | None = None, stages: Sequence[Stage] = ()) -> Outcome:
+    """Go on with frames that came since the run into ``output`` was done, as ``neupig append`` does; ``input`` says where
+    the frames are now if they were moved.  A job that was broken off is first brought to its end."""
+    def options() -> Options:
+        chosen = Options()
+        chosen.load_job(output)
+        if input is not None:
+            chosen.set("input", input)
+        return chosen
+
+    if not os.path.exists(os.path.join(output, "done.json")):
+        _wait_for_files(Run(options=options(), progress=progress, stages=stages), output)
+    return _wait_for_files(Run(options=options(), progress=progress, stages=stages, append=True), output)
+
+
+Cloud = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike]]
+
+
+def _push_all(run: Run, frames: Iterable[Cloud], failures: list[BaseException]) -> None:
+    try:
+        for number, frame in enumerate(frames):
+            if isinstance(frame, tuple):
+                run.push(frame[0], frame[1], number=number)
+            else:
+                run.push(frame, number=number)
+        run.finish()
+    except BaseException as failure:  # raised again where the meshes are pulled
+        failures.append(failure)
+        run.stop()
+
+
+def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None] | None = None,
+                stages: Sequence[Stage] = (), **options: object) -> Motion:
+    """Arrays in, a moving mesh out.  ``frames`` gives N x 3 points, or (points, normals), in time order; it is read on a
+    thread of its own, as fast as the run can take it.  The keyframe is chosen inside the look-ahead, as for a live
+    source: name a better one with ``keyframe=NUMBER``.  When the run fails this returns once ``frames`` has given its next
+    frame."""
+    failures: list[BaseException] = []
+    with Run(options=Options({**options, "pull": True}), progress=progress, stages=stages) as run:
+        pusher = threading.Thread(target=_push_all, args=(run, frames, failures), daemon=True)
+        pusher.start()
+        try:
+            meshes = sorted(run, key=lambda mesh: mesh.index)
+            run.wait()
+        except BaseException as error:
+            run.stop()
+            pusher.join()
+            if failures and isinstance(error, Error) and error.status is Status.STOPPED:
+                raise failures[0] from None  # what made it stop
+            raise
+        pusher.join()
+    if failures:
+        raise failures[0]
+    if not meshes:
+        raise Error(Status.BAD_INPUT, "no frame got a mesh")
+    return Motion(np.array([m.number for m in meshes], np.int64), np.stack([m.vertices for m in meshes]),
+                  meshes[0].faces, np.array([m.residual for m in meshes]), np.array([m.coverage for m in meshes]))

@@ -1,0 +1,133 @@
+/* neupig batch: many captures, each in a folder and a process of its own. */
+#include <stddef.h>
+#include <string.h>
+
+#include "batch_estimate.h"
+#include "batch_run.h"
+#include "batch_table.h"
+#include "batch_verdict.h"
+#include "cli.h"
+
+typedef struct settings {
+    const char *config;
+    int progress;
+    bool quiet, verbose, dry_run, list, report;
+    int64_t jobs, task_index, task_count;
+    double max_time_s;
+} settings;
+
+#define AT(member) offsetof(settings, member)
+
+const npg_option npg_batch_options[] = {
+    {"config",
+     "Options for all captures from a JSON object in FILE, or a method configuration of the paper's "
+     "published code "
+     "(also -c)",
+     NPG_OPTION_TEXT, AT(config), "", 0, 0, NULL, "FILE"},
+    {"jobs", "Captures at work at the same time; each uses all cores", NPG_OPTION_INT, AT(jobs), "1", 1, 256,
+     NULL, "N"},
+    {"max-time",
+     "Stop a capture after this many seconds, 0: no limit; started again it goes on; -1: as the manifest "
+     "says",
+     NPG_OPTION_REAL, AT(max_time_s), "-1", -1, 1e9, NULL, "SECONDS"},
+    {"dry-run", "Only say what the captures hold and would take in memory, disk and time", NPG_OPTION_FLAG,
+     AT(dry_run), "no", 0, 0, NULL, NULL},
+    {"list", "Only print the names of the captures, one per line", NPG_OPTION_FLAG, AT(list), "no", 0, 0,
+     NULL, NULL},
+    {"report",
+     "Only write batch.json and batch.html and print the table of what is there; the exit code is that of "
+     "all",
+     NPG_OPTION_FLAG, AT(report), "no", 0, 0, NULL, NULL},
+    {"task-index", "With several processes or machines: the number of this one, from 0", NPG_OPTION_INT,
+     AT(task_index), "0", 0, 1e6, NULL, "I"},
+    {"task-count", "... of so many; each capture is done by exactly one", NPG_OPTION_INT, AT(task_count), "1",
+     1, 1e6, NULL, "N"},
+    {"progress",
+     "How to show progress; json writes one line per event to standard output; auto: a bar on a terminal",
+     NPG_OPTION_CHOICE, AT(progress), "auto", 0, 0, "auto|bar|json|none", NULL},
+    {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, AT(quiet), "no", 0, 0, NULL, NULL},
+    {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, AT(verbose), "no", 0, 0, NULL, NULL},
+    {0}};
+
+static void print_names(const npg_batch *batch)
+{
+    for (size_t i = 0; i < batch->count; i++)
+        if (npg_batch_is_mine(batch, i)) puts(batch->captures[i].name);
+}
+
+static npg_status status_of(const npg_batch *batch, int exit_code)
+{
+    size_t mine = 0, bad = 0;
+    for (size_t i = 0; i < batch->count; i++) {
+        mine += npg_batch_is_mine(batch, i);
+        bad += npg_batch_is_mine(batch, i) && !npg_verdict_is_done(&batch->captures[i].verdict);
+    }
+    if (exit_code == 1)
+        return npg_error(NPG_FAILED, "%zu of %zu captures are not done; see %s/batch.html", bad, mine,
+                         batch->output);
+    return exit_code == 7 ? NPG_PARTIAL : exit_code == 75 ? NPG_STOPPED : NPG_OK;
+}
+
+static npg_status run(npg_batch *batch, const settings *s)
+{
+    npg_reporter reporter;
+    bool stopped;
+    npg_reporter_init(&reporter, s->progress, s->quiet, s->verbose);
+    npg_status status = npg_batch_run(batch, &reporter, (size_t)s->jobs, &stopped);
+    npg_reporter_pause(&reporter);
+    if (!status) status = npg_batch_report(batch, reporter.show == NPG_SHOW_JSON ? NULL : stdout);
+    if (!status) status = status_of(batch, npg_batch_exit_code(batch, false, stopped));
+    npg_reporter_end(&reporter, status, batch->output);
+    if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to go on\n", stderr);
+    if (status == NPG_PARTIAL)
+        fprintf(
+            stderr,
+            "neupig batch: finished, but with frames skipped or below the quality bar; see %s/batch.html\n",
+            batch->output);
+    return status;
+}
+
+/* Whatever process has run the captures. */
+static npg_status report(npg_batch *batch, const settings *s)
+{
+    batch->task_index = 0;
+    batch->task_count = 1;
+    for (size_t i = 0; i < batch->count; i++)
+        npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
+    NPG_TRY(npg_batch_report(batch, s->quiet ? NULL : stdout));
+    return status_of(batch, npg_batch_exit_code(batch, true, false));
+}
+
+static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settings *s)
+{
+    const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s};
+    if (s->task_index >= s->task_count)
+        return npg_error(NPG_USAGE,
+                         "option task-index: %lld is not below the task-count of %lld; the first task is 0",
+                         (long long)s->task_index, (long long)s->task_count);
+    NPG_TRY(npg_batch_open(batch, cli->operands[0], &given));
+    (*batch)->task_index = (size_t)s->task_index;
+    (*batch)->task_count = (size_t)s->task_count;
+    return NPG_OK;
+}
+
+int npg_verb_batch(int argc, char **argv)
+{
+    settings s;
+    npg_cli cli;
+    npg_batch *batch = NULL;
+    npg_options *options = NULL;
+    int code = 0;
+    npg_status status = npg_options_open(&options);
+    if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
+    if (!status) status = open_batch(&batch, &cli, &s);
+    if (!status && s.list)
+        print_names(batch);
+    else if (!status && s.dry_run)
+        status = npg_batch_estimate(batch, s.progress == NPG_SHOW_JSON, &code);
+    else if (!status)
+        status = s.report ? report(batch, &s) : run(batch, &s);
+    npg_batch_close(&batch);
+    npg_options_close(&options);
+    return status ? npg_cli_end(argv[0], status) : code;
+}
