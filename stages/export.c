@@ -94,7 +94,7 @@ static int by_value(const void *left, const void *right)
     return a < b ? -1 : a > b;
 }
 
-static bool is_same_folder(const char *a, const char *b)
+static bool is_same_file(const char *a, const char *b)
 {
     struct stat of_a, of_b;
     return !stat(a, &of_a) && !stat(b, &of_b) && of_a.st_dev == of_b.st_dev && of_a.st_ino == of_b.st_ino;
@@ -109,7 +109,7 @@ static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
     NPG_TRY(npg_copy_text(&folder, frame->path));
     folder[slash - frame->path] = 0;
     npg_status status = npg_join_path(&meshes, output, "meshes");
-    if (!status && is_same_folder(folder, meshes))
+    if (!status && is_same_file(folder, meshes))
         status = npg_error(NPG_USAGE,
                            "%s is an input, and this run's meshes would be written over it: choose another "
                            "output folder than %s",
@@ -117,6 +117,25 @@ static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
     npg_release(&folder);
     npg_release(&meshes);
     return status;
+}
+
+/* The user's own mesh must not be one of the files that a run makes anew. */
+static npg_status check_reference(const npg_worker *worker)
+{
+    static const char *const names[] = {"reference.ply", "reference.obj"};
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
+    for (size_t i = 0; reference && reference[0] && i < sizeof names / sizeof *names; i++) {
+        char *path;
+        NPG_TRY(npg_join_path(&path, output_of(worker), names[i]));
+        bool is_ours = is_same_file(path, reference);
+        npg_release(&path);
+        if (is_ours)
+            return npg_error(NPG_USAGE,
+                             "option reference: %s lies where this run writes: copy it, or choose another "
+                             "output folder",
+                             reference);
+    }
+    return NPG_OK;
 }
 
 static npg_status note_number(npg_worker *worker, const npg_frame *frame)
@@ -367,6 +386,10 @@ static npg_status write_forms(npg_worker *worker)
     if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
     npg_release(&rest);
     npg_release(&corners);
+    if (!status && npg_forms_name(state->exports, "vdb") && !facts.has_grids)
+        npg_worker_warn(
+            worker, false, -1,
+            "vdb has no latent grids: a run without a job folder (live, or pulled from) keeps none");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
@@ -437,6 +460,7 @@ static npg_status init(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     NPG_TRY(read_options(worker));
     if (!output_of(worker)[0]) return NPG_OK;
+    NPG_TRY(check_reference(worker));
     if (npg_worker_settings(worker)->confine) NPG_TRY(check_own(worker));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
         NPG_TRY(npg_folder_probe(output_of(worker)));

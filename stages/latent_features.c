@@ -100,7 +100,8 @@ static void largest_eigenvector(double *direction, double *share, double *m, dou
 
 static void fill_covariance(double *m, double *mean, const double *values, size_t count, size_t n)
 {
-    for (size_t i = 0; i < count * n; i++) mean[i % n] += values[i] / (double)count;
+    for (size_t i = 0; i < count * n; i++) mean[i % n] += values[i];
+    for (size_t c = 0; c < n && count; c++) mean[c] /= (double)count;
     for (size_t i = 0; i < count; i++)
         for (size_t p = 0; p < n; p++)
             for (size_t q = 0; q < n; q++)

@@ -134,4 +134,8 @@ END
     [ "$status" -eq 2 ]
     [[ "$output" == *"npz can't hold the capture"*"set centre"* ]]
     [ ! -e no/meshes ]
+    run "$NEUPIG" run capture/points -o whole "${small[@]}" --restart --reference whole/reference.ply
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"lies where this run writes"* ]]
+    [ -e whole/done.json ]
 }
