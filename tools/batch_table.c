@@ -70,7 +70,7 @@ static npg_status write_json(const npg_batch *batch, const npg_capture_figures *
     json_t *root = json_pack("{s:s,s:o,s:o,s:i,s:o}", "neupig", npg_version(), "batch",
                              npg_json_text(batch->path), "output", npg_json_text(batch->output), "exit_code",
                              npg_batch_exit_code(batch, true, false), "captures", captures);
-    npg_status status = root ? npg_json_write(root, batch->output, "batch.json")
+    npg_status status = root ? npg_json_write(batch->output, "batch.json", root)
                              : npg_error(NPG_MEMORY, "no memory for batch.json");
     json_decref(root);
     return status;

@@ -85,23 +85,6 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
 
 /* ---- the file ---- */
 
-npg_status npg_json_write(const json_t *value, const char *folder, const char *name)
-{
-    char *path, *text = json_dumps(value, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-    npg_file *file = NULL;
-    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", name);
-    npg_status status = npg_join_path(&path, folder, name);
-    if (!status) status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
-    npg_release(&path);
-    free(text);
-    return status;
-}
-
 json_t *npg_verdict_json(const npg_capture *capture)
 {
     const npg_verdict *v = &capture->verdict;
@@ -119,7 +102,7 @@ json_t *npg_verdict_json(const npg_capture *capture)
 npg_status npg_verdict_write(const npg_capture *capture)
 {
     json_t *object = npg_verdict_json(capture);
-    npg_status status = object ? npg_json_write(object, capture->output, FILE_NAME)
+    npg_status status = object ? npg_json_write(capture->output, FILE_NAME, object)
                                : npg_error(NPG_MEMORY, "no memory for a verdict");
     json_decref(object);
     return status;

@@ -34,7 +34,4 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped);
 /* An object of name, input, output and what verdict.json says. */
 json_t *npg_verdict_json(const npg_capture *capture);
 
-/* Write `value` to a file that appears whole. */
-npg_status npg_json_write(const json_t *value, const char *folder, const char *name);
-
 #endif
