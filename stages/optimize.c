@@ -35,7 +35,7 @@ typedef struct state {
 #define CHOICE_OPTION NPG_OPTION_CHOICE
 
 static const npg_option options[] = {
-    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "30", 0, 1e6, NULL, "N"},
+    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "10", 0, 1e6, NULL, "N"},
     {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
      0, "quaternion|cayley|exponential", NULL},
     {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,
@@ -75,6 +75,10 @@ static const npg_option options[] = {
      AT(feature_start), "3", 0, 1e3, NULL, NULL},
     {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
      AT(rate_end), "0.1", 0, 1, NULL, NULL},
+    {"aligned-rate",
+     "share of the learning rates where frames come aligned: the fit then starts beside its goal, and full "
+     "steps would first lead away from it",
+     REAL_OPTION, offsetof(state, window_settings.aligned_rate), "0.1", 0, 100, NULL, NULL},
     {"samples", "vertices of aligned frames that are fitted and carry the others, 0: all", INT_OPTION,
      offsetof(state, window_settings.samples), "1500", 0, 1e6, NULL, "N"},
     {"rounds", "times in a window's fit that aligned frames are matched with their points", INT_OPTION,

@@ -58,13 +58,17 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     s->settings = *settings;
     s->facts = facts;
     s->is_aligned = is_aligned;
+    if (is_aligned) {
+        s->settings.fit.grid_rate *= settings->aligned_rate;
+        s->settings.fit.mlp_rate *= settings->aligned_rate;
+    }
     npg_status status = NPG_OK;
     if (is_aligned) status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples);
     if (is_aligned && !status)
         status = npg_matcher_open(&s->matcher, s->carry, facts->reference, &settings->match);
     if (!status)
-        status = npg_fit_open(&s->fit, device, &settings->fit, is_aligned ? s->carry->mesh : facts->reference,
-                              seed);
+        status = npg_fit_open(&s->fit, device, &s->settings.fit,
+                              is_aligned ? s->carry->mesh : facts->reference, seed);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;

@@ -14,8 +14,9 @@
 typedef struct npg_window_settings {
     npg_fit_settings fit;
     npg_match_settings match;
-    int64_t samples; /* 0: all vertices             */
-    int64_t rounds;  /* times the matches are made  */
+    int64_t samples;     /* 0: all vertices             */
+    int64_t rounds;      /* times the matches are made  */
+    double aligned_rate; /* share of the fit's learning rates where frames come aligned */
 } npg_window_settings;
 
 /* A frame in hand. */
