@@ -242,11 +242,20 @@ bool npg_options_is_set(const npg_options *options, const char *name)
     return find(options, name, &at) && options->texts[at];
 }
 
+/* The preset by name; quality best is one as well, where no other is named. */
+static const char *chosen_preset(const npg_options *options)
+{
+    size_t at, quality;
+    const npg_option *option = find(options, "preset", &at);
+    if (options->texts[at]) return options->texts[at];
+    bool is_best = find(options, "quality", &quality) && options->texts[quality] &&
+                   !strcmp(options->texts[quality], "best");
+    return is_best ? "best" : option->default_text;
+}
+
 static const char *text_of_preset(const npg_options *options, const char *name)
 {
-    size_t at;
-    const npg_option *option = find(options, "preset", &at);
-    const char *chosen = options->texts[at] ? options->texts[at] : option->default_text;
+    const char *chosen = chosen_preset(options);
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
         if (strcmp(preset->name, chosen) != 0) continue;
         for (const npg_preset_value *value = preset->values; value->name; value++)
@@ -258,7 +267,8 @@ static const char *text_of_preset(const npg_options *options, const char *name)
 static const char *text_of(const npg_options *options, const npg_option *option, size_t at)
 {
     const char *text = options->texts[at];
-    if (!text && strcmp(option->name, "preset") != 0) text = text_of_preset(options, option->name);
+    bool is_chooser = !strcmp(option->name, "preset") || !strcmp(option->name, "quality");
+    if (!text && !is_chooser) text = text_of_preset(options, option->name);
     return text ? text : option->default_text;
 }
 

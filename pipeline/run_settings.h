@@ -6,7 +6,7 @@
 
 typedef struct npg_settings {
     const char *input, *follow, *output, *device, *tuning;
-    int preset;
+    int preset, quality; /* places of their words */
     int64_t seed;
     int64_t ring_capacity;  /* chunks per ring                        */
     int64_t chunk_frames;   /* frames per chunk                       */

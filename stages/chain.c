@@ -26,9 +26,11 @@ static const npg_preset_value paper[] = {{"align", "no"},
                                          {"rate-end", "1"},
                                          {"feature-start", "0"},
                                          {NULL, NULL}};
+static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps", "20"}, {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
 
 const npg_preset npg_presets[] = {
     {"default", "coarse alignment, then windows of few samples", none},
+    {"best", "the same with a finer graph and more steps: slower, closer", best},
     {"paper", "the method as the paper has it: every vertex, from the reference, one joint window", paper},
     {NULL, NULL, NULL}};

@@ -312,6 +312,22 @@ static int close_folder(void **state)
     return 0;
 }
 
+static void quality_best_is_the_preset_unless_another_is_named(void **state)
+{
+    (void)state;
+    npg_options *options;
+    assert_int_equal(npg_options_open(&options), NPG_OK);
+    char usual[32];
+    snprintf(usual, sizeof usual, "%s", npg_options_get(options, "align-nodes"));
+    assert_int_equal(npg_options_set(options, "quality", "best"), NPG_OK);
+    assert_string_not_equal(npg_options_get(options, "align-nodes"), usual);
+    assert_string_equal(npg_options_get(options, "preset"), "default");
+    assert_int_equal(npg_options_set(options, "preset", "paper"), NPG_OK);
+    assert_string_equal(npg_options_get(options, "align-nodes"), usual);
+    assert_string_equal(npg_options_get(options, "align"), "no");
+    npg_options_close(&options);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -321,6 +337,7 @@ int main(void)
         cmocka_unit_test(a_table_outside_the_chain_gets_defaults),
         cmocka_unit_test(all_options_are_described_and_sound),
         cmocka_unit_test(presets_hold_values_that_are_accepted),
+        cmocka_unit_test(quality_best_is_the_preset_unless_another_is_named),
         cmocka_unit_test(numbers_do_not_depend_on_the_locale),
         cmocka_unit_test(a_file_sets_options),
         cmocka_unit_test(a_bad_file_is_named_with_its_line),
