@@ -71,10 +71,15 @@ npg_status npg_buffer_zero(npg_buffer *buffer);
 npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *data, size_t size);
 
 /* Build kernels/<name>.cl with the given build constants ("-DW1=512 ...", may be "") and those of the tuning.
- * The device owns the program; opened twice it is the same one, and lasts until the device is closed. */
+ * The device owns the program; the same text and constants opened twice are the same one, and lasts until the
+ * device is closed. */
 npg_status npg_program_open(npg_program **program, npg_device *device, const char *name,
                             const char *constants);
 void npg_program_close(npg_program **program);
+
+/* The device was found to compute wrong: nothing that was built on it is kept in the cache, and what came
+ * from there is removed, so that the next process builds from the text. */
+void npg_device_distrust(npg_device *device);
 
 /* One argument of a kernel. */
 typedef struct npg_argument {

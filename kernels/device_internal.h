@@ -18,9 +18,11 @@ struct npg_device {
     cl_context context;
     cl_command_queue queue;
     npg_program *programs; /* built so far, owned */
+    bool is_distrusted;    /* it has computed wrong: none of its programs goes into the cache */
 };
 
-/* Release all programs; those that were built from their text are put into the cache first. */
+/* Release all programs; those that were built from their text are put into the cache first, unless the device
+ * is distrusted. */
 void npg_programs_close(npg_device *device);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "check.h"
 
-npg_status npg_kernels_self_test(npg_device *device)
+static npg_status check_all(npg_device *device)
 {
     for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++) {
         double error = 0;
@@ -13,6 +13,13 @@ npg_status npg_kernels_self_test(npg_device *device)
                              npg_device_facts(device)->name, c->op, error, c->tolerance);
     }
     return NPG_OK;
+}
+
+npg_status npg_kernels_self_test(npg_device *device)
+{
+    npg_status status = check_all(device);
+    if (status == NPG_DEVICE) npg_device_distrust(device);
+    return status;
 }
 
 const npg_kernel_case npg_kernel_cases[] = {

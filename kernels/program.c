@@ -1,8 +1,9 @@
 /* Programs and launches.
  *
- * A device owns the programs that were opened on it: the same source and constants are built once.  Built
+ * A device owns the programs that were opened on it: the same text and constants are built once.  Built
  * programs are kept on disk as the driver's binaries, for to hand a driver the text again costs it a pass of
- * its compiler's front end even when its own cache has the rest. */
+ * its compiler's front end even when its own cache has the rest.  In memory and on disk a program is known by
+ * the hash of all that it is made from, never by its name alone. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,6 +21,7 @@ struct npg_program {
     npg_device *device; /* loan */
     const char *name;   /* of the source, static */
     char constants[CONSTANTS_MAX];
+    uint64_t key; /* hash of text, flags, constants, device and driver */
     bool is_from_text;
     cl_program program;
     cl_kernel kernels[NPG_KERNELS_MAX];
@@ -30,14 +32,20 @@ struct npg_program {
 #define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
 #define FLAGS        "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros "
 
-static const char *source_of(const char *name, const char **static_name)
+static const npg_kernel_source *source_of(const char *name)
 {
     for (const npg_kernel_source *source = npg_kernel_sources; source->name; source++)
-        if (!strcmp(source->name, name)) {
-            *static_name = source->name;
-            return source->text;
-        }
+        if (!strcmp(source->name, name)) return source;
     return NULL;
+}
+
+static uint64_t key_of(const npg_device_info *info, const char *text, const char *constants)
+{
+    const char *parts[] = {text, FLAGS, constants, info->name, info->platform, info->version, info->driver};
+    XXH64_hash_t hash = 0;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        hash = XXH64(parts[i], strlen(parts[i]) + 1, hash);
+    return hash;
 }
 
 /* ---- binaries on disk ---- */
@@ -45,35 +53,30 @@ static const char *source_of(const char *name, const char **static_name)
 /* What stands before the driver's bytes. */
 typedef struct binary_head {
     char magic[8];
+    uint64_t key;        /* of the program */
     uint64_t size, hash; /* of the bytes that follow */
 } binary_head;
 
-static const char binary_magic[8] = "npgcl 1";
+static const char binary_magic[8] = "npgcl 2";
 
-/* Text, constants, device and driver decide which file it is; false: there is no cache. */
-static bool binary_path(char *out, size_t size, const npg_program *program, const char *text)
+/* The key decides which file it is; false: there is no cache. */
+static bool binary_path(char *out, size_t size, const npg_program *program)
 {
-    const npg_device_info *info = &program->device->info;
-    const char *parts[] = {text,           FLAGS,         program->constants, info->name,
-                           info->platform, info->version, info->driver};
     char name[64];
-    XXH64_hash_t hash = 0;
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        hash = XXH64(parts[i], strlen(parts[i]) + 1, hash);
-    snprintf(name, sizeof name, "%s-%016llx.program", program->name, (unsigned long long)hash);
+    snprintf(name, sizeof name, "%s-%016llx.program", program->name, (unsigned long long)program->key);
     return npg_kernel_cache_path(out, size, name);
 }
 
-/* The whole file, or NULL when there is none that is whole. */
-static unsigned char *read_binary(const char *path, size_t *size)
+/* The bytes, or NULL when there is no file that is whole and this program's. */
+static unsigned char *read_binary(const char *path, uint64_t key, size_t *size)
 {
     binary_head head;
     unsigned char *bytes = NULL;
     FILE *file = fopen(path, "rb");
     if (!file) return NULL;
     bool good = fread(&head, sizeof head, 1, file) == 1 &&
-                !memcmp(head.magic, binary_magic, sizeof head.magic) && head.size && head.size < 1u << 28 &&
-                !npg_alloc(&bytes, NPG_FOR_DEVICE, head.size);
+                !memcmp(head.magic, binary_magic, sizeof head.magic) && head.key == key && head.size &&
+                head.size < 1u << 28 && !npg_alloc(&bytes, NPG_FOR_DEVICE, head.size);
     good = good && fread(bytes, 1, head.size, file) == head.size && fgetc(file) == EOF &&
            XXH64(bytes, head.size, 0) == head.hash;
     fclose(file);
@@ -82,13 +85,13 @@ static unsigned char *read_binary(const char *path, size_t *size)
     return bytes;
 }
 
-static bool create_from_binary(npg_program *program, const char *text)
+static bool create_from_binary(npg_program *program)
 {
     char path[4400];
     size_t size;
     cl_int code = 0, status = 0;
-    if (!binary_path(path, sizeof path, program, text)) return false;
-    unsigned char *bytes = read_binary(path, &size);
+    if (!binary_path(path, sizeof path, program)) return false;
+    unsigned char *bytes = read_binary(path, program->key, &size);
     if (!bytes) return false;
     const unsigned char *loan = bytes;
     program->program = clCreateProgramWithBinary(program->device->context, 1, &program->device->id, &size,
@@ -100,10 +103,10 @@ static bool create_from_binary(npg_program *program, const char *text)
     return false;
 }
 
-static npg_status write_binary(const char *path, const unsigned char *bytes, size_t size)
+static npg_status write_binary(const char *path, uint64_t key, const unsigned char *bytes, size_t size)
 {
     npg_file *file;
-    binary_head head = {.size = size, .hash = XXH64(bytes, size, 0)};
+    binary_head head = {.key = key, .size = size, .hash = XXH64(bytes, size, 0)};
     memcpy(head.magic, binary_magic, sizeof head.magic);
     NPG_TRY(npg_file_open(&file, path));
     npg_file_write(file, &head, sizeof head);
@@ -115,17 +118,14 @@ static npg_status write_binary(const char *path, const unsigned char *bytes, siz
 static void keep_binary(const npg_program *program)
 {
     char path[4400];
-    const char *name;
     size_t size = 0;
     unsigned char *bytes;
-    if (!npg_kernel_cache_is_ours() ||
-        !binary_path(path, sizeof path, program, source_of(program->name, &name)))
-        return;
+    if (!npg_kernel_cache_is_ours() || !binary_path(path, sizeof path, program)) return;
     if (clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL) || !size)
         return;
     if (npg_alloc(&bytes, NPG_FOR_DEVICE, size)) return;
     if (!clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL))
-        write_binary(path, bytes, size);
+        write_binary(path, program->key, bytes, size);
     npg_release(&bytes);
 }
 
@@ -158,7 +158,7 @@ static npg_status build_program(npg_program *program, const char *text)
     char flags[sizeof FLAGS + CONSTANTS_MAX];
     cl_int code = 0;
     snprintf(flags, sizeof flags, "%s%s", FLAGS, program->constants);
-    if (create_from_binary(program, text)) {
+    if (create_from_binary(program)) {
         if (!clBuildProgram(program->program, 1, &program->device->id, flags, NULL, NULL))
             return make_kernels(program);
         clReleaseProgram(program->program);
@@ -177,30 +177,31 @@ static void release(npg_program *program)
     npg_release(&program);
 }
 
-static npg_program *find_program(const npg_device *device, const char *name, const char *constants)
+static npg_program *find_program(const npg_device *device, uint64_t key)
 {
     npg_program *program = device->programs;
-    while (program && (strcmp(program->name, name) != 0 || strcmp(program->constants, constants) != 0))
-        program = program->next;
+    while (program && program->key != key) program = program->next;
     return program;
 }
 
 npg_status npg_program_open(npg_program **out, npg_device *device, const char *name, const char *constants)
 {
     char tuned[CONSTANTS_MAX / 2], all[CONSTANTS_MAX];
-    const char *static_name, *text = source_of(name, &static_name);
+    const npg_kernel_source *source = source_of(name);
     npg_program *program;
     *out = NULL;
-    if (!text) return npg_error(NPG_USAGE, "there are no kernels named %s", name);
+    if (!source) return npg_error(NPG_USAGE, "there are no kernels named %s", name);
     npg_tuning_constants(tuned, sizeof tuned, &device->tuning, name);
     snprintf(all, sizeof all, "%s %s", tuned, constants);
-    *out = find_program(device, name, all);
+    uint64_t key = key_of(&device->info, source->text, all);
+    *out = find_program(device, key);
     if (*out) return NPG_OK;
     NPG_TRY(npg_alloc(&program, NPG_FOR_DEVICE, sizeof *program));
     program->device = device;
-    program->name = static_name;
+    program->name = source->name;
+    program->key = key;
     memcpy(program->constants, all, sizeof all);
-    npg_status status = build_program(program, text);
+    npg_status status = build_program(program, source->text);
     if (status) {
         release(program);
         return status;
@@ -215,12 +216,21 @@ void npg_program_close(npg_program **slot)
     if (slot) *slot = NULL;
 }
 
+void npg_device_distrust(npg_device *device)
+{
+    char path[4400];
+    device->is_distrusted = true;
+    if (!npg_kernel_cache_is_ours()) return;
+    for (npg_program *program = device->programs; program; program = program->next)
+        if (!program->is_from_text && binary_path(path, sizeof path, program)) remove(path);
+}
+
 void npg_programs_close(npg_device *device)
 {
     while (device->programs) {
         npg_program *program = device->programs;
         device->programs = program->next;
-        if (program->is_from_text) keep_binary(program);
+        if (program->is_from_text && !device->is_distrusted) keep_binary(program);
         release(program);
     }
 }

@@ -27,17 +27,51 @@ needs_shim() {
     "$faults" cache 1 8
 }
 
-@test "a kernel that computes wrong is named, and the exit code is 4" {
+# The binaries of kernels that are kept below cache.
+programs() {
+    find cache -name "${1:-}*.program"
+}
+
+@test "a kernel that computes wrong is named, the exit code is 4, and it is not kept" {
     needs_shim
+    mkdir cache && export XDG_CACHE_HOME="$PWD/cache"
     "$NEUPIG" synth --body bar --frames 2 --points 300 -o capture >synth.log
     run env LD_PRELOAD="$shim" NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" run capture/points -o out --quiet
     echo "$output"
     [ "$status" -eq 4 ]
     [[ "$output" == *"computes op isometry wrong"* ]]
     [ ! -e out/done.json ]
+    [ -z "$(programs)" ]
     run env LD_PRELOAD="$shim" NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" doctor
     [ "$status" -eq 4 ]
     [[ "$output" == *"isometry"* ]]
+    [ -z "$(programs)" ]
+}
+
+@test "a binary in the kernel cache that is broken or another's is built anew, one that computes wrong is named" {
+    needs_shim
+    mkdir cache broken && export XDG_CACHE_HOME="$PWD/cache"
+    "$NEUPIG" doctor >log
+    [ "$(programs | wc -l)" -ge 8 ]
+    for file in $(programs); do # a byte of each, and one is another's
+        printf '\377\0' | dd of="$file" bs=1 seek=$(($(stat -c %s "$file") / 2)) conv=notrunc status=none
+        cp "$file" broken
+    done
+    "$NEUPIG" doctor >log
+    for file in broken/*; do ! cmp -s "$file" "$(programs "$(basename "$file" .program)")"; done
+    cp "$(programs adam- | head -n 1)" "$(programs isometry-)"
+    "$NEUPIG" doctor >log
+    ! cmp -s "$(programs adam- | head -n 1)" "$(programs isometry-)"
+
+    rm "$(programs isometry-)"
+    LD_PRELOAD=$shim NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" bench --vertices 300 --points 300 \
+        --only isometry >log
+    [ -s "$(programs isometry-)" ]
+    run "$NEUPIG" doctor
+    echo "$output"
+    [ "$status" -eq 4 ]
+    [[ "$output" == *"computes op isometry wrong"* ]]
+    "$NEUPIG" doctor >log
 }
 
 @test "a clock that jumps an hour to and fro changes nothing" {

@@ -1,5 +1,5 @@
 /* A kernel that computes wrong on purpose is named by the self-test: one change in every source, compiled and
- * run as any other. */
+ * run as any other, in a kernel cache of this program's own. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,6 +14,7 @@
 #undef npg_kernel_sources
 
 #include "kernels.h"
+#include "temp_folder.h"
 
 enum { TEXT_MAX = 32 << 10 };
 
@@ -39,7 +40,7 @@ static const struct change {
      "latent"},
     {"sobolev", "a = fma(c, vload16(2 * row, in), a)", "a = fma(c, vload16(2 * row, in), 0.99f * a)",
      "sobolev"},
-    {"mlp", "sum0 += a0;", "sum0 -= a0;", "mlp"},
+    {"mlp", "sum[j] += a;", "sum[j] -= a;", "mlp"},
     {"time", "float sum = b[n]", "float sum = 0.9f * b[n]", "mlp"},
     {"adam", "(1.0f - b1) * g[i]", "(1.0f - b2) * g[i]", "adam"},
     {"transform", "2.0f * (q.s * uv", "1.9f * (q.s * uv", "transform"},
@@ -111,9 +112,34 @@ static void a_kernel_that_does_not_compile_is_named(void **state)
     npg_device_close(&device);
 }
 
+/* What a wrong text was built to stays in the cache under that text: the right one does not find it. */
+static void a_binary_in_the_cache_belongs_to_its_text(void **state)
+{
+    npg_device *device;
+    npg_program *program;
+    (void)state;
+    mend_all();
+    spoil(&changes[sizeof changes / sizeof *changes - 1]);
+    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    assert_int_equal(npg_program_open(&program, device, "isometry", ""), NPG_OK);
+    npg_program_close(&program);
+    mend_all();
+    npg_device_close(&device);
+    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    if (npg_kernels_self_test(device)) fail_msg("%s", npg_error_text());
+    npg_device_close(&device);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_wrong_kernel_is_named),
-                                       cmocka_unit_test(a_kernel_that_does_not_compile_is_named)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+                                       cmocka_unit_test(a_kernel_that_does_not_compile_is_named),
+                                       cmocka_unit_test(a_binary_in_the_cache_belongs_to_its_text)};
+    temp_folder cache;
+    if (open_temp_folder(&cache)) return 1;
+    setenv("XDG_CACHE_HOME", cache.path, 1);
+    unsetenv("POCL_CACHE_DIR");
+    int failures = cmocka_run_group_tests(tests, NULL, NULL);
+    close_temp_folder(&cache);
+    return failures;
 }
