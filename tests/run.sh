@@ -1,9 +1,14 @@
 #!/bin/bash
-# All tests: release build with warnings as errors, everything again with the address and undefined-behaviour
-# sanitizers, ring and run with the thread sanitizer, every parser under libFuzzer for half a minute, and the
-# formatting.  Installs what is missing (as root, or
-# through sudo).  Stops at the first part that fails; the output ends with CTest's summary of the last part run.
+# All tests: formatting, release build with warnings as errors, everything again with the address and
+# undefined-behaviour sanitizers, ring and run with the thread sanitizer, every parser under libFuzzer.
+#
+#   tests/run.sh [SECONDS]     of fuzzing for each parser: 10, so that all is done in a quarter of an hour; 60 is
+#                              what a release should have
+#
+# Installs what is missing (as root, or through sudo).  Stops at the first part that fails; the output ends with
+# CTest's summary of the last part run.
 set -euo pipefail
+fuzz_seconds=${1:-10}
 cd "$(dirname "$0")/.."
 
 . samples/packages.sh
@@ -36,7 +41,7 @@ echo "== Tests: threads"
 ctest --preset tsan -L tsan
 
 echo "== Fuzz"
-tests/fuzz.sh 30
+tests/fuzz.sh "$fuzz_seconds"
 
 echo "== Tests: release"
 ctest --preset release
