@@ -206,7 +206,7 @@ npg_status npg_hash_file(uint64_t *hash, const char *path, uint64_t limit)
     npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
     if (!status) status = hash_bytes(state, fd, path, limit);
     if (fd >= 0) close(fd);
-    *hash = XXH3_64bits_digest(state);
+    *hash = status ? 0 : XXH3_64bits_digest(state);
     XXH3_freeState(state);
     return status;
 }
