@@ -12,7 +12,7 @@
 #define SPREADS  6.0
 #define NORMAL   1.4826 /* standard deviations of normal noise per median deviation */
 #define SUSPECT  0.5    /* of the bound */
-#define LOST     3.0    /* times the usual distance of the points: the surface is off everywhere */
+#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere   */
 #define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't */
 #define CLEARLY  2.0    /* times the misfit on the other side */
 
@@ -37,8 +37,9 @@ typedef struct side {
     int64_t next;    /* the index whose turn it is                     */
     record *waiting; /* came ahead of their turn; owned                */
     size_t waiting_count, waiting_room;
-    double history[NPG_MISFITS][HISTORY], fits[HISTORY];
+    double history[NPG_MISFITS][HISTORY];
     size_t history_count; /* ever */
+    double key_fit;       /* of the keyframe: what noise alone leaves */
     record run[NPG_ALARM_BACK +
                NPG_ALARM_FRAMES]; /* the suspect frames since the last explained one, the last of them */
     bool is_unexplained[NPG_ALARM_BACK + NPG_ALARM_FRAMES];
@@ -97,9 +98,9 @@ static level level_of(const double *history, size_t ever, double floor)
 
 static void remember(side *s, const record *r)
 {
+    if (!s->history_count) s->key_fit = r->fit;
     size_t at = s->history_count++ % HISTORY;
     for (int k = 0; k < NPG_MISFITS; k++) s->history[k][at] = r->misfits[k].share;
-    s->fits[at] = r->fit;
 }
 
 /* ---- one frame in its turn ---- */
@@ -111,7 +112,7 @@ static double excess(const record *r, const level *levels, int kind)
 
 static bool is_lost(const side *s, const record *r)
 {
-    return r->fit > fmax(LOST_FIT, LOST * level_of(s->fits, s->history_count, 0).usual);
+    return r->fit > fmax(LOST_FIT, LOST * s->key_fit);
 }
 
 /* Which misfits speak of the topology and not of a surface that lost the points. */
