@@ -8,10 +8,13 @@
 
 #include "stage.h"
 
-#define HISTORY 64 /* explained frames that the usual level is taken from */
-#define SPREADS 6.0
-#define NORMAL  1.4826 /* standard deviations of normal noise per median deviation */
-#define SUSPECT 0.5    /* of the bound */
+#define HISTORY  64 /* explained frames that the usual level is taken from */
+#define SPREADS  6.0
+#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation */
+#define SUSPECT  0.5    /* of the bound */
+#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere   */
+#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't */
+#define CLEARLY  2.0    /* times the misfit on the other side */
 
 static const struct {
     const char *name, *what;
@@ -23,7 +26,12 @@ static const struct {
 typedef struct record {
     int64_t index, number;
     npg_misfit misfits[NPG_MISFITS];
+    double fit; /* median distance of the points, in diagonals */
 } record;
+
+typedef struct level {
+    double usual, bound;
+} level;
 
 typedef struct side {
     int64_t next;    /* the index whose turn it is                     */
@@ -31,11 +39,12 @@ typedef struct side {
     size_t waiting_count, waiting_room;
     double history[NPG_MISFITS][HISTORY];
     size_t history_count; /* ever */
+    double key_fit;       /* of the keyframe: what noise alone leaves */
     record run[NPG_ALARM_BACK +
                NPG_ALARM_FRAMES]; /* the suspect frames since the last explained one, the last of them */
     bool is_unexplained[NPG_ALARM_BACK + NPG_ALARM_FRAMES];
     npg_alarm_cause causes[NPG_ALARM_BACK + NPG_ALARM_FRAMES]; /* the clearest misfit of each */
-    size_t run_count;
+    size_t run_count, run_length;                              /* kept, and in all */
     bool is_raised;
     npg_alarm_cause cause;
 } side;
@@ -77,40 +86,65 @@ static double median_of(double *values, size_t count)
     return count ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : 0;
 }
 
-static void usual_level(const side *s, int kind, double *usual, double *bound)
+static level level_of(const double *history, size_t ever, double floor)
 {
     double values[HISTORY];
-    size_t count = s->history_count < HISTORY ? s->history_count : HISTORY;
-    memcpy(values, s->history[kind], count * sizeof *values);
-    *usual = median_of(values, count);
-    for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - *usual);
-    *bound = fmax(fmax(kinds[kind].floor, SPREADS * NORMAL * median_of(values, count)), *usual);
+    size_t count = ever < HISTORY ? ever : HISTORY;
+    memcpy(values, history, count * sizeof *values);
+    double usual = median_of(values, count);
+    for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - usual);
+    return (level){usual, fmax(fmax(floor, SPREADS * NORMAL * median_of(values, count)), usual)};
 }
 
 static void remember(side *s, const record *r)
 {
-    for (int k = 0; k < NPG_MISFITS; k++) s->history[k][s->history_count % HISTORY] = r->misfits[k].share;
-    s->history_count++;
+    if (!s->history_count) s->key_fit = r->fit;
+    size_t at = s->history_count++ % HISTORY;
+    for (int k = 0; k < NPG_MISFITS; k++) s->history[k][at] = r->misfits[k].share;
 }
 
 /* ---- one frame in its turn ---- */
 
+static double excess(const record *r, const level *levels, int kind)
+{
+    return r->misfits[kind].share - levels[kind].usual;
+}
+
+static bool is_lost(const side *s, const record *r)
+{
+    return r->fit > fmax(LOST_FIT, LOST * s->key_fit);
+}
+
+/* Which misfits speak of the topology and not of a surface that lost the points. */
+static void judge(bool counts[NPG_MISFITS], const side *s, const record *r, const level *levels)
+{
+    double far = fmax(excess(r, levels, NPG_MISFIT_FAR), 0),
+           bare = fmax(excess(r, levels, NPG_MISFIT_BARE), 0);
+    bool is_off = is_lost(s, r);
+    counts[NPG_MISFIT_FAR] = far > CLEARLY * bare;
+    counts[NPG_MISFIT_BARE] = !is_off && bare > CLEARLY * far;
+    counts[NPG_MISFIT_TORN] = !is_off && far < SUSPECT * levels[NPG_MISFIT_FAR].bound;
+}
+
 /* The clearest misfit of a frame; the result is how many times its bound it lies above the usual. */
 static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
 {
+    level levels[NPG_MISFITS];
+    bool counts[NPG_MISFITS];
     double most = -1;
+    for (int k = 0; k < NPG_MISFITS; k++)
+        levels[k] = level_of(s->history[k], s->history_count, kinds[k].floor);
+    judge(counts, s, r, levels);
     for (int k = 0; k < NPG_MISFITS; k++) {
-        double usual, bound;
-        usual_level(s, k, &usual, &bound);
-        double times = (r->misfits[k].share - usual) / bound;
-        if (!(times > most)) continue;
+        double times = excess(r, levels, k) / levels[k].bound;
+        if (!counts[k] || !(times > most)) continue;
         most = times;
         *cause = (npg_alarm_cause){.seen_index = r->index,
                                    .seen_number = r->number,
                                    .misfit = k,
                                    .value = r->misfits[k].share,
-                                   .usual = usual,
-                                   .bound = bound};
+                                   .usual = levels[k].usual,
+                                   .bound = levels[k].bound};
         memcpy(cause->at, r->misfits[k].at, sizeof cause->at);
     }
     return most;
@@ -137,7 +171,7 @@ static void raise_alarm(side *s)
 static void end_run(side *s)
 {
     for (size_t i = 0; i < s->run_count; i++) remember(s, &s->run[i]);
-    s->run_count = 0;
+    s->run_count = s->run_length = 0;
 }
 
 /* The oldest suspect frame makes room: a long run of merely suspect frames becomes usual. */
@@ -156,19 +190,20 @@ static void take(side *s, const record *r)
 {
     npg_alarm_cause cause;
     if (s->is_raised || !isfinite(r->misfits[NPG_MISFIT_FAR].share)) return;
-    double times = clearest(&cause, s, r);
-    if (!s->history_count || !(times > SUSPECT)) { /* the keyframe is what is usual */
+    double times = s->history_count ? clearest(&cause, s, r) : -1; /* the keyframe is what is usual */
+    if (!(times > SUSPECT)) {
         end_run(s);
-        remember(s, r);
+        if (!s->history_count || !is_lost(s, r)) remember(s, r);
         return;
     }
     make_room(s);
+    s->run_length++;
     s->run[s->run_count] = *r;
     s->causes[s->run_count] = cause;
     s->is_unexplained[s->run_count++] = times > 1;
     size_t row = 0;
     while (row < s->run_count && s->is_unexplained[s->run_count - 1 - row]) row++;
-    if (row >= NPG_ALARM_FRAMES) raise_alarm(s);
+    if (row >= NPG_ALARM_FRAMES && s->run_length - row <= NPG_ALARM_RISE) raise_alarm(s);
 }
 
 /* ---- order ---- */
@@ -205,6 +240,7 @@ npg_status npg_alarm_add(npg_alarm *alarm, const npg_frame *frame)
 {
     record r = {.index = frame->index, .number = frame->number};
     memcpy(r.misfits, frame->figures.misfits, sizeof r.misfits);
+    r.fit = (double)(float)frame->figures.point_dist_median; /* as a run reads it back that goes on */
     if (frame->index >= alarm->key) NPG_TRY(add(&alarm->sides[NPG_FORWARD], NPG_FORWARD, &r));
     if (frame->index <= alarm->key) NPG_TRY(add(&alarm->sides[NPG_BACKWARD], NPG_BACKWARD, &r));
     return NPG_OK;

@@ -6,10 +6,18 @@
  *
  *     bound = max(floor, 6 x 1.4826 x median deviation, median)
  *
- * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm; it dates
- * from the first of the suspect ones before them, by NPG_ALARM_BACK frames at most.  A frame or two alone (an
- * outlier, a fast motion that the next frame has caught up with) raise none, and no level that is spread all
- * over the surface or usual in the capture (noise, holes, what cameras don't see) does.
+ * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm, if no
+ * more than NPG_ALARM_RISE suspect ones lead up to them: a topology changes at once, a fit that creeps away
+ * is another fault (the quality bar's).  It dates from the first of the suspect ones before them, by
+ * NPG_ALARM_BACK frames at most.  A frame or two alone (an outlier, a fast motion that the next frame has
+ * caught up with) raise none, and no level that is spread all over the surface or usual in the capture
+ * (noise, holes, what cameras don't see) does.
+ *
+ * Nor does a surface that has lost the points, which the quality bar tells.  One shows by points and surface
+ * that miss each other: what is far counts only at more than twice the excess of what is bare, and the other
+ * way round; torn not beside what is far.  The other shows by points that are off everywhere: bare and torn
+ * don't count when their median distance is above 0.4 % of the diagonal and above 3 times the keyframe's.  (A
+ * new part pulls the surface off the points, too, so far counts there.)
  *
  * Frames may come in any order: they are taken in order of their distance from the keyframe, so the result
  * does not depend on it.  Memory: the frames that came ahead of their turn. */
@@ -22,6 +30,7 @@
 
 #define NPG_ALARM_FRAMES 3
 #define NPG_ALARM_BACK   3
+#define NPG_ALARM_RISE   6
 
 enum { NPG_FORWARD, NPG_BACKWARD, NPG_DIRECTIONS };
 

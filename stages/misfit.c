@@ -17,11 +17,14 @@
 #define BESIDE_SIZE    0.15 /* of the diagonal: as far beyond a border lies surface not seen before  */
 #define TORN           1.5  /* times its length in the reference                */
 #define OFF_SHARE      0.6  /* of the reach: torn surface lies off the points   */
+#define LEAST_FAR      12   /* points in a place                                */
+#define LEAST_MISSED   20   /* points that would lie on a place of the surface  */
+#define LEAST_VERTS    6    /* vertices whose mean area it has                  */
 
 struct npg_misfit_finder {
     const npg_mesh *reference; /* loan */
     double size;               /* its diagonal                                       */
-    bool is_closed;            /* its frame saw all of it                            */
+    bool is_closed;            /* has no border, and its frame saw all of it         */
     uint8_t *is_border;        /* V: on the border of what its frame saw; owned      */
     uint32_t (*edges)[2];      /* E x 2; owned */
     size_t edge_count;
@@ -69,6 +72,7 @@ static npg_status find_borders(npg_misfit_finder *f)
     npg_status status = npg_mesh_twins(twins, mesh->faces, mesh->face_count);
     for (size_t h = 0; h < 3 * mesh->face_count && !status; h++) {
         if (twins[h] != UINT32_MAX) continue;
+        f->is_closed = false;
         f->is_border[mesh->faces[h]] = f->is_border[mesh->faces[h - h % 3 + (h + 1) % 3]] = 1;
     }
     npg_release(&twins);
@@ -130,11 +134,13 @@ static void add(npg_misfit_finder *f, uint32_t i, const float *pos, double weigh
     for (size_t a = 0; a < 3; a++) sum[1 + a] += weight * (double)pos[a];
 }
 
-static void take_largest(npg_misfit *misfit, const npg_misfit_finder *f, size_t count, double whole)
+/* least: a smaller place is none. */
+static void take_largest(npg_misfit *misfit, const npg_misfit_finder *f, size_t count, double whole,
+                         double least)
 {
     const double *best = NULL;
     for (size_t i = 0; i < count; i++)
-        if (f->sums[4 * i] > (best ? best[0] : 0)) best = f->sums + 4 * i;
+        if (f->sums[4 * i] >= least && f->sums[4 * i] > (best ? best[0] : 0)) best = f->sums + 4 * i;
     misfit->share = best && whole > 0 ? best[0] / whole : 0;
     for (size_t a = 0; a < 3; a++) misfit->at[a] = best ? best[1 + a] / best[0] : (double)NAN;
 }
@@ -182,7 +188,7 @@ static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_m
     }
     NPG_TRY(link_far(f, count, link));
     for (size_t i = 0; i < count; i++) add(f, (uint32_t)i, f->far + 3 * i, 1);
-    take_largest(misfit, f, count, (double)frame->point_count);
+    take_largest(misfit, f, count, (double)frame->point_count, LEAST_FAR);
     return NPG_OK;
 }
 
@@ -205,7 +211,8 @@ static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misf
     size_t v = f->reference->vert_count;
     for (size_t i = 0; i < v; i++)
         if (f->flags[i]) add(f, (uint32_t)i, frame->vert_unit + 3 * i, frame->vert_areas[i]);
-    take_largest(misfit, f, v, frame->area);
+    double least = fmax(LEAST_MISSED / (double)frame->point_count, LEAST_VERTS / (double)v);
+    take_largest(misfit, f, v, frame->area, least * frame->area);
 }
 
 static npg_status find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,

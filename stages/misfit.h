@@ -2,13 +2,17 @@
  * noise, outliers and a poor fit are spread all over.
  *
  *   far   points further from the surface than `reach`, near each other: something is there that the
- * reference does not have (what lies just beyond its border, where it has one, its frame did not see) bare
- * connected surface further than `reach` from all points: something is gone torn  connected surface that is
- * stretched, its edges more than 1.5 times as long as in the reference, and further than 0.6 x reach from all
- * points: a web between parts that went apart
+ *         reference does not have (what lies just beyond its border, where it has one, its frame did not see)
+ *   bare  connected surface further than `reach` from all points: something is gone
+ *   torn  connected surface that is stretched, its edges more than 1.5 times as long as in the reference, and
+ *         further than 0.6 x reach from all points: a web between parts that went apart
  *
  * reach = max(3 x spacing of the points on the surface, 1.5 % of the reference's diagonal), with noise 5 x
- * the median distance of the points, but no more than twice as far; the places are the largest ones. */
+ * the median distance of the points, but no more than twice as far; the places are the largest ones.
+ *
+ * What sampling can explain is nothing: a place of fewer than 12 points, and one on the surface where fewer
+ * than 20 points would be expected or that has fewer than 6 vertices' share of the area.  A reference with a
+ * border, or one that saw only a part of its frame, is never bare or torn: what cameras see differs. */
 #ifndef NPG_MISFIT_H
 #define NPG_MISFIT_H
 
@@ -18,8 +22,7 @@
 typedef struct npg_misfit_finder npg_misfit_finder;
 
 /* The mesh is a loan that must outlive the finder.  unseen_share: of its area that no point of its frame saw;
- * above 2 % the capture is of cameras that see other parts in each frame, and that surface is bare
- * or torn says nothing. */
+ * above 2 % the capture is of cameras that see other parts in each frame. */
 npg_status npg_misfit_open(npg_misfit_finder **finder, const npg_mesh *reference, double unseen_share);
 void npg_misfit_close(npg_misfit_finder **finder);
 

@@ -7,7 +7,7 @@ small=(--epochs 10 --width-1 64 --width-2 64 --faces 2000 --poisson-depth 6 --wi
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --body two --frames 14 --change 7 --points 1500 --cell 0.05 -o two >synth.log
-    "$NEUPIG" run two/points -o whole "${small[@]}" --segments auto >whole.log 2>&1
+    "$NEUPIG" run two/points -o whole "${small[@]}" --segments auto --keyframe 3 >whole.log 2>&1
 }
 
 setup() {
@@ -124,18 +124,23 @@ END
     done
 }
 
-@test "killed at any moment it goes on to the same" {
-    for wait in 0.3 1 2; do
+@test "killed in the first run, at the cut or in a segment it goes on to the same" {
+    second=$(basename "$(ls -d whole/segment_* | tail -1)")
+    for sign in job segments.partial.json "$second/job"; do
         rm -rf again
-        "$NEUPIG" run two/points -o again "${small[@]}" --segments auto >again.log 2>&1 &
+        "$NEUPIG" run two/points -o again "${small[@]}" --segments auto --keyframe 3 >again.log 2>&1 &
         pid=$!
-        sleep $wait
-        kill -KILL $pid 2>/dev/null || true
+        until [ -e "again/$sign" ]; do
+            kill -0 $pid
+            sleep 0.05
+        done
+        kill -KILL $pid
         wait $pid || true
-        "$NEUPIG" run two/points -o again "${small[@]}" --segments auto
+        [ ! -e again/done.json ]
+        "$NEUPIG" run two/points -o again "${small[@]}" --segments auto --keyframe 3
         same again
     done
-    run "$NEUPIG" run two/points -o again "${small[@]}" --segments auto
+    run "$NEUPIG" run two/points -o again "${small[@]}" --segments auto --keyframe 3
     [ "$status" -eq 0 ]
     same again
 }
@@ -154,15 +159,15 @@ END
 
 @test "segments are not mixed with a run without, with other frames or with a live source" {
     cp -r whole mixed
-    run "$NEUPIG" run two/points -o mixed "${small[@]}"
+    run "$NEUPIG" run two/points -o mixed "${small[@]}" --keyframe 3
     [ "$status" -eq 2 ]
     [[ "$output" == *"2 segments"*--restart* ]]
-    run "$NEUPIG" run two/points -o mixed "${small[@]}" --segments auto --frames 0:13
+    run "$NEUPIG" run two/points -o mixed "${small[@]}" --keyframe 3 --segments auto --frames 0:13
     [ "$status" -eq 2 ]
     [[ "$output" == *"other frames"*--restart* ]]
     run "$NEUPIG" run - -o live "${small[@]}" --segments auto </dev/null
     [ "$status" -eq 2 ]
-    run "$NEUPIG" run two/points -o mixed "${small[@]}" --frames 0:5 --restart
+    run "$NEUPIG" run two/points -o mixed "${small[@]}" --keyframe 3 --frames 0:5 --restart
     echo "$output"
     [ "$status" -eq 0 ]
     [ ! -e mixed/segments.json ]

@@ -101,6 +101,10 @@ static double drift(int64_t index)
 {
     return 0.02 + 0.0015 * (double)llabs(index - KEY) + 0.01 * chance(index);
 }
+static double creep(int64_t index)
+{
+    return index < 25 ? 0 : index < 37 ? 0.0095 : 0.012;
+}
 static double step_above_noise(int64_t index)
 {
     return noise(index) + (index >= 33 ? 0.4 : 0);
@@ -134,6 +138,45 @@ static void what_is_usual_or_passes_raises_none(void **state)
     }
 }
 
+static void what_creeps_raises_none(void **state)
+{
+    (void)state;
+    expect(NPG_MISFIT_FAR, creep, -1, -1);
+    expect(NPG_MISFIT_BARE, creep, -1, -1);
+}
+
+/* Whether an alarm is raised by frames with these figures from index 30 on. */
+static bool is_raised_by(double far, double bare, double torn, double fit)
+{
+    npg_alarm *alarm;
+    assert_int_equal(npg_alarm_open(&alarm, 0), NPG_OK);
+    for (int64_t i = 0; i < FRAMES; i++) {
+        npg_frame frame = frame_of(i, NPG_MISFIT_FAR, i < 30 ? 0 : far);
+        frame.figures.misfits[NPG_MISFIT_BARE].share = i < 30 ? 0 : bare;
+        frame.figures.misfits[NPG_MISFIT_TORN].share = i < 30 ? 0 : torn;
+        frame.figures.point_dist_median = i < 30 ? 0.002 : fit;
+        assert_int_equal(npg_alarm_add(alarm, &frame), NPG_OK);
+    }
+    npg_alarm_finish(alarm);
+    bool is_raised = npg_alarm_raised(alarm, NPG_FORWARD) != NULL;
+    npg_alarm_close(&alarm);
+    return is_raised;
+}
+
+static void a_surface_that_lost_the_points_raises_none(void **state)
+{
+    (void)state;
+    assert_true(is_raised_by(0.1, 0.01, 0, 0.002));
+    assert_true(is_raised_by(0.1, 0, 0, 0.02));
+    assert_false(is_raised_by(0.1, 0.08, 0, 0.002));
+    assert_true(is_raised_by(0.01, 0.1, 0, 0.005));
+    assert_false(is_raised_by(0.08, 0.1, 0, 0.002));
+    assert_false(is_raised_by(0, 0.1, 0, 0.02));
+    assert_true(is_raised_by(0, 0, 0.02, 0.002));
+    assert_false(is_raised_by(0, 0, 0.02, 0.02));
+    assert_false(is_raised_by(0.05, 0.05, 0.02, 0.002));
+}
+
 static void frames_without_figures_are_passed_over(void **state)
 {
     (void)state;
@@ -157,7 +200,8 @@ static void frames_without_figures_are_passed_over(void **state)
 
 enum { SIDE = 20, VERTS = (SIDE + 1) * (SIDE + 1), EXTRA = 40 };
 
-/* A sheet of 1 x 1 in cells of 1 / SIDE, a point on every vertex. */
+/* A sheet of 1 x 1 in cells of 1 / SIDE, a point on every vertex; without a border each side goes on at the
+ * other. */
 typedef struct sheet {
     npg_mesh *mesh;
     float points[3 * (VERTS + EXTRA)], vert_dist_sq[VERTS], vert_unit[3 * VERTS];
@@ -166,21 +210,23 @@ typedef struct sheet {
     npg_misfit_frame frame;
 } sheet;
 
-static void open_sheet(sheet *s)
+static void open_sheet(sheet *s, bool has_border)
 {
+    enum { ROW = SIDE + 1 };
     *s = (sheet){0};
-    assert_int_equal(npg_mesh_open(&s->mesh, VERTS, 2 * SIDE * SIDE), NPG_OK);
+    assert_int_equal(npg_mesh_open(&s->mesh, VERTS, has_border ? 2 * SIDE * SIDE : 2 * VERTS), NPG_OK);
     uint32_t *face = s->mesh->faces;
     for (uint32_t v = 0; v < VERTS; v++) {
         float *p = s->mesh->vert_pos + 3 * v;
-        p[0] = (float)(v % (SIDE + 1)) / SIDE;
-        p[1] = (float)(v / (SIDE + 1)) / SIDE;
+        uint32_t x = v % ROW, y = v / ROW, right = (x + 1) % ROW, above = (y + 1) % ROW * ROW;
+        p[0] = (float)x / SIDE;
+        p[1] = (float)y / SIDE;
         memcpy(s->points + 3 * v, p, 12);
         memcpy(s->vert_unit + 3 * v, p, 12);
         s->areas[v] = 1.0 / VERTS;
         s->hits[v].weights[0] = 1;
-        if (v % (SIDE + 1) == SIDE || v / (SIDE + 1) == SIDE) continue;
-        const uint32_t faces[] = {v, v + 1, v + SIDE + 2, v, v + SIDE + 2, v + SIDE + 1};
+        if (has_border && (x == SIDE || y == SIDE)) continue;
+        const uint32_t faces[] = {v, y * ROW + right, above + right, v, above + right, above + x};
         memcpy(face, faces, sizeof faces);
         face += 6;
     }
@@ -226,7 +272,7 @@ static void points_in_a_cluster_far_off_are_found_and_scattered_ones_not(void **
     sheet s;
     npg_misfit m[NPG_MISFITS];
     (void)state;
-    open_sheet(&s);
+    open_sheet(&s, true);
     find(m, &s);
     for (int k = 0; k < NPG_MISFITS; k++) assert_true(m[k].share == 0 && isnan(m[k].at[0]));
     add_points(&s, 0.5, 0.04);
@@ -235,7 +281,7 @@ static void points_in_a_cluster_far_off_are_found_and_scattered_ones_not(void **
     assert_true(fabs(m[NPG_MISFIT_FAR].at[2] - 0.5) < 1e-6 && fabs(m[NPG_MISFIT_FAR].at[0] - 0.64) < 1e-6);
     add_points(&s, 0.5, 0.4);
     find(m, &s);
-    assert_true(m[NPG_MISFIT_FAR].share < 1.5 / VERTS);
+    assert_true(m[NPG_MISFIT_FAR].share == 0);
     add_points(&s, 0.02, 0.04);
     find(m, &s);
     assert_true(m[NPG_MISFIT_FAR].share == 0);
@@ -247,7 +293,7 @@ static void what_lies_beyond_a_border_is_not_far(void **state)
     sheet s;
     npg_misfit m[NPG_MISFITS];
     (void)state;
-    open_sheet(&s);
+    open_sheet(&s, true);
     add_points(&s, 0.18, 0.04);
     for (size_t i = 0; i < EXTRA; i++) s.hits[VERTS + i].face = 0;
     for (size_t i = 0; i < EXTRA; i++) memcpy(s.hits[VERTS + i].weights, (float[]){0.5f, 0.5f, 0}, 12);
@@ -267,7 +313,7 @@ static void bare_and_torn_surface_is_found(void **state)
     npg_misfit m[NPG_MISFITS];
     double bare = 0;
     (void)state;
-    open_sheet(&s);
+    open_sheet(&s, false);
     for (size_t v = 0; v < VERTS; v++) {
         bool is_right = v % (SIDE + 1) > SIDE / 2;
         s.vert_dist_sq[v] = is_right ? 0.09f : 0;
@@ -283,15 +329,35 @@ static void bare_and_torn_surface_is_found(void **state)
     close_sheet(&s);
 }
 
+static void what_sampling_or_a_border_explains_is_not_bare(void **state)
+{
+    sheet s;
+    npg_misfit m[NPG_MISFITS];
+    (void)state;
+    for (int has_border = 0; has_border < 2; has_border++) {
+        open_sheet(&s, has_border);
+        for (size_t v = 0; v < 19; v++) s.vert_dist_sq[v] = 1;
+        find(m, &s);
+        assert_true(m[NPG_MISFIT_BARE].share == 0);
+        for (size_t v = 0; v < 21; v++) s.vert_dist_sq[v] = 1;
+        find(m, &s);
+        assert_true(has_border ? m[NPG_MISFIT_BARE].share == 0 : m[NPG_MISFIT_BARE].share > 0.04);
+        close_sheet(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_lasting_misfit_raises_the_alarm),
         cmocka_unit_test(it_dates_from_the_first_suspect_frame),
         cmocka_unit_test(what_is_usual_or_passes_raises_none),
+        cmocka_unit_test(what_creeps_raises_none),
+        cmocka_unit_test(a_surface_that_lost_the_points_raises_none),
         cmocka_unit_test(frames_without_figures_are_passed_over),
         cmocka_unit_test(points_in_a_cluster_far_off_are_found_and_scattered_ones_not),
         cmocka_unit_test(what_lies_beyond_a_border_is_not_far),
-        cmocka_unit_test(bare_and_torn_surface_is_found)};
+        cmocka_unit_test(bare_and_torn_surface_is_found),
+        cmocka_unit_test(what_sampling_or_a_border_explains_is_not_bare)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
