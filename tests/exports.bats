@@ -8,7 +8,7 @@ setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --body bar --frames 9 --points 400 -o capture >synth.log
     # Whether so few points are fitted well, which differs between builds, is no matter here: 7 says they are not.
-    "$NEUPIG" run capture/points -o whole "${small[@]}" "${forms[@]}" >whole.log || [ $? -eq 7 ]
+    "$NEUPIG" run capture/points -o whole "${small[@]}" "${forms[@]}" >whole.log
 }
 
 setup() {
@@ -81,7 +81,7 @@ find_modules() {
 
 @test "OBJ files keep colours and texture coordinates of the user's mesh" {
     find_python
-    "$NEUPIG" run capture/points -o plain "${small[@]}" --keyframe 4 --format obj || [ $? -eq 7 ]
+    "$NEUPIG" run capture/points -o plain "${small[@]}" --keyframe 4 --format obj
     "$python" - <<'END'
 lines, corner = [], 0
 for line in open("plain/meshes/frame_0004.obj"):
@@ -94,7 +94,7 @@ for line in open("plain/meshes/frame_0004.obj"):
         corner += 3
 open("mine.obj", "w").write("# mine\nmtllib mine.mtl\nusemtl skin\n" + "\n".join(lines) + "\n")
 END
-    "$NEUPIG" run capture/points -o own "${small[@]}" --keyframe 4 --reference mine.obj --export ply,obj,glb,npz || [ $? -eq 7 ]
+    "$NEUPIG" run capture/points -o own "${small[@]}" --keyframe 4 --reference mine.obj --export ply,obj,glb,npz
     "$python" "$BATS_TEST_DIRNAME/check_exports.py" obj own mine.obj
     grep -aq "property float s" own/meshes/frame_0000.ply
     grep -aq "property uchar red" own/meshes/frame_0000.ply
@@ -110,7 +110,7 @@ END
     kill -KILL $pid 2>/dev/null || true
     wait $pid || true
     [ ! -e killed/done.json ]
-    "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}" || [ $? -eq 7 ]
+    "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}"
     grep -q resumed_frames killed/report.json
     for name in motion.pc2 motion.mdd motion.glb motion.usda motion.npz reference.obj exports.jsonl obj volumes latents; do
         diff -r whole/$name killed/$name
