@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "file.h"
+#include "json_file.h"
 
 const npg_tuning npg_tuning_wide = {.mlp_rows = 192,
                                     .mlp_vector = 16,
@@ -127,21 +127,12 @@ void npg_tuning_constants(char *out, size_t size, const npg_tuning *t, const cha
 
 npg_status npg_tuning_save(const npg_tuning *tuning, const char *path, const char *device)
 {
-    npg_file *file;
     json_t *values = json_object(), *root = json_pack("{s:s, s:s}", "kind", KIND, "device", device);
     for (const npg_tuning_field *field = npg_tuning_fields; field->name; field++)
         json_object_set_new(values, field->name, json_integer(npg_tuning_get(tuning, field)));
     json_object_set_new(root, "values", values);
-    char *text = json_dumps(root, JSON_INDENT(1));
+    npg_status status = npg_json_save(path, root);
     json_decref(root);
-    if (!text) return npg_error(NPG_MEMORY, "%s: no memory", path);
-    npg_status status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
-    free(text);
     return status;
 }
 

@@ -1,4 +1,4 @@
-/* JSON files that people write: with comments, with the place of an error. */
+/* JSON files: those that people write, read with comments and the place of an error, and those we write. */
 #ifndef NPG_JSON_FILE_H
 #define NPG_JSON_FILE_H
 
@@ -10,5 +10,9 @@
  * once. *text gets what was parsed, comments blanked out, lines as they were: npg_release().  The caller owns
  * the root (json_decref).  NPG_USAGE names the file, line, column and cause; both are then NULL. */
 npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit);
+
+/* Write a file that appears whole: <folder>/<name>, or the one of this path.  NPG_DISK, NPG_MEMORY. */
+npg_status npg_json_write(const char *folder, const char *name, const json_t *value);
+npg_status npg_json_save(const char *path, const json_t *value);
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "file.h"
+#include "json_file.h"
 #include "stage.h"
 
 /* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
@@ -46,19 +47,26 @@ json_t *npg_json_real(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
-npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
+npg_status npg_json_save(const char *path, const json_t *value)
 {
-    char *path = NULL, *text = json_dumps(value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    char *text = json_dumps(value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     npg_file *file = NULL;
-    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", name);
-    npg_status status = npg_join_path(&path, folder, name);
-    if (!status) status = npg_file_open(&file, path);
-    npg_release(&path);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", path);
+    npg_status status = npg_file_open(&file, path);
     if (!status) {
         npg_file_write(file, text, strlen(text));
         npg_file_write(file, "\n", 1);
         status = npg_file_commit(&file);
     }
     free(text);
+    return status;
+}
+
+npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    npg_status status = npg_json_save(path, value);
+    npg_release(&path);
     return status;
 }

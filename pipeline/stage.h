@@ -151,9 +151,6 @@ json_t *npg_json_text(const char *text);
 /* A JSON number, or null for one that is not finite. */
 json_t *npg_json_real(double value);
 
-/* <folder>/<name>, whole or not at all.  NPG_DISK. */
-npg_status npg_json_write(const char *folder, const char *name, const json_t *value);
-
 /* Log and report the bound on memory.  The run itself does so before the solving pass of files; in a live one
  * the stage that makes the plan does, as soon as it is made.  Asks all stages' memory(), which then read
  * nothing but options and facts. */

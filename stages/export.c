@@ -8,6 +8,7 @@
 #include "file.h"
 #include "forms.h"
 #include "job.h"
+#include "json_file.h"
 #include "mesh_tools.h"
 #include "placement.h"
 #include "reader.h"

@@ -2,6 +2,7 @@
 #include "topology.h"
 
 #include "alarm.h"
+#include "json_file.h"
 
 static const char *const directions[NPG_DIRECTIONS] = {"forward", "backward"};
 

@@ -4,7 +4,7 @@
 #
 #   tests/coverage.sh [PERCENT]     exit code 1 when all lines together are covered less than PERCENT (90)
 #
-# LAUNCHER=ccache is handed on to CMake as the compilers' launcher.
+# LAUNCHER (a compiler cache, say) is handed on to CMake as the compilers' launcher.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 wanted=${1:-90}

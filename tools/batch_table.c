@@ -10,7 +10,7 @@
 
 #include "batch_page.h"
 #include "batch_verdict.h"
-#include "file.h"
+#include "json_file.h"
 #include "memory.h"
 #include "progress.h"
 #include "stage.h"

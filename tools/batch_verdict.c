@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "file.h"
+#include "json_file.h"
 #include "memory.h"
 #include "stage.h"
 

@@ -10,6 +10,7 @@
 
 #include "export.h"
 #include "file.h"
+#include "json_file.h"
 #include "segments.h"
 #include "stage.h"
 

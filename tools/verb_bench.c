@@ -10,7 +10,7 @@
 #include "bench_kernels.h"
 #include "cli.h"
 #include "clock.h"
-#include "file.h"
+#include "json_file.h"
 
 typedef struct settings {
     int64_t vertices, points, frames, epochs, repeat, dense;
@@ -221,24 +221,9 @@ static void print_table(const json_t *root)
                number_of(fit, "cpu_seconds_per_epoch"));
 }
 
-static npg_status write_report(const json_t *root, const char *path)
-{
-    npg_file *file;
-    char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(6));
-    if (!text) return npg_error(NPG_MEMORY, "%s: no memory", path);
-    npg_status status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
-    free(text);
-    return status;
-}
-
 static npg_status give(const settings *s, const json_t *root)
 {
-    if (*s->output) NPG_TRY(write_report(root, s->output));
+    if (*s->output) NPG_TRY(npg_json_save(s->output, root));
     if (!s->json) {
         print_table(root);
         return NPG_OK;
