@@ -165,6 +165,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fifty_captures_leave_nothing_behind_and_give_the_same_bytes)};
-    if (!mallopt(M_ARENA_MAX, 1)) return 1;
+    mallopt(M_ARENA_MAX, 1); /* a sanitizer's allocator has no arenas and refuses */
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
