@@ -6,6 +6,7 @@
 #include "contact.h"
 #include "mesh_clean.h"
 #include "mesh_tools.h"
+#include "parallel.h"
 #include "resurface.h"
 #include "stage.h"
 
@@ -159,47 +160,69 @@ static npg_status list_candidates(choosing *c, npg_fare *fares, int64_t best_sco
     return NPG_OK;
 }
 
-static npg_status draft_of(choosing *c, candidate *one)
+/* What is done for several candidates at the same time. */
+typedef struct together {
+    choosing *c;
+    npg_status (*act)(choosing *c, candidate *one);
+    candidate *list[NPG_CHOICE_MAX];
+    npg_status status[NPG_CHOICE_MAX];
+    size_t count;
+} together;
+
+static npg_status draft_one(choosing *c, candidate *one)
 {
-    npg_status status = make_draft(&one->draft, &one->fare->handles, &c->sights->list[one->at], c->settings);
-    return is_fatal(status) ? status : NPG_OK;
+    return make_draft(&one->draft, &one->fare->handles, &c->sights->list[one->at], c->settings);
 }
 
 static npg_status follow_one(choosing *c, candidate *one)
 {
-    if (!one->draft) return NPG_OK;
-    npg_status status = follow(one->fare, c->sights, one->at, one->draft, c->settings);
-    return is_fatal(status) ? status : NPG_OK;
+    return follow(one->fare, c->sights, one->at, one->draft, c->settings);
+}
+
+static void act_for_one(void *user, size_t part)
+{
+    together *t = user;
+    t->status[part] = t->act(t->c, t->list[part]);
+}
+
+static npg_status act_for_all(together *t)
+{
+    npg_parallel(act_for_one, t, t->count);
+    for (size_t i = 0; i < t->count; i++)
+        if (is_fatal(t->status[i]))
+            return npg_error(t->status[i], "while frame %lld was looked at as a keyframe",
+                             (long long)t->list[i]->fare->number);
+    return NPG_OK;
 }
 
 /* Drafts are made only of candidates that could be more apart than the best-scored frame: a closed draft
  * without handles has none to lose. */
 static npg_status make_drafts(choosing *c)
 {
-    const candidate *scored = c->scored < c->count ? &c->list[c->scored] : NULL;
-    if (scored) NPG_TRY(draft_of(c, &c->list[c->scored]));
-    bool may_lose_handles = scored && scored->draft && scored->fare->handles > 0;
+    candidate *scored = c->scored < c->count ? &c->list[c->scored] : NULL;
+    together first = {.c = c, .act = draft_one, .list = {scored}, .count = scored != NULL};
+    together others = {.c = c, .act = draft_one};
+    NPG_TRY(act_for_all(&first));
+    bool has_draft = scored && scored->draft, may_lose_handles = has_draft && scored->fare->handles > 0;
     for (size_t i = 0; i < c->count; i++) {
-        if (i == c->scored) continue;
-        if (scored && scored->draft && !may_lose_handles && !is_less_touching(c->list[i].fare, scored->fare))
-            continue;
-        NPG_TRY(draft_of(c, &c->list[i]));
-        if (scored && scored->draft && c->list[i].draft && !is_more_apart(c->list[i].fare, scored->fare))
-            npg_mesh_unref(&c->list[i].draft);
+        bool is_wanted = !has_draft || may_lose_handles || is_less_touching(c->list[i].fare, scored->fare);
+        if (i != c->scored && is_wanted) others.list[others.count++] = &c->list[i];
     }
+    NPG_TRY(act_for_all(&others));
+    for (size_t i = 0; i < others.count; i++)
+        if (has_draft && others.list[i]->draft && !is_more_apart(others.list[i]->fare, scored->fare))
+            npg_mesh_unref(&others.list[i]->draft);
     return NPG_OK;
 }
 
 /* Followed is nobody when the best-scored frame is alone in the running. */
 static npg_status compare(choosing *c)
 {
-    size_t running = 0;
-    for (size_t i = 0; i < c->count; i++) running += c->list[i].draft != NULL;
-    for (size_t i = 0; i < c->count; i++) {
-        if (running < 2 && i == c->scored) continue;
-        NPG_TRY(follow_one(c, &c->list[i]));
-    }
-    return NPG_OK;
+    together running = {.c = c, .act = follow_one};
+    for (size_t i = 0; i < c->count; i++)
+        if (c->list[i].draft) running.list[running.count++] = &c->list[i];
+    bool is_alone = running.count == 1 && running.list[0] == &c->list[c->scored];
+    return is_alone ? NPG_OK : act_for_all(&running);
 }
 
 static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
