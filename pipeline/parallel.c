@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <unistd.h>
 
 typedef struct helper {
@@ -11,27 +12,35 @@ typedef struct helper {
     size_t index;
     pthread_t thread;
     bool is_started;
+    npg_status status;
+    char error[512]; /* error texts belong to threads */
 } helper;
 
 static void *do_part(void *argument)
 {
-    const helper *h = argument;
-    h->part(h->user, h->index);
+    helper *h = argument;
+    h->status = h->part(h->user, h->index);
+    if (h->status) snprintf(h->error, sizeof h->error, "%s", npg_error_text());
     return NULL;
 }
 
-void npg_parallel(npg_part part, void *user, size_t count)
+npg_status npg_parallel(npg_part part, void *user, size_t count)
 {
     helper helpers[NPG_PARALLEL_MAX];
     if (count > NPG_PARALLEL_MAX) count = NPG_PARALLEL_MAX;
     for (size_t i = 0; i < count; i++) {
-        helpers[i] = (helper){.part = part, .user = user, .index = i};
-        if (i) helpers[i].is_started = !pthread_create(&helpers[i].thread, NULL, do_part, &helpers[i]);
+        helpers[i].part = part;
+        helpers[i].user = user;
+        helpers[i].index = i;
+        helpers[i].is_started = i && !pthread_create(&helpers[i].thread, NULL, do_part, &helpers[i]);
     }
     for (size_t i = 0; i < count; i++)
-        if (!helpers[i].is_started) part(user, i);
+        if (!helpers[i].is_started) do_part(&helpers[i]);
     for (size_t i = 1; i < count; i++)
         if (helpers[i].is_started) pthread_join(helpers[i].thread, NULL);
+    for (size_t i = 0; i < count; i++)
+        if (helpers[i].status) return npg_error(helpers[i].status, "%s", helpers[i].error);
+    return NPG_OK;
 }
 
 size_t npg_parallel_parts(size_t count, size_t least, size_t most)

@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "status.h"
+
 #define NPG_PARALLEL_MAX 64
 
 /* Code that gcc builds for several widths of x86 processor; which one runs is settled when the program is
@@ -15,13 +17,14 @@
 #endif
 
 /* What one part does; parts may not touch what another writes. */
-typedef void (*npg_part)(void *user, size_t part);
+typedef npg_status (*npg_part)(void *user, size_t part);
 
 /* Call part(user, 0) .. part(user, count - 1), count <= NPG_PARALLEL_MAX, each in a thread of its own but the
- * first, and return when all are done.  A part whose thread can't be started is done by the caller: only the
- * time suffers.  What comes out must not depend on how many threads there are: split by what the work is, or
- * let no part's result depend on the split. */
-void npg_parallel(npg_part part, void *user, size_t count);
+ * first, and return when all are done: NPG_OK, or the status of the lowest part that did not return it, with
+ * its error text.  A part whose thread can't be started is done by the caller: only the time suffers.  What
+ * comes out must not depend on how many threads there are: split by what the work is, or let no part's result
+ * depend on the split. */
+npg_status npg_parallel(npg_part part, void *user, size_t count);
 
 /* Parts that are worth their threads: one per core, each of at least `least` of `count` items, no more than
  * `most` (0: as many as there are cores). */

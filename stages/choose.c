@@ -165,7 +165,6 @@ typedef struct together {
     choosing *c;
     npg_status (*act)(choosing *c, candidate *one);
     candidate *list[NPG_CHOICE_MAX];
-    npg_status status[NPG_CHOICE_MAX];
     size_t count;
 } together;
 
@@ -179,20 +178,18 @@ static npg_status follow_one(choosing *c, candidate *one)
     return follow(one->fare, c->sights, one->at, one->draft, c->settings);
 }
 
-static void act_for_one(void *user, size_t part)
+static npg_status act_for_one(void *user, size_t part)
 {
-    together *t = user;
-    t->status[part] = t->act(t->c, t->list[part]);
+    const together *t = user;
+    npg_status status = t->act(t->c, t->list[part]);
+    return is_fatal(status)
+               ? npg_error_prefix(status, "frame %lld as a keyframe", (long long)t->list[part]->fare->number)
+               : NPG_OK;
 }
 
 static npg_status act_for_all(together *t)
 {
-    npg_parallel(act_for_one, t, t->count);
-    for (size_t i = 0; i < t->count; i++)
-        if (is_fatal(t->status[i]))
-            return npg_error(t->status[i], "while frame %lld was looked at as a keyframe",
-                             (long long)t->list[i]->fare->number);
-    return NPG_OK;
+    return npg_parallel(act_for_one, t, t->count);
 }
 
 /* Drafts are made only of candidates that could be more apart than the best-scored frame: a closed draft

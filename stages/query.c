@@ -153,16 +153,17 @@ typedef struct split {
     size_t count, parts;
 } split;
 
-static void do_part(void *user, size_t part)
+static npg_status do_part(void *user, size_t part)
 {
     const split *s = user;
     s->job->body(s->job, s->count * part / s->parts, s->count * (part + 1) / s->parts);
+    return NPG_OK;
 }
 
-static void do_job(const job *j, size_t count, int threads)
+static npg_status do_job(const job *j, size_t count, int threads)
 {
     split s = {j, count, npg_parallel_parts(count, BATCH_MIN, threads > 0 ? (size_t)threads : 0)};
-    npg_parallel(do_part, &s, s.parts);
+    return npg_parallel(do_part, &s, s.parts);
 }
 
 /* ---- closest points ---- */
@@ -244,8 +245,7 @@ npg_status npg_surface_closest_near(const npg_surface *surface, npg_surface_hit 
              .start_dist = start_dist,
              .start_face = start_face,
              .hits = hits};
-    do_job(&j, point_count, threads);
-    return NPG_OK;
+    return do_job(&j, point_count, threads);
 }
 
 npg_status npg_surface_closest(const npg_surface *surface, npg_surface_hit *hits, const float *points,
@@ -294,6 +294,5 @@ npg_status npg_surface_rays(const npg_surface *surface, npg_ray_hit *hits, const
 {
     NPG_REQUIRE(surface && ((hits && rays) || !ray_count));
     job j = {.body = ray_part, .surface = surface, .rays = rays, .ray_hits = hits};
-    do_job(&j, ray_count, threads);
-    return NPG_OK;
+    return do_job(&j, ray_count, threads);
 }

@@ -2,7 +2,6 @@
 #include "tracker.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "block_system.h"
@@ -330,8 +329,6 @@ typedef struct step {
     double width, stiffness, reverse_chamfer;
     npg_tracked tracked;
     bool is_first, is_settling;
-    npg_status status[2];
-    char error[2][256]; /* error texts belong to threads */
 } step;
 
 static npg_status to_surface(step *s)
@@ -361,11 +358,9 @@ static npg_status to_points(step *s)
     return NPG_OK;
 }
 
-static void one_direction(void *user, size_t part)
+static npg_status one_direction(void *user, size_t part)
 {
-    step *s = user;
-    s->status[part] = part ? to_points(s) : to_surface(s);
-    if (s->status[part]) snprintf(s->error[part], sizeof s->error[part], "%s", npg_error_text());
+    return part ? to_points(user) : to_surface(user);
 }
 
 static npg_status gather(step *s)
@@ -374,9 +369,7 @@ static npg_status gather(step *s)
     npg_tracker_vertices(t, t->vert_pos, s->pose);
     npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
                             t->mesh->face_count);
-    npg_parallel(one_direction, s, 2);
-    for (int i = 0; i < 2; i++)
-        if (s->status[i]) return npg_error(s->status[i], "%s", s->error[i]);
+    NPG_TRY(npg_parallel(one_direction, s, 2));
     npg_block_merge(t->system, t->reverse);
     return NPG_OK;
 }
