@@ -5,6 +5,7 @@
 
 #include "mesh_clean.h"
 #include "mesh_tools.h"
+#include "sets.h"
 
 #define SMOOTH_ROUNDS 12
 #define MEND_ROUNDS   12
@@ -104,19 +105,6 @@ static int by_ends(const void *left, const void *right)
     return a->corner < b->corner ? -1 : a->corner > b->corner;
 }
 
-static uint32_t root_of(uint32_t *parent, uint32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
-static void join(uint32_t *parent, uint32_t a, uint32_t b)
-{
-    a = root_of(parent, a);
-    b = root_of(parent, b);
-    parent[a > b ? a : b] = a > b ? b : a;
-}
-
 static uint32_t next_corner(uint32_t corner)
 {
     return corner - corner % 3 + (corner + 1) % 3;
@@ -162,8 +150,8 @@ static npg_status join_corners(uint32_t *parent, const npg_mesh *mesh)
         size_t back = find_side(sides, count, sides[i].to, sides[i].from);
         for (size_t k = i; k < next && back < count; k++, back++) {
             if (sides[back].from != sides[i].to || sides[back].to != sides[i].from) break;
-            join(parent, sides[k].corner, next_corner(sides[back].corner));
-            join(parent, next_corner(sides[k].corner), sides[back].corner);
+            npg_set_join(parent, sides[k].corner, next_corner(sides[back].corner));
+            npg_set_join(parent, next_corner(sides[k].corner), sides[back].corner);
         }
     }
     npg_release(&sides);
@@ -183,7 +171,7 @@ static npg_status split(npg_mesh **slot, npg_mending *done)
     NPG_TRY_OR(end, status, join_corners(parent, mesh));
     memset(first, 0xff, mesh->vert_count * sizeof *first);
     for (uint32_t c = 0; c < corners; c++) {
-        uint32_t root = root_of(parent, c), v = mesh->faces[c];
+        uint32_t root = npg_set_root(parent, c), v = mesh->faces[c];
         if (root != c) continue;
         number[c] = first[v] == UINT32_MAX ? v : (uint32_t)(mesh->vert_count + extra++);
         if (first[v] == UINT32_MAX) first[v] = c;
@@ -192,7 +180,7 @@ static npg_status split(npg_mesh **slot, npg_mending *done)
     NPG_TRY_OR(end, status, npg_mesh_open(&out, mesh->vert_count + extra, mesh->face_count));
     memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
     for (uint32_t c = 0; c < corners; c++) {
-        out->faces[c] = number[root_of(parent, c)];
+        out->faces[c] = number[npg_set_root(parent, c)];
         memcpy(out->vert_pos + 3 * (size_t)out->faces[c], mesh->vert_pos + 3 * (size_t)mesh->faces[c],
                3 * sizeof(float));
     }

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sets.h"
+
 static void face_cross(double out[3], const float *vert_pos, const uint32_t face[3])
 {
     const float *a = vert_pos + 3 * (size_t)face[0], *b = vert_pos + 3 * (size_t)face[1],
@@ -99,12 +101,6 @@ npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_cou
     return NPG_OK;
 }
 
-static uint32_t root_of(uint32_t *parent, uint32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, size_t vert_count,
                                const uint32_t *faces, size_t face_count)
 {
@@ -113,12 +109,11 @@ npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, 
     for (size_t i = 0; i < vert_count; i++) parent[i] = (uint32_t)i;
     for (size_t f = 0; f < face_count; f++)
         for (int k = 1; k < 3; k++) {
-            uint32_t a = root_of(parent, faces[3 * f]), b = root_of(parent, faces[3 * f + (size_t)k]);
-            parent[a > b ? a : b] = a > b ? b : a;
+            npg_set_join(parent, faces[3 * f], faces[3 * f + (size_t)k]);
         }
     size_t count = 0;
     for (size_t i = 0; i < vert_count; i++) {
-        uint32_t root = root_of(parent, (uint32_t)i);
+        uint32_t root = npg_set_root(parent, (uint32_t)i);
         component_of[i] = root == i ? (uint32_t)count++ : component_of[root];
     }
     *component_count = count;

@@ -6,6 +6,7 @@
 #include "frame_box.h"
 #include "kdtree.h"
 #include "mesh_tools.h"
+#include "sets.h"
 
 #define REACH_SPACINGS 3.0
 #define REACH_SIZE     0.015 /* of the reference's diagonal */
@@ -113,23 +114,9 @@ static npg_status begin_places(npg_misfit_finder *f, size_t count)
     return NPG_OK;
 }
 
-static uint32_t place_of(uint32_t *parents, uint32_t i)
-{
-    while (parents[i] != i) i = parents[i] = parents[parents[i]];
-    return i;
-}
-
-static void join(uint32_t *parents, uint32_t a, uint32_t b)
-{
-    a = place_of(parents, a);
-    b = place_of(parents, b);
-    if (a < b) parents[b] = a;
-    if (b < a) parents[a] = b;
-}
-
 static void add(npg_misfit_finder *f, uint32_t i, const float *pos, double weight)
 {
-    double *sum = f->sums + 4 * (size_t)place_of(f->parents, i);
+    double *sum = f->sums + 4 * (size_t)npg_set_root(f->parents, i);
     sum[0] += weight;
     for (size_t a = 0; a < 3; a++) sum[1 + a] += weight * (double)pos[a];
 }
@@ -156,7 +143,8 @@ static npg_status link_far(npg_misfit_finder *f, size_t count, double link)
     npg_status status = npg_kdtree_nearest(tree, f->links, f->link_sq, f->far, count, LINKS, 1);
     npg_kdtree_close(&tree);
     for (size_t i = 0; i < LINKS * count && !status; i++)
-        if ((double)f->link_sq[i] <= link * link) join(f->parents, (uint32_t)(i / LINKS), f->links[i]);
+        if ((double)f->link_sq[i] <= link * link)
+            npg_set_join(f->parents, (uint32_t)(i / LINKS), f->links[i]);
     return status;
 }
 
@@ -203,7 +191,7 @@ static void join_flagged(npg_misfit_finder *f)
 {
     for (size_t e = 0; e < f->edge_count; e++)
         if (f->flags[f->edges[e][0]] && f->flags[f->edges[e][1]])
-            join(f->parents, f->edges[e][0], f->edges[e][1]);
+            npg_set_join(f->parents, f->edges[e][0], f->edges[e][1]);
 }
 
 static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "frame_box.h"
+#include "jacobi.h"
 #include "kdtree.h"
 #include "memory.h"
 
@@ -13,37 +14,10 @@
 
 /* ---- smallest eigenvector of a symmetric 3 x 3 matrix ---- */
 
-/* One Jacobi rotation that clears m[p][q]; v collects the rotations. */
-static void rotate(double m[3][3], double v[3][3], int p, int q)
-{
-    if (m[p][q] == 0) return;
-    double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-    double t = (theta >= 0 ? 1 : -1) / (fabs(theta) + sqrt(theta * theta + 1));
-    double c = 1 / sqrt(t * t + 1), s = t * c;
-    for (int k = 0; k < 3; k++) {
-        double a = m[k][p], b = m[k][q];
-        m[k][p] = c * a - s * b;
-        m[k][q] = s * a + c * b;
-    }
-    for (int k = 0; k < 3; k++) {
-        double a = m[p][k], b = m[q][k];
-        m[p][k] = c * a - s * b;
-        m[q][k] = s * a + c * b;
-        a = v[k][p];
-        b = v[k][q];
-        v[k][p] = c * a - s * b;
-        v[k][q] = s * a + c * b;
-    }
-}
-
 static void smallest_axis(float axis[3], double m[3][3])
 {
-    double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    for (int i = 0; i < JACOBI_ROUNDS; i++) {
-        rotate(m, v, 0, 1);
-        rotate(m, v, 0, 2);
-        rotate(m, v, 1, 2);
-    }
+    double v[3][3];
+    npg_jacobi(m[0], v[0], 3, JACOBI_ROUNDS);
     int least = m[0][0] <= m[1][1] ? 0 : 1;
     if (m[2][2] < m[least][least]) least = 2;
     double length = sqrt(v[0][least] * v[0][least] + v[1][least] * v[1][least] + v[2][least] * v[2][least]);

@@ -173,13 +173,11 @@ npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
     return read_mesh(mesh, path, origin, false);
 }
 
-/* The points of a format that knows no faces. */
-static npg_status read_bare_points(npg_mesh **mesh, const char *path, npg_origin *origin)
+npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin)
 {
     npg_frame frame = {0};
     NPG_TRY(npg_read_cloud(&frame, path, origin));
-    npg_status status = frame.point_count ? npg_mesh_open(mesh, 0, 0)
-                                          : npg_error(NPG_BAD_INPUT, "%s: there are no points", path);
+    npg_status status = npg_mesh_open(mesh, 0, 0);
     if (!status) {
         (*mesh)->vert_count = frame.point_count;
         (*mesh)->vert_pos = frame.pos_local;
@@ -190,10 +188,19 @@ static npg_status read_bare_points(npg_mesh **mesh, const char *path, npg_origin
     return status;
 }
 
+/* A format that knows no faces. */
+static npg_status read_bare_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    NPG_TRY(npg_read_points(mesh, path, origin));
+    if ((*mesh)->vert_count) return NPG_OK;
+    npg_mesh_unref(mesh);
+    return npg_error(NPG_BAD_INPUT, "%s: there are no points", path);
+}
+
 npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
 {
     const char *format = npg_reader_for(path);
     *mesh = NULL;
     bool has_faces = !format || !strcmp(format, "ply") || !strcmp(format, "obj");
-    return has_faces ? read_mesh(mesh, path, origin, true) : read_bare_points(mesh, path, origin);
+    return has_faces ? read_mesh(mesh, path, origin, true) : read_bare_shape(mesh, path, origin);
 }

@@ -24,6 +24,10 @@ npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin
  * kept where given.  vert_pos is local.  Indices are checked; a mesh without faces is NPG_BAD_INPUT. */
 npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin);
 
+/* The points of a file, whatever else it holds, as a mesh without faces (maybe without points); normals where
+ * the file has them.  Errors are those of npg_read_cloud. */
+npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin);
+
 /* The same for any of the formats, faces or not: points alone become a mesh with face_count 0.  NPG_BAD_INPUT
  * where there is not even a point. */
 npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin);

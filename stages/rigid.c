@@ -1,7 +1,7 @@
 /* Rigid: the rotation and translation that take one set of points closest to another. */
 #include "rigid.h"
 
-#include <math.h>
+#include "jacobi.h"
 
 #define JACOBI_ROUNDS 24
 
@@ -14,34 +14,11 @@ static void mean_of(double mean[3], const float *points, size_t count)
     }
 }
 
-/* One Jacobi rotation that clears m[p][q]; v collects the rotations in its columns. */
-static void clear_entry(double m[4][4], double v[4][4], int p, int q)
-{
-    if (fabs(m[p][q]) == 0) return;
-    double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-    double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1));
-    double c = 1 / sqrt(t * t + 1), s = t * c;
-    for (int k = 0; k < 4; k++) {
-        double a = m[k][p], b = m[k][q];
-        m[k][p] = c * a - s * b;
-        m[k][q] = s * a + c * b;
-    }
-    for (int k = 0; k < 4; k++) {
-        double a = m[p][k], b = m[q][k], x = v[k][p], y = v[k][q];
-        m[p][k] = c * a - s * b;
-        m[q][k] = s * a + c * b;
-        v[k][p] = c * x - s * y;
-        v[k][q] = s * x + c * y;
-    }
-}
-
 static void largest_eigenvector(double out[4], double m[4][4])
 {
-    double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+    double v[4][4];
     int best = 0;
-    for (int round = 0; round < JACOBI_ROUNDS; round++)
-        for (int p = 0; p < 3; p++)
-            for (int q = p + 1; q < 4; q++) clear_entry(m, v, p, q);
+    npg_jacobi(m[0], v[0], 4, JACOBI_ROUNDS);
     for (int k = 1; k < 4; k++)
         if (m[k][k] > m[best][best]) best = k;
     for (int k = 0; k < 4; k++) out[k] = v[k][best];

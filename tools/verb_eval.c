@@ -54,18 +54,7 @@ typedef struct evaluation {
 
 static npg_status read_truth(npg_mesh **mesh, const char *path, evaluation *e)
 {
-    npg_frame frame = {0};
-    if (!e->s.points_only) return npg_read_mesh(mesh, path, &e->origin);
-    NPG_TRY(npg_read_cloud(&frame, path, &e->origin));
-    npg_status status = npg_mesh_open(mesh, 0, 0);
-    if (!status) {
-        (*mesh)->vert_count = frame.point_count;
-        (*mesh)->vert_pos = frame.pos_local;
-        (*mesh)->vert_normals = frame.normals;
-        frame.pos_local = frame.normals = NULL;
-    }
-    npg_frame_clear(&frame);
-    return status;
+    return e->s.points_only ? npg_read_points(mesh, path, &e->origin) : npg_read_mesh(mesh, path, &e->origin);
 }
 
 static npg_status check_finite(const npg_mesh *mesh, const char *path)
