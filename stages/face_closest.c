@@ -1,6 +1,7 @@
 /* Closest point of one triangle: by the region of the plane in which the foot of the perpendicular lies.
  * Based on: C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5. */
 #include <math.h>
+#include <stdbool.h>
 
 #include "query.h"
 
@@ -20,12 +21,12 @@ static double segment(double *t, const double a[3], const double b[3])
     return dot(at, at);
 }
 
-/* The best of the three edges: right for every triangle when the foot lies outside, and for degenerate ones.
- */
-static double edges(double weights[3], double corner[3][3])
+/* The best of the edges k -> k + 1 that are wanted. */
+static double edges(double weights[3], double corner[3][3], const bool is_wanted[3])
 {
     double best = INFINITY;
     for (int k = 0; k < 3; k++) {
+        if (!is_wanted[k]) continue;
         double t, dist_sq = segment(&t, corner[k], corner[(k + 1) % 3]);
         if (!(dist_sq < best)) continue;
         best = dist_sq;
@@ -36,8 +37,9 @@ static double edges(double weights[3], double corner[3][3])
     return best;
 }
 
-/* The triangle's corners are relative to the query.  The foot of the perpendicular has weights by areas;
- * inside when none is negative. */
+/* The triangle's corners are relative to the query.  The foot of the perpendicular has weights by areas:
+ * inside when none is negative; else the closest point is on an edge across from a corner whose weight is.
+ * Of a degenerate triangle it is on any. */
 static double triangle(double weights[3], double corner[3][3])
 {
     double u[3], v[3], n[3];
@@ -47,10 +49,11 @@ static double triangle(double weights[3], double corner[3][3])
     }
     for (int i = 0; i < 3; i++) n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
     double n_sq = dot(n, n), uu = dot(u, u), vv = dot(v, v), uv = dot(u, v);
-    if (!(n_sq > 1e-24 * uu * vv)) return edges(weights, corner);
+    if (!(n_sq > 1e-24 * uu * vv)) return edges(weights, corner, (const bool[3]){true, true, true});
     double du = -dot(corner[0], u), dv = -dot(corner[0], v);
     double b = (vv * du - uv * dv) / n_sq, c = (uu * dv - uv * du) / n_sq;
-    if (b < 0 || c < 0 || b + c > 1) return edges(weights, corner);
+    const bool is_beyond[3] = {c<0, b + c> 1, b < 0};
+    if (is_beyond[0] || is_beyond[1] || is_beyond[2]) return edges(weights, corner, is_beyond);
     double height = dot(n, corner[0]);
     weights[0] = 1 - b - c;
     weights[1] = b;

@@ -11,8 +11,8 @@
 #define ROUNDS_MAX  4
 #define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
 #define CLEARLY     (-0.3f)
-#define SETTLED     0.0005 /* share of turned normals that ends it */
-#define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
+#define SETTLED     0.002 /* share of turned normals that ends it */
+#define RESTLESS    0.005 /* share that ends it when a round turns no fewer than the one before */
 
 /* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */
 static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const float *n)
@@ -47,21 +47,21 @@ done:
     return status;
 }
 
-static npg_status draft(size_t *turned, float *normals, const float *points, size_t n,
+/* A surface that only serves the normals. */
+static npg_status draft(npg_mesh **mesh, size_t *turned, float *normals, const float *points, size_t n,
                         const npg_poisson_settings *settings)
 {
     npg_poisson_settings quick = *settings;
-    npg_mesh *mesh;
     if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
-    NPG_TRY(npg_poisson(&mesh, points, normals, n, &quick));
-    npg_status status =
-        npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float));
+    NPG_TRY(npg_poisson(mesh, points, normals, n, &quick));
+    npg_mesh *m = *mesh;
+    npg_status status = npg_alloc_array(&m->vert_normals, NPG_FOR_MESH, m->vert_count, 3 * sizeof(float));
     if (!status) {
-        npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
-                                mesh->face_count);
-        status = turn_to_surface(turned, normals, mesh, points, n);
+        npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
+        status = turn_to_surface(turned, normals, m, points, n);
     }
-    npg_mesh_unref(&mesh);
+    npg_release(&m->vert_normals);
+    if (status) npg_mesh_unref(mesh);
     return status;
 }
 
@@ -69,15 +69,19 @@ npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *no
                          size_t point_count, const npg_poisson_settings *settings)
 {
     size_t now = point_count, before = SIZE_MAX;
+    double settled = SETTLED * (double)point_count;
     int rounds_max = settings->rounds_max ? settings->rounds_max : ROUNDS_MAX;
     *mesh = NULL;
     *turned = 0;
-    for (*rounds = 0; *rounds < rounds_max && (double)now > SETTLED * (double)point_count; ++*rounds) {
+    for (*rounds = 0; *rounds < rounds_max && (double)now > settled; ++*rounds) {
         if (now >= before && (double)now < RESTLESS * (double)point_count) break;
         before = now;
-        NPG_TRY(draft(&now, normals, points, point_count, settings));
+        npg_mesh_unref(mesh);
+        NPG_TRY(draft(mesh, &now, normals, points, point_count, settings));
         *turned += now;
     }
+    if (settings->depth <= DRAFT_DEPTH && (double)now <= settled) return NPG_OK; /* the draft is as good */
+    npg_mesh_unref(mesh);
     ++*rounds;
     return npg_poisson(mesh, points, normals, point_count, settings);
 }

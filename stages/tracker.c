@@ -18,12 +18,14 @@
 #define MOVE_MAX    0.15  /* units */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface */
 
+/* What each thread gathers: points -> surface; surface -> points and the edges. */
+enum { TO_SURFACE, TO_POINTS };
+
 struct npg_tracker {
     npg_tracker_settings settings;
     npg_mesh *mesh; /* counted reference */
     npg_graph *graph;
-    npg_block_system *system;  /* points -> surface, then all terms */
-    npg_block_system *reverse; /* surface -> points, and the edges  */
+    npg_block_system *system; /* its parts: TO_SURFACE, TO_POINTS */
     npg_surface *surface;
     float *vert_pos, *vert_normals; /* V x 3: the pose at work */
     uint32_t *samples;              /* vertices, spread over the surface */
@@ -49,7 +51,6 @@ void npg_tracker_close(npg_tracker **slot)
     npg_tracker *t = *slot;
     npg_graph_close(&t->graph);
     npg_block_close(&t->system);
-    npg_block_close(&t->reverse);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->mesh);
     void *all[] = {&t->vert_pos, &t->vert_normals,   &t->samples,   &t->step,
@@ -67,12 +68,11 @@ static void choose_samples(npg_tracker *t)
     for (size_t v = 0; v < t->mesh->vert_count; v += step) t->samples[t->sample_count++] = (uint32_t)v;
 }
 
-static npg_status open_systems(npg_tracker *t)
+static npg_status open_system(npg_tracker *t)
 {
     const npg_graph *graph = t->graph;
-    const uint32_t(*edges)[2] = (const uint32_t(*)[2])graph->edges;
-    NPG_TRY(npg_block_open(&t->system, graph->node_count, edges, graph->edge_count));
-    return npg_block_open(&t->reverse, graph->node_count, edges, graph->edge_count);
+    return npg_block_open(&t->system, graph->node_count, (const uint32_t(*)[2])graph->edges,
+                          graph->edge_count);
 }
 
 npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tracker_settings *settings)
@@ -84,7 +84,7 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     t->mesh = npg_mesh_ref(reference);
     size_t v = reference->vert_count, m = settings->samples;
     npg_status status = npg_graph_open(&t->graph, reference, settings->nodes);
-    if (!status) status = open_systems(t);
+    if (!status) status = open_system(t);
     if (!status)
         status =
             npg_surface_open(&t->surface, reference->vert_pos, v, reference->faces, reference->face_count);
@@ -148,35 +148,39 @@ static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit
     for (int b = 0; b < NPG_GRAPH_BIND; b++) p->weights[b] /= sum;
 }
 
-/* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
-static void add_pull(npg_block_system *to, const npg_tracker *t, const pull *p, const double *pose,
-                     double weight, double width)
+/* rotation (point - node). */
+static void set_arm(double arm[3], const double *rotation, const float *point, const float *node)
 {
-    double x[3], d[3], dist_sq = 0, jacobians[NPG_GRAPH_BIND][18], w[9];
-    size_t count = 0;
+    for (int i = 0; i < 3; i++) {
+        arm[i] = 0;
+        for (int c = 0; c < 3; c++) arm[i] += rotation[3 * i + c] * ((double)point[c] - (double)node[c]);
+    }
+}
+
+/* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
+static void add_pull(const npg_tracker *t, size_t part, const pull *p, const double *pose, double weight,
+                     double width)
+{
+    npg_block_term term = {0};
+    double x[3], dist_sq = 0;
     npg_pose_point(x, t->graph, pose, p->rest, p->nodes, p->weights);
     for (int i = 0; i < 3; i++) {
-        d[i] = p->target[i] - x[i];
-        dist_sq += d[i] * d[i];
+        term.right[i] = p->target[i] - x[i];
+        dist_sq += term.right[i] * term.right[i];
     }
     double robust = 1 / (1 + dist_sq / (width * width));
     weight *= robust * robust;
-    for (; count < NPG_GRAPH_BIND && p->nodes[count] != UINT32_MAX; count++) {
-        const double *k = pose + p->nodes[count] * NPG_POSE_SIZE;
-        const float *g = t->graph->node_pos + 3 * (size_t)p->nodes[count];
-        double y[3], share = (double)p->weights[count], *j = jacobians[count];
-        for (int i = 0; i < 3; i++) {
-            y[i] = 0;
-            for (int c = 0; c < 3; c++) y[i] += k[3 * i + c] * ((double)p->rest[c] - (double)g[c]);
-        }
-        const double rows[18] = {0,     y[2], -y[1], 1, 0, 0, /* omega x y, translation */
-                                 -y[2], 0,    y[0],  0, 1, 0, y[1], -y[0], 0, 0, 0, 1};
-        for (int i = 0; i < 18; i++) j[i] = share * rows[i];
+    for (; term.count < NPG_GRAPH_BIND && p->nodes[term.count] != UINT32_MAX; term.count++) {
+        uint32_t node = p->nodes[term.count];
+        term.nodes[term.count] = node;
+        term.shares[term.count] = (double)p->weights[term.count];
+        set_arm(term.arms[term.count], pose + node * NPG_POSE_SIZE, p->rest,
+                t->graph->node_pos + 3 * (size_t)node);
     }
-    for (int i = 0; i < 9; i++)
-        w[i] = weight * ((1 - t->settings.along) * p->normal[i / 3] * p->normal[i % 3] +
-                         (i % 4 == 0 ? t->settings.along : 0));
-    npg_block_add(to, p->nodes, (const double(*)[18])jacobians, count, w, d);
+    memcpy(term.normal, p->normal, sizeof term.normal);
+    term.across = weight * (1 - t->settings.along);
+    term.along = weight * t->settings.along;
+    npg_block_add(t->system, part, &term);
 }
 
 /* ---- the terms of a step ---- */
@@ -211,7 +215,7 @@ static void add_targets(npg_tracker *t, npg_tracked *tracked, const double *pose
         if (facing < -0.2) continue;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
-        add_pull(t->system, t, &p, pose, share, width);
+        add_pull(t, TO_SURFACE, &p, pose, share, width);
     }
     tracked->point_dist_mean = sum * share;
     tracked->chamfer = squares * share;
@@ -235,7 +239,7 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
         if (facing < -0.2 || (double)t->near_sq[s] > 9 * width * width) continue;
         memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
         memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
-        add_pull(t->reverse, t, &p, pose, share, width);
+        add_pull(t, TO_POINTS, &p, pose, share, width);
     }
 }
 
@@ -243,23 +247,17 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
 static void add_edges(npg_tracker *t, const double *pose, double stiffness)
 {
     const npg_graph *graph = t->graph;
-    double weight = stiffness / (double)graph->edge_count;
-    const double w[9] = {weight, 0, 0, 0, weight, 0, 0, 0, weight};
+    npg_block_term term = {.count = 2, .shares = {1, -1}, .along = stiffness / (double)graph->edge_count};
     for (size_t e = 0; e < 2 * graph->edge_count; e++) {
         uint32_t j = graph->edges[e / 2][e % 2], k = graph->edges[e / 2][1 - e % 2];
         const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
         const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
-        double y[3], r[3];
-        for (int i = 0; i < 3; i++) {
-            y[i] = 0;
-            for (int c = 0; c < 3; c++) y[i] += pj[3 * i + c] * ((double)gk[c] - (double)gj[c]);
-            r[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - y[i];
-        }
-        const double jacobians[2][18] = {
-            {0, y[2], -y[1], 1, 0, 0, -y[2], 0, y[0], 0, 1, 0, y[1], -y[0], 0, 0, 0, 1},
-            {0, 0, 0, -1, 0, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 0, -1}};
-        const uint32_t nodes[2] = {j, k};
-        npg_block_add(t->reverse, nodes, jacobians, 2, w, r);
+        term.nodes[0] = j;
+        term.nodes[1] = k;
+        set_arm(term.arms[0], pj, gk, gj);
+        for (int i = 0; i < 3; i++)
+            term.right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term.arms[0][i];
+        npg_block_add(t->system, TO_POINTS, &term);
     }
 }
 
@@ -338,7 +336,7 @@ static npg_status to_surface(step *s)
     NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
     NPG_TRY(npg_surface_closest_near(t->surface, t->hits, t->targets, t->target_count,
                                      s->is_first ? NULL : t->start_face, NULL, 1));
-    npg_block_clear(t->system);
+    npg_block_clear(t->system, TO_SURFACE);
     add_targets(t, &s->tracked, s->pose, s->normals != NULL, s->width);
     return NPG_OK;
 }
@@ -352,7 +350,7 @@ static npg_status to_points(step *s)
     s->reverse_chamfer = 0;
     for (size_t i = 0; i < t->sample_count; i++) s->reverse_chamfer += (double)t->near_sq[i];
     s->reverse_chamfer /= (double)t->sample_count;
-    npg_block_clear(t->reverse);
+    npg_block_clear(t->system, TO_POINTS);
     add_samples(t, s->pose, s->points, s->normals, s->width);
     add_edges(t, s->pose, s->stiffness);
     return NPG_OK;
@@ -360,7 +358,7 @@ static npg_status to_points(step *s)
 
 static npg_status one_direction(void *user, size_t part)
 {
-    return part ? to_points(user) : to_surface(user);
+    return part == TO_POINTS ? to_points(user) : to_surface(user);
 }
 
 static npg_status gather(step *s)
@@ -369,9 +367,7 @@ static npg_status gather(step *s)
     npg_tracker_vertices(t, t->vert_pos, s->pose);
     npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
                             t->mesh->face_count);
-    NPG_TRY(npg_parallel(one_direction, s, 2));
-    npg_block_merge(t->system, t->reverse);
-    return NPG_OK;
+    return npg_parallel(one_direction, s, NPG_BLOCK_PARTS);
 }
 
 /* How far a fit has come, 0..1 before the last steps; the noisier the points, the more of them must agree
@@ -394,8 +390,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     NPG_TRY(gather(s));
     tracked->point_dist_mean = s->tracked.point_dist_mean;
     tracked->chamfer = s->tracked.chamfer + s->reverse_chamfer;
-    npg_block_damp(t->system, 1e-9);
-    npg_block_solve(t->system, t->step, 1e-3, 60);
+    npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
     tracked->change = move_nodes(t, pose);
