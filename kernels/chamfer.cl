@@ -8,13 +8,6 @@
 
 #define SLOT 8
 
-/* LOCAL: build constant, from the tuning of the device. */
-#if LOCAL == 1
-#define ITEM 0
-#else
-#define ITEM ((int)get_local_id(0))
-#endif
-
 inline float weight_of(float dist_sq, float falloff)
 {
     return exp(-dist_sq * dist_sq * falloff);
@@ -24,7 +17,7 @@ inline float weight_of(float dist_sq, float falloff)
  * points: targets; to_points / to_verts: nearest indices; forward / reverse: the slots (op nearest) of the searches
  * vertex -> point and point -> vertex.  falloff = 1 / (2 alpha^2), 0 for plain squared distances.
  * Global size: one group of LOCAL items per frame, frames first ... */
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
+GROUP_KERNEL
 chamfer_frame(global float *cd, global float *g, global const float *x, global const float *points,
               global const int *to_points, global const int *to_verts, global const int *forward,
               global const int *reverse, float falloff, int rows, int first, int count)

@@ -24,15 +24,6 @@
 #define STORE PASTE(vstore, VW)
 #define TW (VW * NV) /* columns of a tile */
 
-#if LOCAL == 1
-#define ITEM 0
-#define SYNC
-#else
-#define ITEM ((int)get_local_id(0))
-#define SYNC barrier(CLK_GLOBAL_MEM_FENCE);
-#endif
-#define GROUP_KERNEL __attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
-
 /* The columns of this item among C, each tile's first: c. */
 #define FOR_COLUMNS(c, C) for (int c = ITEM * TW; c < (C); c += LOCAL * TW)
 

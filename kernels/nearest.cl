@@ -13,13 +13,6 @@
 #define FAR 1e18f
 
 /* Build constants from the tuning of the device: QUERIES, LOCAL. */
-#if LOCAL == 1
-#define ITEM 0
-#define SYNC
-#else
-#define ITEM ((int)get_local_id(0))
-#define SYNC barrier(CLK_GLOBAL_MEM_FENCE);
-#endif
 
 /* Box blocks of the level over `count` children. */
 inline int blocks_over(int count)
@@ -41,7 +34,7 @@ inline float highest(float16 v)
 }
 
 /* Boxes of all levels of the tree of each frame, from its points.  Global size: one group of LOCAL items per frame. */
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
+GROUP_KERNEL
 nearest_refit(global float *boxes, global const float *points, global const int *slots, int first, int count)
 {
     if (get_group_id(0) >= (size_t)count) return;

@@ -9,7 +9,7 @@
 
 /* CHAINS independent chains of multiply-adds on vectors of VW: 2 VW CHAINS operations a round and item.
  * Global size: groups of LOCAL items; sink: [items]. */
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void peak_multiply_add(global float *sink, int rounds,
+GROUP_KERNEL peak_multiply_add(global float *sink, int rounds,
                                                                                  float a, float b)
 {
     REAL acc[CHAINS], sum = 0.0f;
@@ -26,7 +26,7 @@ __attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void peak_multiply_add
 }
 
 /* to = from, `vectors` of VW floats for each item: 8 VW bytes moved per vector.  Global size: groups of LOCAL items. */
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void peak_copy(global float *to, global const float *from,
+GROUP_KERNEL peak_copy(global float *to, global const float *from,
                                                                          int vectors)
 {
     size_t first = get_group_id(0) * vectors * LOCAL + get_local_id(0), end = first + (size_t)vectors * LOCAL;

@@ -12,14 +12,9 @@
  * LOCAL work-items (build constant, from the tuning of the device); each owns every LOCAL-th block of 16 vertices, walks
  * the list in order and adds what pulls at its own: equal input gives equal bits.
  * Global size: one group of LOCAL items per frame, frames first ... */
-#if LOCAL == 1
-#define ITEM 0
-#else
-#define ITEM ((int)get_local_id(0))
-#endif
 #define IS_MINE(v) ((v) / 16 % LOCAL == ITEM)
 
-__attribute__((reqd_work_group_size(LOCAL, 1, 1))) kernel void
+GROUP_KERNEL
 pull_frame(global float *loss, global float *g, global const float *x, global const float *pulls,
            global const int *start, int rows, int first, int count)
 {

@@ -342,16 +342,6 @@ static npg_status read_file(npg_follow *follow, const file *head, npg_frame *fra
     return status;
 }
 
-static int64_t common_divisor(int64_t a, int64_t b)
-{
-    while (b) {
-        int64_t rest = a % b;
-        a = b;
-        b = rest;
-    }
-    return a;
-}
-
 /* The head becomes *frame. */
 static npg_status take(npg_follow *follow, npg_frame *frame)
 {
@@ -360,7 +350,7 @@ static npg_status take(npg_follow *follow, npg_frame *frame)
     if (follow->taken_count && number <= follow->number)
         return npg_error(NPG_BAD_INPUT, "%s/%s: has the number %lld, and the frame before it %lld",
                          follow->folder, head.name, (long long)number, (long long)follow->number);
-    if (follow->taken_count) follow->step = common_divisor(number - follow->number, follow->step);
+    if (follow->taken_count) follow->step = npg_common_divisor(number - follow->number, follow->step);
     frame->number = follow->number = number;
     follow->taken_count++;
     npg_release(&follow->last);

@@ -12,21 +12,11 @@
 
 #define SLOTS_MAX ((int64_t)10000000)
 
-static int64_t common_divisor(int64_t a, int64_t b)
-{
-    while (b) {
-        int64_t rest = a % b;
-        a = b;
-        b = rest;
-    }
-    return a;
-}
-
 /* The largest step that leads to every number from the first one; 1 for a single frame. */
 static int64_t step_of(const int64_t *numbers, size_t count)
 {
     int64_t step = 0;
-    for (size_t i = 1; i < count; i++) step = common_divisor(numbers[i] - numbers[i - 1], step);
+    for (size_t i = 1; i < count; i++) step = npg_common_divisor(numbers[i] - numbers[i - 1], step);
     return step ? step : 1;
 }
 

@@ -106,3 +106,13 @@ int64_t npg_name_number(const char *name, size_t from_end)
     size_t runs;
     return run_value(name, from_end, &runs);
 }
+
+int64_t npg_common_divisor(int64_t a, int64_t b)
+{
+    while (b) {
+        int64_t rest = a % b;
+        a = b;
+        b = rest;
+    }
+    return a;
+}

@@ -21,4 +21,7 @@ npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *pa
  * -1 where there is none or it is too long for a number. */
 int64_t npg_name_number(const char *name, size_t from_end);
 
+/* The largest number that divides both, for the step of a numbering; the other one when one is 0. */
+int64_t npg_common_divisor(int64_t a, int64_t b);
+
 #endif

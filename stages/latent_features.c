@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "jacobi.h"
 #include "memory.h"
 
 #define SWEEPS 30
@@ -59,35 +60,11 @@ npg_status npg_features_solve(double *values, int nodes, int channels, double sc
 
 /* ---- the component ---- */
 
-static void rotate(double *m, double *v, size_t n, size_t p, size_t q)
-{
-    double theta = (m[q * n + q] - m[p * n + p]) / (2 * m[p * n + q]);
-    double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1));
-    double c = 1 / sqrt(t * t + 1), s = t * c;
-    for (size_t k = 0; k < n; k++) {
-        double a = m[k * n + p], b = m[k * n + q];
-        m[k * n + p] = c * a - s * b;
-        m[k * n + q] = s * a + c * b;
-    }
-    for (size_t k = 0; k < n; k++) {
-        double a = m[p * n + k], b = m[q * n + k], x = v[k * n + p], y = v[k * n + q];
-        m[p * n + k] = c * a - s * b;
-        m[q * n + k] = s * a + c * b;
-        v[k * n + p] = c * x - s * y;
-        v[k * n + q] = s * x + c * y;
-    }
-}
-
-/* Jacobi's method: rotations that clear one entry of m after the other. */
 static void largest_eigenvector(double *direction, double *share, double *m, double *v, size_t n)
 {
     size_t best = 0, peak = 0;
     double trace = 0;
-    for (size_t i = 0; i < n; i++) v[i * n + i] = 1;
-    for (int sweep = 0; sweep < SWEEPS; sweep++)
-        for (size_t p = 0; p + 1 < n; p++)
-            for (size_t q = p + 1; q < n; q++)
-                if (m[p * n + q] != 0) rotate(m, v, n, p, q);
+    npg_jacobi(m, v, (int)n, SWEEPS);
     for (size_t i = 0; i < n; i++) {
         trace += m[i * n + i];
         if (m[i * n + i] > m[best * n + best]) best = i;

@@ -1,8 +1,7 @@
 # Many captures at once: verdicts, limits, signals, manifests, the folders and configurations of the published code.
 
-tiny='"keyframe": 1, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
-    "align-steps": 3, "grid-levels": 2, "max-residual": 100, "max-flipped": 100, "max-stretched": 100, "min-coverage": 0'
-small="\"epochs\": 2, $tiny"
+load batch_helpers
+
 endless='"epochs": 1000000, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "grid-levels": 2'
 
 # Two captures that go well, one whose second frame is cut off.
@@ -26,14 +25,6 @@ setup_file() {
 setup() {
     cd "$BATS_FILE_TMPDIR"
     export XDG_CACHE_HOME=$BATS_FILE_TMPDIR/cache
-}
-
-# await PID COMMAND...: until the command succeeds, as long as the process lives
-await() {
-    until "${@:2}" 2>/dev/null; do
-        kill -0 "$1"
-        sleep 0.05
-    done
 }
 
 @test "one broken capture of three: the others are done, and the table says all" {

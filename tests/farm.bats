@@ -1,8 +1,7 @@
 # Recipes for many captures: GNU parallel, a watch folder, a real Slurm on this machine.
 
-tiny='"keyframe": 1, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
-    "align-steps": 3, "grid-levels": 2, "max-residual": 100, "max-flipped": 100, "max-stretched": 100, "min-coverage": 0'
-small="\"epochs\": 2, $tiny"
+load batch_helpers
+
 long='"epochs": 40, "window": 5, "overlap": 2'
 samples=$BATS_TEST_DIRNAME/../samples
 
@@ -22,14 +21,6 @@ setup() {
 # The options of a manifest as they stand on a command line.
 flags() {
     tr -d ' \n"' <<<"$1" | sed 's/^/--/; s/,/ --/g; s/:/=/g'
-}
-
-# await PID COMMAND...: until the command succeeds, as long as the process lives
-await() {
-    until "${@:2}" 2>/dev/null; do
-        kill -0 "$1"
-        sleep 0.1
-    done
 }
 
 @test "GNU parallel: what failed is done again, what is done is not" {

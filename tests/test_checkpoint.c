@@ -7,25 +7,10 @@
 #include <cmocka.h>
 
 #include "archive.h"
+#include "group_folder.h"
 #include "plan.h"
 #include "random.h"
-#include "temp_folder.h"
 #include "vdb_grids.h"
-
-static temp_folder folder;
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return 0;
-}
 
 /* ---- archives ---- */
 

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 
 #include "evaluate.h"
-#include "temp_folder.h"
+#include "group_folder.h"
 #include "test_chain.h"
 #include "writer.h"
 
@@ -240,7 +240,6 @@ static const npg_stage reader = {.name = "reader", .help = "", .conclude = read_
 static const npg_stage *const chain[] = {
     &test_source, &npg_stage_keyframe, &mesher, &npg_stage_evaluate, &test_sink, &reader, NULL};
 
-static temp_folder folder;
 static char last_text[1024];
 
 static npg_status run_scene(scene *s, const char *const (*more)[2])
@@ -433,19 +432,6 @@ static void no_memory_is_said(void **state)
         assert_int_equal(npg_memory_used(), before);
     }
     assert_int_equal(status, NPG_OK);
-}
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return 0;
 }
 
 int main(void)

@@ -14,9 +14,9 @@
 #include <xxhash.h>
 
 #include "export.h"
+#include "group_folder.h"
 #include "mesh_tools.h"
 #include "reader.h"
-#include "temp_folder.h"
 #include "test_chain.h"
 
 extern const npg_stage npg_stage_keyframe, npg_stage_export;
@@ -92,7 +92,6 @@ static const npg_stage mesher = {.name = "mesher",
                                  .process = mesh_process};
 static const npg_stage *const chain[] = {&test_source, &npg_stage_keyframe, &mesher, &npg_stage_export, NULL};
 
-static temp_folder folder;
 static char last_text[1024];
 
 static scene plain_scene(void)
@@ -468,19 +467,6 @@ static void no_memory_leaves_no_done(void **state)
         assert_int_equal(npg_memory_used(), before);
     }
     assert_int_equal(status, NPG_OK);
-}
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return 0;
 }
 
 int main(void)

@@ -13,10 +13,8 @@
 #include <sys/wait.h>
 
 #include "file.h"
+#include "group_folder.h"
 #include "memory.h"
-#include "temp_folder.h"
-
-static temp_folder folder;
 
 static void a_file_appears_when_it_is_whole(void **state)
 {
@@ -210,19 +208,6 @@ static void no_memory_is_said(void **state)
         assert_int_equal(npg_memory_used(), 0);
     }
     assert_int_equal(status, NPG_OK);
-}
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return 0;
 }
 
 int main(void)

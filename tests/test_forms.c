@@ -15,19 +15,18 @@
 #include "border_caps.h"
 #include "corner_split.h"
 #include "forms.h"
+#include "group_folder.h"
 #include "latent_features.h"
 #include "mesh_tools.h"
 #include "reader.h"
 #include "rigid.h"
 #include "sobolev.h"
-#include "temp_folder.h"
 #include "vdb_surface.h"
 #include "writer.h"
 #include "zip_store.h"
 
 enum { V = 5, F = 6 }; /* two tetrahedra on one base: closed */
 
-static temp_folder folder;
 static const uint32_t faces[3 * F] = {0, 1, 3, 1, 2, 3, 2, 0, 3, 1, 0, 4, 2, 1, 4, 0, 2, 4};
 static const float rest[3 * V] = {0, 0, 0, 1, 0, 0, 0.5f, 0, -1, 0.5f, 1, -0.3f, 0.5f, -1, -0.3f};
 static const uint8_t colours[4 * V] = {255, 0,   0, 255, 0, 255, 0, 255, 0, 0,
@@ -558,19 +557,6 @@ static void clearing_leaves_what_is_not_ours(void **state)
     assert_false(is_there(out, "exports.jsonl"));
     assert_false(is_there(out, "obj/frame_0010.obj"));
     assert_false(is_there(out, "volumes/frame_0010.vdb"));
-}
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return npg_memory_used() ? -1 : 0;
 }
 
 int main(void)

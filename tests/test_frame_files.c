@@ -9,23 +9,8 @@
 
 #include "frame_files.h"
 #include "frame_names.h"
+#include "group_folder.h"
 #include "memory.h"
-#include "temp_folder.h"
-
-static temp_folder folder;
-
-static int open_tests(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_tests(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return npg_memory_used() ? -1 : 0;
-}
 
 /* A fresh sub-folder with files of these names ("a/b.ply" makes the folder a); its path. */
 static const char *make_files(const char *name, const char *const *files)
@@ -313,5 +298,5 @@ int main(void)
                                        cmocka_unit_test(list_files),
                                        cmocka_unit_test(odd_inputs),
                                        cmocka_unit_test(no_memory_at_any_point)};
-    return cmocka_run_group_tests(tests, open_tests, close_tests);
+    return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

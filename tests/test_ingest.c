@@ -8,24 +8,9 @@
 #include <fcntl.h>
 
 #include "capture.h"
+#include "group_folder.h"
 #include "ingest.h"
-#include "temp_folder.h"
 #include "test_chain.h"
-
-static temp_folder folder;
-
-static int open_tests(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_tests(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return npg_memory_used() ? -1 : 0;
-}
 
 /* ---- a stage that writes down what it sees, and plans ---- */
 
@@ -338,5 +323,5 @@ int main(void)
                                        cmocka_unit_test(frames_from_standard_input),
                                        cmocka_unit_test(frames_that_are_pushed),
                                        cmocka_unit_test(no_memory_at_any_point)};
-    return cmocka_run_group_tests(tests, open_tests, close_tests);
+    return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

@@ -8,11 +8,11 @@
 
 #include <locale.h>
 
+#include "group_folder.h"
 #include "memory.h"
 #include "options.h"
 #include "run_settings.h"
 #include "stage.h"
-#include "temp_folder.h"
 
 /* ---- a chain with tables of its own; the second stage has none ---- */
 
@@ -208,8 +208,6 @@ static void numbers_do_not_depend_on_the_locale(void **state)
 
 /* ---- the configuration file ---- */
 
-static temp_folder folder;
-
 static npg_status load(npg_options *options, const char *text)
 {
     const char *path = in_folder(&folder, "config.json");
@@ -297,19 +295,6 @@ static void no_memory_is_said(void **state)
         assert_int_equal(npg_memory_used(), before);
     }
     assert_int_equal(status, NPG_OK);
-}
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return 0;
 }
 
 static void quality_best_is_the_preset_unless_another_is_named(void **state)

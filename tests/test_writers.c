@@ -7,26 +7,11 @@
 #include <cmocka.h>
 #include <math.h>
 
+#include "group_folder.h"
 #include "reader.h"
-#include "temp_folder.h"
 #include "writer.h"
 
 enum { V = 6, F = 4 };
-
-static temp_folder folder;
-
-static int open_tests(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_tests(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return npg_memory_used() ? -1 : 0;
-}
 
 static const uint32_t faces[3 * F] = {0, 1, 2, 2, 1, 3, 3, 4, 5, 0, 5, 4};
 static double world[3 * V];
@@ -158,5 +143,5 @@ int main(void)
                                        cmocka_unit_test(a_cloud_has_no_faces),
                                        cmocka_unit_test(the_same_mesh_gives_the_same_bytes),
                                        cmocka_unit_test(failures_leave_nothing)};
-    return cmocka_run_group_tests(tests, open_tests, close_tests);
+    return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

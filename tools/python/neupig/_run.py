@@ -11,13 +11,13 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from ctypes import POINTER, byref, c_double, c_float, c_void_p, sizeof
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, NamedTuple, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _library as native
+from ._closing import Closing
 from ._library import Error, Status, check, lib
 from ._options import Options
 
@@ -116,7 +116,7 @@ class Stage(NamedTuple):
     frame: Callable[[FrameView], None]
 
 
-class Run:
+class Run(Closing):
     """A run: frames come from files (``input``), or are pushed; results go to a folder (``output``), are pulled
     (``pull=True``), or both.
 
@@ -269,17 +269,6 @@ class Run:
         with self._closing:
             if self._handle:
                 lib.npg_run_close(byref(self._handle))
-
-    def __enter__(self) -> Run:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        self.close()
-
-    def __del__(self) -> None:
-        if getattr(self, "_handle", None):
-            self.close()
 
 
 def _wait_for_files(run: Run, output: Path) -> Outcome:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import POINTER, byref, c_float, c_uint32, c_void_p
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _library as native
+from ._closing import Closing
 from ._library import Error, Status, check, lib
 
 _HIT = np.dtype([("face", np.uint32), ("weights", np.float32, 3), ("dist_sq", np.float32)])
@@ -32,7 +32,7 @@ def _rows(array: npt.ArrayLike, kind: type, what: str) -> npt.NDArray[Any]:
     return rows
 
 
-class Surface:
+class Surface(Closing):
     """A mesh that can be asked for its nearest point.  Asking is thread-safe and lets other Python threads run; ``move``
     refits the search tree and must not run beside a question."""
 
@@ -62,14 +62,3 @@ class Surface:
     def close(self) -> None:
         if self._handle:
             lib.npg_surface_close(byref(self._handle))
-
-    def __enter__(self) -> Surface:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        self.close()
-
-    def __del__(self) -> None:
-        if getattr(self, "_handle", None):
-            self.close()
