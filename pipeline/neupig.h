@@ -99,7 +99,9 @@ typedef struct npg_allocator {
 /* NPG_USAGE while memory of the library is still in use.  NULL brings back the default. */
 NPG_API npg_status npg_memory_set_allocator(const npg_allocator *allocator);
 
-/* Bytes in use now, and the most ever in use since the process began (device buffers on the CPU included). */
+/* Bytes in use now, and the most ever in use since the process began (device buffers on the CPU included).
+ * The process has more resident: code, the device's compiler, and what its heap keeps though it is free. With
+ * glibc mallopt(M_MMAP_THRESHOLD, 1 << 20) at the program's start keeps that small, as the command does. */
 NPG_API size_t npg_memory_used(void);
 NPG_API size_t npg_memory_peak(void);
 

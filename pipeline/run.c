@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include "clock.h"
@@ -222,6 +223,14 @@ void npg_run_announce_memory(npg_run *run)
 
 /* ---- the conductor ---- */
 
+/* What the process ever had resident: other libraries, compiled kernels and free pages of the heap as well.
+ */
+static json_int_t resident_peak(void)
+{
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) ? 0 : (json_int_t)usage.ru_maxrss * 1024;
+}
+
 static npg_status conclude(npg_run *run)
 {
     json_t *r = run->report;
@@ -231,6 +240,7 @@ static npg_status conclude(npg_run *run)
     json_object_set_new(r, "wall_s", json_real(npg_clock_s() - run->opened_s));
     json_object_set_new(r, "process_cpu_s", json_real(npg_clock_process_s()));
     json_object_set_new(r, "memory_peak_bytes", json_integer((json_int_t)npg_memory_peak()));
+    json_object_set_new(r, "resident_peak_bytes", json_integer(resident_peak()));
     npg_status status = open_worker_states(run);
     for (size_t i = 0; i < run->worker_count && !status; i++)
         if (run->workers[i].stage->conclude) status = run->workers[i].stage->conclude(&run->workers[i]);

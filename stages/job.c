@@ -27,7 +27,8 @@ typedef struct left_poses { /* what align left for a moment */
 struct npg_job {
     char *output, *folder; /* owned */
     int lock_fd;
-    json_t *then, *now;   /* owned; what an earlier run was made of (may be NULL), and this one */
+    json_t *then, *now;   /* owned; what an earlier run was made of, and this one; NULL once written */
+    int64_t frame_count;  /* of the input, gaps included */
     npg_archive *archive; /* owned */
     char *grids_path;     /* of the archive, owned */
     int64_t serial;       /* of the newest state in place, -1: none */
@@ -264,7 +265,7 @@ static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_list)
 
 int64_t npg_job_frame_count(const npg_job *job)
 {
-    return (int64_t)json_array_size(json_object_get(job->now, "frames"));
+    return job->frame_count;
 }
 
 const npg_archive *npg_job_archive(const npg_job *job)
@@ -362,6 +363,7 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     NPG_TRY(npg_copy_text(&job->output, npg_worker_settings(worker)->output));
     NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
+    job->frame_count = (int64_t)json_array_size(json_object_get(job->now, "frames"));
     if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
     NPG_TRY(npg_make_folder(job->folder));
     NPG_TRY(take_lock(job));
@@ -421,6 +423,14 @@ static npg_status write_description(const npg_job *job)
     return status;
 }
 
+/* They have about a KiB for every frame, and nobody asks for them any more. */
+static void forget_descriptions(npg_job *job)
+{
+    json_decref(job->then);
+    json_decref(job->now);
+    job->then = job->now = NULL;
+}
+
 npg_status npg_job_write(npg_job *job)
 {
     if (job->forgets) {
@@ -429,6 +439,7 @@ npg_status npg_job_write(npg_job *job)
         job->serial = job->forward_serial = -1;
         NPG_TRY(write_description(job));
     }
+    forget_descriptions(job);
     pthread_mutex_lock(&job->lock);
     job->is_written = true;
     pthread_cond_broadcast(&job->changed);

@@ -9,6 +9,7 @@ extern "C" {
 #include "vdb_grids.h"
 }
 #include "guard.hpp"
+#include "vdb_writer.hpp"
 
 namespace
 {
@@ -77,7 +78,7 @@ void describe(openvdb::GridBase &grid, const npg_level &level, int at, int chann
 }
 
 template <class Grid>
-void add_grid(openvdb::GridCPtrVec &grids, const npg_level &level, int at, int channel, const float *rows,
+void add_grid(npg::vdb_writer &file, const npg_level &level, int at, int channel, const float *rows,
               const npg_vdb_place &place)
 {
     auto grid = Grid::create();
@@ -88,7 +89,7 @@ void add_grid(openvdb::GridCPtrVec &grids, const npg_level &level, int at, int c
         accessor.setValueOn(node, value);
     });
     describe(*grid, level, at, channel, place);
-    grids.push_back(grid);
+    file.add(grid);
 }
 
 template <class Grid>
@@ -121,6 +122,17 @@ template <class Vec3, class Single> npg_status each_grid(const npg_levels *level
     return NPG_OK;
 }
 
+int32_t grid_count(const npg_levels *levels)
+{
+    int32_t count = 0;
+    auto one_more = [&](int, int) {
+        count++;
+        return NPG_OK;
+    };
+    each_grid(levels, one_more, one_more);
+    return count;
+}
+
 } // namespace
 
 npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const float *rows,
@@ -128,26 +140,23 @@ npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const
 {
     return npg::guard("OpenVDB", [&] {
         openvdb::initialize();
-        openvdb::GridCPtrVec grids;
         openvdb::MetaMap about;
-        NPG_TRY(each_grid(
-            levels,
-            [&](int at, int channel) {
-                add_grid<Vec3SGrid>(grids, levels->level[at], at, channel, rows, *place);
-                return NPG_OK;
-            },
-            [&](int at, int channel) {
-                add_grid<FloatGrid>(grids, levels->level[at], at, channel, rows, *place);
-                return NPG_OK;
-            }));
         about.insertMeta("npg_version", openvdb::StringMetadata(npg_version()));
         about.insertMeta("npg_window", openvdb::Int64Metadata(place->window));
         about.insertMeta("npg_levels", openvdb::Int32Metadata(levels->count));
         about.insertMeta("npg_world_centre", openvdb::Vec3DMetadata(openvdb::Vec3d(place->world_centre)));
         about.insertMeta("npg_unit_per_world", openvdb::DoubleMetadata(place->unit_per_world));
-        openvdb::io::File file(path);
-        file.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK); // noise in single precision: nothing to gain
-        file.write(grids, about);
+        npg::vdb_writer file(path, about, grid_count(levels));
+        NPG_TRY(each_grid(
+            levels,
+            [&](int at, int channel) {
+                add_grid<Vec3SGrid>(file, levels->level[at], at, channel, rows, *place);
+                return NPG_OK;
+            },
+            [&](int at, int channel) {
+                add_grid<FloatGrid>(file, levels->level[at], at, channel, rows, *place);
+                return NPG_OK;
+            }));
         file.close();
         return NPG_OK;
     });

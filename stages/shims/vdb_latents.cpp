@@ -11,6 +11,7 @@ extern "C" {
 #include "vdb_latents.h"
 }
 #include "guard.hpp"
+#include "vdb_writer.hpp"
 
 namespace
 {
@@ -18,7 +19,7 @@ namespace
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
-// The grids of one level, by their first channel.
+// The grids of one level, by their first channel; without values until it is their turn.
 struct level {
     std::map<int, openvdb::GridBase::Ptr> grids;
     int nodes, channels;
@@ -142,7 +143,7 @@ npg_status make_component(FloatGrid::Ptr &out, const level &l)
     return NPG_OK;
 }
 
-npg_status make_features(openvdb::GridCPtrVec &made, level &l, const npg_placement *placement)
+npg_status make_features(npg::vdb_writer &file, level &l, const npg_placement *placement)
 {
     size_t n = size_t(l.nodes);
     FloatGrid::Ptr component;
@@ -156,9 +157,16 @@ npg_status make_features(openvdb::GridCPtrVec &made, level &l, const npg_placeme
         [&](FloatGrid &grid, size_t channel) { write_values(l, grid, channel); });
     for (auto &[first, grid] : l.grids) place(*grid, placement);
     NPG_TRY(make_component(component, l));
-    for (auto &[first, grid] : l.grids) made.push_back(grid);
-    made.push_back(component);
+    for (auto &[first, grid] : l.grids) file.add(grid);
+    file.add(component);
     return NPG_OK;
+}
+
+int32_t count_with_components(const std::map<int, level> &levels)
+{
+    size_t count = levels.size();
+    for (const auto &[at, l] : levels) count += l.grids.size();
+    return int32_t(count);
 }
 
 } // namespace
@@ -169,20 +177,19 @@ npg_status npg_vdb_save_latents(const char *path, npg_vdb_span *span, const char
     NPG_REQUIRE(path && span && grids_path);
     return npg::guard("OpenVDB", [&] {
         openvdb::initialize();
-        openvdb::io::File in(grids_path), out(path);
+        openvdb::io::File in(grids_path);
         in.open(false);
-        auto grids = in.getGrids();
-        auto about = in.getMetadata();
-        in.close();
         std::map<int, level> levels;
-        NPG_TRY(sort_into_levels(levels, *grids, grids_path));
+        NPG_TRY(sort_into_levels(levels, *in.readAllGridMetadata(), grids_path));
         if (levels.empty()) return npg_error(NPG_BAD_INPUT, "%s: no latent grids", grids_path);
         const openvdb::GridBase &one = *levels.begin()->second.grids.begin()->second;
         *span = {one.metaValue<int64_t>("npg_frame_first"), one.metaValue<int64_t>("npg_frame_last")};
-        openvdb::GridCPtrVec made;
-        for (auto &[at, l] : levels) NPG_TRY(make_features(made, l, placement));
-        out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
-        out.write(made, *about);
+        npg::vdb_writer out(path, *in.getMetadata(), count_with_components(levels));
+        for (auto &[at, l] : levels) {
+            for (auto &[first, grid] : l.grids) grid = in.readGrid(grid->getName());
+            NPG_TRY(make_features(out, l, placement));
+            l = level(); // the room is for the next one
+        }
         out.close();
         return NPG_OK;
     });
