@@ -8,6 +8,7 @@
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
+#include <time.h>
 
 #include "memory.h"
 #include "ring.h"
@@ -126,30 +127,42 @@ static void *consume(void *argument)
     }
 }
 
+static void stall(void)
+{
+    nanosleep(&(struct timespec){0, 3000000}, NULL);
+}
+
+/* Pop until the end; the consumer stalls on purpose every so often. */
+static int64_t consume_with_stalls(duet *d, npg_status *end)
+{
+    int64_t next = 0;
+    for (;; next++) {
+        npg_chunk *chunk = NULL;
+        if (next % 250 == 0) stall();
+        *end = npg_ring_pop(d->ring, &chunk);
+        if (*end) return next;
+        assert_int_equal(npg_chunk_frame(chunk, 0)->index, next);
+        npg_chunk_unref(&chunk);
+        atomic_fetch_add(&d->popped, 1);
+    }
+}
+
 static void threads_pass_everything_in_order(void **state)
 {
+    static const size_t capacities[] = {1, 2, 3, 8};
     (void)state;
-    for (size_t capacity = 1; capacity <= 4; capacity++) {
+    for (size_t i = 0; i < sizeof capacities / sizeof *capacities; i++) {
         duet d = {.count = 3000};
+        npg_status end;
         pthread_t producer;
-        assert_int_equal(npg_ring_open(&d.ring, capacity), NPG_OK);
+        assert_int_equal(npg_ring_open(&d.ring, capacities[i]), NPG_OK);
         assert_int_equal(pthread_create(&producer, NULL, produce, &d), 0);
-        duet mine = {.ring = d.ring};
-        int64_t next = 0;
-        for (;; next++) {
-            npg_chunk *chunk = NULL;
-            mine.end = npg_ring_pop(d.ring, &chunk);
-            if (mine.end) break;
-            assert_int_equal(npg_chunk_frame(chunk, 0)->index, next);
-            npg_chunk_unref(&chunk);
-            atomic_fetch_add(&d.popped, 1);
-        }
+        assert_int_equal(consume_with_stalls(&d, &end), 3000);
         pthread_join(producer, NULL);
-        assert_int_equal(mine.end, NPG_END);
-        assert_int_equal(next, 3000);
+        assert_int_equal(end, NPG_END);
         assert_int_equal(d.end, NPG_OK);
         /* one more than the capacity can be between the pop and the count of it */
-        assert_true(atomic_load(&d.most_inside) <= (long long)capacity + 1);
+        assert_true(atomic_load(&d.most_inside) <= (long long)capacities[i] + 1);
         npg_ring_close(&d.ring);
     }
 }
