@@ -106,12 +106,18 @@ void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_
         memcpy(samples + 3 * s, vert_pos + 3 * (size_t)carry->vertex[s], 3 * sizeof(float));
 }
 
-void npg_carry_move(const npg_carry *carry, float *vert_pos, const float *before, const float *samples)
+void npg_carriers_move(const npg_carrier *carriers, size_t vert_count, float *vert_pos, const float *before,
+                       const float *samples)
 {
-    for (size_t v = 0; v < carry->vert_count; v++)
+    for (size_t v = 0; v < vert_count; v++)
         for (int c = 0; c < 3; c++) {
-            size_t s = 3 * (size_t)carry->carriers[v].sample[c];
-            float share = carry->carriers[v].share[c];
+            size_t s = 3 * (size_t)carriers[v].sample[c];
+            float share = carriers[v].share[c];
             for (size_t i = 0; i < 3; i++) vert_pos[3 * v + i] += share * (samples[s + i] - before[s + i]);
         }
+}
+
+void npg_carry_move(const npg_carry *carry, float *vert_pos, const float *before, const float *samples)
+{
+    npg_carriers_move(carry->carriers, carry->vert_count, vert_pos, before, samples);
 }

@@ -41,4 +41,8 @@ void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_
 void npg_carry_move(const npg_carry *carry, float *vert_pos, const float *samples_before,
                     const float *samples);
 
+/* The same with the carriers of V vertices alone. */
+void npg_carriers_move(const npg_carrier *carriers, size_t vert_count, float *vert_pos,
+                       const float *samples_before, const float *samples);
+
 #endif

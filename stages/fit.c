@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "adam.h"
 #include "fit_weights.h"
@@ -528,6 +529,19 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
             vert_unit[3 * fit->order[row] + axis] = at;
         }
     return NPG_OK;
+}
+
+npg_status npg_fit_features(npg_fit *fit, float *features)
+{
+    size_t row_size = NPG_LATENT_CHANNELS * sizeof(float);
+    float *rows;
+    NPG_REQUIRE(fit->frame_count);
+    NPG_TRY(npg_alloc(&rows, NPG_FOR_FIT, fit->real * row_size));
+    npg_status status = npg_buffer_read(&fit->mlp.z, 0, rows, fit->real * row_size);
+    for (size_t row = 0; row < fit->real && !status; row++)
+        memcpy(features + NPG_LATENT_CHANNELS * fit->order[row], rows + NPG_LATENT_CHANNELS * row, row_size);
+    npg_release(&rows);
+    return status;
 }
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit)

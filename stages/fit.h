@@ -87,6 +87,10 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
 /* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
 
+/* features (V x NPG_LATENT_CHANNELS, in the order of the reference): what the grids gave the decoder in the
+ * last window, as it is after its last step. */
+npg_status npg_fit_features(npg_fit *fit, float *features);
+
 /* What goes from window to window, for saving and restoring: loans of the fit's own. */
 typedef struct npg_fit_parts {
     const struct npg_levels *levels;

@@ -15,6 +15,7 @@
 
 #include "file.h"
 #include "forms.h"
+#include "record.h"
 
 #define STATE_NAME "window_%06lld.%s"
 
@@ -67,6 +68,12 @@ static int64_t serial_of(const char *name)
     return fields == 2 || !strcmp(rest, ".part") ? serial : -1;
 }
 
+/* Records of windows, also their hidden, unfinished form. */
+static bool is_motion(const char *name)
+{
+    return !strncmp(name + (name[0] == '.'), "motion_", 7);
+}
+
 /* Call visit(job, name, serial) for every file of a state. */
 static npg_status each_state(npg_job *job,
                              npg_status (*visit)(npg_job *job, const char *name, int64_t serial))
@@ -94,6 +101,17 @@ static npg_status remove_state(npg_job *job, const char *name, int64_t serial)
 {
     (void)serial;
     return remove_file(job, name);
+}
+
+static npg_status remove_motions(npg_job *job)
+{
+    npg_status status = NPG_OK;
+    DIR *listing = opendir(job->folder);
+    if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
+    for (struct dirent *entry; !status && (entry = readdir(listing));)
+        if (is_motion(entry->d_name)) status = remove_file(job, entry->d_name);
+    closedir(listing);
+    return status;
 }
 
 /* Keep the two newest and the one that later frames go on from; grids that are to be exported stay, too. */
@@ -436,6 +454,7 @@ npg_status npg_job_write(npg_job *job)
     if (job->forgets) {
         NPG_TRY(remove_file(job, "job.json"));
         NPG_TRY(each_state(job, remove_state));
+        NPG_TRY(remove_motions(job));
         job->serial = job->forward_serial = -1;
         NPG_TRY(write_description(job));
     }
@@ -460,6 +479,13 @@ npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path
     npg_status status = state_path(grids_path, job, *serial, "vdb");
     if (status) npg_release(archive_path);
     return status;
+}
+
+npg_status npg_job_motion_path(const npg_job *job, char **path)
+{
+    char name[64];
+    snprintf(name, sizeof name, NPG_MOTION_NAME, (long long)job->serial + 1);
+    return npg_join_path(path, job->folder, name);
 }
 
 npg_status npg_job_commit(npg_job *job, bool is_forward_end)

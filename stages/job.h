@@ -7,6 +7,9 @@
  * optimiser, the coarse alignment's poses and the frames that the next windows share
  *     OUT/job/window_000012.vdb    the latent grids of the same moment (stages/shims/vdb_grids.h)
  *
+ *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (record.h); those of all
+ * windows stay, for neupig apply
+ *
  * The two newest windows stay, and the one that later frames go on from (neupig append); where grids are to
  * be exported, those of all.  Each file appears whole or not at all; the archive names the checksum of its
  * grids and of the list of frames, so that a damaged one is noticed and the one before it taken.  No file
@@ -87,6 +90,9 @@ typedef struct npg_job_list {
 
 /* The number and the paths (to npg_release()) of the next state. */
 npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path);
+
+/* Where the record of the next window goes (record.h); to npg_release(). */
+npg_status npg_job_motion_path(const npg_job *job, char **path);
 
 /* Both files of the next state are in place: count it and remove states that nobody goes on from any more.
  * is_forward_end: later frames go on from it. */

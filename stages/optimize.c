@@ -10,6 +10,7 @@
 #include "fit_state.h"
 #include "kernels.h"
 #include "live_plan.h"
+#include "record.h"
 #include "window.h"
 
 typedef struct state {
@@ -279,10 +280,30 @@ static npg_status emit_done(npg_worker *worker)
 
 /* ---- states on disk ---- */
 
+/* The motion of the window for neupig apply, before the state says that the window is solved. */
+static npg_status save_record(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_record_source source = {s->solver,
+                                      &s->window_settings.fit,
+                                      facts,
+                                      &s->window,
+                                      s->held,
+                                      s->held_count,
+                                      (uint64_t)npg_worker_settings(worker)->seed};
+    char *path;
+    NPG_TRY(npg_job_motion_path(facts->job, &path));
+    npg_status status = npg_record_save(path, &source);
+    npg_release(&path);
+    return status;
+}
+
 static npg_status save_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (!npg_worker_facts(worker)->job) return NPG_OK;
+    NPG_TRY(save_record(worker));
     const npg_hand hand = {s->held,    s->held_count,   s->held_capacity, s->window_at,
                            s->emitted, s->last_chamfer, s->last_isometry, s->is_aligned};
     return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));

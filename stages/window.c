@@ -1,6 +1,7 @@
 /* Window: solving one, from aligned frames or as in the paper. */
 #include "window.h"
 
+#include <math.h>
 #include <string.h>
 
 struct npg_window_solver {
@@ -29,6 +30,11 @@ size_t npg_window_sample_count(const npg_window_solver *solver)
 npg_fit *npg_window_fit(npg_window_solver *solver)
 {
     return solver->fit;
+}
+
+const npg_carry *npg_window_carry(const npg_window_solver *solver)
+{
+    return solver->carry;
 }
 
 static void close_frames(npg_window_solver *s)
@@ -88,13 +94,11 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
     return NPG_OK;
 }
 
-/* The time code is a function of the absolute frame with a fixed period, the length of a window, so that
- * frames which two windows share mean the same to both. */
-static double time_of(const npg_window_solver *s, int64_t index)
+double npg_window_time(const npg_plan *plan, double index)
 {
-    npg_window first = npg_plan_key_window(&s->facts->plan);
+    npg_window first = npg_plan_key_window(plan);
     int64_t length = first.last - first.first;
-    return length ? (double)(index - first.first) / (double)length : 0;
+    return length ? (index - (double)first.first) / (double)length : 0;
 }
 
 static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_t count)
@@ -110,9 +114,9 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
     for (size_t i = 0; i < count; i++) {
         const npg_frame *frame = &held[i]->frame;
         if (s->is_aligned) npg_carry_gather(s->carry, s->bases + i * size, frame->vert_unit);
-        s->frames[i] =
-            (npg_fit_frame){frame->index, time_of(s, frame->index), s->points + 3 * s->point_start[i],
-                            frame->point_count, s->is_aligned ? s->bases + i * size : NULL};
+        s->frames[i] = (npg_fit_frame){frame->index, npg_window_time(&s->facts->plan, (double)frame->index),
+                                       s->points + 3 * s->point_start[i], frame->point_count,
+                                       s->is_aligned ? s->bases + i * size : NULL};
     }
     return NPG_OK;
 }
@@ -168,15 +172,14 @@ static npg_status run_rounds(npg_window_solver *s, npg_held *const *held, npg_fi
     return read_samples(s);
 }
 
-/* What a window says of a frame that an earlier one has solved counts more the nearer the frame is to the new
- * ones. */
-static float share_of_new(const npg_window *window, int64_t index)
+double npg_window_share(const npg_window *window, double index)
 {
-    if (index >= window->new_first && index <= window->new_last) return 1;
+    double first = (double)window->new_first, last = (double)window->new_last;
+    if (!window->direction || (index >= first && index <= last)) return 1;
     int64_t overlap =
         window->direction > 0 ? window->new_first - window->first : window->last - window->new_last;
-    int64_t away = window->direction > 0 ? window->new_first - index : index - window->new_last;
-    return (float)(overlap + 1 - away) / (float)(overlap + 1);
+    double away = window->direction > 0 ? first - index : index - last;
+    return fmin(1, fmax(0, ((double)overlap + 1 - away) / (double)(overlap + 1)));
 }
 
 static npg_status keep_solved(npg_held *held, const float *dense, size_t verts, float share)
@@ -205,7 +208,7 @@ npg_status npg_window_solve(npg_window_solver *s, npg_held *const *held, const n
     for (size_t i = 0; i < s->count; i++) {
         if (s->is_aligned) carry_dense(s, &held[i]->frame, i);
         NPG_TRY(keep_solved(held[i], s->is_aligned ? s->dense : s->now + i * size, verts,
-                            share_of_new(window, held[i]->frame.index)));
+                            (float)npg_window_share(window, (double)held[i]->frame.index)));
     }
     close_frames(s);
     return NPG_OK;

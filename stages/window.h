@@ -35,6 +35,18 @@ void npg_window_solver_close(npg_window_solver **solver);
 npg_fit *npg_window_fit(npg_window_solver *solver); /* a loan */
 size_t npg_window_sample_count(const npg_window_solver *solver);
 
+/* The samples that carry the surface; NULL where every vertex is decoded.  A loan. */
+const npg_carry *npg_window_carry(const npg_window_solver *solver);
+
+/* What the time code is a function of: the absolute frame with a fixed period, the length of the first
+ * window, so that frames which two windows share mean the same to both.  Moments between frames have times,
+ * too. */
+double npg_window_time(const npg_plan *plan, double index);
+
+/* How much a window says of a frame, or of a moment between two, against what the windows before it have
+ * said: 1 where it is the first to solve, less the farther into the overlap, 0 on the first frame outside. */
+double npg_window_share(const npg_window *window, double index);
+
 /* Solve a window: held[i] are its frames in order of time; fills `solved` of each. */
 npg_status npg_window_solve(npg_window_solver *solver, npg_held *const *held, const npg_window *window,
                             npg_fit_watch *watch, void *user);

@@ -78,6 +78,89 @@ first_x() { awk '$1 == "v" { print $2 + 0; exit }' "$1"; }
     sed -n '/^element/p;/^end_header/q' twice/frame_0003.ply | cmp - <(echo "element vertex 1200")
 }
 
+# Mean correspondence error of the odd frames of $1 against the truth in $2.
+odd_error() {
+    "$NEUPIG" eval "$1" "$2" --samples 1000 --per-frame --json | tr -d ' \n' | tr '{' '\n' |
+        sed -n 's/.*"frame":\([0-9]*\),"Corr":\([0-9.e-]*\).*/\1 \2/p' |
+        awk '$1 % 2 { sum += $2; count++ } END { if (!count) exit 1; print sum / count }'
+}
+
+# Twice as many frames as the run sees: what lies between has a truth.
+fine_and_coarse() {
+    [ -d fine ] && return
+    "$NEUPIG" synth --body bar --frames 17 --points 1500 -o fine >/dev/null
+    mkdir coarse
+    for t in 0 1 2 3 4 5 6 7 8; do cp "fine/points/frame_00$(printf %02d $((2 * t))).ply" coarse/frame_000$t.ply; done
+}
+
+between_run() {
+    "$NEUPIG" run coarse -o "$1" --keyframe 4 --epochs 20 --width-1 64 --width-2 64 --faces 1000 --poisson-depth 6 \
+        --quiet --max-residual 100 --max-flipped 100 --window 4 --overlap 1 "${@:2}" >"$1.log" || [ $? -eq 7 ]
+}
+
+@test "in-between frames come from the saved windows, nearer the truth than lines between meshes" {
+    fine_and_coarse
+    between_run wide
+    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-windows --fps-scale 2
+    grep -q '"between": "windows"' wide-windows/done.json
+    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-line --fps-scale 2 --between line
+    windows=$(odd_error wide-windows fine)
+    line=$(odd_error wide-line fine)
+    echo "windows $windows, lines $line"
+    awk -v w="$windows" -v l="$line" 'BEGIN { exit !(w > 0 && w < 0.95 * l) }'
+    # nothing leaps where windows meet: a step of a 16th of a frame is never much longer than those beside it
+    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-steps --fps-scale 16 --format obj
+    for step in wide-steps/*.obj; do grep '^v ' "$step" | awk '{ print $2, $3, $4 }' >"$step.v"; done
+    for k in $(seq 0 127); do
+        paste "$(printf wide-steps/frame_%04d.obj.v "$k")" "$(printf wide-steps/frame_%04d.obj.v $((k + 1)))" |
+            awk '{ sum += sqrt(($1 - $4) ^ 2 + ($2 - $5) ^ 2 + ($3 - $6) ^ 2) } END { print sum / NR }'
+    done >lengths
+    awk '{ if (NR > 2 && last > 1.5 * $1 + 2e-5 && last > 1.5 * before + 2e-5) bad++; before = last; last = $1 }
+        END { exit bad > 0 || NR != 128 }' lengths
+}
+
+@test "the saved windows are enough: without meshes all frames are the same" {
+    fine_and_coarse
+    for run in wide paper; do
+        options=()
+        [ $run = paper ] && options=(--align=no --epochs 30 --axes xz-y --unit cm)
+        [ -d $run ] || between_run $run "${options[@]}"
+        rm -rf $run-with $run-alone
+        "$NEUPIG" apply $run --mesh coarse/frame_0004.ply -o $run-with --fps-scale 2 --between windows --far 1000
+        mv $run/meshes $run-meshes
+        "$NEUPIG" apply $run --mesh coarse/frame_0004.ply -o $run-alone --fps-scale 2 --format obj --far 1000 2>$run.err
+        "$NEUPIG" apply $run --mesh $run/reference.ply -o $run-again --overwrite
+        mv $run-meshes $run/meshes
+        grep -q '9 of 9 meshes' $run.err
+        grep -q '"frames_from_windows": 9' $run-alone/done.json
+        run "$NEUPIG" eval $run-again $run/meshes --samples 1000
+        echo "$output"
+        [ "$(figure Corr)" = "0.00000" ]
+        [ "$(ls $run-alone | grep -c obj)" -eq 17 ]
+    done
+}
+
+@test "a damaged window is named; without windows there are curves" {
+    fine_and_coarse
+    [ -d wide ] || between_run wide
+    cp -r wide hurt
+    record=$(ls hurt/job/motion_*.npg | tail -1)
+    printf '\x5a\xa5' | dd of="$record" bs=1 seek=3000 conv=notrunc status=none
+    fail_with 3 "$(basename "$record")" hurt --mesh hurt/reference.ply --fps-scale 2
+    "$NEUPIG" apply hurt --mesh hurt/reference.ply -o hurt-curve --fps-scale 2 --between curve
+    rm "$record"
+    fail_with 3 "no record has frame" hurt --mesh hurt/reference.ply --fps-scale 2
+    rm hurt/job/motion_*
+    fail_with 3 "no windows" hurt --mesh hurt/reference.ply --fps-scale 2 --between windows
+    "$NEUPIG" apply hurt --mesh hurt/reference.ply -o hurt-auto --fps-scale 2
+    grep -q '"between": "curve"' hurt-auto/done.json
+    cmp hurt-auto/frame_0003.ply hurt-curve/frame_0003.ply
+    cp -r wide odd
+    cp odd/meshes/frame_0000.ply odd/reference.ply # not the one that the windows move
+    fail_with 3 "is not the reference" odd --mesh odd/reference.ply --fps-scale 2
+    fail_with 4 "no such device" wide --mesh wide/reference.ply --fps-scale 2 --device "no such device"
+}
+
 @test "in-between frames lie on the curve through the frames, gaps or not" {
     rm -rf curve gap
     hand_made curve 0 1 2 3

@@ -13,6 +13,7 @@
 #include "cli.h"
 #include "export.h"
 #include "file.h"
+#include "job_motion.h"
 #include "listing.h"
 #include "mesh_tools.h"
 #include "reader.h"
@@ -21,14 +22,16 @@
 #define PATH_SIZE 4096
 
 typedef struct settings {
-    const char *mesh, *output, *prefix;
+    const char *mesh, *output, *prefix, *device;
     int64_t fps_scale;
-    int format;
+    int format, between;
     double far_share;
     bool overwrite;
 } settings;
 
 enum { AS_MESH, AS_PLY, AS_OBJ };
+enum { BY_ANY, BY_WINDOWS, BY_CURVE, BY_LINE };
+static const char *const between_words[] = {"auto", "windows", "curve", "line"};
 
 #define AT(member) offsetof(settings, member)
 
@@ -38,10 +41,16 @@ const npg_option npg_apply_options[] = {
      NPG_OPTION_TEXT, AT(mesh), "", 0, 0, NULL, "FILE"},
     {"output", "Folder for the carried meshes (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "OUT"},
     {"fps-scale",
-     "Steps from each frame to the next; more than 1 adds in-between frames by Catmull-Rom curves in time "
-     "and "
-     "numbers the files 0, 1, 2 ...",
+     "Steps from each frame to the next; more than 1 adds in-between frames and numbers the files 0, 1, 2 "
+     "...",
      NPG_OPTION_INT, AT(fps_scale), "1", 1, 1000, NULL, "K"},
+    {"between",
+     "Where in-between frames come from: the saved windows, whose decoders know every time; or the run's "
+     "meshes, by "
+     "Catmull-Rom curves or straight lines; auto: the windows where the run has left them, else curves",
+     NPG_OPTION_CHOICE, AT(between), "auto", 0, 0, "auto|windows|curve|line", NULL},
+    {"device", "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name",
+     NPG_OPTION_TEXT, AT(device), "auto", 0, 0, NULL, "DEVICE"},
     {"far", "Points farther from the reference than this share of its diagonal are said (exit code 7)",
      NPG_OPTION_REAL, AT(far_share), "0.05", 0, 1e6, NULL, "SHARE"},
     {"format", "Format of the files; mesh: as the mesh that is carried (PLY for other points)",
@@ -54,7 +63,7 @@ const npg_option npg_apply_options[] = {
 typedef struct moment { /* a solved frame */
     bool is_there;
     int64_t index, number;
-    npg_mesh *mesh; /* owned */
+    float *vert_pos; /* V x 3, owned */
 } moment;
 
 typedef struct applying {
@@ -63,16 +72,18 @@ typedef struct applying {
     npg_origin origin;
     npg_mesh *reference, *carried;
     npg_attachment *attachment;
-    moment window[4];   /* in time; [1] and [2] are the two frames that are being written between */
-    float *between;     /* reference's V x 3                                                     */
-    double *pos;        /* carried's V x 3                                                       */
-    float *pos_float;   /* the same, where normals are made from it                              */
-    float *normals;     /* carried's V x 3, or NULL                                              */
-    bool turns_normals; /* they are the file's own                                               */
-    bool is_like;       /* OBJ from OBJ: the file's lines are kept                               */
+    npg_job_motion *motion; /* where the saved windows are needed */
+    moment window[4];       /* in time; [1] and [2] are the two frames that are being written between */
+    float *between;         /* reference's V x 3                                                     */
+    double *pos;            /* carried's V x 3                                                       */
+    float *pos_float;       /* the same, where normals are made from it                              */
+    float *normals;         /* carried's V x 3, or NULL                                              */
+    bool turns_normals;     /* they are the file's own                                               */
+    bool is_like;           /* OBJ from OBJ: the file's lines are kept                               */
     npg_mesh_names names;
     npg_file *done; /* collects OUT/done.json; appears last */
-    size_t frame_count, written, far_count;
+    size_t frame_count, written, far_count,
+        lost_count; /* lost: frames whose mesh file is not there any more */
     int64_t number_max;
     int64_t first_index, last_index;
     double fps;
@@ -120,8 +131,10 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     applying *a = user;
     int64_t number = json_integer_value(json_object_get(frame, "number"));
     int64_t index = json_integer_value(json_object_get(frame, "index"));
+    const char *file = json_string_value(json_object_get(frame, "file"));
     (void)line, (void)size;
-    if (!json_is_string(json_object_get(frame, "file"))) return NPG_OK;
+    if (!file) return NPG_OK;
+    if (npg_path_stays(file) && !is_in(a->job, file)) a->lost_count++;
     if (a->frame_count && index <= a->last_index)
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl: frame %lld is not after the one before it", a->job,
                          (long long)index);
@@ -138,6 +151,29 @@ static npg_status each_line(const applying *a, npg_visit_line *visit, void *user
     return npg_frame_lines_each(path, (int64_t)npg_file_bytes(path), visit, user);
 }
 
+/* The saved windows, where frames between frames or lost ones need them. */
+static npg_status open_motion(applying *a)
+{
+    bool makes_between = a->s.fps_scale > 1 && a->s.between <= BY_WINDOWS;
+    if (!makes_between && !a->lost_count) return NPG_OK;
+    npg_status status = npg_job_motion_open(&a->motion, a->job, a->reference, a->s.device);
+    if (status < 0) return npg_error_prefix(status, "%s", a->job);
+    if (status == NPG_END && a->lost_count)
+        return npg_error(NPG_BAD_INPUT,
+                         "%s: %zu of %zu meshes are missing, and job/ has no windows to make them from",
+                         a->job, a->lost_count, a->frame_count);
+    if (status == NPG_END && a->s.between == BY_WINDOWS)
+        return npg_error(NPG_BAD_INPUT,
+                         "%s: job/ has no windows (live runs leave none); --between curve does without",
+                         a->job);
+    if (a->lost_count)
+        fprintf(
+            stderr,
+            "neupig apply: %zu of %zu meshes of %s are missing; their frames come from the saved windows\n",
+            a->lost_count, a->frame_count, a->job);
+    return NPG_OK;
+}
+
 static npg_status open_job(applying *a)
 {
     char path[PATH_SIZE];
@@ -145,28 +181,42 @@ static npg_status open_job(applying *a)
     NPG_TRY(each_line(a, count_line, a));
     if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->job);
     NPG_TRY(path_of(path, a->job, "reference.ply"));
-    return npg_read_mesh(&a->reference, path, &a->origin);
+    NPG_TRY(npg_read_mesh(&a->reference, path, &a->origin));
+    return open_motion(a);
+}
+
+/* The mesh in a file, that it is the reference moved; its positions go to vert_pos. */
+static npg_status take_mesh(const applying *a, float *vert_pos, const npg_mesh *mesh, const char *path)
+{
+    const npg_mesh *reference = a->reference;
+    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
+        if (!isfinite(mesh->vert_pos[i]))
+            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    if (mesh->vert_count != reference->vert_count || mesh->face_count != reference->face_count)
+        return npg_error(NPG_BAD_INPUT, "%s has %zu vertices and %zu faces, %s/reference.ply %zu and %zu",
+                         path, mesh->vert_count, mesh->face_count, a->job, reference->vert_count,
+                         reference->face_count);
+    if (memcmp(mesh->faces, reference->faces, reference->face_count * 3 * sizeof *reference->faces) != 0)
+        return npg_error(NPG_BAD_INPUT, "%s: its faces are not those of %s/reference.ply", path, a->job);
+    memcpy(vert_pos, mesh->vert_pos, 3 * mesh->vert_count * sizeof *vert_pos);
+    return NPG_OK;
 }
 
 static npg_status read_moment(const applying *a, moment *m, const char *file)
 {
     char path[PATH_SIZE];
     npg_origin origin = a->origin;
-    const npg_mesh *reference = a->reference;
+    npg_mesh *mesh;
     if (!npg_path_stays(file))
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names %s, which is not in the job", a->job, file);
+    NPG_TRY(npg_alloc_array(&m->vert_pos, NPG_FOR_MESH, a->reference->vert_count, 3 * sizeof *m->vert_pos));
+    if (!is_in(a->job, file) && a->motion)
+        return npg_job_motion_pose(a->motion, m->vert_pos, (double)m->index);
     NPG_TRY(path_of(path, a->job, file));
-    NPG_TRY(npg_read_mesh(&m->mesh, path, &origin));
-    for (size_t i = 0; i < 3 * m->mesh->vert_count; i++)
-        if (!isfinite(m->mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
-    if (m->mesh->vert_count != reference->vert_count || m->mesh->face_count != reference->face_count)
-        return npg_error(NPG_BAD_INPUT, "%s has %zu vertices and %zu faces, %s/reference.ply %zu and %zu",
-                         path, m->mesh->vert_count, m->mesh->face_count, a->job, reference->vert_count,
-                         reference->face_count);
-    if (memcmp(m->mesh->faces, reference->faces, reference->face_count * 3 * sizeof *reference->faces) != 0)
-        return npg_error(NPG_BAD_INPUT, "%s: its faces are not those of %s/reference.ply", path, a->job);
-    return NPG_OK;
+    NPG_TRY(npg_read_mesh(&mesh, path, &origin));
+    npg_status status = take_mesh(a, m->vert_pos, mesh, path);
+    npg_mesh_unref(&mesh);
+    return status;
 }
 
 /* ---- the mesh that is carried ---- */
@@ -327,22 +377,49 @@ static double slope(const moment *window, int k, size_t i)
 {
     const moment *before = &window[window[k - 1].is_there ? k - 1 : k];
     const moment *after = &window[window[k + 1].is_there ? k + 1 : k];
-    return ((double)after->mesh->vert_pos[i] - (double)before->mesh->vert_pos[i]) /
+    return ((double)after->vert_pos[i] - (double)before->vert_pos[i]) /
            (double)(after->index - before->index);
 }
 
 /* The reference at share 0..1 of the way from window[1] to window[2]: the cubic that has the two positions
  * and the slopes there (Catmull-Rom; the slopes count missing frames, so that a gap does not bend the curve).
  */
-static void make_between(applying *a, double share)
+static void make_curve(applying *a, double share)
 {
     const moment *w = a->window;
     double gap = (double)(w[2].index - w[1].index), u = share, u2 = u * u, u3 = u2 * u;
     for (size_t i = 0; i < 3 * a->reference->vert_count; i++) {
-        double p = (double)w[1].mesh->vert_pos[i], q = (double)w[2].mesh->vert_pos[i];
+        double p = (double)w[1].vert_pos[i], q = (double)w[2].vert_pos[i];
         a->between[i] = (float)((2 * u3 - 3 * u2 + 1) * p + (3 * u2 - 2 * u3) * q +
                                 (u3 - 2 * u2 + u) * gap * slope(w, 1, i) + (u3 - u2) * gap * slope(w, 2, i));
     }
+}
+
+static void make_line(applying *a, double share)
+{
+    const float *p = a->window[1].vert_pos, *q = a->window[2].vert_pos;
+    for (size_t i = 0; i < 3 * a->reference->vert_count; i++)
+        a->between[i] = (float)((1 - share) * (double)p[i] + share * (double)q[i]);
+}
+
+static int way_between(const applying *a)
+{
+    if (a->s.between != BY_ANY) return a->s.between;
+    return a->motion ? BY_WINDOWS : BY_CURVE;
+}
+
+/* The k-th of the steps from window[1] to window[2]. */
+static npg_status make_between(applying *a, int64_t k, int64_t steps)
+{
+    double share = (double)k / (double)steps, gap = (double)(a->window[2].index - a->window[1].index);
+    int way = way_between(a);
+    if (way == BY_WINDOWS)
+        return npg_job_motion_pose(a->motion, a->between, (double)a->window[1].index + share * gap);
+    if (way == BY_CURVE)
+        make_curve(a, share);
+    else
+        make_line(a, share);
+    return NPG_OK;
 }
 
 /* window[1], and the steps from it to window[2]. */
@@ -351,11 +428,11 @@ static npg_status write_step(applying *a)
     const moment *from = &a->window[1], *to = &a->window[2];
     int64_t scale = a->s.fps_scale, first = (from->index - a->first_index) * scale;
     if (!from->is_there) return NPG_OK;
-    NPG_TRY(write_pose(a, from->mesh->vert_pos, scale > 1 ? first : from->number));
+    NPG_TRY(write_pose(a, from->vert_pos, scale > 1 ? first : from->number));
     if (!to->is_there || scale == 1) return NPG_OK;
     int64_t steps = (to->index - from->index) * scale;
     for (int64_t k = 1; k < steps; k++) {
-        make_between(a, (double)k / (double)steps);
+        NPG_TRY(make_between(a, k, steps));
         NPG_TRY(write_pose(a, a->between, first + k));
     }
     return NPG_OK;
@@ -363,7 +440,7 @@ static npg_status write_step(applying *a)
 
 static void shift_window(applying *a)
 {
-    npg_mesh_unref(&a->window[0].mesh);
+    npg_release(&a->window[0].vert_pos);
     memmove(a->window, a->window + 1, 3 * sizeof *a->window);
     a->window[3] = (moment){0};
 }
@@ -392,6 +469,9 @@ static npg_status finish(applying *a)
                               (json_int_t)a->frame_count, "fps_scale", (json_int_t)a->s.fps_scale,
                               "points_far", (json_int_t)a->far_count, "fps", a->fps * (double)a->s.fps_scale,
                               "exit_code", npg_status_exit_code(a->far_count ? NPG_PARTIAL : NPG_OK));
+    if (a->s.fps_scale > 1) json_object_set_new(facts, "between", json_string(between_words[way_between(a)]));
+    if (a->lost_count)
+        json_object_set_new(facts, "frames_from_windows", json_integer((json_int_t)a->lost_count));
     json_object_set_new(facts, "job", npg_json_text(a->job));
     json_object_set_new(facts, "mesh", npg_json_text(a->s.mesh));
     char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
@@ -419,7 +499,8 @@ static npg_status apply(applying *a)
 
 static void close_applying(applying *a)
 {
-    for (int i = 0; i < 4; i++) npg_mesh_unref(&a->window[i].mesh);
+    for (int i = 0; i < 4; i++) npg_release(&a->window[i].vert_pos);
+    npg_job_motion_close(&a->motion);
     npg_file_discard(&a->done);
     npg_attach_close(&a->attachment);
     npg_mesh_unref(&a->reference);
