@@ -215,7 +215,8 @@ static double measure_flops(void)
 void npg_probe_estimate(npg_estimate *e, const npg_probe *probe, size_t vertices, size_t epochs,
                         size_t window)
 {
-    const double flop_per_vertex = 1.72e6, fit_bytes_per_vertex = 2400, fixed_bytes = 320e6;
+    const double flop_per_vertex = 1.72e6, fit_bytes_per_vertex = 2400, fixed_bytes = 320e6,
+                 decoder_bytes = 1.4e6;
     double frames = (double)probe->frames, in_window = fmin(frames, (double)window);
     size_t most = 0;
     for (size_t i = 0; i + probe->unreadable < probe->frames; i++)
@@ -226,5 +227,6 @@ void npg_probe_estimate(npg_estimate *e, const npg_probe *probe, size_t vertices
     e->memory_bytes = fixed_bytes +
                       in_window * ((double)vertices * fit_bytes_per_vertex + 48 * (double)most) +
                       40 * 24 * (double)most;
-    e->disk_bytes = frames * (double)vertices * (24 + 2 * 13);
+    /* a mesh, and in job/ the alignment, of every frame; the decoder of every window */
+    e->disk_bytes = frames * (double)vertices * (24 + 2 * 13 + 12) + frames / in_window * decoder_bytes;
 }
