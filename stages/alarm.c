@@ -21,7 +21,8 @@ static const struct {
     double floor;
 } kinds[NPG_MISFITS] = {{"far", "of the points are far from the surface in one place", 0.01},
                         {"bare", "of the surface have no points near them in one place", 0.015},
-                        {"torn", "of the surface are torn apart in one place", 0.003}};
+                        {"torn", "of the surface are torn apart in one place", 0.003},
+                        {"deserted", "of the surface are one part that has lost most of its points", 0.015}};
 
 typedef struct record {
     int64_t index, number;
@@ -124,6 +125,7 @@ static void judge(bool counts[NPG_MISFITS], const side *s, const record *r, cons
     counts[NPG_MISFIT_FAR] = far > CLEARLY * bare;
     counts[NPG_MISFIT_BARE] = !is_off && bare > CLEARLY * far;
     counts[NPG_MISFIT_TORN] = !is_off && far < SUSPECT * levels[NPG_MISFIT_FAR].bound;
+    counts[NPG_MISFIT_DESERTED] = counts[NPG_MISFIT_TORN];
 }
 
 /* The clearest misfit of a frame; the result is how many times its bound it lies above the usual. */

@@ -15,9 +15,9 @@
  *
  * Nor does a surface that has lost the points, which the quality bar tells.  One shows by points and surface
  * that miss each other: what is far counts only at more than twice the excess of what is bare, and the other
- * way round; torn not beside what is far.  The other shows by points that are off everywhere: bare and torn
- * don't count when their median distance is above 0.4 % of the diagonal and above 3 times the keyframe's.  (A
- * new part pulls the surface off the points, too, so far counts there.)
+ * way round; torn and deserted not beside what is far.  The other shows by points that are off everywhere:
+ * bare, torn and deserted don't count when their median distance is above 0.4 % of the diagonal and above 3
+ * times the keyframe's.  (A new part pulls the surface off the points, too, so far counts there.)
  *
  * Frames may come in any order: they are taken in order of their distance from the keyframe, so the result
  * does not depend on it.  Memory: the frames that came ahead of their turn. */

@@ -116,7 +116,7 @@ static json_t *json_of_figures(const npg_figures *f)
     return figures;
 }
 
-static const char *const misfit_names[NPG_MISFITS] = {"far", "bare", "torn"};
+static const char *const misfit_names[NPG_MISFITS] = {"far", "bare", "torn", "deserted"};
 
 static json_t *json_of_misfits(const npg_figures *f)
 {

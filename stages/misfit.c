@@ -21,6 +21,7 @@
 #define LEAST_FAR      12   /* points in a place                                */
 #define LEAST_MISSED   20   /* points that would lie on a place of the surface  */
 #define LEAST_VERTS    6    /* vertices whose mean area it has                  */
+#define FEW            0.6  /* of the points that a part should have            */
 
 struct npg_misfit_finder {
     const npg_mesh *reference; /* loan */
@@ -30,6 +31,9 @@ struct npg_misfit_finder {
     uint32_t (*edges)[2];      /* E x 2; owned */
     size_t edge_count;
     float *edge_lengths; /* E, of the reference; owned */
+    uint32_t *part_of;   /* V: which part of the reference; owned */
+    size_t part_count;
+    double *part_sums; /* of each part: area, area x position, points; x 5; owned */
     /* scratch, owned */
     uint32_t *parents; /* of the places so far: max(N, V)        */
     double *sums;      /* their size and weighted middle: x 4    */
@@ -56,6 +60,9 @@ static npg_status take_reference(npg_misfit_finder *f)
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
     f->size = npg_bounds_diagonal(&bounds);
+    NPG_TRY(npg_alloc_array(&f->part_of, NPG_FOR_MESH, mesh->vert_count, sizeof *f->part_of));
+    NPG_TRY(npg_mesh_components(f->part_of, &f->part_count, mesh->vert_count, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_alloc_array(&f->part_sums, NPG_FOR_MESH, f->part_count, 5 * sizeof *f->part_sums));
     NPG_TRY(npg_mesh_edges(&f->edges, &f->edge_count, mesh->faces, mesh->face_count));
     NPG_TRY(npg_alloc_array(&f->edge_lengths, NPG_FOR_MESH, f->edge_count, sizeof *f->edge_lengths));
     NPG_TRY(npg_alloc_array(&f->flags, NPG_FOR_MESH, mesh->vert_count, sizeof *f->flags));
@@ -97,8 +104,8 @@ void npg_misfit_close(npg_misfit_finder **slot)
 {
     npg_misfit_finder *f = *slot;
     if (!f) return;
-    void *all[] = {&f->is_border, &f->edges, &f->edge_lengths, &f->parents, &f->sums,
-                   &f->flags,     &f->far,   &f->links,        &f->link_sq};
+    void *all[] = {&f->is_border, &f->edges, &f->edge_lengths, &f->parents, &f->sums,     &f->flags,
+                   &f->far,       &f->links, &f->link_sq,      &f->part_of, &f->part_sums};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -238,6 +245,35 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
     return NPG_OK;
 }
 
+/* Area, middle and points of every part as it lies in this frame. */
+static void sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
+{
+    for (size_t i = 0; i < 5 * f->part_count; i++) f->part_sums[i] = 0;
+    for (size_t v = 0; v < f->reference->vert_count; v++) {
+        double *sum = f->part_sums + 5 * (size_t)f->part_of[v];
+        sum[0] += frame->vert_areas[v];
+        for (size_t a = 0; a < 3; a++)
+            sum[1 + a] += frame->vert_areas[v] * (double)frame->vert_unit[3 * v + a];
+    }
+    for (size_t i = 0; i < frame->point_count; i++)
+        f->part_sums[5 * (size_t)f->part_of[f->reference->faces[3 * (size_t)frame->hits[i].face]] + 4] += 1;
+}
+
+static void find_deserted(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
+{
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!f->is_closed || f->part_count < 2 || !frame->point_count || !(frame->area > 0)) return;
+    sum_parts(f, frame);
+    for (size_t p = 0; p < f->part_count; p++) {
+        const double *sum = f->part_sums + 5 * p;
+        double expected = (double)frame->point_count * sum[0] / frame->area, missing = expected - sum[4];
+        double share = missing / (double)frame->point_count;
+        if (!(sum[4] < FEW * expected) || missing < LEAST_MISSED || share <= misfit->share) continue;
+        misfit->share = share;
+        for (size_t a = 0; a < 3; a++) misfit->at[a] = sum[1 + a] / sum[0];
+    }
+}
+
 npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_misfit_frame *frame)
 {
     double spacing = frame->point_count ? sqrt(frame->area / (double)frame->point_count) : 0;
@@ -246,5 +282,6 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
     double link = fmax(LINK_SPACINGS * spacing, REACH_SIZE * f->size);
     NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
     NPG_TRY(find_bare(f, &misfits[NPG_MISFIT_BARE], frame, reach));
+    find_deserted(f, &misfits[NPG_MISFIT_DESERTED], frame);
     return find_torn(f, &misfits[NPG_MISFIT_TORN], frame, OFF_SHARE * reach);
 }

@@ -6,13 +6,17 @@
  *   bare  connected surface further than `reach` from all points: something is gone
  *   torn  connected surface that is stretched, its edges more than 1.5 times as long as in the reference, and
  *         further than 0.6 x reach from all points: a web between parts that went apart
+ *   deserted   a part of the reference (one that hangs together) with fewer than 60 % of the points that are
+ *         its share by area: it is gone, though its surface has found a place on another part's points, where
+ *         it is neither bare nor torn.  A point is its nearest part's; the share counts what is missing
  *
  * reach = max(3 x spacing of the points on the surface, 1.5 % of the reference's diagonal), with noise 5 x
  * the median distance of the points, but no more than twice as far; the places are the largest ones.
  *
  * What sampling can explain is nothing: a place of fewer than 12 points, and one on the surface where fewer
  * than 20 points would be expected or that has fewer than 6 vertices' share of the area.  A reference with a
- * border, or one that saw only a part of its frame, is never bare or torn: what cameras see differs. */
+ * border, or one that saw only a part of its frame, is never bare, torn or deserted: what cameras see
+ * differs. */
 #ifndef NPG_MISFIT_H
 #define NPG_MISFIT_H
 

@@ -58,6 +58,18 @@ same() {
     [ "$(alarm back forward)" = null ]
 }
 
+@test "a ball that disappears raises it, though its surface hides on the bar's points" {
+    "$NEUPIG" synth --body gone --frames 16 --change 8 --points 1500 --cell 0.05 -o gone >>synth.log
+    for key in 3 6; do
+        run "$NEUPIG" run gone/points -o gone$key "${small[@]}" --keyframe $key
+        echo "$output"
+        [ "$status" -eq 7 ]
+        [ "$(alarm gone$key forward)" -eq 8 ]
+        [ "$(alarm gone$key backward)" = null ]
+    done
+    [[ "$output" == *"one part that has lost most of its points"* ]]
+}
+
 @test "a hand that leaves the hip raises the alarm, unless the weld was cut" {
     "$NEUPIG" synth --body hands --frames 14 --change 6 --points 1500 --cell 0.04 -o hands
     run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --welds keep

@@ -346,6 +346,35 @@ static void what_sampling_or_a_border_explains_is_not_bare(void **state)
     }
 }
 
+/* Two sheets in one place: the second has no points of its own, then a fair share. */
+static void a_part_without_points_of_its_own_is_deserted(void **state)
+{
+    enum { ROW = SIDE + 1, HALF = SIDE / 2 * ROW };
+    sheet s;
+    npg_misfit m[NPG_MISFITS];
+    (void)state;
+    open_sheet(&s, false);
+    for (size_t f = 0; f < s.mesh->face_count; f++) { /* cut between the rows of the two halves */
+        uint32_t *face = s.mesh->faces + 3 * f;
+        bool is_upper = face[0] >= HALF;
+        for (int k = 0; k < 3; k++)
+            if ((face[k] >= HALF) != is_upper) face[k] = is_upper ? HALF + face[k] % ROW : face[k] % ROW;
+    }
+    uint32_t lower = UINT32_MAX, upper = UINT32_MAX;
+    for (uint32_t f = 0; f < s.mesh->face_count; f++) *(s.mesh->faces[3 * f] >= HALF ? &upper : &lower) = f;
+    for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 2 ? lower : upper;
+    find(m, &s);
+    assert_true(m[NPG_MISFIT_DESERTED].share == 0);
+    for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 5 ? lower : upper;
+    find(m, &s);
+    assert_true(fabs(m[NPG_MISFIT_DESERTED].share - 0.3) < 0.05 && m[NPG_MISFIT_DESERTED].at[1] > 0.5);
+    assert_true(m[NPG_MISFIT_BARE].share == 0 && m[NPG_MISFIT_TORN].share == 0);
+    for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 3 ? lower : upper; /* 67 %: still its own */
+    find(m, &s);
+    assert_true(m[NPG_MISFIT_DESERTED].share == 0);
+    close_sheet(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -358,6 +387,7 @@ int main(void)
         cmocka_unit_test(points_in_a_cluster_far_off_are_found_and_scattered_ones_not),
         cmocka_unit_test(what_lies_beyond_a_border_is_not_far),
         cmocka_unit_test(bare_and_torn_surface_is_found),
-        cmocka_unit_test(what_sampling_or_a_border_explains_is_not_bare)};
+        cmocka_unit_test(what_sampling_or_a_border_explains_is_not_bare),
+        cmocka_unit_test(a_part_without_points_of_its_own_is_deserted)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

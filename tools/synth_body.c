@@ -15,7 +15,7 @@ struct npg_body {
     float *weights; /* V x NPG_BONES, rows sum to 1; walking figures only */
     bool is_welded; /* the surface at rest lies in the pose `weld`        */
     npg_rigid weld[NPG_BONES];
-    size_t bar_verts; /* of the body TWO; the ball's come after them */
+    size_t bar_verts; /* the ball's come after them                   */
 };
 
 /* ---- skin of the walker ---- */
@@ -127,7 +127,7 @@ static void pose_bar(const npg_body *body, float *vert_pos, double phase)
     }
 }
 
-/* ---- the ball that comes to the bar ---- */
+/* ---- the ball that comes to the bar, or leaves it ---- */
 
 static const double ball_radius = 0.22;
 
@@ -165,7 +165,8 @@ static npg_status open_bar(npg_body *body, double cell)
     npg_mesh *ball = NULL, *bar = NULL;
     NPG_TRY(npg_body_mesh(&body->rest, bar_distance, NULL, lo, hi, cell));
     body->bar_verts = body->rest->vert_count;
-    if (body->kind != NPG_BODY_TWO || !body->is_changed) return NPG_OK;
+    bool has_ball = body->kind == (body->is_changed ? NPG_BODY_TWO : NPG_BODY_GONE);
+    if (!has_ball) return NPG_OK;
     NPG_TRY(npg_body_mesh(&ball, ball_distance, NULL, ball_lo, ball_hi, cell));
     bar = body->rest;
     body->rest = NULL;
@@ -179,7 +180,7 @@ static npg_status open_bar(npg_body *body, double cell)
 
 bool npg_body_changes(int kind)
 {
-    return kind == NPG_BODY_HANDS || kind == NPG_BODY_TWO;
+    return kind == NPG_BODY_HANDS || kind == NPG_BODY_TWO || kind == NPG_BODY_GONE;
 }
 
 static bool is_walking(const npg_body *body)

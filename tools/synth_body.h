@@ -5,8 +5,9 @@
 #include "mesh.h"
 
 /* The words of --body.  HANDS: a walker whose right hand has grown into its hip and leaves it at the change.
- * TWO: the bar, beside which a ball appears at the change. */
-enum { NPG_BODY_WALKER, NPG_BODY_BAR, NPG_BODY_HANDS, NPG_BODY_TWO, NPG_BODIES };
+ * TWO: the bar, beside which a ball appears at the change.  GONE: the bar with a ball that disappears there.
+ */
+enum { NPG_BODY_WALKER, NPG_BODY_BAR, NPG_BODY_HANDS, NPG_BODY_TWO, NPG_BODY_GONE, NPG_BODIES };
 
 typedef struct npg_body npg_body;
 

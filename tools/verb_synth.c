@@ -26,9 +26,10 @@ const npg_option npg_synth_options[] = {
     {"output", "Folder for points/ and truth/ (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "DIR"},
     {"body",
      "What moves: a walking figure, a bending bar, a figure whose hand has grown into its hip and leaves it, "
-     "or the bar that a ball comes to",
-     NPG_OPTION_CHOICE, AT(body), "walker", 0, 0, "walker|bar|hands|two", NULL},
-    {"change", "The first frame in which the hand is off the hip, or the ball there; -1: the middle one",
+     "the bar that a ball comes to, or one beside which a ball disappears",
+     NPG_OPTION_CHOICE, AT(body), "walker", 0, 0, "walker|bar|hands|two|gone", NULL},
+    {"change",
+     "The first frame in which the hand is off the hip, or the ball there or gone; -1: the middle one",
      NPG_OPTION_INT, AT(change), "-1", -1, 1e6, NULL, "FRAME"},
     {"frames", "Frames", NPG_OPTION_INT, AT(frames), "24", 1, 1e6, NULL, NULL},
     {"points", "Points per frame", NPG_OPTION_INT, AT(points), "5000", 1, 1e8, NULL, NULL},
