@@ -152,11 +152,13 @@ static npg_status put_list(npg_archive_writer *out, const npg_worker *worker, co
 static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
 {
     npg_window window = npg_plan_window(&facts->plan, hand->window_at);
-    npg_vdb_place place = {.unit_per_world = facts->box.scale,
+    npg_vdb_place place = {.unit_per_world = facts->box.scale * hand->figure.scale,
                            .frame_first = window.first,
                            .frame_last = window.last,
                            .window = hand->window_at};
-    for (int a = 0; a < 3; a++) place.world_centre[a] = facts->box.origin[a] + facts->box.centre[a];
+    for (int a = 0; a < 3; a++)
+        place.world_centre[a] =
+            facts->box.origin[a] + facts->box.centre[a] + hand->figure.centre[a] / facts->box.scale;
     return place;
 }
 

@@ -13,6 +13,7 @@ typedef struct npg_hand {
     int64_t emitted;   /* frames passed on before it closed              */
     double last_chamfer, last_isometry;
     bool is_aligned;
+    npg_figure figure; /* the grids' coordinates; of a hand to save */
 } npg_hand;
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until

@@ -304,8 +304,9 @@ static npg_status save_state(npg_worker *worker)
     state *s = npg_worker_state(worker);
     if (!npg_worker_facts(worker)->job) return NPG_OK;
     NPG_TRY(save_record(worker));
-    const npg_hand hand = {s->held,    s->held_count,   s->held_capacity, s->window_at,
-                           s->emitted, s->last_chamfer, s->last_isometry, s->is_aligned};
+    const npg_hand hand = {s->held,          s->held_count, s->held_capacity,
+                           s->window_at,     s->emitted,    s->last_chamfer,
+                           s->last_isometry, s->is_aligned, npg_window_figure(s->solver)};
     return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));
 }
 

@@ -79,16 +79,17 @@ static bool are_sane(const npg_record_facts *f)
     bool has_shape = f->width_1 >= 32 && f->width_1 <= 4096 && f->width_2 >= 32 && f->width_2 <= 4096 &&
                      f->width_1 % 32 == 0 && f->width_2 % 32 == 0 && f->frequencies > 0 &&
                      f->frequencies <= 16;
-    return has_order && has_sizes && has_shape && f->time_kind >= NPG_TIME_FOURIER &&
-           f->time_kind <= NPG_TIME_LEARNED && f->rotation >= NPG_ROTATION_QUATERNION &&
-           f->rotation <= NPG_ROTATION_EXPONENTIAL;
+    return has_order && has_sizes && has_shape && f->scale > 0 && f->scale < 1e6 &&
+           f->time_kind >= NPG_TIME_FOURIER && f->time_kind <= NPG_TIME_LEARNED &&
+           f->rotation >= NPG_ROTATION_QUATERNION && f->rotation <= NPG_ROTATION_EXPONENTIAL;
 }
 
 static bool belong_together(const npg_record_facts *a, const npg_record_facts *b)
 {
     return a->vert_count == b->vert_count && a->sample_count == b->sample_count &&
            a->is_aligned == b->is_aligned && a->width_1 == b->width_1 && a->width_2 == b->width_2 &&
-           a->frequencies == b->frequencies && a->time_kind == b->time_kind && a->rotation == b->rotation;
+           a->frequencies == b->frequencies && a->time_kind == b->time_kind && a->rotation == b->rotation &&
+           a->scale == b->scale;
 }
 
 /* Sizes of all blocks, and that every index is one, so that a record which opens can be used. */
@@ -350,18 +351,20 @@ static npg_status decode(npg_replay *r, const npg_archive *in, const record *of,
 
 static npg_status move_samples(npg_replay *r, const record *of, const uint32_t *vertex)
 {
+    npg_figure figure = {.scale = of->facts.scale};
+    for (size_t s = 0; s < r->samples; s++)
+        memcpy(r->before + 3 * s, r->base + 3 * (vertex ? (size_t)vertex[s] : s), 3 * sizeof(float));
+    if (of->facts.is_aligned) npg_figure_centre(figure.centre, r->before, r->samples);
+    npg_figure_from_unit(&figure, r->after, r->before, r->samples);
     for (size_t s = 0; s < r->samples; s++) {
         double out[7], base[3], x[3];
-        const float *from = r->base + 3 * (vertex ? (size_t)vertex[s] : s);
         for (int i = 0; i < 7; i++) out[i] = (double)r->out[s * NPG_MLP_OUT + (size_t)i];
-        for (int i = 0; i < 3; i++) base[i] = (double)from[i];
+        for (size_t i = 0; i < 3; i++) base[i] = (double)r->after[3 * s + i];
         npg_transform_ref(x, out, base, (npg_rotation)of->facts.rotation);
         if (!isfinite(x[0] + x[1] + x[2])) return bad(of->serial, "its decoder gives what is not finite");
-        for (size_t i = 0; i < 3; i++) {
-            r->before[3 * s + i] = from[i];
-            r->after[3 * s + i] = (float)x[i];
-        }
+        for (size_t i = 0; i < 3; i++) r->after[3 * s + i] = (float)x[i];
     }
+    npg_figure_to_unit(&figure, r->after, r->after, r->samples);
     return NPG_OK;
 }
 

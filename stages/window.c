@@ -11,10 +11,13 @@ struct npg_window_solver {
     npg_fit *fit;
     npg_carry *carry;
     npg_matcher *matcher;
+    npg_figure figure; /* of the reference */
     /* of the window at work, owned */
     float *points;       /* all frames' points in units   */
     size_t *point_start; /* count + 1                     */
     float *bases, *now;  /* count x S x 3                 */
+    float *fit_bases;    /* the bases in figure coordinates */
+    npg_figure *figures; /* of the frames                 */
     float *dense;        /* V x 3                         */
     npg_pull *pulls;
     size_t *pull_start;
@@ -39,8 +42,8 @@ const npg_carry *npg_window_carry(const npg_window_solver *solver)
 
 static void close_frames(npg_window_solver *s)
 {
-    void *all[] = {&s->points, &s->point_start, &s->bases,      &s->now,
-                   &s->dense,  &s->pulls,       &s->pull_start, &s->frames};
+    void *all[] = {&s->points, &s->point_start, &s->bases,  &s->now,       &s->dense,
+                   &s->pulls,  &s->pull_start,  &s->frames, &s->fit_bases, &s->figures};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 
@@ -52,6 +55,58 @@ void npg_window_solver_close(npg_window_solver **slot)
     npg_matcher_close(&(*slot)->matcher);
     npg_carry_close(&(*slot)->carry);
     npg_release(slot);
+}
+
+npg_figure npg_window_figure(const npg_window_solver *solver)
+{
+    return solver->figure;
+}
+
+/* ---- figure coordinates ---- */
+
+void npg_figure_centre(double centre[3], const float *samples, size_t count)
+{
+    memset(centre, 0, 3 * sizeof *centre);
+    for (size_t i = 0; i < 3 * count; i++) centre[i % 3] += (double)samples[i] / (double)count;
+}
+
+void npg_figure_from_unit(const npg_figure *figure, float *out, const float *unit, size_t count)
+{
+    for (size_t i = 0; i < 3 * count; i++)
+        out[i] = (float)(((double)unit[i] - figure->centre[i % 3]) * figure->scale);
+}
+
+void npg_figure_to_unit(const npg_figure *figure, float *out, const float *points, size_t count)
+{
+    for (size_t i = 0; i < 3 * count; i++)
+        out[i] = (float)((double)points[i] / figure->scale + figure->centre[i % 3]);
+}
+
+static npg_figure figure_of(const npg_mesh *mesh)
+{
+    npg_figure figure = {.scale = 1};
+    npg_bounds bounds = npg_bounds_empty();
+    double longest = 0;
+    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
+    for (int a = 0; a < 3; a++) {
+        figure.centre[a] = 0.5 * (bounds.lo[a] + bounds.hi[a]);
+        longest = fmax(longest, bounds.hi[a] - bounds.lo[a]);
+    }
+    if (longest > 0) figure.scale = 2 * NPG_UNIT_EXTENT / longest;
+    return figure;
+}
+
+/* A fit over the samples, moved into figure coordinates. */
+static npg_status open_aligned_fit(npg_window_solver *s, npg_device *device, uint64_t seed)
+{
+    npg_mesh *mesh;
+    const npg_mesh *samples = s->carry->mesh;
+    s->figure = figure_of(samples);
+    NPG_TRY(npg_mesh_copy(&mesh, samples));
+    npg_figure_from_unit(&s->figure, mesh->vert_pos, samples->vert_pos, samples->vert_count);
+    npg_status status = npg_fit_open(&s->fit, device, &s->settings.fit, mesh, seed);
+    npg_mesh_unref(&mesh);
+    return status;
 }
 
 npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
@@ -72,9 +127,10 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     if (is_aligned) status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples);
     if (is_aligned && !status)
         status = npg_matcher_open(&s->matcher, s->carry, facts->reference, &settings->match);
+    s->figure = (npg_figure){.scale = 1};
     if (!status)
-        status = npg_fit_open(&s->fit, device, &s->settings.fit,
-                              is_aligned ? s->carry->mesh : facts->reference, seed);
+        status = is_aligned ? open_aligned_fit(s, device, seed)
+                            : npg_fit_open(&s->fit, device, &s->settings.fit, facts->reference, seed);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
@@ -110,13 +166,23 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
     NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FIT, count, sizeof *s->frames));
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, count, size * sizeof(float)));
     NPG_TRY(npg_alloc_array(&s->dense, NPG_FOR_FIT, verts, 3 * sizeof(float)));
-    if (s->is_aligned) NPG_TRY(npg_alloc_array(&s->bases, NPG_FOR_FIT, count, size * sizeof(float)));
+    if (s->is_aligned) {
+        NPG_TRY(npg_alloc_array(&s->bases, NPG_FOR_FIT, count, size * sizeof(float)));
+        NPG_TRY(npg_alloc_array(&s->fit_bases, NPG_FOR_FIT, count, size * sizeof(float)));
+        NPG_TRY(npg_alloc_array(&s->figures, NPG_FOR_FIT, count, sizeof *s->figures));
+    }
     for (size_t i = 0; i < count; i++) {
         const npg_frame *frame = &held[i]->frame;
-        if (s->is_aligned) npg_carry_gather(s->carry, s->bases + i * size, frame->vert_unit);
+        if (s->is_aligned) {
+            float *base = s->bases + i * size;
+            npg_carry_gather(s->carry, base, frame->vert_unit);
+            s->figures[i].scale = s->figure.scale;
+            npg_figure_centre(s->figures[i].centre, base, size / 3);
+            npg_figure_from_unit(&s->figures[i], s->fit_bases + i * size, base, size / 3);
+        }
         s->frames[i] = (npg_fit_frame){frame->index, npg_window_time(&s->facts->plan, (double)frame->index),
                                        s->points + 3 * s->point_start[i], frame->point_count,
-                                       s->is_aligned ? s->bases + i * size : NULL};
+                                       s->is_aligned ? s->fit_bases + i * size : NULL};
     }
     return NPG_OK;
 }
@@ -134,8 +200,22 @@ static void carry_dense(npg_window_solver *s, const npg_frame *frame, size_t i)
 static npg_status read_samples(npg_window_solver *s)
 {
     size_t size = 3 * npg_window_sample_count(s);
-    for (size_t i = 0; i < s->count; i++) NPG_TRY(npg_fit_vertices(s->fit, s->now + i * size, i));
+    for (size_t i = 0; i < s->count; i++) {
+        float *now = s->now + i * size;
+        NPG_TRY(npg_fit_vertices(s->fit, now, i));
+        if (s->is_aligned) npg_figure_to_unit(&s->figures[i], now, now, size / 3);
+    }
     return NPG_OK;
+}
+
+/* sum share x + constant, in unit coordinates, becomes scale times that in figure coordinates; the shares of
+ * a pull sum up to 1. */
+static void move_pulls(const npg_figure *figure, npg_pull *pulls, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        for (int a = 0; a < 3; a++)
+            pulls[i].constant[a] =
+                (float)(((double)pulls[i].constant[a] + figure->centre[a]) * figure->scale);
 }
 
 /* Pulls of all frames at the samples' present positions. */
@@ -155,6 +235,7 @@ static npg_status match_all(npg_window_solver *s, npg_held *const *held)
             npg_carry_gather(s->carry, s->dense, held[i]->solved); /* S x 3 fits into V x 3 */
             npg_match_tie(s->matcher, s->pulls, &count, s->dense);
         }
+        move_pulls(&s->figures[i], s->pulls + s->pull_start[i], count - s->pull_start[i]);
         s->pull_start[i + 1] = count;
     }
     return npg_fit_set_pulls(s->fit, s->pulls, s->pull_start);

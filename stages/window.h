@@ -27,6 +27,25 @@ typedef struct npg_held {
 
 typedef struct npg_window_solver npg_window_solver;
 
+/* Figure coordinates, in which aligned frames are fitted: (unit - centre) * scale.  scale lets the reference
+ * fill the grids' cube; its centre is the middle of its box, that of a frame the mean of its aligned samples.
+ * So the fit is the same wherever in the capture's box the surface is and however small in it: rotations turn
+ * about the surface, not about the middle of the way that it has gone.  Without alignment: unit coordinates,
+ * scale 1, centre 0. */
+typedef struct npg_figure {
+    double centre[3], scale;
+} npg_figure;
+
+/* Of the reference. */
+npg_figure npg_window_figure(const npg_window_solver *solver);
+
+/* The mean of S points: a frame's centre. */
+void npg_figure_centre(double centre[3], const float *samples, size_t count);
+
+/* count x 3; out may be the input. */
+void npg_figure_from_unit(const npg_figure *figure, float *out, const float *unit, size_t count);
+void npg_figure_to_unit(const npg_figure *figure, float *out, const float *points, size_t count);
+
 /* The device and facts are loans that outlive the solver; facts->reference and box are known. */
 npg_status npg_window_solver_open(npg_window_solver **solver, npg_device *device,
                                   const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
