@@ -380,6 +380,52 @@ static void ties_hold_what_is_solved(void **state)
     npg_mesh_unref(&ball);
 }
 
+/* One window over frames that have all gone `way` along x: where it puts the last one's first vertices. */
+static void solve_gone(float solved[3 * VERTS], npg_mesh *ball, float way)
+{
+    const npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, 1}, 100, 2, 1};
+    npg_facts facts = {.reference = ball, .plan = {.frame_count = 2, .window = 2}};
+    const npg_window window = {0, 1, -1, 0, 1, 0};
+    npg_window_solver *solver;
+    npg_held held[2] = {{{0}, NULL}};
+    npg_held *in_time[] = {&held[0], &held[1]};
+    facts.box.scale = 1;
+    for (int i = 0; i < 2; i++) {
+        npg_frame *frame = &held[i].frame;
+        *frame = (npg_frame){.index = i, .number = i, .point_count = VERTS, .vert_count = VERTS};
+        assert_int_equal(npg_alloc_array(&frame->pos_local, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
+        assert_int_equal(npg_alloc_array(&frame->vert_unit, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
+        pose_ball(frame->vert_unit, ball->vert_pos, VERTS, i);
+        pose_ball(frame->pos_local, ball->vert_pos, VERTS, i + 0.5); /* what is left to find */
+        for (int v = 0; v < VERTS; v++) frame->vert_unit[3 * v] += way, frame->pos_local[3 * v] += way;
+    }
+    if (npg_window_solver_open(&solver, device, &settings, &facts, 3, true)) fail_msg("%s", npg_error_text());
+    if (npg_window_solve(solver, in_time, &window, NULL, NULL)) fail_msg("%s", npg_error_text());
+    for (int i = 0; i < 3 * VERTS; i++) solved[i] = held[1].solved[i] - (i % 3 ? 0 : way);
+    npg_window_solver_close(&solver);
+    for (int i = 0; i < 2; i++) {
+        npg_frame_clear(&held[i].frame);
+        npg_release(&held[i].solved);
+    }
+}
+
+static void where_the_surface_is_does_not_matter(void **state)
+{
+    npg_mesh *ball = open_ball();
+    float here[3 * VERTS], far[3 * VERTS], start[3 * VERTS], worst = 0, moved = 0;
+    (void)state;
+    solve_gone(here, ball, 0);
+    solve_gone(far, ball, 8);
+    pose_ball(start, ball->vert_pos, VERTS, 1);
+    for (int i = 0; i < 3 * VERTS; i++) {
+        worst = fmaxf(worst, fabsf(far[i] - here[i]));
+        moved = fmaxf(moved, fabsf(here[i] - start[i]));
+    }
+    print_message("moved by %.2g, 8 units away another by %.2g\n", (double)moved, (double)worst);
+    assert_true(moved > 2e-3f && worst < 0.05f * moved);
+    npg_mesh_unref(&ball);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -388,6 +434,7 @@ int main(void)
         cmocka_unit_test(the_device_has_the_same_gradient),
         cmocka_unit_test(the_warm_start_is_exact_on_the_overlap),
         cmocka_unit_test(ties_hold_what_is_solved),
+        cmocka_unit_test(where_the_surface_is_does_not_matter),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
