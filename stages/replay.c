@@ -79,7 +79,11 @@ static bool are_sane(const npg_record_facts *f)
     bool has_shape = f->width_1 >= 32 && f->width_1 <= 4096 && f->width_2 >= 32 && f->width_2 <= 4096 &&
                      f->width_1 % 32 == 0 && f->width_2 % 32 == 0 && f->frequencies > 0 &&
                      f->frequencies <= 16;
-    return has_order && has_sizes && has_shape && f->scale > 0 && f->scale < 1e6 &&
+    const npg_plan *plan = &f->time_plan;
+    bool has_time = plan->frame_count > 0 && plan->frame_count < INT32_MAX && plan->window > 0 &&
+                    plan->window < INT32_MAX && plan->key >= 0 && plan->key < INT32_MAX &&
+                    plan->first_count >= 0 && plan->first_count < INT32_MAX;
+    return has_order && has_sizes && has_shape && has_time && f->scale > 0 && f->scale < 1e6 &&
            f->time_kind >= NPG_TIME_FOURIER && f->time_kind <= NPG_TIME_LEARNED &&
            f->rotation >= NPG_ROTATION_QUATERNION && f->rotation <= NPG_ROTATION_EXPONENTIAL;
 }
