@@ -5,12 +5,15 @@
 #include <string.h>
 
 #include "block_system.h"
+#include "frame_box.h"
 #include "kdtree.h"
 #include "mesh_tools.h"
 #include "parallel.h"
 #include "query.h"
 
-#define STIFF_START 10.0  /* times the final stiffness at the first step */
+#define STIFF_START 10.0 /* times the final stiffness at the first step */
+/* For a reference that fills the box of all frames; one that travels through it is smaller, and so are these.
+ */
 #define NOISE_UNIT  0.003 /* mean distance of points at which the stiffness has doubled */
 #define WIDTH_START 0.08  /* of the robust weight, in units: what may move between two frames */
 #define WIDTH_END   0.01  /* at the last step, more where the points are noisy               */
@@ -31,6 +34,7 @@ struct npg_tracker {
     uint32_t *samples;              /* vertices, spread over the surface */
     size_t sample_count;
     double *step; /* K x 6 */
+    double size;  /* longest side of the reference against that of the box of all frames */
     /* of the frame at work */
     float *targets, *target_normals; /* M x 3 */
     size_t target_count, target_capacity;
@@ -75,6 +79,15 @@ static npg_status open_system(npg_tracker *t)
                           graph->edge_count);
 }
 
+static double size_of(const npg_mesh *reference)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    double longest = 0;
+    npg_bounds_add_points(&bounds, reference->vert_pos, reference->vert_count);
+    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds.hi[a] - bounds.lo[a]);
+    return longest > 0 ? longest / (2 * NPG_UNIT_EXTENT) : 1;
+}
+
 npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tracker_settings *settings)
 {
     npg_tracker *t;
@@ -82,6 +95,7 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     NPG_TRY(npg_alloc(&t, NPG_FOR_FIT, sizeof *t));
     t->settings = *settings;
     t->mesh = npg_mesh_ref(reference);
+    t->size = size_of(reference);
     size_t v = reference->vert_count, m = settings->samples;
     npg_status status = npg_graph_open(&t->graph, reference, settings->nodes);
     if (!status) status = open_system(t);
@@ -376,11 +390,11 @@ static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_
 {
     int last = effort->steps - 1;
     double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
-    double noise = tracked->point_dist_mean / NOISE_UNIT;
+    double noise = tracked->point_dist_mean / (NOISE_UNIT * s->t->size);
     s->is_first = !tracked->steps;
     s->is_settling = progress >= 1;
     s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
-    s->width = effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
+    s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
     s->width = fmax(s->width, 2.5 * tracked->point_dist_mean);
 }
 
