@@ -87,6 +87,7 @@ npg_status npg_batch_finish(npg_batch *batch, npg_capture *capture, const char *
     NPG_TRY(set_given(capture->options, given->options));
     NPG_TRY(check_options(capture->options));
     if (given->max_time_s >= 0) capture->max_time_s = given->max_time_s;
+    if (given->segments) capture->segments = given->segments;
     NPG_TRY(npg_join_path(&capture->output, batch->output, capture->name));
     NPG_TRY(npg_options_set(capture->options, "input", capture->input));
     return npg_options_set(capture->options, "output", capture->output);

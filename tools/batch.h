@@ -18,11 +18,15 @@ typedef struct npg_verdict {
     bool was_done; /* this start found it done; not part of the file */
 } npg_verdict;
 
+/* The words of the manifest's and the batch's "segments"; UNSAID: one, or what the manifest says. */
+enum { NPG_BATCH_SEGMENTS_UNSAID, NPG_BATCH_SEGMENTS_ONE, NPG_BATCH_SEGMENTS_AUTO };
+
 typedef struct npg_capture {
     char *name;            /* of its folder in the output; owned                      */
     char *input, *output;  /* absolute paths; owned                                   */
     npg_options *options;  /* of its run, input and output among them; owned          */
     double max_time_s;     /* 0: no limit                                             */
+    int segments;          /* NPG_BATCH_SEGMENTS_..                                   */
     bool of_mesh_vertices; /* its points are the vertices of meshes: nothing else is there */
     npg_verdict verdict;
 } npg_capture;
@@ -38,6 +42,7 @@ typedef struct npg_batch {
 typedef struct npg_batch_given {
     const npg_options *options; /* those set in it win over the manifest's; "output" is that of the batch */
     double max_time_s;          /* < 0: not given */
+    int segments;               /* NPG_BATCH_SEGMENTS_.. */
 } npg_batch_given;
 
 /* path: a manifest (batch_manifest.c) or a folder whose sub-folders are captures (batch_folder.c).

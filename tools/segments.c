@@ -174,6 +174,8 @@ static npg_status split(npg_segments *s, size_t at, const npg_options *options, 
     json_t *told;
     npg_segment *segment = &s->list[at];
     NPG_TRY(read_topology(&told, s, segment));
+    json_decref(s->overlaps);
+    s->overlaps = NULL;
     int64_t key = segment->first - segment->shared_first +
                   (int64_t)json_integer_value(json_object_get(told, "key_index"));
     NPG_TRY(npg_segment_remove(s, segment));
@@ -191,10 +193,21 @@ static npg_status split(npg_segments *s, size_t at, const npg_options *options, 
 
 /* ---- all of them ---- */
 
+/* Done before without segments, and there was an alarm: what it left makes way for the segments. */
+static npg_status solve_anew(const npg_segments *s, const npg_options *options, npg_reporter *reporter)
+{
+    say(reporter, "%s was done with one reference, which does not explain all frames: it is done anew",
+        s->output);
+    NPG_TRY(npg_segment_remove(s, &s->list[0]));
+    return run_segment(s, &s->list[0], options, reporter);
+}
+
 static npg_status solve_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
     for (size_t i = 0; i < s->count;) {
         npg_status status = run_segment(s, &s->list[i], options, reporter);
+        if (status == NPG_PARTIAL && !strcmp(s->list[i].folder, ".") && npg_segments_was_alarmed(s))
+            status = solve_anew(s, options, reporter);
         if (status == NPG_CHANGED) {
             NPG_TRY(split(s, i, options, reporter));
             i = 0; /* those before are done and say so at once */
@@ -216,6 +229,8 @@ static npg_status begin(npg_segments *s, const npg_options *options)
     if (restarts && s->count) NPG_TRY(npg_segments_remove(s));
     if (s->count && !restarts) return NPG_OK;
     for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
+    json_decref(s->overlaps);
+    s->overlaps = NULL;
     s->count = 0;
     return npg_segments_insert(s, 0, &whole);
 }
@@ -244,7 +259,11 @@ static npg_status work(npg_segments *s, const npg_options *options, npg_reporter
     NPG_TRY(begin(s, options));
     NPG_TRY(solve_all(s, options, reporter));
     for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;
-    npg_status status = npg_segments_link(&overlaps, s);
+    npg_status status = NPG_OK;
+    if (npg_segments_are_linked(s))
+        overlaps = json_incref(s->overlaps);
+    else
+        status = npg_segments_link(&overlaps, s);
     if (!status) status = npg_segments_conclude(s, overlaps, is_partial);
     json_decref(overlaps);
     return status ? status : is_partial ? NPG_PARTIAL : NPG_OK;

@@ -16,6 +16,7 @@
 #include "listing.h"
 #include "mesh_tools.h"
 #include "reader.h"
+#include "segments.h"
 #include "writer.h"
 
 #define PATH_SIZE 4096
@@ -95,6 +96,7 @@ static bool is_in(const char *folder, const char *name)
 static npg_status check_job(applying *a)
 {
     char path[PATH_SIZE];
+    NPG_TRY(npg_segments_refuse(a->job, "apply", false));
     static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
                                          "job/job.json"};
     bool is_job = false;
