@@ -33,6 +33,10 @@ static bool is_on(const npg_options *options, const char *name)
 static npg_status look_at(look *l, const npg_capture *capture)
 {
     npg_probe_init(&l->probe);
+    if (capture->refusal) {
+        snprintf(l->cause, sizeof l->cause, "%s", capture->refusal);
+        return NPG_OK;
+    }
     npg_status status = npg_probe_files(&l->probe, &l->list, capture->input, capture->options);
     if (status == NPG_MEMORY) return status;
     if (status) {

@@ -88,6 +88,14 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
     }
 }
 
+npg_status npg_verdict_refuse(npg_capture *capture)
+{
+    capture->verdict = (npg_verdict){.is_known = true};
+    set(&capture->verdict, word_of(3), 3, capture->refusal);
+    NPG_TRY(npg_make_folder(capture->output));
+    return npg_verdict_write(capture);
+}
+
 bool npg_verdict_is_done(const npg_verdict *v)
 {
     return v->is_known && (v->exit_code == 0 || v->exit_code == 7);
