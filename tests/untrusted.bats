@@ -135,6 +135,24 @@ untouched() {
         refused 2 "out/$name is a link" run in/frame_0000.ply -o out --confine "${small[@]}"
         untouched
     done
+    for name in obj volumes latents; do
+        rm -rf out
+        mkdir out
+        ln -s ../outside "out/$name"
+        refused 2 "out/$name is a link" run in/frame_0000.ply -o out --confine --export ply,obj,vdb "${small[@]}"
+        untouched
+    done
+    rm -rf out
+    mkdir out
+    ln -s ../outside out/links
+    refused 2 "out/links is a link" run in/frame_0000.ply -o out --confine --segments auto "${small[@]}"
+    untouched
+    mkdir out/meshes
+    rm out/links
+    echo '{"selection": "", "frames": 1, "segments": [{"folder": "segment_0000", "first": 0, "last": 0}]}' >out/segments.json
+    ln -s ../outside out/segment_0000
+    refused 2 "out/segment_0000 is a link" run in/frame_0000.ply -o out --confine --segments auto "${small[@]}"
+    untouched
     rm -rf out
     mkdir -p out/meshes
     for name in .write-test .reference.ply meshes/.frame_0000.ply; do ln -s "$PWD/outside/frame.ply" "out/$name.part"; done

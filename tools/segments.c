@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "file.h"
+#include "run_settings.h"
 
 static void say(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
 static void say(npg_reporter *reporter, const char *format, ...)
@@ -107,11 +108,25 @@ static npg_status narrow(npg_options *options, const npg_segments *s, const npg_
     return npg_options_set(options, "alarm", "split");
 }
 
+/* With option confine, what stands in the place of a folder of ours must not be a link. */
+static npg_status check_own(const npg_segments *s, const npg_options *options, const char *name)
+{
+    npg_settings settings;
+    char *folder;
+    npg_options_fill(options, npg_run_options, &settings);
+    if (!settings.confine || !strcmp(name, ".")) return NPG_OK;
+    NPG_TRY(npg_join_path(&folder, s->output, name));
+    npg_status status = npg_folder_is_own(folder);
+    npg_release(&folder);
+    return status;
+}
+
 static npg_status run_segment(const npg_segments *s, const npg_segment *segment, const npg_options *options,
                               npg_reporter *reporter)
 {
     npg_options *own;
     bool is_open;
+    NPG_TRY(check_own(s, options, segment->folder));
     NPG_TRY(npg_options_copy(&own, options));
     npg_status status = narrow(own, s, segment);
     if (!status && strcmp(segment->folder, ".") != 0)
@@ -257,6 +272,7 @@ static npg_status work(npg_segments *s, const npg_options *options, npg_reporter
     bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
     NPG_TRY(npg_frame_files_open(&s->frames, npg_options_get(options, "input"), s->selection, finds_gaps));
     NPG_TRY(begin(s, options));
+    NPG_TRY(check_own(s, options, "links"));
     NPG_TRY(solve_all(s, options, reporter));
     for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;
     npg_status status = NPG_OK;
