@@ -218,6 +218,31 @@ END
     same again
 }
 
+@test "where the links or the lists can't be written the exit code is 5, nothing is done, and the next run goes on" {
+    shim=$(dirname "$NEUPIG")/fault_shim.so
+    [ -e "$shim" ] || skip "not under a sanitizer"
+    mkdir late # all segments are there, what comes after them is not
+    cp -r whole/segment_* late
+    cp whole/segments.json late/segments.partial.json
+    for kind in EIO SYNC; do
+        for ((n = 1; n < 20; n++)); do
+            rm -rf failed mark
+            cp -r late failed
+            NPG_FAULT=$kind:$n NPG_FAULT_UNDER=$PWD/failed NPG_FAULT_MARK=$PWD/mark LD_PRELOAD=$shim \
+                run "$NEUPIG" run two/points -o failed "${small[@]}" --segments auto --keyframe 3
+            [ -e mark ] || break
+            echo "$kind $n: $output"
+            [ "$status" -eq 5 ]
+            [ ! -e failed/done.json ]
+            [ ! -e failed/segments.json ] || cmp failed/segments.json whole/segments.json
+            "$NEUPIG" run two/points -o failed "${small[@]}" --segments auto --keyframe 3
+            same failed
+            [ -e failed/done.json ]
+        done
+        [ "$n" -ge 5 ] && [ "$n" -lt 20 ]
+    done
+}
+
 @test "a capture that does not change is one segment, byte for byte that of a run without segments" {
     "$NEUPIG" synth --body bar --frames 9 --points 500 --cell 0.06 -o bar
     "$NEUPIG" run bar/points -o bar-one "${small[@]}"

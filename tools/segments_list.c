@@ -339,6 +339,14 @@ static npg_status write_if_new(const npg_segments *s, const char *name, const js
     return is_same ? NPG_OK : npg_json_write(s->output, name, value);
 }
 
+static void remove_done(const npg_segments *s)
+{
+    char *path;
+    if (npg_join_path(&path, s->output, "done.json")) return;
+    unlink(path);
+    npg_release(&path);
+}
+
 static npg_status write_done(const npg_segments *s, bool is_partial)
 {
     json_t *files = json_array();
@@ -354,6 +362,7 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
                              is_partial ? "partial" : "ok", "exit_code", is_partial ? 7 : 0, "frames",
                              (json_int_t)s->frames->count, "segments", (json_int_t)s->count, "files", files);
     if (!status) status = write_if_new(s, "done.json", done);
+    if (status) remove_done(s); /* whole it may be, but what fails at its last step is not done */
     json_decref(done);
     return status;
 }

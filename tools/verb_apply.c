@@ -401,7 +401,12 @@ static npg_status finish(applying *a)
     if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
     npg_status status = npg_file_print(a->done, "\n  ],%s\n", text + 1); /* goes on in the same object */
     free(text);
-    return status ? status : npg_file_commit(&a->done);
+    NPG_TRY(status);
+    status = npg_file_commit(&a->done);
+    char path[PATH_SIZE];
+    if (status && path_of(path, a->s.output, "done.json") == NPG_OK)
+        unlink(path); /* whole it may be, but what fails at its last step is not done */
+    return status;
 }
 
 /* ---- the verb ---- */
