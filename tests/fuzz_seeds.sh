@@ -59,5 +59,5 @@ block() { # NAME SIZE BYTES: as in pipeline/archive.h
 } >archive/reference
 { printf 'NPGARCH1' && block text 7 'seven b' && block end 8 '\0\0\0\0\0\0\0\0'; } >archive/small
 mkdir -p manifest
-printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
-printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5}]}' >manifest/names
+printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
+printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names
