@@ -69,6 +69,8 @@ END
     [[ "$output" == *"two: was done already"* ]]
     [ "$before" = "$(find night/two -type f ! -name log.jsonl ! -name verdict.json -printf '%p %T@ %i\n' | sort)" ]
     [ "$peak" = "$(grep peak_memory night/two/verdict.json)" ]
+    run "$NEUPIG" batch night.json --dry-run
+    [[ "$output" == *"segments: the time is that of one reference"* ]]
     run "$NEUPIG" batch night.json --segments one # what the command line says wins
     [ "$status" -eq 1 ]
     [[ "$output" == *"usage"*"2 segments"*--restart* ]]
