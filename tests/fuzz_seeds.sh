@@ -28,6 +28,7 @@ npy() { # DESCR ORDER SHAPE: a header of 118 bytes
 { npy '<f4' False '(2, 3)' && printf "$floats\0\0\200\77\0\0\0\0"; } >npy/single
 { npy '>f8' True '(1, 3)' && printf '\100\0\0\0\0\0\0\0%.0s' 1 2 3; } >npy/double
 { npy '<f4' False '(1, 6)' && printf "$floats\0\0\0\0\0\0\200\77"; } >npy/normals
+printf '\223NUMPY\1\0\77\0%51s%s' '' "'descr': '>f4', 'fortran_order': True, 'shape': (2, 3)" >npy/cut_type
 pcd() { # FIELDS SIZES TYPES COUNTS POINTS DATA
     printf 'VERSION 0.7\nFIELDS %s\nSIZE %s\nTYPE %s\nCOUNT %s\nWIDTH %s\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS %s\nDATA %s\n' \
         "$1" "$2" "$3" "$4" "$5" "$5" "$6"
