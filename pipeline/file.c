@@ -236,6 +236,15 @@ bool npg_path_is_inside(const char *path, const char *folder)
     return inside;
 }
 
+npg_status npg_path_confine(const char *path, const char *folder)
+{
+    if (npg_path_is_inside(path, folder)) return NPG_OK;
+    return npg_error(NPG_BAD_INPUT,
+                     "%s: leads out of %s, and option confine is set (as always in a batch, unless it says "
+                     "otherwise); --no-confine follows it",
+                     path, folder);
+}
+
 /* ---- folders ---- */
 
 npg_status npg_folder_is_own(const char *folder)

@@ -43,6 +43,9 @@ bool npg_path_stays(const char *name);
 /* Whether the file is in the folder after all links are followed, at any depth. */
 bool npg_path_is_inside(const char *path, const char *folder);
 
+/* NPG_BAD_INPUT, by name, for one that is not inside: what option confine is for. */
+npg_status npg_path_confine(const char *path, const char *folder);
+
 /* NPG_USAGE where a link stands in the place of a folder. */
 npg_status npg_folder_is_own(const char *folder);
 

@@ -37,8 +37,9 @@ const npg_option npg_run_options[] = {
     {"keep-going", "Skip frames that can't be used instead of stopping; ends with exit code 7",
      NPG_OPTION_FLAG, OFFSET(keep_going), "no", 0, 0, NULL, NULL},
     {"confine",
-     "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), and "
-     "links in the place of the output's own folders",
+     "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), true "
+     "meshes outside the truth's, and links in the place of the output's own folders; in a batch it is on "
+     "unless the batch says otherwise",
      NPG_OPTION_FLAG, OFFSET(confine), "no", 0, 0, NULL, NULL},
     {"ring", "Chunks that may wait between two stages", NPG_OPTION_INT, OFFSET(ring_capacity), "2", 1, 1024,
      NULL, NULL},

@@ -8,6 +8,9 @@
 # killed and started again at any time: the run at work goes on where it was.  Results: OUT/NAME with run.log.  POLL is
 # the seconds between two looks (5).  Ends with 0 once a file IN/watch.end is there and all captures have been run, with
 # 75 after SIGTERM or SIGINT.
+#
+# Whoever fills IN may be anybody: nothing that links lead out of a capture's folder is read (--confine; --no-confine
+# among the OPTIONS takes it back), and a link in the place of a capture is left alone and said once.
 set -euo pipefail
 neupig=${NEUPIG:-neupig} settle=${SETTLE:-60} poll=${POLL:-5}
 if [ $# -lt 2 ]; then
@@ -50,7 +53,7 @@ run_capture() { # CAPTURE RESULT OPTIONS...
     mkdir -p "$result"
     rm -f "$result/failed"
     contents "$capture" >"$result/.contents"
-    "$neupig" run "$capture" -o "$result" --log-file "$result/log.jsonl" --quiet "$@" >"$result/run.log" 2>&1 9>&- &
+    "$neupig" run "$capture" -o "$result" --confine --log-file "$result/log.jsonl" --quiet "$@" >"$result/run.log" 2>&1 9>&- &
     run=$!
     wait $run || code=$?
     run=""
@@ -62,11 +65,17 @@ run_capture() { # CAPTURE RESULT OPTIONS...
     esac
 }
 
+declare -A said
 while true; do
     left=0
     for capture in "$in"/*/; do
         [ -d "$capture" ] || continue
         capture=${capture%/}
+        if [ -L "$capture" ]; then
+            [ -n "${said[$capture]:-}" ] || echo "$(date -u +%FT%TZ) $(basename "$capture"): a link, left alone"
+            said[$capture]=yes
+            continue
+        fi
         result=$out/$(basename "$capture")
         is_over "$capture" "$result" && continue
         left=$((left + 1))

@@ -49,7 +49,7 @@ static const npg_option options[] = {
     {"align-stiffness", "weight of the graph's edges against the distances", NPG_OPTION_REAL,
      offsetof(state, stiffness), "0.006", 0, 1e6, NULL, NULL},
     {"align-along", "share of distances along the surface, 0 to 1", NPG_OPTION_REAL, offsetof(state, along),
-     "0.01", 0, 1, NULL, NULL},
+     "0.001", 0, 1, NULL, NULL},
     {0}};
 
 static void uninit(npg_worker *worker)

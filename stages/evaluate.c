@@ -415,7 +415,8 @@ static npg_status init(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     if (npg_worker_facts(worker)->is_resumed) NPG_TRY(take_up(worker));
-    return state->truth_folder[0] ? npg_truth_open(&state->truth, state->truth_folder) : NPG_OK;
+    if (!state->truth_folder[0]) return NPG_OK;
+    return npg_truth_open(&state->truth, state->truth_folder, npg_worker_settings(worker)->confine);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)

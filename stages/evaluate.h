@@ -32,8 +32,8 @@ double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count,
 typedef struct npg_truth npg_truth;
 
 /* The meshes (PLY or OBJ) of a folder, found by the last number in their names.  NPG_BAD_INPUT when there are
- * none or two have one number. */
-npg_status npg_truth_open(npg_truth **truth, const char *folder);
+ * none or two have one number, and with is_confined when one leads out of the folder. */
+npg_status npg_truth_open(npg_truth **truth, const char *folder, bool is_confined);
 void npg_truth_close(npg_truth **truth);
 
 /* Fill truth_cd, truth_nc, truth_f and truth_corr of a frame by stages/metrics.h; they are NaN when the

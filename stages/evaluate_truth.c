@@ -76,11 +76,13 @@ static npg_status list_files(npg_truth *truth, const char *folder)
     return NPG_OK;
 }
 
-npg_status npg_truth_open(npg_truth **out, const char *folder)
+npg_status npg_truth_open(npg_truth **out, const char *folder, bool is_confined)
 {
     npg_truth *truth;
     NPG_TRY(npg_alloc(&truth, NPG_FOR_FILES, sizeof *truth));
     npg_status status = list_files(truth, folder);
+    for (size_t i = 0; is_confined && i < truth->count && !status; i++)
+        status = npg_error_prefix(npg_path_confine(truth->files[i].path, folder), "truth");
     if (status) npg_truth_close(&truth);
     *out = truth;
     return status;

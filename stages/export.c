@@ -449,10 +449,14 @@ static npg_status conclude(npg_worker *worker)
 
 static npg_status check_own(const npg_worker *worker)
 {
-    char *meshes;
-    NPG_TRY(npg_join_path(&meshes, output_of(worker), "meshes"));
-    npg_status status = npg_folder_is_own(meshes);
-    npg_release(&meshes);
+    static const char *const names[] = {"meshes", "obj", "volumes", "latents"};
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++) {
+        char *folder;
+        NPG_TRY(npg_join_path(&folder, output_of(worker), names[i]));
+        status = npg_folder_is_own(folder);
+        npg_release(&folder);
+    }
     return status;
 }
 

@@ -180,10 +180,8 @@ static npg_status stat_all(npg_follow *follow)
         char *path;
         NPG_TRY(npg_join_path(&path, follow->folder, f.name));
         bool is_there = !stat(path, &info) && !S_ISDIR(info.st_mode);
-        npg_status status = is_there && follow->settings.confine && !npg_path_is_inside(path, follow->folder)
-                                ? npg_error(NPG_BAD_INPUT, "%s: leads out of %s, and option confine is set",
-                                            path, follow->folder)
-                                : NPG_OK;
+        npg_status status =
+            is_there && follow->settings.confine ? npg_path_confine(path, follow->folder) : NPG_OK;
         npg_release(&path);
         NPG_TRY(status);
         if (!is_there) { /* taken away again, or a folder */

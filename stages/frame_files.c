@@ -130,15 +130,15 @@ npg_status npg_frame_files_confine(const npg_frame_files *list, const char *inpu
     char *folder;
     struct stat info;
     NPG_TRY(npg_copy_text(&folder, input));
-    char *slash = strrchr(folder, '/');
-    bool is_folder = !stat(input, &info) && S_ISDIR(info.st_mode);
-    if (!is_folder && slash) slash[slash == folder] = 0;
-    const char *place = is_folder || slash ? folder : ".";
+    /* of a pattern, what comes before the first folder that is a pattern itself */
+    while (folder[0] && strcmp(folder, "/") != 0 && (stat(folder, &info) || !S_ISDIR(info.st_mode))) {
+        char *slash = strrchr(folder, '/');
+        folder[!slash ? 0 : slash == folder ? 1 : slash - folder] = 0;
+    }
+    const char *place = folder[0] ? folder : ".";
     npg_status status = NPG_OK;
     for (size_t i = 0; i < list->count && !status; i++)
-        if (list->slots[i].path && !npg_path_is_inside(list->slots[i].path, place))
-            status = npg_error(NPG_BAD_INPUT, "%s: leads out of %s, and option confine is set",
-                               list->slots[i].path, place);
+        if (list->slots[i].path) status = npg_path_confine(list->slots[i].path, place);
     npg_release(&folder);
     return status;
 }

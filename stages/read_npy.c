@@ -39,7 +39,8 @@ static npg_status take_type(array *a, const char *text, const npg_source *source
     if (!text || (*text != '\'' && *text != '"')) return bad(source, "no plain type (descr)");
     char name[4] = {0};
     snprintf(name, sizeof name, "%.3s", text + 1);
-    if (!strchr("<>=", name[0]) || !name[0] || (text[4] != '\'' && text[4] != '"'))
+    bool is_whole = strlen(name) == 3; /* else the header ends within it, and there is no text[4] */
+    if (!is_whole || !strchr("<>=", name[0]) || (text[4] != '\'' && text[4] != '"'))
         return bad(source, "type (descr) is neither f4 nor f8");
     a->order = name[0] == '>' ? NPG_PLY_BIG : NPG_PLY_LITTLE;
     a->type = name[2] == '8' ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT;

@@ -17,8 +17,8 @@ files=(stages/read_*.c stages/reader.c stages/stream.c stages/source.c stages/pl
     stages/time_code.c stages/glb_*.c stages/zip_store.c stages/point_cache.c stages/vdb_file.c pipeline/archive.c
     pipeline/json_*.c pipeline/options.c pipeline/file.c pipeline/own_stage.c)
 
-tests="test_readers test_bad_files test_writers test_export test_checkpoint test_frame_files test_options test_file
-test_ingest test_follow test_own_stage test_abi input resume apply export exports formats live"
+tests="test_readers test_bad_files test_writers test_forms test_time_code test_export test_checkpoint test_frame_files
+test_options test_file test_ingest test_follow test_own_stage test_abi input resume apply export exports formats live"
 
 cmake -G Ninja -B "$build" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_C_FLAGS_DEBUG="-O1 -g --coverage" \
     -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g" -DCMAKE_EXE_LINKER_FLAGS=--coverage -DCMAKE_SHARED_LINKER_FLAGS=--coverage \

@@ -59,6 +59,7 @@ flags() {
 
 @test "a watch folder runs what is complete, once, and goes on after it was stopped" {
     mkdir watched
+    ln -s ../short watched/linked
     # shellcheck disable=SC2046
     watch() { SETTLE=2 POLL=0.2 "$samples/watch_folder.sh" watched watch-out $(flags "$tiny, $long") >>watch.log 2>&1; }
     watch &
@@ -90,6 +91,8 @@ flags() {
     cat watch.log
     [ "$status" -eq 0 ]
     grep -q 'bad: exit code 0' watch.log
+    [ "$(grep -c 'linked: a link, left alone' watch.log)" -eq 3 ] # once by each watcher
+    [ ! -e watch-out/linked ]
 }
 
 # A Slurm of its own in $1: one machine, this one.

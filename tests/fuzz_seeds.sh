@@ -28,6 +28,7 @@ npy() { # DESCR ORDER SHAPE: a header of 118 bytes
 { npy '<f4' False '(2, 3)' && printf "$floats\0\0\200\77\0\0\0\0"; } >npy/single
 { npy '>f8' True '(1, 3)' && printf '\100\0\0\0\0\0\0\0%.0s' 1 2 3; } >npy/double
 { npy '<f4' False '(1, 6)' && printf "$floats\0\0\0\0\0\0\200\77"; } >npy/normals
+printf '\223NUMPY\1\0\77\0%51s%s' '' "'descr': '>f4', 'fortran_order': True, 'shape': (2, 3)" >npy/cut_type
 pcd() { # FIELDS SIZES TYPES COUNTS POINTS DATA
     printf 'VERSION 0.7\nFIELDS %s\nSIZE %s\nTYPE %s\nCOUNT %s\nWIDTH %s\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS %s\nDATA %s\n' \
         "$1" "$2" "$3" "$4" "$5" "$5" "$6"
@@ -59,5 +60,5 @@ block() { # NAME SIZE BYTES: as in pipeline/archive.h
 } >archive/reference
 { printf 'NPGARCH1' && block text 7 'seven b' && block end 8 '\0\0\0\0\0\0\0\0'; } >archive/small
 mkdir -p manifest
-printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
-printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5}]}' >manifest/names
+printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
+printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names

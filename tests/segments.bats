@@ -7,7 +7,11 @@ small=(--epochs 10 --width-1 64 --width-2 64 --faces 2000 --poisson-depth 6 --wi
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --body two --frames 14 --change 7 --points 1500 --cell 0.05 -o two >synth.log
-    "$NEUPIG" run two/points -o whole "${small[@]}" --segments auto --keyframe 3 >whole.log 2>&1
+    for ((i = 0; i + 1 < ${#small[@]}; i += 2)); do printf '"%s": %s,\n' "${small[i]#--}" "${small[i + 1]}"; done >keys
+    echo "{\"output\": \"night\", \"defaults\": {$(cat keys) \"segments\": \"auto\"}, \"captures\": [
+        {\"input\": \"two/points\", \"name\": \"two\", \"keyframe\": 3}]}" >night.json
+    "$NEUPIG" batch night.json >night.table 2>night.log
+    cp -r night/two whole
 }
 
 setup() {
@@ -37,6 +41,45 @@ same() {
     [ "$(ls -d "$1"/segment_* | wc -l)" -eq "$(ls -d whole/segment_* | wc -l)" ]
 }
 
+@test "a batch says the segments in its verdict, its table and its page, and leaves them alone when started again" {
+    cat night.log night.table
+    second=$(basename "$(ls -d night/two/segment_* | tail -1)")
+    from=$((10#${second#segment_}))
+    within "$from" 7
+    grep -Eq '^capture +verdict +good frames +segments ' night.table
+    grep -Eq "^two +done +14 of 14 +2 \(from $from\) " night.table
+    python3 - "$second" "$from" <<'END'
+import json, sys
+for told in json.load(open("night/two/verdict.json")), json.load(open("night/batch.json"))["captures"][0]:
+    first, second = told["segments"]
+    assert first["folder"] == "segment_0000" and first["first_frame"] == 0 and first["keyframe"] == 3 and not first["cause"]
+    assert second["folder"] == sys.argv[1] and second["first_frame"] == int(sys.argv[2]) and second["last_frame"] == 13
+    assert "far from the surface" in second["cause"] and second["status"] == "ok"
+END
+    xmllint --noout night/batch.html
+    grep -q "<td>2 (from $from)</td>" night/batch.html
+    grep -q "<code>$second</code>: frames $from to 13, keyframe .*far from the surface" night/batch.html
+    grep -q "<line class=\"cut\".*another reference from frame $from<" night/batch.html
+    [ "$(grep -o 'data:image/png;base64,' night/batch.html | wc -l)" -eq 4 ] # two references, the worst frame, its points
+    before=$(find night/two -type f ! -name log.jsonl ! -name verdict.json -printf '%p %T@ %i\n' | sort)
+    peak=$(grep peak_memory night/two/verdict.json)
+    run "$NEUPIG" batch night.json
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"two: was done already"* ]]
+    [ "$before" = "$(find night/two -type f ! -name log.jsonl ! -name verdict.json -printf '%p %T@ %i\n' | sort)" ]
+    [ "$peak" = "$(grep peak_memory night/two/verdict.json)" ]
+    run "$NEUPIG" batch night.json --dry-run
+    [[ "$output" == *"segments: the time is that of one reference"* ]]
+    run "$NEUPIG" batch night.json --segments one # what the command line says wins
+    [ "$status" -eq 1 ]
+    [[ "$output" == *"usage"*"2 segments"*--restart* ]]
+    sed 's/"auto"/"some"/' night.json >bad.json
+    run "$NEUPIG" batch bad.json
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'bad.json: defaults.segments: neither'* ]]
+}
+
 @test "a second object raises the alarm at its frame, and the run ends with 7" {
     run "$NEUPIG" run two/points -o one "${small[@]}" --keyframe 3
     echo "$output"
@@ -48,6 +91,38 @@ same() {
     [ "$(grep -c '"unexplained":true' one/frames.jsonl)" -eq $((14 - from)) ]
     sed -n $((from + 1))p one/frames.jsonl | grep -q '"unexplained":true'
     grep -q '"exit_code": 7' one/done.json
+    mkdir single
+    cp -r one single/two
+    sed 's/"auto"/"one"/; s/night/single/' night.json >single.json
+    run "$NEUPIG" batch single.json
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [[ "$output" == *"from frame $from on the reference no longer explains the points; \"segments\": \"auto\""* ]]
+    # asked for segments it is done anew with them
+    run "$NEUPIG" run two/points -o one "${small[@]}" --keyframe 3 --segments auto --no-quiet
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"was done with one reference, which does not explain all frames"* ]]
+    same one
+}
+
+@test "append and apply: a segment is named, and carries another mesh through its own frames" {
+    run "$NEUPIG" append whole
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"2 segments"*--segments*--restart* ]]
+    second=$(basename "$(ls -d whole/segment_* | tail -1)")
+    run "$NEUPIG" append "whole/$second"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"is one segment of a capture"* ]]
+    run "$NEUPIG" apply whole --mesh "whole/$second/reference.ply" -o carried
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"whole/segment_0000 (frames 0 to "*"whole/$second (frames "*" to 13)"* ]]
+    [ ! -e carried ]
+    "$NEUPIG" apply "whole/$second" --mesh "whole/$second/reference.ply" -o carried
+    [ "$(ls carried | grep -c ply)" -eq "$(ls "whole/$second/meshes" | wc -l)" ]
+    run "$NEUPIG" eval carried "whole/$second/meshes" --samples 1000
+    [[ "$output" == *"Corr 0.00000"* ]]
 }
 
 @test "a keyframe with the object raises it backward" {
@@ -157,6 +232,31 @@ END
     same again
 }
 
+@test "where the links or the lists can't be written the exit code is 5, nothing is done, and the next run goes on" {
+    shim=$(dirname "$NEUPIG")/fault_shim.so
+    [ -e "$shim" ] || skip "not under a sanitizer"
+    mkdir late # all segments are there, what comes after them is not
+    cp -r whole/segment_* late
+    cp whole/segments.json late/segments.partial.json
+    for kind in EIO SYNC; do
+        for ((n = 1; n < 20; n++)); do
+            rm -rf failed mark
+            cp -r late failed
+            NPG_FAULT=$kind:$n NPG_FAULT_UNDER=$PWD/failed NPG_FAULT_MARK=$PWD/mark LD_PRELOAD=$shim \
+                run "$NEUPIG" run two/points -o failed "${small[@]}" --segments auto --keyframe 3
+            [ -e mark ] || break
+            echo "$kind $n: $output"
+            [ "$status" -eq 5 ]
+            [ ! -e failed/done.json ]
+            [ ! -e failed/segments.json ] || cmp failed/segments.json whole/segments.json
+            "$NEUPIG" run two/points -o failed "${small[@]}" --segments auto --keyframe 3
+            same failed
+            [ -e failed/done.json ]
+        done
+        [ "$n" -ge 5 ] && [ "$n" -lt 20 ]
+    done
+}
+
 @test "a capture that does not change is one segment, byte for byte that of a run without segments" {
     "$NEUPIG" synth --body bar --frames 9 --points 500 --cell 0.06 -o bar
     "$NEUPIG" run bar/points -o bar-one "${small[@]}"
@@ -167,6 +267,14 @@ END
     [ "$(grep -c '"folder"' bar-auto/segments.json)" -eq 1 ]
     run "$NEUPIG" run bar/points -o bar-auto "${small[@]}"
     [ "$status" -eq 0 ]
+    # frames that come later: as without segments
+    "$NEUPIG" synth --body bar --frames 11 --points 500 --cell 0.06 -o longer
+    cp longer/points/frame_0009.ply longer/points/frame_0010.ply bar/points
+    "$NEUPIG" append bar-auto -q
+    [ "$(ls bar-auto/meshes | wc -l)" -eq 11 ]
+    [ ! -e bar-auto/segments.json ]
+    "$NEUPIG" run bar/points -o bar-auto "${small[@]}" --segments auto
+    grep -q '"frames": 11' bar-auto/segments.json
 }
 
 @test "segments are not mixed with a run without, with other frames or with a live source" {

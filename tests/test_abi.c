@@ -119,9 +119,10 @@ static void members_stay_where_they_are(void **state)
 
 static void status_values_stay(void **state)
 {
-    const int values[] = {NPG_OK,        NPG_END,    NPG_STOPPED, NPG_PARTIAL, NPG_FAILED,   NPG_USAGE,
-                          NPG_BAD_INPUT, NPG_DEVICE, NPG_DISK,    NPG_MEMORY,  NPG_DIVERGED, NPG_ABORTED};
-    const int were[] = {0, 1, 2, 3, -1, -2, -3, -4, -5, -6, -7, -8};
+    const int values[] = {NPG_OK,     NPG_END,      NPG_STOPPED,   NPG_PARTIAL, NPG_CHANGED,
+                          NPG_FAILED, NPG_USAGE,    NPG_BAD_INPUT, NPG_DEVICE,  NPG_DISK,
+                          NPG_MEMORY, NPG_DIVERGED, NPG_ABORTED};
+    const int were[] = {0, 1, 2, 3, 4, -1, -2, -3, -4, -5, -6, -7, -8};
     (void)state;
     assert_memory_equal(values, were, sizeof were);
 }

@@ -15,6 +15,7 @@
 #include "file.h"
 #include "group_folder.h"
 #include "memory.h"
+#include "stage.h"
 
 static void a_file_appears_when_it_is_whole(void **state)
 {
@@ -192,6 +193,37 @@ static void paths_join(void **state)
     }
 }
 
+/* What is no UTF-8 becomes "?", byte by byte; the rest stays. */
+static void any_bytes_become_a_json_text(void **state)
+{
+    static const char *const pairs[][2] = {
+        {"plain", "plain"},
+        {"a\nb", "a\nb"},
+        {"\xc3\xa4 \xe2\x82\xac \xf0\x9f\x98\x80", "\xc3\xa4 \xe2\x82\xac \xf0\x9f\x98\x80"},
+        {"\xff\xfe", "??"},
+        {"\xc3", "?"},                                                     /* cut off */
+        {"\xe2\x82x", "??x"},                                              /* cut off within */
+        {"\xc0\x80", "??"},                                                /* too long for its value */
+        {"\xe0\x9f\xbf", "???"},                                           /* too long for its value */
+        {"\xf0\x8f\xbf\xbf", "????"},                                      /* too long for its value */
+        {"\xed\xa0\x80", "???"},                                           /* half of a pair of UTF-16 */
+        {"\xf4\x90\x80\x80", "????"},                                      /* beyond the last character */
+        {"\xf5\x80\x80\x80", "????"},                                      /* no first byte of anything */
+        {"\x80 \xf0\x90\x80\x80\xf4\x8f\xbf\xbf \xed\x9f\xbf\xe0\xa0\x80", /* first and last that are some */
+         "? \xf0\x90\x80\x80\xf4\x8f\xbf\xbf \xed\x9f\xbf\xe0\xa0\x80"}};
+    (void)state;
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        json_t *text = npg_json_text(pairs[i][0]);
+        assert_non_null(text);
+        assert_string_equal(json_string_value(text), pairs[i][1]);
+        json_decref(text);
+    }
+    assert_true(json_is_null(npg_json_text(NULL)));
+    npg_memory_fail_at(1, false);
+    assert_null(npg_json_text("\xff"));
+    npg_memory_fail_at(0, false);
+}
+
 static void no_memory_is_said(void **state)
 {
     (void)state;
@@ -222,6 +254,7 @@ int main(void)
         cmocka_unit_test(a_killed_writer_leaves_no_final_name),
         cmocka_unit_test(a_link_in_the_way_is_not_followed),
         cmocka_unit_test(paths_join),
+        cmocka_unit_test(any_bytes_become_a_json_text),
         cmocka_unit_test(no_memory_is_said),
     };
     return cmocka_run_group_tests(tests, open_folder, close_folder);

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include <malloc.h>
 #include <math.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -516,6 +517,97 @@ static void a_full_disk_is_said(void **state)
     }
 }
 
+/* ---- memory does not grow with frames ---- */
+
+static size_t most_counted;
+
+static void *take(void *user, size_t align, size_t size)
+{
+    (void)user;
+    size_t now = npg_memory_used() + size;
+    if (now > most_counted) most_counted = now;
+    return aligned_alloc(align, (size + align - 1) / align * align);
+}
+
+static void give(void *user, void *memory)
+{
+    (void)user;
+    free(memory);
+}
+
+/* In use between frames: after the first, what the library counts; after the 12th, all that malloc() gave,
+ * for other libraries' is not counted. */
+typedef struct held {
+    int frames;
+    size_t counted, counted_most, given, given_most;
+} held;
+
+static bool look(void *user)
+{
+    held *h = user;
+    struct mallinfo2 now = mallinfo2();
+    size_t given = now.uordblks + now.hblkhd, counted = npg_memory_used();
+    if (++h->frames == 2) h->counted = counted;
+    if (h->frames == 12) h->given = given;
+    if (h->frames >= 2 && counted > h->counted_most) h->counted_most = counted;
+    if (h->frames >= 12 && given > h->given_most) h->given_most = given;
+    return false;
+}
+
+/* One mesh stands for all frames: what is in them does not matter here. */
+static const char *make_repeated(const char *name, int64_t count)
+{
+    const char *out = make_run(name, 1, -1);
+    char path[600];
+    snprintf(path, sizeof path, "%s/frames.jsonl", out);
+    FILE *list = fopen(path, "w");
+    for (int64_t t = 0; t < count; t++)
+        fprintf(list, "{\"index\":%d,\"number\":%d,\"file\":\"meshes/frame_0010.ply\"}\n", (int)t, (int)t);
+    fclose(list);
+    return out;
+}
+
+/* The most that was counted while `count` frames were written in a form. */
+static size_t counted_for(const char *list, int64_t count)
+{
+    char name[80];
+    snprintf(name, sizeof name, "%s-of-%d", list, (int)count);
+    npg_form_facts facts = facts_of(make_repeated(name, count));
+    held h = {0};
+    npg_form_watch watch = {.should_stop = look, .user = &h};
+    facts.uvs = uvs;
+    facts.colours = colours;
+    most_counted = 0;
+    assert_int_equal(write_list(list, &facts, &watch), NPG_OK);
+    assert_int_equal(h.frames, count);
+    if (count <= 256 && h.counted_most != h.counted) /* one file */
+        fail_msg("%s: %zu counted bytes after the first frame, %zu later", list, h.counted, h.counted_most);
+    if (h.given_most > h.given + (64 << 10))
+        fail_msg("%s: %zu bytes in use after 11 frames, %zu later", list, h.given, h.given_most);
+    return most_counted;
+}
+
+static void memory_does_not_grow_with_frames(void **state)
+{
+    const char *const lists[] = {"ply,obj", "pc2", "mdd", "usda", "npz", "vdb", "glb"};
+    const npg_allocator noting = {sizeof noting, NULL, take, give};
+    (void)state;
+    assert_int_equal(npg_memory_set_allocator(&noting), NPG_OK);
+    for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
+        bool is_glb = !strcmp(lists[i], "glb");
+        size_t few = counted_for(lists[i], 12), many = counted_for(lists[i], 48);
+        /* a line of text for each pose of the file that is written, and what the text's buffer has to spare
+         */
+        size_t allowed = is_glb ? (48 - 12) * 1024 : 600;
+        if (many > few + allowed) fail_msg("%s: %zu bytes for 12 frames, %zu for 48", lists[i], few, many);
+        if (!is_glb) continue;
+        /* one file of 256 against four: the same text but for its numbers */
+        few = counted_for(lists[i], 256), many = counted_for(lists[i], 1024);
+        if (many > few + 4096) fail_msg("%s: %zu bytes for 256 frames, %zu for 1024", lists[i], few, many);
+    }
+    assert_int_equal(npg_memory_set_allocator(NULL), NPG_OK);
+}
+
 static void no_memory_leaves_no_list(void **state)
 {
     const char *out = make_run("memory", 3, 1);
@@ -577,6 +669,7 @@ int main(void)
         cmocka_unit_test(a_changed_mesh_is_noticed),
         cmocka_unit_test(a_stop_leaves_nothing),
         cmocka_unit_test(a_full_disk_is_said),
+        cmocka_unit_test(memory_does_not_grow_with_frames),
         cmocka_unit_test(no_memory_leaves_no_list),
         cmocka_unit_test(clearing_leaves_what_is_not_ours),
     };

@@ -259,6 +259,41 @@ static void odd_inputs(void **state)
     CONTAINS(listed(in_folder(&folder, "nowhere/at/all"), "", true), "there is no such file or folder");
 }
 
+static npg_status confined(const char *input)
+{
+    npg_frame_files *list;
+    assert_int_equal(npg_frame_files_open(&list, input, "", false), NPG_OK);
+    npg_status status = npg_frame_files_confine(list, input);
+    npg_frame_files_close(&list);
+    return status;
+}
+
+/* Of a pattern the folders before the first that is a pattern itself. */
+static void links_out_of_the_input_are_refused(void **state)
+{
+    char path[450], input[500], target[500];
+    (void)state;
+    snprintf(path, sizeof path, "%s",
+             make_files("confined", FILES("takes/a/f_1.xyz", "takes/b/f_1.xyz", "outside.xyz")));
+    for (int linked = 0; linked < 2; linked++) {
+        const npg_status wanted = linked ? NPG_BAD_INPUT : NPG_OK;
+        snprintf(input, sizeof input, "%s/takes/*/f_1.xyz", path);
+        assert_int_equal(confined(input), wanted);
+        snprintf(input, sizeof input, "%s/takes/b/f_%%d.xyz", path);
+        assert_int_equal(confined(input), wanted);
+        snprintf(input, sizeof input, "%s/takes/b/f_1.xyz", path);
+        assert_int_equal(confined(input), wanted);
+        snprintf(input, sizeof input, "%s/takes/b/", path);
+        assert_int_equal(confined(input), wanted);
+        snprintf(input, sizeof input, "%s/takes/a", path);
+        assert_int_equal(confined(input), NPG_OK);
+        snprintf(input, sizeof input, "%s/takes/b/f_1.xyz", path);
+        snprintf(target, sizeof target, "%s/outside.xyz", path);
+        assert_true(linked || (unlink(input) == 0 && symlink(target, input) == 0));
+    }
+    CONTAINS(npg_error_text(), "--no-confine");
+}
+
 static void no_memory_at_any_point(void **state)
 {
     (void)state;
@@ -297,6 +332,7 @@ int main(void)
                                        cmocka_unit_test(patterns_and_globs),
                                        cmocka_unit_test(list_files),
                                        cmocka_unit_test(odd_inputs),
+                                       cmocka_unit_test(links_out_of_the_input_are_refused),
                                        cmocka_unit_test(no_memory_at_any_point)};
     return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

@@ -135,6 +135,24 @@ untouched() {
         refused 2 "out/$name is a link" run in/frame_0000.ply -o out --confine "${small[@]}"
         untouched
     done
+    for name in obj volumes latents; do
+        rm -rf out
+        mkdir out
+        ln -s ../outside "out/$name"
+        refused 2 "out/$name is a link" run in/frame_0000.ply -o out --confine --export ply,obj,vdb "${small[@]}"
+        untouched
+    done
+    rm -rf out
+    mkdir out
+    ln -s ../outside out/links
+    refused 2 "out/links is a link" run in/frame_0000.ply -o out --confine --segments auto "${small[@]}"
+    untouched
+    mkdir out/meshes
+    rm out/links
+    echo '{"selection": "", "frames": 1, "segments": [{"folder": "segment_0000", "first": 0, "last": 0}]}' >out/segments.json
+    ln -s ../outside out/segment_0000
+    refused 2 "out/segment_0000 is a link" run in/frame_0000.ply -o out --confine --segments auto "${small[@]}"
+    untouched
     rm -rf out
     mkdir -p out/meshes
     for name in .write-test .reference.ply meshes/.frame_0000.ply; do ln -s "$PWD/outside/frame.ply" "out/$name.part"; done
@@ -177,4 +195,75 @@ untouched() {
         run timeout 300 "$NEUPIG" run in/frame_0000.ply -o job "${small[@]}"
         [ "$status" -eq 2 ]
     done
+}
+
+# night DIR OPTIONS...: a batch of the folder; its table is in $output
+night() {
+    run timeout 300 "$NEUPIG" batch "$1" -o results "${small[@]}" "${@:2}"
+    echo "$output"
+}
+
+# held NAME WORDS: its verdict is bad input and says why, and nothing of it was written
+held() {
+    grep -q '"verdict": "bad input"' "results/$1/verdict.json"
+    grep -q "$2" "results/$1/verdict.json"
+    [ ! -e "results/$1/meshes/frame_0000.ply" ]
+    [ ! -e "results/$1/done.json" ]
+}
+
+@test "a batch reads nothing that links lead out of a capture's folder, unless it is told to" {
+    cp -r "$BATS_FILE_TMPDIR/capture/truth" outside/truth
+    mkdir -p set/{good,frames,points,truth,meshes/truth,only}
+    cp "$BATS_FILE_TMPDIR"/capture/points/* set/good
+    cp "$BATS_FILE_TMPDIR"/capture/points/* set/meshes
+    for name in frames points truth; do cp in/frame_0000.ply set/$name; done
+    ln -s ../../outside/frame.ply set/frames/frame_0001.ply
+    rm set/points/*
+    ln -s ../../in set/points/points
+    ln -s ../../outside/truth set/truth/truth
+    ln -s ../../../outside/truth/frame_0000.ply set/meshes/truth/frame_0000.ply
+    ln -s ../../in set/only/anything
+    ln -s ../in set/link
+    ln -s good set/same
+    night set --dry-run
+    [ "$status" -eq 1 ]
+    [ "$(grep -c 'would fail: .*leads out of ' <<<"$output")" -eq 5 ]
+    [ ! -e results ]
+    night set
+    [ "$status" -eq 1 ]
+    [ "$(grep -Ec '^(good|same) +done ' <<<"$output")" -eq 2 ]
+    held frames 'set/frames/frame_0001.ply: leads out of .*set/frames.*--no-confine'
+    held points 'set/points/points: leads out of .*set/points'
+    held truth 'set/truth/truth: leads out of .*set/truth'
+    held meshes 'truth: .*set/meshes/truth/frame_0000.ply: leads out of .*set/meshes/truth'
+    held only 'set/only/anything/frame_0000.ply: leads out of .*set/only'
+    held link 'set/link: leads out of .*set,'
+    [ "$(grep -c '"verdict": "bad input"' results/batch.json)" -eq 6 ]
+    # whoever writes the manifest names the folders; what is in them is of others all the same
+    echo '{"captures": [{"input": "set/link"}, {"input": "set/frames"}, {"input": "set/points", "confine": false}]}' >named.json
+    rm -r results
+    night named.json
+    [ "$status" -eq 1 ]
+    [ "$(grep -Ec '^(link|set) +done ' <<<"$output")" -eq 2 ]
+    held frames 'leads out of'
+    night named.json --no-confine
+    [ "$status" -eq 0 ]
+    [ "$(ls results/frames/meshes | wc -l)" -eq 2 ]
+    cmp outside/frame.ply "$BATS_FILE_TMPDIR/capture/points/frame_0001.ply"
+}
+
+@test "a batch of folders with strange names runs them all, under names that can be printed" {
+    mkdir odd
+    for name in -rf $'a\nb\e[31m' $'a\tb\e[31m' "$(printf 'x%.0s' {1..250})" '<b>&'; do cp -r in "odd/$name"; done
+    mkfifo odd/pipe odd/-rf/frame_0001.ply
+    truncate -s 1000 odd/$'a\tb\e[31m/frame_0000.ply'
+    night odd
+    [ "$status" -eq 1 ]
+    [[ "$output" != *$'\e'* ]]
+    [ "$(grep -Ec '^(a_b_\[31m(_2)?|x{190}|_rf|<b>&)  ' <<<"$output")" -eq 5 ]
+    [ "$(ls -d results/*/ | wc -l)" -eq 5 ]
+    [ "$(grep -Ec ' done +1 of 1 ' <<<"$output")" -eq 3 ]
+    held _rf 'a pipe or a device'
+    xmllint --noout results/batch.html
+    [ "$(ls)" = $'in\nodd\noutside\nresults' ]
 }

@@ -10,6 +10,7 @@
 
 #include "file.h"
 #include "memory.h"
+#include "run_settings.h"
 
 npg_status npg_path_from(char **path, const char *folder, const char *text)
 {
@@ -72,21 +73,44 @@ static npg_status check_options(const npg_options *options)
     return NPG_OK;
 }
 
+/* Captures come from others: what leads out of a capture's folder is not read unless the batch says so. */
+static npg_status confine(bool *is_confined, npg_options *options)
+{
+    npg_settings settings;
+    if (!npg_options_is_set(options, "confine")) NPG_TRY(npg_options_set(options, "confine", "yes"));
+    npg_options_fill(options, npg_run_options, &settings);
+    *is_confined = settings.confine;
+    return NPG_OK;
+}
+
+/* Of a batch that is a folder, whoever fills it, a capture is not read that is a link out of it. */
+static npg_status find_input(char **input, const npg_batch *batch, npg_capture *capture, const char *path,
+                             bool is_confined)
+{
+    struct stat info;
+    if (stat(path, &info) || !S_ISDIR(info.st_mode)) return npg_copy_text(input, path);
+    if (is_confined && batch->is_folder) NPG_TRY(npg_path_confine(path, batch->path));
+    return npg_batch_look_inside(capture, input, path, is_confined);
+}
+
 npg_status npg_batch_finish(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
                             const npg_batch_given *given)
 {
-    char *input, *path;
-    struct stat info;
-    NPG_TRY(npg_path_from(&path, folder, text));
-    bool is_folder = !stat(path, &info) && S_ISDIR(info.st_mode);
-    npg_status status =
-        is_folder ? npg_batch_look_inside(capture, &input, path) : npg_copy_text(&input, path);
-    npg_release(&path);
-    NPG_TRY(status);
-    capture->input = input;
+    char *path;
+    bool is_confined;
     NPG_TRY(set_given(capture->options, given->options));
     NPG_TRY(check_options(capture->options));
+    NPG_TRY(confine(&is_confined, capture->options));
     if (given->max_time_s >= 0) capture->max_time_s = given->max_time_s;
+    if (given->segments) capture->segments = given->segments;
+    NPG_TRY(npg_path_from(&path, folder, text));
+    npg_status status = find_input(&capture->input, batch, capture, path, is_confined);
+    if (status == NPG_BAD_INPUT) {
+        status = npg_copy_text(&capture->refusal, npg_error_text());
+        if (!status) status = npg_copy_text(&capture->input, path);
+    }
+    npg_release(&path);
+    NPG_TRY(status);
     NPG_TRY(npg_join_path(&capture->output, batch->output, capture->name));
     NPG_TRY(npg_options_set(capture->options, "input", capture->input));
     return npg_options_set(capture->options, "output", capture->output);
@@ -112,8 +136,8 @@ static npg_status fill(npg_batch *batch, const char *path, const npg_batch_given
     NPG_TRY(npg_copy_text(&batch->path, path));
     NPG_TRY(set_output(batch, given));
     if (stat(path, &info)) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
-    return S_ISDIR(info.st_mode) ? npg_batch_read_folder(batch, given)
-                                 : npg_batch_read_manifest(batch, given);
+    batch->is_folder = S_ISDIR(info.st_mode);
+    return batch->is_folder ? npg_batch_read_folder(batch, given) : npg_batch_read_manifest(batch, given);
 }
 
 npg_status npg_batch_open(npg_batch **out, const char *path, const npg_batch_given *given)
@@ -138,6 +162,7 @@ void npg_batch_close(npg_batch **slot)
         npg_release(&capture->name);
         npg_release(&capture->input);
         npg_release(&capture->output);
+        npg_release(&capture->refusal);
         npg_options_close(&capture->options);
     }
     npg_release(&batch->captures);

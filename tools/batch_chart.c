@@ -74,6 +74,22 @@ static void draw_bar(npg_file *page, const chart *c)
                    LEFT, WIDTH - RIGHT, y_of(c, bar), y_of(c, bar), bar);
 }
 
+/* Where a segment takes over from the one before. */
+static void draw_cuts(npg_file *page, const chart *c)
+{
+    const npg_capture_figures *f = c->figures;
+    for (size_t i = 1, next = 1; i < json_array_size(f->segments) && i <= MARKS_MAX; i++) {
+        const json_t *segment = json_array_get(f->segments, i);
+        long long first = (long long)json_integer_value(json_object_get(segment, "first_frame"));
+        while (next < f->count && f->frames[next].number < first) next++;
+        double x = x_of(c, next) - (x_of(c, 1) - x_of(c, 0)) / 2;
+        npg_file_print(page,
+                       "<line class=\"cut\" x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\"><title>another "
+                       "reference from frame %lld</title></line>\n",
+                       x, x, TOP, HEIGHT - BOTTOM, first);
+    }
+}
+
 static void draw_marks(npg_file *page, const chart *c)
 {
     const npg_capture_figures *f = c->figures;
@@ -122,6 +138,7 @@ void npg_page_chart(npg_file *page, const npg_capture_figures *figures)
         WIDTH, HEIGHT, WIDTH, HEIGHT);
     draw_axes(page, &c);
     draw_bar(page, &c);
+    draw_cuts(page, &c);
     draw_line(page, &c);
     draw_marks(page, &c);
     npg_file_print(page, "</svg>\n");

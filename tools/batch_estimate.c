@@ -33,6 +33,10 @@ static bool is_on(const npg_options *options, const char *name)
 static npg_status look_at(look *l, const npg_capture *capture)
 {
     npg_probe_init(&l->probe);
+    if (capture->refusal) {
+        snprintf(l->cause, sizeof l->cause, "%s", capture->refusal);
+        return NPG_OK;
+    }
     npg_status status = npg_probe_files(&l->probe, &l->list, capture->input, capture->options);
     if (status == NPG_MEMORY) return status;
     if (status) {
@@ -55,6 +59,8 @@ static void print_row(const npg_capture *capture, look *l)
            l->list ? l->list->gap_count : 0, npg_probe_counts(&l->probe).median, e->memory_bytes / 0x1p20,
            e->disk_bytes / 0x1p20, time);
     if (l->cause[0]) printf("    would fail: %s\n", l->cause);
+    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO)
+        printf("    segments: the time is that of one reference; each cut solves frames anew\n");
     for (size_t i = 0; i < json_array_size(l->probe.attention); i++)
         printf("    attention: %s\n", json_string_value(json_array_get(l->probe.attention, i)));
 }
@@ -68,6 +74,8 @@ static void print_line(const npg_capture *capture, look *l)
         (json_int_t)l->probe.frames, "gaps", (json_int_t)(l->list ? l->list->gap_count : 0), "points_median",
         (json_int_t)npg_probe_counts(&l->probe).median, "memory_bytes", e->memory_bytes, "disk_bytes",
         e->disk_bytes, "time_s", e->time_s, "attention", l->probe.attention, "would_fail", l->cause);
+    bool is_auto = capture->segments == NPG_BATCH_SEGMENTS_AUTO;
+    json_object_set_new(line, "segments", json_string(is_auto ? "auto" : "one"));
     char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(6));
     if (text) puts(text);
     free(text);

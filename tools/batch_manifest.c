@@ -9,8 +9,9 @@
  *         ]
  *     }
  *
- * Beside "input", "name", "config" (a file of options, read first) and "max-time" a capture's keys are
- * options of neupig run; its own win over the defaults.  Paths are taken from the manifest's folder. */
+ * Beside "input", "name", "config" (a file of options, read first), "max-time" and "segments" (as --segments
+ * of neupig run) a capture's keys are options of neupig run; its own win over the defaults.  Paths are taken
+ * from the manifest's folder. */
 #include <jansson.h>
 #include <stdio.h>
 #include <string.h>
@@ -58,11 +59,21 @@ static npg_status set_path(const manifest *m, npg_options *options, const char *
     return status;
 }
 
+static npg_status set_segments(npg_capture *capture, const json_t *value)
+{
+    const char *text = json_is_string(value) ? json_string_value(value) : "";
+    bool is_auto = !strcmp(text, "auto");
+    if (!is_auto && strcmp(text, "one") != 0) return npg_error(NPG_USAGE, "neither \"one\" nor \"auto\"");
+    capture->segments = is_auto ? NPG_BATCH_SEGMENTS_AUTO : NPG_BATCH_SEGMENTS_ONE;
+    return NPG_OK;
+}
+
 static npg_status set_key(const manifest *m, npg_capture *capture, const char *key, const json_t *value)
 {
     if (!strcmp(key, "input") || !strcmp(key, "name") || !strcmp(key, "config")) return NPG_OK;
     if (!strcmp(key, "output")) return npg_error(NPG_USAGE, "captures go to folders of the batch's output");
     if (is_path(key)) return set_path(m, capture->options, key, value);
+    if (!strcmp(key, "segments")) return set_segments(capture, value);
     if (strcmp(key, "max-time") != 0) return npg_options_set_json(capture->options, key, value);
     capture->max_time_s = json_number_value(value);
     return json_is_number(value) && capture->max_time_s >= 0
@@ -150,6 +161,7 @@ static npg_status read_capture(const manifest *m, json_t *object, const char *pl
     npg_status status = npg_error_prefix(add_capture(m, &capture, object), "%s", place);
     if (status) return status;
     capture->max_time_s = m->base.max_time_s;
+    capture->segments = m->base.segments;
     npg_options_close(&capture->options);
     NPG_TRY(npg_options_copy(&capture->options, m->base.options));
     NPG_TRY(set_keys(m, capture, object, place));

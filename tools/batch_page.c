@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "batch_segments.h"
 #include "batch_verdict.h"
 #include "memory.h"
 #include "progress.h"
@@ -28,6 +29,7 @@ static const char head[] =
     "svg .axis { fill: none; stroke: #999; } svg .bar { stroke: #9a6700; stroke-dasharray: 5 4; }\n"
     "svg .line { fill: none; stroke: #0b62a8; stroke-width: 1.5; }\n"
     "svg circle.bad, svg circle.skipped { fill: #b42318; } svg circle.worst { fill: #0b62a8; }\n"
+    "svg .cut { stroke: #777; stroke-dasharray: 2 3; }\n"
     "code { font-size: 13px; }\n</style>\n</head>\n<body>\n";
 
 /* ---- text ---- */
@@ -84,7 +86,15 @@ static void write_sums(npg_file *page, const npg_batch *batch)
                    batch->count, done, partial, batch->count - done - partial - open, open);
 }
 
-static void write_row(npg_file *page, const npg_capture *capture, size_t i, const npg_capture_figures *f)
+static void write_segments_cell(npg_file *page, const npg_capture_figures *f)
+{
+    char text[80];
+    npg_batch_segments_text(text, sizeof text, f->segments);
+    npg_file_print(page, "<td>%s</td>", text);
+}
+
+static void write_row(npg_file *page, const npg_capture *capture, size_t i, const npg_capture_figures *f,
+                      bool with_segments)
 {
     const npg_verdict *v = &capture->verdict;
     char time[32] = "";
@@ -96,6 +106,7 @@ static void write_row(npg_file *page, const npg_capture *capture, size_t i, cons
         npg_file_print(page, "<td class=\"number\">%zu of %zu</td>", f->good, f->count);
     else
         npg_file_print(page, "<td></td>");
+    if (with_segments) write_segments_cell(page, f);
     if (f->worst < f->count)
         npg_file_print(page, "<td class=\"number\">%.3f</td><td class=\"number\">%.3f in %lld</td>", f->mean,
                        f->frames[f->worst].error, (long long)f->frames[f->worst].number);
@@ -110,13 +121,18 @@ static void write_row(npg_file *page, const npg_capture *capture, size_t i, cons
 
 static void write_table(npg_file *page, const npg_batch *batch, const npg_capture_figures *figures)
 {
-    npg_file_print(page, "<table>\n<tr><th>capture</th><th>verdict</th><th class=\"number\">good frames</th>"
-                         "<th class=\"number\">error, %%</th><th class=\"number\">worst</th>"
-                         "<th class=\"number\">time</th><th class=\"number\">memory</th></tr>\n");
-    for (size_t i = 0; i < batch->count; i++) write_row(page, &batch->captures[i], i, &figures[i]);
+    bool with_segments = npg_batch_has_segments(batch);
+    npg_file_print(page,
+                   "<table>\n<tr><th>capture</th><th>verdict</th><th class=\"number\">good frames</th>%s"
+                   "<th class=\"number\">error, %%</th><th class=\"number\">worst</th>"
+                   "<th class=\"number\">time</th><th class=\"number\">memory</th></tr>\n",
+                   with_segments ? "<th>segments</th>" : "");
+    for (size_t i = 0; i < batch->count; i++)
+        write_row(page, &batch->captures[i], i, &figures[i], with_segments);
     npg_file_print(page,
                    "</table>\n<p>The error is the median distance of a frame's points to the surface, in per "
-                   "cent of the capture's diagonal.</p>\n");
+                   "cent of the capture's diagonal%s.</p>\n",
+                   with_segments ? ", or of the segment's where it has several" : "");
 }
 
 /* ---- a capture ---- */
@@ -129,6 +145,50 @@ static npg_status add_mesh(npg_file *page, const npg_capture *capture, const cha
     npg_status status = npg_page_picture(page, path, reach_of, caption);
     npg_release(&path);
     return status;
+}
+
+/* One line for each segment: its frames, its keyframe, and why it is one. */
+static void write_segments(npg_file *page, const npg_capture_figures *f)
+{
+    size_t i;
+    json_t *segment;
+    if (json_array_size(f->segments) < 2) return;
+    npg_file_print(page, "<ul>\n");
+    json_array_foreach(f->segments, i, segment)
+    {
+        const char *cause = json_string_value(json_object_get(segment, "cause"));
+        npg_file_print(page, "<li><code>");
+        npg_page_text(page, json_string_value(json_object_get(segment, "folder")));
+        npg_file_print(page, "</code>: frames %lld to %lld, keyframe %lld, ",
+                       (long long)json_integer_value(json_object_get(segment, "first_frame")),
+                       (long long)json_integer_value(json_object_get(segment, "last_frame")),
+                       (long long)json_integer_value(json_object_get(segment, "keyframe")));
+        npg_page_text(page, json_string_value(json_object_get(segment, "status")));
+        if (cause) npg_file_print(page, "; cut off because ");
+        if (cause) npg_page_text(page, cause);
+        npg_file_print(page, "</li>\n");
+    }
+    npg_file_print(page, "</ul>\n");
+}
+
+/* The reference mesh, or that of each of the first segments. */
+static npg_status add_references(npg_file *page, const npg_capture *capture, const npg_capture_figures *f)
+{
+    enum { SHOWN = 6 };
+    size_t i;
+    json_t *segment;
+    if (json_array_size(f->segments) < 2)
+        return add_mesh(page, capture, "reference.ply", NULL, "reference mesh");
+    json_array_foreach(f->segments, i, segment)
+    {
+        char name[80], caption[80];
+        const char *folder = json_string_value(json_object_get(segment, "folder"));
+        if (i == SHOWN) break;
+        snprintf(name, sizeof name, "%.40s/reference.ply", folder);
+        snprintf(caption, sizeof caption, "reference mesh of %.40s", folder);
+        NPG_TRY(add_mesh(page, capture, name, NULL, caption));
+    }
+    return NPG_OK;
 }
 
 /* The worst frame's mesh beside its points, in one view. */
@@ -167,7 +227,8 @@ static npg_status write_capture(npg_file *page, const npg_capture *capture, size
     npg_file_print(page, "</p>\n");
     if (f->count) {
         npg_page_chart(page, f);
-        NPG_TRY(add_mesh(page, capture, "reference.ply", NULL, "reference mesh"));
+        write_segments(page, f);
+        NPG_TRY(add_references(page, capture, f));
         NPG_TRY(add_worst(page, capture, f));
     }
     npg_file_print(page, "</section>\n");

@@ -58,6 +58,7 @@ static npg_status make_command(command *c, const npg_capture *capture, const cha
     NPG_TRY(add_word(c, "progress", "json"));
     NPG_TRY(add_word(c, "quiet", "yes"));
     NPG_TRY(add_word(c, "log-file", log_path));
+    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO) NPG_TRY(add_word(c, "segments", "auto"));
     for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++) {
         const char *value = npg_options_get(capture->options, info.name);
         bool is_set = npg_options_is_set(capture->options, info.name) && strcmp(info.name, "input") != 0;

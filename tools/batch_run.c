@@ -181,13 +181,14 @@ static void start_next(work *w, size_t place)
     if (w->next == w->batch->count) return;
     npg_capture *capture = &w->batch->captures[w->next++];
     tell_start(w, capture);
-    npg_status status = npg_process_start(&w->processes[place], capture);
+    npg_status status =
+        capture->refusal ? npg_verdict_refuse(capture) : npg_process_start(&w->processes[place], capture);
     w->told_s[place] = 0;
-    if (!status) {
+    if (!status && !capture->refusal) {
         w->running++;
         return;
     }
-    end_badly(capture, status);
+    if (status) end_badly(capture, status);
     count_end(w, capture);
 }
 

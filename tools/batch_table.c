@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "batch_page.h"
+#include "batch_segments.h"
 #include "batch_verdict.h"
 #include "json_file.h"
 #include "memory.h"
@@ -17,7 +18,17 @@
 
 /* ---- text ---- */
 
-static void print_row(FILE *out, const npg_capture *capture, const npg_capture_figures *f, int name_width)
+enum { SEGMENTS_WIDTH = 24 };
+
+static void print_segments(FILE *out, const npg_capture_figures *f)
+{
+    char text[80];
+    npg_batch_segments_text(text, sizeof text, f->segments);
+    fprintf(out, "%-*s  ", SEGMENTS_WIDTH, text);
+}
+
+static void print_row(FILE *out, const npg_capture *capture, const npg_capture_figures *f, int name_width,
+                      bool with_segments)
 {
     const npg_verdict *v = &capture->verdict;
     char time[32] = "", frames[64] = "", error[80] = "", memory[32] = "";
@@ -27,19 +38,23 @@ static void print_row(FILE *out, const npg_capture *capture, const npg_capture_f
     if (f->worst < f->count)
         snprintf(error, sizeof error, "%.3f (%.3f in %lld)", f->mean, f->frames[f->worst].error,
                  (long long)f->frames[f->worst].number);
-    fprintf(out, "%-*s  %-9s  %-12s  %-24s  %8s  %9s  %s\n", name_width, capture->name,
-            v->is_known ? v->word : "not run", frames, error, time, memory,
+    fprintf(out, "%-*s  %-9s  %-12s  ", name_width, capture->name, v->is_known ? v->word : "not run", frames);
+    if (with_segments) print_segments(out, f);
+    fprintf(out, "%-24s  %8s  %9s  %s\n", error, time, memory,
             v->is_known && !npg_verdict_is_done(v) ? v->message : "");
 }
 
 static void print_table(FILE *out, const npg_batch *batch, const npg_capture_figures *figures)
 {
     int width = 7;
+    bool with_segments = npg_batch_has_segments(batch);
     for (size_t i = 0; i < batch->count; i++)
         if ((int)strlen(batch->captures[i].name) > width) width = (int)strlen(batch->captures[i].name);
-    fprintf(out, "%-*s  %-9s  %-12s  %-24s  %8s  %9s\n", width, "capture", "verdict", "good frames",
-            "error % (worst in frame)", "time", "memory");
-    for (size_t i = 0; i < batch->count; i++) print_row(out, &batch->captures[i], &figures[i], width);
+    fprintf(out, "%-*s  %-9s  %-12s  ", width, "capture", "verdict", "good frames");
+    if (with_segments) fprintf(out, "%-*s  ", SEGMENTS_WIDTH, "segments");
+    fprintf(out, "%-24s  %8s  %9s\n", "error % (worst in frame)", "time", "memory");
+    for (size_t i = 0; i < batch->count; i++)
+        print_row(out, &batch->captures[i], &figures[i], width, with_segments);
     fprintf(out, "\n%s/batch.html\n%s/batch.json\n", batch->output, batch->output);
 }
 

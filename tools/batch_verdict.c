@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "batch_segments.h"
 #include "file.h"
 #include "json_file.h"
 #include "memory.h"
@@ -36,6 +37,27 @@ static void set(npg_verdict *v, const char *word, int exit_code, const char *mes
     v->exit_code = exit_code;
 }
 
+/* Of a capture with one reference for all frames: where that ended to explain them, and what helps. */
+static void tell_topology(npg_verdict *v, const npg_capture *capture)
+{
+    static const char *const directions[] = {"forward", "backward"};
+    char *path;
+    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO || npg_join_path(&path, capture->output, "report.json"))
+        return;
+    json_t *report = json_load_file(path, 0, NULL), *stages = json_object_get(report, "stages");
+    const json_t *told = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    for (int d = 1; d >= 0; d--) {
+        const json_t *alarm = json_object_get(told, directions[d]);
+        if (json_is_object(alarm))
+            snprintf(v->message, sizeof v->message,
+                     "from frame %lld %s the reference no longer explains the points; \"segments\": "
+                     "\"auto\" takes another there",
+                     (long long)json_integer_value(json_object_get(alarm, "from_frame")), d ? "back" : "on");
+    }
+    json_decref(report);
+    npg_release(&path);
+}
+
 void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_stop_cause cause,
                        const char *words)
 {
@@ -45,7 +67,8 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
     if (code == 0) {
         set(v, "done", 0, "");
     } else if (code == 7) {
-        set(v, "partial", 7, "frames were skipped or are below the quality bar");
+        set(v, "partial", 7, "frames were skipped, are unexplained or below the quality bar");
+        tell_topology(v, capture);
     } else if (cause == NPG_STOP_TIME) {
         snprintf(text, sizeof text, "not done after %g s (max-time)%s; started again it goes on",
                  capture->max_time_s, code == 75 ? "" : " and had to be killed");
@@ -63,6 +86,14 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
     } else {
         set(v, word_of(code), code, words);
     }
+}
+
+npg_status npg_verdict_refuse(npg_capture *capture)
+{
+    capture->verdict = (npg_verdict){.is_known = true};
+    set(&capture->verdict, word_of(3), 3, capture->refusal);
+    NPG_TRY(npg_make_folder(capture->output));
+    return npg_verdict_write(capture);
 }
 
 bool npg_verdict_is_done(const npg_verdict *v)
@@ -97,6 +128,8 @@ json_t *npg_verdict_json(const npg_capture *capture)
     json_object_set_new(object, "message", npg_json_text(v->message));
     json_object_set_new(object, "seconds", npg_json_real(v->seconds));
     json_object_set_new(object, "peak_memory_bytes", json_integer((json_int_t)v->peak_bytes));
+    json_t *segments = npg_verdict_is_done(v) ? npg_batch_segments(capture) : NULL;
+    if (segments) json_object_set_new(object, "segments", segments);
     return object;
 }
 

@@ -18,6 +18,9 @@ typedef enum npg_stop_cause {
 void npg_verdict_judge(npg_verdict *verdict, const npg_capture *capture, int how, npg_stop_cause cause,
                        const char *words);
 
+/* Of a capture that is not started because of its refusal: bad input.  In its folder, as any other. */
+npg_status npg_verdict_refuse(npg_capture *capture);
+
 /* Whether nothing is left to do, whatever the quality. */
 bool npg_verdict_is_done(const npg_verdict *verdict);
 

@@ -5,6 +5,7 @@
 
 #include "listing.h"
 #include "reader.h"
+#include "run_settings.h"
 
 npg_status npg_probe_note(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
                           int64_t number)
@@ -23,7 +24,10 @@ npg_status npg_probe_files(npg_probe *probe, npg_frame_files **out, const char *
                            const npg_options *options)
 {
     const char *selection = npg_options_get(options, "frames");
+    npg_settings settings;
+    npg_options_fill(options, npg_run_options, &settings);
     NPG_TRY(npg_frame_files_open(out, input, selection ? selection : "", true));
+    if (settings.confine) NPG_TRY(npg_frame_files_confine(*out, input));
     const npg_frame_files *list = *out;
     for (size_t i = 0; i < list->count; i++) {
         const npg_frame_slot *slot = &list->slots[i];

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "file.h"
+#include "run_settings.h"
 
 static void say(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
 static void say(npg_reporter *reporter, const char *format, ...)
@@ -107,11 +108,25 @@ static npg_status narrow(npg_options *options, const npg_segments *s, const npg_
     return npg_options_set(options, "alarm", "split");
 }
 
+/* With option confine, what stands in the place of a folder of ours must not be a link. */
+static npg_status check_own(const npg_segments *s, const npg_options *options, const char *name)
+{
+    npg_settings settings;
+    char *folder;
+    npg_options_fill(options, npg_run_options, &settings);
+    if (!settings.confine || !strcmp(name, ".")) return NPG_OK;
+    NPG_TRY(npg_join_path(&folder, s->output, name));
+    npg_status status = npg_folder_is_own(folder);
+    npg_release(&folder);
+    return status;
+}
+
 static npg_status run_segment(const npg_segments *s, const npg_segment *segment, const npg_options *options,
                               npg_reporter *reporter)
 {
     npg_options *own;
     bool is_open;
+    NPG_TRY(check_own(s, options, segment->folder));
     NPG_TRY(npg_options_copy(&own, options));
     npg_status status = narrow(own, s, segment);
     if (!status && strcmp(segment->folder, ".") != 0)
@@ -174,6 +189,8 @@ static npg_status split(npg_segments *s, size_t at, const npg_options *options, 
     json_t *told;
     npg_segment *segment = &s->list[at];
     NPG_TRY(read_topology(&told, s, segment));
+    json_decref(s->overlaps);
+    s->overlaps = NULL;
     int64_t key = segment->first - segment->shared_first +
                   (int64_t)json_integer_value(json_object_get(told, "key_index"));
     NPG_TRY(npg_segment_remove(s, segment));
@@ -191,10 +208,21 @@ static npg_status split(npg_segments *s, size_t at, const npg_options *options, 
 
 /* ---- all of them ---- */
 
+/* Done before without segments, and there was an alarm: what it left makes way for the segments. */
+static npg_status solve_anew(const npg_segments *s, const npg_options *options, npg_reporter *reporter)
+{
+    say(reporter, "%s was done with one reference, which does not explain all frames: it is done anew",
+        s->output);
+    NPG_TRY(npg_segment_remove(s, &s->list[0]));
+    return run_segment(s, &s->list[0], options, reporter);
+}
+
 static npg_status solve_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
     for (size_t i = 0; i < s->count;) {
         npg_status status = run_segment(s, &s->list[i], options, reporter);
+        if (status == NPG_PARTIAL && !strcmp(s->list[i].folder, ".") && npg_segments_was_alarmed(s))
+            status = solve_anew(s, options, reporter);
         if (status == NPG_CHANGED) {
             NPG_TRY(split(s, i, options, reporter));
             i = 0; /* those before are done and say so at once */
@@ -216,6 +244,8 @@ static npg_status begin(npg_segments *s, const npg_options *options)
     if (restarts && s->count) NPG_TRY(npg_segments_remove(s));
     if (s->count && !restarts) return NPG_OK;
     for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
+    json_decref(s->overlaps);
+    s->overlaps = NULL;
     s->count = 0;
     return npg_segments_insert(s, 0, &whole);
 }
@@ -242,9 +272,14 @@ static npg_status work(npg_segments *s, const npg_options *options, npg_reporter
     bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
     NPG_TRY(npg_frame_files_open(&s->frames, npg_options_get(options, "input"), s->selection, finds_gaps));
     NPG_TRY(begin(s, options));
+    NPG_TRY(check_own(s, options, "links"));
     NPG_TRY(solve_all(s, options, reporter));
     for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;
-    npg_status status = npg_segments_link(&overlaps, s);
+    npg_status status = NPG_OK;
+    if (npg_segments_are_linked(s))
+        overlaps = json_incref(s->overlaps);
+    else
+        status = npg_segments_link(&overlaps, s);
     if (!status) status = npg_segments_conclude(s, overlaps, is_partial);
     json_decref(overlaps);
     return status ? status : is_partial ? NPG_PARTIAL : NPG_OK;

@@ -30,6 +30,14 @@ enum { NPG_SEGMENTS_ONE, NPG_SEGMENTS_AUTO }; /* the words of --segments */
 /* The whole work.  NPG_USAGE for live sources, and where OUT holds the segments of something else. */
 npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter);
 
+/* Before neupig append or apply (the verb) takes a folder for that of one run.  NPG_USAGE: it holds several
+ * segments (the message names them), or is one of several and `is_alone` (frames that came later belong to
+ * all). */
+npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone);
+
+/* After neupig append has gone on with OUT: a list of one segment that is not of all frames any more goes. */
+npg_status npg_segments_forget(const char *output);
+
 /* Before a run without --segments: OUT must not hold segments, unless the run is to restart; then they go. */
 npg_status npg_segments_make_way(const npg_options *options);
 
@@ -49,6 +57,7 @@ typedef struct npg_segments {
     npg_frame_files *frames;        /* all that are selected; owned */
     npg_segment *list;              /* in time order; owned */
     size_t count, capacity;
+    json_t *overlaps; /* as an earlier run that came to its end wrote them, or NULL; owned */
 } npg_segments;
 
 void npg_segments_clear(npg_segments *s);
@@ -67,6 +76,12 @@ void npg_segment_name(npg_segment *segment, const npg_segments *s);
 /* The list as an earlier run left it; count 0: there was none.  NPG_USAGE: it is of other frames. */
 npg_status npg_segments_load(npg_segments *s);
 npg_status npg_segments_save(const npg_segments *s);
+
+/* Whether the files of the overlaps that were loaded are there. */
+bool npg_segments_are_linked(const npg_segments *s);
+
+/* Whether OUT was done by a run without segments, which raised an alarm and went on. */
+bool npg_segments_was_alarmed(const npg_segments *s);
 
 /* Remove what is in OUT of the segments that were loaded, and their lists. */
 npg_status npg_segments_remove(const npg_segments *s);

@@ -11,6 +11,7 @@
 #include "export.h"
 #include "file.h"
 #include "json_file.h"
+#include "listing.h"
 #include "segments.h"
 #include "stage.h"
 
@@ -20,6 +21,7 @@
 void npg_segments_clear(npg_segments *s)
 {
     for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
+    json_decref(s->overlaps);
     npg_release(&s->list);
     npg_frame_files_close(&s->frames);
 }
@@ -99,6 +101,8 @@ static npg_status load(npg_segments *s, const char *name)
                            "%s holds segments of other frames; give --restart to discard what is there, or "
                            "choose another output folder",
                            s->output);
+    if (!status && s->count && !strcmp(name, WHOLE))
+        s->overlaps = json_incref(json_object_get(told, "overlaps"));
     json_decref(told);
     npg_release(&path);
     return status;
@@ -108,6 +112,148 @@ npg_status npg_segments_load(npg_segments *s)
 {
     NPG_TRY(load(s, PARTIAL));
     return s->count ? NPG_OK : load(s, WHOLE);
+}
+
+bool npg_segments_are_linked(const npg_segments *s)
+{
+    size_t i, k;
+    json_t *overlap, *link;
+    json_array_foreach(s->overlaps, i, overlap)
+    {
+        json_array_foreach(json_object_get(overlap, "links"), k, link)
+        {
+            char *path;
+            const char *name = json_string_value(json_object_get(link, "file"));
+            if (!name || npg_join_path(&path, s->output, name)) return false;
+            bool is_there = (int64_t)npg_file_bytes(path) == number_in(link, "bytes");
+            npg_release(&path);
+            if (!is_there) return false;
+        }
+    }
+    return s->overlaps != NULL;
+}
+
+/* NULL where there is none, or none that can be read. */
+static json_t *read_in(const char *folder, const char *name)
+{
+    char *path;
+    if (npg_join_path(&path, folder, name)) return NULL;
+    json_t *told = json_load_file(path, 0, NULL);
+    npg_release(&path);
+    return told;
+}
+
+bool npg_segments_was_alarmed(const npg_segments *s)
+{
+    json_t *done = read_in(s->output, "done.json"), *report = read_in(s->output, "report.json");
+    const char *mode = json_string_value(json_object_get(json_object_get(done, "options"), "alarm"));
+    const json_t *stages = json_object_get(report, "stages"),
+                 *told = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    bool was = mode && !strcmp(mode, "report") &&
+               (json_is_object(json_object_get(told, "forward")) ||
+                json_is_object(json_object_get(told, "backward")));
+    json_decref(done);
+    json_decref(report);
+    return was;
+}
+
+/* ---- files ---- */
+
+static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *place)
+{
+    (void)info, (void)kind, (void)place;
+    return remove(path);
+}
+
+static npg_status remove_tree(const char *path)
+{
+    if (nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS) && errno != ENOENT)
+        return npg_error_errno(NPG_DISK, "can't remove %s", path);
+    return NPG_OK;
+}
+
+static npg_status remove_in(const char *folder, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    npg_status status = remove_tree(path);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- other verbs ---- */
+
+static bool is_part(const char *folder)
+{
+    char *above;
+    char *real = realpath(folder, NULL);
+    const char *slash = real ? strrchr(real, '/') : NULL;
+    bool found = false;
+    if (slash && slash > real && !npg_copy_text(&above, real)) {
+        above[slash - real] = 0;
+        json_t *told = read_in(above, WHOLE);
+        const json_t *list = json_object_get(told, "segments");
+        for (size_t i = 0; i < json_array_size(list); i++) {
+            const char *name = json_string_value(json_object_get(json_array_get(list, i), "folder"));
+            found = found || (name && !strcmp(name, slash + 1));
+        }
+        json_decref(told);
+        npg_release(&above);
+    }
+    free(real);
+    return found;
+}
+
+/* "OUT/segment_0000 (frames 0 to 6), ...", as many as there is room for. */
+static void spell(char *text, size_t size, const json_t *list, const char *output)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < json_array_size(list) && used < size; i++) {
+        const json_t *entry = json_array_get(list, i);
+        const char *folder = json_string_value(json_object_get(entry, "folder"));
+        used += (size_t)snprintf(text + used, size - used, "%s%s/%s (frames %lld to %lld)", i ? ", " : "",
+                                 output, folder ? folder : "", (long long)number_in(entry, "first_frame"),
+                                 (long long)number_in(entry, "last_frame"));
+    }
+}
+
+npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone)
+{
+    json_t *told = read_in(folder, WHOLE), *open = read_in(folder, PARTIAL);
+    const json_t *list = json_object_get(open ? open : told, "segments");
+    npg_status status = NPG_OK;
+    char text[512];
+    if (json_array_size(list) > 1 && !is_alone) {
+        spell(text, sizeof text, list, folder);
+        status = npg_error(NPG_USAGE,
+                           "%s holds a capture in %zu segments with a reference each; neupig %s takes one of "
+                           "them: %s",
+                           folder, json_array_size(list), verb, text);
+    } else if (json_array_size(list) > 1) {
+        status =
+            npg_error(NPG_USAGE,
+                      "%s holds a capture in %zu segments, and neupig %s goes on with one reference: run "
+                      "the frames that came later into a folder of their own (neupig run INPUT -o "
+                      "NEW --segments auto --frames FIRST:), or all of them anew (--restart)",
+                      folder, json_array_size(list), verb);
+    } else if (is_alone && is_part(folder)) {
+        status = npg_error(NPG_USAGE,
+                           "%s is one segment of a capture; neupig %s would part it from the others: run the "
+                           "frames that came later into a folder of their own",
+                           folder, verb);
+    }
+    json_decref(told);
+    json_decref(open);
+    return status;
+}
+
+npg_status npg_segments_forget(const char *output)
+{
+    json_t *told = read_in(output, WHOLE), *done = read_in(output, "done.json");
+    bool is_old = told && number_in(told, "frames") != number_in(done, "frames");
+    json_decref(told);
+    json_decref(done);
+    return is_old ? remove_in(output, WHOLE) : NPG_OK;
 }
 
 /* ---- writing ---- */
@@ -139,28 +285,6 @@ npg_status npg_segments_save(const npg_segments *s)
 }
 
 /* ---- removing ---- */
-
-static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *place)
-{
-    (void)info, (void)kind, (void)place;
-    return remove(path);
-}
-
-static npg_status remove_tree(const char *path)
-{
-    if (nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS) && errno != ENOENT)
-        return npg_error_errno(NPG_DISK, "can't remove %s", path);
-    return NPG_OK;
-}
-
-static npg_status remove_in(const char *folder, const char *name)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = remove_tree(path);
-    npg_release(&path);
-    return status;
-}
 
 /* OUT itself may hold more than what a run left. */
 npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment)
@@ -206,6 +330,23 @@ static npg_status add_report(json_t *entry, const npg_segments *s, const npg_seg
     return status;
 }
 
+/* What is there and says the same stays as it is: a capture that was done is not touched. */
+static npg_status write_if_new(const npg_segments *s, const char *name, const json_t *value)
+{
+    json_t *before = read_in(s->output, name);
+    bool is_same = before && json_equal(before, value);
+    json_decref(before);
+    return is_same ? NPG_OK : npg_json_write(s->output, name, value);
+}
+
+static void remove_done(const npg_segments *s)
+{
+    char *path;
+    if (npg_join_path(&path, s->output, "done.json")) return;
+    unlink(path);
+    npg_release(&path);
+}
+
 static npg_status write_done(const npg_segments *s, bool is_partial)
 {
     json_t *files = json_array();
@@ -220,7 +361,8 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
     json_t *done = json_pack("{ss ss si sI sI so}", "neupig", npg_version(), "status",
                              is_partial ? "partial" : "ok", "exit_code", is_partial ? 7 : 0, "frames",
                              (json_int_t)s->frames->count, "segments", (json_int_t)s->count, "files", files);
-    if (!status) status = npg_json_write(s->output, "done.json", done);
+    if (!status) status = write_if_new(s, "done.json", done);
+    if (status) remove_done(s); /* whole it may be, but what fails at its last step is not done */
     json_decref(done);
     return status;
 }
@@ -233,7 +375,7 @@ npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool i
         status = add_report(json_array_get(list, i), s, &s->list[i]);
     json_object_set(told, "overlaps", overlaps);
     json_object_set_new(told, "status", json_string(is_partial ? "partial" : "ok"));
-    if (!status) status = npg_json_write(s->output, WHOLE, told);
+    if (!status) status = write_if_new(s, WHOLE, told);
     json_decref(told);
     if (!status && s->count > 1) status = write_done(s, is_partial);
     return status ? status : remove_in(s->output, PARTIAL);

@@ -6,6 +6,7 @@
 #include "cli.h"
 #include "progress.h"
 #include "run_job.h"
+#include "segments.h"
 
 typedef struct settings {
     const char *input;
@@ -35,6 +36,7 @@ static bool is_done(const char *folder)
 static npg_status append(npg_options *options, const npg_cli *cli, const settings *s)
 {
     npg_reporter reporter;
+    NPG_TRY(npg_segments_refuse(cli->operands[0], cli->verb->name, true));
     NPG_TRY(npg_options_load_job(options, cli->operands[0]));
     if (s->input[0]) NPG_TRY(npg_options_set(options, "input", s->input));
     npg_reporter_init(&reporter, s->progress, s->quiet, s->verbose);
@@ -42,6 +44,7 @@ static npg_status append(npg_options *options, const npg_cli *cli, const setting
     if (status != NPG_OK && status != NPG_PARTIAL) return status;
     NPG_TRY(npg_options_set(options, "append", "yes"));
     status = npg_run_job(options, &reporter);
+    if (status == NPG_OK || status == NPG_PARTIAL) NPG_TRY(npg_segments_forget(cli->operands[0]));
     if (reporter.show != NPG_SHOW_JSON) npg_run_job_results(cli->verb->name, cli->operands[0], status);
     return status;
 }

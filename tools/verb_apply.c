@@ -17,6 +17,7 @@
 #include "listing.h"
 #include "mesh_tools.h"
 #include "reader.h"
+#include "segments.h"
 #include "writer.h"
 
 #define PATH_SIZE 4096
@@ -106,6 +107,7 @@ static bool is_in(const char *folder, const char *name)
 static npg_status check_job(applying *a)
 {
     char path[PATH_SIZE];
+    NPG_TRY(npg_segments_refuse(a->job, "apply", false));
     static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
                                          "job/job.json"};
     bool is_job = false;
@@ -479,7 +481,12 @@ static npg_status finish(applying *a)
     if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
     npg_status status = npg_file_print(a->done, "\n  ],%s\n", text + 1); /* goes on in the same object */
     free(text);
-    return status ? status : npg_file_commit(&a->done);
+    NPG_TRY(status);
+    status = npg_file_commit(&a->done);
+    char path[PATH_SIZE];
+    if (status && path_of(path, a->s.output, "done.json") == NPG_OK)
+        unlink(path); /* whole it may be, but what fails at its last step is not done */
+    return status;
 }
 
 /* ---- the verb ---- */

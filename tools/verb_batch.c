@@ -10,7 +10,7 @@
 
 typedef struct settings {
     const char *config;
-    int progress;
+    int progress, segments;
     bool quiet, verbose, dry_run, list, report;
     int64_t jobs, task_index, task_count;
     double max_time_s;
@@ -30,6 +30,11 @@ const npg_option npg_batch_options[] = {
      "Stop a capture after this many seconds, 0: no limit; started again it goes on; -1: as the manifest "
      "says",
      NPG_OPTION_REAL, AT(max_time_s), "-1", -1, 1e9, NULL, "SECONDS"},
+    {"segments",
+     "Where the topology of a capture changes: one reference all the same, with an alarm (one), another "
+     "from there on (auto), or as the manifest says",
+     NPG_OPTION_CHOICE, AT(segments), "manifest", 0, 0, "manifest|one|auto",
+     NULL}, /* NPG_BATCH_SEGMENTS_.. */
     {"dry-run", "Only say what the captures hold and would take in memory, disk and time", NPG_OPTION_FLAG,
      AT(dry_run), "no", 0, 0, NULL, NULL},
     {"list", "Only print the names of the captures, one per line", NPG_OPTION_FLAG, AT(list), "no", 0, 0,
@@ -80,10 +85,10 @@ static npg_status run(npg_batch *batch, const settings *s)
     npg_reporter_end(&reporter, status, batch->output);
     if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to go on\n", stderr);
     if (status == NPG_PARTIAL)
-        fprintf(
-            stderr,
-            "neupig batch: finished, but with frames skipped or below the quality bar; see %s/batch.html\n",
-            batch->output);
+        fprintf(stderr,
+                "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; see "
+                "%s/batch.html\n",
+                batch->output);
     return status;
 }
 
@@ -100,7 +105,7 @@ static npg_status report(npg_batch *batch, const settings *s)
 
 static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settings *s)
 {
-    const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s};
+    const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s, s->segments};
     if (s->task_index >= s->task_count)
         return npg_error(NPG_USAGE,
                          "option task-index: %lld is not below the task-count of %lld; the first task is 0",
