@@ -15,14 +15,16 @@
 #define LOST     3.0    /* times the points' distance in the keyframe: off everywhere   */
 #define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't */
 #define CLEARLY  2.0    /* times the misfit on the other side */
+#define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES)
 
 static const struct {
     const char *name, *what;
-    double floor;
-} kinds[NPG_MISFITS] = {{"far", "of the points are far from the surface in one place", 0.01},
-                        {"bare", "of the surface have no points near them in one place", 0.015},
-                        {"torn", "of the surface are torn apart in one place", 0.003},
-                        {"deserted", "of the surface are one part that has lost most of its points", 0.015}};
+    double floor, weight; /* weight: of an unexplained frame among NPG_ALARM_FRAMES */
+} kinds[NPG_MISFITS] = {
+    {"far", "of the points are far from the surface in one place", 0.01, 1},
+    {"bare", "of the surface have no points near them in one place", 0.015, 1},
+    {"torn", "of the surface are torn apart in one place", 0.003, 0.5},
+    {"deserted", "of the surface are one part that has lost most of its points", 0.015, 1}};
 
 typedef struct record {
     int64_t index, number;
@@ -41,11 +43,10 @@ typedef struct side {
     double history[NPG_MISFITS][HISTORY];
     size_t history_count; /* ever */
     double key_fit;       /* of the keyframe: what noise alone leaves */
-    record run[NPG_ALARM_BACK +
-               NPG_ALARM_FRAMES]; /* the suspect frames since the last explained one, the last of them */
-    bool is_unexplained[NPG_ALARM_BACK + NPG_ALARM_FRAMES];
-    npg_alarm_cause causes[NPG_ALARM_BACK + NPG_ALARM_FRAMES]; /* the clearest misfit of each */
-    size_t run_count, run_length;                              /* kept, and in all */
+    record run[RUN_MAX];  /* the suspect frames since the last explained one, the last of them */
+    bool is_unexplained[RUN_MAX];
+    npg_alarm_cause causes[RUN_MAX]; /* the clearest misfit of each */
+    size_t run_count, run_length;    /* kept, and in all */
     bool is_raised;
     npg_alarm_cause cause;
 } side;
@@ -128,6 +129,18 @@ static void judge(bool counts[NPG_MISFITS], const side *s, const record *r, cons
     counts[NPG_MISFIT_DESERTED] = counts[NPG_MISFIT_TORN];
 }
 
+/* What a misfit of so many times its bound adds to a row of unexplained frames. */
+static double weight_of(int kind, double times)
+{
+    return times > 1 ? kinds[kind].weight : 0;
+}
+
+static bool is_clearer(int kind, double times, int than_kind, double than_times)
+{
+    double more = weight_of(kind, times) - weight_of(than_kind, than_times);
+    return more > 0 || (more >= 0 && times > than_times);
+}
+
 /* The clearest misfit of a frame; the result is how many times its bound it lies above the usual. */
 static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
 {
@@ -139,7 +152,8 @@ static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
     judge(counts, s, r, levels);
     for (int k = 0; k < NPG_MISFITS; k++) {
         double times = excess(r, levels, k) / levels[k].bound;
-        if (!counts[k] || !(times > most)) continue;
+        if (!counts[k] || !(times > -1) || (most > -1 && !is_clearer(k, times, cause->misfit, most)))
+            continue;
         most = times;
         *cause = (npg_alarm_cause){.seen_index = r->index,
                                    .seen_number = r->number,
@@ -157,13 +171,15 @@ static double times_bound(const npg_alarm_cause *cause)
     return (cause->value - cause->usual) / cause->bound;
 }
 
-/* The last frames of the run are unexplained: it dates from the first suspect one. */
-static void raise_alarm(side *s)
+/* The last `row` frames of the run are unexplained: it dates from the first suspect one. */
+static void raise_alarm(side *s, size_t row)
 {
-    size_t first_unexplained = s->run_count - NPG_ALARM_FRAMES, best = first_unexplained;
+    size_t first_unexplained = s->run_count - row, best = first_unexplained;
     size_t first = first_unexplained > NPG_ALARM_BACK ? first_unexplained - NPG_ALARM_BACK : 0;
     for (size_t i = first_unexplained; i < s->run_count; i++)
-        if (times_bound(&s->causes[i]) > times_bound(&s->causes[best])) best = i;
+        if (is_clearer(s->causes[i].misfit, times_bound(&s->causes[i]), s->causes[best].misfit,
+                       times_bound(&s->causes[best])))
+            best = i;
     s->cause = s->causes[best];
     s->cause.index = s->run[first].index;
     s->cause.number = s->run[first].number;
@@ -204,8 +220,12 @@ static void take(side *s, const record *r)
     s->causes[s->run_count] = cause;
     s->is_unexplained[s->run_count++] = times > 1;
     size_t row = 0;
-    while (row < s->run_count && s->is_unexplained[s->run_count - 1 - row]) row++;
-    if (row >= NPG_ALARM_FRAMES && s->run_length - row <= NPG_ALARM_RISE) raise_alarm(s);
+    double weight = 0;
+    while (row < s->run_count && s->is_unexplained[s->run_count - 1 - row]) {
+        row++;
+        weight += kinds[s->causes[s->run_count - row].misfit].weight;
+    }
+    if (weight >= NPG_ALARM_FRAMES && s->run_length - row <= NPG_ALARM_RISE) raise_alarm(s, row);
 }
 
 /* ---- order ---- */

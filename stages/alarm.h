@@ -6,9 +6,10 @@
  *
  *     bound = max(floor, 6 x 1.4826 x median deviation, median)
  *
- * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm, if no
- * more than NPG_ALARM_RISE suspect ones lead up to them: a topology changes at once, a fit that creeps away
- * is another fault (the quality bar's).  It dates from the first of the suspect ones before them, by
+ * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm (twice as
+ * many where each is merely torn: an alignment that slips tears the surface, too, until it is found again),
+ * if no more than NPG_ALARM_RISE suspect ones lead up to them: a topology changes at once, a fit that creeps
+ * away is another fault (the quality bar's).  It dates from the first of the suspect ones before them, by
  * NPG_ALARM_BACK frames at most.  A frame or two alone (an outlier, a fast motion that the next frame has
  * caught up with) raise none, and no level that is spread all over the surface or usual in the capture
  * (noise, holes, what cameras don't see) does.

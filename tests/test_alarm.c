@@ -97,6 +97,10 @@ static double two_frames(int64_t index)
 {
     return index == 30 || index == 31 || index == 40 || index == 10 ? 0.3 : 0;
 }
+static double five_frames(int64_t index)
+{
+    return index >= 40 && index < 45 ? 0.3 : 0;
+}
 static double drift(int64_t index)
 {
     return 0.02 + 0.0015 * (double)llabs(index - KEY) + 0.01 * chance(index);
@@ -116,7 +120,8 @@ static void a_lasting_misfit_raises_the_alarm(void **state)
     for (int k = 0; k < NPG_MISFITS; k++) {
         expect(k, step_up, 37, -1);
         expect(k, step_up_behind, -1, 9);
-        expect(k, on_both_sides, 50, 3);
+        expect(k, on_both_sides, 50, k == NPG_MISFIT_TORN ? -1 : 3); /* the last four frames backward */
+        expect(k, five_frames, k == NPG_MISFIT_TORN ? -1 : 40, -1);
         expect(k, step_above_noise, 33, -1);
     }
 }
