@@ -177,7 +177,7 @@ static bool is_lost(const state *s, const npg_tracked *tracked)
  * where the surface was.  The pose that explains the frame best stays. */
 static npg_status try_again(npg_worker *worker, npg_tracked *best, side *at, const npg_frame *frame)
 {
-    static const npg_tracker_effort patience[] = {{40, 100, 0.2}, {80, 100, 0.4}};
+    static const npg_tracker_effort patience[] = {{40, 100, 0.2, 10}, {80, 100, 0.4, 10}};
     state *s = npg_worker_state(worker);
     const double *starts[] = {at->before, s->start};
     s->sum.tried_again++;

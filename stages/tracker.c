@@ -34,6 +34,7 @@ struct npg_tracker {
     uint32_t *samples;              /* vertices, spread over the surface */
     size_t sample_count;
     double *step; /* K x 6 */
+    double along; /* share of distances along the surface in the fit at work */
     double size;  /* longest side of the reference against that of the box of all frames */
     /* of the frame at work */
     float *targets, *target_normals; /* M x 3 */
@@ -192,8 +193,8 @@ static void add_pull(const npg_tracker *t, size_t part, const pull *p, const dou
                 t->graph->node_pos + 3 * (size_t)node);
     }
     memcpy(term.normal, p->normal, sizeof term.normal);
-    term.across = weight * (1 - t->settings.along);
-    term.along = weight * t->settings.along;
+    term.across = weight * (1 - t->along);
+    term.along = weight * t->along;
     npg_block_add(t->system, part, &term);
 }
 
@@ -415,7 +416,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
                            const float *normals, size_t point_count, const npg_tracker_effort *effort)
 {
-    const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START};
+    const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START, 1};
     npg_kdtree *tree;
     NPG_REQUIRE(point_count);
     t->target_count =
@@ -425,6 +426,7 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     npg_status status = NPG_OK;
     step s = {.t = t, .pose = pose, .tree = tree, .points = points, .normals = normals};
     if (!effort) effort = &usual;
+    t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {
         set_schedule(&s, tracked, effort);
         status = do_step(&s, tracked, pose);

@@ -44,6 +44,7 @@ typedef struct npg_tracker_effort {
     int steps;         /* at most                                                            */
     double stiffness;  /* of the first step, in final stiffnesses                             */
     double width_unit; /* of the first step's robust weight: what may move                    */
+    double along;      /* times the share of distances along the surface                      */
 } npg_tracker_effort;
 
 /* Improve pose (K x 12) to explain the points (N x 3, unit; normals N x 3 or NULL: points whose normal speaks
