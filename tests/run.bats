@@ -1,6 +1,6 @@
 # The whole chain on a small capture: what a run leaves, that it is the same every time, how bad input ends.
 
-small=(--epochs 8 --width-1 64 --width-2 64 --faces 800 --poisson-depth 7 --quiet)
+small=(--epochs 8 --width-1 64 --width-2 64 --faces 800 --poisson-depth 7 --max-flipped 5 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
