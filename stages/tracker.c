@@ -20,6 +20,7 @@
 #define TURN_MAX    0.6   /* of a node in one step, radians */
 #define MOVE_MAX    0.15  /* units */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface */
+#define LENT        0.35  /* share of the targets that the thread for surface -> points looks for */
 
 /* What each thread gathers: points -> surface; surface -> points and the edges. */
 enum { TO_SURFACE, TO_POINTS };
@@ -332,57 +333,70 @@ void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const do
     npg_pose_vertices(vert_unit, tracker->graph, pose, tracker->mesh->vert_pos);
 }
 
-/* ---- a step: each direction finds its pairs and gathers its terms in a thread of its own ---- */
+/* ---- a step: two threads find the pairs of both directions, then each gathers the terms of one ---- */
 
 typedef struct step {
     npg_tracker *t;
     const double *pose;
     const npg_kdtree *tree;
     const float *points, *normals;
-    double width, stiffness, reverse_chamfer;
+    double width, stiffness;
     npg_tracked tracked;
     bool is_first, is_settling;
 } step;
 
-static npg_status to_surface(step *s)
+/* The surface's nearest points of targets [first, last). */
+static npg_status find_on_surface(const step *s, size_t first, size_t last)
 {
-    npg_tracker *t = s->t;
-    for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
-    NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
-    NPG_TRY(npg_surface_closest_near(t->surface, t->hits, t->targets, t->target_count,
-                                     s->is_first ? NULL : t->start_face, NULL, 1));
-    npg_block_clear(t->system, TO_SURFACE);
-    add_targets(t, &s->tracked, s->pose, s->normals != NULL, s->width);
-    return NPG_OK;
+    const npg_tracker *t = s->t;
+    return npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
+                                    s->is_first ? NULL : t->start_face + first, NULL, 1);
 }
 
-static npg_status to_points(step *s)
+/* To look on the surface takes longer, so the thread of the other direction lends a hand. */
+static npg_status find_pairs(void *user, size_t part)
 {
-    npg_tracker *t = s->t;
+    const step *s = user;
+    const npg_tracker *t = s->t;
+    size_t lent = (size_t)(LENT * (double)t->target_count);
+    if (part == TO_SURFACE) return find_on_surface(s, lent, t->target_count);
+    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                            t->mesh->face_count);
     for (size_t i = 0; i < t->sample_count; i++)
         memcpy(t->sample_pos + 3 * i, t->vert_pos + 3 * (size_t)t->samples[i], 3 * sizeof(float));
     NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
-    s->reverse_chamfer = 0;
-    for (size_t i = 0; i < t->sample_count; i++) s->reverse_chamfer += (double)t->near_sq[i];
-    s->reverse_chamfer /= (double)t->sample_count;
-    npg_block_clear(t->system, TO_POINTS);
-    add_samples(t, s->pose, s->points, s->normals, s->width);
-    add_edges(t, s->pose, s->stiffness);
+    return find_on_surface(s, 0, lent);
+}
+
+static npg_status add_terms(void *user, size_t part)
+{
+    step *s = user;
+    npg_block_clear(s->t->system, part);
+    if (part == TO_SURFACE) {
+        add_targets(s->t, &s->tracked, s->pose, s->normals != NULL, s->width);
+    } else {
+        add_samples(s->t, s->pose, s->points, s->normals, s->width);
+        add_edges(s->t, s->pose, s->stiffness);
+    }
     return NPG_OK;
 }
 
-static npg_status one_direction(void *user, size_t part)
+/* Surface -> points: its part of the Chamfer distance. */
+static double samples_chamfer(const npg_tracker *t)
 {
-    return part == TO_POINTS ? to_points(user) : to_surface(user);
+    double sum = 0;
+    for (size_t i = 0; i < t->sample_count; i++) sum += (double)t->near_sq[i];
+    return sum / (double)t->sample_count;
 }
 
 static npg_status gather(step *s)
 {
     npg_tracker *t = s->t;
     npg_tracker_vertices(t, t->vert_pos, s->pose);
-    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
-                            t->mesh->face_count);
-    return npg_parallel(one_direction, s, NPG_BLOCK_PARTS);
+    NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
+    for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
+    NPG_TRY(npg_parallel(find_pairs, s, NPG_BLOCK_PARTS));
+    return npg_parallel(add_terms, s, NPG_BLOCK_PARTS);
 }
 
 /* How far a fit has come, 0..1 before the last steps; the noisier the points, the more of them must agree
@@ -404,7 +418,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     npg_tracker *t = s->t;
     NPG_TRY(gather(s));
     tracked->point_dist_mean = s->tracked.point_dist_mean;
-    tracked->chamfer = s->tracked.chamfer + s->reverse_chamfer;
+    tracked->chamfer = s->tracked.chamfer + samples_chamfer(t);
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
