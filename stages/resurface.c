@@ -2,6 +2,7 @@
 #include "resurface.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "apart.h"
@@ -11,8 +12,9 @@
 #define ROUNDS_MAX  4
 #define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
 #define CLEARLY     (-0.3f)
-#define SETTLED     0.002 /* share of turned normals that ends it */
-#define RESTLESS    0.005 /* share that ends it when a round turns no fewer than the one before */
+#define SETTLED     0.0005 /* share of turned normals that ends it */
+#define ALMOST      0.002  /* the same where a draft is all that is wanted */
+#define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
 
 /* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */
 static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const float *n)
@@ -69,7 +71,8 @@ npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *no
                          size_t point_count, const npg_poisson_settings *settings)
 {
     size_t now = point_count, before = SIZE_MAX;
-    double settled = SETTLED * (double)point_count;
+    bool is_draft = settings->depth <= DRAFT_DEPTH;
+    double settled = (is_draft ? ALMOST : SETTLED) * (double)point_count;
     int rounds_max = settings->rounds_max ? settings->rounds_max : ROUNDS_MAX;
     *mesh = NULL;
     *turned = 0;
@@ -80,7 +83,7 @@ npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *no
         NPG_TRY(draft(mesh, &now, normals, points, point_count, settings));
         *turned += now;
     }
-    if (settings->depth <= DRAFT_DEPTH && (double)now <= settled) return NPG_OK; /* the draft is as good */
+    if (is_draft && (double)now <= settled) return NPG_OK; /* the last draft is as good */
     npg_mesh_unref(mesh);
     ++*rounds;
     return npg_poisson(mesh, points, normals, point_count, settings);
