@@ -140,7 +140,7 @@ static npg_status take_line(pcd_header *h, const header_line *line, const npg_so
     return NPG_OK;
 }
 
-static npg_status find_xyz(const pcd_header *h, const npg_source *source)
+static npg_status check_axes(const pcd_header *h, const npg_source *source)
 {
     for (const char *axis = "xyz"; *axis; axis++) {
         size_t i = 0;
@@ -148,10 +148,27 @@ static npg_status find_xyz(const pcd_header *h, const npg_source *source)
         if (i == h->field_count || h->counts[i] != 1)
             return npg_source_bad_line(source, "the header has no single field %c", *axis);
     }
-    for (size_t i = 0; i < h->field_count; i++)
-        if (h->types[i] == 'F' && h->sizes[i] < 4)
-            return npg_source_bad_line(source, "field \"%s\" is a float of %zu bytes", h->names[i],
-                                       h->sizes[i]);
+    return NPG_OK;
+}
+
+static bool is_used(const char *name)
+{
+    static const char *const names[] = {"x", "y", "z", "normal_x", "normal_y", "normal_z"};
+    size_t i = 0;
+    while (i < 6 && strcmp(name, names[i]) != 0) i++;
+    return i < 6;
+}
+
+/* PCL 1.13 knows no whole numbers of 8 bytes: it steps over such a field, but not in compressed files. */
+static npg_status check_types(const pcd_header *h, const npg_source *source)
+{
+    bool is_packed = !strcmp(h->data, "binary_compressed");
+    for (size_t i = 0; i < h->field_count; i++) {
+        bool is_float = h->types[i] == 'F';
+        if (is_float ? h->sizes[i] < 4 : h->sizes[i] > 4 && (is_packed || is_used(h->names[i])))
+            return npg_source_bad_line(source, "field \"%s\" is a %s of %zu bytes", h->names[i],
+                                       is_float ? "float" : "whole number", h->sizes[i]);
+    }
     return NPG_OK;
 }
 
@@ -169,7 +186,8 @@ static npg_status check_header(pcd_header *h, const npg_source *source)
     if (h->width * h->height != h->points)
         return npg_source_bad_line(source, "%llu x %llu is not %llu points", (unsigned long long)h->width,
                                    (unsigned long long)h->height, (unsigned long long)h->points);
-    return find_xyz(h, source);
+    NPG_TRY(check_axes(h, source));
+    return check_types(h, source);
 }
 
 static npg_status read_header(pcd_header *h, npg_source *source)

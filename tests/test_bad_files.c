@@ -153,6 +153,8 @@ static const struct bad_file {
     {"a.pcd", BYTES("VERSION 0.7\nFIELDS x y z\nSIZE 4 4\n"), "line 3: SIZE has 2 entries for 3 fields"},
     {"a.pcd", BYTES(PCD("9 -4 4", "F F F", "1", "1", "ascii") "1 2 3\n"), "line 3: field \"x\" has size 9"},
     {"a.pcd", BYTES(PCD("2 4 4", "F F F", "1", "1", "ascii") "1 2 3\n"), "field \"x\" is a float of 2 bytes"},
+    {"a.pcd", BYTES(PCD("4 4 8", "F F I", "1", "1", "ascii") "1 2 3\n"),
+     "field \"z\" is a whole number of 8 bytes"},
     {"a.pcd", BYTES(PCD("4 4 4", "F F Q", "1", "1", "ascii") "1 2 3\n"), "unknown type Q"},
     {"a.pcd", BYTES(PCD3("-1", "1", "ascii") "1 2 3\n"), "\"-1\" is not a count"},
     {"a.pcd", BYTES(PCD3("4", "1", "ascii") "1 2 3\n"), "4 x 1 is not 1 points"},

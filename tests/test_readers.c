@@ -210,6 +210,11 @@ static const struct text_case {
      "COUNT 1 1 1 1 1 1 1\nWIDTH 5\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 5\nDATA ascii\n"
      "9 1 4 7 1 0 0\n9 11 14 17 0 1 0\n9 21 24 27 0 0 1\n9 31 34 37 1 0 0\n9 41 44 47 0 1 0\n",
      true},
+    {"c.pcd",
+     "VERSION .7\nFIELDS x y z stamp\nSIZE 4 4 2 8\nTYPE F F I U\n"
+     "COUNT 1 1 1 1\nWIDTH 5\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 5\nDATA ascii\n"
+     "1 4 7 1763650000123456789\n11 14 17 2\n21 24 27 3\n31 34 37 4\n41 44 47 5\n",
+     false},
     {"a.ply",
      "ply\nformat ascii 1.0\nobj_info x\nelement vertex 5\nproperty float z\nproperty double y\n"
      "property float x\nend_header\n\n7 4 1\n  17 14 11  \n27 24 21\n37 34 31\n47 44 41",
