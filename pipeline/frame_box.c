@@ -38,6 +38,13 @@ double npg_bounds_diagonal(const npg_bounds *bounds)
     return sqrt(sum);
 }
 
+double npg_bounds_longest(const npg_bounds *bounds)
+{
+    double longest = 0;
+    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds->hi[a] - bounds->lo[a]);
+    return longest;
+}
+
 void npg_origin_offer(npg_origin *origin, const double world[3])
 {
     if (origin->known || !isfinite(world[0] + world[1] + world[2])) return;

@@ -37,6 +37,9 @@ void npg_bounds_add_points(npg_bounds *bounds, const float *points, size_t point
 void npg_bounds_add(npg_bounds *bounds, const npg_bounds *other);
 double npg_bounds_diagonal(const npg_bounds *bounds);
 
+/* The longest side; 0 while nothing was added. */
+double npg_bounds_longest(const npg_bounds *bounds);
+
 /* The box for local bounds.  NPG_BAD_INPUT when they are empty, not finite or have no extent. */
 npg_status npg_frame_box_set(npg_frame_box *box, const npg_origin *origin, const npg_bounds *bounds_local);
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "parallel.h"
 
 #define NEIGHBOURS    NPG_SIDE_NEIGHBOURS
 #define PATCH_ROUNDS  4
@@ -48,13 +49,8 @@ static void fill_panel(panel *p, const npg_sided_cloud *c, const uint32_t *index
     }
 }
 
-/* sum_j A_j (p_j - at) . n_j / (|p_j - at|^2 + soft^2)^(3/2).  Built for several widths of processor; which
- * one runs is settled when the program is loaded. */
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-__attribute__((target_clones("default", "avx2", "arch=skylake-avx512")))
-#endif
-static float
-sum_panel(const panel *p, const float *at, float soft_sq)
+/* sum_j A_j (p_j - at) . n_j / (|p_j - at|^2 + soft^2)^(3/2). */
+NPG_WIDE static float sum_panel(const panel *p, const float *at, float soft_sq)
 {
     const float *x = p->x, *y = p->y, *z = p->z, *nx = p->nx, *ny = p->ny, *nz = p->nz;
     float sums[LANES] = {0}, ax = at[0], ay = at[1], az = at[2];

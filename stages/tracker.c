@@ -84,9 +84,8 @@ static npg_status open_system(npg_tracker *t)
 static double size_of(const npg_mesh *reference)
 {
     npg_bounds bounds = npg_bounds_empty();
-    double longest = 0;
     npg_bounds_add_points(&bounds, reference->vert_pos, reference->vert_count);
-    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds.hi[a] - bounds.lo[a]);
+    double longest = npg_bounds_longest(&bounds);
     return longest > 0 ? longest / (2 * NPG_UNIT_EXTENT) : 1;
 }
 

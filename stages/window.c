@@ -86,12 +86,9 @@ static npg_figure figure_of(const npg_mesh *mesh)
 {
     npg_figure figure = {.scale = 1};
     npg_bounds bounds = npg_bounds_empty();
-    double longest = 0;
     npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
-    for (int a = 0; a < 3; a++) {
-        figure.centre[a] = 0.5 * (bounds.lo[a] + bounds.hi[a]);
-        longest = fmax(longest, bounds.hi[a] - bounds.lo[a]);
-    }
+    double longest = npg_bounds_longest(&bounds);
+    for (int a = 0; a < 3; a++) figure.centre[a] = 0.5 * (bounds.lo[a] + bounds.hi[a]);
     if (longest > 0) figure.scale = 2 * NPG_UNIT_EXTENT / longest;
     return figure;
 }

@@ -10,25 +10,10 @@
 #include <cmocka.h>
 
 #include "check.h"
+#include "group_device.h"
 #include "kernels.h"
 #include "latent.h"
 #include "mlp.h"
-
-static npg_device *device;
-
-static int open_device(void **state)
-{
-    (void)state;
-    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
-    return 0;
-}
-
-static int close_device(void **state)
-{
-    (void)state;
-    npg_device_close(&device);
-    return 0;
-}
 
 static void check_all(npg_device *on, const int *sizes, size_t size_count)
 {

@@ -11,6 +11,7 @@
 
 #include "neupig.h"
 #include "temp_folder.h"
+#include "write_ball.h"
 
 /* Windows of 6 frames that go on by 4.  The least of some windows is compared with the least of as many later
  * ones; the last windows are left out, since by then the stages before hold no frames any more.  A leak of
@@ -23,22 +24,6 @@ enum { HEAP_GROWTH_KIB = 1 << 20, ANONYMOUS_GROWTH_KIB = 1 << 20 };
 enum { HEAP_GROWTH_KIB = 256, ANONYMOUS_GROWTH_KIB = 4096 };
 #endif
 enum { COUNTED_GROWTH_KIB = 64 };
-
-static int write_ball(const char *path, int frame)
-{
-    FILE *file = fopen(path, "w");
-    if (!file) return -1;
-    double away = 0.2 * sin(0.3 * frame);
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\n", POINTS);
-    fputs("property float x\nproperty float y\nproperty float z\n", file);
-    fputs("property float nx\nproperty float ny\nproperty float nz\nend_header\n", file);
-    for (int i = 0; i < POINTS; i++) {
-        double z = 1 - 2 * (i + 0.5) / POINTS, turn = 2.399963229728653 * i + frame, flat = sqrt(1 - z * z);
-        double x = flat * cos(turn), y = flat * sin(turn);
-        fprintf(file, "%.6f %.6f %.6f %.6f %.6f %.6f\n", x + away, y, z, x, y, z);
-    }
-    return fclose(file);
-}
 
 /* ---- what the process holds ---- */
 
@@ -116,7 +101,7 @@ static void a_late_window_holds_what_an_early_one_held(void **state)
     assert_int_equal(mkdir(input, 0777), 0);
     for (int t = 0; t < FRAMES; t++) {
         snprintf(name, sizeof name, "capture/frame_%03d.ply", t);
-        assert_int_equal(write_ball(in_folder(&folder, name), t), 0);
+        assert_int_equal(write_ball(in_folder(&folder, name), POINTS, t, 0.2 * sin(0.3 * t)), 0);
     }
     npg_status status = run_capture(input, in_folder(&folder, "out"), &w);
     assert_true(status == NPG_OK || status == NPG_PARTIAL);

@@ -12,6 +12,7 @@
 
 #include "neupig.h"
 #include "temp_folder.h"
+#include "write_ball.h"
 
 /* What is judged is what the heap has given out and not got back, to the byte, and the anonymous memory that
  * is resident once the heap's free pages have gone back to the system.  The plain resident size tells
@@ -25,21 +26,6 @@ enum { RUNS = 6, WARM_UP = 2, WINDOW = 2, HEAP_GROWTH_KIB = 256, ANONYMOUS_GROWT
 enum { RUNS = 50, WARM_UP = 10, WINDOW = 10, HEAP_GROWTH_KIB = 128, ANONYMOUS_GROWTH_KIB = 4096 };
 #endif
 enum { FRAMES = 2, POINTS = 400 };
-
-static int write_ball(const char *path, int frame)
-{
-    FILE *file = fopen(path, "w");
-    if (!file) return -1;
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %d\n", POINTS);
-    fputs("property float x\nproperty float y\nproperty float z\n", file);
-    fputs("property float nx\nproperty float ny\nproperty float nz\nend_header\n", file);
-    for (int i = 0; i < POINTS; i++) {
-        double z = 1 - 2 * (i + 0.5) / POINTS, turn = 2.399963229728653 * i + frame, flat = sqrt(1 - z * z);
-        double x = flat * cos(turn), y = flat * sin(turn);
-        fprintf(file, "%.6f %.6f %.6f %.6f %.6f %.6f\n", x + 0.03 * frame, y, z, x, y, z);
-    }
-    return fclose(file);
-}
 
 /* ---- what the process holds ---- */
 
@@ -134,7 +120,8 @@ static void fifty_captures_leave_nothing_behind_and_give_the_same_bytes(void **s
     assert_int_equal(open_temp_folder(&folder), 0);
     assert_int_equal(mkdir(in_folder(&folder, "capture"), 0777), 0);
     for (int t = 0; t < FRAMES; t++)
-        assert_int_equal(write_ball(in_folder(&folder, t ? "capture/frame_1.ply" : "capture/frame_0.ply"), t),
+        assert_int_equal(write_ball(in_folder(&folder, t ? "capture/frame_1.ply" : "capture/frame_0.ply"),
+                                    POINTS, t, 0.03 * t),
                          0);
     snprintf(first, sizeof first, "%s/first", folder.path);
     run_capture(&folder, first);

@@ -11,6 +11,7 @@
 #include <math.h>
 
 #include "check.h"
+#include "group_device.h"
 #include "latent.h"
 #include "match.h"
 #include "mesh_tools.h"
@@ -18,22 +19,6 @@
 #include "window.h"
 
 enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 3 };
-
-static npg_device *device;
-
-static int open_device(void **state)
-{
-    (void)state;
-    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
-    return 0;
-}
-
-static int close_device(void **state)
-{
-    (void)state;
-    npg_device_close(&device);
-    return 0;
-}
 
 /* ---- a reference: a ball, a little flattened, and where it is in frame t ---- */
 
