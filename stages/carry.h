@@ -10,7 +10,7 @@
 #ifndef NPG_CARRY_H
 #define NPG_CARRY_H
 
-#include "mesh.h"
+#include "thin.h"
 
 typedef struct npg_carrier {
     int32_t sample[3];
@@ -18,16 +18,19 @@ typedef struct npg_carrier {
 } npg_carrier;
 
 typedef struct npg_carry {
-    npg_mesh
-        *mesh; /* S samples: a decimated reference whose vertices are vertices of it; counted reference */
-    uint32_t *vertex;      /* S: which vertex of the reference each sample is      */
-    npg_carrier *carriers; /* V */
-    npg_surface *surface;  /* of mesh, at rest  */
-    size_t vert_count;     /* V     */
+    npg_thin *surface;             /* W vertices: the surface that points are matched with        */
+    npg_thin *samples;             /* S: vertices of that surface                                 */
+    uint32_t *vertex;              /* S: which vertex of the reference each sample is             */
+    npg_carrier *carriers;         /* V */
+    npg_carrier *surface_carriers; /* W */
+    npg_surface *rest;             /* of the samples, at rest */
+    size_t vert_count;             /* V */
 } npg_carry;
 
-/* About sample_target samples (0, or more than V: all vertices).  reference has normals; it is a loan. */
-npg_status npg_carry_open(npg_carry **carry, const npg_mesh *reference, size_t sample_target);
+/* About sample_target samples (0, or more than there are: all vertices of the surface, which has about
+ * surface_target, or, with 0, all).  reference has normals; it is a loan. */
+npg_status npg_carry_open(npg_carry **carry, const npg_mesh *reference, size_t sample_target,
+                          size_t surface_target);
 void npg_carry_close(npg_carry **carry);
 
 /* Which samples carry points given at rest (N x 3). */
@@ -36,12 +39,8 @@ npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const f
 /* samples (S x 3) = the samples' rows of vert_pos (V x 3). */
 void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_pos);
 
-/* vert_pos (V x 3), the y of the formula on entry, becomes x: samples_before are the y_i, samples the x_i (S
- * x 3). */
-void npg_carry_move(const npg_carry *carry, float *vert_pos, const float *samples_before,
-                    const float *samples);
-
-/* The same with the carriers of V vertices alone. */
+/* vert_pos (N x 3), the y of the formula on entry, becomes x for the N vertices that the carriers are of:
+ * samples_before are the y_i, samples the x_i (S x 3). */
 void npg_carriers_move(const npg_carrier *carriers, size_t vert_count, float *vert_pos,
                        const float *samples_before, const float *samples);
 

@@ -161,20 +161,35 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     return npg_clean_voxels(frame, enough);
 }
 
-npg_status npg_clean_isolated(npg_frame *frame, int neighbours, double ratio)
+/* Of the points that are left drop those whose keep is 0, and say so in keep_all, which is about all points.
+ */
+static size_t compact(float *left, uint8_t *keep_all, size_t count, const uint8_t *keep)
 {
-    uint8_t *keep;
-    npg_status status = NPG_OK;
-    NPG_TRY(npg_alloc(&keep, NPG_FOR_FRAMES, frame->point_count));
-    for (int round = 0; round < ISOLATED_ROUNDS && !status; round++) {
-        size_t dropped;
-        status =
-            npg_outliers_statistical(keep, &dropped, frame->pos_local, frame->point_count, neighbours, ratio);
-        if (status || !dropped) break;
-        npg_frame_keep(frame, keep);
-        frame->cleaning.isolated += dropped;
+    size_t at = 0, kept = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!keep_all[i]) continue;
+        keep_all[i] = keep[at];
+        if (keep[at]) memmove(left + 3 * kept++, left + 3 * at, 3 * sizeof *left);
+        at++;
     }
-    npg_release(&keep);
+    return kept;
+}
+
+npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, int neighbours, double ratio)
+{
+    float *left = NULL;
+    uint8_t *keep_left;
+    size_t dropped = 1, left_count = count;
+    memset(keep, 1, count);
+    NPG_TRY(npg_alloc(&keep_left, NPG_FOR_FRAMES, count));
+    npg_status status = npg_alloc_array(&left, NPG_FOR_FRAMES, count, 3 * sizeof *left);
+    if (!status) memcpy(left, points, count * 3 * sizeof *left);
+    for (int round = 0; round < ISOLATED_ROUNDS && !status && dropped; round++) {
+        status = npg_outliers_statistical(keep_left, &dropped, left, left_count, neighbours, ratio);
+        if (!status && dropped) left_count = compact(left, keep, count, keep_left);
+    }
+    npg_release(&left);
+    npg_release(&keep_left);
     return status;
 }
 

@@ -1,5 +1,6 @@
 /* Evaluate: says for every frame how well the deformed surface explains the points, and whether that is good
- * enough. */
+ * enough.  Flipped and stretched faces are counted on the whole reference, distances measured to a surface of
+ * at most about NPG_THIN_SURFACE of its vertices. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -11,6 +12,7 @@
 #include "kdtree.h"
 #include "misfit.h"
 #include "stage.h"
+#include "thin.h"
 #include "topology.h"
 
 #define WARNINGS_MAX 10 /* frames below the bar that get a warning of their own */
@@ -48,16 +50,18 @@ typedef struct evaluate_state {
     const char *truth_folder;
     npg_topology_settings watch;
     /* of the run */
-    npg_surface *surface;
+    npg_thin *thin;       /* W vertices of the reference: the surface that distances are to */
+    npg_surface *surface; /* moves from frame to frame */
     npg_shape *shape;
     npg_misfit_finder *finder;
     npg_topology *topology;
     npg_truth *truth;
     bool is_tied;          /* the truth, in a frame */
-    float *points, *dists; /* N x 3 and max(N, V), of the frame at hand, in units; owned */
+    float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
     npg_surface_hit *hits; /* N; owned */
-    uint32_t *nearest;     /* V; owned */
-    double *vert_areas;    /* V; owned */
+    float *vert_unit;      /* W x 3; owned */
+    uint32_t *nearest;     /* W; owned */
+    double *vert_areas;    /* W; owned */
     size_t points_capacity, dists_capacity, hits_capacity;
     aggregate sums[SUMMED];
     int64_t *bad; /* numbers of the frames below the bar; owned */
@@ -146,18 +150,18 @@ static void place_misfits(npg_figures *figures, const npg_frame_box *box)
 
 /* After measure_points() of the same frame. */
 static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_facts *facts,
-                                   const float *vert_unit, size_t point_count, double per_unit,
-                                   double *mean_sq)
+                                   size_t point_count, double per_unit, double *mean_sq)
 {
-    const npg_mesh *reference = facts->reference;
-    size_t v = reference->vert_count;
+    const npg_mesh *mesh = state->thin->mesh;
+    const float *vert_unit = state->vert_unit;
+    size_t v = mesh->vert_count;
     npg_kdtree *tree;
     NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, v, sizeof *state->dists, NPG_FOR_QUERY));
     NPG_TRY(npg_kdtree_open(&tree, state->points, point_count));
     npg_status status = npg_kdtree_nearest(tree, state->nearest, state->dists, vert_unit, v, 1, 0);
     npg_kdtree_close(&tree);
     NPG_TRY(status);
-    double area = npg_vertex_areas(state->vert_areas, vert_unit, v, reference->faces, reference->face_count);
+    double area = npg_vertex_areas(state->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
     double radius = cover_radius(state, area, point_count, per_unit), covered = 0, whole = 0, sum = 0,
            sum_sq = 0;
     for (size_t i = 0; i < v; i++) {
@@ -187,12 +191,15 @@ static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, 
 
 static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference, double unseen_share)
 {
-    size_t v = reference->vert_count;
     NPG_TRY(npg_shape_open(&state->shape, reference));
-    NPG_TRY(npg_misfit_open(&state->finder, reference, unseen_share));
-    NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, v, sizeof *state->nearest));
-    NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, v, sizeof *state->vert_areas));
-    return npg_surface_open(&state->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+    NPG_TRY(npg_thin_open(&state->thin, reference, NPG_THIN_SURFACE));
+    npg_mesh *mesh = state->thin->mesh;
+    size_t w = mesh->vert_count;
+    NPG_TRY(npg_misfit_open(&state->finder, mesh, unseen_share));
+    NPG_TRY(npg_alloc_array(&state->vert_unit, NPG_FOR_QUERY, w, 3 * sizeof *state->vert_unit));
+    NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, w, sizeof *state->nearest));
+    NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, w, sizeof *state->vert_areas));
+    return npg_surface_open(&state->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
 }
 
 static npg_status check_vertices(const npg_frame *frame, const npg_mesh *reference)
@@ -249,9 +256,10 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     if (state->truth) NPG_TRY(compare_truth(worker, frame));
     if (!frame->is_skipped) NPG_TRY(take_points(state, &facts->box, frame, &point_count));
     if (!point_count) return NPG_OK;
-    NPG_TRY(npg_surface_move(state->surface, frame->vert_unit));
+    npg_thin_gather(state->thin, state->vert_unit, frame->vert_unit);
+    NPG_TRY(npg_surface_move(state->surface, state->vert_unit));
     NPG_TRY(measure_points(state, figures, point_count, per_unit, &points_sq));
-    NPG_TRY(measure_vertices(state, figures, facts, frame->vert_unit, point_count, per_unit, &vertices_sq));
+    NPG_TRY(measure_vertices(state, figures, facts, point_count, per_unit, &vertices_sq));
     figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5;
     return NPG_OK;
 }
@@ -440,6 +448,7 @@ static void uninit(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     npg_surface_close(&state->surface);
+    npg_thin_close(&state->thin);
     npg_shape_close(&state->shape);
     npg_misfit_close(&state->finder);
     npg_topology_close(&state->topology);
@@ -447,6 +456,7 @@ static void uninit(npg_worker *worker)
     npg_release(&state->points);
     npg_release(&state->dists);
     npg_release(&state->hits);
+    npg_release(&state->vert_unit);
     npg_release(&state->nearest);
     npg_release(&state->vert_areas);
     npg_release(&state->bad);

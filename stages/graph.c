@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "mesh_tools.h"
+#include "parallel.h"
 
 #define REACH 2.5 /* radii within which a node carries a vertex */
 
@@ -245,6 +246,44 @@ npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_tar
     return status;
 }
 
+static npg_status take_nodes(npg_graph *part, const npg_graph *whole)
+{
+    NPG_TRY(npg_alloc_array(&part->node_pos, NPG_FOR_MESH, whole->node_count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&part->edges, NPG_FOR_MESH, whole->edge_count + 1, sizeof *part->edges));
+    memcpy(part->node_pos, whole->node_pos, whole->node_count * 3 * sizeof(float));
+    memcpy(part->edges, whole->edges, whole->edge_count * sizeof *part->edges);
+    part->node_count = whole->node_count;
+    part->edge_count = whole->edge_count;
+    part->radius = whole->radius;
+    return NPG_OK;
+}
+
+static npg_status take_bindings(npg_graph *part, const npg_graph *whole, const uint32_t *verts, size_t count)
+{
+    const size_t size = NPG_GRAPH_BIND;
+    NPG_TRY(npg_alloc_array(&part->vert_node, NPG_FOR_MESH, count, size * sizeof *part->vert_node));
+    NPG_TRY(npg_alloc_array(&part->vert_weight, NPG_FOR_MESH, count, size * sizeof *part->vert_weight));
+    for (size_t i = 0; i < size * count; i++) {
+        size_t from = verts[i / size] * size + i % size;
+        part->vert_node[i] = whole->vert_node[from];
+        part->vert_weight[i] = whole->vert_weight[from];
+    }
+    part->vert_count = count;
+    return NPG_OK;
+}
+
+npg_status npg_graph_take(npg_graph **out, const npg_graph *whole, const uint32_t *verts, size_t count)
+{
+    npg_graph *part;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&part, NPG_FOR_MESH, sizeof *part));
+    npg_status status = take_nodes(part, whole);
+    if (!status) status = take_bindings(part, whole, verts, count);
+    if (status) npg_graph_close(&part);
+    *out = part;
+    return status;
+}
+
 void npg_graph_close(npg_graph **slot)
 {
     if (!slot || !*slot) return;
@@ -279,12 +318,37 @@ void npg_pose_point(double out[3], const npg_graph *graph, const double *pose, c
     }
 }
 
-void npg_pose_vertices(float *vert_pos, const npg_graph *graph, const double *pose, const float *rest)
+void npg_pose_rows(float *rows, const npg_graph *graph, const double *pose)
+{
+    for (size_t k = 0; k < graph->node_count; k++) {
+        const double *p = pose + k * NPG_POSE_SIZE;
+        const float *g = graph->node_pos + 3 * k;
+        float *row = rows + k * NPG_POSE_ROW;
+        for (int i = 0; i < 3; i++) {
+            double at = (double)g[i] + p[9 + i];
+            for (int c = 0; c < 3; c++) {
+                row[4 * c + i] = (float)p[3 * i + c];
+                at -= p[3 * i + c] * (double)g[c];
+            }
+            row[12 + i] = (float)at;
+        }
+        for (int c = 0; c < 4; c++) row[4 * c + 3] = 0;
+    }
+}
+
+/* The maps are mixed before they are applied. */
+NPG_WIDE void npg_pose_vertices(float *restrict vert_pos, const npg_graph *graph, const float *restrict rows,
+                                const float *restrict rest)
 {
     for (size_t v = 0; v < graph->vert_count; v++) {
-        double x[3];
-        npg_pose_point(x, graph, pose, rest + 3 * v, graph->vert_node + v * NPG_GRAPH_BIND,
-                       graph->vert_weight + v * NPG_GRAPH_BIND);
-        for (size_t i = 0; i < 3; i++) vert_pos[3 * v + i] = (float)x[i];
+        const uint32_t *nodes = graph->vert_node + v * NPG_GRAPH_BIND;
+        const float *weights = graph->vert_weight + v * NPG_GRAPH_BIND, *x = rest + 3 * v;
+        float map[NPG_POSE_ROW] = {0};
+        for (int b = 0; b < NPG_GRAPH_BIND && nodes[b] != UINT32_MAX; b++) {
+            const float *row = rows + (size_t)nodes[b] * NPG_POSE_ROW, weight = weights[b];
+            for (int i = 0; i < NPG_POSE_ROW; i++) map[i] += weight * row[i];
+        }
+        for (int i = 0; i < 3; i++)
+            vert_pos[3 * v + (size_t)i] = map[i] * x[0] + map[4 + i] * x[1] + map[8 + i] * x[2] + map[12 + i];
     }
 }

@@ -26,6 +26,9 @@ typedef struct npg_graph {
 npg_status npg_graph_open(npg_graph **graph, const npg_mesh *mesh, size_t node_target);
 void npg_graph_close(npg_graph **graph);
 
+/* The same nodes, carrying only these vertices of the whole (count). */
+npg_status npg_graph_take(npg_graph **part, const npg_graph *whole, const uint32_t *verts, size_t count);
+
 /* A pose: for each node the rotation (row-major 3 x 3) and the translation, 12 doubles. */
 #define NPG_POSE_SIZE 12
 
@@ -36,7 +39,13 @@ void npg_pose_rest(double *pose, size_t node_count);
 void npg_pose_point(double out[3], const npg_graph *graph, const double *pose, const float rest[3],
                     const uint32_t nodes[NPG_GRAPH_BIND], const float weights[NPG_GRAPH_BIND]);
 
-/* vert_pos (V x 3) of the vertices rest (V x 3) in a pose. */
-void npg_pose_vertices(float *vert_pos, const npg_graph *graph, const double *pose, const float *rest);
+/* A pose as affine maps in single precision, for many points: rows (K x 16) holds each node's 3 x 4 matrix by
+ * columns of four, [R | g + t - R g], the fourth number of a column 0. */
+#define NPG_POSE_ROW 16
+void npg_pose_rows(float *rows, const npg_graph *graph, const double *pose);
+
+/* vert_pos (V x 3) of the vertices rest (V x 3) in a pose given by its rows. */
+void npg_pose_vertices(float *restrict vert_pos, const npg_graph *graph, const float *restrict rows,
+                       const float *restrict rest);
 
 #endif

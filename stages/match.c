@@ -12,17 +12,17 @@
 
 struct npg_matcher {
     npg_match_settings settings;
-    const npg_carry *carry;    /* loan */
-    const npg_mesh *reference; /* loan */
-    npg_surface *surface;      /* moves from frame to frame */
-    float *vert_normals;       /* V x 3 */
-    float *targets, *normals;  /* M x 3 */
-    npg_surface_hit *hits;     /* M */
-    float *rest;               /* M x 3: where the hits are at rest */
-    npg_carrier *carriers;     /* M */
-    float *sorted;             /* max(M, S): distances */
-    uint32_t *near;            /* S */
-    float *near_sq;            /* S */
+    const npg_carry *carry;   /* loan */
+    const npg_mesh *mesh;     /* its surface, W vertices */
+    npg_surface *surface;     /* moves from frame to frame */
+    float *vert_normals;      /* W x 3 */
+    float *targets, *normals; /* M x 3 */
+    npg_surface_hit *hits;    /* M */
+    float *rest;              /* M x 3: where the hits are at rest */
+    npg_carrier *carriers;    /* M */
+    float *sorted;            /* max(M, S): distances */
+    uint32_t *near;           /* S */
+    float *near_sq;           /* S */
     size_t target_count;
 };
 
@@ -37,19 +37,18 @@ void npg_matcher_close(npg_matcher **slot)
     npg_release(slot);
 }
 
-npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg_mesh *reference,
-                            const npg_match_settings *settings)
+npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg_match_settings *settings)
 {
     npg_matcher *m;
-    size_t n = (size_t)settings->points, s = carry->mesh->vert_count, v = reference->vert_count;
+    const npg_mesh *mesh = carry->surface->mesh;
+    size_t n = (size_t)settings->points, s = carry->samples->mesh->vert_count, w = mesh->vert_count;
     *out = NULL;
     NPG_TRY(npg_alloc(&m, NPG_FOR_FIT, sizeof *m));
     m->settings = *settings;
     m->carry = carry;
-    m->reference = reference;
-    npg_status status =
-        npg_surface_open(&m->surface, reference->vert_pos, v, reference->faces, reference->face_count);
-    if (!status) status = npg_alloc_array(&m->vert_normals, NPG_FOR_FIT, v, 3 * sizeof(float));
+    m->mesh = mesh;
+    npg_status status = npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
+    if (!status) status = npg_alloc_array(&m->vert_normals, NPG_FOR_FIT, w, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&m->targets, NPG_FOR_FIT, n, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&m->normals, NPG_FOR_FIT, n, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&m->hits, NPG_FOR_FIT, n, sizeof *m->hits);
@@ -65,7 +64,7 @@ npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg
 
 size_t npg_matcher_most(const npg_matcher *m)
 {
-    return (size_t)m->settings.points + 2 * m->carry->mesh->vert_count;
+    return (size_t)m->settings.points + 2 * m->carry->samples->mesh->vert_count;
 }
 
 static int by_value(const void *a, const void *b)
@@ -110,7 +109,7 @@ static void pull_target(npg_matcher *m, npg_pull *pull, size_t i, const float *v
                         const float *samples, float weight)
 {
     const npg_surface_hit *hit = &m->hits[i];
-    const uint32_t *face = m->reference->faces + 3 * (size_t)hit->face;
+    const uint32_t *face = m->mesh->faces + 3 * (size_t)hit->face;
     float at[3];
     face_point(at, vert_unit, face, hit->weights);
     *pull = (npg_pull){.weight = weight, .along = (float)m->settings.along};
@@ -143,7 +142,7 @@ static void match_targets(npg_matcher *m, npg_pull *pulls, size_t *count, const 
 static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, const float *samples,
                                 const float *points, const float *normals, size_t point_count)
 {
-    size_t s_count = m->carry->mesh->vert_count;
+    size_t s_count = m->carry->samples->mesh->vert_count;
     npg_kdtree *tree;
     NPG_TRY(npg_kdtree_open(&tree, points, point_count));
     npg_status status = npg_kdtree_nearest(tree, m->near, m->near_sq, samples, s_count, 1, 1);
@@ -155,7 +154,7 @@ static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, 
     for (size_t s = 0; s < s_count; s++) {
         const float *to = points + 3 * (size_t)m->near[s];
         npg_pull pull = {.vertex = {(int32_t)s, (int32_t)s, (int32_t)s}, .share = {1, 0, 0}};
-        memcpy(pull.normal, m->vert_normals + 3 * (size_t)m->carry->vertex[s], sizeof pull.normal);
+        memcpy(pull.normal, m->vert_normals + 3 * (size_t)m->carry->samples->vertex[s], sizeof pull.normal);
         if (normals && dot3(pull.normal, normals + 3 * (size_t)m->near[s]) < (float)OPPOSITE) continue;
         pull.weight = (float)share * robust_weight((double)m->near_sq[s], width);
         pull.along = (float)m->settings.along;
@@ -169,7 +168,7 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
                             const float *samples, const float *points, const float *normals,
                             size_t point_count)
 {
-    const npg_mesh *mesh = m->reference;
+    const npg_mesh *mesh = m->mesh;
     if (!point_count) return NPG_OK;
     m->target_count =
         npg_points_spread(m->targets, m->normals, (size_t)m->settings.points, points, normals, point_count);
@@ -187,7 +186,7 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
 
 void npg_match_tie(const npg_matcher *m, npg_pull *pulls, size_t *count, const float *solved)
 {
-    size_t s_count = m->carry->mesh->vert_count;
+    size_t s_count = m->carry->samples->mesh->vert_count;
     for (size_t s = 0; s < s_count && m->settings.tie > 0; s++) {
         npg_pull pull = {.vertex = {(int32_t)s, (int32_t)s, (int32_t)s}, .share = {1, 0, 0}, .along = 1};
         pull.weight = (float)(m->settings.tie * m->settings.total / (double)s_count);

@@ -16,17 +16,17 @@ typedef struct npg_match_settings {
     double tie;     /* weight of keeping solved positions, for a whole frame                  */
 } npg_match_settings;
 
-/* carry and reference are loans that outlive the matcher. */
-npg_status npg_matcher_open(npg_matcher **matcher, const npg_carry *carry, const npg_mesh *reference,
+/* carry is a loan that outlives the matcher. */
+npg_status npg_matcher_open(npg_matcher **matcher, const npg_carry *carry,
                             const npg_match_settings *settings);
 void npg_matcher_close(npg_matcher **matcher);
 
 /* The most pulls of one frame. */
 size_t npg_matcher_most(const npg_matcher *matcher);
 
-/* Pulls of a frame whose surface is now at vert_unit (V x 3) with the samples at `samples` (S x 3).  Points:
- * N x 3 unit, normals N x 3 or NULL.  Distances count less the more they exceed three times the frame's
- * median (Geman and McClure). Appends to pulls and *count. */
+/* Pulls of a frame whose surface (carry.h) is now at vert_unit (W x 3) with the samples at `samples` (S x 3).
+ * Points: N x 3 unit, normals N x 3 or NULL.  Distances count less the more they exceed three times the
+ * frame's median (Geman and McClure). Appends to pulls and *count. */
 npg_status npg_match_points(npg_matcher *matcher, npg_pull *pulls, size_t *count, const float *vert_unit,
                             const float *samples, const float *points, const float *normals,
                             size_t point_count);

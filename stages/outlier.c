@@ -10,7 +10,9 @@
 
 #include "cleaning.h"
 #include "clock.h"
+#include "isolated.h"
 #include "normals.h"
+#include "parallel.h"
 #include "stage.h"
 
 enum { NORMALS_AUTO, NORMALS_ESTIMATE, NORMALS_GIVEN };
@@ -78,12 +80,30 @@ static npg_status parse_sensor(outlier_state *s)
     return NPG_OK;
 }
 
+#define REMEMBERED_MAX ((size_t)4 << 20) /* bytes of what the statistical filter found */
+
+static void release_isolated(void *thing)
+{
+    npg_isolated *isolated = thing;
+    npg_isolated_close(&isolated);
+}
+
+static npg_status open_isolated(npg_worker *worker)
+{
+    npg_isolated *isolated;
+    if (npg_worker_kept(worker)) return NPG_OK;
+    NPG_TRY(npg_isolated_open(&isolated, npg_worker_facts(worker)->is_live ? 0 : REMEMBERED_MAX));
+    npg_worker_keep(worker, isolated, release_isolated);
+    return NPG_OK;
+}
+
 static npg_status outlier_init(npg_worker *worker)
 {
     const outlier_state *s = npg_worker_state(worker);
     if (s->normal_neighbours && s->normal_neighbours < 4)
         return npg_error(NPG_USAGE, "option normal-neighbours: %lld is neither 0 nor at least 4",
                          (long long)s->normal_neighbours);
+    NPG_TRY(open_isolated(worker));
     return parse_sensor(npg_worker_state(worker));
 }
 
@@ -109,8 +129,7 @@ static npg_status clean(npg_worker *worker, npg_frame *frame)
         npg_worker_warn(worker, false, frame->number,
                         "%zu points are more than points-max %lld: thinned to %zu, one per cube of side %g",
                         read, (long long)s->point_max, frame->point_count, side);
-    if (s->drop_isolated) NPG_TRY(npg_clean_isolated(frame, (int)s->neighbours, s->ratio));
-    return npg_clean_check(frame);
+    return NPG_OK;
 }
 
 /* ---- normals ---- */
@@ -257,10 +276,16 @@ static npg_status refuse(npg_worker *worker, npg_frame *frame, npg_status status
     return NPG_OK;
 }
 
-static npg_status do_frame(npg_worker *worker, npg_frame *frame)
+static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
+{
+    npg_status status = frame->is_skipped ? NPG_OK : clean(worker, frame);
+    return status ? refuse(worker, frame, status) : NPG_OK;
+}
+
+static npg_status finish_frame(npg_worker *worker, npg_frame *frame)
 {
     if (frame->is_skipped) return NPG_OK;
-    npg_status status = clean(worker, frame);
+    npg_status status = npg_clean_check(frame);
     if (!status && needs_normals(worker, frame)) status = do_normals(worker, frame);
     if (status) return refuse(worker, frame, status);
     frame->fields |= NPG_FIELD_CLEAN;
@@ -268,11 +293,28 @@ static npg_status do_frame(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
+static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    size_t frame_count = npg_chunk_count(chunk);
+    npg_frame **frames;
+    if (!s->drop_isolated) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
+    for (size_t i = 0; i < frame_count; i++) frames[i] = npg_chunk_frame(chunk, i);
+    npg_status status =
+        npg_isolated_drop(npg_worker_kept(worker), frames, frame_count, (int)s->neighbours, s->ratio);
+    npg_release(&frames);
+    return status;
+}
+
 static npg_status outlier_process(npg_worker *worker, npg_chunk **chunk)
 {
-    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+    size_t frame_count = npg_chunk_count(*chunk);
+    for (size_t i = 0; i < frame_count; i++) NPG_TRY(clean_frame(worker, npg_chunk_frame(*chunk, i)));
+    NPG_TRY(drop_isolated(worker, *chunk));
+    for (size_t i = 0; i < frame_count; i++) {
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
-        NPG_TRY(do_frame(worker, npg_chunk_frame(*chunk, i)));
+        NPG_TRY(finish_frame(worker, npg_chunk_frame(*chunk, i)));
     }
     return NPG_OK;
 }
@@ -301,13 +343,16 @@ static npg_status outlier_flush(npg_worker *worker)
     return NPG_OK;
 }
 
-/* One frame at work: the hash table, PCL's copy and tree, and the normals. */
+/* One frame at work: the hash table and the normals; as many as there are threads with PCL's copy and tree;
+ * what is remembered of all. */
 static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
 {
     const outlier_state *s = npg_worker_state(worker);
     size_t points = npg_worker_facts(worker)->point_count_max;
+    size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
+    size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 120 * (points < (size_t)s->point_max ? points : (size_t)s->point_max);
+    return 17 * points + 120 * thinned * threads + REMEMBERED_MAX;
 }
 
 const npg_stage npg_stage_outlier = {.name = "outlier",

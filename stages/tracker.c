@@ -10,6 +10,7 @@
 #include "mesh_tools.h"
 #include "parallel.h"
 #include "query.h"
+#include "thin.h"
 
 #define STIFF_START 10.0 /* times the final stiffness at the first step */
 /* For a reference that fills the box of all frames; one that travels through it is smaller, and so are these.
@@ -27,14 +28,18 @@ enum { TO_SURFACE, TO_POINTS };
 
 struct npg_tracker {
     npg_tracker_settings settings;
-    npg_mesh *mesh; /* counted reference */
+    npg_mesh *reference; /* counted reference; V vertices, which the whole graph carries */
+    npg_graph *whole;
+    npg_thin *thin;       /* the surface that is aligned: W vertices of it, which the graph carries */
+    const npg_mesh *mesh; /* the thin one's */
     npg_graph *graph;
     npg_block_system *system; /* its parts: TO_SURFACE, TO_POINTS */
     npg_surface *surface;
-    float *vert_pos, *vert_normals; /* V x 3: the pose at work */
+    float *vert_pos, *vert_normals; /* W x 3: the pose at work */
     uint32_t *samples;              /* vertices, spread over the surface */
     size_t sample_count;
     double *step; /* K x 6 */
+    float *rows;  /* K x 16: the pose at work, for many points */
     double along; /* share of distances along the surface in the fit at work */
     double size;  /* longest side of the reference against that of the box of all frames */
     /* of the frame at work */
@@ -56,12 +61,14 @@ void npg_tracker_close(npg_tracker **slot)
     if (!slot || !*slot) return;
     npg_tracker *t = *slot;
     npg_graph_close(&t->graph);
+    npg_graph_close(&t->whole);
+    npg_thin_close(&t->thin);
     npg_block_close(&t->system);
     npg_surface_close(&t->surface);
-    npg_mesh_unref(&t->mesh);
-    void *all[] = {&t->vert_pos, &t->vert_normals,   &t->samples,   &t->step,
-                   &t->targets,  &t->target_normals, &t->hits,      &t->start_face,
-                   &t->near,     &t->near_sq,        &t->sample_pos};
+    npg_mesh_unref(&t->reference);
+    void *all[] = {&t->vert_pos,   &t->vert_normals, &t->samples,        &t->step,
+                   &t->rows,       &t->targets,      &t->target_normals, &t->hits,
+                   &t->start_face, &t->near,         &t->near_sq,        &t->sample_pos};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -72,6 +79,17 @@ static void choose_samples(npg_tracker *t)
 {
     size_t step = t->mesh->vert_count / t->settings.samples + 1;
     for (size_t v = 0; v < t->mesh->vert_count; v += step) t->samples[t->sample_count++] = (uint32_t)v;
+}
+
+/* The graph, and the surface that it carries through the steps. */
+static npg_status open_surface(npg_tracker *t)
+{
+    NPG_TRY(npg_graph_open(&t->whole, t->reference, t->settings.nodes));
+    NPG_TRY(npg_thin_open(&t->thin, t->reference, NPG_THIN_SURFACE));
+    t->mesh = t->thin->mesh;
+    NPG_TRY(npg_graph_take(&t->graph, t->whole, t->thin->vertex, t->mesh->vert_count));
+    return npg_surface_open(&t->surface, t->mesh->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                            t->mesh->face_count);
 }
 
 static npg_status open_system(npg_tracker *t)
@@ -95,18 +113,17 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     *out = NULL;
     NPG_TRY(npg_alloc(&t, NPG_FOR_FIT, sizeof *t));
     t->settings = *settings;
-    t->mesh = npg_mesh_ref(reference);
+    t->reference = npg_mesh_ref(reference);
     t->size = size_of(reference);
-    size_t v = reference->vert_count, m = settings->samples;
-    npg_status status = npg_graph_open(&t->graph, reference, settings->nodes);
+    npg_status status = open_surface(t);
+    size_t w = status ? 0 : t->mesh->vert_count, m = settings->samples;
     if (!status) status = open_system(t);
-    if (!status)
-        status =
-            npg_surface_open(&t->surface, reference->vert_pos, v, reference->faces, reference->face_count);
-    if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, v, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, v, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->samples, NPG_FOR_FIT, v, sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, w, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, w, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->samples, NPG_FOR_FIT, w, sizeof(uint32_t));
     if (!status) status = npg_alloc_array(&t->step, NPG_FOR_FIT, t->graph->node_count, 6 * sizeof(double));
+    if (!status)
+        status = npg_alloc_array(&t->rows, NPG_FOR_FIT, t->graph->node_count, NPG_POSE_ROW * sizeof(float));
     if (!status) status = npg_alloc_array(&t->targets, NPG_FOR_FIT, m, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->target_normals, NPG_FOR_FIT, m, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->hits, NPG_FOR_FIT, m, sizeof *t->hits);
@@ -329,7 +346,8 @@ static double move_nodes(npg_tracker *t, double *pose)
 
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose)
 {
-    npg_pose_vertices(vert_unit, tracker->graph, pose, tracker->mesh->vert_pos);
+    npg_pose_rows(tracker->rows, tracker->whole, pose);
+    npg_pose_vertices(vert_unit, tracker->whole, tracker->rows, tracker->reference->vert_pos);
 }
 
 /* ---- a step: two threads find the pairs of both directions, then each gathers the terms of one ---- */
@@ -391,7 +409,8 @@ static double samples_chamfer(const npg_tracker *t)
 static npg_status gather(step *s)
 {
     npg_tracker *t = s->t;
-    npg_tracker_vertices(t, t->vert_pos, s->pose);
+    npg_pose_rows(t->rows, t->graph, s->pose);
+    npg_pose_vertices(t->vert_pos, t->graph, t->rows, t->mesh->vert_pos);
     NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
     for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
     NPG_TRY(npg_parallel(find_pairs, s, NPG_BLOCK_PARTS));

@@ -27,7 +27,7 @@ struct npg_window_solver {
 
 size_t npg_window_sample_count(const npg_window_solver *solver)
 {
-    return solver->carry ? solver->carry->mesh->vert_count : solver->facts->reference->vert_count;
+    return solver->carry ? solver->carry->samples->mesh->vert_count : solver->facts->reference->vert_count;
 }
 
 npg_fit *npg_window_fit(npg_window_solver *solver)
@@ -97,7 +97,7 @@ static npg_figure figure_of(const npg_mesh *mesh)
 static npg_status open_aligned_fit(npg_window_solver *s, npg_device *device, uint64_t seed)
 {
     npg_mesh *mesh;
-    const npg_mesh *samples = s->carry->mesh;
+    const npg_mesh *samples = s->carry->samples->mesh;
     s->figure = figure_of(samples);
     NPG_TRY(npg_mesh_copy(&mesh, samples));
     npg_figure_from_unit(&s->figure, mesh->vert_pos, samples->vert_pos, samples->vert_count);
@@ -121,9 +121,9 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
         s->settings.fit.mlp_rate *= settings->aligned_rate;
     }
     npg_status status = NPG_OK;
-    if (is_aligned) status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples);
-    if (is_aligned && !status)
-        status = npg_matcher_open(&s->matcher, s->carry, facts->reference, &settings->match);
+    if (is_aligned)
+        status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples, NPG_THIN_SURFACE);
+    if (is_aligned && !status) status = npg_matcher_open(&s->matcher, s->carry, &settings->match);
     s->figure = (npg_figure){.scale = 1};
     if (!status)
         status = is_aligned ? open_aligned_fit(s, device, seed)
@@ -186,12 +186,22 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
 
 /* ---- aligned frames ---- */
 
-/* The dense surface that the samples now make, from the aligned one. */
+/* Where the samples now carry the surface that points are matched with. */
+static void carry_surface(npg_window_solver *s, const npg_frame *frame, size_t i)
+{
+    size_t size = 3 * npg_window_sample_count(s);
+    npg_thin_gather(s->carry->surface, s->dense, frame->vert_unit);
+    npg_carriers_move(s->carry->surface_carriers, s->carry->surface->mesh->vert_count, s->dense,
+                      s->bases + i * size, s->now + i * size);
+}
+
+/* Where they carry every vertex. */
 static void carry_dense(npg_window_solver *s, const npg_frame *frame, size_t i)
 {
-    size_t size = 3 * s->carry->mesh->vert_count;
+    size_t size = 3 * npg_window_sample_count(s);
     memcpy(s->dense, frame->vert_unit, s->carry->vert_count * 3 * sizeof(float));
-    npg_carry_move(s->carry, s->dense, s->bases + i * size, s->now + i * size);
+    npg_carriers_move(s->carry->carriers, s->carry->vert_count, s->dense, s->bases + i * size,
+                      s->now + i * size);
 }
 
 static npg_status read_samples(npg_window_solver *s)
@@ -218,18 +228,18 @@ static void move_pulls(const npg_figure *figure, npg_pull *pulls, size_t count)
 /* Pulls of all frames at the samples' present positions. */
 static npg_status match_all(npg_window_solver *s, npg_held *const *held)
 {
-    size_t size = 3 * s->carry->mesh->vert_count, most = npg_matcher_most(s->matcher), count = 0;
+    size_t size = 3 * npg_window_sample_count(s), most = npg_matcher_most(s->matcher), count = 0;
     npg_release(&s->pulls);
     npg_release(&s->pull_start);
     NPG_TRY(npg_alloc_array(&s->pulls, NPG_FOR_FIT, s->count * most, sizeof *s->pulls));
     NPG_TRY(npg_alloc_array(&s->pull_start, NPG_FOR_FIT, s->count + 1, sizeof *s->pull_start));
     for (size_t i = 0; i < s->count; i++) {
         const npg_frame *frame = &held[i]->frame;
-        carry_dense(s, frame, i);
+        carry_surface(s, frame, i);
         NPG_TRY(npg_match_points(s->matcher, s->pulls, &count, s->dense, s->now + i * size,
                                  s->points + 3 * s->point_start[i], frame->normals, frame->point_count));
         if (held[i]->solved) {
-            npg_carry_gather(s->carry, s->dense, held[i]->solved); /* S x 3 fits into V x 3 */
+            npg_carry_gather(s->carry, s->dense, held[i]->solved); /* no more than V */
             npg_match_tie(s->matcher, s->pulls, &count, s->dense);
         }
         move_pulls(&s->figures[i], s->pulls + s->pull_start[i], count - s->pull_start[i]);

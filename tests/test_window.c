@@ -10,6 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 
+#include "ball_mesh.h"
 #include "check.h"
 #include "group_device.h"
 #include "latent.h"
@@ -19,58 +20,6 @@
 #include "window.h"
 
 enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 3 };
-
-/* ---- a reference: a ball, a little flattened, and where it is in frame t ---- */
-
-static void put_face(npg_mesh *mesh, size_t *count, uint32_t a, uint32_t b, uint32_t c)
-{
-    uint32_t *face = mesh->faces + 3 * (*count)++;
-    face[0] = a, face[1] = b, face[2] = c;
-}
-
-static void fill_faces(npg_mesh *mesh)
-{
-    size_t count = 0;
-    for (uint32_t s = 0; s < SPOKES; s++) {
-        uint32_t next = (s + 1) % SPOKES, last = (RINGS - 1) * SPOKES;
-        put_face(mesh, &count, VERTS - 2, s, next);
-        put_face(mesh, &count, VERTS - 1, last + next, last + s);
-        for (uint32_t r = 0; r + 1 < RINGS; r++) {
-            put_face(mesh, &count, r * SPOKES + s, (r + 1) * SPOKES + s, r * SPOKES + next);
-            put_face(mesh, &count, r * SPOKES + next, (r + 1) * SPOKES + s, (r + 1) * SPOKES + next);
-        }
-    }
-    assert_int_equal(count, mesh->face_count);
-}
-
-static npg_mesh *open_ball(void)
-{
-    npg_mesh *mesh;
-    assert_int_equal(npg_mesh_open(&mesh, VERTS, 2 * SPOKES * RINGS), 0);
-    assert_int_equal(npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, VERTS, 3 * sizeof(float)), 0);
-    for (int v = 0; v < VERTS; v++) {
-        double polar =
-            v >= RINGS * SPOKES ? (v == VERTS - 2 ? 0 : M_PI) : M_PI * (v / SPOKES + 1) / (RINGS + 1);
-        double turn = 2 * M_PI * (v % SPOKES) / SPOKES;
-        mesh->vert_pos[3 * v] = (float)(0.5 * sin(polar) * cos(turn));
-        mesh->vert_pos[3 * v + 1] = (float)(0.4 * sin(polar) * sin(turn));
-        mesh->vert_pos[3 * v + 2] = (float)(0.5 * cos(polar));
-    }
-    fill_faces(mesh);
-    npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, VERTS, mesh->faces, mesh->face_count);
-    return mesh;
-}
-
-/* Bent and moved, the more the later. */
-static void pose_ball(float *out, const float *rest, size_t count, double t)
-{
-    for (size_t i = 0; i < count; i++) {
-        double x = (double)rest[3 * i], y = (double)rest[3 * i + 1], z = (double)rest[3 * i + 2];
-        out[3 * i] = (float)(x + 0.03 * t + 0.05 * t * z * z);
-        out[3 * i + 1] = (float)(y - 0.02 * t);
-        out[3 * i + 2] = (float)(z + 0.01 * t * x);
-    }
-}
 
 /* ---- gradients through the overlap's terms ---- */
 
@@ -127,9 +76,9 @@ static void open_tied(tied *t, npg_mesh *ball)
     npg_random random = npg_random_stream(11, 0, 0);
     float dense[3 * VERTS], before[3 * VERTS];
     *t = (tied){.shape = {32, 64, 4, 0.01f}};
-    assert_int_equal(npg_carry_open(&t->carry, ball, 60), 0);
-    assert_int_equal(npg_matcher_open(&t->matcher, t->carry, ball, &match), 0);
-    size_t s = t->samples = t->carry->mesh->vert_count;
+    assert_int_equal(npg_carry_open(&t->carry, ball, 60, 0), 0);
+    assert_int_equal(npg_matcher_open(&t->matcher, t->carry, &match), 0);
+    size_t s = t->samples = t->carry->samples->mesh->vert_count;
     t->param_count = npg_mlp_param_count(&t->shape);
     assert_int_equal(npg_alloc_array(&t->base, NPG_FOR_RUN, s, 3 * sizeof(float)), 0);
     assert_int_equal(npg_alloc_array(&t->solved, NPG_FOR_RUN, s, 3 * sizeof(float)), 0);
@@ -163,7 +112,7 @@ static void close_tied(tied *t)
 static void ties_are_the_squared_way_back(void **state)
 {
     tied t;
-    npg_mesh *ball = open_ball();
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
     double sum = 0;
     (void)state;
     open_tied(&t, ball);
@@ -182,7 +131,7 @@ static void ties_are_the_squared_way_back(void **state)
 static void gradients_through_the_ties_are_slopes(void **state)
 {
     tied t;
-    npg_mesh *ball = open_ball();
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
     double error = 0;
     (void)state;
     open_tied(&t, ball);
@@ -233,7 +182,7 @@ static npg_status device_slopes(tied *t, npg_mlp *mlp, npg_motion *motion)
 static void the_device_has_the_same_gradient(void **state)
 {
     tied t;
-    npg_mesh *ball = open_ball();
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
     npg_mlp mlp = {0};
     npg_motion motion = {0};
     double loss, loss_error = 0, grad_error = 0, dz_error = 0;
@@ -282,7 +231,7 @@ static const npg_fit_settings small = {.epochs = 12,
 
 static void the_warm_start_is_exact_on_the_overlap(void **state)
 {
-    npg_mesh *ball = open_ball();
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
     npg_fit *fit;
     npg_fit_frame frames[FRAMES];
     float points[FRAMES][3 * VERTS], end[FRAMES][3 * VERTS], again[3 * VERTS], worst = 0, moved = 0;
@@ -356,7 +305,7 @@ static double way_from_the_first(npg_mesh *ball, double tie)
 
 static void ties_hold_what_is_solved(void **state)
 {
-    npg_mesh *ball = open_ball();
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
     (void)state;
     double free = way_from_the_first(ball, 0), tied_way = way_from_the_first(ball, 1),
            held = way_from_the_first(ball, 30);
@@ -396,7 +345,7 @@ static void solve_gone(float solved[3 * VERTS], npg_mesh *ball, float way)
 
 static void where_the_surface_is_does_not_matter(void **state)
 {
-    npg_mesh *ball = open_ball();
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
     float here[3 * VERTS], far[3 * VERTS], start[3 * VERTS], worst = 0, moved = 0;
     (void)state;
     solve_gone(here, ball, 0);

@@ -237,7 +237,7 @@ typedef struct dense {
     npg_carry *carry;
     npg_graph *graph;
     double *pose;
-    float *verts, *before, *samples;
+    float *verts, *before, *samples, *rows;
     npg_mlp mlp;
     npg_motion motion;
 } dense;
@@ -245,14 +245,15 @@ typedef struct dense {
 static npg_status carry(void *user)
 {
     dense *d = user;
-    npg_carry_move(d->carry, d->verts, d->before, d->samples);
+    npg_carriers_move(d->carry->carriers, d->carry->vert_count, d->verts, d->before, d->samples);
     return NPG_OK;
 }
 
 static npg_status pose(void *user)
 {
     dense *d = user;
-    npg_pose_vertices(d->verts, d->graph, d->pose, d->mesh->vert_pos);
+    npg_pose_rows(d->rows, d->graph, d->pose);
+    npg_pose_vertices(d->verts, d->graph, d->rows, d->mesh->vert_pos);
     return NPG_OK;
 }
 
@@ -272,8 +273,9 @@ static npg_status open_dense(dense *d, npg_device *device, const npg_mesh *mesh)
     NPG_TRY(npg_graph_open(&d->graph, mesh, NODES));
     NPG_TRY(npg_alloc_array(&d->pose, NPG_FOR_RUN, d->graph->node_count, NPG_POSE_SIZE * sizeof(double)));
     npg_pose_rest(d->pose, d->graph->node_count);
-    NPG_TRY(npg_carry_open(&d->carry, mesh, SAMPLES));
-    size_t count = d->carry->mesh->vert_count;
+    NPG_TRY(npg_alloc_array(&d->rows, NPG_FOR_RUN, d->graph->node_count, NPG_POSE_ROW * sizeof(float)));
+    NPG_TRY(npg_carry_open(&d->carry, mesh, SAMPLES, NPG_THIN_SURFACE));
+    size_t count = d->carry->samples->mesh->vert_count;
     NPG_TRY(npg_alloc_array(&d->verts, NPG_FOR_RUN, rows, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&d->before, NPG_FOR_RUN, count, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&d->samples, NPG_FOR_RUN, count, 3 * sizeof(float)));
@@ -285,10 +287,10 @@ static npg_status open_dense(dense *d, npg_device *device, const npg_mesh *mesh)
 
 static npg_status note_dense(bench *b, dense *d)
 {
-    const double V = (double)d->carry->vert_count, W = 512, S = (double)d->carry->mesh->vert_count;
+    const double V = (double)d->carry->vert_count, W = 512, S = (double)d->carry->samples->mesh->vert_count;
     npg_bench_row posed = {.name = "dense_pose",
                            .on_host = true,
-                           .flops = V * (4 * 24 + 18),
+                           .flops = V * (4 * 24 + 21),
                            .bytes = V * (24 + 32),
                            .vertex_frames = V};
     npg_bench_row carried = {.name = "dense_carry",
@@ -317,6 +319,7 @@ npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, 
     npg_carry_close(&d.carry);
     npg_graph_close(&d.graph);
     npg_release(&d.pose);
+    npg_release(&d.rows);
     npg_release(&d.verts);
     npg_release(&d.before);
     npg_release(&d.samples);
