@@ -1,7 +1,7 @@
 /* Kernel cache: one folder per version behind a lock, private folders for everybody else. */
 #include "kernel_cache.h"
 
-#include <errno.h>
+#include <dirent.h>
 #include <fcntl.h>
 #include <ftw.h>
 #include <pthread.h>
@@ -9,11 +9,17 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include "file.h"
 #include "kernel_sources.h"
+
+#define PRIVATE_PREFIX "neupig-kernels-"
+#define PRIVATE_LOCK   "owner"
+#define PRIVATE_AGE_S  60
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int users, lock_fd = -1;
@@ -56,13 +62,69 @@ static void take_shared(void)
     }
 }
 
-static npg_status make_private(void)
+static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
+{
+    (void)info, (void)kind, (void)walk;
+    remove(path);
+    return 0;
+}
+
+static void remove_folder(const char *path)
+{
+    nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+}
+
+/* ---- private folders: each with a lock file that its process holds as long as it lives ---- */
+
+static const char *private_parent(void)
 {
     const char *temp = getenv("TMPDIR");
-    snprintf(private_folder, sizeof private_folder, "%s/neupig-kernels-XXXXXX",
-             temp && temp[0] == '/' ? temp : "/tmp");
-    if (mkdtemp(private_folder)) return NPG_OK;
+    return temp && temp[0] == '/' ? temp : "/tmp";
+}
+
+/* The descriptor of the folder's lock, ours from now on; -1 if another process has it. */
+static int lock_private(const char *folder, int flags)
+{
+    char path[4200];
+    snprintf(path, sizeof path, "%s/" PRIVATE_LOCK, folder);
+    int fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0600);
+    if (fd < 0 || !flock(fd, LOCK_EX | LOCK_NB)) return fd;
+    close(fd);
+    return -1;
+}
+
+/* Whether the process that made the folder is gone without removing it (it was killed); a young one may not
+ * have its lock yet. */
+static bool is_left_behind(const char *folder)
+{
+    struct stat info;
+    if (lstat(folder, &info) || !S_ISDIR(info.st_mode) || info.st_uid != getuid()) return false;
+    if (time(NULL) < info.st_mtime + PRIVATE_AGE_S) return false;
+    int fd = lock_private(folder, 0);
+    if (fd >= 0) close(fd);
+    return fd >= 0;
+}
+
+static void remove_left_behind(void)
+{
+    const size_t length = strlen(PRIVATE_PREFIX);
+    DIR *parent = opendir(private_parent());
+    for (struct dirent *entry; parent && (entry = readdir(parent));) {
+        char path[4096];
+        if (strncmp(entry->d_name, PRIVATE_PREFIX, length) != 0) continue;
+        snprintf(path, sizeof path, "%s/%s", private_parent(), entry->d_name);
+        if (is_left_behind(path)) remove_folder(path);
+    }
+    if (parent) closedir(parent);
+}
+
+static npg_status make_private(void)
+{
+    snprintf(private_folder, sizeof private_folder, "%s/" PRIVATE_PREFIX "XXXXXX", private_parent());
+    bool is_made = mkdtemp(private_folder) != NULL;
+    if (is_made && lock_private(private_folder, O_CREAT) >= 0) return NPG_OK;
     npg_status status = npg_error_errno(NPG_DISK, "%s", private_folder);
+    if (is_made) remove_folder(private_folder);
     private_folder[0] = 0;
     return status;
 }
@@ -71,6 +133,7 @@ static npg_status choose_folder(void)
 {
     take_shared();
     if (getenv("POCL_CACHE_DIR")) return NPG_OK;
+    remove_left_behind();
     if (lock_fd < 0) NPG_TRY(make_private());
     setenv("POCL_CACHE_DIR", lock_fd < 0 ? private_folder : shared_folder, 1);
     return NPG_OK;
@@ -100,16 +163,9 @@ npg_status npg_kernel_cache_enter(void)
     return status;
 }
 
-static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info, (void)kind, (void)walk;
-    remove(path);
-    return 0;
-}
-
 static void remove_private(void)
 {
-    if (private_folder[0]) nftw(private_folder, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+    if (private_folder[0]) remove_folder(private_folder);
 }
 
 /* The driver keeps using the folder until the process ends, so that is when it goes. */

@@ -27,6 +27,18 @@ needs_shim() {
     "$faults" cache 1 8
 }
 
+@test "what a killed process left of its private kernel cache goes with a later one, what a living one uses stays" {
+    mkdir -p temp/neupig-kernels-{dead1,lives,young}/deep temp/other && export TMPDIR="$PWD/temp"
+    touch temp/neupig-kernels-{dead1,lives,young}/{owner,deep/kernel}
+    ln -s "$PWD/temp/other" temp/neupig-kernels-link1
+    touch -d '2 minutes ago' temp/neupig-kernels-{dead1,lives}
+    flock temp/neupig-kernels-lives/owner "$NEUPIG" doctor >log
+    [ ! -e temp/neupig-kernels-dead1 ]
+    [ -e temp/neupig-kernels-lives/deep/kernel ]
+    [ -e temp/neupig-kernels-young/deep/kernel ]
+    [ -L temp/neupig-kernels-link1 ] && [ -d temp/other ]
+}
+
 # The binaries of kernels that are kept below cache.
 programs() {
     find cache -name "${1:-}*.program"
