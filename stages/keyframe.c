@@ -6,10 +6,12 @@
  * surface, near the middle in time.
  *
  * Not in the paper: the score hardly tells frames apart, so the frame it finds is only the first of several
- * candidates (shortlist.h), of which the choosing pass takes the one whose surface fares best (choose.h). */
+ * candidates (shortlist.h), of which the choosing pass takes the one whose surface fares best (choose.h).  A
+ * mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to (likeness.h). */
 #include <math.h>
 #include <string.h>
 
+#include "likeness.h"
 #include "live_plan.h"
 #include "look_ahead.h"
 #include "shortlist.h"
@@ -27,6 +29,7 @@ typedef struct candidate {
     int64_t index, number;
     size_t cell_count;
     double score;
+    double dist_unit; /* from the user's own mesh, where there is one */
 } candidate;
 
 typedef struct keyframe_state {
@@ -37,7 +40,8 @@ typedef struct keyframe_state {
     uint64_t *cells;              /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
     candidate best[SHOWN_SCORES]; /* best first */
     size_t best_count;
-    candidate chosen; /* the frame the user named */
+    npg_likeness *likeness; /* of the user's own mesh; owned */
+    candidate chosen;       /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
     int64_t usable_count; /* frames that were not skipped                    */
     int64_t passed_count; /* frames of the solving pass so far               */
@@ -138,15 +142,37 @@ static void offer(keyframe_state *state, candidate new)
     state->best[at] = new;
 }
 
-/* Whether there is a choosing pass, which takes files, and a keyframe that is not named. */
-static bool has_candidates(const keyframe_state *state)
+/* The user's own mesh; "" where the reference is to be made (or no stage of the chain makes one). */
+static const char *own_mesh(const npg_worker *worker)
 {
-    return state->choice == CHOICE_APART && state->number == NO_NUMBER;
+    const char *path = npg_options_get(npg_worker_options(worker), "reference");
+    return path ? path : "";
 }
 
-static npg_status score_frame(keyframe_state *state, const npg_facts *facts, int64_t frame_count,
-                              const npg_frame *frame)
+/* Whether there is a choosing pass, which takes files, and a keyframe that is neither named nor that of a
+ * mesh. */
+static bool has_candidates(const npg_worker *worker)
 {
+    const keyframe_state *state = npg_worker_state(worker);
+    return state->choice == CHOICE_APART && state->number == NO_NUMBER && !*own_mesh(worker);
+}
+
+/* A mesh of one's own has the pose of a frame: the nearest one is the keyframe. */
+static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!state->likeness)
+        NPG_TRY(npg_likeness_open(&state->likeness, own_mesh(worker), &facts->origin, &facts->box));
+    NPG_TRY(npg_likeness_dist(&c->dist_unit, state->likeness, frame, &facts->box));
+    c->score = -c->dist_unit;
+    return NPG_OK;
+}
+
+static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     bool is_named = frame->number == state->number && state->number != NO_NUMBER;
     if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
     if (frame->is_skipped) return NPG_OK;
@@ -154,21 +180,26 @@ static npg_status score_frame(keyframe_state *state, const npg_facts *facts, int
     mark_cells(state->cells, &facts->box, frame, false);
     double from_middle = (double)frame->index - (double)frame_count / 2;
     double score = (double)cell_count * exp(-0.001 * from_middle * from_middle);
-    candidate new = {frame->index, frame->number, cell_count, score};
+    candidate new = {frame->index, frame->number, cell_count, score, 0};
+    if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &new, frame));
     if (cell_count) offer(state, new);
     if (is_named && cell_count && !state->is_chosen) {
         state->chosen = new;
         state->is_chosen = true;
     }
-    if (facts->is_live || !has_candidates(state) || !npg_shortlist_wants(frame->index, frame_count))
+    if (facts->is_live || !has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count))
         return NPG_OK;
     return npg_shortlist_add(&state->shortlist, frame, cell_count);
 }
 
 static json_t *json_of(const candidate *c)
 {
-    return json_pack("{sI sI sI sf}", "index", (json_int_t)c->index, "number", (json_int_t)c->number, "cells",
-                     (json_int_t)c->cell_count, "score", c->score);
+    json_t *json = json_pack("{sI sI sI}", "index", (json_int_t)c->index, "number", (json_int_t)c->number,
+                             "cells", (json_int_t)c->cell_count);
+    bool is_by_mesh = c->dist_unit > 0;
+    json_object_set_new(json, is_by_mesh ? "reference_dist_unit" : "score",
+                        json_real(is_by_mesh ? c->dist_unit : c->score));
+    return json;
 }
 
 static npg_status choose(const keyframe_state *state, candidate *key)
@@ -194,18 +225,20 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     int64_t overlap = window < frame_count ? state->overlap : 0;
     facts->plan =
         (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
-    if (!facts->is_live && frame_count > 1 && (has_candidates(state) || state->welds == WELDS_CUT)) {
-        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count,
-                             !has_candidates(state));
-        facts->choice.cut_welds = state->welds == WELDS_CUT;
+    bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker), is_open = has_candidates(worker);
+    if (!facts->is_live && frame_count > 1 && (is_open || cuts_welds)) {
+        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count, !is_open);
+        facts->choice.cut_welds = cuts_welds;
     }
     json_t *report = npg_worker_report(worker), *scores = json_array();
     for (size_t i = 0; i < state->best_count; i++) json_array_append_new(scores, json_of(&state->best[i]));
     json_object_set_new(report, "key", json_of(&key));
     json_object_set_new(report, "best", scores);
     json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
-    npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.1f)",
-                   facts->choice.candidate_count > 1 ? "has the best score" : "is the keyframe",
+    const char *what = *own_mesh(worker)                   ? "is the keyframe, nearest to the reference"
+                       : facts->choice.candidate_count > 1 ? "has the best score"
+                                                           : "is the keyframe";
+    npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.4g)", what,
                    (long long)frame_count, key.cell_count, key.score);
     return NPG_OK;
 }
@@ -263,7 +296,7 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     facts->box.diagonal = diagonal;
     if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
     for (size_t i = 0; i < state->held.count; i++)
-        NPG_TRY(score_frame(state, facts, frame_count, &state->held.frames[i]));
+        NPG_TRY(score_frame(worker, frame_count, &state->held.frames[i]));
     npg_status status = set_plan(worker, frame_count);
     if (status && is_open)
         return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
@@ -337,7 +370,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         if (pass == NPG_PASS_MEASURE)
             measure_frame(state, facts, frame);
         else if (pass == NPG_PASS_SCORE)
-            NPG_TRY(score_frame(state, facts, facts->frame_count, frame));
+            NPG_TRY(score_frame(worker, facts->frame_count, frame));
         else
             NPG_TRY(facts->is_live ? take_live(worker, frame) : mark_key(worker, frame));
     }
@@ -361,6 +394,7 @@ static void uninit(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
     npg_look_ahead_clear(&state->held);
+    npg_likeness_close(&state->likeness);
     npg_release(&state->cells);
 }
 
@@ -377,7 +411,9 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 #define OFFSET(member) offsetof(keyframe_state, member)
 
 static const npg_option options[] = {
-    {"keyframe", "Number of the frame whose surface is the reference, as in the file names; -1: by score",
+    {"keyframe",
+     "Number of the frame whose surface is the reference, as in the file names; -1: by score, or, with a "
+     "reference of one's own, the frame that it is nearest to",
      NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
     {"keyframe-choice",
      "Take the frame with the best score (paper), or the one of several good frames whose surface fares best "

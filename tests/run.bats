@@ -55,6 +55,20 @@ run_bad() {
     done
 }
 
+key_is() { # OUT INDEX
+    python3 -c 'import json, sys
+assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"]["index"] == int(sys.argv[2])' "$@"
+}
+
+@test "the keyframe of a mesh of one's own is the frame that it is nearest to, from files and live" {
+    mesh=$(ls "$PWD"/capture/truth/* | sed -n 4p)
+    "$NEUPIG" run capture/points -o own "${small[@]}" --max-residual 100 --reference "$mesh"
+    key_is own 3
+    cat capture/points/* | "$NEUPIG" run - -o own-live "${small[@]}" --max-residual 100 --reference "$mesh"
+    key_is own-live 3
+    cmp own/reference.ply own-live/reference.ply
+}
+
 @test "frames on standard input give the same meshes as the files" {
     cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --max-residual 100 >/dev/null
     for mesh in first/meshes/*.ply; do
