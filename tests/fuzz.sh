@@ -6,6 +6,7 @@
 # Each target runs over its seeds, then for SECONDS (10) or RUNS (0: no limit) on inputs it makes; as many at a
 # time as there are processors.  A parser that crashes, leaks, keeps memory or passes its bound fails, and the
 # input that did it stays in build/fuzz/found.  What is learnt is kept in build/fuzz/corpus for the next time.
+# FUZZ_SEED names the seed of the inputs; without it each time has another.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:-10} runs=${2:-0}
@@ -23,7 +24,7 @@ fuzz() { # PARSER
     mkdir -p $build/corpus/"$name"
     $build/fuzz_"$name" -max_total_time="$seconds" -runs="$([ "$runs" -gt 0 ] && echo "$runs" || echo -1)" \
         -max_len=4096 -rss_limit_mb=1024 -timeout=20 -detect_leaks=1 -print_final_stats=1 \
-        -artifact_prefix=$build/found/"$name"- $build/corpus/"$name" $build/seeds/"$name" \
+        -artifact_prefix=$build/found/"$name"- ${FUZZ_SEED:+-seed=$FUZZ_SEED} $build/corpus/"$name" $build/seeds/"$name" \
         >$build/logs/"$name" 2>&1 || status=$?
     if [ $status -eq 0 ]; then
         echo "$name: $(sed -n 's/^stat::number_of_executed_units: *//p' $build/logs/"$name") runs, no fault"
