@@ -26,6 +26,7 @@ const npg_kernel_case npg_kernel_cases[] = {
     {"latent", npg_check_latent, npg_slope_latent, 2e-5},
     {"sobolev", npg_check_sobolev, NULL, 1e-5},
     {"sobolev, graph", npg_check_sobolev_graph, NULL, 1e-5},
+    {"sobolev, doubled", npg_check_sobolev_doubled, NULL, 1e-5},
     {"mlp", npg_check_mlp, npg_slope_mlp, 2e-5},
     {"adam", npg_check_adam, NULL, 1e-5},
     {"transform", npg_check_transform, npg_slope_transform, 2e-5},

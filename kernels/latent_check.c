@@ -8,17 +8,17 @@
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 
-static void make_levels(npg_levels *levels, int size, bool screened)
+static void make_levels(npg_levels *levels, int size, double screen, double degree)
 {
     *levels = (npg_levels){0};
     int count = size < 4 ? 3 : 8;
     for (int l = 0; l < count; l++)
         npg_levels_add(levels,
                        (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 1.0 / count, 0.4 * pow(1.5, l),
-                                   screened, 1},
+                                   screen, degree, 1},
                        0);
-    npg_levels_add(levels, (npg_level){NPG_LEVEL_HASHED, 9 + size, 0, 0, 0, 2, 1, 0, false, 1}, 256);
-    npg_levels_add(levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, screened, 1}, 0);
+    npg_levels_add(levels, (npg_level){NPG_LEVEL_HASHED, 9 + size, 0, 0, 0, 2, 1, 0, 1, 1, 1}, 256);
+    npg_levels_add(levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, screen, degree, 1}, 0);
 }
 
 /* ---- latent ---- */
@@ -36,7 +36,7 @@ static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
     npg_random random = npg_random_stream(seed, 10, (uint64_t)size);
     d->real = size == 1 ? 5 : (size_t)size * 397 + 3;
     d->rows = (d->real + 15) / 16 * 16;
-    make_levels(&d->levels, size, false);
+    make_levels(&d->levels, size, 1, 1);
     size_t nodes = d->levels.row_count * CHANNELS, z = d->rows * CHANNELS;
     NPG_TRY(npg_check_values(&d->positions, NULL, d->real * 3, 1.05, &random)); /* some outside the cube */
     NPG_TRY(npg_check_values(&d->normals, NULL, d->real * 3, 1, &random));
@@ -155,20 +155,26 @@ static npg_status residual_of(npg_device *device, const npg_levels *levels, npg_
     return status;
 }
 
-static npg_status check_sobolev(npg_device *device, int size, uint64_t seed, bool screened, double *error)
+static npg_status check_sobolev(npg_device *device, int size, uint64_t seed, double screen, double degree,
+                                double *error)
 {
     npg_levels levels;
     npg_random random = npg_random_stream(seed, 11, (uint64_t)size);
-    make_levels(&levels, size, screened);
+    make_levels(&levels, size, screen, degree);
     return residual_of(device, &levels, &random, error);
 }
 
 npg_status npg_check_sobolev(npg_device *device, int size, uint64_t seed, double *error)
 {
-    return check_sobolev(device, size, seed, true, error);
+    return check_sobolev(device, size, seed, 3.4, 1, error);
 }
 
 npg_status npg_check_sobolev_graph(npg_device *device, int size, uint64_t seed, double *error)
 {
-    return check_sobolev(device, size, seed, false, error);
+    return check_sobolev(device, size, seed, 1, 1, error);
+}
+
+npg_status npg_check_sobolev_doubled(npg_device *device, int size, uint64_t seed, double *error)
+{
+    return check_sobolev(device, size, seed, 1, 2, error);
 }

@@ -23,7 +23,8 @@ typedef struct npg_level {
     int channel_first, channel_end; /* the channels it fills                                          */
     double share;                   /* weight of its value: 1 / L where levels are averaged             */
     double lambda;                  /* strength of the smoothing, 0: none                               */
-    bool screened;                  /* (1 + 6 lambda) I + lambda L in place of I + lambda L             */
+    double screen, degree;          /* ... by screen I + lambda (degree D - A): D counts a node's
+                                     * neighbours inside the grid, A joins them                         */
     double rate;                    /* learning rate                                                    */
 } npg_level;
 

@@ -1,7 +1,7 @@
 /* sobolev: tables of the levels and the six passes. */
 #include "sobolev.h"
 
-#include <math.h>
+#include "path_spectrum.h"
 
 typedef struct tables {
     int32_t level[NPG_LEVELS_MAX][4];
@@ -26,30 +26,35 @@ static void fill_tables(tables *t, const npg_levels *levels)
         t->level[l][3] = (int32_t)t->matrix_size;
         t->eigen_first[l] = (int32_t)t->eigen_size;
         t->lambda[l] = (float)level->lambda;
-        t->diagonal[l] = (float)(1 + (level->screened ? 6 * level->lambda : 0));
+        t->diagonal[l] = (float)level->screen;
         t->matrix_size += n * n;
         t->eigen_size += n;
         t->lines += n ? n * n : level->row_count;
     }
 }
 
-/* Orthonormal DCT-II: C[k][j] = s_k cos(pi (j + 1/2) k / n), s_0 = sqrt(1 / n), s_k = sqrt(2 / n). */
-static void fill_transform(float *matrix, float *eigen, int n)
+static npg_status fill_transform(float *matrix, float *eigen, const npg_level *level, size_t n)
 {
-    for (int k = 0; k < n; k++) {
-        eigen[k] = (float)(2 - 2 * cos(M_PI * k / n));
-        for (int j = 0; j < n; j++)
-            matrix[k * n + j] = (float)(sqrt((k ? 2.0 : 1.0) / n) * cos(M_PI * (j + 0.5) * k / n));
-    }
+    double *basis;
+    NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FIT, n + 1, n * sizeof *basis));
+    double *values = basis + n * n;
+    npg_status status = npg_path_spectrum(basis, values, (int)n, level->degree);
+    for (size_t i = 0; i < n * n && !status; i++) matrix[i] = (float)basis[i];
+    for (size_t i = 0; i < n && !status; i++) eigen[i] = (float)values[i];
+    npg_release(&basis);
+    return status;
 }
 
-static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, const tables *t)
+static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels,
+                                    const tables *t)
 {
     float *matrices = NULL, *eigen = NULL;
     npg_status status = npg_alloc_array(&matrices, NPG_FOR_FIT, t->matrix_size + 1, sizeof(float));
     if (!status) status = npg_alloc_array(&eigen, NPG_FOR_FIT, t->eigen_size + 1, sizeof(float));
     for (int l = 0; !status && l < sobolev->level_count; l++)
-        fill_transform(matrices + t->level[l][3], eigen + t->eigen_first[l], t->level[l][0]);
+        if (t->level[l][0])
+            status = fill_transform(matrices + t->level[l][3], eigen + t->eigen_first[l], &levels->level[l],
+                                    (size_t)t->level[l][0]);
     if (!status)
         status = npg_buffer_from(&sobolev->matrices, device, matrices, (t->matrix_size + 1) * sizeof(float));
     if (!status)
@@ -72,7 +77,7 @@ npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_
                npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first));
     NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda));
     NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal));
-    NPG_TRY_OR(failed, status, upload_transforms(sobolev, device, &t));
+    NPG_TRY_OR(failed, status, upload_transforms(sobolev, device, levels, &t));
     NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->a, device, bytes));
     NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->b, device, bytes));
     return NPG_OK;

@@ -22,7 +22,7 @@ static npg_status find_carriers(npg_carry *carry, const npg_mesh *reference)
                              samples->face_count));
     NPG_TRY(npg_alloc_array(&carry->carriers, NPG_FOR_MESH, v, sizeof *carry->carriers));
     NPG_TRY(npg_alloc_array(&carry->surface_carriers, NPG_FOR_MESH, w, sizeof *carry->surface_carriers));
-    NPG_TRY(npg_carry_find(carry, carry->carriers, reference->vert_pos, v));
+    NPG_TRY(npg_carry_find(carry, carry->carriers, reference->vert_pos, v, 0));
     for (size_t i = 0; i < w; i++) carry->surface_carriers[i] = carry->carriers[carry->surface->vertex[i]];
     return NPG_OK;
 }
@@ -55,11 +55,12 @@ void npg_carry_close(npg_carry **slot)
     npg_release(slot);
 }
 
-npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const float *rest, size_t count)
+npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const float *rest, size_t count,
+                          int threads)
 {
     npg_surface_hit *hits;
     NPG_TRY(npg_alloc_array(&hits, NPG_FOR_FIT, count, sizeof *hits));
-    npg_status status = npg_surface_closest(carry->rest, hits, rest, count);
+    npg_status status = npg_surface_closest_near(carry->rest, hits, rest, count, NULL, NULL, threads);
     for (size_t i = 0; i < count && !status; i++)
         for (int c = 0; c < 3; c++) {
             carriers[i].sample[c] =

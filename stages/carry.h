@@ -33,8 +33,9 @@ npg_status npg_carry_open(npg_carry **carry, const npg_mesh *reference, size_t s
                           size_t surface_target);
 void npg_carry_close(npg_carry **carry);
 
-/* Which samples carry points given at rest (N x 3). */
-npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const float *rest, size_t count);
+/* Which samples carry points given at rest (N x 3).  threads: 0 for one per core. */
+npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const float *rest, size_t count,
+                          int threads);
 
 /* samples (S x 3) = the samples' rows of vert_pos (V x 3). */
 void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_pos);

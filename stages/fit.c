@@ -56,6 +56,17 @@ struct npg_fit {
 
 /* ---- opening: what does not depend on the window ---- */
 
+/* The two numbers of a level's smoothing matrix (levels.h). */
+static double screen_of(const npg_fit_settings *s, double lambda)
+{
+    return s->smoothing == NPG_SMOOTHING_SCREENED ? 1 + 6 * lambda : 1;
+}
+
+static double degree_of(const npg_fit_settings *s)
+{
+    return s->smoothing == NPG_SMOOTHING_DOUBLED ? 2 : 1;
+}
+
 static void add_grids(npg_levels *levels, const npg_fit_settings *s)
 {
     bool single = s->encoding == NPG_ENCODING_SINGLE;
@@ -67,7 +78,8 @@ static void add_grids(npg_levels *levels, const npg_fit_settings *s)
                                    .channel_end = POSITION_END,
                                    .share = single ? 1.0 : 1.0 / (double)s->grid_levels,
                                    .lambda = s->lambda * pow(s->lambda_growth, (double)l),
-                                   .screened = s->smoothing == 1,
+                                   .screen = screen_of(s, s->lambda * pow(s->lambda_growth, (double)l)),
+                                   .degree = degree_of(s),
                                    .rate = s->grid_rate * pow(s->grid_rate_growth, (double)l)},
                        0);
 }
@@ -99,7 +111,8 @@ static void choose_levels(npg_levels *levels, const npg_fit_settings *s)
                                .channel_end = NORMAL_END,
                                .share = 1,
                                .lambda = s->lambda,
-                               .screened = s->smoothing == 1,
+                               .screen = screen_of(s, s->lambda),
+                               .degree = degree_of(s),
                                .rate = s->grid_rate},
                    0);
 }

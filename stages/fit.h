@@ -26,11 +26,18 @@ typedef enum npg_catch_up {
     NPG_CATCH_UP_INTERPOLATED /* w = (1 - e) omega + e         */
 } npg_catch_up;
 
+/* M of the Sobolev steps (I + lambda M)^-1; D counts a grid node's neighbours, A joins them. */
+typedef enum npg_smoothing {
+    NPG_SMOOTHING_GRAPH,    /* D - A                                    */
+    NPG_SMOOTHING_SCREENED, /* 6 I + D - A: inside a grid 2 D - A        */
+    NPG_SMOOTHING_DOUBLED   /* 2 D - A: the published code's, at the border, too */
+} npg_smoothing;
+
 typedef enum npg_encoding { NPG_ENCODING_GRID, NPG_ENCODING_SINGLE, NPG_ENCODING_HASH } npg_encoding;
 
 typedef struct npg_fit_settings {
     int64_t epochs;
-    int rotation, time_code, encoding, confidence, catch_up, smoothing /* 0 graph, 1 screened */;
+    int rotation, time_code, encoding, confidence, catch_up, smoothing /* npg_smoothing */;
     int64_t frequencies;
     int64_t grid_base, grid_step, grid_levels, normal_nodes;
     bool normal_grid;

@@ -6,18 +6,11 @@
 
 #include "jacobi.h"
 #include "memory.h"
+#include "path_spectrum.h"
 
 #define SWEEPS 30
 
 /* ---- the solve ---- */
-
-/* Rows of an orthonormal cosine basis: basis[k][i]. */
-static void fill_basis(double *basis, int nodes)
-{
-    for (int k = 0; k < nodes; k++)
-        for (int i = 0; i < nodes; i++)
-            basis[k * nodes + i] = sqrt((k ? 2.0 : 1.0) / nodes) * cos(M_PI * k * (i + 0.5) / nodes);
-}
 
 /* Along one axis, whose neighbours lie `step` values apart: out = basis in, or its transpose. */
 static void turn_axis(double *values, double *line, const double *basis, int n, size_t step, size_t count,
@@ -35,27 +28,27 @@ static void turn_axis(double *values, double *line, const double *basis, int n, 
     }
 }
 
-npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double lambda)
+npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double degree,
+                              double lambda)
 {
     double *basis;
     size_t n = (size_t)nodes, c = (size_t)channels;
-    NPG_REQUIRE(nodes > 0 && channels > 0 && screen > 0 && lambda >= 0);
-    NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FILES, n + 1, n * sizeof *basis));
-    double *line = basis + n * n;
-    fill_basis(basis, nodes);
-    for (int back = 0; back < 2; back++) {
+    NPG_REQUIRE(nodes > 0 && channels > 0 && screen > 0 && degree >= 1 && lambda >= 0);
+    NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FILES, n + 2, n * sizeof *basis));
+    double *line = basis + n * n, *eigen = line + n;
+    npg_status status = npg_path_spectrum(basis, eigen, nodes, degree);
+    for (int back = 0; back < 2 && !status; back++) {
         for (size_t axis = 0, step = c; axis < 3; axis++, step *= n)
             turn_axis(values, line, basis, nodes, step, n * n * c, back);
         for (size_t i = 0; i < n * n * n * c && !back; i++) {
             size_t node = i / c;
             double sum = 0;
-            for (int axis = 0; axis < 3; axis++, node /= n)
-                sum += 2 - 2 * cos(M_PI * (double)(node % n) / nodes);
+            for (int axis = 0; axis < 3; axis++, node /= n) sum += eigen[node % n];
             values[i] /= screen + lambda * sum;
         }
     }
     npg_release(&basis);
-    return NPG_OK;
+    return status;
 }
 
 /* ---- the component ---- */

@@ -8,11 +8,11 @@
 extern "C" {
 #endif
 
-/* x = (a I + lambda L)^-1 y of a dense grid, L the Laplacian of the graph of neighbouring nodes: n^3 nodes
- * with C channels each ([n][n][n][C]), in place, in double on the host.  The cosine transform along each axis
- * makes the matrix diagonal: eigenvalues a + lambda sum_axis (2 - 2 cos(pi k_axis / n)).  O(C n^4).
- * NPG_MEMORY. */
-npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double lambda);
+/* x = (screen I + lambda (degree D - A))^-1 y of a dense grid (kernels/levels.h): n^3 nodes with C channels
+ * each ([n][n][n][C]), in place, in double on the host.  What makes the matrix of a path diagonal
+ * (kernels/path_spectrum.h) along each axis does so with the grid's.  O(C n^4).  NPG_MEMORY. */
+npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double degree,
+                              double lambda);
 
 /* The first principal component of `count` rows of C values: out[i] = direction . (row_i - mean), where
  * direction (C, unit length, its largest entry positive) is the eigenvector of the covariance's largest

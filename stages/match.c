@@ -7,6 +7,7 @@
 
 #include "kdtree.h"
 #include "mesh_tools.h"
+#include "query.h"
 
 #define OPPOSITE -0.2 /* cosine below which a point's normal speaks against the surface's */
 
@@ -174,11 +175,11 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
         npg_points_spread(m->targets, m->normals, (size_t)m->settings.points, points, normals, point_count);
     npg_mesh_vertex_normals(m->vert_normals, vert_unit, mesh->vert_count, mesh->faces, mesh->face_count);
     NPG_TRY(npg_surface_move(m->surface, vert_unit));
-    NPG_TRY(npg_surface_closest(m->surface, m->hits, m->targets, m->target_count));
+    NPG_TRY(npg_surface_closest_near(m->surface, m->hits, m->targets, m->target_count, NULL, NULL, 1));
     for (size_t i = 0; i < m->target_count; i++)
         face_point(m->rest + 3 * i, mesh->vert_pos, mesh->faces + 3 * (size_t)m->hits[i].face,
                    m->hits[i].weights);
-    NPG_TRY(npg_carry_find(m->carry, m->carriers, m->rest, m->target_count));
+    NPG_TRY(npg_carry_find(m->carry, m->carriers, m->rest, m->target_count, 1));
     match_targets(m, pulls, count, vert_unit, samples, normals != NULL);
     if (m->settings.reverse <= 0) return NPG_OK;
     return match_samples(m, pulls, count, samples, points, normals, point_count);

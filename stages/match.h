@@ -16,7 +16,8 @@ typedef struct npg_match_settings {
     double tie;     /* weight of keeping solved positions, for a whole frame                  */
 } npg_match_settings;
 
-/* carry is a loan that outlives the matcher. */
+/* carry is a loan that outlives the matcher.  A matcher works in its caller's thread; several may share a
+ * carry. */
 npg_status npg_matcher_open(npg_matcher **matcher, const npg_carry *carry,
                             const npg_match_settings *settings);
 void npg_matcher_close(npg_matcher **matcher);

@@ -55,8 +55,11 @@ static const npg_option options[] = {
     {"lambda", "smoothing of the coarsest level, 0 for none", REAL_OPTION, AT(lambda), "0.4", 0, 1e4, NULL,
      NULL},
     {"lambda-growth", "its growth per level", REAL_OPTION, AT(lambda_growth), "1.5", 0.1, 10, NULL, NULL},
-    {"smoothing", "matrix of the smoothing: I + lambda (D - A), or with 6 lambda on the diagonal",
-     CHOICE_OPTION, AT(smoothing), "screened", 0, 0, "graph|screened", NULL},
+    {"smoothing",
+     "matrix of the smoothing: I + lambda (D - A), the same with 6 lambda more on the diagonal, or I + "
+     "lambda "
+     "(2 D - A)",
+     CHOICE_OPTION, AT(smoothing), "screened", 0, 0, "graph|screened|doubled", NULL},
     {"normal-grid", "features by normal direction beside those by position", NPG_OPTION_FLAG, AT(normal_grid),
      "yes", 0, 0, NULL, NULL},
     {"normal-nodes", "nodes per axis of the normal grid", INT_OPTION, AT(normal_nodes), "4", 2, 32, NULL,

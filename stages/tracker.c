@@ -21,7 +21,9 @@
 #define TURN_MAX    0.6   /* of a node in one step, radians */
 #define MOVE_MAX    0.15  /* units */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface */
-#define LENT        0.35  /* share of the targets that the thread for surface -> points looks for */
+/* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
+#define LENT_PAIRS 0.35
+#define LENT_TERMS 0.18
 
 /* What each thread gathers: points -> surface; surface -> points and the edges. */
 enum { TO_SURFACE, TO_POINTS };
@@ -230,12 +232,13 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
-/* Points -> surface.  tracked: the mean distance, and its part of the Chamfer distance. */
-static void add_targets(npg_tracker *t, npg_tracked *tracked, const double *pose, bool with_normals,
-                        double width)
+/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the Chamfer
+ * distance. */
+static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t first, size_t last,
+                        const double *pose, bool with_normals, double width)
 {
     double sum = 0, squares = 0, share = 1 / (double)t->target_count;
-    for (size_t i = 0; i < t->target_count; i++) {
+    for (size_t i = first; i < last; i++) {
         const npg_surface_hit *hit = &t->hits[i];
         pull p;
         sum += sqrt((double)hit->dist_sq);
@@ -247,7 +250,7 @@ static void add_targets(npg_tracker *t, npg_tracked *tracked, const double *pose
         if (facing < -0.2) continue;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
-        add_pull(t, TO_SURFACE, &p, pose, share, width);
+        add_pull(t, part, &p, pose, share, width);
     }
     tracked->point_dist_mean = sum * share;
     tracked->chamfer = squares * share;
@@ -358,7 +361,7 @@ typedef struct step {
     const npg_kdtree *tree;
     const float *points, *normals;
     double width, stiffness;
-    npg_tracked tracked;
+    npg_tracked tracked[NPG_BLOCK_PARTS]; /* what each thread sums up */
     bool is_first, is_settling;
 } step;
 
@@ -370,12 +373,17 @@ static npg_status find_on_surface(const step *s, size_t first, size_t last)
                                     s->is_first ? NULL : t->start_face + first, NULL, 1);
 }
 
+static size_t lent_of(const npg_tracker *t, double share)
+{
+    return (size_t)(share * (double)t->target_count);
+}
+
 /* To look on the surface takes longer, so the thread of the other direction lends a hand. */
 static npg_status find_pairs(void *user, size_t part)
 {
     const step *s = user;
     const npg_tracker *t = s->t;
-    size_t lent = (size_t)(LENT * (double)t->target_count);
+    size_t lent = lent_of(t, LENT_PAIRS);
     if (part == TO_SURFACE) return find_on_surface(s, lent, t->target_count);
     npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
                             t->mesh->face_count);
@@ -388,13 +396,15 @@ static npg_status find_pairs(void *user, size_t part)
 static npg_status add_terms(void *user, size_t part)
 {
     step *s = user;
-    npg_block_clear(s->t->system, part);
-    if (part == TO_SURFACE) {
-        add_targets(s->t, &s->tracked, s->pose, s->normals != NULL, s->width);
-    } else {
-        add_samples(s->t, s->pose, s->points, s->normals, s->width);
-        add_edges(s->t, s->pose, s->stiffness);
-    }
+    npg_tracker *t = s->t;
+    size_t lent = lent_of(t, LENT_TERMS);
+    bool is_lent = part == TO_POINTS;
+    npg_block_clear(t->system, part);
+    add_targets(t, part, &s->tracked[part], is_lent ? 0 : lent, is_lent ? lent : t->target_count, s->pose,
+                s->normals != NULL, s->width);
+    if (part == TO_SURFACE) return NPG_OK;
+    add_samples(t, s->pose, s->points, s->normals, s->width);
+    add_edges(t, s->pose, s->stiffness);
     return NPG_OK;
 }
 
@@ -435,8 +445,8 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 {
     npg_tracker *t = s->t;
     NPG_TRY(gather(s));
-    tracked->point_dist_mean = s->tracked.point_dist_mean;
-    tracked->chamfer = s->tracked.chamfer + samples_chamfer(t);
+    tracked->point_dist_mean = s->tracked[TO_SURFACE].point_dist_mean + s->tracked[TO_POINTS].point_dist_mean;
+    tracked->chamfer = s->tracked[TO_SURFACE].chamfer + s->tracked[TO_POINTS].chamfer + samples_chamfer(t);
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");

@@ -4,14 +4,20 @@
 #include <math.h>
 #include <string.h>
 
+#include "parallel.h"
+
+#define MATCHERS_MAX 8
+
 struct npg_window_solver {
     npg_window_settings settings;
     const npg_facts *facts; /* loan */
     bool is_aligned;
     npg_fit *fit;
     npg_carry *carry;
-    npg_matcher *matcher;
-    npg_figure figure; /* of the reference */
+    npg_matcher *matchers[MATCHERS_MAX]; /* each for a frame at a time */
+    size_t matcher_count;
+    float *surfaces;   /* per matcher W x 3 */
+    npg_figure figure; /* of the reference  */
     /* of the window at work, owned */
     float *points;       /* all frames' points in units   */
     size_t *point_start; /* count + 1                     */
@@ -52,7 +58,8 @@ void npg_window_solver_close(npg_window_solver **slot)
     if (!slot || !*slot) return;
     close_frames(*slot);
     npg_fit_close(&(*slot)->fit);
-    npg_matcher_close(&(*slot)->matcher);
+    for (size_t m = 0; m < MATCHERS_MAX; m++) npg_matcher_close(&(*slot)->matchers[m]);
+    npg_release(&(*slot)->surfaces);
     npg_carry_close(&(*slot)->carry);
     npg_release(slot);
 }
@@ -106,6 +113,16 @@ static npg_status open_aligned_fit(npg_window_solver *s, npg_device *device, uin
     return status;
 }
 
+static npg_status open_matchers(npg_window_solver *s)
+{
+    size_t count = npg_parallel_parts(MATCHERS_MAX, 1, MATCHERS_MAX);
+    NPG_TRY(npg_alloc_array(&s->surfaces, NPG_FOR_FIT, count * s->carry->surface->mesh->vert_count,
+                            3 * sizeof(float)));
+    for (; s->matcher_count < count; s->matcher_count++)
+        NPG_TRY(npg_matcher_open(&s->matchers[s->matcher_count], s->carry, &s->settings.match));
+    return NPG_OK;
+}
+
 npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
                                   const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
                                   bool is_aligned)
@@ -123,7 +140,7 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     npg_status status = NPG_OK;
     if (is_aligned)
         status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples, NPG_THIN_SURFACE);
-    if (is_aligned && !status) status = npg_matcher_open(&s->matcher, s->carry, &settings->match);
+    if (is_aligned && !status) status = open_matchers(s);
     s->figure = (npg_figure){.scale = 1};
     if (!status)
         status = is_aligned ? open_aligned_fit(s, device, seed)
@@ -186,12 +203,12 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
 
 /* ---- aligned frames ---- */
 
-/* Where the samples now carry the surface that points are matched with. */
-static void carry_surface(npg_window_solver *s, const npg_frame *frame, size_t i)
+/* Where the samples now carry the surface that points are matched with (W x 3). */
+static void carry_surface(const npg_window_solver *s, float *surface, const npg_frame *frame, size_t i)
 {
     size_t size = 3 * npg_window_sample_count(s);
-    npg_thin_gather(s->carry->surface, s->dense, frame->vert_unit);
-    npg_carriers_move(s->carry->surface_carriers, s->carry->surface->mesh->vert_count, s->dense,
+    npg_thin_gather(s->carry->surface, surface, frame->vert_unit);
+    npg_carriers_move(s->carry->surface_carriers, s->carry->surface->mesh->vert_count, surface,
                       s->bases + i * size, s->now + i * size);
 }
 
@@ -225,25 +242,54 @@ static void move_pulls(const npg_figure *figure, npg_pull *pulls, size_t count)
                 (float)(((double)pulls[i].constant[a] + figure->centre[a]) * figure->scale);
 }
 
-/* Pulls of all frames at the samples' present positions. */
+typedef struct matching {
+    npg_window_solver *s;
+    npg_held *const *held;
+    size_t most;    /* pulls of a frame, whose own begin at i * most */
+    size_t *counts; /* of the frames' pulls                          */
+} matching;
+
+static npg_status match_frame(const matching *m, size_t i, npg_matcher *matcher, float *surface)
+{
+    const npg_window_solver *s = m->s;
+    const npg_frame *frame = &m->held[i]->frame;
+    size_t size = 3 * npg_window_sample_count(s);
+    npg_pull *pulls = s->pulls + i * m->most;
+    m->counts[i] = 0;
+    carry_surface(s, surface, frame, i);
+    NPG_TRY(npg_match_points(matcher, pulls, &m->counts[i], surface, s->now + i * size,
+                             s->points + 3 * s->point_start[i], frame->normals, frame->point_count));
+    if (m->held[i]->solved) {
+        npg_carry_gather(s->carry, surface, m->held[i]->solved); /* no more than W */
+        npg_match_tie(matcher, pulls, &m->counts[i], surface);
+    }
+    move_pulls(&s->figures[i], pulls, m->counts[i]);
+    return NPG_OK;
+}
+
+static npg_status match_share(void *user, size_t part)
+{
+    const matching *m = user;
+    npg_window_solver *s = m->s;
+    float *surface = s->surfaces + 3 * part * s->carry->surface->mesh->vert_count;
+    for (size_t i = part; i < s->count; i += s->matcher_count)
+        NPG_TRY(match_frame(m, i, s->matchers[part], surface));
+    return NPG_OK;
+}
+
+/* Pulls of all frames at the samples' present positions; several frames at a time. */
 static npg_status match_all(npg_window_solver *s, npg_held *const *held)
 {
-    size_t size = 3 * npg_window_sample_count(s), most = npg_matcher_most(s->matcher), count = 0;
+    matching m = {s, held, npg_matcher_most(s->matchers[0]), NULL};
     npg_release(&s->pulls);
     npg_release(&s->pull_start);
-    NPG_TRY(npg_alloc_array(&s->pulls, NPG_FOR_FIT, s->count * most, sizeof *s->pulls));
+    NPG_TRY(npg_alloc_array(&s->pulls, NPG_FOR_FIT, s->count * m.most, sizeof *s->pulls));
     NPG_TRY(npg_alloc_array(&s->pull_start, NPG_FOR_FIT, s->count + 1, sizeof *s->pull_start));
-    for (size_t i = 0; i < s->count; i++) {
-        const npg_frame *frame = &held[i]->frame;
-        carry_surface(s, frame, i);
-        NPG_TRY(npg_match_points(s->matcher, s->pulls, &count, s->dense, s->now + i * size,
-                                 s->points + 3 * s->point_start[i], frame->normals, frame->point_count));
-        if (held[i]->solved) {
-            npg_carry_gather(s->carry, s->dense, held[i]->solved); /* no more than V */
-            npg_match_tie(s->matcher, s->pulls, &count, s->dense);
-        }
-        move_pulls(&s->figures[i], s->pulls + s->pull_start[i], count - s->pull_start[i]);
-        s->pull_start[i + 1] = count;
+    m.counts = s->pull_start + 1;
+    NPG_TRY(npg_parallel(match_share, &m, s->matcher_count));
+    for (size_t i = 0; i < s->count; i++) { /* one behind the other */
+        memmove(s->pulls + s->pull_start[i], s->pulls + i * m.most, m.counts[i] * sizeof *s->pulls);
+        s->pull_start[i + 1] += s->pull_start[i];
     }
     return npg_fit_set_pulls(s->fit, s->pulls, s->pull_start);
 }

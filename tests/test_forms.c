@@ -418,16 +418,22 @@ static void a_rigid_motion_is_found(void **state)
 static void features_invert_the_grid_matrix(void **state)
 {
     (void)state;
-    for (int screened = 0; screened < 2; screened++) {
+    static const double matrices[3][2] = {{1, 1}, {19, 1}, {1, 2}}; /* screen, degree */
+    for (int m = 0; m < 3; m++) {
+        double screen = matrices[m][0], degree = matrices[m][1];
         npg_levels levels = {0};
-        npg_level level = {
-            .kind = NPG_LEVEL_POSITION, .nodes = 5, .channel_end = 32, .lambda = 3, .screened = screened};
+        npg_level level = {.kind = NPG_LEVEL_POSITION,
+                           .nodes = 5,
+                           .channel_end = 32,
+                           .lambda = 3,
+                           .screen = screen,
+                           .degree = degree};
         npg_levels_add(&levels, level, 0);
         size_t count = levels.row_count * NPG_LATENT_CHANNELS;
         double *unknowns = calloc(count, sizeof *unknowns), *x = calloc(count, sizeof *x),
                *again = calloc(count, sizeof *again);
         for (size_t i = 0; i < count; i++) x[i] = unknowns[i] = sin(1.7 * (double)i) + (double)(i % 7);
-        assert_int_equal(npg_features_solve(x, 5, NPG_LATENT_CHANNELS, screened ? 19 : 1, 3), NPG_OK);
+        assert_int_equal(npg_features_solve(x, 5, NPG_LATENT_CHANNELS, screen, degree, 3), NPG_OK);
         npg_sobolev_apply_ref(again, x, &levels);
         for (size_t i = 0; i < count; i++) assert_true(fabs(again[i] - unknowns[i]) < 1e-10);
         free(unknowns);

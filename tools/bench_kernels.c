@@ -88,8 +88,8 @@ static npg_status open_grids(grids *g, const bench *b, size_t rows)
     for (int l = 0; l < 8; l++)
         npg_levels_add(
             &g->levels,
-            (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4 * pow(1.5, l), true, 1}, 0);
-    npg_levels_add(&g->levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, true, 1}, 0);
+            (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4 * pow(1.5, l), 3.4, 1, 1}, 0);
+    npg_levels_add(&g->levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, 3.4, 1, 1}, 0);
     NPG_TRY(
         npg_samples_open(&samples, &g->levels, mesh->vert_pos, mesh->vert_normals, mesh->vert_count, rows));
     npg_status status = npg_latent_open(&g->latent, b->meter->device, &samples);

@@ -20,10 +20,10 @@ typedef struct npg_vdb_place {
  * "position_L05_c03" (level 5, channels 3 to 5), what is left over makes float grids "normal_L08_c30".  The
  * voxel (i, j, k) is node (i, j, k) of the level; the transform takes it to world coordinates (grids over
  * normal directions: to the cube [-1, 1]^3).  Every grid has the metadata npg_level, npg_nodes, npg_lambda,
- * npg_screen (a of a I + lambda L), npg_channel_first, npg_frame_first, npg_frame_last; the file has
- * npg_window, npg_levels, npg_world_centre, npg_unit_per_world.  Values are the unknowns of the fit,
- * differential coordinates: the features are (a I + lambda L)^-1 of them.  Single precision, exact.  Hashed
- * levels are not written. */
+ * npg_screen and npg_degree (a and b of a I + lambda (b D - A)), npg_channel_first, npg_frame_first,
+ * npg_frame_last; the file has npg_window, npg_levels, npg_world_centre, npg_unit_per_world.  Values are the
+ * unknowns of the fit, differential coordinates: the features are that matrix, inverted, times them.  Single
+ * precision, exact.  Hashed levels are not written. */
 npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const float *rows,
                                const npg_vdb_place *place);
 
