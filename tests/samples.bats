@@ -44,8 +44,9 @@ highest() { sed -n 's/.*highest vertex at y = //p' <<<"$output"; }
     awk -v y="$(highest)" 'BEGIN { exit !(y > 0.5 && y < 1.5) }'
     dropped=$(grep -A 3 '"floor": {' own/report.json | sed -n 's/.*"points_dropped": \([0-9]*\).*/\1/p')
     [ "$dropped" -gt 100 ]
-    # what remains lies above the floor, but for the surface's slack
-    "$NEUPIG" probe own/meshes --json >probe.json || [ $? -eq 7 ]
+    # what remains lies above the floor, but for the surface's slack (in other frames than its own nothing holds
+    # the end that the floor took)
+    "$NEUPIG" probe own/reference.ply --json >probe.json || [ $? -eq 7 ]
     awk '/"low"/ { getline; getline; exit !($1 + 0 > -0.3) }' probe.json
     grep -q '"own_stages":' own/job/job.json
 }
