@@ -16,8 +16,8 @@ typedef struct npg_thin {
     uint32_t *vertex; /* T, ascending: which vertex of the whole each one is                  */
 } npg_thin;
 
-/* About vert_target vertices by edge collapse (meshoptimizer); with 0, or where no more than a fifth would go,
- * all that have a face.  whole is a loan during the call. */
+/* About vert_target vertices by edge collapse (meshoptimizer); with 0, or where no more than a fifth would
+ * go, all that have a face.  whole is a loan during the call. */
 npg_status npg_thin_open(npg_thin **thin, const npg_mesh *whole, size_t vert_target);
 void npg_thin_close(npg_thin **thin);
 
