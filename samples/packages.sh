@@ -6,8 +6,8 @@ packages_to_build="build-essential cmake ninja-build pkg-config pocl-opencl-icd 
 libpcl-dev libeigen3-dev libboost-dev libembree-dev libopenvdb-dev libtbb-dev libmeshoptimizer-dev libjansson-dev
 libpng-dev libzstd-dev libxxhash-dev libnanoflann-dev"
 
-packages_to_test="libcmocka-dev bats clang-format-14 clang-14 libclang-rt-14-dev zsh python3-numpy python3-venv libxml2-utils parallel
-slurmctld slurmd slurm-client munge"
+packages_to_test="libcmocka-dev bats clang-format-14 clang-14 libclang-rt-14-dev zsh python3-numpy python3-venv python3-vtk9 blender
+libxml2-utils parallel slurmctld slurmd slurm-client munge"
 
 # Install those of the named packages that are missing; says what it installs, asks nothing.
 install_packages()
