@@ -8,6 +8,8 @@ libpng-dev libzstd-dev libxxhash-dev libnanoflann-dev"
 
 packages_to_test="libcmocka-dev bats clang-format-14 clang-14 libclang-rt-14-dev zsh python3-numpy python3-venv python3-vtk9 blender
 libxml2-utils parallel slurmctld slurmd slurm-client munge"
+# Node from elsewhere brings an npm that Debian's would not go with.
+command -v npm >/dev/null || packages_to_test="$packages_to_test nodejs npm"
 
 # Install those of the named packages that are missing; says what it installs, asks nothing.
 install_packages()
