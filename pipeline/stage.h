@@ -51,6 +51,7 @@ typedef struct npg_facts {
     npg_frame_box box;
     npg_plan plan;     /* with the keyframe by score                                    */
     npg_choice choice; /* what the choosing pass should look at                        */
+    size_t own_verts;  /* vertices of the user's own mesh; 0: the reference is to be made */
     /* mesh; it also sets plan.key at the end of the choosing pass */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
     double unseen_share; /* share of the reference's area that no point of its frame saw  */
@@ -103,8 +104,8 @@ const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);
 
-/* Vertices of the reference mesh; before it is known, as many as the option faces and the points let it have.
- */
+/* Vertices of the reference mesh; before it is known, those of the user's own mesh, or as many as the option
+ * faces and the points let it have. */
 size_t npg_worker_verts_at_most(const npg_worker *worker);
 
 /* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called

@@ -47,6 +47,7 @@ size_t npg_worker_verts_at_most(const npg_worker *worker)
     const char *text = npg_options_get(worker->run->options, "faces");
     size_t faces = text ? (size_t)strtoull(text, NULL, 10) : 0, by_points = 4 * facts->point_count_max;
     if (facts->reference) return facts->reference->vert_count;
+    if (facts->own_verts) return facts->own_verts;
     if (by_points && faces > by_points) faces = by_points;
     return faces ? faces / 2 + 2 : 0; /* a closed mesh has half as many vertices as faces */
 }

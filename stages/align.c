@@ -280,12 +280,12 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    size_t verts = facts->reference ? facts->reference->vert_count : 10000, nodes = (size_t)s->nodes;
+    size_t verts = npg_worker_verts_at_most(worker), nodes = (size_t)s->nodes;
     *chunks_held = 1;
     if (!s->is_on) return 0;
-    /* two sides of two poses; blocks of the equations, about 20 pairs a node; per vertex weights, positions,
-     * normals */
-    return nodes * (4 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 160 +
+    /* two sides of two poses; blocks of the equations, about 20 pairs a node; per vertex weights and the
+     * graph's search for them, positions, normals */
+    return nodes * (4 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 320 +
            facts->point_count_max * 40;
 }
 

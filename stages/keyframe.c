@@ -162,8 +162,10 @@ static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_fram
 {
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
-    if (!state->likeness)
+    if (!state->likeness) {
         NPG_TRY(npg_likeness_open(&state->likeness, own_mesh(worker), &facts->origin, &facts->box));
+        facts->own_verts = npg_likeness_vert_count(state->likeness);
+    }
     NPG_TRY(npg_likeness_dist(&c->dist_unit, state->likeness, frame, &facts->box));
     c->score = -c->dist_unit;
     return NPG_OK;

@@ -12,7 +12,7 @@
 
 struct npg_likeness {
     float *verts; /* at most KEPT, in units */
-    size_t vert_count;
+    size_t vert_count, whole_count;
     npg_kdtree *tree;
 };
 
@@ -32,6 +32,7 @@ static size_t spread_finite(float *out, size_t most, const float *points, size_t
 static npg_status take_mesh(npg_likeness *likeness, const npg_mesh *mesh, const npg_frame_box *box)
 {
     NPG_TRY(npg_alloc_array(&likeness->verts, NPG_FOR_RUN, KEPT, 3 * sizeof *likeness->verts));
+    likeness->whole_count = mesh->vert_count;
     likeness->vert_count = spread_finite(likeness->verts, KEPT, mesh->vert_pos, mesh->vert_count);
     npg_box_local_to_unit(box, likeness->verts, likeness->verts, likeness->vert_count);
     return npg_kdtree_open(&likeness->tree, likeness->verts, likeness->vert_count);
@@ -51,6 +52,11 @@ npg_status npg_likeness_open(npg_likeness **out, const char *path, npg_origin *o
     if (status) npg_likeness_close(&likeness);
     *out = likeness;
     return status;
+}
+
+size_t npg_likeness_vert_count(const npg_likeness *likeness)
+{
+    return likeness->whole_count;
 }
 
 void npg_likeness_close(npg_likeness **slot)

@@ -404,9 +404,9 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;
-    size_t verts = facts->reference ? facts->reference->vert_count : 10000;
-    return npg_fit_memory(&s->window_settings.fit, verts, frames, facts->point_count_max, 2) +
-           frames * verts * 3 * sizeof(float);
+    const char *align = npg_options_get(npg_worker_options(worker), "align");
+    return npg_window_memory(&s->window_settings, align && !strcmp(align, "yes"),
+                             npg_worker_verts_at_most(worker), frames, facts->point_count_max);
 }
 
 const npg_stage npg_stage_optimize = {

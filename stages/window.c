@@ -113,9 +113,14 @@ static npg_status open_aligned_fit(npg_window_solver *s, npg_device *device, uin
     return status;
 }
 
+static size_t matcher_count(void)
+{
+    return npg_parallel_parts(MATCHERS_MAX, 1, MATCHERS_MAX);
+}
+
 static npg_status open_matchers(npg_window_solver *s)
 {
-    size_t count = npg_parallel_parts(MATCHERS_MAX, 1, MATCHERS_MAX);
+    size_t count = matcher_count();
     NPG_TRY(npg_alloc_array(&s->surfaces, NPG_FOR_FIT, count * s->carry->surface->mesh->vert_count,
                             3 * sizeof(float)));
     for (; s->matcher_count < count; s->matcher_count++)
@@ -148,6 +153,28 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
+}
+
+#define UNITS 2 /* of the device, whose scratch memory counts: on more the drivers' own counts more */
+
+/* A surface's copy, its search tree and what a matcher keeps per vertex. */
+#define SURFACE_BYTES 400
+
+size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, size_t vert_count,
+                         size_t frames, size_t points)
+{
+    const size_t vector = 3 * sizeof(float);
+    size_t all = (size_t)settings->samples ? (size_t)settings->samples : vert_count;
+    size_t samples = all + all / 10 + 16, looked_at = (size_t)settings->match.points;
+    size_t solved = frames * vert_count * vector, clouds = frames * points * vector;
+    if (!is_aligned)
+        return npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS) + solved + clouds;
+    if (samples > vert_count) samples = vert_count;
+    size_t surface = vert_count < 2 * NPG_THIN_SURFACE ? vert_count : NPG_THIN_SURFACE;
+    size_t pulls = frames * (looked_at + 2 * samples) * sizeof(npg_pull);
+    return npg_fit_memory(&settings->fit, samples, frames, looked_at, UNITS) + solved + clouds + 2 * pulls +
+           4 * frames * samples * vector + vert_count * (sizeof(npg_carrier) + vector) +
+           (1 + matcher_count()) * surface * SURFACE_BYTES;
 }
 
 /* ---- the window's frames ---- */

@@ -51,6 +51,10 @@ npg_status npg_window_solver_open(npg_window_solver **solver, npg_device *device
                                   const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
                                   bool is_aligned);
 void npg_window_solver_close(npg_window_solver **solver);
+
+/* Bytes that a solver takes at most, with windows of `frames` frames of at most `points` points. */
+size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, size_t vert_count,
+                         size_t frames, size_t points);
 npg_fit *npg_window_fit(npg_window_solver *solver); /* a loan */
 size_t npg_window_sample_count(const npg_window_solver *solver);
 
