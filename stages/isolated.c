@@ -125,7 +125,8 @@ npg_status npg_isolated_drop(npg_isolated *isolated, npg_frame *const *frames, s
     looks s = {.neighbours = neighbours, .ratio = ratio};
     npg_status status = npg_alloc_array(&s.all, NPG_FOR_FRAMES, count + 1, sizeof *s.all);
     for (size_t i = 0; i < count && !status; i++)
-        if (!frames[i]->is_skipped) status = begin_look(isolated, &s.all[s.count++], frames[i]);
+        if (!frames[i]->is_skipped && frames[i]->point_count)
+            status = begin_look(isolated, &s.all[s.count++], frames[i]);
     s.parts = npg_parallel_parts(s.count, 1, s.count);
     if (!status && s.parts) status = npg_parallel(filter_share, &s, s.parts);
     for (size_t i = 0; i < s.count && !status; i++) status = end_look(isolated, &s.all[i]);
