@@ -45,6 +45,8 @@ static npg_status next_line(header_line *line, npg_source *source)
             return npg_source_bad_line(source, "more than %d fields", FIELDS_MAX);
         line->words[line->word_count++] = word;
     }
+    /* PCL 1.13 reads past its list of words in a line that has none but blanks. */
+    if (!line->word_count) return npg_source_bad_line(source, "an empty line in the header");
     return NPG_OK;
 }
 
@@ -198,7 +200,7 @@ static npg_status read_header(pcd_header *h, npg_source *source)
     for (int i = 0; !status && !h->data[0]; i++) {
         if (i == 1000) status = npg_source_bad_line(source, "no line DATA in the first 1000 lines");
         if (!status) status = next_line(line, source);
-        if (!status && line->word_count && line->words[0][0] != '#') status = take_line(h, line, source);
+        if (!status && line->words[0][0] != '#') status = take_line(h, line, source);
     }
     if (!status) status = check_header(h, source);
     npg_release(&line);

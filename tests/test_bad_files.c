@@ -150,6 +150,9 @@ static const struct bad_file {
     {"a.obj", BYTES("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n"), "is not there (3 are)"},
     /* PCD */
     {"a.pcd", BYTES("VERSION 0.7\n"), "the file ends inside the header"},
+    {"a.pcd",
+     BYTES("VERSION 0.7\n \nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 3\n"),
+     "line 2: an empty line in the header"},
     {"a.pcd", BYTES("VERSION 0.7\nFIELDS x y z\nSIZE 4 4\n"), "line 3: SIZE has 2 entries for 3 fields"},
     {"a.pcd", BYTES(PCD("9 -4 4", "F F F", "1", "1", "ascii") "1 2 3\n"), "line 3: field \"x\" has size 9"},
     {"a.pcd", BYTES(PCD("2 4 4", "F F F", "1", "1", "ascii") "1 2 3\n"), "field \"x\" is a float of 2 bytes"},
