@@ -1,8 +1,7 @@
 /* Carry: choosing samples, and carrying the dense surface along. */
 #include "carry.h"
 
-#include <string.h>
-
+#include "mesh_tools.h"
 #include "query.h"
 
 static npg_status find_vertices(npg_carry *carry)
@@ -73,8 +72,7 @@ npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const f
 
 void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_pos)
 {
-    for (size_t s = 0; s < carry->samples->mesh->vert_count; s++)
-        memcpy(samples + 3 * s, vert_pos + 3 * (size_t)carry->vertex[s], 3 * sizeof(float));
+    npg_rows_gather(samples, vert_pos, carry->vertex, carry->samples->mesh->vert_count);
 }
 
 void npg_carriers_move(const npg_carrier *carriers, size_t vert_count, float *vert_pos, const float *before,

@@ -67,9 +67,9 @@ static size_t dropped_by(const look *l)
     return count;
 }
 
-static npg_status remember(npg_isolated *isolated, const look *l)
+static npg_status remember(npg_isolated *isolated, const look *l, size_t dropped)
 {
-    size_t index = (size_t)l->frame->index, dropped = dropped_by(l), count = 0;
+    size_t index = (size_t)l->frame->index, count = 0;
     size_t bytes = dropped * sizeof(uint32_t) + sizeof(memory);
     if (l->is_known || l->frame->index < 0 || isolated->bytes + bytes > isolated->byte_max) return NPG_OK;
     if (index >= isolated->frame_count) {
@@ -90,8 +90,8 @@ static npg_status remember(npg_isolated *isolated, const look *l)
 
 static npg_status end_look(npg_isolated *isolated, const look *l)
 {
-    NPG_TRY(remember(isolated, l));
     size_t dropped = dropped_by(l);
+    NPG_TRY(remember(isolated, l, dropped));
     if (dropped) npg_frame_keep(l->frame, l->keep);
     l->frame->cleaning.isolated += dropped;
     return NPG_OK;

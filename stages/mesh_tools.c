@@ -280,6 +280,12 @@ done:
     return status;
 }
 
+void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        for (size_t a = 0; a < 3; a++) out[3 * i + a] = rows[3 * (size_t)which[i] + a];
+}
+
 size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
                          const float *normals, size_t point_count)
 {

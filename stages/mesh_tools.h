@@ -44,6 +44,9 @@ npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
  */
 npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
 
+/* out (count x 3) = the rows of rows (x 3) that which[] names. */
+void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count);
+
 /* Copy at most `most` of the points (N x 3), evenly by their order, and of their normals where there are any.
  * Returns how many. */
 size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,

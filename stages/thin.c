@@ -5,6 +5,8 @@
 
 #include <meshoptimizer.h>
 
+#include "mesh_tools.h"
+
 /* Faces that remain, still over the whole's vertices. */
 static npg_status decimate(uint32_t **faces, size_t *face_count, const npg_mesh *whole, size_t vert_target)
 {
@@ -75,6 +77,5 @@ void npg_thin_close(npg_thin **slot)
 
 void npg_thin_gather(const npg_thin *thin, float *out, const float *rows)
 {
-    for (size_t t = 0; t < thin->mesh->vert_count; t++)
-        memcpy(out + 3 * t, rows + 3 * (size_t)thin->vertex[t], 3 * sizeof(float));
+    npg_rows_gather(out, rows, thin->vertex, thin->mesh->vert_count);
 }

@@ -387,8 +387,7 @@ static npg_status find_pairs(void *user, size_t part)
     if (part == TO_SURFACE) return find_on_surface(s, lent, t->target_count);
     npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
                             t->mesh->face_count);
-    for (size_t i = 0; i < t->sample_count; i++)
-        memcpy(t->sample_pos + 3 * i, t->vert_pos + 3 * (size_t)t->samples[i], 3 * sizeof(float));
+    npg_rows_gather(t->sample_pos, t->vert_pos, t->samples, t->sample_count);
     NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
     return find_on_surface(s, 0, lent);
 }
