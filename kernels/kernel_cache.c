@@ -2,8 +2,8 @@
 #include "kernel_cache.h"
 
 #include <dirent.h>
+#include <errno.h>
 #include <fcntl.h>
-#include <ftw.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +15,7 @@
 #include <xxhash.h>
 
 #include "file.h"
+#include "folder.h"
 #include "kernel_sources.h"
 
 #define PRIVATE_PREFIX "neupig-kernels-"
@@ -62,18 +63,6 @@ static void take_shared(void)
     }
 }
 
-static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info, (void)kind, (void)walk;
-    remove(path);
-    return 0;
-}
-
-static void remove_folder(const char *path)
-{
-    nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
-}
-
 /* ---- private folders: each with a lock file that its process holds as long as it lives ---- */
 
 static const char *private_parent(void)
@@ -113,7 +102,7 @@ static void remove_left_behind(void)
         char path[4096];
         if (strncmp(entry->d_name, PRIVATE_PREFIX, length) != 0) continue;
         snprintf(path, sizeof path, "%s/%s", private_parent(), entry->d_name);
-        if (is_left_behind(path)) remove_folder(path);
+        if (is_left_behind(path)) npg_folder_remove(path);
     }
     if (parent) closedir(parent);
 }
@@ -123,8 +112,10 @@ static npg_status make_private(void)
     snprintf(private_folder, sizeof private_folder, "%s/" PRIVATE_PREFIX "XXXXXX", private_parent());
     bool is_made = mkdtemp(private_folder) != NULL;
     if (is_made && lock_private(private_folder, O_CREAT) >= 0) return NPG_OK;
+    int cause = errno;
+    if (is_made) npg_folder_remove(private_folder);
+    errno = cause;
     npg_status status = npg_error_errno(NPG_DISK, "%s", private_folder);
-    if (is_made) remove_folder(private_folder);
     private_folder[0] = 0;
     return status;
 }
@@ -165,7 +156,7 @@ npg_status npg_kernel_cache_enter(void)
 
 static void remove_private(void)
 {
-    if (private_folder[0]) remove_folder(private_folder);
+    if (private_folder[0]) npg_folder_remove(private_folder);
 }
 
 /* The driver keeps using the folder until the process ends, so that is when it goes. */

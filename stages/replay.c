@@ -1,7 +1,6 @@
 /* Replay: records of windows read back, and their decoders asked for any time. */
 #include "replay.h"
 
-#include <dirent.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +8,7 @@
 
 #include "archive.h"
 #include "file.h"
+#include "folder.h"
 #include "latent.h"
 #include "mlp.h"
 #include "record.h"
@@ -29,7 +29,7 @@ typedef struct open_record {
 struct npg_replay {
     char *folder;
     record *records; /* in the order they were solved; owned */
-    size_t count, capacity;
+    size_t count;
     open_record open[OPEN_MOST];
     uint64_t clock;
     npg_mlp mlp; /* of one frame */
@@ -137,28 +137,15 @@ static npg_status read_record(const npg_replay *r, npg_archive **out, record *of
     return status;
 }
 
-static int by_serial(const void *a, const void *b)
-{
-    int64_t left = ((const record *)a)->serial, right = ((const record *)b)->serial;
-    return (left > right) - (left < right);
-}
-
+/* A record for each window, in the order they were solved. */
 static npg_status find_records(npg_replay *r)
 {
-    npg_status status = NPG_OK;
-    DIR *listing = opendir(r->folder);
-    if (!listing) return NPG_END; /* live runs keep none */
-    for (struct dirent *entry; !status && (entry = readdir(listing));) {
-        long long serial;
-        char rest[8];
-        if (sscanf(entry->d_name, "motion_%lld.%7s", &serial, rest) != 2 || strcmp(rest, "npg") != 0)
-            continue;
-        status = npg_grow(&r->records, &r->capacity, r->count + 1, sizeof *r->records, NPG_FOR_FILES);
-        if (!status) r->records[r->count++] = (record){.serial = serial};
-    }
-    closedir(listing);
-    if (!status && !r->count) return NPG_END;
-    if (!status) qsort(r->records, r->count, sizeof *r->records, by_serial);
+    int64_t *serials;
+    NPG_TRY(npg_folder_numbers(&serials, &r->count, r->folder, "motion_", "npg"));
+    if (!r->count) return NPG_END; /* live runs keep none */
+    npg_status status = npg_alloc_array(&r->records, NPG_FOR_FILES, r->count, sizeof *r->records);
+    for (size_t i = 0; i < r->count && !status; i++) r->records[i].serial = serials[i];
+    npg_release(&serials);
     return status;
 }
 

@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 
 #include "file.h"
+#include "folder.h"
 #include "group_folder.h"
 #include "memory.h"
 #include "stage.h"
@@ -224,6 +225,55 @@ static void any_bytes_become_a_json_text(void **state)
     npg_memory_fail_at(0, false);
 }
 
+static void files_are_found_by_their_numbers(void **state)
+{
+    static const char *const names[] = {"w_000010.vdb",
+                                        "w_2.vdb",
+                                        "w_000003.vdb",
+                                        "w_.vdb",
+                                        "w_4.vdbx",
+                                        "w_5.npg",
+                                        "xw_6.vdb",
+                                        "w_7",
+                                        "w_8vdb",
+                                        "w_-9.vdb",
+                                        "w_ 9.vdb",
+                                        "w_9.9.vdb",
+                                        "w_99999999999999999999.vdb"};
+    int64_t *numbers;
+    size_t count;
+    (void)state;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        assert_int_equal(write_text_file(in_folder(&folder, names[i]), ""), 0);
+    assert_int_equal(npg_folder_numbers(&numbers, &count, folder.path, "w_", "vdb"), NPG_OK);
+    assert_int_equal(count, 3);
+    assert_true(numbers[0] == 2 && numbers[1] == 3 && numbers[2] == 10);
+    npg_release(&numbers);
+    assert_int_equal(npg_folder_numbers(&numbers, &count, in_folder(&folder, "none"), "w_", "vdb"), NPG_OK);
+    assert_true(!numbers && !count);
+    assert_int_equal(npg_folder_numbers(&numbers, &count, in_folder(&folder, "w_7"), "w_", "vdb"), NPG_DISK);
+    assert_non_null(strstr(npg_error_text(), "w_7"));
+    assert_int_equal(npg_memory_used(), 0);
+}
+
+static void a_folder_goes_but_not_what_its_links_lead_to(void **state)
+{
+    (void)state;
+    assert_int_equal(npg_make_folder(in_folder(&folder, "kept")), NPG_OK);
+    assert_int_equal(npg_make_folder(in_folder(&folder, "gone/deep/deeper")), NPG_OK);
+    assert_int_equal(write_text_file(in_folder(&folder, "kept/file"), "x"), 0);
+    assert_int_equal(write_text_file(in_folder(&folder, "gone/deep/file"), "x"), 0);
+    assert_int_equal(symlink(in_folder(&folder, "kept"), in_folder(&folder, "gone/link")), 0);
+    assert_int_equal(npg_folder_remove(in_folder(&folder, "gone")), NPG_OK);
+    assert_false(exists(in_folder(&folder, "gone")));
+    assert_true(exists(in_folder(&folder, "kept/file")));
+    assert_int_equal(npg_folder_remove(in_folder(&folder, "kept/file")), NPG_OK);
+    assert_false(exists(in_folder(&folder, "kept/file")));
+    assert_int_equal(npg_folder_remove(in_folder(&folder, "gone")), NPG_OK); /* there is nothing to do */
+    assert_int_equal(npg_folder_remove("/proc/self"), NPG_DISK);             /* nobody can */
+    assert_non_null(strstr(npg_error_text(), "can't remove /proc/self"));
+}
+
 static void no_memory_is_said(void **state)
 {
     (void)state;
@@ -255,6 +305,8 @@ int main(void)
         cmocka_unit_test(a_link_in_the_way_is_not_followed),
         cmocka_unit_test(paths_join),
         cmocka_unit_test(any_bytes_become_a_json_text),
+        cmocka_unit_test(files_are_found_by_their_numbers),
+        cmocka_unit_test(a_folder_goes_but_not_what_its_links_lead_to),
         cmocka_unit_test(no_memory_is_said),
     };
     return cmocka_run_group_tests(tests, open_folder, close_folder);

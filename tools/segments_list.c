@@ -1,7 +1,6 @@
 /* The list of segments, and the folders they lie in. */
 #include <dirent.h>
 #include <errno.h>
-#include <ftw.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +9,7 @@
 
 #include "export.h"
 #include "file.h"
+#include "folder.h"
 #include "json_file.h"
 #include "listing.h"
 #include "segments.h"
@@ -159,24 +159,11 @@ bool npg_segments_was_alarmed(const npg_segments *s)
 
 /* ---- files ---- */
 
-static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *place)
-{
-    (void)info, (void)kind, (void)place;
-    return remove(path);
-}
-
-static npg_status remove_tree(const char *path)
-{
-    if (nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS) && errno != ENOENT)
-        return npg_error_errno(NPG_DISK, "can't remove %s", path);
-    return NPG_OK;
-}
-
 static npg_status remove_in(const char *folder, const char *name)
 {
     char *path;
     NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = remove_tree(path);
+    npg_status status = npg_folder_remove(path);
     npg_release(&path);
     return status;
 }
