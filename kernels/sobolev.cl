@@ -1,9 +1,9 @@
 /* sobolev: x = (a I + lambda L)^-1 y on every grid level, exactly.
  *
  * L of an n^3 grid is the Kronecker sum of three matrices of paths, which an orthonormal matrix C (n x n)
- * diagonalises (path_spectrum.h; for the graph's Laplacian the DCT-II with 2 - 2 cos(pi k / n)).  So the solve is C on
- * each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper: section on the objectives, "Preconditioning";
- * the published code iterates conjugate gradients instead.
+ * diagonalises (path_spectrum.h; for the graph's Laplacian the DCT-II with 2 - 2 cos(pi k / n)).  So the solve
+ * is C on each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper:
+ * section on the objectives, "Preconditioning"; the published code iterates conjugate gradients instead.
  *
  * levels: [L][4] = {n, first node, first line, offset of its matrix}; the node (i, j, k) of a level is row
  * first + (i n + j) n + k with 32 channels.  A line is one of the n^2 rows of nodes along the axis of the pass.
@@ -26,7 +26,8 @@ inline line_of find_line(global const int *levels, int L, int line, int axis)
 }
 
 /* One pass.  matrices: C of each level, row-major; back = 1 multiplies by C^T.  scale = 1 divides the result by
- * diagonal[l] + lambda[l] (e_i + e_a + e_b), e the eigenvalues eigen[eigen_first[l] + k].  Only the pass over axis 2 may scale. Global size: (lines). */
+ * diagonal[l] + lambda[l] (e_i + e_a + e_b), e the eigenvalues eigen[eigen_first[l] + k].  Only the pass over
+ * axis 2 may scale.  Global size: (lines). */
 kernel void sobolev_pass(global float *out, global const float *in, global const int *levels,
                          global const float *matrices, global const float *eigen, global const int *eigen_first,
                          global const float *lambda, global const float *diagonal, int L, int lines, int axis, int back,

@@ -28,8 +28,7 @@ enum { WELDS_KEEP, WELDS_CUT };
 typedef struct candidate {
     int64_t index, number;
     size_t cell_count;
-    double score;
-    double dist_unit; /* from the user's own mesh, where there is one */
+    double score; /* with a mesh of the user's own: minus its distance from it, unit */
 } candidate;
 
 typedef struct keyframe_state {
@@ -166,8 +165,9 @@ static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_fram
         NPG_TRY(npg_likeness_open(&state->likeness, own_mesh(worker), &facts->origin, &facts->box));
         facts->own_verts = npg_likeness_vert_count(state->likeness);
     }
-    NPG_TRY(npg_likeness_dist(&c->dist_unit, state->likeness, frame, &facts->box));
-    c->score = -c->dist_unit;
+    double dist_unit;
+    NPG_TRY(npg_likeness_dist(&dist_unit, state->likeness, frame, &facts->box));
+    c->score = -dist_unit;
     return NPG_OK;
 }
 
@@ -182,7 +182,7 @@ static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg
     mark_cells(state->cells, &facts->box, frame, false);
     double from_middle = (double)frame->index - (double)frame_count / 2;
     double score = (double)cell_count * exp(-0.001 * from_middle * from_middle);
-    candidate new = {frame->index, frame->number, cell_count, score, 0};
+    candidate new = {frame->index, frame->number, cell_count, score};
     if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &new, frame));
     if (cell_count) offer(state, new);
     if (is_named && cell_count && !state->is_chosen) {
@@ -194,13 +194,12 @@ static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg
     return npg_shortlist_add(&state->shortlist, frame, cell_count);
 }
 
-static json_t *json_of(const candidate *c)
+static json_t *json_of(const candidate *c, bool is_by_mesh)
 {
     json_t *json = json_pack("{sI sI sI}", "index", (json_int_t)c->index, "number", (json_int_t)c->number,
                              "cells", (json_int_t)c->cell_count);
-    bool is_by_mesh = c->dist_unit > 0;
     json_object_set_new(json, is_by_mesh ? "reference_dist_unit" : "score",
-                        json_real(is_by_mesh ? c->dist_unit : c->score));
+                        json_real(is_by_mesh ? -c->score : c->score));
     return json;
 }
 
@@ -227,17 +226,19 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     int64_t overlap = window < frame_count ? state->overlap : 0;
     facts->plan =
         (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
-    bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker), is_open = has_candidates(worker);
+    bool is_own = *own_mesh(worker) != 0, is_named = state->number != NO_NUMBER;
+    bool cuts_welds = state->welds == WELDS_CUT && !is_own, is_open = has_candidates(worker);
     if (!facts->is_live && frame_count > 1 && (is_open || cuts_welds)) {
         npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count, !is_open);
         facts->choice.cut_welds = cuts_welds;
     }
     json_t *report = npg_worker_report(worker), *scores = json_array();
-    for (size_t i = 0; i < state->best_count; i++) json_array_append_new(scores, json_of(&state->best[i]));
-    json_object_set_new(report, "key", json_of(&key));
+    for (size_t i = 0; i < state->best_count; i++)
+        json_array_append_new(scores, json_of(&state->best[i], is_own));
+    json_object_set_new(report, "key", json_of(&key, is_own));
     json_object_set_new(report, "best", scores);
     json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
-    const char *what = *own_mesh(worker)                   ? "is the keyframe, nearest to the reference"
+    const char *what = is_own && !is_named                 ? "is the keyframe, nearest to the reference"
                        : facts->choice.candidate_count > 1 ? "has the best score"
                                                            : "is the keyframe";
     npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.4g)", what,
