@@ -8,19 +8,31 @@
  *
  *     s_i = -n_i max(0, (1.5 h - g_i) / 2), smoothed over the neighbours on the same side
  *
- * g_i: distance to the nearest point that faces point i (contact.h), h: the points' spacing.  Not in the
- * paper. */
+ * g_i: distance to the nearest point that faces point i (contact.h), h: the points' spacing.  The way back is
+ * not exact (a vertex goes by the mean of what the points around it went), so the surface there is drawn to
+ * its points twice: each vertex by the mean of the gaps along the normals that the points around it have to
+ * the surface.  Not in the paper. */
 #ifndef NPG_APART_H
 #define NPG_APART_H
 
 #include "mesh.h"
 
-/* shift (N x 3): how far each point goes; *moved counts those that go at all.  points, normals (outward): N
- * x 3. spacing as npg_cloud_spacing() gives it.  NPG_MEMORY. */
-npg_status npg_cloud_apart(float *shift, size_t *moved, const float *points, const float *normals,
-                           size_t point_count, double spacing);
+/* N points and where they are for the reconstruction. */
+typedef struct npg_apart {
+    const float *points, *normals; /* N x 3, loans; outward                               */
+    size_t count;                  /* N                                                   */
+    double spacing;                /* h, as npg_cloud_spacing() gives it                  */
+    float *shift, *shifted;        /* N x 3, owned: how far each point goes, and to where */
+    size_t moved;                  /* points that go at all                               */
+} npg_apart;
 
-/* Move the vertices of a mesh made from the shifted points (N x 3) back.  NPG_MEMORY. */
-npg_status npg_mesh_move_back(npg_mesh *mesh, const float *shifted, const float *shift, size_t point_count);
+/* NPG_MEMORY. */
+npg_status npg_apart_open(npg_apart *apart, const float *points, const float *normals, size_t count,
+                          double spacing);
+void npg_apart_close(npg_apart *apart);
+
+/* Move the vertices of a mesh made from the shifted points back.  normals may have been turned since.
+ * NPG_MEMORY. */
+npg_status npg_apart_bring_back(const npg_apart *apart, npg_mesh *mesh);
 
 #endif

@@ -93,18 +93,13 @@ npg_status npg_resurface_apart(npg_mesh **mesh, size_t *moved, size_t *turned, i
                                const float *points, size_t n, double spacing,
                                const npg_poisson_settings *settings)
 {
-    float *shift = NULL, *shifted = NULL;
-    npg_status status;
+    npg_apart apart;
     *mesh = NULL;
-    NPG_TRY_OR(done, status, npg_alloc_array(&shift, NPG_FOR_MESH, n, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&shifted, NPG_FOR_MESH, n, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_cloud_apart(shift, moved, points, normals, n, spacing));
-    for (size_t i = 0; i < 3 * n; i++) shifted[i] = points[i] + shift[i];
-    NPG_TRY_OR(done, status, npg_resurface(mesh, turned, rounds, normals, shifted, n, settings));
-    if (*moved) status = npg_mesh_move_back(*mesh, shifted, shift, n);
+    NPG_TRY(npg_apart_open(&apart, points, normals, n, spacing));
+    *moved = apart.moved;
+    npg_status status = npg_resurface(mesh, turned, rounds, normals, apart.shifted, n, settings);
+    if (!status) status = npg_apart_bring_back(&apart, *mesh);
     if (status) npg_mesh_unref(mesh);
-done:
-    npg_release(&shift);
-    npg_release(&shifted);
+    npg_apart_close(&apart);
     return status;
 }

@@ -10,6 +10,7 @@
 #include "legs.h"
 #include "loop_fill.h"
 #include "mesh_tools.h"
+#include "poisson.h"
 
 /* ---- a torus of n x n quads, with `holes` faces left out at its end ---- */
 
@@ -133,32 +134,73 @@ static void feet_that_nearly_touch_are_in_contact(void **state)
     assert_true(near > apart + 0.01);
 }
 
+/* Mean distance to the surface of the points that were moved. */
+static double gap_to(const npg_mesh *mesh, const npg_apart *apart)
+{
+    static npg_surface_hit hits[LEGS_POINTS];
+    npg_surface *surface;
+    double sum = 0;
+    assert_int_equal(
+        npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count), NPG_OK);
+    assert_int_equal(npg_surface_closest(surface, hits, apart->points, apart->count), NPG_OK);
+    npg_surface_close(&surface);
+    for (size_t i = 0; i < apart->count; i++) {
+        const float *s = apart->shift + 3 * i;
+        if (s[0] != 0 || s[1] != 0 || s[2] != 0) sum += sqrt((double)hits[i].dist_sq);
+    }
+    return sum / (double)apart->moved;
+}
+
 static void points_go_apart_and_the_surface_comes_back(void **state)
 {
     (void)state;
+    const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60};
     npg_frame frame = {0};
-    size_t moved, n = LEGS_POINTS;
-    static float shift[3 * LEGS_POINTS], shifted[3 * LEGS_POINTS];
+    npg_apart apart;
+    npg_mesh *mesh;
+    size_t n = LEGS_POINTS;
+    int64_t handles;
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK); /* a gap of 0.02 at the feet */
-    assert_int_equal(npg_cloud_apart(shift, &moved, frame.pos_local, frame.normals, n, 0.05), NPG_OK);
-    assert_in_range(moved, 20, n / 3);
-    for (size_t i = 0; i < n; i++)
-        for (size_t a = 0; a < 3; a++) shifted[3 * i + a] = frame.pos_local[3 * i + a] + shift[3 * i + a];
+    assert_int_equal(npg_apart_open(&apart, frame.pos_local, frame.normals, n, 0.05), NPG_OK);
+    assert_in_range(apart.moved, 20, n / 3);
     for (size_t i = 0; i < n; i++) { /* nobody crosses over, and the feet go outward */
         bool is_inner = frame.normals[3 * i] * frame.pos_local[3 * i] < 0;
-        if (frame.pos_local[3 * i + 1] > -0.5f || shift[3 * i] == 0 || !is_inner) continue;
-        assert_true((shift[3 * i] > 0) == (frame.pos_local[3 * i] > 0));
+        if (frame.pos_local[3 * i + 1] > -0.5f || apart.shift[3 * i] == 0 || !is_inner) continue;
+        assert_true((apart.shift[3 * i] > 0) == (frame.pos_local[3 * i] > 0));
     }
-    npg_mesh *mesh;
-    assert_int_equal(npg_mesh_open(&mesh, n, 0), NPG_OK);
-    memcpy(mesh->vert_pos, shifted, sizeof shifted);
-    assert_int_equal(npg_mesh_move_back(mesh, shifted, shift, n), NPG_OK);
-    double error = 0;
-    for (size_t i = 0; i < 3 * n; i++)
-        error = fmax(error, fabs((double)mesh->vert_pos[i] - (double)frame.pos_local[i]));
-    assert_true(error < 0.02);
+    assert_int_equal(npg_poisson(&mesh, apart.shifted, frame.normals, n, &settings), NPG_OK);
+    double before = gap_to(mesh, &apart);
+    assert_int_equal(npg_apart_bring_back(&apart, mesh), NPG_OK);
+    double after = gap_to(mesh, &apart);
+    print_message("%zu points moved; the surface is %.4f from them, then %.4f\n", apart.moved, before, after);
+    assert_true(before > 0.002 && after < 0.1 * before);
+    assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
+    assert_int_equal(handles, 0);
+    npg_mesh_unref(&mesh);
+    npg_apart_close(&apart);
+    npg_frame_clear(&frame);
+}
+
+static void coming_back_needs_memory(void **state)
+{
+    (void)state;
+    npg_frame frame = {0};
+    npg_apart apart;
+    npg_mesh *mesh = torus(8, 0);
+    npg_status status = NPG_MEMORY;
+    assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
+    for (uint64_t i = 1; status && i < 60; i++) {
+        npg_memory_fail_at(i, false);
+        status = npg_apart_open(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05);
+        if (!status) status = npg_apart_bring_back(&apart, mesh);
+        npg_memory_fail_at(0, false);
+        assert_true(status == NPG_OK || status == NPG_MEMORY);
+        npg_apart_close(&apart);
+    }
+    assert_int_equal(status, NPG_OK);
     npg_mesh_unref(&mesh);
     npg_frame_clear(&frame);
+    assert_int_equal(npg_memory_used(), 0);
 }
 
 int main(void)
@@ -170,6 +212,7 @@ int main(void)
         cmocka_unit_test(a_loop_that_cannot_be_filled_is_said),
         cmocka_unit_test(feet_that_nearly_touch_are_in_contact),
         cmocka_unit_test(points_go_apart_and_the_surface_comes_back),
+        cmocka_unit_test(coming_back_needs_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
