@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "adam.h"
+#include "fit_least.h"
 #include "fit_weights.h"
 #include "latent.h"
 #include "mesh_tools.h"
@@ -45,6 +46,7 @@ struct npg_fit {
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
+    npg_fit_step result;                /* what the present state measures; of a run that keeps the least */
     bool is_pulled;                     /* by known correspondences, from bases */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
     size_t *rank;                       /* its inverse */
@@ -425,7 +427,8 @@ static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, i
     return NPG_OK;
 }
 
-static npg_status do_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
+/* Positions, losses, and the gradient at the decoder's end. */
+static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
 {
     const npg_fit_settings *s = &fit->settings;
     double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
@@ -437,9 +440,8 @@ static npg_status do_batch(npg_fit *fit, npg_weights *weights, size_t first, siz
     NPG_TRY(check_losses(fit, first, count, epoch));
     for (size_t k = first; k < first + count; k++)
         fit->gains[k] = (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
-    NPG_TRY(
-        npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first, count));
-    return npg_mlp_backward(&fit->mlp, first, count);
+    return npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first,
+                           count);
 }
 
 static npg_status step_time_code(npg_fit *fit)
@@ -484,17 +486,18 @@ static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
     return status;
 }
 
-static npg_status do_epoch(npg_fit *fit, npg_fit_step *step)
+/* What the present state measures; with is_learning the gradients for a step, too. */
+static npg_status look(npg_fit *fit, npg_fit_step *step, bool is_learning)
 {
     npg_weights weights;
     double progress = (double)step->epoch / (double)step->epochs;
     npg_weights_begin(&weights, &fit->settings, progress, fit->index[0], fit->frame_count);
     NPG_TRY(begin_epoch(fit));
     for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
-        size_t left = fit->frame_count - first;
-        NPG_TRY(do_batch(fit, &weights, first, left < fit->mlp.batch ? left : fit->mlp.batch, step->epoch));
+        size_t left = fit->frame_count - first, count = left < fit->mlp.batch ? left : fit->mlp.batch;
+        NPG_TRY(measure_batch(fit, &weights, first, count, step->epoch));
+        if (is_learning) NPG_TRY(npg_mlp_backward(&fit->mlp, first, count));
     }
-    NPG_TRY(end_epoch(fit));
     return sum_up(fit, step);
 }
 
@@ -517,17 +520,60 @@ static double rate_at(const npg_fit_settings *s, int64_t epoch)
     return s->rate_end + (1 - s->rate_end) * 0.5 * (1 + cos(M_PI * part));
 }
 
+static npg_fit_knowns knowns_of(npg_fit *fit)
+{
+    return (npg_fit_knowns){&fit->u, &fit->mlp.params, fit->time_code};
+}
+
+/* The state that step measured, where it is the best so far. */
+static npg_status offer(npg_fit *fit, npg_fit_least *least, const npg_fit_step *step)
+{
+    npg_fit_knowns now = knowns_of(fit);
+    if (!least) return NPG_OK;
+    return npg_fit_least_offer(least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
+}
+
+static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_least *least,
+                             npg_fit_watch *watch, void *user)
+{
+    for (; step->epoch < end; step->epoch++) {
+        fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
+        NPG_TRY(look(fit, step, true));
+        NPG_TRY(offer(fit, least, step));
+        NPG_TRY(end_epoch(fit));
+        if (watch) NPG_TRY(watch(user, step));
+    }
+    return NPG_OK;
+}
+
+/* The last step's outcome is looked at as well; then the fit goes back to the state with the least loss. */
+static npg_status go_back(npg_fit *fit, npg_fit_least *least, npg_fit_step *step)
+{
+    npg_fit_knowns now = knowns_of(fit);
+    NPG_TRY(look(fit, step, false));
+    NPG_TRY(offer(fit, least, step));
+    fit->result = least->step;
+    return npg_fit_least_restore(least, &now);
+}
+
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
 {
     npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
-    for (; step.epoch < end; step.epoch++) {
-        fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step.epoch);
-        NPG_TRY(do_epoch(fit, &step));
-        if (watch) NPG_TRY(watch(user, &step));
-    }
+    npg_fit_least least = {.rows = NULL};
+    bool is_kept = fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled && end > first;
+    fit->result.epochs = 0;
+    npg_status status = run_epochs(fit, &step, end, is_kept ? &least : NULL, watch, user);
+    if (!status && is_kept) status = go_back(fit, &least, &step);
+    npg_fit_least_clear(&least);
+    if (status) return status;
     NPG_TRY(npg_buffer_read(&fit->mlp.params, 0, fit->params,
                             npg_mlp_param_count(&fit->mlp.shape) * sizeof(float)));
     return decode(fit);
+}
+
+const npg_fit_step *npg_fit_result(const npg_fit *fit)
+{
+    return fit->result.epochs ? &fit->result : NULL;
 }
 
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
@@ -577,6 +623,6 @@ size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frame
     size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
     size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
     size_t per_group = npg_mlp_param_count(&shape) + 2 * block * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
-    size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 7, decoder = npg_mlp_param_count(&shape) * 6;
+    size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_param_count(&shape) * 7;
     return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
 }

@@ -35,9 +35,16 @@ typedef enum npg_smoothing {
 
 typedef enum npg_encoding { NPG_ENCODING_GRID, NPG_ENCODING_SINGLE, NPG_ENCODING_HASH } npg_encoding;
 
+/* Which of the states that a run by Chamfer distance goes through is its result; runs by pulls end with the
+ * last. */
+typedef enum npg_deliver {
+    NPG_DELIVER_LEAST, /* the one with the least loss, the confidence left aside */
+    NPG_DELIVER_LAST   /* the one after the last step                            */
+} npg_deliver;
+
 typedef struct npg_fit_settings {
     int64_t epochs;
-    int rotation, time_code, encoding, confidence, catch_up, smoothing /* npg_smoothing */;
+    int rotation, time_code, encoding, confidence, catch_up, smoothing, deliver /* enums of these names */;
     int64_t frequencies;
     int64_t grid_base, grid_step, grid_levels, normal_nodes;
     bool normal_grid;
@@ -90,6 +97,10 @@ npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start)
 /* Epochs first .. end - 1 of settings.epochs; afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED
  * names epoch and frame. */
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user);
+
+/* What the state that the last run ended with measures (its epoch: steps before it), or NULL where the run
+ * simply kept the last. */
+const npg_fit_step *npg_fit_result(const npg_fit *fit);
 
 /* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);

@@ -79,6 +79,10 @@ static const npg_option options[] = {
      AT(feature_start), "3", 0, 1e3, NULL, NULL},
     {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
      AT(rate_end), "0.1", 0, 1, NULL, NULL},
+    {"deliver",
+     "result of a joint fit by Chamfer distance: of all the states between its steps the one with the least "
+     "loss, or the last",
+     CHOICE_OPTION, AT(deliver), "least", 0, 0, "least|last", NULL},
     {"aligned-rate",
      "share of the learning rates where frames come aligned: the fit then starts beside its goal, and full "
      "steps would first lead away from it",
@@ -221,6 +225,19 @@ static npg_status watch(void *user, const npg_fit_step *step)
     return npg_worker_stopping(worker) ? NPG_STOPPED : NPG_OK;
 }
 
+static void note_result(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_fit_step *result = npg_fit_result(npg_window_fit(s->solver));
+    if (!result) return;
+    s->last_chamfer = result->chamfer;
+    s->last_isometry = result->isometry;
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "window %lld: least loss after %lld of %lld steps, kept: chamfer %.4g isometry %.4g",
+                   (long long)s->window_at, (long long)result->epoch, (long long)result->epochs,
+                   result->chamfer, result->isometry);
+}
+
 static npg_status solve_window(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -230,6 +247,7 @@ static npg_status solve_window(npg_worker *worker)
     for (size_t i = 0; i < count; i++) frames[i] = held_frame(s, s->window.first + (int64_t)i);
     npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
     npg_release(&frames);
+    if (!status) note_result(worker);
     return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
                             (long long)s->window.first, (long long)s->window.last);
 }

@@ -12,6 +12,7 @@
 
 #include "ball_mesh.h"
 #include "check.h"
+#include "fit_least.h"
 #include "group_device.h"
 #include "latent.h"
 #include "match.h"
@@ -261,6 +262,69 @@ static void the_warm_start_is_exact_on_the_overlap(void **state)
     npg_mesh_unref(&ball);
 }
 
+typedef struct seen {
+    npg_fit_step steps[100];
+    size_t count;
+} seen;
+
+static npg_status note(void *user, const npg_fit_step *step)
+{
+    seen *s = user;
+    s->steps[s->count++] = *step;
+    return NPG_OK;
+}
+
+/* Runs a fit of the first `end` of 40 epochs that overshoot, and takes the vertices of its last frame. */
+static void overshoot(npg_mesh *ball, npg_deliver deliver, npg_time_kind time_code, int64_t end, seen *s,
+                      float *verts, npg_fit_step *result)
+{
+    npg_fit_settings settings = small;
+    npg_fit *fit;
+    npg_fit_frame frames[FRAMES];
+    float points[FRAMES][3 * VERTS];
+    settings.epochs = 40;
+    settings.rate_end = 1;
+    settings.mlp_rate = 0.03;
+    settings.deliver = deliver;
+    settings.time_code = time_code;
+    for (int i = 0; i < FRAMES; i++) {
+        pose_ball(points[i], ball->vert_pos, VERTS, i);
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+    }
+    assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
+    assert_int_equal(npg_fit_run(fit, 0, end, s ? note : NULL, s), 0);
+    assert_int_equal(npg_fit_vertices(fit, verts, FRAMES - 1), 0);
+    assert_true((npg_fit_result(fit) != NULL) == (deliver == NPG_DELIVER_LEAST));
+    if (npg_fit_result(fit)) *result = *npg_fit_result(fit);
+    npg_fit_close(&fit);
+}
+
+/* The result is the state with the least loss: that of a run that stops there, byte by byte. */
+static void a_fit_ends_with_its_least_loss(void **state)
+{
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    (void)state;
+    for (int kind = 0; kind < 2; kind++) {
+        npg_time_kind code = kind ? NPG_TIME_LEARNED : NPG_TIME_FOURIER;
+        seen s = {.count = 0};
+        npg_fit_step result, none;
+        float verts[3 * VERTS], again[3 * VERTS], last[3 * VERTS];
+        overshoot(ball, NPG_DELIVER_LEAST, code, 40, &s, verts, &result);
+        print_message("kept after %d steps: chamfer %.4g; last step's %.4g\n", (int)result.epoch,
+                      result.chamfer, s.steps[39].chamfer);
+        assert_int_equal(s.count, 40);
+        for (size_t e = 0; e < s.count; e++)
+            assert_true(npg_fit_plain_loss(&s.steps[e], 5) >= npg_fit_plain_loss(&result, 5));
+        assert_true(result.epoch > 0 && result.epoch < 40); /* or the settings no longer overshoot */
+        overshoot(ball, NPG_DELIVER_LAST, code, result.epoch, NULL, again, &none);
+        overshoot(ball, NPG_DELIVER_LAST, code, 40, NULL, last, &none);
+        assert_memory_equal(verts, again, sizeof verts);
+        assert_memory_not_equal(verts, last, sizeof verts);
+    }
+    npg_mesh_unref(&ball);
+}
+
 /* Two windows over frames of which they share one; the second sees that frame's points elsewhere.  How far
  * its solved vertices then are from the first's, in the mean. */
 static double way_from_the_first(npg_mesh *ball, double tie)
@@ -367,6 +431,7 @@ int main(void)
         cmocka_unit_test(gradients_through_the_ties_are_slopes),
         cmocka_unit_test(the_device_has_the_same_gradient),
         cmocka_unit_test(the_warm_start_is_exact_on_the_overlap),
+        cmocka_unit_test(a_fit_ends_with_its_least_loss),
         cmocka_unit_test(ties_hold_what_is_solved),
         cmocka_unit_test(where_the_surface_is_does_not_matter),
     };
