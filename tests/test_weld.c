@@ -10,7 +10,7 @@
 #include "legs.h"
 #include "loop_fill.h"
 #include "mesh_tools.h"
-#include "poisson.h"
+#include "resurface.h"
 
 /* ---- a torus of n x n quads, with `holes` faces left out at its end ---- */
 
@@ -181,6 +181,36 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     npg_frame_clear(&frame);
 }
 
+/* Handles of the legs' surface; the feet, welded, make one. */
+static int64_t handles_of_legs(bool holds_apart, size_t *moved)
+{
+    const npg_poisson_settings settings = {
+        .depth = 7, .point_weight = 4, .time_limit_s = 60, .holds_apart = holds_apart};
+    npg_frame frame = {0};
+    npg_mesh *mesh;
+    size_t turned;
+    int rounds;
+    int64_t handles;
+    assert_int_equal(legs_frame(&frame, 0.155, 5), NPG_OK); /* a gap of 0.01 */
+    assert_int_equal(npg_resurface_apart(&mesh, moved, &turned, &rounds, frame.normals, frame.pos_local,
+                                         LEGS_POINTS, 0.05, &settings),
+                     NPG_OK);
+    assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
+    npg_mesh_unref(&mesh);
+    npg_frame_clear(&frame);
+    return handles;
+}
+
+static void feet_that_nearly_touch_are_joined_unless_held_apart(void **state)
+{
+    (void)state;
+    size_t moved;
+    assert_int_equal(handles_of_legs(true, &moved), 0);
+    assert_true(moved > 0);
+    assert_true(handles_of_legs(false, &moved) > 0);
+    assert_int_equal(moved, 0);
+}
+
 static void coming_back_needs_memory(void **state)
 {
     (void)state;
@@ -212,6 +242,7 @@ int main(void)
         cmocka_unit_test(a_loop_that_cannot_be_filled_is_said),
         cmocka_unit_test(feet_that_nearly_touch_are_in_contact),
         cmocka_unit_test(points_go_apart_and_the_surface_comes_back),
+        cmocka_unit_test(feet_that_nearly_touch_are_joined_unless_held_apart),
         cmocka_unit_test(coming_back_needs_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
