@@ -10,7 +10,7 @@
 #include "query.h"
 
 #define NEIGHBOURS    48  /* in which a facing point is looked for */
-#define WIDE_SPACINGS 1.5 /* a gap that survives                   */
+#define WIDE_SPACINGS 1.2 /* a gap that survives                   */
 #define SMOOTH_OVER   12  /* neighbours                            */
 #define SMOOTH_ROUNDS 3
 #define BACK_OVER     6  /* points around a vertex, on its side     */

@@ -6,7 +6,7 @@
  * is made; then its vertices are moved back by what the points around them were moved.  The surface ends
  * where the points are, without the weld.
  *
- *     s_i = -n_i max(0, (1.5 h - g_i) / 2), smoothed over the neighbours on the same side
+ *     s_i = -n_i max(0, (1.2 h - g_i) / 2), smoothed over the neighbours on the same side
  *
  * g_i: distance to the nearest point that faces point i (contact.h), h: the points' spacing.  The way back is
  * not exact (a vertex goes by the mean of what the points around it went), so the surface there is drawn to
