@@ -2,6 +2,7 @@
 #include "apart.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "contact.h"
@@ -9,13 +10,19 @@
 #include "mesh_tools.h"
 #include "query.h"
 
-#define NEIGHBOURS    48  /* in which a facing point is looked for */
-#define WIDE_SPACINGS 1.2 /* a gap that survives                   */
-#define SMOOTH_OVER   12  /* neighbours                            */
+#define NEIGHBOURS    48 /* in which a facing point is looked for */
+#define SMOOTH_OVER   12 /* neighbours                            */
 #define SMOOTH_ROUNDS 3
-#define BACK_OVER     6  /* points around a vertex, on its side     */
-#define BACK_AMONG    16 /* nearest ones that they are among        */
-#define BACK_ROUNDS   2  /* times the surface is drawn to its points */
+#define BACK_OVER     6  /* points around a vertex          */
+#define BACK_AMONG    16 /* nearest ones that they are among */
+
+typedef struct manner {
+    double wide;       /* a gap that survives, in spacings                          */
+    bool is_one_sided; /* a vertex goes by points on its own side of the gap alone  */
+    int rounds;        /* times that the surface is then drawn to its points        */
+} manner;
+
+static const manner manners[] = {[NPG_APART_TIGHT] = {1.2, true, 2}, [NPG_APART_LOOSE] = {1.5, false, 0}};
 
 /* ---- gaps ---- */
 
@@ -65,7 +72,7 @@ static npg_status measure_pushes(float *push, const npg_apart *apart)
     NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, near, dist_sq, points, n, NEIGHBOURS, 0));
     for (size_t i = 0; i < n; i++)
         push[i] = push_of(i, near + NEIGHBOURS * i, dist_sq + NEIGHBOURS * i, points, normals, n,
-                          WIDE_SPACINGS * apart->spacing);
+                          manners[apart->way].wide * apart->spacing);
     for (int round = 0; round < SMOOTH_ROUNDS; round++) {
         smooth(smoothed, push, near, normals, n);
         memcpy(push, smoothed, n * sizeof(float));
@@ -79,12 +86,12 @@ done:
 }
 
 npg_status npg_apart_open(npg_apart *apart, const float *points, const float *normals, size_t n,
-                          double spacing)
+                          double spacing, npg_apart_way way)
 {
     float *push = NULL;
     npg_status status;
-    NPG_REQUIRE(n && spacing > 0);
-    *apart = (npg_apart){.points = points, .normals = normals, .count = n, .spacing = spacing};
+    NPG_REQUIRE(n && spacing > 0 && way != NPG_APART_NOT);
+    *apart = (npg_apart){.points = points, .normals = normals, .count = n, .spacing = spacing, .way = way};
     NPG_TRY_OR(done, status, npg_alloc_array(&apart->shift, NPG_FOR_MESH, n, 3 * sizeof(float)));
     NPG_TRY_OR(done, status, npg_alloc_array(&apart->shifted, NPG_FOR_MESH, n, 3 * sizeof(float)));
     NPG_TRY_OR(done, status, npg_alloc_array(&push, NPG_FOR_MESH, n, sizeof(float)));
@@ -133,7 +140,8 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
 {
     float scale = 0;
     for (size_t k = 0; k < BACK_AMONG && near[k] < apart->count && to->count < BACK_OVER; k++) {
-        if (dot(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0) continue;
+        bool is_across = dot(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0;
+        if (is_across && manners[apart->way].is_one_sided) continue;
         if (!to->count) scale = dist_sq[k] + 1e-12f;
         to->weight[to->count] = scale / (dist_sq[k] + scale);
         to->point[to->count++] = near[k];
@@ -225,7 +233,7 @@ npg_status npg_apart_bring_back(const npg_apart *apart, npg_mesh *mesh)
     NPG_TRY_OR(done, status, npg_alloc_array(&w.gaps, NPG_FOR_MESH, n, 3 * sizeof(float)));
     NPG_TRY_OR(done, status, find_around(&w));
     move(&w, apart->shift, -1);
-    for (int round = 0; round < BACK_ROUNDS; round++) {
+    for (int round = 0; round < manners[apart->way].rounds; round++) {
         NPG_TRY_OR(done, status, measure_gaps(&w));
         move(&w, w.gaps, 1);
     }

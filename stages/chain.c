@@ -16,16 +16,19 @@ const npg_stage *const npg_chain[] = {
     &npg_stage_export,   /* meshes, report, the last word                                 */
     NULL};
 
-static const npg_preset_value paper[] = {{"align", "no"},
-                                         {"keyframe-choice", "paper"},
-                                         {"welds", "keep"},
-                                         {"window", "0"},
-                                         {"epochs", "250"},
-                                         {"isometry", "100"},
-                                         {"confidence", "cumulative"},
-                                         {"rate-end", "1"},
-                                         {"feature-start", "0"},
-                                         {NULL, NULL}};
+static const npg_preset_value paper[] = {
+    {"align", "no"},              /* from the reference */
+    {"keyframe-choice", "paper"}, /* by score alone */
+    {"hold-apart", "loose"},      /* a little of the gap helps a fit that knows only distances */
+    {"welds", "keep"},            /* nothing is cut */
+    {"window", "0"},              /* all frames at once */
+    {"epochs", "250"},            /* of every vertex */
+    {"isometry", "100"},          /* as published, like the rest */
+    {"confidence", "cumulative"},
+    {"smoothing", "doubled"},
+    {"rate-end", "1"},
+    {"feature-start", "0"},
+    {NULL, NULL}};
 static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps", "20"}, {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
 

@@ -34,7 +34,8 @@ typedef struct mesh_state {
     int mesher, unseen, pieces;
     int64_t depth, face_max, time_limit_s, memory_limit_mib;
     double point_weight, trim, invented_max;
-    bool smooth, holds_apart;
+    int apart; /* npg_apart_way */
+    bool smooth;
 } mesh_state;
 
 #define OFFSET(member) offsetof(mesh_state, member)
@@ -60,8 +61,9 @@ static const npg_option mesh_options[] = {
     {"smooth", "Smooth the keyframe's points for the reconstruction when they are noisy", NPG_OPTION_FLAG,
      OFFSET(smooth), "yes", 0, 0, NULL, NULL},
     {"hold-apart",
-     "Hold parts that nearly touch apart while the surface is made, so that they are not joined",
-     NPG_OPTION_FLAG, OFFSET(holds_apart), "yes", 0, 0, NULL, NULL},
+     "Hold parts that nearly touch apart while the surface is made, so that they are not joined; after that "
+     "bring it back to its points (tight), or nearly so, which leaves a little of the gap (loose)",
+     NPG_OPTION_CHOICE, OFFSET(apart), "tight", 0, 0, "tight|loose|no", NULL},
     {"faces", "Faces of the reference mesh at most (and no more than 4 per point)", NPG_OPTION_INT,
      OFFSET(face_max), "20000", 16, 1e8, NULL, NULL},
     {"trim",
@@ -148,7 +150,7 @@ static npg_poisson_settings poisson_settings(npg_worker *worker)
     const mesh_state *s = npg_worker_state(worker);
     return (npg_poisson_settings){.depth = (int)s->depth,
                                   .point_weight = s->point_weight,
-                                  .holds_apart = s->holds_apart,
+                                  .apart = (npg_apart_way)s->apart,
                                   .time_limit_s = (double)s->time_limit_s,
                                   .memory_limit = (size_t)s->memory_limit_mib << 20,
                                   .should_stop = should_stop,

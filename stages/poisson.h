@@ -9,13 +9,13 @@
 
 #include <stdbool.h>
 
-#include "mesh.h"
+#include "apart.h"
 
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                                         */
     double point_weight; /* of the screening term, 10                                 */
     int rounds_max;      /* npg_resurface(): drafts at most; 0: 4                     */
-    bool holds_apart;    /* npg_resurface_apart(): false makes it npg_resurface()     */
+    npg_apart_way apart; /* npg_resurface_apart(): how                                */
     double time_limit_s;
     size_t memory_limit; /* bytes of address space of the child; 0: none              */
     const char *program; /* NULL: neupig-poisson                                      */

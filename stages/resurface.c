@@ -96,8 +96,9 @@ npg_status npg_resurface_apart(npg_mesh **mesh, size_t *moved, size_t *turned, i
     npg_apart apart;
     *mesh = NULL;
     *moved = 0;
-    if (!settings->holds_apart) return npg_resurface(mesh, turned, rounds, normals, points, n, settings);
-    NPG_TRY(npg_apart_open(&apart, points, normals, n, spacing));
+    if (settings->apart == NPG_APART_NOT)
+        return npg_resurface(mesh, turned, rounds, normals, points, n, settings);
+    NPG_TRY(npg_apart_open(&apart, points, normals, n, spacing, settings->apart));
     *moved = apart.moved;
     npg_status status = npg_resurface(mesh, turned, rounds, normals, apart.shifted, n, settings);
     if (!status) status = npg_apart_bring_back(&apart, *mesh);

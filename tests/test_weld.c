@@ -161,7 +161,8 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     size_t n = LEGS_POINTS;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK); /* a gap of 0.02 at the feet */
-    assert_int_equal(npg_apart_open(&apart, frame.pos_local, frame.normals, n, 0.05), NPG_OK);
+    assert_int_equal(npg_apart_open(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_APART_TIGHT),
+                     NPG_OK);
     assert_in_range(apart.moved, 20, n / 3);
     for (size_t i = 0; i < n; i++) { /* nobody crosses over, and the feet go outward */
         bool is_inner = frame.normals[3 * i] * frame.pos_local[3 * i] < 0;
@@ -182,10 +183,9 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
 }
 
 /* Handles of the legs' surface; the feet, welded, make one. */
-static int64_t handles_of_legs(double feet, bool holds_apart, size_t *moved)
+static int64_t handles_of_legs(double feet, npg_apart_way way, size_t *moved)
 {
-    const npg_poisson_settings settings = {
-        .depth = 7, .point_weight = 4, .time_limit_s = 60, .holds_apart = holds_apart};
+    const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60, .apart = way};
     npg_frame frame = {0};
     npg_mesh *mesh;
     size_t turned;
@@ -206,11 +206,13 @@ static void feet_that_nearly_touch_are_joined_unless_held_apart(void **state)
     (void)state;
     size_t moved;
     for (double feet = 0.155; feet < 0.177; feet += 0.005) { /* gaps of a fifth of the spacing to all of it */
-        assert_int_equal(handles_of_legs(feet, true, &moved), 0);
+        for (npg_apart_way way = NPG_APART_TIGHT; way < NPG_APART_NOT; way++) {
+            assert_int_equal(handles_of_legs(feet, way, &moved), 0);
+            assert_true(moved > 0);
+        }
         print_message("gap %.2f of the spacing: %zu points moved\n", 2 * (feet - 0.15) / 0.05, moved);
-        assert_true(moved > 0);
     }
-    assert_true(handles_of_legs(0.155, false, &moved) > 0);
+    assert_true(handles_of_legs(0.155, NPG_APART_NOT, &moved) > 0);
     assert_int_equal(moved, 0);
 }
 
@@ -224,7 +226,7 @@ static void coming_back_needs_memory(void **state)
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
     for (uint64_t i = 1; status && i < 60; i++) {
         npg_memory_fail_at(i, false);
-        status = npg_apart_open(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05);
+        status = npg_apart_open(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05, NPG_APART_TIGHT);
         if (!status) status = npg_apart_bring_back(&apart, mesh);
         npg_memory_fail_at(0, false);
         assert_true(status == NPG_OK || status == NPG_MEMORY);
