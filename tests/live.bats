@@ -137,10 +137,8 @@ await() {
 @test "memory does not grow with the length of the source" {
     "$NEUPIG" synth --body bar --frames 24 --points 600 -o loop >loop.log
     for times in 1 5; do # there and back, so that nothing leaps
-        status=0
         for i in $(seq $times); do cat loop/points/*.ply $(ls -r loop/points/*.ply); done |
-            "$NEUPIG" run - -o "long$times" "${small[@]}" --epochs 1 --align=no >long.log || status=$?
-        [ "$status" -eq 0 ] || [ "$status" -eq 7 ] # one step a window does not follow the bar
+            "$NEUPIG" run - -o "long$times" "${small[@]}" --epochs 1 --align=no --deliver last >long.log
     done
     short=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long1/report.json)
     long=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long5/report.json)

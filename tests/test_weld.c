@@ -182,6 +182,30 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     npg_frame_clear(&frame);
 }
 
+/* Vertices that are the points themselves come back to within what their neighbours went differently. */
+static void loose_vertices_come_back_nearly(void **state)
+{
+    (void)state;
+    npg_frame frame = {0};
+    npg_apart apart;
+    npg_mesh *mesh;
+    size_t n = LEGS_POINTS;
+    double error = 0;
+    assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
+    assert_int_equal(npg_apart_open(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_APART_LOOSE),
+                     NPG_OK);
+    assert_in_range(apart.moved, 20, n / 3);
+    assert_int_equal(npg_mesh_open(&mesh, n, 0), NPG_OK);
+    memcpy(mesh->vert_pos, apart.shifted, 3 * n * sizeof(float));
+    assert_int_equal(npg_apart_bring_back(&apart, mesh), NPG_OK);
+    for (size_t i = 0; i < 3 * n; i++)
+        error = fmax(error, fabs((double)mesh->vert_pos[i] - (double)frame.pos_local[i]));
+    assert_true(error < 0.02);
+    npg_mesh_unref(&mesh);
+    npg_apart_close(&apart);
+    npg_frame_clear(&frame);
+}
+
 /* Handles of the legs' surface; the feet, welded, make one. */
 static int64_t handles_of_legs(double feet, npg_apart_way way, size_t *moved)
 {
@@ -247,6 +271,7 @@ int main(void)
         cmocka_unit_test(a_loop_that_cannot_be_filled_is_said),
         cmocka_unit_test(feet_that_nearly_touch_are_in_contact),
         cmocka_unit_test(points_go_apart_and_the_surface_comes_back),
+        cmocka_unit_test(loose_vertices_come_back_nearly),
         cmocka_unit_test(feet_that_nearly_touch_are_joined_unless_held_apart),
         cmocka_unit_test(coming_back_needs_memory),
     };
