@@ -9,12 +9,7 @@
 #include <string.h>
 
 #include "memory.h"
-
-static int by_value(const void *left, const void *right)
-{
-    int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
-    return (a > b) - (a < b);
-}
+#include "order.h"
 
 /* The number between prefix and extension; false for any other name. */
 static bool number_in(const char *name, const char *prefix, const char *extension, int64_t *number)
@@ -47,7 +42,7 @@ npg_status npg_folder_numbers(int64_t **numbers, size_t *count, const char *fold
     if (status)
         npg_release(numbers);
     else if (*count)
-        qsort(*numbers, *count, sizeof **numbers, by_value);
+        qsort(*numbers, *count, sizeof **numbers, npg_order_int64);
     return status;
 }
 

@@ -24,6 +24,11 @@ typedef struct manner {
 
 static const manner manners[] = {[NPG_APART_TIGHT] = {1.2, true, 2}, [NPG_APART_LOOSE] = {1.5, false, 0}};
 
+static float dot(const float *a, const float *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 /* ---- gaps ---- */
 
 static float push_of(size_t i, const uint32_t *near, const float *dist_sq, const float *points,
@@ -48,8 +53,7 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
         for (size_t k = 0; k < SMOOTH_OVER; k++) {
             size_t j = near[NEIGHBOURS * i + k];
             if (j >= n) break;
-            const float *a = normals + 3 * i, *b = normals + 3 * j;
-            if (a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < 0.3f) continue;
+            if (dot(normals + 3 * i, normals + 3 * j) < 0.3f) continue;
             sum += push[j];
             weight += 1;
         }
@@ -129,11 +133,6 @@ typedef struct way_back {
     npg_surface_hit *hits; /* N, owned */
     float *gaps;           /* N x 3, owned: from the surface to each point, along its normal */
 } way_back;
-
-static float dot(const float *a, const float *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static void choose_around(around *to, const float *vert_normal, const uint32_t *near, const float *dist_sq,
                           const npg_apart *apart)

@@ -11,6 +11,7 @@
 #include "job.h"
 #include "kdtree.h"
 #include "misfit.h"
+#include "order.h"
 #include "stage.h"
 #include "thin.h"
 #include "topology.h"
@@ -342,17 +343,11 @@ static json_t *json_of_sums(const evaluate_state *state)
     return figures;
 }
 
-static int by_number(const void *left, const void *right)
-{
-    int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
-    return a < b ? -1 : a > b;
-}
-
 static npg_status flush(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker), *bad = json_array();
-    if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, by_number);
+    if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
     for (size_t i = 0; i < state->bad_count; i++)
         json_array_append_new(bad, json_integer((json_int_t)state->bad[i]));
     json_object_set_new(report, "figures", json_of_sums(state));

@@ -10,6 +10,7 @@
 #include "job.h"
 #include "json_file.h"
 #include "mesh_tools.h"
+#include "order.h"
 #include "placement.h"
 #include "reader.h"
 #include "writer.h"
@@ -89,12 +90,6 @@ static void set_width(export_state *state, const npg_facts *facts)
 
 /* ---- measuring pass: would the names be in each other's or an earlier run's way? ---- */
 
-static int by_value(const void *left, const void *right)
-{
-    int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
-    return a < b ? -1 : a > b;
-}
-
 static bool is_same_file(const char *a, const char *b)
 {
     struct stat of_a, of_b;
@@ -153,7 +148,7 @@ static npg_status check_numbers(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     if (!state->number_count) return NPG_OK;
-    qsort(state->numbers, state->number_count, sizeof *state->numbers, by_value);
+    qsort(state->numbers, state->number_count, sizeof *state->numbers, npg_order_int64);
     for (size_t i = 1; i < state->number_count; i++)
         if (state->numbers[i] == state->numbers[i - 1])
             return npg_error(

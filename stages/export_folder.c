@@ -12,6 +12,7 @@
 #include "export.h"
 #include "file.h"
 #include "forms.h"
+#include "order.h"
 
 #define PROBE_BYTES (256 << 10)
 
@@ -82,12 +83,6 @@ static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
     return status;
 }
 
-static int by_number(const void *left, const void *right)
-{
-    int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
-    return a < b ? -1 : a > b;
-}
-
 typedef struct own_meshes {
     const npg_mesh_names *names;
     const int64_t *numbers;
@@ -101,7 +96,7 @@ static npg_status refuse_foreign(void *user, const char *folder, const char *nam
     npg_mesh_name(own_name, own->names, number);
     if (name[0] == '.') return NPG_OK;
     if (!strcmp(name, own_name) && own->number_count &&
-        bsearch(&number, own->numbers, own->number_count, sizeof number, by_number))
+        bsearch(&number, own->numbers, own->number_count, sizeof number, npg_order_int64))
         return NPG_OK;
     return npg_error(NPG_USAGE,
                      "%s/%s is of another run and would mix with this one's frames: choose another output "

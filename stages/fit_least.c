@@ -22,7 +22,7 @@ npg_status npg_fit_least_offer(npg_fit_least *least, const npg_fit_step *step, d
     size_t code_count;
     int64_t *code_step;
     const double *code = npg_time_code_parts(now->time_code, &code_count, &code_step);
-    if (least->rows && loss >= least->loss) return NPG_OK;
+    if (least->rows && !(loss < least->loss)) return NPG_OK; /* nor what is no number */
     NPG_TRY(alloc_copies(least, now, code_count));
     NPG_TRY(npg_buffer_read(now->rows, 0, least->rows, now->rows->size));
     NPG_TRY(npg_buffer_read(now->params, 0, least->params, now->params->size));

@@ -1,0 +1,14 @@
+/* Order: what qsort() and bsearch() ask. */
+#ifndef NPG_ORDER_H
+#define NPG_ORDER_H
+
+#include <stdint.h>
+
+/* Ascending int64_t. */
+static inline int npg_order_int64(const void *left, const void *right)
+{
+    int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
+    return (a > b) - (a < b);
+}
+
+#endif
