@@ -1,5 +1,5 @@
 /* adam: the optimiser's state and launch. */
-#include "adam.h"
+#include "kernels/adam.h"
 
 #include <math.h>
 

@@ -2,7 +2,7 @@
 #ifndef NPG_ADAM_H
 #define NPG_ADAM_H
 
-#include "device.h"
+#include "kernels/runtime/device.h"
 
 /* State for one list of parameters. */
 typedef struct npg_adam {

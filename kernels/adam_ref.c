@@ -1,7 +1,7 @@
 /* adam: the plain twin of adam.cl, in double, as Kingma and Ba write it. */
 #include <math.h>
 
-#include "adam.h"
+#include "kernels/adam.h"
 
 void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
                        const float *rates, size_t row, size_t count, int64_t step)

@@ -1,5 +1,5 @@
 /* Check: random values, comparison, finite differences. */
-#include "check.h"
+#include "kernels/check.h"
 
 #include <math.h>
 

@@ -2,9 +2,9 @@
 #ifndef NPG_CHECK_H
 #define NPG_CHECK_H
 
-#include "device.h"
-#include "kernels.h"
-#include "random.h"
+#include "kernels/kernels.h"
+#include "kernels/runtime/device.h"
+#include "pipeline/random.h"
 
 /* n values in +-scale, as float and (when `wide` is not NULL) the same in double. */
 npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random);

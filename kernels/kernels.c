@@ -1,7 +1,7 @@
 /* Kernels: the self-test. */
-#include "kernels.h"
+#include "kernels/kernels.h"
 
-#include "check.h"
+#include "kernels/check.h"
 
 static npg_status check_all(npg_device *device)
 {

@@ -2,7 +2,7 @@
 #ifndef NPG_KERNELS_H
 #define NPG_KERNELS_H
 
-#include "device.h"
+#include "kernels/runtime/device.h"
 
 /* Run one op on the device and its twin on the host over random data of the given size (1 is small; the
  * figures of size 8 are large and odd) and give the largest error, relative to the largest value. */

@@ -1,5 +1,5 @@
 /* latent: the sparse sampling matrix and its kernels. */
-#include "latent.h"
+#include "kernels/latent.h"
 
 #include <string.h>
 

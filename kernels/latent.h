@@ -2,8 +2,8 @@
 #ifndef NPG_LATENT_H
 #define NPG_LATENT_H
 
-#include "device.h"
-#include "levels.h"
+#include "kernels/levels.h"
+#include "kernels/runtime/device.h"
 
 /* The constant sparse matrix, by rows (K entries each) and transposed (row lists by node). */
 typedef struct npg_samples {

@@ -2,9 +2,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "check.h"
-#include "latent.h"
-#include "sobolev.h"
+#include "kernels/check.h"
+#include "kernels/latent.h"
+#include "kernels/sobolev.h"
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 

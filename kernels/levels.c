@@ -1,5 +1,5 @@
 /* Levels: the grids behind the latent features. */
-#include "levels.h"
+#include "kernels/levels.h"
 
 #include <assert.h>
 #include <math.h>

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "memory.h"
+#include "pipeline/memory.h"
 
 #define NPG_LATENT_CHANNELS 32
 #define NPG_LEVELS_MAX      32

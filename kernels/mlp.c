@@ -1,9 +1,9 @@
 /* mlp: buffers and launches of the decoder. */
-#include "mlp.h"
+#include "kernels/mlp.h"
 
 #include <stdio.h>
 
-#include "levels.h"
+#include "kernels/levels.h"
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 

@@ -7,7 +7,7 @@
 #ifndef NPG_MLP_H
 #define NPG_MLP_H
 
-#include "device.h"
+#include "kernels/runtime/device.h"
 
 #define NPG_MLP_OUT 8 /* floats of output per vertex, 7 used */
 

@@ -1,10 +1,10 @@
 /* mlp and adam: the checker's cases. */
 #include <math.h>
 
-#include "adam.h"
-#include "check.h"
-#include "levels.h"
-#include "mlp.h"
+#include "kernels/adam.h"
+#include "kernels/check.h"
+#include "kernels/levels.h"
+#include "kernels/mlp.h"
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 

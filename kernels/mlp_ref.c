@@ -1,6 +1,6 @@
 /* mlp: the plain twins of mlp.cl and time.cl, in double, written as the paper writes the network. */
-#include "levels.h"
-#include "mlp.h"
+#include "kernels/levels.h"
+#include "kernels/mlp.h"
 
 #define CHANNELS  NPG_LATENT_CHANNELS
 #define WIDTH_MAX 4096

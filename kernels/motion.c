@@ -1,5 +1,5 @@
 /* motion: buffers and launches of transform, nearest, chamfer and isometry. */
-#include "motion.h"
+#include "kernels/motion.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H
 
-#include "device.h"
+#include "kernels/runtime/device.h"
 
 #define NPG_SLOT 8 /* ints that describe one search of one frame, see nearest.cl */
 

@@ -2,9 +2,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "check.h"
-#include "mlp.h"
-#include "motion.h"
+#include "kernels/check.h"
+#include "kernels/mlp.h"
+#include "kernels/motion.h"
 
 #define FRAMES 3
 

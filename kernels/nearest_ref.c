@@ -1,5 +1,5 @@
 /* nearest: the plain twin of nearest.cl, in double: look at every point. */
-#include "motion.h"
+#include "kernels/motion.h"
 
 size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *points, size_t count)
 {

@@ -1,8 +1,8 @@
 /* Path spectrum: in closed form, or by rotations. */
-#include "path_spectrum.h"
+#include "kernels/path_spectrum.h"
 
-#include "jacobi.h"
-#include "memory.h"
+#include "kernels/jacobi.h"
+#include "pipeline/memory.h"
 
 #define SWEEPS 60
 

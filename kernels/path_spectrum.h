@@ -6,7 +6,7 @@
 #ifndef NPG_PATH_SPECTRUM_H
 #define NPG_PATH_SPECTRUM_H
 
-#include "status.h"
+#include "pipeline/status.h"
 
 #ifdef __cplusplus
 extern "C" {

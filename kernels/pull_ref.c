@@ -1,7 +1,7 @@
 /* pull: the plain twin of pull.cl, in double. */
 #include <string.h>
 
-#include "motion.h"
+#include "kernels/motion.h"
 
 double npg_pull_ref(double *g, const double *x, size_t real, const npg_pull *pulls, size_t count)
 {

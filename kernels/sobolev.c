@@ -1,7 +1,7 @@
 /* sobolev: tables of the levels and the six passes. */
-#include "sobolev.h"
+#include "kernels/sobolev.h"
 
-#include "path_spectrum.h"
+#include "kernels/path_spectrum.h"
 
 typedef struct tables {
     int32_t level[NPG_LEVELS_MAX][4];

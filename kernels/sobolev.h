@@ -3,8 +3,8 @@
 #ifndef NPG_SOBOLEV_H
 #define NPG_SOBOLEV_H
 
-#include "device.h"
-#include "levels.h"
+#include "kernels/levels.h"
+#include "kernels/runtime/device.h"
 
 typedef struct npg_sobolev {
     npg_program *program;

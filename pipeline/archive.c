@@ -1,5 +1,5 @@
 /* Archive: named blocks of bytes in one file that is read whole or not at all. */
-#include "archive.h"
+#include "pipeline/archive.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "file.h"
+#include "pipeline/file.h"
 
 static const char magic[8] = "NPGARCH1", end_name[NPG_BLOCK_NAME] = "end";
 

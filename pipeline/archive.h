@@ -9,7 +9,7 @@
 #ifndef NPG_ARCHIVE_H
 #define NPG_ARCHIVE_H
 
-#include "memory.h"
+#include "pipeline/memory.h"
 
 #define NPG_BLOCK_NAME 32
 

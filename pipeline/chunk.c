@@ -1,5 +1,5 @@
 /* Chunk: a few consecutive frames on their way through the stages. */
-#include "chunk.h"
+#include "pipeline/chunk.h"
 
 #include <assert.h>
 #include <stdatomic.h>

@@ -9,7 +9,7 @@
 
 #include <stdbool.h>
 
-#include "memory.h"
+#include "pipeline/memory.h"
 
 /* What a frame carries.  Stages say which fields they need and give; the chain is checked when it is built.
  */

@@ -1,5 +1,5 @@
 /* File: output that appears under its final name only when it is whole. */
-#include "file.h"
+#include "pipeline/file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "memory.h"
+#include "pipeline/memory.h"
 
 #define BUFFER_SIZE (256 << 10)
 

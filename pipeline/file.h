@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 typedef struct npg_file npg_file;
 

@@ -1,5 +1,5 @@
 /* Folder: listing and removing. */
-#include "folder.h"
+#include "pipeline/folder.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "memory.h"
-#include "order.h"
+#include "pipeline/memory.h"
+#include "pipeline/order.h"
 
 /* The number between prefix and extension; false for any other name. */
 static bool number_in(const char *name, const char *prefix, const char *extension, int64_t *number)

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 /* The numbers N of the files "<prefix>N.<extension>" in a folder, ascending; *numbers is to be given to
  * npg_release(), NULL where there are none, nor a folder.  NPG_DISK when it can't be listed. */

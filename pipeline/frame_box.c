@@ -1,5 +1,5 @@
 /* Frame box: the one place where coordinates change. */
-#include "frame_box.h"
+#include "pipeline/frame_box.h"
 
 #include <float.h>
 #include <math.h>

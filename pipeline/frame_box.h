@@ -9,7 +9,7 @@
 
 #include <stdbool.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 #define NPG_UNIT_EXTENT 0.95 /* half of the longest side of the box, in units */
 

@@ -1,12 +1,12 @@
 /* JSON files that people write: with comments, with the place of an error. */
-#include "json_file.h"
+#include "pipeline/json_file.h"
 
 #include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "memory.h"
+#include "pipeline/memory.h"
 
 /* Blank out comments in place, so that line numbers stay. */
 static void blank_comments(char *text)

@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 /* Parse a file of at most `limit` bytes; comments go from // to the end of the line, a key may stand only
  * once. *text gets what was parsed, comments blanked out, lines as they were: npg_release().  The caller owns

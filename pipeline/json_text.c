@@ -3,9 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "file.h"
-#include "json_file.h"
-#include "stage.h"
+#include "pipeline/file.h"
+#include "pipeline/json_file.h"
+#include "pipeline/stage.h"
 
 /* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
 static size_t sequence_length(const unsigned char *text)

@@ -1,5 +1,5 @@
 /* Live plan: the windows of a capture whose end is not known yet. */
-#include "live_plan.h"
+#include "pipeline/live_plan.h"
 
 #include <assert.h>
 

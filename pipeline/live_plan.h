@@ -20,7 +20,7 @@
 
 #include <stdbool.h>
 
-#include "plan.h"
+#include "pipeline/plan.h"
 
 #define NPG_FRAMES_OPEN (INT64_MAX / 4)
 

@@ -1,12 +1,12 @@
 /* Memory: aligned, zeroed, counted by purpose, from the user's allocator; the n-th request can be made to
  * fail. */
-#include "memory.h"
+#include "pipeline/memory.h"
 
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "struct_size.h"
+#include "pipeline/struct_size.h"
 
 #define ALIGN 64
 

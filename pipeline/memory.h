@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 #ifdef __cplusplus
 extern "C" {

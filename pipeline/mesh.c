@@ -1,5 +1,5 @@
 /* Mesh: vertices and triangles as plain arrays, shared by counted references. */
-#include "mesh.h"
+#include "pipeline/mesh.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#include "memory.h"
+#include "pipeline/memory.h"
 
 typedef struct npg_mesh {
     size_t vert_count, face_count; /* V, F                                                                */

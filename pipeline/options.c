@@ -1,5 +1,5 @@
 /* Options: tables, one per stage; parser, help, configuration file and manual all come from them. */
-#include "options.h"
+#include "pipeline/options.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -11,11 +11,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "json_file.h"
-#include "memory.h"
-#include "own_stage.h"
-#include "run_settings.h"
-#include "struct_size.h"
+#include "pipeline/json_file.h"
+#include "pipeline/memory.h"
+#include "pipeline/own_stage.h"
+#include "pipeline/run_settings.h"
+#include "pipeline/struct_size.h"
 
 struct npg_options {
     const npg_stage *const *chain; /* whose tables count */

@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 /* One option.  A table ends with a name of NULL.  offset is where the value goes in the stage's state:
  * FLAG bool, INT int64_t, REAL double, CHOICE int (which word), TEXT const char * (a loan, lives as long as

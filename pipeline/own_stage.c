@@ -1,10 +1,10 @@
 /* Own stage: a stage that a program adds to the chain; shows each frame to a callback. */
-#include "own_stage.h"
+#include "pipeline/own_stage.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "run_internal.h"
+#include "pipeline/run_internal.h"
 
 typedef struct own_state {
     uint8_t *keep; /* owned */

@@ -2,7 +2,7 @@
 #ifndef NPG_OWN_STAGE_H
 #define NPG_OWN_STAGE_H
 
-#include "stage.h"
+#include "pipeline/stage.h"
 
 #define NPG_OWN_STAGES_MAX 6 /* beside the chain's */
 

@@ -1,5 +1,5 @@
 /* Parallel: threads for the parts of one piece of work. */
-#include "parallel.h"
+#include "pipeline/parallel.h"
 
 #include <pthread.h>
 #include <stdbool.h>

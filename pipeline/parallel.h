@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 #define NPG_PARALLEL_MAX 64
 

@@ -1,5 +1,5 @@
 /* Plan: which frames are solved together, and in what order the solving pass reads the capture. */
-#include "plan.h"
+#include "pipeline/plan.h"
 
 #include <assert.h>
 

@@ -9,7 +9,7 @@
 
 #include <stdbool.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 typedef struct npg_plan {
     int64_t frame_count; /* T                                                     */

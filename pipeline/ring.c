@@ -1,10 +1,10 @@
 /* Ring: a bounded queue of chunks between two stages. */
-#include "ring.h"
+#include "pipeline/ring.h"
 
 #include <pthread.h>
 
-#include "clock.h"
-#include "memory.h"
+#include "pipeline/clock.h"
+#include "pipeline/memory.h"
 
 typedef enum ring_state { RING_OPEN, RING_ENDED, RING_ABORTED } ring_state;
 

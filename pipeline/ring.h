@@ -7,7 +7,7 @@
 #ifndef NPG_RING_H
 #define NPG_RING_H
 
-#include "chunk.h"
+#include "pipeline/chunk.h"
 
 typedef struct npg_ring npg_ring;
 

@@ -7,10 +7,10 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "clock.h"
-#include "file.h"
-#include "run_internal.h"
-#include "struct_size.h"
+#include "pipeline/clock.h"
+#include "pipeline/file.h"
+#include "pipeline/run_internal.h"
+#include "pipeline/struct_size.h"
 
 #define OFFSET(member) offsetof(npg_settings, member)
 

@@ -6,8 +6,8 @@
 #include <semaphore.h>
 #include <stdatomic.h>
 
-#include "own_stage.h"
-#include "ring.h"
+#include "pipeline/own_stage.h"
+#include "pipeline/ring.h"
 
 #define NPG_STAGES_MAX   16
 #define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */

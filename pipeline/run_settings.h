@@ -2,7 +2,7 @@
 #ifndef NPG_RUN_SETTINGS_H
 #define NPG_RUN_SETTINGS_H
 
-#include "options.h"
+#include "pipeline/options.h"
 
 typedef struct npg_settings {
     const char *input, *follow, *output, *device, *tuning;

@@ -8,12 +8,12 @@
 #include <jansson.h>
 #include <stdatomic.h>
 
-#include "chunk.h"
-#include "frame_box.h"
-#include "mesh.h"
-#include "options.h"
-#include "plan.h"
-#include "run_settings.h"
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/mesh.h"
+#include "pipeline/options.h"
+#include "pipeline/plan.h"
+#include "pipeline/run_settings.h"
 
 /* A pass is one walk of the capture through the stages that take part in it. */
 typedef enum npg_pass {

@@ -1,5 +1,5 @@
 /* Failures: a status to return and one line of text per thread that says what, where and why. */
-#include "status.h"
+#include "pipeline/status.h"
 
 #include <errno.h>
 #include <stdarg.h>

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "status.h"
+#include "pipeline/status.h"
 
 /* The size a struct had when `last` was its last member. */
 #define NPG_SIZE_UP_TO(type, last) (offsetof(type, last) + sizeof(((type *)0)->last))

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "clock.h"
-#include "run_internal.h"
+#include "pipeline/clock.h"
+#include "pipeline/run_internal.h"
 
 void *npg_worker_state(const npg_worker *worker)
 {

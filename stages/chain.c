@@ -1,5 +1,5 @@
 /* Chain: the order of the data's way.  The program's table of contents. */
-#include "stage.h"
+#include "pipeline/stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
     npg_stage_align, npg_stage_optimize, npg_stage_evaluate, npg_stage_export, npg_stage_job;

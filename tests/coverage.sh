@@ -12,9 +12,8 @@ build=build/coverage
 
 # Parsers: captures, configurations, archives.  Writers: meshes, exports, files.  State: jobs, checkpoints, fits.
 shopt -s nullglob
-files=(stages/read_*.c stages/reader.c stages/stream.c stages/source.c stages/ply_header.c stages/point_list.c
-    stages/number.c stages/write*.c stages/export*.c stages/checkpoint.c stages/fit_state.c stages/job*.c stages/frame_*.c
-    stages/time_code.c stages/glb_*.c stages/zip_store.c stages/point_cache.c stages/vdb_file.c pipeline/archive.c
+files=(stages/ingest/formats/*.c stages/ingest/stream.c stages/ingest/frame_*.c stages/export/*.c stages/export/forms/*.c
+    stages/job/*.c stages/optimize/checkpoint.c stages/optimize/fit_state.c stages/optimize/time_code.c pipeline/archive.c
     pipeline/json_*.c pipeline/options.c pipeline/file.c pipeline/own_stage.c)
 
 tests="test_readers test_bad_files test_writers test_forms test_time_code test_export test_checkpoint test_frame_files
@@ -25,7 +24,7 @@ cmake -G Ninja -B "$build" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_C_FLAGS_DEBUG="-O1 -
     ${LAUNCHER:+-DCMAKE_C_COMPILER_LAUNCHER="$LAUNCHER" -DCMAKE_CXX_COMPILER_LAUNCHER="$LAUNCHER"} >/dev/null
 targets="neupig"
 for test in $tests; do
-    [ ! -e "tests/$test.c" ] || targets="$targets $test"
+    ! compgen -G "tests/*/$test.c" >/dev/null || targets="$targets $test"
 done
 # shellcheck disable=SC2086
 cmake --build "$build" --target $targets

@@ -1,11 +1,11 @@
 /* Command line: options from tables, operands, help, and how a verb ends. */
-#include "cli.h"
+#include "tools/cli.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "method_config.h"
-#include "stage.h"
+#include "pipeline/stage.h"
+#include "tools/method_config.h"
 
 enum { NAME_LIMIT = 64, HELP_INDENT = 28, HELP_WIDTH = 100 };
 

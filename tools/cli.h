@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "verbs.h"
+#include "tools/verbs.h"
 
 typedef struct npg_cli {
     const npg_verb *verb;

@@ -1,11 +1,11 @@
 /* Motion figures of a mesh sequence of constant topology. */
-#include "eval_motion.h"
+#include "tools/eval_motion.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh_tools.h"
+#include "geometry/mesh_tools.h"
 
 void npg_eval_motion_close(npg_eval_motion *motion)
 {

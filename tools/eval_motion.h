@@ -3,7 +3,7 @@
 #ifndef NPG_EVAL_MOTION_H
 #define NPG_EVAL_MOTION_H
 
-#include "mesh.h"
+#include "pipeline/mesh.h"
 
 typedef struct npg_eval_motion {
     double diagonal;

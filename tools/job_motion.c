@@ -1,12 +1,12 @@
 /* Job motion: replayed windows in the coordinates of the run's files. */
-#include "job_motion.h"
+#include "tools/job_motion.h"
 
 #include <math.h>
 #include <stdio.h>
 
-#include "file.h"
-#include "frame_box.h"
-#include "replay.h"
+#include "optimize/replay.h"
+#include "pipeline/file.h"
+#include "pipeline/frame_box.h"
 
 #define OFF_MOST 1e-4 /* of the diagonal, between reference.ply and the reference of the windows */
 

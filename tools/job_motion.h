@@ -3,7 +3,7 @@
 #ifndef NPG_JOB_MOTION_H
 #define NPG_JOB_MOTION_H
 
-#include "mesh.h"
+#include "pipeline/mesh.h"
 
 typedef struct npg_job_motion npg_job_motion;
 

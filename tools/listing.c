@@ -1,5 +1,5 @@
 /* Listing: files of a folder in natural order, for the verbs that take folders of meshes or clouds. */
-#include "listing.h"
+#include "tools/listing.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -9,9 +9,9 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "file.h"
-#include "frame_names.h"
-#include "memory.h"
+#include "ingest/frame_names.h"
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
 
 static int compare_paths(const void *a, const void *b)
 {

@@ -1,5 +1,5 @@
 /* Log files: one JSON object per line. */
-#include "log_file.h"
+#include "tools/log_file.h"
 
 #include <errno.h>
 #include <stdio.h>

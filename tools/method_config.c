@@ -2,7 +2,7 @@
  *
  * That code solves (I + lambda L) u = z by conjugate gradients and names the choice and its neighbourhood;
  * the solve is exact here, so these keys have no counterpart.  Features have a fixed width of 30 + 2. */
-#include "method_config.h"
+#include "tools/method_config.h"
 
 #include <jansson.h>
 #include <stdbool.h>

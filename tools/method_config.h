@@ -2,7 +2,7 @@
 #ifndef NPG_METHOD_CONFIG_H
 #define NPG_METHOD_CONFIG_H
 
-#include "status.h"
+#include "pipeline/status.h"
 
 /* Read options from a JSON file of either kind: our own ({"epochs": 250}), or a method configuration of the
  * published code, which is told by its sections "optimization", "grid" and "mlp".  The latter chooses the

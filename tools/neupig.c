@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "tools/cli.h"
 
 const npg_verb npg_verbs[] = {
     {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",

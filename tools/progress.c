@@ -1,5 +1,5 @@
 /* Progress: how far a run is, as a bar on a terminal or as JSON lines, and the log on standard error. */
-#include "progress.h"
+#include "tools/progress.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,8 +10,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "log_file.h"
-#include "stage.h"
+#include "pipeline/stage.h"
+#include "tools/log_file.h"
 
 void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose)
 {

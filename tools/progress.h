@@ -2,7 +2,7 @@
 #ifndef NPG_PROGRESS_H
 #define NPG_PROGRESS_H
 
-#include "status.h"
+#include "pipeline/status.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -2,7 +2,7 @@
 #ifndef NPG_RUN_JOB_H
 #define NPG_RUN_JOB_H
 
-#include "progress.h"
+#include "tools/progress.h"
 
 /* Holds the process id of the batch that a run belongs to. */
 #define NPG_PARENT_VARIABLE "NEUPIG_BATCH_PID"

@@ -3,10 +3,10 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "cli.h"
-#include "progress.h"
-#include "run_job.h"
-#include "segments.h"
+#include "tools/cli.h"
+#include "tools/progress.h"
+#include "tools/run_job.h"
+#include "tools/segments/segments.h"
 
 typedef struct settings {
     const char *input;

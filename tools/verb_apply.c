@@ -9,16 +9,16 @@
 #include <strings.h>
 #include <unistd.h>
 
-#include "attach.h"
-#include "cli.h"
-#include "export.h"
-#include "file.h"
-#include "job_motion.h"
-#include "listing.h"
-#include "mesh_tools.h"
-#include "reader.h"
-#include "segments.h"
-#include "writer.h"
+#include "export/export.h"
+#include "export/forms/writer.h"
+#include "geometry/attach.h"
+#include "geometry/mesh_tools.h"
+#include "ingest/formats/reader.h"
+#include "pipeline/file.h"
+#include "tools/cli.h"
+#include "tools/job_motion.h"
+#include "tools/listing.h"
+#include "tools/segments/segments.h"
 
 #define PATH_SIZE 4096
 

@@ -2,11 +2,11 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "batch_estimate.h"
-#include "batch_run.h"
-#include "batch_table.h"
-#include "batch_verdict.h"
-#include "cli.h"
+#include "tools/batch/batch_estimate.h"
+#include "tools/batch/batch_run.h"
+#include "tools/batch/batch_table.h"
+#include "tools/batch/batch_verdict.h"
+#include "tools/cli.h"
 
 typedef struct settings {
     const char *config;

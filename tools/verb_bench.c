@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bench_compare.h"
-#include "bench_kernels.h"
-#include "cli.h"
-#include "clock.h"
-#include "json_file.h"
+#include "pipeline/clock.h"
+#include "pipeline/json_file.h"
+#include "tools/bench/bench_compare.h"
+#include "tools/bench/bench_kernels.h"
+#include "tools/cli.h"
 
 typedef struct settings {
     int64_t vertices, points, frames, epochs, repeat, dense;

@@ -10,8 +10,8 @@
 #include <xxhash.h>
 #include <zstd.h>
 
-#include "cli.h"
-#include "kernels.h"
+#include "kernels/kernels.h"
+#include "tools/cli.h"
 
 typedef struct settings {
     bool json;

@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
-#include "eval_motion.h"
-#include "listing.h"
-#include "metrics.h"
-#include "reader.h"
+#include "geometry/metrics.h"
+#include "ingest/formats/reader.h"
+#include "tools/cli.h"
+#include "tools/eval_motion.h"
+#include "tools/listing.h"
 
 typedef struct settings {
     bool points_only, json, per_frame;

@@ -2,8 +2,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "cli.h"
-#include "stage.h"
+#include "pipeline/stage.h"
+#include "tools/cli.h"
 
 typedef enum completion { COMPLETION_NONE, COMPLETION_BASH, COMPLETION_ZSH } completion;
 

@@ -4,10 +4,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
-#include "clock.h"
-#include "probe_capture.h"
-#include "reader.h"
+#include "ingest/formats/reader.h"
+#include "pipeline/clock.h"
+#include "tools/cli.h"
+#include "tools/probe/probe_capture.h"
 
 typedef struct settings {
     bool json;

@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
-#include "listing.h"
-#include "render_image.h"
+#include "tools/cli.h"
+#include "tools/listing.h"
+#include "tools/render/render_image.h"
 
 typedef struct settings {
     const char *output;

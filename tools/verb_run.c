@@ -8,10 +8,10 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include "cli.h"
-#include "clock.h"
-#include "progress.h"
-#include "segments.h"
+#include "pipeline/clock.h"
+#include "tools/cli.h"
+#include "tools/progress.h"
+#include "tools/segments/segments.h"
 
 typedef struct settings {
     const char *config, *log_file;

@@ -3,14 +3,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
-#include "file.h"
-#include "frame_box.h"
-#include "mesh_tools.h"
-#include "metrics.h"
-#include "synth_body.h"
-#include "synth_points.h"
-#include "writer.h"
+#include "export/forms/writer.h"
+#include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
+#include "pipeline/file.h"
+#include "pipeline/frame_box.h"
+#include "tools/cli.h"
+#include "tools/synth/synth_body.h"
+#include "tools/synth/synth_points.h"
 
 typedef struct settings {
     const char *output;

@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "bench_kernels.h"
-#include "cli.h"
-#include "kernels.h"
+#include "kernels/kernels.h"
+#include "tools/bench/bench_kernels.h"
+#include "tools/cli.h"
 
 #define GAIN 0.03 /* a set takes the place of the present one when it is faster by this share */
 

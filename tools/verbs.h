@@ -2,7 +2,7 @@
 #ifndef NPG_VERBS_H
 #define NPG_VERBS_H
 
-#include "options.h"
+#include "pipeline/options.h"
 
 typedef struct npg_verb {
     const char *name;

@@ -1,0 +1,292 @@
+/* Device: opening OpenCL devices, buffers. */
+#include "kernels/runtime/device.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+#include "kernels/runtime/cl_error.h"
+#include "kernels/runtime/device_internal.h"
+#include "kernels/runtime/kernel_cache.h"
+
+#define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
+
+/* ---- finding devices ---- */
+
+static npg_status all_devices(cl_device_id *ids, size_t capacity, size_t *count)
+{
+    cl_platform_id platforms[16];
+    cl_uint platform_count = 0, found;
+    *count = 0;
+    cl_int code = clGetPlatformIDs(16, platforms, &platform_count);
+    if (code == -1001 || (!code && !platform_count))
+        return npg_error(NPG_DEVICE,
+                         "no OpenCL driver is installed (on Debian: apt-get install pocl-opencl-icd)");
+    NPG_TRY(npg_cl_status(code, "clGetPlatformIDs"));
+    for (cl_uint i = 0; i < platform_count && i < 16; i++) {
+        code = clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, (cl_uint)(capacity - *count), ids + *count,
+                              &found);
+        if (code == CL_DEVICE_NOT_FOUND) continue;
+        NPG_TRY(npg_cl_status(code, "clGetDeviceIDs"));
+        *count += found < capacity - *count ? found : capacity - *count;
+    }
+    return NPG_OK;
+}
+
+static npg_status read_facts(npg_device_info *info, cl_device_id id)
+{
+    cl_platform_id platform;
+    cl_device_type type;
+    cl_uint units, vector;
+    cl_ulong memory;
+    memset(info, 0, sizeof *info);
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_NAME, sizeof info->name - 1, info->name, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_VERSION, sizeof info->version - 1, info->version, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_TYPE, sizeof type, &type, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_GLOBAL_MEM_SIZE, sizeof memory, &memory, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DRIVER_VERSION, sizeof info->driver - 1, info->driver, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, sizeof vector, &vector, NULL));
+    CL_TRY(clGetDeviceInfo(id, CL_DEVICE_PLATFORM, sizeof platform, &platform, NULL));
+    CL_TRY(clGetPlatformInfo(platform, CL_PLATFORM_NAME, sizeof info->platform - 1, info->platform, NULL));
+    info->is_cpu = type & CL_DEVICE_TYPE_CPU;
+    info->units = (int)units;
+    info->vector = (int)vector;
+    info->memory_bytes = memory;
+    return NPG_OK;
+}
+
+npg_status npg_device_describe(size_t i, npg_device_info *info)
+{
+    cl_device_id ids[32];
+    size_t count;
+    NPG_TRY(npg_kernel_cache_enter());
+    npg_status status = all_devices(ids, 32, &count);
+    if (!status) status = i < count ? read_facts(info, ids[i]) : NPG_END;
+    npg_kernel_cache_leave();
+    return status;
+}
+
+static bool has_part(const char *text, const char *part)
+{
+    size_t size = strlen(part);
+    for (; *text; text++)
+        if (!strncasecmp(text, part, size)) return true;
+    return false;
+}
+
+static bool fits(const npg_device_info *info, size_t i, const char *spec)
+{
+    char *end;
+    unsigned long number = strtoul(spec, &end, 10);
+    if (isdigit((unsigned char)*spec) && !*end) return number == i;
+    if (!strcmp(spec, "cpu")) return info->is_cpu;
+    if (!strcmp(spec, "gpu")) return !info->is_cpu;
+    return has_part(info->name, spec);
+}
+
+static npg_status choose_device(npg_device *device, const char *spec)
+{
+    cl_device_id ids[32];
+    size_t count;
+    char list[1024] = "";
+    NPG_TRY(all_devices(ids, 32, &count));
+    for (int any = 0; any < (*spec ? 1 : 2); any++)
+        for (size_t i = 0; i < count; i++) {
+            NPG_TRY(read_facts(&device->info, ids[i]));
+            device->id = ids[i];
+            if (*spec ? fits(&device->info, i, spec) : any || device->info.is_cpu) return NPG_OK;
+            size_t used = strlen(list);
+            snprintf(list + used, sizeof list - used, " %zu \"%s\"", i, device->info.name);
+        }
+    return npg_error(NPG_DEVICE, "no OpenCL device fits \"%s\"; there is:%s", spec, *list ? list : " none");
+}
+
+/* ---- tuning ---- */
+
+static const struct {
+    const char *name;
+    const npg_tuning *tuning;
+} sets[] = {{"wide", &npg_tuning_wide}, {"narrow", &npg_tuning_narrow}, {"gpu", &npg_tuning_gpu}};
+
+static void take_set(npg_device *device, size_t i)
+{
+    device->tuning = *sets[i].tuning;
+    snprintf(device->tuning_source, sizeof device->tuning_source, "%s", sets[i].name);
+}
+
+npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *device)
+{
+    const npg_device_info *info = &device->info;
+    XXH64_hash_t hash = XXH64(info->platform, strlen(info->platform), (XXH64_hash_t)info->units);
+    char name[64];
+    hash = XXH64(info->driver, strlen(info->driver), XXH64(info->name, strlen(info->name), hash));
+    snprintf(name, sizeof name, "tuning-%016llx.json", (unsigned long long)hash);
+    if (npg_kernel_cache_path(out, size, name)) return NPG_OK;
+    return npg_error(NPG_DISK, "there is no folder for the cache (XDG_CACHE_HOME, HOME)");
+}
+
+/* The set of this kind of device, and over it what was tuned. */
+static void tune_by_kind(npg_device *device)
+{
+    char path[4200];
+    take_set(device, !device->info.is_cpu ? 2 : device->info.vector >= 16 ? 0 : 1);
+    if (npg_device_tuning_path(path, sizeof path, device)) return;
+    npg_status status = npg_tuning_load(&device->tuning, path, device->info.name);
+    if (!status) snprintf(device->tuning_source, sizeof device->tuning_source, "%s", path);
+    if (status < 0) {
+        size_t used = strlen(device->tuning_source);
+        snprintf(device->tuning_source + used, sizeof device->tuning_source - used, " (not used: %.2000s)",
+                 npg_error_text());
+    }
+}
+
+static npg_status choose_tuning(npg_device *device, const char *tuning)
+{
+    for (size_t i = 0; i < sizeof sets / sizeof *sets; i++)
+        if (!strcmp(sets[i].name, tuning)) {
+            take_set(device, i);
+            return NPG_OK;
+        }
+    if (!*tuning || !strcmp(tuning, "auto")) {
+        tune_by_kind(device);
+        return NPG_OK;
+    }
+    npg_status status = npg_tuning_load(&device->tuning, tuning, device->info.name);
+    if (status == NPG_END) return npg_error(NPG_BAD_INPUT, "tuning %s: there is no such file or set", tuning);
+    snprintf(device->tuning_source, sizeof device->tuning_source, "%s", tuning);
+    return npg_error_prefix(status, "tuning");
+}
+
+const npg_tuning *npg_device_tuning(const npg_device *device)
+{
+    return &device->tuning;
+}
+
+const char *npg_device_tuning_source(const npg_device *device)
+{
+    return device->tuning_source;
+}
+
+npg_status npg_device_set_tuning(npg_device *device, const npg_tuning *tuning)
+{
+    NPG_TRY(npg_tuning_check(tuning));
+    device->tuning = *tuning;
+    snprintf(device->tuning_source, sizeof device->tuning_source, "given");
+    return NPG_OK;
+}
+
+/* ---- opening ---- */
+
+npg_status npg_device_open(npg_device **out, const char *spec)
+{
+    return npg_device_open_tuned(out, spec, "auto");
+}
+
+npg_status npg_device_open_tuned(npg_device **out, const char *spec, const char *tuning)
+{
+    npg_device *device;
+    cl_int code = 0;
+    *out = NULL;
+    NPG_TRY(npg_kernel_cache_enter());
+    npg_status status = npg_alloc(&device, NPG_FOR_DEVICE, sizeof *device);
+    if (status) {
+        npg_kernel_cache_leave();
+        return status;
+    }
+    status = choose_device(device, spec && strcmp(spec, "auto") != 0 ? spec : "");
+    if (!status) status = choose_tuning(device, tuning);
+    if (!status) {
+        device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
+        status = npg_cl_status(code, "clCreateContext");
+    }
+    if (!status) {
+        device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
+        status = npg_cl_status(code, "clCreateCommandQueue");
+    }
+    if (status) npg_device_close(&device);
+    *out = device;
+    return status;
+}
+
+void npg_device_close(npg_device **slot)
+{
+    if (!slot || !*slot) return;
+    npg_device *device = *slot;
+    if (device->queue) clFinish(device->queue);
+    npg_programs_close(device);
+    if (device->queue) clReleaseCommandQueue(device->queue);
+    if (device->context) clReleaseContext(device->context);
+    npg_release(slot);
+    npg_kernel_cache_leave();
+}
+
+const npg_device_info *npg_device_facts(const npg_device *device)
+{
+    return &device->info;
+}
+
+npg_status npg_device_finish(npg_device *device)
+{
+    CL_TRY(clFinish(device->queue));
+    return NPG_OK;
+}
+
+/* ---- buffers ---- */
+
+npg_status npg_buffer_open(npg_buffer *buffer, npg_device *device, size_t size)
+{
+    cl_int code;
+    if (!size) size = 64;
+    *buffer = (npg_buffer){device, NULL, size};
+    NPG_TRY(npg_memory_count(NPG_FOR_DEVICE, (ptrdiff_t)size));
+    buffer->memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, size, NULL, &code);
+    if (code) {
+        npg_memory_count(NPG_FOR_DEVICE, -(ptrdiff_t)size);
+        buffer->memory = NULL;
+        return npg_error_prefix(npg_cl_status(code, "clCreateBuffer"), "device buffer of %zu bytes", size);
+    }
+    npg_status status = npg_buffer_zero(buffer);
+    if (status) npg_buffer_close(buffer);
+    return status;
+}
+
+void npg_buffer_close(npg_buffer *buffer)
+{
+    if (!buffer || !buffer->memory) return;
+    clReleaseMemObject(buffer->memory);
+    npg_memory_count(NPG_FOR_DEVICE, -(ptrdiff_t)buffer->size);
+    *buffer = (npg_buffer){0};
+}
+
+npg_status npg_buffer_write(npg_buffer *buffer, size_t offset, const void *data, size_t size)
+{
+    if (!size) return NPG_OK;
+    CL_TRY(clEnqueueWriteBuffer(buffer->device->queue, buffer->memory, CL_TRUE, offset, size, data, 0, NULL,
+                                NULL));
+    return NPG_OK;
+}
+
+npg_status npg_buffer_read(const npg_buffer *buffer, size_t offset, void *data, size_t size)
+{
+    if (!size) return NPG_OK;
+    CL_TRY(clEnqueueReadBuffer(buffer->device->queue, buffer->memory, CL_TRUE, offset, size, data, 0, NULL,
+                               NULL));
+    return NPG_OK;
+}
+
+npg_status npg_buffer_zero(npg_buffer *buffer)
+{
+    const cl_uchar zero = 0;
+    CL_TRY(
+        clEnqueueFillBuffer(buffer->device->queue, buffer->memory, &zero, 1, 0, buffer->size, 0, NULL, NULL));
+    return NPG_OK;
+}
+
+npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *data, size_t size)
+{
+    NPG_TRY(npg_buffer_open(buffer, device, size));
+    return npg_buffer_write(buffer, 0, data, size);
+}

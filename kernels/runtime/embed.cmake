@@ -1,0 +1,21 @@
+# Writes the kernel sources SOURCES, each behind the text of HEAD, into OUT as C arrays, so that the library needs no files at
+# run time.
+function(bytes_of out file)
+  file(READ ${file} hex HEX)
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
+  set(${out} "${bytes}" PARENT_SCOPE)
+endfunction()
+
+set(text "/* generated from the .cl files of kernels */\n#include \"kernels/runtime/kernel_sources.h\"\n\n")
+set(table "")
+bytes_of(head ${HEAD})
+string(HEX "#line 1\n" line)
+string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," line "${line}")
+foreach(source ${SOURCES})
+  get_filename_component(name ${source} NAME_WE)
+  bytes_of(bytes ${source})
+  string(APPEND text "static const char ${name}_text[] = {${head}${line}${bytes}0};\n")
+  string(APPEND table "    {\"${name}\", ${name}_text},\n")
+endforeach()
+string(APPEND text "\nconst npg_kernel_source npg_kernel_sources[] = {\n${table}    {0, 0}};\n")
+file(WRITE ${OUT} "${text}")

@@ -1,0 +1,514 @@
+/* Tracker: correspondences and Gauss-Newton steps on the deformation graph. */
+#include "align/tracker.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/block_system.h"
+#include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
+#include "geometry/query.h"
+#include "geometry/thin.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/parallel.h"
+
+#define STIFF_START 10.0 /* times the final stiffness at the first step */
+/* For a reference that fills the box of all frames; one that travels through it is smaller, and so are these.
+ */
+#define NOISE_UNIT  0.003 /* mean distance of points at which the stiffness has doubled */
+#define WIDTH_START 0.08  /* of the robust weight, in units: what may move between two frames */
+#define WIDTH_END   0.01  /* at the last step, more where the points are noisy               */
+#define TURN_MAX    0.6   /* of a node in one step, radians */
+#define MOVE_MAX    0.15  /* units */
+#define REVERSE     0.5   /* weight of surface -> points against points -> surface */
+/* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
+#define LENT_PAIRS 0.35
+#define LENT_TERMS 0.18
+
+/* What each thread gathers: points -> surface; surface -> points and the edges. */
+enum { TO_SURFACE, TO_POINTS };
+
+struct npg_tracker {
+    npg_tracker_settings settings;
+    npg_mesh *reference; /* counted reference; V vertices, which the whole graph carries */
+    npg_graph *whole;
+    npg_thin *thin;       /* the surface that is aligned: W vertices of it, which the graph carries */
+    const npg_mesh *mesh; /* the thin one's */
+    npg_graph *graph;
+    npg_block_system *system; /* its parts: TO_SURFACE, TO_POINTS */
+    npg_surface *surface;
+    float *vert_pos, *vert_normals; /* W x 3: the pose at work */
+    uint32_t *samples;              /* vertices, spread over the surface */
+    size_t sample_count;
+    double *step; /* K x 6 */
+    float *rows;  /* K x 16: the pose at work, for many points */
+    double along; /* share of distances along the surface in the fit at work */
+    double size;  /* longest side of the reference against that of the box of all frames */
+    /* of the frame at work */
+    float *targets, *target_normals; /* M x 3 */
+    size_t target_count, target_capacity;
+    npg_surface_hit *hits; /* M */
+    uint32_t *start_face;  /* M: where the step before found each point's nearest */
+    uint32_t *near;        /* samples: nearest target */
+    float *near_sq, *sample_pos;
+};
+
+size_t npg_tracker_node_count(const npg_tracker *tracker)
+{
+    return tracker->graph->node_count;
+}
+
+void npg_tracker_close(npg_tracker **slot)
+{
+    if (!slot || !*slot) return;
+    npg_tracker *t = *slot;
+    npg_graph_close(&t->graph);
+    npg_graph_close(&t->whole);
+    npg_thin_close(&t->thin);
+    npg_block_close(&t->system);
+    npg_surface_close(&t->surface);
+    npg_mesh_unref(&t->reference);
+    void *all[] = {&t->vert_pos,   &t->vert_normals, &t->samples,        &t->step,
+                   &t->rows,       &t->targets,      &t->target_normals, &t->hits,
+                   &t->start_face, &t->near,         &t->near_sq,        &t->sample_pos};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_release(slot);
+}
+
+/* Every n-th vertex: Poisson meshes have their vertices evenly over the surface, and in no order that
+ * repeats. */
+static void choose_samples(npg_tracker *t)
+{
+    size_t step = t->mesh->vert_count / t->settings.samples + 1;
+    for (size_t v = 0; v < t->mesh->vert_count; v += step) t->samples[t->sample_count++] = (uint32_t)v;
+}
+
+/* The graph, and the surface that it carries through the steps. */
+static npg_status open_surface(npg_tracker *t)
+{
+    NPG_TRY(npg_graph_open(&t->whole, t->reference, t->settings.nodes));
+    NPG_TRY(npg_thin_open(&t->thin, t->reference, NPG_THIN_SURFACE));
+    t->mesh = t->thin->mesh;
+    NPG_TRY(npg_graph_take(&t->graph, t->whole, t->thin->vertex, t->mesh->vert_count));
+    return npg_surface_open(&t->surface, t->mesh->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                            t->mesh->face_count);
+}
+
+static npg_status open_system(npg_tracker *t)
+{
+    const npg_graph *graph = t->graph;
+    return npg_block_open(&t->system, graph->node_count, (const uint32_t(*)[2])graph->edges,
+                          graph->edge_count);
+}
+
+static double size_of(const npg_mesh *reference)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, reference->vert_pos, reference->vert_count);
+    double longest = npg_bounds_longest(&bounds);
+    return longest > 0 ? longest / (2 * NPG_UNIT_EXTENT) : 1;
+}
+
+npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tracker_settings *settings)
+{
+    npg_tracker *t;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&t, NPG_FOR_FIT, sizeof *t));
+    t->settings = *settings;
+    t->reference = npg_mesh_ref(reference);
+    t->size = size_of(reference);
+    npg_status status = open_surface(t);
+    size_t w = status ? 0 : t->mesh->vert_count, m = settings->samples;
+    if (!status) status = open_system(t);
+    if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, w, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, w, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->samples, NPG_FOR_FIT, w, sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&t->step, NPG_FOR_FIT, t->graph->node_count, 6 * sizeof(double));
+    if (!status)
+        status = npg_alloc_array(&t->rows, NPG_FOR_FIT, t->graph->node_count, NPG_POSE_ROW * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->targets, NPG_FOR_FIT, m, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->target_normals, NPG_FOR_FIT, m, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->hits, NPG_FOR_FIT, m, sizeof *t->hits);
+    if (!status) status = npg_alloc_array(&t->start_face, NPG_FOR_FIT, m, sizeof *t->start_face);
+    if (!status) choose_samples(t);
+    if (!status) status = npg_alloc_array(&t->near, NPG_FOR_FIT, t->sample_count, sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&t->near_sq, NPG_FOR_FIT, t->sample_count, sizeof(float));
+    if (!status) status = npg_alloc_array(&t->sample_pos, NPG_FOR_FIT, t->sample_count, 3 * sizeof(float));
+    if (status) npg_tracker_close(&t);
+    *out = t;
+    return status;
+}
+
+/* ---- one term ---- */
+
+/* A point that nodes carry and where it should go. */
+typedef struct pull {
+    float rest[3];
+    uint32_t nodes[NPG_GRAPH_BIND];
+    float weights[NPG_GRAPH_BIND];
+    double normal[3], target[3];
+} pull;
+
+/* The nodes of a surface point: those of its face's corners, the four that matter most. */
+static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit *hit)
+{
+    uint32_t nodes[3 * NPG_GRAPH_BIND];
+    float weights[3 * NPG_GRAPH_BIND], sum = 0;
+    int count = 0;
+    memset(p->rest, 0, sizeof p->rest);
+    for (int corner = 0; corner < 3; corner++) {
+        size_t v = t->mesh->faces[3 * (size_t)hit->face + (size_t)corner];
+        for (size_t i = 0; i < 3; i++) p->rest[i] += hit->weights[corner] * t->mesh->vert_pos[3 * v + i];
+        for (size_t b = 0; b < NPG_GRAPH_BIND; b++) {
+            uint32_t node = t->graph->vert_node[v * NPG_GRAPH_BIND + b];
+            float weight = hit->weights[corner] * t->graph->vert_weight[v * NPG_GRAPH_BIND + b];
+            if (node == UINT32_MAX) break;
+            int at = 0;
+            while (at < count && nodes[at] != node) at++;
+            weights[at] = at < count ? weights[at] + weight : weight;
+            nodes[at] = node;
+            count += at == count;
+        }
+    }
+    for (int b = 0; b < NPG_GRAPH_BIND; b++) {
+        int best = -1;
+        for (int i = 0; i < count; i++)
+            if (weights[i] > 0 && (best < 0 || weights[i] > weights[best])) best = i;
+        p->nodes[b] = best < 0 ? UINT32_MAX : nodes[best];
+        p->weights[b] = best < 0 ? 0 : weights[best];
+        if (best >= 0) weights[best] = 0;
+        sum += p->weights[b];
+    }
+    for (int b = 0; b < NPG_GRAPH_BIND; b++) p->weights[b] /= sum;
+}
+
+/* rotation (point - node). */
+static void set_arm(double arm[3], const double *rotation, const float *point, const float *node)
+{
+    for (int i = 0; i < 3; i++) {
+        arm[i] = 0;
+        for (int c = 0; c < 3; c++) arm[i] += rotation[3 * i + c] * ((double)point[c] - (double)node[c]);
+    }
+}
+
+/* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
+static void add_pull(const npg_tracker *t, size_t part, const pull *p, const double *pose, double weight,
+                     double width)
+{
+    npg_block_term term = {0};
+    double x[3], dist_sq = 0;
+    npg_pose_point(x, t->graph, pose, p->rest, p->nodes, p->weights);
+    for (int i = 0; i < 3; i++) {
+        term.right[i] = p->target[i] - x[i];
+        dist_sq += term.right[i] * term.right[i];
+    }
+    double robust = 1 / (1 + dist_sq / (width * width));
+    weight *= robust * robust;
+    for (; term.count < NPG_GRAPH_BIND && p->nodes[term.count] != UINT32_MAX; term.count++) {
+        uint32_t node = p->nodes[term.count];
+        term.nodes[term.count] = node;
+        term.shares[term.count] = (double)p->weights[term.count];
+        set_arm(term.arms[term.count], pose + node * NPG_POSE_SIZE, p->rest,
+                t->graph->node_pos + 3 * (size_t)node);
+    }
+    memcpy(term.normal, p->normal, sizeof term.normal);
+    term.across = weight * (1 - t->along);
+    term.along = weight * t->along;
+    npg_block_add(t->system, part, &term);
+}
+
+/* ---- the terms of a step ---- */
+
+static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface_hit *hit)
+{
+    double size = 0;
+    for (size_t i = 0; i < 3; i++) {
+        normal[i] = 0;
+        for (size_t c = 0; c < 3; c++)
+            normal[i] += (double)hit->weights[c] *
+                         (double)t->vert_normals[3 * t->mesh->faces[3 * (size_t)hit->face + c] + i];
+        size += normal[i] * normal[i];
+    }
+    for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
+}
+
+/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the Chamfer
+ * distance. */
+static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t first, size_t last,
+                        const double *pose, bool with_normals, double width)
+{
+    double sum = 0, squares = 0, share = 1 / (double)t->target_count;
+    for (size_t i = first; i < last; i++) {
+        const npg_surface_hit *hit = &t->hits[i];
+        pull p;
+        sum += sqrt((double)hit->dist_sq);
+        squares += (double)hit->dist_sq;
+        hit_normal(p.normal, t, hit);
+        double facing = 0;
+        for (size_t c = 0; c < 3 && with_normals; c++)
+            facing += p.normal[c] * (double)t->target_normals[3 * i + c];
+        if (facing < -0.2) continue;
+        bind_face_point(&p, t, hit);
+        for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
+        add_pull(t, part, &p, pose, share, width);
+    }
+    tracked->point_dist_mean = sum * share;
+    tracked->chamfer = squares * share;
+}
+
+/* Surface -> points, for samples whose nearest point is close enough to be theirs. */
+static void add_samples(npg_tracker *t, const double *pose, const float *points, const float *normals,
+                        double width)
+{
+    double share = REVERSE / (double)t->sample_count;
+    for (size_t s = 0; s < t->sample_count; s++) {
+        size_t v = t->samples[s];
+        pull p;
+        double facing = 0;
+        for (size_t c = 0; c < 3; c++) {
+            p.rest[c] = t->mesh->vert_pos[3 * v + c];
+            p.normal[c] = (double)t->vert_normals[3 * v + c];
+            p.target[c] = (double)points[3 * (size_t)t->near[s] + c];
+            if (normals) facing += p.normal[c] * (double)normals[3 * (size_t)t->near[s] + c];
+        }
+        if (facing < -0.2 || (double)t->near_sq[s] > 9 * width * width) continue;
+        memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
+        memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
+        add_pull(t, TO_POINTS, &p, pose, share, width);
+    }
+}
+
+/* Edges keep their length and direction in the frame of each end. */
+static void add_edges(npg_tracker *t, const double *pose, double stiffness)
+{
+    const npg_graph *graph = t->graph;
+    npg_block_term term = {.count = 2, .shares = {1, -1}, .along = stiffness / (double)graph->edge_count};
+    for (size_t e = 0; e < 2 * graph->edge_count; e++) {
+        uint32_t j = graph->edges[e / 2][e % 2], k = graph->edges[e / 2][1 - e % 2];
+        const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
+        const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
+        term.nodes[0] = j;
+        term.nodes[1] = k;
+        set_arm(term.arms[0], pj, gk, gj);
+        for (int i = 0; i < 3; i++)
+            term.right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term.arms[0][i];
+        npg_block_add(t->system, TO_POINTS, &term);
+    }
+}
+
+/* ---- moving ---- */
+
+/* rotation = exp(omega) rotation (Rodrigues). */
+static void turn(double rotation[9], const double omega[3])
+{
+    double angle = sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]), m[9], out[9];
+    double s = angle > 1e-9 ? sin(angle) / angle : 1,
+           c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
+    const double x[9] = {0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0};
+    for (int i = 0; i < 9; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++) square += x[i / 3 * 3 + k] * x[3 * k + i % 3];
+        m[i] = (i % 4 == 0) + s * x[i] + c * square;
+    }
+    for (int i = 0; i < 9; i++) {
+        out[i] = 0;
+        for (int k = 0; k < 3; k++) out[i] += m[i / 3 * 3 + k] * rotation[3 * k + i % 3];
+    }
+    memcpy(rotation, out, sizeof out);
+}
+
+/* The share of a step that turns and moves no node by more than the largest allowed: a linearised turn means
+ * nothing beyond. */
+static double share_of_step(const npg_tracker *t)
+{
+    double largest = 0;
+    for (size_t k = 0; k < t->graph->node_count; k++)
+        for (size_t half = 0; half < 2; half++) {
+            const double *d = t->step + 6 * k + 3 * half;
+            largest =
+                fmax(largest, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (half ? MOVE_MAX : TURN_MAX));
+        }
+    return largest > 1 ? 1 / largest : 1;
+}
+
+static double move_nodes(npg_tracker *t, double *pose)
+{
+    double largest = 0, share = share_of_step(t);
+    for (size_t k = 0; k < t->graph->node_count; k++) {
+        double *d = t->step + 6 * k, moved = 0;
+        for (int i = 0; i < 6; i++) d[i] *= share;
+        turn(pose + k * NPG_POSE_SIZE, d);
+        for (int i = 0; i < 3; i++) {
+            pose[k * NPG_POSE_SIZE + 9 + (size_t)i] += d[3 + i];
+            moved += d[3 + i] * d[3 + i];
+        }
+        largest = fmax(largest, moved);
+    }
+    return sqrt(largest);
+}
+
+void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose)
+{
+    npg_pose_rows(tracker->rows, tracker->whole, pose);
+    npg_pose_vertices(vert_unit, tracker->whole, tracker->rows, tracker->reference->vert_pos);
+}
+
+/* ---- a step: two threads find the pairs of both directions, then each gathers the terms of one ---- */
+
+typedef struct step {
+    npg_tracker *t;
+    const double *pose;
+    const npg_kdtree *tree;
+    const float *points, *normals;
+    double width, stiffness;
+    npg_tracked tracked[NPG_BLOCK_PARTS]; /* what each thread sums up */
+    bool is_first, is_settling;
+} step;
+
+/* The surface's nearest points of targets [first, last). */
+static npg_status find_on_surface(const step *s, size_t first, size_t last)
+{
+    const npg_tracker *t = s->t;
+    return npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
+                                    s->is_first ? NULL : t->start_face + first, NULL, 1);
+}
+
+static size_t lent_of(const npg_tracker *t, double share)
+{
+    return (size_t)(share * (double)t->target_count);
+}
+
+/* To look on the surface takes longer, so the thread of the other direction lends a hand. */
+static npg_status find_pairs(void *user, size_t part)
+{
+    const step *s = user;
+    const npg_tracker *t = s->t;
+    size_t lent = lent_of(t, LENT_PAIRS);
+    if (part == TO_SURFACE) return find_on_surface(s, lent, t->target_count);
+    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                            t->mesh->face_count);
+    npg_rows_gather(t->sample_pos, t->vert_pos, t->samples, t->sample_count);
+    NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
+    return find_on_surface(s, 0, lent);
+}
+
+static npg_status add_terms(void *user, size_t part)
+{
+    step *s = user;
+    npg_tracker *t = s->t;
+    size_t lent = lent_of(t, LENT_TERMS);
+    bool is_lent = part == TO_POINTS;
+    npg_block_clear(t->system, part);
+    add_targets(t, part, &s->tracked[part], is_lent ? 0 : lent, is_lent ? lent : t->target_count, s->pose,
+                s->normals != NULL, s->width);
+    if (part == TO_SURFACE) return NPG_OK;
+    add_samples(t, s->pose, s->points, s->normals, s->width);
+    add_edges(t, s->pose, s->stiffness);
+    return NPG_OK;
+}
+
+/* Surface -> points: its part of the Chamfer distance. */
+static double samples_chamfer(const npg_tracker *t)
+{
+    double sum = 0;
+    for (size_t i = 0; i < t->sample_count; i++) sum += (double)t->near_sq[i];
+    return sum / (double)t->sample_count;
+}
+
+static npg_status gather(step *s)
+{
+    npg_tracker *t = s->t;
+    npg_pose_rows(t->rows, t->graph, s->pose);
+    npg_pose_vertices(t->vert_pos, t->graph, t->rows, t->mesh->vert_pos);
+    NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
+    for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
+    NPG_TRY(npg_parallel(find_pairs, s, NPG_BLOCK_PARTS));
+    return npg_parallel(add_terms, s, NPG_BLOCK_PARTS);
+}
+
+/* How far a fit has come, 0..1 before the last steps; the noisier the points, the more of them must agree
+ * before the surface gives way. */
+static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_effort *effort)
+{
+    int last = effort->steps - 1;
+    double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
+    double noise = tracked->point_dist_mean / (NOISE_UNIT * s->t->size);
+    s->is_first = !tracked->steps;
+    s->is_settling = progress >= 1;
+    s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
+    s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
+    s->width = fmax(s->width, 2.5 * tracked->point_dist_mean);
+}
+
+static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
+{
+    npg_tracker *t = s->t;
+    NPG_TRY(gather(s));
+    tracked->point_dist_mean = s->tracked[TO_SURFACE].point_dist_mean + s->tracked[TO_POINTS].point_dist_mean;
+    tracked->chamfer = s->tracked[TO_SURFACE].chamfer + s->tracked[TO_POINTS].chamfer + samples_chamfer(t);
+    npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
+    for (size_t i = 0; i < 6 * t->graph->node_count; i++)
+        if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
+    tracked->change = move_nodes(t, pose);
+    tracked->steps++;
+    return NPG_OK;
+}
+
+npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
+                           const float *normals, size_t point_count, const npg_tracker_effort *effort)
+{
+    const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START, 1};
+    npg_kdtree *tree;
+    NPG_REQUIRE(point_count);
+    t->target_count =
+        npg_points_spread(t->targets, t->target_normals, t->settings.samples, points, normals, point_count);
+    NPG_TRY(npg_kdtree_open(&tree, points, point_count));
+    *tracked = (npg_tracked){0};
+    npg_status status = NPG_OK;
+    step s = {.t = t, .pose = pose, .tree = tree, .points = points, .normals = normals};
+    if (!effort) effort = &usual;
+    t->along = fmin(1, t->settings.along * effort->along);
+    while (tracked->steps < effort->steps && !status) {
+        set_schedule(&s, tracked, effort);
+        status = do_step(&s, tracked, pose);
+        if (s.is_settling && tracked->change < 0.01 * t->graph->radius) break;
+    }
+    npg_kdtree_close(&tree);
+    return status;
+}
+
+/* ---- extrapolation ---- */
+
+/* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt): products of
+ * products would else triple their rounding errors with every frame. */
+static void straighten(double m[9])
+{
+    double along = 0, size = 0;
+    for (int i = 0; i < 3; i++) size += m[i] * m[i];
+    for (int i = 0; i < 3; i++) m[i] /= sqrt(size);
+    for (int i = 0; i < 3; i++) along += m[i] * m[3 + i];
+    for (int i = 0; i < 3; i++) m[3 + i] -= along * m[i];
+    size = m[3] * m[3] + m[4] * m[4] + m[5] * m[5];
+    for (int i = 3; i < 6; i++) m[i] /= sqrt(size);
+    m[6] = m[1] * m[5] - m[2] * m[4];
+    m[7] = m[2] * m[3] - m[0] * m[5];
+    m[8] = m[0] * m[4] - m[1] * m[3];
+}
+
+void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)
+{
+    for (size_t k = 0; k < node_count;
+         k++, next += NPG_POSE_SIZE, now += NPG_POSE_SIZE, before += NPG_POSE_SIZE) {
+        double change[9];
+        for (int i = 0; i < 9; i++) { /* now before^T */
+            change[i] = 0;
+            for (int c = 0; c < 3; c++) change[i] += now[i / 3 * 3 + c] * before[i % 3 * 3 + c];
+        }
+        for (int i = 0; i < 9; i++) {
+            next[i] = 0;
+            for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
+        }
+        straighten(next);
+        for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
+    }
+}

@@ -1,0 +1,62 @@
+/* Tracker: a coarse alignment of the reference with one frame's points, from a nearby pose.
+ *
+ * Gauss-Newton on the nodes of a deformation graph (graph.h):
+ *
+ *     E = mean_p rho(|x(c_p) - p|_W^2) + mean_s rho(|x(s) - p_s|_W^2)
+ *         + stiffness * sum over edges |R_j (g_k - g_j) + g_j + t_j - (g_k + t_k)|^2 / radius^2 / edges
+ *
+ * c_p: the point of the deformed surface closest to the target point p; p_s: the target point closest to the
+ * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
+ * is the robust weight of Geman and McClure, whose width shrinks step by step.  Few unknowns, second order:
+ * it reaches what gradient descent needs hundreds of steps for; the joint fit then needs to find only what
+ * the graph can't express. Not in the paper: it replaces the slow way from the identity (paper, "Deformation
+ * Loss", confidence). */
+#ifndef NPG_TRACKER_H
+#define NPG_TRACKER_H
+
+#include "align/graph.h"
+
+typedef struct npg_tracker npg_tracker;
+
+typedef struct npg_tracker_settings {
+    size_t nodes;     /* of the graph, about                                   */
+    size_t samples;   /* of the surface, and most target points looked at      */
+    int steps;        /* at most                                               */
+    double stiffness; /* final weight of the edges; it starts ten times higher */
+    double along;     /* share of distances along the surface, 0..1            */
+} npg_tracker_settings;
+
+/* How well it went, lengths in units. */
+typedef struct npg_tracked {
+    double point_dist_mean; /* target points -> surface, mean of distances              */
+    double chamfer;         /* mean of squared distances, points -> surface and surface -> points   */
+    double change;          /* the last step's largest movement of a node               */
+    int steps;
+} npg_tracked;
+
+/* reference: unit coordinates with normals; counted reference kept. */
+npg_status npg_tracker_open(npg_tracker **tracker, npg_mesh *reference, const npg_tracker_settings *settings);
+void npg_tracker_close(npg_tracker **tracker);
+size_t npg_tracker_node_count(const npg_tracker *tracker);
+
+/* How a fit goes about it. */
+typedef struct npg_tracker_effort {
+    int steps;         /* at most                                                            */
+    double stiffness;  /* of the first step, in final stiffnesses                             */
+    double width_unit; /* of the first step's robust weight: what may move                    */
+    double along;      /* times the share of distances along the surface                      */
+} npg_tracker_effort;
+
+/* Improve pose (K x 12) to explain the points (N x 3, unit; normals N x 3 or NULL: points whose normal speaks
+ * against the surface's are left out).  effort: NULL for the usual one. */
+npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose, const float *points,
+                           const float *normals, size_t point_count, const npg_tracker_effort *effort);
+
+/* vert_unit (V x 3) of the reference in a pose. */
+void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
+
+/* next = the pose after `now`, if the motion since `before` goes on: next_k = now_k before_k^-1 now_k.  K x
+ * 12 each. */
+void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count);
+
+#endif

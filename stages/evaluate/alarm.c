@@ -1,0 +1,302 @@
+/* Alarm: notices from which frame on the reference no longer explains the capture. */
+#include "evaluate/alarm.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pipeline/stage.h"
+
+#define HISTORY  64 /* explained frames that the usual level is taken from */
+#define SPREADS  6.0
+#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation */
+#define SUSPECT  0.5    /* of the bound */
+#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere   */
+#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't */
+#define CLEARLY  2.0    /* times the misfit on the other side */
+#define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES)
+
+static const struct {
+    const char *name, *what;
+    double floor, weight; /* weight: of an unexplained frame among NPG_ALARM_FRAMES */
+} kinds[NPG_MISFITS] = {
+    {"far", "of the points are far from the surface in one place", 0.01, 1},
+    {"bare", "of the surface have no points near them in one place", 0.015, 1},
+    {"torn", "of the surface are torn apart in one place", 0.003, 0.5},
+    {"deserted", "of the surface are one part that has lost most of its points", 0.015, 1}};
+
+typedef struct record {
+    int64_t index, number;
+    npg_misfit misfits[NPG_MISFITS];
+    double fit; /* median distance of the points, in diagonals */
+} record;
+
+typedef struct level {
+    double usual, bound;
+} level;
+
+typedef struct side {
+    int64_t next;    /* the index whose turn it is                     */
+    record *waiting; /* came ahead of their turn; owned                */
+    size_t waiting_count, waiting_room;
+    double history[NPG_MISFITS][HISTORY];
+    size_t history_count; /* ever */
+    double key_fit;       /* of the keyframe: what noise alone leaves */
+    record run[RUN_MAX];  /* the suspect frames since the last explained one, the last of them */
+    bool is_unexplained[RUN_MAX];
+    npg_alarm_cause causes[RUN_MAX]; /* the clearest misfit of each */
+    size_t run_count, run_length;    /* kept, and in all */
+    bool is_raised;
+    npg_alarm_cause cause;
+} side;
+
+struct npg_alarm {
+    int64_t key;
+    side sides[NPG_DIRECTIONS];
+};
+
+npg_status npg_alarm_open(npg_alarm **out, int64_t key)
+{
+    npg_alarm *alarm;
+    NPG_TRY(npg_alloc(&alarm, NPG_FOR_RUN, sizeof *alarm));
+    alarm->key = key;
+    alarm->sides[NPG_FORWARD].next = key;
+    alarm->sides[NPG_BACKWARD].next = key;
+    *out = alarm;
+    return NPG_OK;
+}
+
+void npg_alarm_close(npg_alarm **slot)
+{
+    if (!*slot) return;
+    for (int d = 0; d < NPG_DIRECTIONS; d++) npg_release(&(*slot)->sides[d].waiting);
+    npg_release(slot);
+}
+
+/* ---- the usual level ---- */
+
+static int by_value(const void *left, const void *right)
+{
+    double a = *(const double *)left, b = *(const double *)right;
+    return a < b ? -1 : a > b;
+}
+
+static double median_of(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, by_value);
+    return count ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : 0;
+}
+
+static level level_of(const double *history, size_t ever, double floor)
+{
+    double values[HISTORY];
+    size_t count = ever < HISTORY ? ever : HISTORY;
+    memcpy(values, history, count * sizeof *values);
+    double usual = median_of(values, count);
+    for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - usual);
+    return (level){usual, fmax(fmax(floor, SPREADS * NORMAL * median_of(values, count)), usual)};
+}
+
+static void remember(side *s, const record *r)
+{
+    if (!s->history_count) s->key_fit = r->fit;
+    size_t at = s->history_count++ % HISTORY;
+    for (int k = 0; k < NPG_MISFITS; k++) s->history[k][at] = r->misfits[k].share;
+}
+
+/* ---- one frame in its turn ---- */
+
+static double excess(const record *r, const level *levels, int kind)
+{
+    return r->misfits[kind].share - levels[kind].usual;
+}
+
+static bool is_lost(const side *s, const record *r)
+{
+    return r->fit > fmax(LOST_FIT, LOST * s->key_fit);
+}
+
+/* Which misfits speak of the topology and not of a surface that lost the points. */
+static void judge(bool counts[NPG_MISFITS], const side *s, const record *r, const level *levels)
+{
+    double far = fmax(excess(r, levels, NPG_MISFIT_FAR), 0),
+           bare = fmax(excess(r, levels, NPG_MISFIT_BARE), 0);
+    bool is_off = is_lost(s, r);
+    counts[NPG_MISFIT_FAR] = far > CLEARLY * bare;
+    counts[NPG_MISFIT_BARE] = !is_off && bare > CLEARLY * far;
+    counts[NPG_MISFIT_TORN] = !is_off && far < SUSPECT * levels[NPG_MISFIT_FAR].bound;
+    counts[NPG_MISFIT_DESERTED] = counts[NPG_MISFIT_TORN];
+}
+
+/* What a misfit of so many times its bound adds to a row of unexplained frames. */
+static double weight_of(int kind, double times)
+{
+    return times > 1 ? kinds[kind].weight : 0;
+}
+
+static bool is_clearer(int kind, double times, int than_kind, double than_times)
+{
+    double more = weight_of(kind, times) - weight_of(than_kind, than_times);
+    return more > 0 || (more >= 0 && times > than_times);
+}
+
+/* The clearest misfit of a frame; the result is how many times its bound it lies above the usual. */
+static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
+{
+    level levels[NPG_MISFITS];
+    bool counts[NPG_MISFITS];
+    double most = -1;
+    for (int k = 0; k < NPG_MISFITS; k++)
+        levels[k] = level_of(s->history[k], s->history_count, kinds[k].floor);
+    judge(counts, s, r, levels);
+    for (int k = 0; k < NPG_MISFITS; k++) {
+        double times = excess(r, levels, k) / levels[k].bound;
+        if (!counts[k] || !(times > -1) || (most > -1 && !is_clearer(k, times, cause->misfit, most)))
+            continue;
+        most = times;
+        *cause = (npg_alarm_cause){.seen_index = r->index,
+                                   .seen_number = r->number,
+                                   .misfit = k,
+                                   .value = r->misfits[k].share,
+                                   .usual = levels[k].usual,
+                                   .bound = levels[k].bound};
+        memcpy(cause->at, r->misfits[k].at, sizeof cause->at);
+    }
+    return most;
+}
+
+static double times_bound(const npg_alarm_cause *cause)
+{
+    return (cause->value - cause->usual) / cause->bound;
+}
+
+/* The last `row` frames of the run are unexplained: it dates from the first suspect one. */
+static void raise_alarm(side *s, size_t row)
+{
+    size_t first_unexplained = s->run_count - row, best = first_unexplained;
+    size_t first = first_unexplained > NPG_ALARM_BACK ? first_unexplained - NPG_ALARM_BACK : 0;
+    for (size_t i = first_unexplained; i < s->run_count; i++)
+        if (is_clearer(s->causes[i].misfit, times_bound(&s->causes[i]), s->causes[best].misfit,
+                       times_bound(&s->causes[best])))
+            best = i;
+    s->cause = s->causes[best];
+    s->cause.index = s->run[first].index;
+    s->cause.number = s->run[first].number;
+    s->is_raised = true;
+}
+
+static void end_run(side *s)
+{
+    for (size_t i = 0; i < s->run_count; i++) remember(s, &s->run[i]);
+    s->run_count = s->run_length = 0;
+}
+
+/* The oldest suspect frame makes room: a long run of merely suspect frames becomes usual. */
+static void make_room(side *s)
+{
+    size_t most = sizeof s->run / sizeof *s->run;
+    if (s->run_count < most) return;
+    remember(s, &s->run[0]);
+    memmove(s->run, s->run + 1, (most - 1) * sizeof *s->run);
+    memmove(s->causes, s->causes + 1, (most - 1) * sizeof *s->causes);
+    memmove(s->is_unexplained, s->is_unexplained + 1, (most - 1) * sizeof *s->is_unexplained);
+    s->run_count--;
+}
+
+static void take(side *s, const record *r)
+{
+    npg_alarm_cause cause;
+    if (s->is_raised || !isfinite(r->misfits[NPG_MISFIT_FAR].share)) return;
+    double times = s->history_count ? clearest(&cause, s, r) : -1; /* the keyframe is what is usual */
+    if (!(times > SUSPECT)) {
+        end_run(s);
+        if (!s->history_count || !is_lost(s, r)) remember(s, r);
+        return;
+    }
+    make_room(s);
+    s->run_length++;
+    s->run[s->run_count] = *r;
+    s->causes[s->run_count] = cause;
+    s->is_unexplained[s->run_count++] = times > 1;
+    size_t row = 0;
+    double weight = 0;
+    while (row < s->run_count && s->is_unexplained[s->run_count - 1 - row]) {
+        row++;
+        weight += kinds[s->causes[s->run_count - row].misfit].weight;
+    }
+    if (weight >= NPG_ALARM_FRAMES && s->run_length - row <= NPG_ALARM_RISE) raise_alarm(s, row);
+}
+
+/* ---- order ---- */
+
+static int64_t step_of(int direction)
+{
+    return direction == NPG_FORWARD ? 1 : -1;
+}
+
+static void take_waiting(side *s, int direction, bool is_end)
+{
+    size_t done = 0;
+    while (done < s->waiting_count && (is_end || s->waiting[done].index == s->next)) {
+        s->next = s->waiting[done].index + step_of(direction);
+        take(s, &s->waiting[done++]);
+    }
+    s->waiting_count -= done;
+    memmove(s->waiting, s->waiting + done, s->waiting_count * sizeof *s->waiting);
+}
+
+/* Those nearest the keyframe come first. */
+static npg_status add(side *s, int direction, const record *r)
+{
+    NPG_TRY(npg_grow(&s->waiting, &s->waiting_room, s->waiting_count + 1, sizeof *s->waiting, NPG_FOR_RUN));
+    size_t at = s->waiting_count++;
+    for (; at > 0 && (s->waiting[at - 1].index - r->index) * step_of(direction) > 0; at--)
+        s->waiting[at] = s->waiting[at - 1];
+    s->waiting[at] = *r;
+    take_waiting(s, direction, false);
+    return NPG_OK;
+}
+
+npg_status npg_alarm_add(npg_alarm *alarm, const npg_frame *frame)
+{
+    record r = {.index = frame->index, .number = frame->number};
+    memcpy(r.misfits, frame->figures.misfits, sizeof r.misfits);
+    r.fit = (double)(float)frame->figures.point_dist_median; /* as a run reads it back that goes on */
+    if (frame->index >= alarm->key) NPG_TRY(add(&alarm->sides[NPG_FORWARD], NPG_FORWARD, &r));
+    if (frame->index <= alarm->key) NPG_TRY(add(&alarm->sides[NPG_BACKWARD], NPG_BACKWARD, &r));
+    return NPG_OK;
+}
+
+void npg_alarm_finish(npg_alarm *alarm)
+{
+    for (int d = 0; d < NPG_DIRECTIONS; d++) take_waiting(&alarm->sides[d], d, true);
+}
+
+const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction)
+{
+    const side *s = &alarm->sides[direction];
+    return s->is_raised ? &s->cause : NULL;
+}
+
+/* ---- telling ---- */
+
+void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause)
+{
+    snprintf(text, size, "%.3g %% %s, around (%.4g, %.4g, %.4g) in frame %lld; usual is %.3g %%",
+             100 * cause->value, kinds[cause->misfit].what, cause->at[0], cause->at[1], cause->at[2],
+             (long long)cause->seen_number, 100 * cause->usual);
+}
+
+json_t *npg_alarm_json(const npg_alarm_cause *cause)
+{
+    char text[256];
+    if (!cause) return json_null();
+    json_t *at = json_array();
+    npg_alarm_text(text, sizeof text, cause);
+    for (int a = 0; a < 3; a++) json_array_append_new(at, npg_json_real(cause->at[a]));
+    return json_pack("{sI sI ss sf sf sf sI so ss}", "from_frame", (json_int_t)cause->number, "from_index",
+                     (json_int_t)cause->index, "figure", kinds[cause->misfit].name, "value", cause->value,
+                     "usual", cause->usual, "bound", cause->bound, "frame", (json_int_t)cause->seen_number,
+                     "at", at, "cause", text);
+}

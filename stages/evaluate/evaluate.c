@@ -1,0 +1,522 @@
+/* Evaluate: says for every frame how well the deformed surface explains the points, and whether that is good
+ * enough.  Flipped and stretched faces are counted on the whole reference, distances measured to a surface of
+ * at most about NPG_THIN_SURFACE of its vertices. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "evaluate/evaluate.h"
+#include "evaluate/misfit.h"
+#include "evaluate/topology.h"
+#include "export/export.h"
+#include "geometry/kdtree.h"
+#include "geometry/thin.h"
+#include "job/job.h"
+#include "pipeline/file.h"
+#include "pipeline/order.h"
+#include "pipeline/stage.h"
+
+#define WARNINGS_MAX 10 /* frames below the bar that get a warning of their own */
+
+typedef struct aggregate {
+    double sum, worst;
+    size_t count;
+    int64_t worst_number;
+} aggregate;
+
+/* The figures that the report sums up. */
+static const struct {
+    const char *name;
+    size_t offset;
+    bool is_small_bad;
+} summed[] = {{"point_dist_median", offsetof(npg_figures, point_dist_median), false},
+              {"point_dist_mean", offsetof(npg_figures, point_dist_mean), false},
+              {"point_dist_p95", offsetof(npg_figures, point_dist_p95), false},
+              {"vertex_dist_mean", offsetof(npg_figures, vertex_dist_mean), false},
+              {"coverage", offsetof(npg_figures, coverage), true},
+              {"flipped_share", offsetof(npg_figures, flipped_share), false},
+              {"stretched_share", offsetof(npg_figures, stretched_share), false},
+              {"edge_change", offsetof(npg_figures, edge_change), false},
+              {"chamfer", offsetof(npg_figures, chamfer), false},
+              {"truth_cd", offsetof(npg_figures, truth_cd), false},
+              {"truth_nc", offsetof(npg_figures, truth_nc), true},
+              {"truth_f", offsetof(npg_figures, truth_f), true},
+              {"truth_corr", offsetof(npg_figures, truth_corr), false}};
+enum { SUMMED = sizeof summed / sizeof *summed };
+
+typedef struct evaluate_state {
+    /* options; the shares in per cent */
+    double residual_max, coverage_min, flipped_max, stretched_max, cover_dist;
+    int64_t point_limit;
+    const char *truth_folder;
+    npg_topology_settings watch;
+    /* of the run */
+    npg_thin *thin;       /* W vertices of the reference: the surface that distances are to */
+    npg_surface *surface; /* moves from frame to frame */
+    npg_shape *shape;
+    npg_misfit_finder *finder;
+    npg_topology *topology;
+    npg_truth *truth;
+    bool is_tied;          /* the truth, in a frame */
+    float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
+    npg_surface_hit *hits; /* N; owned */
+    float *vert_unit;      /* W x 3; owned */
+    uint32_t *nearest;     /* W; owned */
+    double *vert_areas;    /* W; owned */
+    size_t points_capacity, dists_capacity, hits_capacity;
+    aggregate sums[SUMMED];
+    int64_t *bad; /* numbers of the frames below the bar; owned */
+    size_t bad_count, bad_capacity, good_count, skipped_count;
+} evaluate_state;
+
+/* ---- points -> surface ---- */
+
+/* Every step-th point, so that no more than the limit are asked for. */
+static npg_status take_points(evaluate_state *state, const npg_frame_box *box, const npg_frame *frame,
+                              size_t *taken)
+{
+    size_t limit = state->point_limit ? (size_t)state->point_limit : SIZE_MAX;
+    size_t step = frame->point_count > limit ? (frame->point_count + limit - 1) / limit : 1;
+    size_t count = (frame->point_count + step - 1) / step;
+    NPG_TRY(
+        npg_grow(&state->points, &state->points_capacity, count, 3 * sizeof *state->points, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&state->hits, &state->hits_capacity, count, sizeof *state->hits, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, count, sizeof *state->dists, NPG_FOR_QUERY));
+    *taken = 0;
+    for (size_t i = 0; i < frame->point_count; i += step) {
+        const float *p = frame->pos_local + 3 * i;
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) continue;
+        npg_box_local_to_unit(box, state->points + 3 * (*taken)++, p, 1);
+    }
+    return NPG_OK;
+}
+
+static int by_size(const void *left, const void *right)
+{
+    float a = *(const float *)left, b = *(const float *)right;
+    return a < b ? -1 : a > b;
+}
+
+/* The value that a share of the sorted values does not pass. */
+static double quantile(const float *sorted, size_t count, double share)
+{
+    double at = share * (double)(count - 1);
+    size_t below = (size_t)at, above = below + 1 < count ? below + 1 : below;
+    double rest = at - (double)below;
+    return (double)sorted[below] * (1 - rest) + (double)sorted[above] * rest;
+}
+
+/* The distances of `count` points; the result in *mean_sq is in diagonals, squared. */
+static npg_status measure_points(evaluate_state *state, npg_figures *figures, size_t count, double per_unit,
+                                 double *mean_sq)
+{
+    double sum = 0, sum_sq = 0;
+    NPG_TRY(npg_surface_closest(state->surface, state->hits, state->points, count));
+    for (size_t i = 0; i < count; i++) {
+        double dist_sq = (double)state->hits[i].dist_sq;
+        sum_sq += dist_sq;
+        sum += sqrt(dist_sq);
+        state->dists[i] = (float)sqrt(dist_sq);
+    }
+    qsort(state->dists, count, sizeof *state->dists, by_size);
+    figures->point_dist_median = quantile(state->dists, count, 0.5) * per_unit;
+    figures->point_dist_p95 = quantile(state->dists, count, 0.95) * per_unit;
+    figures->point_dist_mean = sum / (double)count * per_unit;
+    *mean_sq = sum_sq / (double)count * per_unit * per_unit;
+    return NPG_OK;
+}
+
+/* ---- surface -> points ---- */
+
+/* A vertex is covered when a point lies within cover-distance of it, or within twice the mean spacing of the
+ * points on the surface where they are sparser than that. */
+static double cover_radius(const evaluate_state *state, double area, size_t point_count, double per_unit)
+{
+    double spacing = sqrt(area / (double)point_count);
+    return fmax(state->cover_dist / 100 / per_unit, 2 * spacing);
+}
+
+/* Misfits as they are written down, so that a run which reads them back decides as this one. */
+static void place_misfits(npg_figures *figures, const npg_frame_box *box)
+{
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        npg_misfit *misfit = &figures->misfits[i];
+        float at[3] = {(float)misfit->at[0], (float)misfit->at[1], (float)misfit->at[2]};
+        double world[3];
+        npg_box_unit_to_world(box, world, at, 1);
+        misfit->share = (double)(float)misfit->share;
+        for (int a = 0; a < 3; a++) misfit->at[a] = (double)(float)world[a];
+    }
+}
+
+/* After measure_points() of the same frame. */
+static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_facts *facts,
+                                   size_t point_count, double per_unit, double *mean_sq)
+{
+    const npg_mesh *mesh = state->thin->mesh;
+    const float *vert_unit = state->vert_unit;
+    size_t v = mesh->vert_count;
+    npg_kdtree *tree;
+    NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, v, sizeof *state->dists, NPG_FOR_QUERY));
+    NPG_TRY(npg_kdtree_open(&tree, state->points, point_count));
+    npg_status status = npg_kdtree_nearest(tree, state->nearest, state->dists, vert_unit, v, 1, 0);
+    npg_kdtree_close(&tree);
+    NPG_TRY(status);
+    double area = npg_vertex_areas(state->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
+    double radius = cover_radius(state, area, point_count, per_unit), covered = 0, whole = 0, sum = 0,
+           sum_sq = 0;
+    for (size_t i = 0; i < v; i++) {
+        double dist_sq = (double)state->dists[i];
+        sum_sq += dist_sq;
+        sum += sqrt(dist_sq);
+        whole += state->vert_areas[i];
+        if (dist_sq <= radius * radius) covered += state->vert_areas[i];
+    }
+    figures->coverage = whole > 0 ? covered / whole : 0;
+    figures->vertex_dist_mean = sum / (double)v * per_unit;
+    *mean_sq = sum_sq / (double)v * per_unit * per_unit;
+    npg_misfit_frame frame = {.points = state->points,
+                              .hits = state->hits,
+                              .point_count = point_count,
+                              .point_dist_median = figures->point_dist_median / per_unit,
+                              .vert_unit = vert_unit,
+                              .vert_dist_sq = state->dists,
+                              .vert_areas = state->vert_areas,
+                              .area = area};
+    NPG_TRY(npg_misfit_find(state->finder, figures->misfits, &frame));
+    place_misfits(figures, &facts->box);
+    return NPG_OK;
+}
+
+/* ---- one frame ---- */
+
+static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference, double unseen_share)
+{
+    NPG_TRY(npg_shape_open(&state->shape, reference));
+    NPG_TRY(npg_thin_open(&state->thin, reference, NPG_THIN_SURFACE));
+    npg_mesh *mesh = state->thin->mesh;
+    size_t w = mesh->vert_count;
+    NPG_TRY(npg_misfit_open(&state->finder, mesh, unseen_share));
+    NPG_TRY(npg_alloc_array(&state->vert_unit, NPG_FOR_QUERY, w, 3 * sizeof *state->vert_unit));
+    NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, w, sizeof *state->nearest));
+    NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, w, sizeof *state->vert_areas));
+    return npg_surface_open(&state->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
+}
+
+static npg_status check_vertices(const npg_frame *frame, const npg_mesh *reference)
+{
+    if (frame->vert_count != reference->vert_count)
+        return npg_error(NPG_FAILED, "frame %" PRId64 " has %zu vertices, the reference %zu", frame->number,
+                         frame->vert_count, reference->vert_count);
+    for (size_t i = 0; i < 3 * frame->vert_count; i++)
+        if (!isfinite(frame->vert_unit[i]))
+            return npg_error(NPG_DIVERGED, "frame %" PRId64 ": vertex %zu is not finite", frame->number,
+                             i / 3);
+    return NPG_OK;
+}
+
+static npg_figures no_figures(void)
+{
+    npg_figures figures;
+    for (size_t i = 0; i < SUMMED; i++) *(double *)((char *)&figures + summed[i].offset) = (double)NAN;
+    for (int i = 0; i < NPG_MISFITS; i++)
+        figures.misfits[i] = (npg_misfit){(double)NAN, {(double)NAN, (double)NAN, (double)NAN}};
+    figures.good = false;
+    return figures;
+}
+
+/* The truth is tied in the first frame that is compared; a run that goes on ties it in the same one. */
+static npg_status compare_truth(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    uint64_t seed = (uint64_t)npg_worker_settings(worker)->seed;
+    int64_t number;
+    size_t vert_count;
+    const float *tied = facts->job ? npg_job_tied(facts->job, &number, &vert_count) : NULL;
+    if (facts->job && !tied)
+        NPG_TRY(npg_job_leave_tied(facts->job, frame->number, frame->vert_unit, frame->vert_count));
+    if (tied && !state->is_tied) {
+        npg_frame first = {.number = number, .vert_count = vert_count, .vert_unit = (float *)tied};
+        NPG_TRY(npg_truth_compare(state->truth, &first, facts, seed));
+    }
+    state->is_tied = true;
+    return npg_truth_compare(state->truth, frame, facts, seed);
+}
+
+static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_figures *figures = &frame->figures;
+    double per_unit = 1 / (facts->box.scale * facts->box.diagonal), points_sq, vertices_sq;
+    size_t point_count = 0;
+    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference, facts->unseen_share));
+    NPG_TRY(check_vertices(frame, facts->reference));
+    npg_shape_measure(state->shape, figures, frame->vert_unit);
+    if (state->truth) NPG_TRY(compare_truth(worker, frame));
+    if (!frame->is_skipped) NPG_TRY(take_points(state, &facts->box, frame, &point_count));
+    if (!point_count) return NPG_OK;
+    npg_thin_gather(state->thin, state->vert_unit, frame->vert_unit);
+    NPG_TRY(npg_surface_move(state->surface, state->vert_unit));
+    NPG_TRY(measure_points(state, figures, point_count, per_unit, &points_sq));
+    NPG_TRY(measure_vertices(state, figures, facts, point_count, per_unit, &vertices_sq));
+    figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5;
+    return NPG_OK;
+}
+
+/* ---- the verdict ---- */
+
+/* What is wrong with a frame, NULL when it is above the bar.  A comparison with NaN fails, as it should. */
+static const char *fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share,
+                            double *value, double *bound)
+{
+    *value = 100 * f->point_dist_median;
+    *bound = state->residual_max;
+    if (!(*value <= *bound)) return "median distance of the points to the surface, in % of the diagonal,";
+    *value = 100 * f->coverage;
+    *bound = state->coverage_min * (1 - unseen_share);
+    if (!(*value >= *bound)) return "share of the surface with points near it, in %,";
+    *value = 100 * f->flipped_share;
+    *bound = state->flipped_max;
+    if (!(*value <= *bound)) return "share of flipped faces, in %,";
+    *value = 100 * f->stretched_share;
+    *bound = state->stretched_max;
+    if (!(*value <= *bound)) return "share of stretched faces, in %,";
+    return NULL;
+}
+
+static void add_up(evaluate_state *state, const npg_frame *frame)
+{
+    for (size_t i = 0; i < SUMMED; i++) {
+        double value = *(const double *)((const char *)&frame->figures + summed[i].offset);
+        aggregate *sum = &state->sums[i];
+        if (!isfinite(value)) continue;
+        bool is_worse = summed[i].is_small_bad ? value < sum->worst : value > sum->worst;
+        bool is_tie = value == sum->worst && frame->number < sum->worst_number;
+        if (!sum->count++ || is_worse || is_tie) {
+            sum->worst = value;
+            sum->worst_number = frame->number;
+        }
+        sum->sum += value;
+    }
+}
+
+static npg_status note_bad(evaluate_state *state, int64_t number)
+{
+    NPG_TRY(
+        npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
+    state->bad[state->bad_count++] = number;
+    return NPG_OK;
+}
+
+static npg_status judge(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    double value, bound;
+    const char *fault =
+        fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share, &value, &bound);
+    frame->figures.good = !fault && !frame->is_skipped;
+    if (frame->is_shared) return NPG_OK;
+    add_up(state, frame);
+    state->good_count += frame->figures.good;
+    if (frame->is_skipped || !fault) return NPG_OK;
+    NPG_TRY(note_bad(state, frame->number));
+    if (state->bad_count <= WARNINGS_MAX)
+        npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g", fault, value,
+                        bound);
+    return NPG_OK;
+}
+
+/* ---- the report ---- */
+
+static json_t *json_of_sums(const evaluate_state *state)
+{
+    json_t *figures = json_object();
+    for (size_t i = 0; i < SUMMED; i++) {
+        const aggregate *sum = &state->sums[i];
+        if (!sum->count) continue;
+        json_object_set_new(figures, summed[i].name,
+                            json_pack("{sf sf sI}", "mean", sum->sum / (double)sum->count, "worst",
+                                      sum->worst, "worst_frame", (json_int_t)sum->worst_number));
+    }
+    return figures;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    json_t *report = npg_worker_report(worker), *bad = json_array();
+    if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
+    for (size_t i = 0; i < state->bad_count; i++)
+        json_array_append_new(bad, json_integer((json_int_t)state->bad[i]));
+    json_object_set_new(report, "figures", json_of_sums(state));
+    json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
+    json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
+    json_object_set_new(report, "bad", bad);
+    /* a run that goes on has not warned of all of them itself */
+    if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))
+        npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
+                        state->bad_count);
+    if (state->skipped_count)
+        npg_worker_warn(worker, true, -1, "%zu frames were skipped", state->skipped_count);
+    return state->topology ? npg_topology_finish(state->topology, worker) : NPG_OK;
+}
+
+/* ---- the alarm ---- */
+
+static npg_status watch(npg_worker *worker, const npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    if (!state->topology)
+        NPG_TRY(npg_topology_open(&state->topology, &state->watch, npg_worker_facts(worker)->plan.key));
+    return npg_topology_add(state->topology, worker, frame);
+}
+
+/* ---- what an earlier run of the same job has measured ---- */
+
+static npg_status take_line(void *user, const json_t *line, const char *text, size_t size)
+{
+    npg_worker *worker = user;
+    evaluate_state *state = npg_worker_state(worker);
+    const json_t *figures = json_object_get(line, "figures");
+    npg_frame frame = {.index = (int64_t)json_integer_value(json_object_get(line, "index")),
+                       .number = (int64_t)json_integer_value(json_object_get(line, "number")),
+                       .is_shared = json_is_true(json_object_get(line, "shared")),
+                       .figures = no_figures()};
+    (void)text, (void)size;
+    if (!figures || frame.is_shared) return NPG_OK;
+    for (size_t i = 0; i < SUMMED; i++) {
+        const json_t *value = json_object_get(figures, summed[i].name);
+        if (json_is_number(value))
+            *(double *)((char *)&frame.figures + summed[i].offset) = json_number_value(value);
+    }
+    bool is_good = json_is_true(json_object_get(line, "good"));
+    bool is_skipped = json_is_true(json_object_get(line, "skipped"));
+    add_up(state, &frame);
+    state->good_count += is_good;
+    state->skipped_count += is_skipped;
+    if (!is_good && !is_skipped) NPG_TRY(note_bad(state, frame.number));
+    npg_misfits_take(&frame.figures, json_object_get(line, "misfits"));
+    return watch(worker, &frame);
+}
+
+static npg_status take_up(npg_worker *worker)
+{
+    char *path;
+    int64_t count, bytes;
+    npg_job_exported(npg_worker_facts(worker)->job, &count, &bytes);
+    NPG_TRY(npg_join_path(&path, npg_worker_settings(worker)->output, "frames.partial.jsonl"));
+    npg_status status = npg_frame_lines_each(path, bytes, take_line, worker);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- the stage ---- */
+
+static npg_status init(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    if (npg_worker_facts(worker)->is_resumed) NPG_TRY(take_up(worker));
+    if (!state->truth_folder[0]) return NPG_OK;
+    return npg_truth_open(&state->truth, state->truth_folder, npg_worker_settings(worker)->confine);
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit;
+        frame->figures = no_figures();
+        frame->fields |= NPG_FIELD_FIGURES;
+        frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
+        state->skipped_count += frame->is_skipped && !frame->is_shared;
+        if (has_mesh) NPG_TRY(measure_frame(worker, frame));
+        NPG_TRY(judge(worker, frame));
+        NPG_TRY(watch(worker, frame));
+    }
+    return NPG_OK;
+}
+
+static void uninit(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    npg_surface_close(&state->surface);
+    npg_thin_close(&state->thin);
+    npg_shape_close(&state->shape);
+    npg_misfit_close(&state->finder);
+    npg_topology_close(&state->topology);
+    npg_truth_close(&state->truth);
+    npg_release(&state->points);
+    npg_release(&state->dists);
+    npg_release(&state->hits);
+    npg_release(&state->vert_unit);
+    npg_release(&state->nearest);
+    npg_release(&state->vert_areas);
+    npg_release(&state->bad);
+}
+
+/* Points, hits and distances, with the k-d tree about as much again; per vertex of the reference the shape,
+ * the surface and its search tree. */
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    size_t points = facts->point_count_max, limit = (size_t)state->point_limit;
+    if (limit && points > limit) points = limit;
+    *chunks_held = 1;
+    return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
+           points * 120 + /* misfits: were all points far, with their links */
+           720 * npg_worker_verts_at_most(worker);
+}
+
+#define OFFSET(member) offsetof(evaluate_state, member)
+
+static const npg_option options[] = {
+    {"max-residual",
+     "A frame is good when the median distance of its points to the surface is at most this, "
+     "in per cent of the capture's diagonal",
+     NPG_OPTION_REAL, OFFSET(residual_max), "0.5", 0, 100, NULL, "PERCENT"},
+    {"min-coverage",
+     "... and at least this share of the surface that the keyframe saw has points near it, in "
+     "per cent",
+     NPG_OPTION_REAL, OFFSET(coverage_min), "50", 0, 100, NULL, "PERCENT"},
+    {"max-flipped", "... and at most this share of its faces is turned over, in per cent", NPG_OPTION_REAL,
+     OFFSET(flipped_max), "1", 0, 100, NULL, "PERCENT"},
+    {"max-stretched", "... and at most this share of its faces grew or shrank tenfold, in per cent",
+     NPG_OPTION_REAL, OFFSET(stretched_max), "5", 0, 100, NULL, "PERCENT"},
+    {"cover-distance", "How near a point must be to cover the surface, in per cent of the diagonal",
+     NPG_OPTION_REAL, OFFSET(cover_dist), "1", 0, 100, NULL, "PERCENT"},
+    {"evaluate-points", "Points per frame that figures are taken from, evenly spread over the file; 0: all",
+     NPG_OPTION_INT, OFFSET(point_limit), "100000", 0, 1e12, NULL, NULL},
+    {"truth", "Folder with the true meshes, numbered as the frames: their figures go into the report",
+     NPG_OPTION_TEXT, OFFSET(truth_folder), "", 0, 0, NULL, "DIR"},
+    {"alarm",
+     "Where the reference no longer explains the points: say so and go on, or end there (what --segments "
+     "auto "
+     "asks for)",
+     NPG_OPTION_CHOICE, OFFSET(watch.mode), "report", 0, 0, "report|split", NULL},
+    {"segment-min",
+     "Frames that a segment has at least; shorter ones are left to their neighbour, with exit code 7",
+     NPG_OPTION_INT, OFFSET(watch.segment_min), "8", 1, 1e9, NULL, NULL},
+    {"shared-first", "Frames at the beginning that another segment explains: solved, but not judged",
+     NPG_OPTION_INT, OFFSET(watch.shared_first), "0", 0, 1e9, NULL, NULL},
+    {"shared-last", "The same at the end", NPG_OPTION_INT, OFFSET(watch.shared_last), "0", 0, 1e9, NULL,
+     NULL},
+    {0}};
+
+extern const npg_stage npg_stage_evaluate;
+const npg_stage npg_stage_evaluate = {.name = "evaluate",
+                                      .help = "Measure every frame and judge it",
+                                      .options = options,
+                                      .state_size = sizeof(evaluate_state),
+                                      .passes = NPG_PASS_SOLVE,
+                                      .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE |
+                                               NPG_FIELD_VERTICES,
+                                      .gives = NPG_FIELD_FIGURES,
+                                      .init = init,
+                                      .process = process,
+                                      .flush = flush,
+                                      .uninit = uninit,
+                                      .memory = memory};

@@ -1,0 +1,156 @@
+/* Shape: flipped and stretched faces and the change of edges of a deformed mesh against its reference. */
+#include <math.h>
+
+#include "evaluate/evaluate.h"
+#include "geometry/mesh_tools.h"
+
+#define FLIP_COSINE 0.2
+#define STRETCH     10.0
+
+struct npg_shape {
+    const npg_mesh *reference; /* loan */
+    uint32_t (*edges)[2];      /* E x 2; owned */
+    size_t edge_count;
+    double *areas;     /* F, of the reference; owned */
+    double *cosines;   /* F, each face against its neighbourhood in the reference; owned */
+    double *normals;   /* F x 3 scratch; owned */
+    double *vert_sums; /* V x 3 scratch; owned */
+};
+
+static void subtract(double out[3], const float *a, const float *b)
+{
+    for (int i = 0; i < 3; i++) out[i] = (double)a[i] - (double)b[i];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Unit normal (0 for a face without area); the result is the area. */
+static double face_normal(double normal[3], const float *vert_pos, const uint32_t *face)
+{
+    double u[3], v[3];
+    subtract(u, vert_pos + 3 * (size_t)face[1], vert_pos + 3 * (size_t)face[0]);
+    subtract(v, vert_pos + 3 * (size_t)face[2], vert_pos + 3 * (size_t)face[0]);
+    for (int i = 0; i < 3; i++) normal[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+    double length = sqrt(dot(normal, normal));
+    for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
+    return length / 2;
+}
+
+/* Sums of the faces' normals around each vertex, weighted by reference area. */
+static void sum_normals(const npg_shape *shape)
+{
+    const npg_mesh *mesh = shape->reference;
+    for (size_t i = 0; i < 3 * mesh->vert_count; i++) shape->vert_sums[i] = 0;
+    for (size_t f = 0; f < mesh->face_count; f++)
+        for (size_t k = 0; k < 3; k++)
+            for (size_t a = 0; a < 3; a++)
+                shape->vert_sums[3 * (size_t)mesh->faces[3 * f + k] + a] +=
+                    shape->areas[f] * shape->normals[3 * f + a];
+}
+
+/* Cosine between a face's normal and the mean normal of the faces that share a vertex with it; 1 for a face
+ * that stands alone, 0 where one of the two has no direction. */
+static double cosine_of(const npg_shape *shape, size_t f)
+{
+    const uint32_t *face = shape->reference->faces + 3 * f;
+    const double *normal = shape->normals + 3 * f;
+    double sum[3];
+    for (int a = 0; a < 3; a++) {
+        sum[a] = -3 * shape->areas[f] * normal[a];
+        for (int k = 0; k < 3; k++) sum[a] += shape->vert_sums[3 * (size_t)face[k] + (size_t)a];
+    }
+    double length = sqrt(dot(sum, sum));
+    return length > 1e-9 * shape->areas[f] ? dot(sum, normal) / length : 0;
+}
+
+static npg_status take_reference(npg_shape *shape)
+{
+    const npg_mesh *mesh = shape->reference;
+    size_t v = mesh->vert_count, f = mesh->face_count;
+    NPG_TRY(npg_mesh_edges(&shape->edges, &shape->edge_count, mesh->faces, f));
+    NPG_TRY(npg_alloc_array(&shape->areas, NPG_FOR_MESH, f, sizeof *shape->areas));
+    NPG_TRY(npg_alloc_array(&shape->cosines, NPG_FOR_MESH, f, sizeof *shape->cosines));
+    NPG_TRY(npg_alloc_array(&shape->normals, NPG_FOR_MESH, f, 3 * sizeof *shape->normals));
+    NPG_TRY(npg_alloc_array(&shape->vert_sums, NPG_FOR_MESH, v, 3 * sizeof *shape->vert_sums));
+    for (size_t i = 0; i < f; i++)
+        shape->areas[i] = face_normal(shape->normals + 3 * i, mesh->vert_pos, mesh->faces + 3 * i);
+    sum_normals(shape);
+    for (size_t i = 0; i < f; i++) shape->cosines[i] = cosine_of(shape, i);
+    return NPG_OK;
+}
+
+npg_status npg_shape_open(npg_shape **out, const npg_mesh *reference)
+{
+    npg_shape *shape;
+    NPG_TRY(npg_alloc(&shape, NPG_FOR_MESH, sizeof *shape));
+    shape->reference = reference;
+    npg_status status = take_reference(shape);
+    if (status) npg_shape_close(&shape);
+    *out = shape;
+    return status;
+}
+
+void npg_shape_close(npg_shape **slot)
+{
+    npg_shape *shape = *slot;
+    if (!shape) return;
+    npg_release(&shape->edges);
+    npg_release(&shape->areas);
+    npg_release(&shape->cosines);
+    npg_release(&shape->normals);
+    npg_release(&shape->vert_sums);
+    npg_release(slot);
+}
+
+static double length_of(const float *vert_pos, const uint32_t edge[2])
+{
+    double d[3];
+    subtract(d, vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
+    return sqrt(dot(d, d));
+}
+
+static double edge_change(const npg_shape *shape, const float *vert_unit)
+{
+    double sum = 0;
+    size_t count = 0;
+    for (size_t e = 0; e < shape->edge_count; e++) {
+        double before = length_of(shape->reference->vert_pos, shape->edges[e]);
+        if (!(before > 0)) continue;
+        sum += fabs(length_of(vert_unit, shape->edges[e]) / before - 1);
+        count++;
+    }
+    return count ? sum / (double)count : 0;
+}
+
+void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float *vert_unit)
+{
+    const npg_mesh *mesh = shape->reference;
+    size_t flipped = 0, stretched = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        double area = face_normal(shape->normals + 3 * f, vert_unit, mesh->faces + 3 * f);
+        stretched += area > STRETCH * shape->areas[f] || STRETCH * area < shape->areas[f];
+    }
+    sum_normals(shape);
+    for (size_t f = 0; f < mesh->face_count; f++)
+        flipped += shape->cosines[f] > FLIP_COSINE && cosine_of(shape, f) < -FLIP_COSINE;
+    double face_count = mesh->face_count ? (double)mesh->face_count : 1;
+    figures->flipped_share = (double)flipped / face_count;
+    figures->stretched_share = (double)stretched / face_count;
+    figures->edge_change = edge_change(shape, vert_unit);
+}
+
+double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count, const uint32_t *faces,
+                        size_t face_count)
+{
+    double sum = 0, normal[3];
+    for (size_t i = 0; i < vert_count; i++) areas[i] = 0;
+    for (size_t f = 0; f < face_count; f++) {
+        double area = face_normal(normal, vert_pos, faces + 3 * f);
+        for (size_t k = 0; k < 3; k++) areas[faces[3 * f + k]] += area / 3;
+        sum += area;
+    }
+    return sum;
+}

@@ -1,0 +1,287 @@
+/* Misfit: finds where in a frame the surface fails in one place. */
+#include "evaluate/misfit.h"
+
+#include <math.h>
+
+#include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
+#include "geometry/sets.h"
+#include "pipeline/frame_box.h"
+
+#define REACH_SPACINGS 3.0
+#define REACH_SIZE     0.015 /* of the reference's diagonal */
+#define REACH_MEDIANS  5.0
+#define REACH_MOST     2.0  /* times what it is without noise */
+#define LINK_SPACINGS  2.0  /* between neighbours in a cluster of far points */
+#define LINKS          6    /* neighbours that are looked at                 */
+#define UNSEEN_MOST    0.02 /* of the reference: more than that, and it is of cameras that see parts */
+#define BESIDE_SIZE    0.15 /* of the diagonal: as far beyond a border lies surface not seen before  */
+#define TORN           1.5  /* times its length in the reference                */
+#define OFF_SHARE      0.6  /* of the reach: torn surface lies off the points   */
+#define LEAST_FAR      12   /* points in a place                                */
+#define LEAST_MISSED   20   /* points that would lie on a place of the surface  */
+#define LEAST_VERTS    6    /* vertices whose mean area it has                  */
+#define FEW            0.6  /* of the points that a part should have            */
+
+struct npg_misfit_finder {
+    const npg_mesh *reference; /* loan */
+    double size;               /* its diagonal                                       */
+    bool is_closed;            /* has no border, and its frame saw all of it         */
+    uint8_t *is_border;        /* V: on the border of what its frame saw; owned      */
+    uint32_t (*edges)[2];      /* E x 2; owned */
+    size_t edge_count;
+    float *edge_lengths; /* E, of the reference; owned */
+    uint32_t *part_of;   /* V: which part of the reference; owned */
+    size_t part_count;
+    double *part_sums; /* of each part: area, area x position, points; x 5; owned */
+    /* scratch, owned */
+    uint32_t *parents; /* of the places so far: max(N, V)        */
+    double *sums;      /* their size and weighted middle: x 4    */
+    uint8_t *flags;    /* V                                      */
+    float *far;        /* far points x 3                         */
+    uint32_t *links;   /* far points x LINKS                     */
+    float *link_sq;
+    size_t parents_room, sums_room, far_room, links_room, link_sq_room;
+};
+
+static double length_of(const float *vert_pos, const uint32_t edge[2])
+{
+    double sum = 0;
+    for (size_t a = 0; a < 3; a++) {
+        double d = (double)vert_pos[3 * (size_t)edge[0] + a] - (double)vert_pos[3 * (size_t)edge[1] + a];
+        sum += d * d;
+    }
+    return sqrt(sum);
+}
+
+static npg_status take_reference(npg_misfit_finder *f)
+{
+    const npg_mesh *mesh = f->reference;
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
+    f->size = npg_bounds_diagonal(&bounds);
+    NPG_TRY(npg_alloc_array(&f->part_of, NPG_FOR_MESH, mesh->vert_count, sizeof *f->part_of));
+    NPG_TRY(npg_mesh_components(f->part_of, &f->part_count, mesh->vert_count, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_alloc_array(&f->part_sums, NPG_FOR_MESH, f->part_count, 5 * sizeof *f->part_sums));
+    NPG_TRY(npg_mesh_edges(&f->edges, &f->edge_count, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_alloc_array(&f->edge_lengths, NPG_FOR_MESH, f->edge_count, sizeof *f->edge_lengths));
+    NPG_TRY(npg_alloc_array(&f->flags, NPG_FOR_MESH, mesh->vert_count, sizeof *f->flags));
+    for (size_t e = 0; e < f->edge_count; e++)
+        f->edge_lengths[e] = (float)length_of(mesh->vert_pos, f->edges[e]);
+    return NPG_OK;
+}
+
+static npg_status find_borders(npg_misfit_finder *f)
+{
+    const npg_mesh *mesh = f->reference;
+    uint32_t *twins;
+    NPG_TRY(npg_alloc_array(&f->is_border, NPG_FOR_MESH, mesh->vert_count, sizeof *f->is_border));
+    NPG_TRY(npg_alloc_array(&twins, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twins));
+    npg_status status = npg_mesh_twins(twins, mesh->faces, mesh->face_count);
+    for (size_t h = 0; h < 3 * mesh->face_count && !status; h++) {
+        if (twins[h] != UINT32_MAX) continue;
+        f->is_closed = false;
+        f->is_border[mesh->faces[h]] = f->is_border[mesh->faces[h - h % 3 + (h + 1) % 3]] = 1;
+    }
+    npg_release(&twins);
+    return status;
+}
+
+npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, double unseen_share)
+{
+    npg_misfit_finder *finder;
+    NPG_TRY(npg_alloc(&finder, NPG_FOR_MESH, sizeof *finder));
+    finder->reference = reference;
+    finder->is_closed = unseen_share <= UNSEEN_MOST;
+    npg_status status = take_reference(finder);
+    if (!status) status = find_borders(finder);
+    if (status) npg_misfit_close(&finder);
+    *out = finder;
+    return status;
+}
+
+void npg_misfit_close(npg_misfit_finder **slot)
+{
+    npg_misfit_finder *f = *slot;
+    if (!f) return;
+    void *all[] = {&f->is_border, &f->edges, &f->edge_lengths, &f->parents, &f->sums,     &f->flags,
+                   &f->far,       &f->links, &f->link_sq,      &f->part_of, &f->part_sums};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_release(slot);
+}
+
+/* ---- places: sets of things that belong together ---- */
+
+static npg_status begin_places(npg_misfit_finder *f, size_t count)
+{
+    NPG_TRY(npg_grow(&f->parents, &f->parents_room, count, sizeof *f->parents, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&f->sums, &f->sums_room, count, 4 * sizeof *f->sums, NPG_FOR_QUERY));
+    for (size_t i = 0; i < count; i++) f->parents[i] = (uint32_t)i;
+    for (size_t i = 0; i < 4 * count; i++) f->sums[i] = 0;
+    return NPG_OK;
+}
+
+static void add(npg_misfit_finder *f, uint32_t i, const float *pos, double weight)
+{
+    double *sum = f->sums + 4 * (size_t)npg_set_root(f->parents, i);
+    sum[0] += weight;
+    for (size_t a = 0; a < 3; a++) sum[1 + a] += weight * (double)pos[a];
+}
+
+/* least: a smaller place is none. */
+static void take_largest(npg_misfit *misfit, const npg_misfit_finder *f, size_t count, double whole,
+                         double least)
+{
+    const double *best = NULL;
+    for (size_t i = 0; i < count; i++)
+        if (f->sums[4 * i] >= least && f->sums[4 * i] > (best ? best[0] : 0)) best = f->sums + 4 * i;
+    misfit->share = best && whole > 0 ? best[0] / whole : 0;
+    for (size_t a = 0; a < 3; a++) misfit->at[a] = best ? best[1 + a] / best[0] : (double)NAN;
+}
+
+/* ---- the three kinds ---- */
+
+static npg_status link_far(npg_misfit_finder *f, size_t count, double link)
+{
+    npg_kdtree *tree;
+    NPG_TRY(npg_grow(&f->links, &f->links_room, count, LINKS * sizeof *f->links, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&f->link_sq, &f->link_sq_room, count, LINKS * sizeof *f->link_sq, NPG_FOR_QUERY));
+    NPG_TRY(npg_kdtree_open(&tree, f->far, count));
+    npg_status status = npg_kdtree_nearest(tree, f->links, f->link_sq, f->far, count, LINKS, 1);
+    npg_kdtree_close(&tree);
+    for (size_t i = 0; i < LINKS * count && !status; i++)
+        if ((double)f->link_sq[i] <= link * link)
+            npg_set_join(f->parents, (uint32_t)(i / LINKS), f->links[i]);
+    return status;
+}
+
+/* Points beyond the border of a reference that its frame saw in part are of what it did not see. */
+static bool is_far(const npg_misfit_finder *f, const npg_surface_hit *hit, double reach)
+{
+    double dist_sq = (double)hit->dist_sq, beside = BESIDE_SIZE * f->size, on_border = 0;
+    if (!(dist_sq > reach * reach)) return false;
+    const uint32_t *face = f->reference->faces + 3 * (size_t)hit->face;
+    for (int k = 0; k < 3; k++)
+        if (f->is_border[face[k]]) on_border += (double)hit->weights[k];
+    return on_border < 0.999 || dist_sq > beside * beside;
+}
+
+static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                           double reach, double link)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < frame->point_count; i++) count += is_far(f, &frame->hits[i], reach);
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!count) return NPG_OK;
+    NPG_TRY(npg_grow(&f->far, &f->far_room, count, 3 * sizeof *f->far, NPG_FOR_QUERY));
+    NPG_TRY(begin_places(f, count));
+    count = 0;
+    for (size_t i = 0; i < frame->point_count; i++) {
+        if (!is_far(f, &frame->hits[i], reach)) continue;
+        for (size_t a = 0; a < 3; a++) f->far[3 * count + a] = frame->points[3 * i + a];
+        count++;
+    }
+    NPG_TRY(link_far(f, count, link));
+    for (size_t i = 0; i < count; i++) add(f, (uint32_t)i, f->far + 3 * i, 1);
+    take_largest(misfit, f, count, (double)frame->point_count, LEAST_FAR);
+    return NPG_OK;
+}
+
+/* Flag the vertices that are further than `reach` from all points. */
+static void flag_off(npg_misfit_finder *f, const npg_misfit_frame *frame, double reach)
+{
+    for (size_t i = 0; i < f->reference->vert_count; i++)
+        f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach;
+}
+
+static void join_flagged(npg_misfit_finder *f)
+{
+    for (size_t e = 0; e < f->edge_count; e++)
+        if (f->flags[f->edges[e][0]] && f->flags[f->edges[e][1]])
+            npg_set_join(f->parents, f->edges[e][0], f->edges[e][1]);
+}
+
+static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
+{
+    size_t v = f->reference->vert_count;
+    for (size_t i = 0; i < v; i++)
+        if (f->flags[i]) add(f, (uint32_t)i, frame->vert_unit + 3 * i, frame->vert_areas[i]);
+    double least = fmax(LEAST_MISSED / (double)frame->point_count, LEAST_VERTS / (double)v);
+    take_largest(misfit, f, v, frame->area, least * frame->area);
+}
+
+static npg_status find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                            double reach)
+{
+    NPG_TRY(begin_places(f, f->reference->vert_count));
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!f->is_closed) return NPG_OK;
+    flag_off(f, frame, reach);
+    join_flagged(f);
+    add_flagged(f, misfit, frame);
+    return NPG_OK;
+}
+
+/* Of the surface that is off the points only what is torn stays flagged. */
+static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                            double reach)
+{
+    enum { OFF = 1, ENDS_TORN = 2 };
+    size_t v = f->reference->vert_count;
+    NPG_TRY(begin_places(f, v));
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!f->is_closed) return NPG_OK;
+    flag_off(f, frame, reach);
+    for (size_t e = 0; e < f->edge_count; e++) {
+        uint32_t a = f->edges[e][0], b = f->edges[e][1];
+        if (!f->flags[a] || !f->flags[b]) continue;
+        if (!(length_of(frame->vert_unit, f->edges[e]) > TORN * (double)f->edge_lengths[e])) continue;
+        f->flags[a] |= ENDS_TORN;
+        f->flags[b] |= ENDS_TORN;
+    }
+    for (size_t i = 0; i < v; i++) f->flags[i] &= ENDS_TORN;
+    join_flagged(f);
+    add_flagged(f, misfit, frame);
+    return NPG_OK;
+}
+
+/* Area, middle and points of every part as it lies in this frame. */
+static void sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
+{
+    for (size_t i = 0; i < 5 * f->part_count; i++) f->part_sums[i] = 0;
+    for (size_t v = 0; v < f->reference->vert_count; v++) {
+        double *sum = f->part_sums + 5 * (size_t)f->part_of[v];
+        sum[0] += frame->vert_areas[v];
+        for (size_t a = 0; a < 3; a++)
+            sum[1 + a] += frame->vert_areas[v] * (double)frame->vert_unit[3 * v + a];
+    }
+    for (size_t i = 0; i < frame->point_count; i++)
+        f->part_sums[5 * (size_t)f->part_of[f->reference->faces[3 * (size_t)frame->hits[i].face]] + 4] += 1;
+}
+
+static void find_deserted(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
+{
+    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    if (!f->is_closed || f->part_count < 2 || !frame->point_count || !(frame->area > 0)) return;
+    sum_parts(f, frame);
+    for (size_t p = 0; p < f->part_count; p++) {
+        const double *sum = f->part_sums + 5 * p;
+        double expected = (double)frame->point_count * sum[0] / frame->area, missing = expected - sum[4];
+        double share = missing / (double)frame->point_count;
+        if (!(sum[4] < FEW * expected) || missing < LEAST_MISSED || share <= misfit->share) continue;
+        misfit->share = share;
+        for (size_t a = 0; a < 3; a++) misfit->at[a] = sum[1 + a] / sum[0];
+    }
+}
+
+npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_misfit_frame *frame)
+{
+    double spacing = frame->point_count ? sqrt(frame->area / (double)frame->point_count) : 0;
+    double least = fmax(REACH_SPACINGS * spacing, REACH_SIZE * f->size);
+    double reach = fmin(fmax(least, REACH_MEDIANS * frame->point_dist_median), REACH_MOST * least);
+    double link = fmax(LINK_SPACINGS * spacing, REACH_SIZE * f->size);
+    NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
+    NPG_TRY(find_bare(f, &misfits[NPG_MISFIT_BARE], frame, reach));
+    find_deserted(f, &misfits[NPG_MISFIT_DESERTED], frame);
+    return find_torn(f, &misfits[NPG_MISFIT_TORN], frame, OFF_SHARE * reach);
+}

@@ -1,0 +1,117 @@
+/* Topology: what a run does when its reference stops to explain the capture. */
+#include "evaluate/topology.h"
+
+#include "evaluate/alarm.h"
+#include "pipeline/json_file.h"
+
+static const char *const directions[NPG_DIRECTIONS] = {"forward", "backward"};
+
+struct npg_topology {
+    npg_topology_settings settings;
+    int64_t key;
+    npg_alarm *alarm; /* owned */
+    bool is_said[NPG_DIRECTIONS];
+};
+
+npg_status npg_topology_open(npg_topology **out, const npg_topology_settings *settings, int64_t key)
+{
+    npg_topology *topology;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&topology, NPG_FOR_RUN, sizeof *topology));
+    topology->settings = *settings;
+    topology->key = key;
+    npg_status status = npg_alarm_open(&topology->alarm, key);
+    if (status) npg_topology_close(&topology);
+    *out = topology;
+    return status;
+}
+
+void npg_topology_close(npg_topology **slot)
+{
+    if (!*slot) return;
+    npg_alarm_close(&(*slot)->alarm);
+    npg_release(slot);
+}
+
+/* One behind the last frame that is the run's own. */
+static int64_t own_end(const npg_topology_settings *settings, const npg_facts *facts)
+{
+    return facts->frame_count < 0 ? INT64_MAX : facts->frame_count - settings->shared_last;
+}
+
+bool npg_topology_is_shared(const npg_topology_settings *settings, const npg_facts *facts, int64_t index)
+{
+    return index < settings->shared_first || index >= own_end(settings, facts);
+}
+
+/* Whether both parts are long enough to stand alone. */
+static bool may_split(const npg_topology *t, const npg_facts *facts, int direction, int64_t index)
+{
+    int64_t first = t->settings.shared_first, end = own_end(&t->settings, facts);
+    int64_t cut = direction == NPG_FORWARD ? index : index + 1;
+    return t->settings.mode == NPG_ALARM_SPLIT && cut - first >= t->settings.segment_min &&
+           end - cut >= t->settings.segment_min;
+}
+
+/* ---- the file that tells where ---- */
+
+static npg_status split(npg_topology *t, npg_worker *worker, int direction)
+{
+    const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, direction);
+    json_t *told = json_pack("{ss sI so}", "direction", directions[direction], "key_index",
+                             (json_int_t)t->key, "alarm", npg_alarm_json(cause));
+    npg_status status = npg_json_write(npg_worker_settings(worker)->output, "topology.json", told);
+    json_decref(told);
+    return status
+               ? status
+               : npg_error(NPG_CHANGED, "the reference does not explain frame %lld: the run ends for another",
+                           (long long)cause->number);
+}
+
+/* ---- frames ---- */
+
+static npg_status say(npg_topology *t, npg_worker *worker, int direction)
+{
+    const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, direction);
+    const char *on = direction == NPG_FORWARD ? "on" : "back";
+    char text[256];
+    if (!cause || t->is_said[direction]) return NPG_OK;
+    t->is_said[direction] = true;
+    npg_alarm_text(text, sizeof text, cause);
+    if (may_split(t, npg_worker_facts(worker), direction, cause->index)) {
+        npg_worker_log(worker, NPG_LOG_INFO, cause->number,
+                       "from here %s the reference no longer explains the points: %s", on, text);
+        return split(t, worker, direction);
+    }
+    npg_worker_warn(worker, true, cause->number,
+                    "from here %s the reference no longer explains the points: %s", on, text);
+    return NPG_OK;
+}
+
+static npg_status say_both(npg_topology *t, npg_worker *worker)
+{
+    for (int d = 0; d < NPG_DIRECTIONS; d++) NPG_TRY(say(t, worker, d));
+    return NPG_OK;
+}
+
+npg_status npg_topology_add(npg_topology *t, npg_worker *worker, const npg_frame *frame)
+{
+    if (frame->is_shared) return NPG_OK;
+    NPG_TRY(npg_alarm_add(t->alarm, frame));
+    return say_both(t, worker);
+}
+
+npg_status npg_topology_finish(npg_topology *t, npg_worker *worker)
+{
+    npg_facts *facts = npg_worker_facts(worker);
+    json_t *told = json_object();
+    npg_alarm_finish(t->alarm);
+    for (int d = 0; d < NPG_DIRECTIONS; d++) {
+        const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, d);
+        json_object_set_new(told, directions[d], npg_alarm_json(cause));
+        facts->has_changed[d] = cause != NULL;
+        facts->changed_at[d] = cause ? cause->index : 0;
+    }
+    json_object_set_new(npg_worker_report(worker), "topology", told);
+    return say_both(t, worker);
+}

@@ -1,0 +1,558 @@
+/* Export: writes every frame's mesh with the same faces, in the capture's own units and axes, and what the
+ * run has to say about it. */
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "export/export.h"
+#include "export/forms/forms.h"
+#include "export/forms/placement.h"
+#include "export/forms/writer.h"
+#include "geometry/mesh_tools.h"
+#include "ingest/formats/reader.h"
+#include "job/job.h"
+#include "pipeline/file.h"
+#include "pipeline/json_file.h"
+#include "pipeline/order.h"
+
+typedef enum numbering { NUMBER_OF_FILE, NUMBER_OF_INDEX } numbering;
+
+typedef struct export_state {
+    /* options */
+    int format, numbering, up, unit;
+    const char *prefix, *axes, *exports;
+    double scale, fps, voxel_share;
+    bool overwrite, with_normals, is_centred;
+    /* of a pass */
+    npg_placement map;
+    npg_mesh_names names;
+    npg_form_choice choice;
+    const char *like; /* the user's own reference where it is OBJ: its lines are kept in OBJ files */
+    int64_t *numbers; /* of all frames, while measuring; owned */
+    size_t number_count, number_capacity;
+    npg_frame_log *list;
+    uint32_t *faces;     /* F x 3 as they are written; owned */
+    double *vert_world;  /* V x 3; owned */
+    float *vert_normals; /* V x 3; owned */
+    int64_t mesh_count, skipped_count;
+} export_state;
+
+static const char *output_of(const npg_worker *worker)
+{
+    return npg_worker_settings(worker)->output;
+}
+
+/* ---- options ---- */
+
+static npg_status check_prefix(const char *prefix)
+{
+    json_t *text = json_string(prefix);
+    bool is_good = text && prefix[0] && prefix[0] != '.' && !strchr(prefix, '/') && strlen(prefix) <= 100;
+    for (const char *c = prefix; *c; c++) is_good = is_good && (unsigned char)*c >= 32 && *c != 127;
+    json_decref(text);
+    if (!is_good)
+        return npg_error(NPG_USAGE,
+                         "option prefix: \"%s\" can't begin a file name (1 to 100 bytes, no slash)", prefix);
+    return NPG_OK;
+}
+
+static npg_status read_options(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference"), *format = NULL;
+    NPG_TRY(npg_placement_parse(&state->map, state->axes));
+    state->map.scale = state->scale;
+    NPG_TRY(check_prefix(state->prefix));
+    NPG_TRY(npg_forms_choose(&state->choice, state->exports, state->format));
+    if (reference && reference[0]) format = npg_reader_for(reference);
+    state->like = format && !strcmp(format, "obj") ? reference : NULL;
+    state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
+    return NPG_OK;
+}
+
+/* Once the box is known. */
+static void set_centre(export_state *state, const npg_frame_box *box)
+{
+    for (int a = 0; a < 3 && state->is_centred && box->scale > 0; a++)
+        state->map.centre[a] = box->origin[a] + box->centre[a];
+}
+
+static int64_t number_of(const export_state *state, const npg_frame *frame)
+{
+    return state->numbering == NUMBER_OF_INDEX ? frame->index : frame->number;
+}
+
+static void set_width(export_state *state, const npg_facts *facts)
+{
+    int64_t last = state->numbering == NUMBER_OF_INDEX ? facts->frame_count - 1 : facts->number_max;
+    state->names.width = npg_number_width(last);
+}
+
+/* ---- measuring pass: would the names be in each other's or an earlier run's way? ---- */
+
+static bool is_same_file(const char *a, const char *b)
+{
+    struct stat of_a, of_b;
+    return !stat(a, &of_a) && !stat(b, &of_b) && of_a.st_dev == of_b.st_dev && of_a.st_ino == of_b.st_ino;
+}
+
+/* The results must not land among the frames they are made of. */
+static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
+{
+    char *folder, *meshes;
+    const char *output = output_of(worker), *slash = frame->path ? strrchr(frame->path, '/') : NULL;
+    if (!slash || slash == frame->path) return NPG_OK;
+    NPG_TRY(npg_copy_text(&folder, frame->path));
+    folder[slash - frame->path] = 0;
+    npg_status status = npg_join_path(&meshes, output, "meshes");
+    if (!status && is_same_file(folder, meshes))
+        status = npg_error(NPG_USAGE,
+                           "%s is an input, and this run's meshes would be written over it: choose another "
+                           "output folder than %s",
+                           frame->path, output);
+    npg_release(&folder);
+    npg_release(&meshes);
+    return status;
+}
+
+/* The user's own mesh must not be one of the files that a run makes anew. */
+static npg_status check_reference(const npg_worker *worker)
+{
+    static const char *const names[] = {"reference.ply", "reference.obj"};
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
+    for (size_t i = 0; reference && reference[0] && i < sizeof names / sizeof *names; i++) {
+        char *path;
+        NPG_TRY(npg_join_path(&path, output_of(worker), names[i]));
+        bool is_ours = is_same_file(path, reference);
+        npg_release(&path);
+        if (is_ours)
+            return npg_error(NPG_USAGE,
+                             "option reference: %s lies where this run writes: copy it, or choose another "
+                             "output folder",
+                             reference);
+    }
+    return NPG_OK;
+}
+
+static npg_status note_number(npg_worker *worker, const npg_frame *frame)
+{
+    export_state *state = npg_worker_state(worker);
+    NPG_TRY(check_source(worker, frame));
+    NPG_TRY(npg_grow(&state->numbers, &state->number_capacity, state->number_count + 1,
+                     sizeof *state->numbers, NPG_FOR_FILES));
+    state->numbers[state->number_count++] = number_of(state, frame);
+    return NPG_OK;
+}
+
+static npg_status check_numbers(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    if (!state->number_count) return NPG_OK;
+    qsort(state->numbers, state->number_count, sizeof *state->numbers, npg_order_int64);
+    for (size_t i = 1; i < state->number_count; i++)
+        if (state->numbers[i] == state->numbers[i - 1])
+            return npg_error(
+                NPG_BAD_INPUT,
+                "two frames have the number %lld and would be written to one file: set numbering "
+                "to index",
+                (long long)state->numbers[i]);
+    set_width(state, npg_worker_facts(worker));
+    if (state->overwrite) return NPG_OK;
+    return npg_folder_check(output_of(worker), &state->names, state->numbers, state->number_count);
+}
+
+/* ---- solving pass ---- */
+
+static const double metres_per_unit[] = {1, 0.1, 0.01, 0.001, 1000, 0.0254, 0.3048};
+
+/* What forms may know; before the reference is there, counts are those that the run will have at most. */
+static npg_form_facts form_facts(const npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_frame_box *box = &facts->box;
+    size_t verts = facts->reference ? facts->reference->vert_count : npg_worker_verts_at_most(worker);
+    bool is_known = box->scale > 0;
+    return (npg_form_facts){.output = output_of(worker),
+                            .prefix = state->prefix,
+                            .width = state->names.width,
+                            .vert_count = verts,
+                            .face_count = facts->reference ? facts->reference->face_count : 2 * verts,
+                            .like = state->like,
+                            .turns_faces = state->map.is_mirror,
+                            .has_normals = state->with_normals,
+                            .pose_count = facts->frame_count,
+                            .last_index = facts->frame_count > 0 ? facts->frame_count - 1 : 0,
+                            .fps = state->fps,
+                            .metres_per_unit = metres_per_unit[state->unit],
+                            .is_z_up = state->up,
+                            .largest = is_known ? npg_place_largest(&state->map, box) : 0,
+                            .diagonal = is_known ? state->scale * box->diagonal : 0,
+                            .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
+                            .voxel_share = state->voxel_share,
+                            .has_grids = facts->job != NULL,
+                            .placement = &state->map};
+}
+
+/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be
+ * told. */
+static uint64_t bytes_of_meshes(const npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
+    bool is_obj = state->choice.is_obj;
+    uint64_t verts = npg_worker_verts_at_most(worker), per_vert = is_obj ? 30 : 12;
+    if (facts->frame_count < 0 || (reference && reference[0])) return 0;
+    if (state->with_normals) per_vert *= 2;
+    npg_form_facts of_forms = form_facts(worker);
+    return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (is_obj ? 20 : 13)) +
+           npg_forms_bytes(&state->choice, &of_forms);
+}
+
+/* What a form can't hold is said before the fit starts; of a live source as soon as its box is known. */
+static npg_status check_forms(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    set_centre(state, &npg_worker_facts(worker)->box);
+    npg_form_facts of_forms = form_facts(worker);
+    return npg_forms_check(&state->choice, &of_forms);
+}
+
+static npg_status prepare_folder(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    const char *output = output_of(worker);
+    char *meshes;
+    if (npg_worker_facts(worker)->is_live && !state->overwrite)
+        NPG_TRY(npg_folder_check(output, &state->names, NULL, 0));
+    NPG_TRY(check_forms(worker));
+    NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
+    NPG_TRY(npg_folder_clear(output));
+    NPG_TRY(npg_join_path(&meshes, output, "meshes"));
+    npg_status status = npg_make_folder(meshes);
+    npg_release(&meshes);
+    NPG_TRY(status);
+    NPG_TRY(npg_frame_log_open(&state->list, output));
+    npg_job *job = npg_worker_facts(worker)->job;
+    return job ? npg_job_write(job) : NPG_OK;
+}
+
+/* What an earlier run of the same job wrote stays. */
+static npg_status take_up_folder(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    const char *output = output_of(worker);
+    npg_job *job = npg_worker_facts(worker)->job;
+    int64_t count, bytes;
+    NPG_TRY(check_forms(worker));
+    NPG_TRY(npg_folder_probe(output));
+    NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
+    npg_job_exported(job, &count, &bytes);
+    NPG_TRY(npg_frame_log_resume(&state->list, output, bytes, &state->mesh_count, &state->skipped_count));
+    return npg_job_write(job);
+}
+
+static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit, bool with_normals,
+                             const char *like)
+{
+    export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_mesh *reference = facts->reference;
+    char *path;
+    npg_place_points(&state->map, state->vert_world, &facts->box, vert_unit, reference->vert_count);
+    if (with_normals) {
+        npg_mesh_vertex_normals(state->vert_normals, vert_unit, reference->vert_count, reference->faces,
+                                reference->face_count);
+        npg_place_normals(&state->map, state->vert_normals, state->vert_normals, reference->vert_count);
+    }
+    npg_mesh_view view = {.vert_count = reference->vert_count,
+                          .face_count = reference->face_count,
+                          .vert_world = state->vert_world,
+                          .vert_normals = with_normals ? state->vert_normals : NULL,
+                          .faces = state->faces,
+                          .vert_colours = reference->vert_colours,
+                          .vert_uvs = reference->vert_uvs,
+                          .turns_faces = state->map.is_mirror};
+    NPG_TRY(npg_join_path(&path, output_of(worker), file));
+    npg_status status = like ? npg_write_obj_like(path, like, &view) : npg_write_mesh(path, &view);
+    npg_release(&path);
+    return status;
+}
+
+/* Once the reference mesh is known: buffers, the faces as all files have them, reference.ply. */
+static npg_status begin_meshes(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_mesh *reference = facts->reference;
+    size_t v = reference->vert_count, f = reference->face_count;
+    set_width(state, facts);
+    NPG_TRY(check_forms(worker));
+    NPG_TRY(npg_alloc_array(&state->vert_world, NPG_FOR_FILES, v, 3 * sizeof *state->vert_world));
+    NPG_TRY(npg_alloc_array(&state->vert_normals, NPG_FOR_FILES, v, 3 * sizeof *state->vert_normals));
+    NPG_TRY(npg_alloc_array(&state->faces, NPG_FOR_FILES, f, 3 * sizeof *state->faces));
+    npg_place_faces(&state->map, state->faces, reference->faces, f);
+    return write_mesh(worker, "reference.ply", reference->vert_pos, true, NULL);
+}
+
+static npg_status list_frame(npg_worker *worker, const npg_frame *frame, const char *file)
+{
+    export_state *state = npg_worker_state(worker);
+    npg_job *job = npg_worker_facts(worker)->job;
+    int64_t lines, bytes;
+    NPG_TRY(npg_frame_log_add(state->list, frame, output_of(worker), file));
+    npg_frame_log_size(state->list, &lines, &bytes);
+    if (job) npg_job_note_exported(job, lines, bytes);
+    return NPG_OK;
+}
+
+static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
+{
+    export_state *state = npg_worker_state(worker);
+    const npg_mesh *reference = npg_worker_facts(worker)->reference;
+    char file[NPG_MESH_NAME_SIZE + 8] = "meshes/";
+    bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit && frame->vert_count;
+    state->skipped_count += frame->is_skipped;
+    if (!has_mesh) return list_frame(worker, frame, NULL);
+    if (!reference || frame->vert_count != reference->vert_count)
+        return npg_error(NPG_FAILED, "frame %lld has %zu vertices, the reference %zu",
+                         (long long)frame->number, frame->vert_count, reference ? reference->vert_count : 0);
+    if (!state->faces) NPG_TRY(begin_meshes(worker));
+    npg_mesh_name(file + strlen(file), &state->names, number_of(state, frame));
+    NPG_TRY(write_mesh(worker, file, frame->vert_unit, state->with_normals,
+                       state->choice.is_obj ? state->like : NULL));
+    state->mesh_count++;
+    return list_frame(worker, frame, file);
+}
+
+static void report_settings(json_t *object, const export_state *state)
+{
+    json_object_set_new(object, "format", json_string(state->names.ending));
+    json_object_set_new(object, "scale", json_real(state->scale));
+    json_object_set_new(object, "axes", json_string(state->axes));
+    json_object_set_new(object, "fps", json_real(state->fps));
+    json_object_set_new(object, "up", json_string(state->up ? "z" : "y"));
+    json_object_set_new(object, "metres_per_unit", json_real(metres_per_unit[state->unit]));
+    json_object_set_new(object, "forms", npg_forms_json(&state->choice));
+    if (state->is_centred)
+        json_object_set_new(
+            object, "centre",
+            json_pack("[fff]", state->map.centre[0], state->map.centre[1], state->map.centre[2]));
+}
+
+/* ---- the other forms ---- */
+
+static bool should_stop(void *worker)
+{
+    return npg_worker_stopping(worker);
+}
+
+/* What of the reference is the same in all poses. */
+static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, float **rest, float **corners)
+{
+    export_state *state = npg_worker_state(worker);
+    const npg_mesh *reference = npg_worker_facts(worker)->reference;
+    size_t v = reference->vert_count, f = reference->face_count;
+    NPG_TRY(npg_alloc_array(rest, NPG_FOR_FILES, v, 3 * sizeof **rest));
+    npg_place_points(&state->map, state->vert_world, &npg_worker_facts(worker)->box, reference->vert_pos, v);
+    for (size_t i = 0; i < 3 * v; i++) (*rest)[i] = (float)state->vert_world[i];
+    if (reference->corner_uvs) {
+        NPG_TRY(npg_alloc_array(corners, NPG_FOR_FILES, f, 6 * sizeof **corners));
+        npg_place_corners(&state->map, *corners, reference->corner_uvs, f);
+    }
+    facts->rest = *rest;
+    facts->corner_uvs = *corners;
+    facts->faces = state->faces;
+    facts->colours = reference->vert_colours;
+    facts->uvs = reference->vert_uvs;
+    return NPG_OK;
+}
+
+/* From the meshes on disk, in the order of time (forms.h says why). */
+static npg_status write_forms(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    npg_form_watch watch = {.should_stop = should_stop, .user = worker};
+    float *rest = NULL, *corners = NULL;
+    if (!npg_forms_any(&state->choice)) return NPG_OK;
+    if (!state->faces) NPG_TRY(begin_meshes(worker));
+    npg_form_facts facts = form_facts(worker);
+    npg_status status = place_reference(worker, &facts, &rest, &corners);
+    if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
+    npg_release(&rest);
+    npg_release(&corners);
+    if (!status && npg_forms_name(state->exports, "vdb") && !facts.has_grids)
+        npg_worker_warn(
+            worker, false, -1,
+            "vdb has no latent grids: a run without a job folder (live, or pulled from) keeps none");
+    if (!status && watch.repeated)
+        npg_worker_warn(worker, false, -1,
+                        "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
+                        "times",
+                        (long long)watch.repeated);
+    return status;
+}
+
+static npg_status finish(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    json_t *report = npg_worker_report(worker);
+    if (!state->mesh_count) return npg_error(NPG_FAILED, "no frame got a mesh");
+    report_settings(report, state);
+    json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
+    json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
+    NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker)));
+    return write_forms(worker);
+}
+
+/* ---- the last files ---- */
+
+static json_t *json_of_options(const npg_options *options)
+{
+    json_t *values = json_object();
+    npg_option_info info = {.struct_size = sizeof info};
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        json_object_set_new(values, info.name, npg_json_text(npg_options_get(options, info.name)));
+    return values;
+}
+
+static npg_status conclude(npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    json_t *whole = npg_worker_whole_report(worker), *head = json_object();
+    if (!output_of(worker)[0]) {
+        json_decref(head);
+        return NPG_OK;
+    }
+    npg_status status = read_options(worker);
+    set_centre(npg_worker_state(worker), &npg_worker_facts(worker)->box);
+    if (!status) status = npg_json_write(output_of(worker), "report.json", whole);
+    json_object_set_new(head, "neupig", json_string(npg_version()));
+    json_object_set(head, "status", json_object_get(whole, "status"));
+    json_object_set(head, "exit_code", json_object_get(whole, "exit_code"));
+    json_object_set_new(head, "frames", json_integer((json_int_t)npg_worker_facts(worker)->frame_count));
+    json_object_set(head, "meshes", json_object_get(npg_worker_report(worker), "meshes"));
+    report_settings(head, state);
+    json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
+    if (!status) return npg_done_write(output_of(worker), head, npg_forms_any(&state->choice));
+    json_decref(head);
+    return status;
+}
+
+/* ---- the stage ---- */
+
+static npg_status check_own(const npg_worker *worker)
+{
+    static const char *const names[] = {"meshes", "obj", "volumes", "latents"};
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++) {
+        char *folder;
+        NPG_TRY(npg_join_path(&folder, output_of(worker), names[i]));
+        status = npg_folder_is_own(folder);
+        npg_release(&folder);
+    }
+    return status;
+}
+
+static npg_status init(npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    NPG_TRY(read_options(worker));
+    if (!output_of(worker)[0]) return NPG_OK;
+    NPG_TRY(check_reference(worker));
+    if (npg_worker_settings(worker)->confine) NPG_TRY(check_own(worker));
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
+        NPG_TRY(npg_folder_probe(output_of(worker)));
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
+    return facts->is_resumed ? take_up_folder(worker) : prepare_folder(worker);
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    if (!output_of(worker)[0]) return NPG_OK;
+    bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        const npg_frame *frame = npg_chunk_frame(*chunk, i);
+        NPG_TRY(is_solving ? export_frame(worker, frame) : note_number(worker, frame));
+    }
+    return NPG_OK;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    if (!output_of(worker)[0]) return NPG_OK;
+    return npg_worker_pass(worker) == NPG_PASS_SOLVE ? finish(worker) : check_numbers(worker);
+}
+
+static void uninit(npg_worker *worker)
+{
+    export_state *state = npg_worker_state(worker);
+    npg_frame_log_close(&state->list);
+    npg_release(&state->numbers);
+    npg_release(&state->faces);
+    npg_release(&state->vert_world);
+    npg_release(&state->vert_normals);
+}
+
+/* A place per frame in the list; coordinates, normals and two faces per vertex; the buffers of two files. */
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    int64_t frame_count = npg_worker_facts(worker)->frame_count;
+    *chunks_held = 1;
+    size_t verts = npg_worker_verts_at_most(worker);
+    bool has_forms = npg_options_get(npg_worker_options(worker), "export")[0];
+    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + (60 + (has_forms ? 200 : 0)) * verts +
+           (has_forms ? 4 << 20 : 512 << 10);
+}
+
+#define OFFSET(member) offsetof(export_state, member)
+
+static const npg_option options[] = {
+    {"export",
+     "What to write, any of ply, obj (sequences), pc2, mdd (point caches), glb, usda, npz, vdb, with commas; "
+     "a "
+     "sequence is always there (see format)",
+     NPG_OPTION_TEXT, OFFSET(exports), "", 0, 0, NULL, "LIST"},
+    {"format", "Format of the mesh sequence where export names none", NPG_OPTION_CHOICE, OFFSET(format),
+     "ply", 0, 0, "ply|obj", NULL},
+    {"prefix", "First part of the mesh files' names", NPG_OPTION_TEXT, OFFSET(prefix), "frame", 0, 0, NULL,
+     "NAME"},
+    {"numbering", "Number of a mesh file: as in the input's name, or the place in the sequence",
+     NPG_OPTION_CHOICE, OFFSET(numbering), "file", 0, 0, "file|index", NULL},
+    {"scale", "Multiply all written coordinates by this", NPG_OPTION_REAL, OFFSET(scale), "1", 1e-12, 1e12,
+     NULL, NULL},
+    {"axes", "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up", NPG_OPTION_TEXT,
+     OFFSET(axes), "xyz", 0, 0, NULL, "AXES"},
+    {"fps", "Frames per second of the capture, for the report and formats that carry time", NPG_OPTION_REAL,
+     OFFSET(fps), "30", 1e-3, 1e6, NULL, NULL},
+    {"up", "Axis that points up in the written coordinates, for forms that can say it", NPG_OPTION_CHOICE,
+     OFFSET(up), "y", 0, 0, "y|z", NULL},
+    {"unit", "Unit of the written coordinates, for forms that can say it", NPG_OPTION_CHOICE, OFFSET(unit),
+     "m", 0, 0, "m|dm|cm|mm|km|in|ft", NULL},
+    {"centre",
+     "Write coordinates relative to the middle of the capture's box, which done.json then names: for "
+     "captures "
+     "far from 0",
+     NPG_OPTION_FLAG, OFFSET(is_centred), "no", 0, 0, NULL, NULL},
+    {"vdb-voxel", "Voxel of the level sets, as a share of the longest side of the capture's box",
+     NPG_OPTION_REAL, OFFSET(voxel_share), "0.005", 1e-4, 0.25, NULL, "SHARE"},
+    {"mesh-normals", "Write vertex normals into every mesh", NPG_OPTION_FLAG, OFFSET(with_normals), "no", 0,
+     0, NULL, NULL},
+    {"overwrite", "Remove meshes that an earlier run left in the output folder", NPG_OPTION_FLAG,
+     OFFSET(overwrite), "no", 0, 0, NULL, NULL},
+    {0}};
+
+extern const npg_stage npg_stage_export;
+const npg_stage npg_stage_export = {.name = "export",
+                                    .help = "Write meshes, report and checksums",
+                                    .options = options,
+                                    .state_size = sizeof(export_state),
+                                    .passes = NPG_PASS_MEASURE | NPG_PASS_SOLVE,
+                                    .needs = NPG_FIELD_KEY | NPG_FIELD_REFERENCE | NPG_FIELD_VERTICES,
+                                    .init = init,
+                                    .process = process,
+                                    .flush = flush,
+                                    .uninit = uninit,
+                                    .memory = memory,
+                                    .conclude = conclude};

@@ -1,0 +1,167 @@
+/* The results' folder: can it be written, and what of an earlier run lies in it. */
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include "export/export.h"
+#include "export/forms/forms.h"
+#include "pipeline/file.h"
+#include "pipeline/order.h"
+
+#define PROBE_BYTES (256 << 10)
+
+void npg_mesh_name(char name[NPG_MESH_NAME_SIZE], const npg_mesh_names *names, int64_t number)
+{
+    snprintf(name, NPG_MESH_NAME_SIZE, "%s_%0*lld.%s", names->prefix, names->width, (long long)number,
+             names->ending);
+}
+
+int npg_number_width(int64_t number_max)
+{
+    int width = 4;
+    for (int64_t limit = 10000; number_max >= limit && width < 18; limit *= 10) width++;
+    return width;
+}
+
+npg_status npg_folder_probe(const char *output)
+{
+    static const char zeros[4096];
+    char *path;
+    npg_file *file;
+    NPG_TRY(npg_make_folder(output));
+    NPG_TRY(npg_join_path(&path, output, ".write-test"));
+    npg_status status = npg_file_open(&file, path);
+    if (!status) {
+        for (size_t i = 0; i < PROBE_BYTES / sizeof zeros; i++) npg_file_write(file, zeros, sizeof zeros);
+        status = npg_file_commit(&file);
+        unlink(path);
+    }
+    npg_release(&path);
+    return status;
+}
+
+/* ---- mesh files of any run ---- */
+
+/* Whether a name is <word>_<digits>.ply or .obj, or the hidden unfinished form of one; *number gets the
+ * digits' value. */
+static bool is_mesh_name(const char *name, int64_t *number)
+{
+    size_t length = strlen(name);
+    if (name[0] == '.' && length > 6 && !strcmp(name + length - 5, ".part")) length -= 5;
+    if (length < 7 ||
+        (strncmp(name + length - 4, ".ply", 4) != 0 && strncmp(name + length - 4, ".obj", 4) != 0))
+        return false;
+    size_t first = length - 4;
+    while (first > 0 && isdigit((unsigned char)name[first - 1])) first--;
+    if (length - 4 - first < 4 || length - 4 - first > 18) return false;
+    if (first > 1 && name[first - 1] == '-') first--;
+    *number = strtoll(name + first, NULL, 10);
+    return first > 1 && name[first - 1] == '_';
+}
+
+/* Call visit(user, folder, name, number) for each mesh file; a folder that does not exist has none. */
+typedef npg_status visit_mesh(void *user, const char *folder, const char *name, int64_t number);
+
+static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
+{
+    char *folder;
+    int64_t number;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_join_path(&folder, output, "meshes"));
+    DIR *listing = opendir(folder);
+    if (!listing && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't list %s", folder);
+    for (struct dirent *entry; listing && !status && (entry = readdir(listing));)
+        if (is_mesh_name(entry->d_name, &number)) status = visit(user, folder, entry->d_name, number);
+    if (listing) closedir(listing);
+    npg_release(&folder);
+    return status;
+}
+
+typedef struct own_meshes {
+    const npg_mesh_names *names;
+    const int64_t *numbers;
+    size_t number_count;
+} own_meshes;
+
+static npg_status refuse_foreign(void *user, const char *folder, const char *name, int64_t number)
+{
+    const own_meshes *own = user;
+    char own_name[NPG_MESH_NAME_SIZE];
+    npg_mesh_name(own_name, own->names, number);
+    if (name[0] == '.') return NPG_OK;
+    if (!strcmp(name, own_name) && own->number_count &&
+        bsearch(&number, own->numbers, own->number_count, sizeof number, npg_order_int64))
+        return NPG_OK;
+    return npg_error(NPG_USAGE,
+                     "%s/%s is of another run and would mix with this one's frames: choose another output "
+                     "folder, or set overwrite to remove what earlier runs left",
+                     folder, name);
+}
+
+npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,
+                            size_t number_count)
+{
+    return each_mesh(output, refuse_foreign, &(own_meshes){names, numbers, number_count});
+}
+
+/* ---- room ---- */
+
+static npg_status add_size(void *user, const char *folder, const char *name, int64_t number)
+{
+    uint64_t *sum = user;
+    struct stat info;
+    char *path;
+    (void)number;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    if (!stat(path, &info)) *sum += (uint64_t)info.st_size;
+    npg_release(&path);
+    return NPG_OK;
+}
+
+npg_status npg_folder_has_room(const char *output, uint64_t bytes)
+{
+    struct statvfs info;
+    uint64_t old_bytes = 0;
+    NPG_TRY(each_mesh(output, add_size, &old_bytes));
+    bytes -= old_bytes < bytes ? old_bytes : bytes;
+    if (statvfs(output, &info)) return npg_error_errno(NPG_DISK, "can't look at the disk of %s", output);
+    uint64_t block = info.f_frsize ? info.f_frsize : 1;
+    if (bytes / block <= info.f_bavail) return NPG_OK;
+    return npg_error(NPG_DISK, "%s: the results take about %llu MiB, but only %llu MiB are free", output,
+                     (unsigned long long)(bytes >> 20),
+                     (unsigned long long)((double)info.f_bavail * (double)block / 1048576));
+}
+
+/* ---- removing ---- */
+
+static npg_status remove_file(const char *folder, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    npg_status status = NPG_OK;
+    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status remove_mesh(void *user, const char *folder, const char *name, int64_t number)
+{
+    (void)user;
+    (void)number;
+    return remove_file(folder, name);
+}
+
+npg_status npg_folder_clear(const char *output)
+{
+    static const char *const names[] = {
+        "done.json", "report.json", "frames.jsonl", "frames.partial.jsonl", "reference.ply", "topology.json"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(remove_file(output, names[i]));
+    NPG_TRY(npg_forms_clear(output));
+    return each_mesh(output, remove_mesh, NULL);
+}

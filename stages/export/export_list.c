@@ -1,0 +1,428 @@
+/* The list of frames and the last file of a run. */
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include "export/export.h"
+#include "pipeline/file.h"
+
+typedef struct line_place { /* a frame's line in the partial list */
+    int64_t index;
+    off_t offset;
+    size_t size; /* with its newline */
+} line_place;
+
+struct npg_frame_log {
+    char *output, *partial_path; /* owned */
+    int fd;
+    off_t size;
+    line_place *lines; /* owned */
+    size_t line_count, line_capacity;
+};
+
+/* ---- checksums ---- */
+
+static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
+{
+    unsigned char block[16 << 10];
+    XXH3_state_t *state = XXH3_createState();
+    if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
+    XXH3_64bits_reset(state);
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
+    *size = 0;
+    while (!status) {
+        ssize_t got = read(fd, block, sizeof block);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+        if (got <= 0) break;
+        XXH3_64bits_update(state, block, (size_t)got);
+        *size += got;
+    }
+    if (fd >= 0) close(fd);
+    *hash = XXH3_64bits_digest(state);
+    XXH3_freeState(state);
+    return status;
+}
+
+npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
+{
+    char *path, text[17];
+    XXH64_hash_t hash;
+    int64_t size;
+    NPG_TRY(npg_join_path(&path, output, file));
+    npg_status status = hash_file(&hash, &size, path);
+    npg_release(&path);
+    NPG_TRY(status);
+    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)size));
+    json_object_set_new(entry, "xxh3", json_string(text));
+    return NPG_OK;
+}
+
+npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
+{
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
+    json_t *now = json_object();
+    npg_status status = npg_file_facts(now, output, file);
+    if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
+                    !json_equal(json_object_get(now, "xxh3"), json_object_get(entry, "xxh3"))))
+        status = npg_error(NPG_BAD_INPUT,
+                           "%s/%s was changed since it was written; --restart discards what is there", output,
+                           file);
+    json_decref(now);
+    return status == NPG_DISK ? NPG_BAD_INPUT : status;
+}
+
+/* ---- one line ---- */
+
+static json_t *json_of_cleaning(const npg_cleaning *c)
+{
+    return json_pack("{sI sI sI sI sI sI sI sI}", "read", (json_int_t)c->read, "not_finite",
+                     (json_int_t)c->not_finite, "duplicate", (json_int_t)c->duplicate, "isolated",
+                     (json_int_t)c->isolated, "thinned", (json_int_t)c->thinned, "normals_given",
+                     (json_int_t)c->normals_given, "normals_flipped", (json_int_t)c->normals_flipped,
+                     "normals_estimated", (json_int_t)c->normals_estimated);
+}
+
+static json_t *json_of_figures(const npg_figures *f)
+{
+    const struct {
+        const char *name;
+        double value;
+    } values[] = {{"point_dist_median", f->point_dist_median},
+                  {"point_dist_mean", f->point_dist_mean},
+                  {"point_dist_p95", f->point_dist_p95},
+                  {"vertex_dist_mean", f->vertex_dist_mean},
+                  {"coverage", f->coverage},
+                  {"flipped_share", f->flipped_share},
+                  {"stretched_share", f->stretched_share},
+                  {"edge_change", f->edge_change},
+                  {"chamfer", f->chamfer},
+                  {"truth_cd", f->truth_cd},
+                  {"truth_nc", f->truth_nc},
+                  {"truth_f", f->truth_f},
+                  {"truth_corr", f->truth_corr}};
+    json_t *figures = json_object();
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
+        json_object_set_new(figures, values[i].name, npg_json_real(values[i].value));
+    return figures;
+}
+
+static const char *const misfit_names[NPG_MISFITS] = {"far", "bare", "torn", "deserted"};
+
+static json_t *json_of_misfits(const npg_figures *f)
+{
+    json_t *misfits = json_object();
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        const npg_misfit *misfit = &f->misfits[i];
+        json_t *at = json_array();
+        for (int a = 0; a < 3; a++) json_array_append_new(at, npg_json_real(misfit->at[a]));
+        json_object_set_new(misfits, misfit_names[i],
+                            json_pack("{so so}", "share", npg_json_real(misfit->share), "at", at));
+    }
+    return misfits;
+}
+
+static double real_of(const json_t *value)
+{
+    return json_is_number(value) ? (double)(float)json_number_value(value) : (double)NAN;
+}
+
+void npg_misfits_take(npg_figures *figures, const json_t *misfits)
+{
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        const json_t *misfit = json_object_get(misfits, misfit_names[i]);
+        figures->misfits[i].share = real_of(json_object_get(misfit, "share"));
+        for (size_t a = 0; a < 3; a++)
+            figures->misfits[i].at[a] = real_of(json_array_get(json_object_get(misfit, "at"), a));
+    }
+}
+
+static json_t *json_of_frame(const npg_frame *frame, const char *file)
+{
+    json_t *line = json_object();
+    json_object_set_new(line, "index", json_integer((json_int_t)frame->index));
+    json_object_set_new(line, "number", json_integer((json_int_t)frame->number));
+    json_object_set_new(line, "source", npg_json_text(frame->path));
+    json_object_set_new(line, "key", json_boolean(frame->is_key));
+    json_object_set_new(line, "skipped", json_boolean(frame->is_skipped));
+    json_object_set_new(line, "held", json_boolean(frame->is_held));
+    if (frame->is_shared) json_object_set_new(line, "shared", json_true());
+    json_object_set_new(line, "points", json_integer((json_int_t)frame->point_count));
+    json_object_set_new(line, "cleaning", json_of_cleaning(&frame->cleaning));
+    if (frame->fields & NPG_FIELD_FIGURES) {
+        json_object_set_new(line, "good", json_boolean(frame->figures.good));
+        json_object_set_new(line, "figures", json_of_figures(&frame->figures));
+        json_object_set_new(line, "misfits", json_of_misfits(&frame->figures));
+    }
+    json_object_set_new(line, "file", npg_json_text(file));
+    return line;
+}
+
+/* ---- the list ---- */
+
+static npg_status open_list(npg_frame_log **out, const char *output, int flags)
+{
+    npg_frame_log *list;
+    npg_status status;
+    NPG_TRY(npg_alloc(&list, NPG_FOR_FILES, sizeof *list));
+    list->fd = -1;
+    NPG_TRY_OR(fail, status, npg_copy_text(&list->output, output));
+    NPG_TRY_OR(fail, status, npg_join_path(&list->partial_path, output, "frames.partial.jsonl"));
+    list->fd = open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
+    if (list->fd < 0) {
+        status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
+        goto fail;
+    }
+    *out = list;
+    return NPG_OK;
+fail:
+    npg_frame_log_close(&list);
+    return status;
+}
+
+npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
+{
+    return open_list(out, output, O_CREAT | O_TRUNC);
+}
+
+void npg_frame_log_close(npg_frame_log **slot)
+{
+    npg_frame_log *list = *slot;
+    if (!list) return;
+    if (list->fd >= 0) close(list->fd);
+    npg_release(&list->output);
+    npg_release(&list->partial_path);
+    npg_release(&list->lines);
+    npg_release(slot);
+}
+
+static npg_status add_place(npg_frame_log *list, int64_t index, size_t size)
+{
+    NPG_TRY(npg_grow(&list->lines, &list->line_capacity, list->line_count + 1, sizeof *list->lines,
+                     NPG_FOR_FILES));
+    list->lines[list->line_count++] = (line_place){index, list->size, size};
+    list->size += (off_t)size;
+    return NPG_OK;
+}
+
+static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
+{
+    for (size_t at = 0; at < size;) {
+        ssize_t written = pwrite(list->fd, text + at, size - at, list->size + (off_t)at);
+        if (written < 0 && errno == EINTR) continue;
+        if (written == 0) errno = ENOSPC;
+        if (written <= 0) return npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
+        at += (size_t)written;
+    }
+    return add_place(list, index, size);
+}
+
+void npg_frame_log_size(const npg_frame_log *list, int64_t *lines, int64_t *bytes)
+{
+    *lines = (int64_t)list->line_count;
+    *bytes = (int64_t)list->size;
+}
+
+typedef struct resuming {
+    npg_frame_log *list;
+    int64_t mesh_count, skipped_count;
+} resuming;
+
+static npg_status take_line(void *user, const json_t *frame, const char *line, size_t size)
+{
+    resuming *r = user;
+    const char *file = json_string_value(json_object_get(frame, "file"));
+    (void)line;
+    r->mesh_count += file != NULL;
+    r->skipped_count += json_is_true(json_object_get(frame, "skipped"));
+    if (file) NPG_TRY(npg_file_check(frame, r->list->output, file));
+    return add_place(r->list, (int64_t)json_integer_value(json_object_get(frame, "index")), size);
+}
+
+npg_status npg_frame_log_resume(npg_frame_log **out, const char *output, int64_t bytes, int64_t *mesh_count,
+                                int64_t *skipped_count)
+{
+    resuming r = {0};
+    NPG_TRY(open_list(out, output, 0));
+    r.list = *out;
+    npg_status status = npg_frame_lines_each(r.list->partial_path, bytes, take_line, &r);
+    if (!status && ftruncate(r.list->fd, (off_t)bytes))
+        status = npg_error_errno(NPG_DISK, "can't shorten %s", r.list->partial_path);
+    if (status) npg_frame_log_close(out);
+    *mesh_count = r.mesh_count;
+    *skipped_count = r.skipped_count;
+    return status;
+}
+
+npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
+                             const char *file)
+{
+    json_t *line = json_of_frame(frame, file);
+    npg_status status = file ? npg_file_facts(line, output, file) : NPG_OK;
+    char *text = status ? NULL : json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_decref(line);
+    NPG_TRY(status);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for the line of frame %lld", (long long)frame->number);
+    size_t size = strlen(text);
+    text[size] = '\n'; /* in the place of the final 0: the size goes along */
+    status = append(list, frame->index, text, size + 1);
+    free(text);
+    return status;
+}
+
+static int by_index(const void *left, const void *right)
+{
+    const line_place *a = left, *b = right;
+    return a->index < b->index ? -1 : a->index > b->index;
+}
+
+static bool is_unexplained(const npg_facts *facts, int64_t index)
+{
+    return (facts->has_changed[0] && index >= facts->changed_at[0]) ||
+           (facts->has_changed[1] && index <= facts->changed_at[1]);
+}
+
+/* A line, with the word that the reference does not explain its frame where it has none yet. */
+static npg_status write_line(npg_file *file, const char *line, size_t size, bool is_unexplained)
+{
+    static const char word[] = ",\"unexplained\":true";
+    bool has = memmem(line, size, word, sizeof word - 1) != NULL;
+    if (!is_unexplained || has || size < 2) return npg_file_write(file, line, size);
+    NPG_TRY(npg_file_write(file, line, size - 2)); /* without brace and newline */
+    NPG_TRY(npg_file_write(file, word, sizeof word - 1));
+    return npg_file_write(file, "}\n", 2);
+}
+
+static npg_status copy_lines(npg_frame_log *list, npg_file *file, const npg_facts *facts)
+{
+    char *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < list->line_count && !status; i++) {
+        const line_place *place = &list->lines[i];
+        status = npg_grow(&line, &capacity, place->size, 1, NPG_FOR_FILES);
+        if (!status && pread(list->fd, line, place->size, place->offset) != (ssize_t)place->size)
+            status = npg_error_errno(NPG_DISK, "can't read back %s", list->partial_path);
+        if (!status) status = write_line(file, line, place->size, is_unexplained(facts, place->index));
+    }
+    npg_release(&line);
+    return status;
+}
+
+npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts)
+{
+    npg_file *file;
+    char *path;
+    if (list->line_count) qsort(list->lines, list->line_count, sizeof *list->lines, by_index);
+    NPG_TRY(npg_join_path(&path, list->output, "frames.jsonl"));
+    npg_status status = npg_file_open(&file, path);
+    npg_release(&path);
+    NPG_TRY(status);
+    status = copy_lines(list, file, facts);
+    if (status)
+        npg_file_discard(&file);
+    else
+        status = npg_file_commit(&file);
+    return status;
+}
+
+/* ---- done.json ---- */
+
+static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)
+{
+    char *text = json_dumps(entry, JSON_COMPACT);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
+    npg_status status = npg_file_print(file, "%s\n    ", *is_first ? "" : ",");
+    if (!status) status = npg_file_write(file, text, strlen(text));
+    *is_first = false;
+    free(text);
+    return status;
+}
+
+static npg_status write_file_entry(npg_file *file, const char *output, const char *name, bool *is_first)
+{
+    json_t *entry = json_pack("{ss}", "path", name);
+    npg_status status = npg_file_facts(entry, output, name);
+    if (!status) status = write_entry(file, entry, is_first);
+    json_decref(entry);
+    return status;
+}
+
+/* Sizes and checksums of the meshes or of the other forms' files, from the lines of the list that has them.
+ */
+static npg_status write_entries(npg_file *file, const char *output, const char *list_name, bool *is_first)
+{
+    char *path, *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_join_path(&path, output, list_name));
+    FILE *list = fopen(path, "re");
+    if (!list) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    while (!status && getline(&line, &capacity, list) > 0) {
+        json_t *frame = json_loads(line, 0, NULL), *name = json_object_get(frame, "file");
+        if (!frame) status = npg_error(NPG_DISK, "%s was changed while the run wrote it", path);
+        if (json_is_string(name)) {
+            json_t *entry = json_pack("{sO sO sO}", "path", name, "bytes", json_object_get(frame, "bytes"),
+                                      "xxh3", json_object_get(frame, "xxh3"));
+            status =
+                entry ? write_entry(file, entry, is_first) : npg_error(NPG_MEMORY, "no memory for done.json");
+            json_decref(entry);
+        }
+        json_decref(frame);
+    }
+    if (list && !status && ferror(list)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    if (list) fclose(list);
+    free(line);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status write_done(npg_file *file, const char *output, const json_t *head, bool has_forms)
+{
+    static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
+    bool is_first = true;
+    char *text = json_dumps(head, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
+    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
+    size_t size = strlen(text) - 2; /* without the last newline and brace: the files are added */
+    npg_status status = npg_file_write(file, text, size);
+    free(text);
+    if (!status) status = npg_file_print(file, ",\n  \"files\": [");
+    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++)
+        status = write_file_entry(file, output, names[i], &is_first);
+    if (!status) status = write_entries(file, output, "frames.jsonl", &is_first);
+    if (!status && has_forms) status = write_file_entry(file, output, "exports.jsonl", &is_first);
+    if (!status && has_forms) status = write_entries(file, output, "exports.jsonl", &is_first);
+    return status ? status : npg_file_print(file, "\n  ]\n}\n");
+}
+
+/* The partial list is what an interrupted run goes on from: it goes when nothing is left to go on with. */
+npg_status npg_done_write(const char *output, json_t *head, bool has_forms)
+{
+    char *path = NULL, *partial = NULL;
+    npg_file *file = NULL;
+    npg_status status = npg_join_path(&path, output, "done.json");
+    if (!status) status = npg_join_path(&partial, output, "frames.partial.jsonl");
+    if (!status) status = npg_file_open(&file, path);
+    if (!status) status = write_done(file, output, head, has_forms);
+    if (!status) {
+        status = npg_file_commit(&file);
+        if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */
+    } else {
+        npg_file_discard(&file);
+    }
+    if (!status && unlink(partial) && errno != ENOENT)
+        status = npg_error_errno(NPG_DISK, "can't remove %s", partial);
+    npg_release(&path);
+    npg_release(&partial);
+    json_decref(head);
+    return status;
+}

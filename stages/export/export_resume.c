@@ -1,0 +1,83 @@
+/* The list of frames as a run that goes on finds it. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "export/export.h"
+#include "pipeline/file.h"
+
+npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line *visit, void *user)
+{
+    char *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_DISK));
+    FILE *list = fdopen(fd, "r");
+    if (!list) {
+        status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+        close(fd);
+        return status;
+    }
+    for (int64_t at = 0; at < bytes && !status;) {
+        ssize_t size = getline(&line, &capacity, list);
+        json_t *frame = size > 0 ? json_loadb(line, (size_t)size, 0, NULL) : NULL;
+        if (!json_is_object(frame) || at + size > bytes)
+            status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written (byte %lld)", path,
+                               (long long)at);
+        if (!status) status = visit(user, frame, line, (size_t)size);
+        at += size;
+        json_decref(frame);
+    }
+    fclose(list);
+    free(line);
+    return status;
+}
+
+/* ---- going back to where appended frames begin ---- */
+
+typedef struct shortened {
+    npg_file *file;
+    int64_t below, lines, bytes;
+} shortened;
+
+static npg_status keep_line(void *user, const json_t *frame, const char *line, size_t size)
+{
+    shortened *list = user;
+    if (json_integer_value(json_object_get(frame, "index")) >= list->below) return NPG_OK;
+    list->lines++;
+    list->bytes += (int64_t)size;
+    return npg_file_write(list->file, line, size);
+}
+
+static npg_status shorten(const char *from, const char *to, int64_t below, int64_t *lines, int64_t *bytes)
+{
+    struct stat info;
+    shortened list = {.below = below};
+    if (stat(from, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", from);
+    NPG_TRY(npg_file_open(&list.file, to));
+    npg_status status = npg_frame_lines_each(from, (int64_t)info.st_size, keep_line, &list);
+    if (!status)
+        status = npg_file_commit(&list.file);
+    else
+        npg_file_discard(&list.file);
+    *lines = list.lines;
+    *bytes = list.bytes;
+    return status;
+}
+
+npg_status npg_frame_log_go_back(const char *output, int64_t below, int64_t *lines, int64_t *bytes)
+{
+    char *whole, *partial = NULL;
+    NPG_TRY(npg_join_path(&whole, output, "frames.jsonl"));
+    npg_status status = npg_join_path(&partial, output, "frames.partial.jsonl");
+    bool is_whole = !status && access(whole, F_OK) == 0;
+    if (!status) status = shorten(is_whole ? whole : partial, partial, below, lines, bytes);
+    if (!status && is_whole && unlink(whole)) status = npg_error_errno(NPG_DISK, "can't remove %s", whole);
+    npg_release(&whole);
+    npg_release(&partial);
+    return status;
+}

@@ -1,0 +1,81 @@
+/* OBJ sequence beside a PLY one: OUT/obj/<prefix>_0000.obj. */
+#include <stdio.h>
+
+#include "export/export.h"
+#include "export/forms/forms.h"
+#include "export/forms/write_obj.h"
+#include "pipeline/file.h"
+
+typedef struct obj_state {
+    const npg_form_facts *facts;
+    npg_mesh_names names;
+} obj_state;
+
+npg_status npg_write_obj_pose(const char *path, const npg_form_facts *facts, const float *pos,
+                              const float *normals)
+{
+    double *world;
+    NPG_TRY(npg_alloc_array(&world, NPG_FOR_FILES, facts->vert_count, 3 * sizeof *world));
+    for (size_t i = 0; i < 3 * facts->vert_count; i++) world[i] = (double)pos[i];
+    npg_mesh_view view = {.vert_count = facts->vert_count,
+                          .face_count = facts->face_count,
+                          .vert_world = world,
+                          .vert_normals = normals,
+                          .faces = facts->faces,
+                          .vert_colours = facts->colours,
+                          .vert_uvs = facts->uvs,
+                          .turns_faces = facts->turns_faces};
+    npg_status status =
+        facts->like ? npg_write_obj_like(path, facts->like, &view) : npg_write_obj(path, &view);
+    npg_release(&world);
+    return status;
+}
+
+static uint64_t bytes(const npg_form_facts *facts)
+{
+    uint64_t per_vert = facts->has_normals ? 100 : 70; /* with its two faces */
+    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * facts->vert_count * per_vert;
+}
+
+static npg_status open_sequence(void *state, const npg_form_facts *facts)
+{
+    obj_state *s = state;
+    char *folder;
+    s->facts = facts;
+    s->names = (npg_mesh_names){facts->prefix, "obj", facts->width};
+    NPG_TRY(npg_join_path(&folder, facts->output, "obj"));
+    npg_status status = npg_make_folder(folder);
+    npg_release(&folder);
+    return status;
+}
+
+static npg_status write_pose(void *state, const npg_pose *pose)
+{
+    obj_state *s = state;
+    char file[NPG_MESH_NAME_SIZE + 8] = "obj/", *path;
+    npg_mesh_name(file + 4, &s->names, pose->number);
+    NPG_TRY(npg_join_path(&path, s->facts->output, file));
+    npg_status status = npg_write_obj_pose(path, s->facts, pose->pos, pose->normals);
+    npg_release(&path);
+    return status ? status : npg_form_made(s->facts->log, "obj", file, pose->index, 1);
+}
+
+static npg_status finish(void *state)
+{
+    (void)state;
+    return NPG_OK;
+}
+
+static void close_sequence(void *state)
+{
+    (void)state;
+}
+
+const npg_form npg_form_obj = {.name = "obj",
+                               .help = "OBJ sequence",
+                               .state_size = sizeof(obj_state),
+                               .bytes = bytes,
+                               .open = open_sequence,
+                               .pose = write_pose,
+                               .finish = finish,
+                               .close = close_sequence};

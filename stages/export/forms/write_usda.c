@@ -1,0 +1,199 @@
+/* USDA writer: a USD stage as text, the surface's points as time samples.
+ *
+ *     /capture          Xform, the default prim
+ *     /capture/surface  Mesh: points.timeSamples and extent.timeSamples with the frame's index as the time
+ * code, faces once, no subdivision, primvars:displayColor and primvars:st where the reference has colours and
+ * UVs
+ *
+ * timeCodesPerSecond is the rate of the capture, metersPerUnit and upAxis as the options say.  Floats have
+ * nine digits and so come back as they were.  Samples of the extent stand before those of the points, each
+ * with a fixed number of bytes, and are filled in as poses come. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "export/forms/forms.h"
+#include "export/forms/srgb.h"
+#include "ingest/formats/number.h"
+#include "pipeline/file.h"
+
+#define EXTENT_SIZE 144 /* bytes of one sample of the extent, padded with blanks */
+
+typedef struct usda_state {
+    const npg_form_facts *facts;
+    npg_file *file;
+    uint64_t extent_at; /* of the next sample */
+} usda_state;
+
+/* ---- text ---- */
+
+static void print_number(npg_file *file, double value)
+{
+    char text[40];
+    npg_file_write(file, text, npg_number_print(text, sizeof text, "%.9g", value));
+}
+
+static void print_tuple(npg_file *file, const float *values, int count)
+{
+    for (int i = 0; i < count; i++) {
+        npg_file_write(file, i ? ", " : "(", i ? 2 : 1);
+        print_number(file, (double)values[i]);
+    }
+    npg_file_write(file, ")", 1);
+}
+
+static void print_tuples(npg_file *file, const float *values, size_t rows, int width)
+{
+    npg_file_write(file, "[", 1);
+    for (size_t i = 0; i < rows; i++) {
+        if (i) npg_file_write(file, ", ", 2);
+        print_tuple(file, values + i * (size_t)width, width);
+    }
+    npg_file_write(file, "]", 1);
+}
+
+static void print_stage(npg_file *file, const npg_form_facts *facts)
+{
+    npg_file_print(file, "#usda 1.0\n(\n    defaultPrim = \"capture\"\n    endTimeCode = %lld\n",
+                   (long long)facts->last_index);
+    npg_file_print(file, "    framesPerSecond = ");
+    print_number(file, facts->fps);
+    npg_file_print(file, "\n    metersPerUnit = ");
+    print_number(file, facts->metres_per_unit);
+    npg_file_print(file,
+                   "\n    startTimeCode = %lld\n    timeCodesPerSecond = ", (long long)facts->first_index);
+    print_number(file, facts->fps);
+    npg_file_print(file, "\n    upAxis = \"%s\"\n)\n\n", facts->is_z_up ? "Z" : "Y");
+}
+
+static void print_faces(npg_file *file, const npg_form_facts *facts)
+{
+    npg_file_print(file, "        int[] faceVertexCounts = [");
+    for (size_t f = 0; f < facts->face_count; f++) npg_file_print(file, f ? ", 3" : "3");
+    npg_file_print(file, "]\n        int[] faceVertexIndices = [");
+    for (size_t i = 0; i < 3 * facts->face_count; i++)
+        npg_file_print(file, i ? ", %u" : "%u", (unsigned)facts->faces[i]);
+    npg_file_print(file, "]\n");
+}
+
+/* Display colours are linear light, what scanners write is sRGB. */
+static void print_colours(npg_file *file, const npg_form_facts *facts)
+{
+    npg_file_print(file, "        color3f[] primvars:displayColor = [");
+    for (size_t i = 0; i < facts->vert_count; i++) {
+        float linear[3];
+        for (size_t c = 0; c < 3; c++) linear[c] = npg_srgb_to_linear(facts->colours[4 * i + c]);
+        if (i) npg_file_write(file, ", ", 2);
+        print_tuple(file, linear, 3);
+    }
+    npg_file_print(file, "] (\n            interpolation = \"vertex\"\n        )\n");
+}
+
+static void print_uvs(npg_file *file, const npg_form_facts *facts)
+{
+    bool is_corner = facts->corner_uvs != NULL;
+    npg_file_print(file, "        texCoord2f[] primvars:st = ");
+    print_tuples(file, is_corner ? facts->corner_uvs : facts->uvs,
+                 is_corner ? 3 * facts->face_count : facts->vert_count, 2);
+    npg_file_print(file, " (\n            interpolation = \"%s\"\n        )\n",
+                   is_corner ? "faceVarying" : "vertex");
+}
+
+/* Room for all samples of the extent, to be filled in. */
+static void print_extent(usda_state *s)
+{
+    char blanks[EXTENT_SIZE];
+    memset(blanks, ' ', sizeof blanks);
+    blanks[sizeof blanks - 1] = '\n';
+    npg_file_print(s->file, "        float3[] extent.timeSamples = {\n");
+    s->extent_at = npg_file_size(s->file);
+    for (int64_t i = 0; i < s->facts->pose_count; i++) npg_file_write(s->file, blanks, sizeof blanks);
+    npg_file_print(s->file, "        }\n");
+}
+
+/* ---- the form ---- */
+
+static uint64_t bytes(const npg_form_facts *facts)
+{
+    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * (facts->vert_count * 36 + EXTENT_SIZE);
+}
+
+static npg_status check(const npg_form_facts *facts)
+{
+    if (facts->vert_count <= INT32_MAX) return NPG_OK;
+    return npg_error(NPG_USAGE,
+                     "usda can't hold the capture: faces name vertices in 31 bits, and there are %zu",
+                     facts->vert_count);
+}
+
+static npg_status open_usda(void *state, const npg_form_facts *facts)
+{
+    usda_state *s = state;
+    char *path;
+    s->facts = facts;
+    NPG_TRY(npg_join_path(&path, facts->output, "motion.usda"));
+    npg_status status = npg_file_open(&s->file, path);
+    npg_release(&path);
+    NPG_TRY(status);
+    print_stage(s->file, facts);
+    npg_file_print(s->file, "def Xform \"capture\" (\n    kind = \"component\"\n)\n{\n"
+                            "    def Mesh \"surface\"\n    {\n"
+                            "        uniform token subdivisionScheme = \"none\"\n"
+                            "        uniform token orientation = \"rightHanded\"\n");
+    print_faces(s->file, facts);
+    if (facts->colours) print_colours(s->file, facts);
+    if (facts->uvs) print_uvs(s->file, facts);
+    print_extent(s);
+    return npg_file_print(s->file, "        point3f[] points.timeSamples = {\n");
+}
+
+static npg_status write_extent(usda_state *s, const npg_pose *pose)
+{
+    float box[6] = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
+    char text[EXTENT_SIZE + 1], numbers[6][40];
+    for (size_t i = 0; i < 3 * s->facts->vert_count; i++) {
+        box[i % 3] = fminf(box[i % 3], pose->pos[i]);
+        box[3 + i % 3] = fmaxf(box[3 + i % 3], pose->pos[i]);
+    }
+    for (int i = 0; i < 6; i++) npg_number_print(numbers[i], sizeof numbers[i], "%.9g", (double)box[i]);
+    int length =
+        snprintf(text, sizeof text, "            %lld: [(%s, %s, %s), (%s, %s, %s)],", (long long)pose->index,
+                 numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]);
+    NPG_TRY(npg_file_patch(s->file, s->extent_at, text, (size_t)length));
+    s->extent_at += EXTENT_SIZE;
+    return NPG_OK;
+}
+
+static npg_status write_pose(void *state, const npg_pose *pose)
+{
+    usda_state *s = state;
+    NPG_TRY(write_extent(s, pose));
+    npg_file_print(s->file, "            %lld: ", (long long)pose->index);
+    print_tuples(s->file, pose->pos, s->facts->vert_count, 3);
+    return npg_file_print(s->file, ",\n");
+}
+
+static npg_status finish(void *state)
+{
+    usda_state *s = state;
+    npg_file_print(s->file, "        }\n    }\n}\n");
+    NPG_TRY(npg_file_commit(&s->file));
+    return npg_form_made(s->facts->log, "usda", "motion.usda", s->facts->first_index, s->facts->pose_count);
+}
+
+static void close_usda(void *state)
+{
+    npg_file_discard(&((usda_state *)state)->file);
+}
+
+const npg_form npg_form_usda = {.name = "usda",
+                                .help = "USD as text, points as time samples",
+                                .is_float = true,
+                                .state_size = sizeof(usda_state),
+                                .check = check,
+                                .bytes = bytes,
+                                .open = open_usda,
+                                .pose = write_pose,
+                                .finish = finish,
+                                .close = close_usda};

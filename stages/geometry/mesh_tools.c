@@ -1,0 +1,299 @@
+/* Mesh tools: small facts about a triangle mesh that several stages need. */
+#include "geometry/mesh_tools.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/sets.h"
+
+static void face_cross(double out[3], const float *vert_pos, const uint32_t face[3])
+{
+    const float *a = vert_pos + 3 * (size_t)face[0], *b = vert_pos + 3 * (size_t)face[1],
+                *c = vert_pos + 3 * (size_t)face[2];
+    double u[3], v[3];
+    for (int i = 0; i < 3; i++) {
+        u[i] = (double)b[i] - (double)a[i];
+        v[i] = (double)c[i] - (double)a[i];
+    }
+    for (int i = 0; i < 3; i++) out[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+}
+
+void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
+                             size_t face_count)
+{
+    memset(normals, 0, vert_count * 3 * sizeof *normals);
+    for (size_t f = 0; f < face_count; f++) {
+        double n[3];
+        face_cross(n, vert_pos, faces + 3 * f);
+        for (int k = 0; k < 3; k++)
+            for (int a = 0; a < 3; a++)
+                normals[3 * (size_t)faces[3 * f + (size_t)k] + (size_t)a] += (float)n[a];
+    }
+    for (size_t i = 0; i < vert_count; i++) {
+        float *n = normals + 3 * i;
+        float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        if (length > 0) {
+            for (int a = 0; a < 3; a++) n[a] /= length;
+        } else {
+            n[0] = n[1] = 0;
+            n[2] = 1;
+        }
+    }
+}
+
+/* A directed edge of a face, ordered by its undirected key. */
+typedef struct half_edge {
+    uint32_t lo, hi, at; /* at: the number of its corner, 3 f + k */
+    int forward;
+} half_edge;
+
+static int by_key(const void *left, const void *right)
+{
+    const half_edge *a = left, *b = right;
+    if (a->lo != b->lo) return a->lo < b->lo ? -1 : 1;
+    return a->hi < b->hi ? -1 : a->hi > b->hi;
+}
+
+static npg_status sorted_half_edges(half_edge **out, const uint32_t *faces, size_t face_count)
+{
+    half_edge *halves;
+    NPG_TRY(npg_alloc_array(&halves, NPG_FOR_MESH, face_count, 3 * sizeof *halves));
+    for (size_t i = 0; i < 3 * face_count; i++) {
+        uint32_t a = faces[i], b = faces[i - i % 3 + (i + 1) % 3];
+        halves[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i, a < b};
+    }
+    if (face_count) qsort(halves, 3 * face_count, sizeof *halves, by_key);
+    *out = halves;
+    return NPG_OK;
+}
+
+npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces, size_t face_count)
+{
+    half_edge *halves;
+    size_t count = 0;
+    *edges = NULL;
+    *edge_count = 0;
+    NPG_TRY(sorted_half_edges(&halves, faces, face_count));
+    for (size_t i = 0; i < 3 * face_count; i++) count += i == 0 || by_key(&halves[i - 1], &halves[i]) != 0;
+    npg_status status = npg_alloc_array(edges, NPG_FOR_MESH, count, sizeof **edges);
+    for (size_t i = 0; i < 3 * face_count && !status; i++) {
+        if (i && !by_key(&halves[i - 1], &halves[i])) continue;
+        (*edges)[*edge_count][0] = halves[i].lo;
+        (*edges)[(*edge_count)++][1] = halves[i].hi;
+    }
+    npg_release(&halves);
+    return status;
+}
+
+npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count)
+{
+    half_edge *halves;
+    size_t count = 3 * face_count;
+    NPG_TRY(sorted_half_edges(&halves, faces, face_count));
+    for (size_t i = 0, next; i < count; i = next) {
+        for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
+        bool is_pair = next - i == 2 && halves[i].forward != halves[i + 1].forward;
+        for (size_t k = i; k < next; k++)
+            twin[halves[k].at] = is_pair ? halves[2 * i + 1 - k].at : UINT32_MAX;
+    }
+    npg_release(&halves);
+    return NPG_OK;
+}
+
+npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, size_t vert_count,
+                               const uint32_t *faces, size_t face_count)
+{
+    uint32_t *parent;
+    NPG_TRY(npg_alloc_array(&parent, NPG_FOR_MESH, vert_count, sizeof *parent));
+    for (size_t i = 0; i < vert_count; i++) parent[i] = (uint32_t)i;
+    for (size_t f = 0; f < face_count; f++)
+        for (int k = 1; k < 3; k++) {
+            npg_set_join(parent, faces[3 * f], faces[3 * f + (size_t)k]);
+        }
+    size_t count = 0;
+    for (size_t i = 0; i < vert_count; i++) {
+        uint32_t root = npg_set_root(parent, (uint32_t)i);
+        component_of[i] = root == i ? (uint32_t)count++ : component_of[root];
+    }
+    *component_count = count;
+    npg_release(&parent);
+    return NPG_OK;
+}
+
+double npg_face_area(const float *vert_pos, const uint32_t face[3])
+{
+    double n[3];
+    face_cross(n, vert_pos, face);
+    return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+double npg_mesh_area(const npg_mesh *mesh)
+{
+    double sum = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) sum += npg_face_area(mesh->vert_pos, mesh->faces + 3 * f);
+    return sum;
+}
+
+double npg_mesh_volume(const npg_mesh *mesh)
+{
+    double sum = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        double n[3];
+        const float *a = mesh->vert_pos + 3 * (size_t)mesh->faces[3 * f];
+        face_cross(n, mesh->vert_pos, mesh->faces + 3 * f);
+        sum += n[0] * (double)a[0] + n[1] * (double)a[1] + n[2] * (double)a[2];
+    }
+    return sum / 6;
+}
+
+static void count_edge(npg_manifold *out, const half_edge *run, size_t uses)
+{
+    out->edge_count++;
+    out->border_edges += uses == 1;
+    out->crowded_edges += uses > 2;
+    out->misoriented_edges += uses == 2 && run[0].forward == run[1].forward;
+}
+
+npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh)
+{
+    half_edge *halves;
+    uint8_t *is_used;
+    size_t count = 3 * mesh->face_count;
+    *out = (npg_manifold){0};
+    NPG_TRY(npg_alloc(&is_used, NPG_FOR_MESH, mesh->vert_count));
+    npg_status status = sorted_half_edges(&halves, mesh->faces, mesh->face_count);
+    for (size_t i = 0, next; i < count && !status; i = next) {
+        for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
+        count_edge(out, halves + i, next - i);
+    }
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *face = mesh->faces + 3 * f;
+        for (int k = 0; k < 3; k++) is_used[face[k]] = 1;
+        out->degenerate_faces += face[0] == face[1] || face[1] == face[2] || face[2] == face[0] ||
+                                 !(npg_face_area(mesh->vert_pos, face) > 0);
+    }
+    for (size_t i = 0; i < mesh->vert_count; i++) out->unused_vertices += !is_used[i];
+    npg_release(&is_used);
+    if (!status) npg_release(&halves);
+    return status;
+}
+
+/* Border loops: what the border's edges, as flat faces, are connected to. */
+static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
+{
+    uint32_t *twin = NULL, *flat = NULL, *component = NULL;
+    size_t count = 0, pieces, border_verts = 0, n = mesh->vert_count;
+    npg_status status;
+    *loops = 0;
+    NPG_TRY_OR(done, status, npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
+    NPG_TRY_OR(done, status, npg_alloc_array(&flat, NPG_FOR_MESH, 3 * mesh->face_count, 3 * sizeof *flat));
+    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, n, sizeof *component));
+    NPG_TRY_OR(done, status, npg_mesh_twins(twin, mesh->faces, mesh->face_count));
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (twin[i] != UINT32_MAX) continue;
+        flat[3 * count] = flat[3 * count + 1] = mesh->faces[i];
+        flat[3 * count++ + 2] = mesh->faces[i - i % 3 + (i + 1) % 3];
+    }
+    NPG_TRY_OR(done, status, npg_mesh_components(component, &pieces, n, flat, count));
+    memset(component, 0, n * sizeof *component);
+    for (size_t i = 0; i < 3 * count; i++) {
+        border_verts += component[flat[i]] == 0;
+        component[flat[i]] = 1;
+    }
+    *loops = pieces + border_verts - n; /* every other vertex is a piece of its own */
+done:
+    npg_release(&twin);
+    npg_release(&flat);
+    npg_release(&component);
+    return status;
+}
+
+npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    uint32_t *component;
+    size_t components, loops;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(count_border_loops(&loops, mesh));
+    NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
+    npg_status status =
+        npg_mesh_components(component, &components, mesh->vert_count, mesh->faces, mesh->face_count);
+    npg_release(&component);
+    NPG_TRY(status);
+    int64_t unused = (int64_t)manifold.unused_vertices;
+    int64_t euler =
+        (int64_t)mesh->vert_count - unused - (int64_t)manifold.edge_count + (int64_t)mesh->face_count;
+    *handles = (2 * ((int64_t)components - unused) - euler - (int64_t)loops) / 2;
+    return NPG_OK;
+}
+
+static void copy_vertex(npg_mesh *out, size_t to, const npg_mesh *mesh, size_t from)
+{
+    memcpy(out->vert_pos + 3 * to, mesh->vert_pos + 3 * from, 3 * sizeof(float));
+    if (out->vert_normals)
+        memcpy(out->vert_normals + 3 * to, mesh->vert_normals + 3 * from, 3 * sizeof(float));
+    if (out->vert_colours) memcpy(out->vert_colours + 4 * to, mesh->vert_colours + 4 * from, 4);
+    if (out->vert_uvs) memcpy(out->vert_uvs + 2 * to, mesh->vert_uvs + 2 * from, 2 * sizeof(float));
+}
+
+/* The new number of every vertex that a kept face uses, UINT32_MAX for the others. */
+static void number_kept(uint32_t *number, size_t *vert_count, size_t *face_count, const npg_mesh *mesh,
+                        const uint8_t *keep_face)
+{
+    *vert_count = *face_count = 0;
+    memset(number, 0xff, mesh->vert_count * sizeof *number);
+    for (size_t f = 0; f < mesh->face_count; f++)
+        for (int k = 0; k < 3 && keep_face[f]; k++) number[mesh->faces[3 * f + (size_t)k]] = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) *face_count += keep_face[f] != 0;
+    for (size_t i = 0; i < mesh->vert_count; i++)
+        if (number[i] != UINT32_MAX) number[i] = (uint32_t)(*vert_count)++;
+}
+
+npg_status npg_mesh_keep_faces(npg_mesh **slot, const uint8_t *keep_face)
+{
+    npg_mesh *mesh = *slot, *out = NULL;
+    uint32_t *number;
+    size_t vert_count, face_count;
+    npg_status status;
+    NPG_TRY(npg_alloc_array(&number, NPG_FOR_MESH, mesh->vert_count, sizeof *number));
+    number_kept(number, &vert_count, &face_count, mesh, keep_face);
+    NPG_TRY_OR(done, status, npg_mesh_open(&out, vert_count, face_count));
+    if (mesh->vert_normals)
+        NPG_TRY_OR(done, status,
+                   npg_alloc_array(&out->vert_normals, NPG_FOR_MESH, vert_count, 3 * sizeof(float)));
+    if (mesh->vert_colours)
+        NPG_TRY_OR(done, status, npg_alloc_array(&out->vert_colours, NPG_FOR_MESH, vert_count, 4));
+    if (mesh->vert_uvs)
+        NPG_TRY_OR(done, status,
+                   npg_alloc_array(&out->vert_uvs, NPG_FOR_MESH, vert_count, 2 * sizeof(float)));
+    for (size_t i = 0; i < mesh->vert_count; i++)
+        if (number[i] != UINT32_MAX) copy_vertex(out, number[i], mesh, i);
+    for (size_t f = 0, to = 0; f < mesh->face_count; f++)
+        for (int k = 0; k < 3 && keep_face[f]; k++) out->faces[to++] = number[mesh->faces[3 * f + (size_t)k]];
+    npg_mesh_unref(slot);
+    *slot = out;
+    out = NULL;
+done:
+    npg_mesh_unref(&out);
+    npg_release(&number);
+    return status;
+}
+
+void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        for (size_t a = 0; a < 3; a++) out[3 * i + a] = rows[3 * (size_t)which[i] + a];
+}
+
+size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
+                         const float *normals, size_t point_count)
+{
+    size_t count = point_count < most ? point_count : most;
+    for (size_t i = 0; i < count; i++) {
+        size_t from = i * point_count / count;
+        memcpy(out + 3 * i, points + 3 * from, 3 * sizeof(float));
+        if (normals) memcpy(out_normals + 3 * i, normals + 3 * from, 3 * sizeof(float));
+    }
+    return count;
+}

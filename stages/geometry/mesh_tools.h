@@ -1,0 +1,55 @@
+/* Mesh tools: small facts about a triangle mesh that several stages need.  V vertices, F faces, E edges. */
+#ifndef NPG_MESH_TOOLS_H
+#define NPG_MESH_TOOLS_H
+
+#include "pipeline/mesh.h"
+
+/* Unit vertex normals, face normals weighted by area; a vertex without area gets (0, 0, 1).  normals: V x 3.
+ */
+void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
+                             size_t face_count);
+
+/* The E distinct undirected edges as vertex pairs (lower index first), sorted; *edges is owned by the caller.
+ */
+npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces,
+                          size_t face_count);
+
+/* twin[3 f + k] = the half-edge (numbered so, by its first corner) of the face on the other side of the edge
+ * from corner k to the next; UINT32_MAX on a border, or where an edge is not used by two faces in opposite
+ * directions. twin: F x 3. */
+npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count);
+
+/* Component of every vertex (0.. *component_count - 1, in order of first vertex) over the faces; vertices
+ * without a face are components of their own. */
+npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, size_t vert_count,
+                               const uint32_t *faces, size_t face_count);
+
+/* Area of one face, and signed volume and area of all (positive volume: faces look outward). */
+double npg_face_area(const float *vert_pos, const uint32_t face[3]);
+double npg_mesh_area(const npg_mesh *mesh);
+double npg_mesh_volume(const npg_mesh *mesh);
+
+/* Edges by the number of faces that use them, and faces that use one in the wrong direction. */
+typedef struct npg_manifold {
+    size_t edge_count, border_edges, crowded_edges /* > 2 faces */, misoriented_edges, degenerate_faces,
+        unused_vertices;
+} npg_manifold;
+npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh);
+
+/* Handles of all components together, by Euler: (2 components - vertices + edges - faces - border loops) / 2.
+ */
+npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
+
+/* Keep the faces whose keep_face is not 0 and the vertices they use, in order.  Vertex data goes with them.
+ */
+npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
+
+/* out (count x 3) = the rows of rows (x 3) that which[] names. */
+void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count);
+
+/* Copy at most `most` of the points (N x 3), evenly by their order, and of their normals where there are any.
+ * Returns how many. */
+size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
+                         const float *normals, size_t point_count);
+
+#endif

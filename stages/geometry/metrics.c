@@ -1,0 +1,213 @@
+/* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures of the method's paper.
+ */
+#include "geometry/metrics.h"
+
+#include <math.h>
+
+#include "geometry/kdtree.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/random.h"
+
+enum { SIDE_PREDICTED, SIDE_TRUTH }; /* keys of the random streams */
+
+/* ---- samples ---- */
+
+static double face_normal(double normal[3], const npg_mesh *mesh, const uint32_t face[3])
+{
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = (double)mesh->vert_pos[3 * face[1] + k] - (double)mesh->vert_pos[3 * face[0] + k];
+        v[k] = (double)mesh->vert_pos[3 * face[2] + k] - (double)mesh->vert_pos[3 * face[0] + k];
+    }
+    double cross[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+    double length = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+    for (int k = 0; k < 3; k++) normal[k] = length > 0 ? cross[k] / length : 0;
+    return 0.5 * length;
+}
+
+/* The first face whose cumulated area is above `area`. */
+static size_t find_face(const double *cumulated, size_t face_count, double area)
+{
+    size_t low = 0, high = face_count - 1;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (cumulated[middle] > area)
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    return low;
+}
+
+npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const npg_mesh *mesh,
+                           size_t sample_count, uint64_t seed, uint64_t frame, uint64_t purpose)
+{
+    double *cumulated, total = 0, normal[3];
+    NPG_TRY(npg_alloc_array(&cumulated, NPG_FOR_QUERY, mesh->face_count, sizeof *cumulated));
+    for (size_t f = 0; f < mesh->face_count; f++)
+        cumulated[f] = total += face_normal(normal, mesh, mesh->faces + 3 * f);
+    if (!(total > 0) || !isfinite(total)) {
+        npg_release(&cumulated);
+        return npg_error(NPG_BAD_INPUT, "the mesh has no area, or a vertex that is not finite");
+    }
+    npg_random random = npg_random_stream(seed, frame, purpose);
+    for (size_t s = 0; s < sample_count; s++) {
+        size_t f = find_face(cumulated, mesh->face_count, npg_random_real(&random) * total);
+        double r = sqrt(npg_random_real(&random)), t = npg_random_real(&random);
+        const uint32_t *face = mesh->faces + 3 * f;
+        const float *a = mesh->vert_pos + 3 * face[0], *b = mesh->vert_pos + 3 * face[1],
+                    *c = mesh->vert_pos + 3 * face[2];
+        face_normal(normal, mesh, face);
+        for (int k = 0; k < 3; k++) {
+            pos[3 * s + k] =
+                (float)((1 - r) * (double)a[k] + r * (1 - t) * (double)b[k] + r * t * (double)c[k]);
+            normals[3 * s + k] = (float)normal[k];
+        }
+        if (face_of) face_of[s] = (uint32_t)f;
+    }
+    npg_release(&cumulated);
+    return NPG_OK;
+}
+
+/* One side of a comparison. */
+typedef struct side {
+    size_t count;
+    const float *pos, *normals; /* loans; normals may be NULL */
+    float *own_pos, *own_normals;
+    uint32_t *nearest; /* of the other side */
+    float *dist_sq;
+} side;
+
+static void close_side(side *s)
+{
+    npg_release(&s->own_pos);
+    npg_release(&s->own_normals);
+    npg_release(&s->nearest);
+    npg_release(&s->dist_sq);
+}
+
+static npg_status open_side(side *s, const npg_mesh *mesh, const npg_metrics_settings *settings,
+                            uint64_t frame, uint64_t purpose)
+{
+    *s = (side){.count = mesh->face_count ? settings->sample_count : mesh->vert_count};
+    if (!s->count) return npg_error(NPG_BAD_INPUT, "the ground truth has no points");
+    if (mesh->face_count) {
+        NPG_TRY(npg_alloc_array(&s->own_pos, NPG_FOR_QUERY, s->count, 3 * sizeof(float)));
+        NPG_TRY(npg_alloc_array(&s->own_normals, NPG_FOR_QUERY, s->count, 3 * sizeof(float)));
+        NPG_TRY(npg_mesh_sample(s->own_pos, s->own_normals, NULL, mesh, s->count, settings->seed, frame,
+                                purpose));
+        s->pos = s->own_pos;
+        s->normals = s->own_normals;
+    } else {
+        s->pos = mesh->vert_pos;
+        s->normals = mesh->vert_normals;
+    }
+    NPG_TRY(npg_alloc_array(&s->nearest, NPG_FOR_QUERY, s->count, sizeof *s->nearest));
+    return npg_alloc_array(&s->dist_sq, NPG_FOR_QUERY, s->count, sizeof *s->dist_sq);
+}
+
+static npg_status find_nearest(side *from, const side *to, int threads)
+{
+    npg_kdtree *tree;
+    NPG_TRY(npg_kdtree_open(&tree, to->pos, to->count));
+    npg_status status =
+        npg_kdtree_nearest(tree, from->nearest, from->dist_sq, from->pos, from->count, 1, threads);
+    npg_kdtree_close(&tree);
+    return status;
+}
+
+/* ---- figures ---- */
+
+static double mean_dist_sq(const side *s, double diagonal)
+{
+    double sum = 0;
+    for (size_t i = 0; i < s->count; i++) sum += (double)s->dist_sq[i];
+    return sum / (double)s->count / (diagonal * diagonal);
+}
+
+static double share_within(const side *s, double dist)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < s->count; i++) count += (double)s->dist_sq[i] <= dist * dist;
+    return (double)count / (double)s->count;
+}
+
+static double normal_agreement(const side *from, const side *to)
+{
+    double sum = 0;
+    for (size_t i = 0; i < from->count; i++) {
+        const float *a = from->normals + 3 * i, *b = to->normals + 3 * (size_t)from->nearest[i];
+        sum += fabs((double)a[0] * (double)b[0] + (double)a[1] * (double)b[1] + (double)a[2] * (double)b[2]);
+    }
+    return sum / (double)from->count;
+}
+
+static void measure(npg_frame_metrics *out, const side *predicted, const side *truth,
+                    const npg_metrics_settings *settings)
+{
+    double tau = settings->tau * settings->diagonal;
+    out->cd_to_truth = 1e5 * mean_dist_sq(predicted, settings->diagonal);
+    out->cd_from_truth = 1e5 * mean_dist_sq(truth, settings->diagonal);
+    out->cd = 0.5 * (out->cd_to_truth + out->cd_from_truth);
+    out->precision = share_within(predicted, tau);
+    out->recall = share_within(truth, tau);
+    double sum = out->precision + out->recall;
+    out->f = sum > 0 ? 2 * out->precision * out->recall / sum : 0;
+    out->nc = (double)NAN;
+    if (truth->normals)
+        out->nc = 0.5 * (normal_agreement(predicted, truth) + normal_agreement(truth, predicted));
+}
+
+npg_status npg_metrics_compare(npg_frame_metrics *out, const npg_mesh *predicted, const npg_mesh *truth,
+                               const npg_metrics_settings *settings, uint64_t frame)
+{
+    side a = {0}, b = {0};
+    NPG_REQUIRE(settings->diagonal > 0 && settings->sample_count > 0 && predicted->face_count > 0);
+    npg_status status = open_side(&a, predicted, settings, frame, SIDE_PREDICTED);
+    if (!status) status = open_side(&b, truth, settings, frame, SIDE_TRUTH);
+    if (!status) status = find_nearest(&a, &b, settings->threads);
+    if (!status) status = find_nearest(&b, &a, settings->threads);
+    if (!status) measure(out, &a, &b, settings);
+    close_side(&a);
+    close_side(&b);
+    return status;
+}
+
+npg_status npg_metrics_tie(uint32_t **truth_of, const npg_mesh *predicted, const npg_mesh *truth)
+{
+    npg_kdtree *tree = NULL;
+    float *dist_sq = NULL;
+    npg_status status = npg_alloc_array(truth_of, NPG_FOR_QUERY, predicted->vert_count, sizeof **truth_of);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, predicted->vert_count, sizeof *dist_sq);
+    if (!status) status = npg_kdtree_open(&tree, truth->vert_pos, truth->vert_count);
+    if (!status)
+        status =
+            npg_kdtree_nearest(tree, *truth_of, dist_sq, predicted->vert_pos, predicted->vert_count, 1, 0);
+    npg_kdtree_close(&tree);
+    npg_release(&dist_sq);
+    if (status) npg_release(truth_of);
+    return status;
+}
+
+double npg_metrics_drift(const npg_mesh *predicted, const npg_mesh *truth, const uint32_t *truth_of,
+                         double diagonal)
+{
+    double sum = 0;
+    for (size_t v = 0; v < predicted->vert_count; v++) {
+        double dist_sq = 0;
+        for (int k = 0; k < 3; k++) {
+            double d =
+                (double)predicted->vert_pos[3 * v + k] - (double)truth->vert_pos[3 * (size_t)truth_of[v] + k];
+            dist_sq += d * d;
+        }
+        sum += sqrt(dist_sq);
+    }
+    return sum / (double)predicted->vert_count / diagonal;
+}
+
+double npg_points_diagonal(const float *points, size_t point_count)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, points, point_count);
+    return npg_bounds_diagonal(&bounds);
+}

@@ -1,0 +1,27 @@
+/* Thin: a decimated copy of a mesh whose vertices are vertices of it.
+ *
+ * What is true of a vertex of the copy (its position in a frame, what carries it) is read from the whole
+ * mesh's rows, so that a step of the fit costs the same however fine the reference is. */
+#ifndef NPG_THIN_H
+#define NPG_THIN_H
+
+#include "pipeline/mesh.h"
+
+/* Vertices of the surface that frames are aligned and matched with: where the reference has more, it is
+ * thinned for that.  Above, distances to it no longer gain by more of them; time is all that they cost. */
+#define NPG_THIN_SURFACE 10000
+
+typedef struct npg_thin {
+    npg_mesh *mesh;   /* T vertices, with normals where the whole has them; counted reference */
+    uint32_t *vertex; /* T, ascending: which vertex of the whole each one is                  */
+} npg_thin;
+
+/* About vert_target vertices by edge collapse (meshoptimizer); with 0, or where no more than a fifth would
+ * go, all that have a face.  whole is a loan during the call. */
+npg_status npg_thin_open(npg_thin **thin, const npg_mesh *whole, size_t vert_target);
+void npg_thin_close(npg_thin **thin);
+
+/* out (T x 3) = the rows of rows (of the whole, x 3) that belong to the copy's vertices. */
+void npg_thin_gather(const npg_thin *thin, float *out, const float *rows);
+
+#endif

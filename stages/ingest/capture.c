@@ -1,0 +1,157 @@
+/* Capture: the frames of a capture in files, readable in any order, with a bounded cache of what was read. */
+#include "ingest/capture.h"
+
+#include "ingest/formats/reader.h"
+
+static npg_status check_gaps(const npg_capture *capture, const char *input)
+{
+    char numbers[256];
+    const npg_frame_files *list = capture->list;
+    if (capture->missing != NPG_MISSING_ERROR || !list->gap_count) return NPG_OK;
+    npg_frame_files_gaps(numbers, sizeof numbers, list);
+    return npg_error(NPG_BAD_INPUT,
+                     "%s: %zu of %zu frames are missing: %s (missing = skip or hold goes on without them)",
+                     input, list->gap_count, list->count, numbers);
+}
+
+npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
+                            bool keep_going, size_t cache_limit)
+{
+    npg_capture *c;
+    npg_status status;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&c, NPG_FOR_FILES, sizeof *c));
+    c->missing = missing;
+    c->keep_going = keep_going;
+    c->cache_limit = cache_limit;
+    NPG_TRY_OR(fail, status, npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE));
+    NPG_TRY_OR(fail, status, check_gaps(c, input));
+    NPG_TRY_OR(fail, status, npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count));
+    NPG_TRY_OR(fail, status, npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached));
+    *out = c;
+    return NPG_OK;
+fail:
+    npg_capture_close(&c);
+    return status;
+}
+
+static void drop_cached(npg_capture *c, int64_t index)
+{
+    if (c->cached[index]) npg_frame_clear(c->cached[index]);
+    npg_release(&c->cached[index]);
+}
+
+void npg_capture_close(npg_capture **slot)
+{
+    npg_capture *c = *slot;
+    if (!c) return;
+    for (size_t i = 0; c->cached && i < c->list->count; i++) drop_cached(c, (int64_t)i);
+    npg_release(&c->cached);
+    npg_release(&c->is_bad);
+    npg_frame_files_close(&c->list);
+    npg_release(slot);
+}
+
+/* ---- cache ---- */
+
+static size_t bytes_of(const npg_frame *frame)
+{
+    return frame->point_count * (frame->normals ? 6 : 3) * sizeof(float) + sizeof *frame;
+}
+
+/* What fits stays: the passes walk the capture from end to end, so throwing out the oldest would leave
+ * nothing for the next pass.  A copy that finds no memory is left out without harm. */
+static void cache(npg_capture *c, int64_t index, const npg_frame *frame)
+{
+    size_t bytes = bytes_of(frame);
+    if (c->cached[index] || bytes > c->cache_limit - c->cache_bytes) return;
+    if (npg_alloc(&c->cached[index], NPG_FOR_FRAMES, sizeof **c->cached)) return;
+    if (npg_frame_copy(c->cached[index], frame)) {
+        npg_release(&c->cached[index]);
+        return;
+    }
+    c->cache_bytes += bytes;
+}
+
+static bool take_cached(npg_status *status, npg_capture *c, npg_frame *frame, int64_t index, bool gives_away)
+{
+    npg_frame *cached = c->cached[index];
+    if (!cached) return false;
+    *status = NPG_OK;
+    if (gives_away) {
+        c->cache_bytes -= bytes_of(cached);
+        *frame = *cached;
+        npg_release(&c->cached[index]);
+    } else {
+        *status = npg_frame_copy(frame, cached);
+    }
+    return true;
+}
+
+static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin,
+                            bool is_last_use)
+{
+    npg_status status;
+    if (take_cached(&status, c, frame, index, is_last_use)) return status;
+    c->reads++;
+    NPG_TRY(npg_read_cloud(frame, c->list->slots[index].path, origin));
+    if (!is_last_use) cache(c, index, frame);
+    return NPG_OK;
+}
+
+/* ---- frames that are not there ---- */
+
+static bool is_readable(const npg_capture *c, int64_t index)
+{
+    return c->list->slots[index].path && !c->is_bad[index];
+}
+
+/* The points of the nearest usable frame before the gap, or after it where none is before. */
+static npg_status hold(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin)
+{
+    int64_t count = (int64_t)c->list->count;
+    for (int direction = -1; direction <= 1; direction += 2)
+        for (int64_t i = index + direction; i >= 0 && i < count; i += direction) {
+            if (!is_readable(c, i)) continue;
+            npg_status status = read_slot(c, frame, i, origin, false);
+            if (status != NPG_BAD_INPUT || !c->keep_going) {
+                frame->is_held = true;
+                return status;
+            }
+        }
+    return npg_error(NPG_BAD_INPUT, "frame %lld: no frame could be read whose points it could hold",
+                     (long long)c->list->slots[index].number);
+}
+
+static npg_status read_or_skip(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin,
+                               bool is_last_use)
+{
+    npg_status status = read_slot(c, frame, index, origin, is_last_use);
+    if (status != NPG_BAD_INPUT) return status;
+    if (!c->keep_going)
+        return npg_error_prefix(status, "frame %lld", (long long)c->list->slots[index].number);
+    c->is_bad[index] = 1;
+    frame->is_skipped = true;
+    return NPG_PARTIAL;
+}
+
+npg_status npg_capture_read(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin,
+                            bool is_last_use)
+{
+    npg_status status = NPG_OK;
+    *frame = (npg_frame){0};
+    if (is_readable(c, index))
+        status = read_or_skip(c, frame, index, origin, is_last_use);
+    else if (c->missing == NPG_MISSING_HOLD && !c->is_bad[index])
+        status = hold(c, frame, index, origin);
+    else
+        frame->is_skipped = true;
+    if (status < 0) {
+        npg_frame_clear(frame);
+        return status;
+    }
+    frame->index = index;
+    frame->number = c->list->slots[index].number;
+    frame->fields = NPG_FIELD_POINTS;
+    return status;
+}

@@ -1,0 +1,38 @@
+/* Capture: the frames of a capture in files, readable in any order, with a bounded cache of what was read. */
+#ifndef NPG_CAPTURE_H
+#define NPG_CAPTURE_H
+
+#include "ingest/frame_files.h"
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
+
+/* What to do about numbers that no file has. */
+typedef enum npg_missing {
+    NPG_MISSING_ERROR, /* refuse the capture                                    */
+    NPG_MISSING_SKIP,  /* a frame without points, is_skipped                    */
+    NPG_MISSING_HOLD,  /* the points of the frame before it (or after), is_held */
+    NPG_MISSING_IGNORE /* numbers mean nothing: frames follow each other        */
+} npg_missing;
+
+typedef struct npg_capture {
+    npg_frame_files *list; /* owned */
+    npg_missing missing;
+    bool keep_going;
+    uint8_t *is_bad;    /* per slot: could not be read; owned                    */
+    npg_frame **cached; /* per slot: a copy of what was read, or NULL; owned    */
+    size_t cache_bytes, cache_limit;
+    uint64_t reads; /* files parsed so far */
+} npg_capture;
+
+/* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open. */
+npg_status npg_capture_open(npg_capture **capture, const char *input, const char *selection,
+                            npg_missing missing, bool keep_going, size_t cache_limit);
+void npg_capture_close(npg_capture **capture);
+
+/* Frame `index` (0 <= index < list->count) into the empty *frame.  NPG_PARTIAL: with keep_going, a file that
+ * can't be used for the first time; the frame is_skipped and npg_error_text() says why.  is_last_use: the
+ * cache may give its copy away. */
+npg_status npg_capture_read(npg_capture *capture, npg_frame *frame, int64_t index, npg_origin *origin,
+                            bool is_last_use);
+
+#endif

@@ -1,0 +1,401 @@
+/* Follow: the frames of a folder that grows. */
+#include "ingest/follow.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fnmatch.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/inotify.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "ingest/formats/formats.h"
+#include "ingest/formats/reader.h"
+#include "ingest/frame_names.h"
+#include "pipeline/clock.h"
+#include "pipeline/file.h"
+
+#define LOOK_MS 250
+
+typedef struct file {
+    char *name; /* owned */
+    off_t size, refused_size;
+    struct timespec changed; /* as the file system tells; only compared for being equal */
+    double since_s;          /* when it was first seen as it is                         */
+    bool is_stable, is_closed, was_refused;
+} file;
+
+struct npg_follow {
+    npg_follow_settings settings;
+    char *folder, *pattern, *last; /* owned; pattern may be NULL; last: the name that was taken last */
+    char ending[16];               /* of all frames, once one was taken */
+    int watch;                     /* inotify, -1 without */
+    file *files;                   /* files[begin .. count): not taken yet, in natural order; owned */
+    size_t begin, count, capacity;
+    size_t taken_count, late_count;
+    size_t number_place; /* which run of digits is the number, from the end of the name */
+    int64_t number, step;
+    int64_t gap_before; /* the last number before which some were left out */
+    bool is_ended, is_changed;
+    double idle_since_s;
+};
+
+/* ---- opening ---- */
+
+static npg_status split(npg_follow *follow, const char *where)
+{
+    struct stat info;
+    NPG_TRY(npg_copy_text(&follow->folder, where));
+    char *slash = strrchr(follow->folder, '/');
+    if (stat(where, &info) && strpbrk(slash ? slash : where, "*?[")) {
+        NPG_TRY(npg_copy_text(&follow->pattern, slash ? slash + 1 : where));
+        if (!slash) memcpy(follow->folder, ".", 2); /* the pattern has at least as many letters */
+        if (slash) slash[slash == follow->folder] = 0;
+    }
+    if (stat(follow->folder, &info))
+        return npg_error(NPG_BAD_INPUT, "%s: can't be followed: %s", follow->folder, strerror(errno));
+    if (!S_ISDIR(info.st_mode))
+        return npg_error(NPG_BAD_INPUT, "%s: only a folder can be followed", follow->folder);
+    return NPG_OK;
+}
+
+npg_status npg_follow_open(npg_follow **out, const npg_follow_settings *settings)
+{
+    npg_follow *follow;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&follow, NPG_FOR_FILES, sizeof *follow));
+    follow->settings = *settings;
+    follow->watch = -1;
+    npg_status status = split(follow, settings->where);
+    if (status) {
+        npg_follow_close(&follow);
+        return status;
+    }
+    /* Where the system can't tell of changes, the looks alone find them. */
+    follow->watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (follow->watch >= 0)
+        inotify_add_watch(follow->watch, follow->folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE);
+    *out = follow;
+    return NPG_OK;
+}
+
+static void clear_files(file *files, size_t count)
+{
+    for (size_t i = 0; i < count; i++) npg_release(&files[i].name);
+}
+
+void npg_follow_close(npg_follow **slot)
+{
+    npg_follow *follow = *slot;
+    if (!follow) return;
+    if (follow->watch >= 0) close(follow->watch);
+    clear_files(follow->files, follow->count);
+    npg_release(&follow->files);
+    npg_release(&follow->folder);
+    npg_release(&follow->pattern);
+    npg_release(&follow->last);
+    npg_release(slot);
+}
+
+int64_t npg_follow_step(const npg_follow *follow)
+{
+    return follow->step;
+}
+size_t npg_follow_late_count(const npg_follow *follow)
+{
+    return follow->late_count;
+}
+
+/* ---- a look into the folder ---- */
+
+static bool is_frame_name(const npg_follow *follow, const char *name)
+{
+    if (name[0] == '.' || !strcmp(name, follow->settings.end_name)) return false;
+    if (follow->pattern) return fnmatch(follow->pattern, name, FNM_PERIOD) == 0;
+    if (!npg_format_by_ending(name)) return false;
+    return !follow->ending[0] || !strcasecmp(strrchr(name, '.'), follow->ending);
+}
+
+static int by_name(const void *left, const void *right)
+{
+    const char *a = ((const file *)left)->name, *b = ((const file *)right)->name;
+    int order = npg_natural_compare(a, b);
+    return order ? order : strcmp(a, b);
+}
+
+static file *find(npg_follow *follow, const char *name)
+{
+    const file key = {.name = (char *)name};
+    return follow->count ? bsearch(&key, follow->files, follow->count, sizeof key, by_name) : NULL;
+}
+
+/* Size and time of the file now, beside those of the look before. */
+static void compare(npg_follow *follow, file *f, const struct stat *now)
+{
+    bool is_same = f->since_s > 0 && f->size == now->st_size && f->changed.tv_sec == now->st_mtim.tv_sec &&
+                   f->changed.tv_nsec == now->st_mtim.tv_nsec;
+    f->is_stable = is_same && npg_clock_s() - f->since_s >= 1e-3 * LOOK_MS;
+    if (is_same) return;
+    f->size = now->st_size;
+    f->changed = now->st_mtim;
+    f->since_s = npg_clock_s();
+    f->is_closed = false;
+    follow->is_changed = true;
+}
+
+static npg_status add(npg_follow *follow, const char *name)
+{
+    NPG_TRY(npg_grow(&follow->files, &follow->capacity, follow->count + 1, sizeof(file), NPG_FOR_FILES));
+    file *new = &follow->files[follow->count];
+    *new = (file){0};
+    NPG_TRY(npg_copy_text(&new->name, name));
+    follow->count++;
+    return NPG_OK;
+}
+
+/* One name of the folder: known, new, or taken before.  *passed counts the last. */
+static npg_status meet(npg_follow *follow, const char *name, size_t known, size_t *passed)
+{
+    if (!is_frame_name(follow, name)) return NPG_OK;
+    if (follow->last && npg_natural_compare(name, follow->last) <= 0) {
+        ++*passed;
+        return NPG_OK;
+    }
+    size_t count = follow->count;
+    follow->count = known; /* only these are sorted */
+    bool is_known = find(follow, name) != NULL;
+    follow->count = count;
+    return is_known ? NPG_OK : add(follow, name);
+}
+
+static npg_status stat_all(npg_follow *follow)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < follow->count; i++) {
+        file f = follow->files[i];
+        struct stat info;
+        char *path;
+        NPG_TRY(npg_join_path(&path, follow->folder, f.name));
+        bool is_there = !stat(path, &info) && !S_ISDIR(info.st_mode);
+        npg_status status =
+            is_there && follow->settings.confine ? npg_path_confine(path, follow->folder) : NPG_OK;
+        npg_release(&path);
+        NPG_TRY(status);
+        if (!is_there) { /* taken away again, or a folder */
+            npg_release(&follow->files[i].name);
+            continue;
+        }
+        compare(follow, &f, &info);
+        follow->files[i].name = NULL;
+        follow->files[kept++] = f;
+    }
+    follow->count = kept;
+    return NPG_OK;
+}
+
+static bool end_is_there(const npg_follow *follow, npg_status *status)
+{
+    char *path;
+    if (!follow->settings.end_name[0]) return false;
+    *status = npg_join_path(&path, follow->folder, follow->settings.end_name);
+    if (*status) return false;
+    bool is_there = access(path, F_OK) == 0;
+    npg_release(&path);
+    return is_there;
+}
+
+static size_t left(const npg_follow *follow)
+{
+    return follow->count - follow->begin;
+}
+
+static void forget_taken(npg_follow *follow)
+{
+    if (follow->begin) memmove(follow->files, follow->files + follow->begin, left(follow) * sizeof(file));
+    follow->count -= follow->begin;
+    follow->begin = 0;
+}
+
+static npg_status look(npg_follow *follow)
+{
+    forget_taken(follow);
+    size_t known = follow->count, passed = 0;
+    npg_status status = NPG_OK;
+    bool is_end = end_is_there(follow, &status); /* before the names: all of them are there then */
+    NPG_TRY(status);
+    DIR *directory = opendir(follow->folder);
+    if (!directory)
+        return npg_error(NPG_BAD_INPUT, "%s: can't be read any more: %s", follow->folder, strerror(errno));
+    for (struct dirent *entry; !status && (entry = readdir(directory));)
+        status = meet(follow, entry->d_name, known, &passed);
+    closedir(directory);
+    if (!status) status = stat_all(follow);
+    if (status) return status;
+    if (follow->count) qsort(follow->files, follow->count, sizeof(file), by_name);
+    size_t late = passed > follow->taken_count ? passed - follow->taken_count : 0;
+    if (late > follow->late_count) follow->late_count = late;
+    follow->is_ended |= is_end;
+    return NPG_OK;
+}
+
+/* ---- waiting ---- */
+
+/* Files that their writers have closed, or that were moved here whole. */
+static void take_events(npg_follow *follow)
+{
+    _Alignas(struct inotify_event) char buffer[16 << 10];
+    for (ssize_t got; (got = read(follow->watch, buffer, sizeof buffer)) > 0;)
+        for (ssize_t at = 0; at < got;) {
+            const struct inotify_event *event = (const void *)(buffer + at);
+            at += (ssize_t)(sizeof *event + event->len);
+            if (!event->len || !(event->mask & (IN_CLOSE_WRITE | IN_MOVED_TO))) continue;
+            file *f = find(follow, event->name);
+            if (f) f->is_closed = true;
+        }
+}
+
+static npg_status wait_and_look(npg_follow *follow)
+{
+    struct pollfd wanted = {follow->watch, POLLIN, 0};
+    if (follow->settings.stopping(follow->settings.user))
+        return npg_error(NPG_STOPPED, "%s: stopped", follow->folder);
+    poll(&wanted, follow->watch >= 0, LOOK_MS);
+    follow->is_changed = false;
+    NPG_TRY(look(follow));
+    if (follow->watch >= 0) take_events(follow);
+    double now_s = npg_clock_s(), idle_s = follow->settings.idle_s;
+    if (follow->is_changed) follow->idle_since_s = now_s;
+    if (idle_s > 0 && now_s - follow->idle_since_s >= idle_s) follow->is_ended = true;
+    return NPG_OK;
+}
+
+/* ---- taking ---- */
+
+static int64_t number_of(const npg_follow *follow, const file *f)
+{
+    int64_t number = npg_name_number(f->name, follow->number_place);
+    return number < 0 ? (int64_t)follow->taken_count : number;
+}
+
+/* The ending that most of the first files have is the frames'; the last run of digits that grows is the
+ * number. */
+static void settle_names(npg_follow *follow)
+{
+    size_t best = 0, best_count = 0;
+    follow->ending[0] = 0;
+    follow->number_place = 0;
+    for (size_t i = 0; i < follow->count && !follow->pattern; i++) {
+        size_t same = 0;
+        for (size_t k = 0; k < follow->count; k++)
+            same += !strcasecmp(strrchr(follow->files[i].name, '.'), strrchr(follow->files[k].name, '.'));
+        if (same > best_count) {
+            best = i;
+            best_count = same;
+        }
+        if (2 * best_count >= follow->count) break;
+    }
+    if (!follow->pattern)
+        strncpy(follow->ending, strrchr(follow->files[best].name, '.'), sizeof follow->ending - 1);
+    size_t kept = 0;
+    for (size_t i = 0; i < follow->count; i++) {
+        if (is_frame_name(follow, follow->files[i].name))
+            follow->files[kept++] = follow->files[i];
+        else
+            npg_release(&follow->files[i].name);
+    }
+    follow->count = kept;
+    const char *first = follow->files[0].name, *second = kept > 1 ? follow->files[1].name : NULL;
+    while (second && npg_name_number(first, follow->number_place) >= 0 &&
+           npg_name_number(first, follow->number_place) >= npg_name_number(second, follow->number_place))
+        follow->number_place++;
+    if (npg_name_number(first, follow->number_place) < 0) follow->number_place = 0;
+}
+
+static bool leaves_numbers_out(const npg_follow *follow, const file *head)
+{
+    int64_t expected = follow->number + (follow->step ? follow->step : 1);
+    return follow->settings.finds_gaps && follow->taken_count && number_of(follow, head) > expected;
+}
+
+/* Before a number counts as missing the folder is looked at once more. */
+static bool waits_for_number(npg_follow *follow, const file *head)
+{
+    if (!leaves_numbers_out(follow, head)) return false;
+    if (!follow->is_ended && left(follow) <= NPG_FOLLOW_LATE) return true;
+    bool is_looked_for = follow->gap_before == number_of(follow, head);
+    follow->gap_before = number_of(follow, head);
+    return !is_looked_for;
+}
+
+static npg_status read_file(npg_follow *follow, const file *head, npg_frame *frame, npg_origin *origin)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, follow->folder, head->name));
+    npg_status status = npg_read_cloud(frame, path, origin);
+    if (status) frame->path = path;
+    if (!status) npg_release(&path);
+    return status;
+}
+
+/* The head becomes *frame. */
+static npg_status take(npg_follow *follow, npg_frame *frame)
+{
+    file head = follow->files[follow->begin];
+    int64_t number = number_of(follow, &head);
+    if (follow->taken_count && number <= follow->number)
+        return npg_error(NPG_BAD_INPUT, "%s/%s: has the number %lld, and the frame before it %lld",
+                         follow->folder, head.name, (long long)number, (long long)follow->number);
+    if (follow->taken_count) follow->step = npg_common_divisor(number - follow->number, follow->step);
+    frame->number = follow->number = number;
+    follow->taken_count++;
+    npg_release(&follow->last);
+    follow->last = head.name;
+    follow->files[follow->begin++].name = NULL;
+    return NPG_OK;
+}
+
+/* Whether a file that was refused as it is now will not get better. */
+static bool is_broken(const npg_follow *follow, const file *head)
+{
+    bool has_follower = left(follow) > 1 || follow->is_ended;
+    return has_follower && npg_clock_s() - head->since_s >= follow->settings.settle_s;
+}
+
+/* *is_taken: the head was complete, or broken (NPG_PARTIAL). */
+static npg_status try_head(npg_follow *follow, npg_frame *frame, npg_origin *origin, bool *is_taken)
+{
+    if (!follow->last) settle_names(follow);
+    file *head = &follow->files[follow->begin];
+    *is_taken = false;
+    if (waits_for_number(follow, head) || !(head->is_closed || head->is_stable)) return NPG_OK;
+    bool is_known_bad = head->was_refused && head->refused_size == head->size;
+    if (is_known_bad && !is_broken(follow, head)) return NPG_OK;
+    npg_status status = read_file(follow, head, frame, origin);
+    bool is_empty = !status && !head->size;
+    if (status && status != NPG_BAD_INPUT) return status;
+    if ((status || is_empty) && !is_known_bad) { /* perhaps it is still being written */
+        npg_frame_clear(frame);
+        head->was_refused = true;
+        head->refused_size = head->size;
+        return NPG_OK;
+    }
+    *is_taken = true;
+    NPG_TRY(take(follow, frame));
+    return status ? NPG_PARTIAL : NPG_OK;
+}
+
+npg_status npg_follow_next(npg_follow *follow, npg_frame *frame, npg_origin *origin)
+{
+    bool is_taken = false;
+    follow->idle_since_s = npg_clock_s();
+    for (;;) {
+        npg_status status = left(follow) ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
+        if (status < 0) npg_frame_clear(frame);
+        if (status || is_taken) return status;
+        if (follow->is_ended && !left(follow)) return NPG_END;
+        NPG_TRY(wait_and_look(follow));
+    }
+}

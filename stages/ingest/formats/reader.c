@@ -1,0 +1,206 @@
+/* Readers: which format a file has, and the calls that do not care. */
+#include "ingest/formats/reader.h"
+
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "ingest/formats/formats.h"
+#include "ingest/formats/point_list.h"
+
+typedef npg_status (*cloud_reader)(npg_frame *frame, npg_source *source, npg_origin *origin);
+
+static npg_status read_xyz(npg_frame *frame, npg_source *source, npg_origin *origin)
+{
+    return npg_xyz_read_cloud(frame, source, origin, false);
+}
+
+static npg_status read_xyzn(npg_frame *frame, npg_source *source, npg_origin *origin)
+{
+    return npg_xyz_read_cloud(frame, source, origin, true);
+}
+
+static const struct format {
+    const char *ending, *name;
+    cloud_reader read;
+    bool needs_whole; /* nothing but blanks may follow */
+} formats[] = {{".ply", "ply", npg_ply_read_cloud, true}, {".obj", "obj", npg_obj_read_cloud, false},
+               {".npy", "npy", npg_npy_read_cloud, true}, {".xyz", "xyz", read_xyz, false},
+               {".xyzn", "xyz", read_xyzn, false},        {".txt", "xyz", read_xyz, false},
+               {".pts", "xyz", read_xyz, false},          {".pcd", "pcd", npg_pcd_read_cloud, false}};
+
+enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
+
+static const struct format *by_ending(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+    for (size_t i = 0; dot && i < FORMATS; i++)
+        if (!strcasecmp(dot, formats[i].ending)) return &formats[i];
+    return NULL;
+}
+
+static bool looks_like_numbers(const char *text, size_t length)
+{
+    size_t digits = 0;
+    for (size_t i = 0; i < length; i++) {
+        if (!text[i] || !strchr("0123456789+-.eE,; \t\r\n", text[i])) return false;
+        digits += text[i] >= '0' && text[i] <= '9';
+    }
+    return digits >= 3;
+}
+
+/* From the first bytes of a file. */
+static const struct format *by_content(const unsigned char *data, size_t size)
+{
+    const char *text = (const char *)data;
+    if (size >= 4 && !memcmp(text, "ply", 3) && strchr("\r\n ", text[3]) && text[3]) return &formats[PLY];
+    if (size >= 6 && !memcmp(text, "\x93NUMPY", 6)) return &formats[NPY];
+    if (size >= 5 && (!memcmp(text, "# .PCD", 5) || !memcmp(text, "VERSION", 5))) return &formats[PCD];
+    if (size >= 2 && !memcmp(text, "v ", 2)) return &formats[OBJ];
+    const char *end = memchr(text, '\n', size);
+    return end && looks_like_numbers(text, (size_t)(end - text)) ? &formats[XYZ] : NULL;
+}
+
+/* The ending decides; a file with another ending, or a PLY, NPY or PCD under a foreign name, shows itself. */
+static npg_status find_format(const struct format **out, npg_source *source)
+{
+    size_t available;
+    NPG_TRY(npg_source_fill(source, 512, &available));
+    const struct format *ending = by_ending(source->name),
+                        *content = by_content(npg_source_data(source), available);
+    bool has_magic = content == &formats[PLY] || content == &formats[NPY] || content == &formats[PCD];
+    *out = has_magic || !ending ? content : ending;
+    if (*out) return NPG_OK;
+    return npg_error(NPG_BAD_INPUT, "%s: not a format that can be read (PLY, OBJ, XYZ, TXT, PTS, NPY, PCD)",
+                     source->name);
+}
+
+const char *npg_format_by_ending(const char *path)
+{
+    const struct format *format = by_ending(path);
+    return format ? format->name : NULL;
+}
+
+const char *npg_reader_for(const char *path)
+{
+    npg_source *source = NULL;
+    const struct format *format = by_ending(path);
+    if (npg_source_open_file(&source, path)) return format ? format->name : NULL;
+    if (find_format(&format, source)) format = NULL;
+    npg_source_close(&source);
+    return format ? format->name : NULL;
+}
+
+/* Data after the end is as wrong as data that is missing: the header's count is not the file's. */
+static npg_status expect_end(npg_source *source)
+{
+    size_t available;
+    for (;;) {
+        NPG_TRY(npg_source_fill(source, 1, &available));
+        if (!available) return NPG_OK;
+        if (!memchr(" \t\r\n", npg_source_data(source)[0], 4))
+            return npg_source_bad_byte(source, "more data than the header declares");
+        npg_source_take(source, 1);
+    }
+}
+
+static npg_status read_points(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    npg_source *source = NULL;
+    const struct format *format;
+    npg_status status = npg_source_open_file(&source, path);
+    if (!status) status = find_format(&format, source);
+    if (!status) status = format->read(frame, source, origin);
+    if (!status && format->needs_whole) status = expect_end(source);
+    if (status == NPG_END) status = npg_error(NPG_BAD_INPUT, "%s: the file is empty", path);
+    npg_source_close(&source);
+    return status;
+}
+
+/* The first file settles the origin.  Where its first point turns out to lie far off (many sensors write
+ * 0 0 0 for a pixel they could not see), float has lost the detail of all others: read again around the
+ * median. */
+static npg_status read_first(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    struct stat info;
+    npg_origin found = {0};
+    NPG_TRY(read_points(frame, path, &found));
+    bool is_file = !stat(path, &info) && S_ISREG(info.st_mode);
+    if (is_file && npg_origin_improve(&found, frame->pos_local, frame->point_count)) {
+        npg_frame_clear(frame);
+        NPG_TRY(read_points(frame, path, &found));
+    }
+    *origin = found;
+    return NPG_OK;
+}
+
+npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    npg_status status = origin->known ? read_points(frame, path, origin) : read_first(frame, path, origin);
+    if (!status) status = npg_copy_text(&frame->path, path);
+    if (status) {
+        npg_frame_clear(frame);
+        return status;
+    }
+    frame->cleaning.read = frame->point_count;
+    frame->fields = NPG_FIELD_POINTS;
+    return NPG_OK;
+}
+
+static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin, bool may_be_points)
+{
+    npg_source *source = NULL;
+    const struct format *format;
+    *mesh = NULL;
+    npg_status status = npg_source_open_file(&source, path);
+    if (!status) status = find_format(&format, source);
+    if (!status && format == &formats[PLY]) {
+        status = npg_ply_read_mesh(mesh, source, origin, may_be_points);
+        if (!status) status = expect_end(source);
+    } else if (!status && format == &formats[OBJ]) {
+        status = npg_obj_read_mesh(mesh, source, origin, may_be_points);
+    } else if (!status) {
+        status = npg_error(NPG_BAD_INPUT, "%s: a mesh must be PLY or OBJ", path);
+    }
+    if (status == NPG_END) status = npg_error(NPG_BAD_INPUT, "%s: the file is empty", path);
+    npg_source_close(&source);
+    if (status) npg_mesh_unref(mesh);
+    return status;
+}
+
+npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    return read_mesh(mesh, path, origin, false);
+}
+
+npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    npg_frame frame = {0};
+    NPG_TRY(npg_read_cloud(&frame, path, origin));
+    npg_status status = npg_mesh_open(mesh, 0, 0);
+    if (!status) {
+        (*mesh)->vert_count = frame.point_count;
+        (*mesh)->vert_pos = frame.pos_local;
+        (*mesh)->vert_normals = frame.normals;
+        frame.pos_local = frame.normals = NULL;
+    }
+    npg_frame_clear(&frame);
+    return status;
+}
+
+/* A format that knows no faces. */
+static npg_status read_bare_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    NPG_TRY(npg_read_points(mesh, path, origin));
+    if ((*mesh)->vert_count) return NPG_OK;
+    npg_mesh_unref(mesh);
+    return npg_error(NPG_BAD_INPUT, "%s: there are no points", path);
+}
+
+npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
+{
+    const char *format = npg_reader_for(path);
+    *mesh = NULL;
+    bool has_faces = !format || !strcmp(format, "ply") || !strcmp(format, "obj");
+    return has_faces ? read_mesh(mesh, path, origin, true) : read_bare_shape(mesh, path, origin);
+}

@@ -1,0 +1,227 @@
+/* Source: the bytes of one file or stream through a sliding window. */
+#include "ingest/formats/source.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
+
+#define WINDOW_SIZE  ((size_t)256 << 10)
+#define STOP_POLL_MS 250
+
+static npg_status unreadable(const char *name, int cause)
+{
+    return npg_error(cause == ENOMEM ? NPG_MEMORY : NPG_BAD_INPUT, "%s: can't be read: %s", name,
+                     strerror(cause));
+}
+
+npg_status npg_source_open_fd(npg_source **out, int fd, const char *name)
+{
+    npg_source *source;
+    struct stat info;
+    *out = NULL;
+    if (fstat(fd, &info)) return unreadable(name, errno);
+    if (S_ISDIR(info.st_mode)) return unreadable(name, EISDIR);
+    NPG_TRY(npg_alloc(&source, NPG_FOR_FILES, sizeof *source));
+    npg_status status = npg_copy_text(&source->name, name);
+    /* A small file needs no more than its own size, so that many small frames stay cheap. */
+    bool is_file = S_ISREG(info.st_mode) && lseek(fd, 0, SEEK_CUR) == 0;
+    size_t window = WINDOW_SIZE;
+    if (is_file && info.st_size < (off_t)WINDOW_SIZE) window = (size_t)info.st_size + 1;
+    if (!status) status = npg_grow(&source->window, &source->capacity, window, 1, NPG_FOR_FILES);
+    if (status) {
+        npg_source_close(&source);
+        return status;
+    }
+    source->fd = fd;
+    source->is_seekable = is_file;
+    source->size = is_file ? (uint64_t)info.st_size : UINT64_MAX;
+    source->line_end = '\n';
+    *out = source;
+    return NPG_OK;
+}
+
+npg_status npg_source_open_file(npg_source **out, const char *path)
+{
+    *out = NULL;
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
+    npg_status status = npg_source_open_fd(out, fd, path);
+    if (status)
+        close(fd);
+    else
+        (*out)->owns_fd = true;
+    return status;
+}
+
+void npg_source_close(npg_source **slot)
+{
+    npg_source *source = *slot;
+    *slot = NULL;
+    if (!source) return;
+    if (source->owns_fd) close(source->fd);
+    npg_release(&source->name);
+    npg_release(&source->window);
+    npg_release(&source);
+}
+
+npg_status npg_source_rewind(npg_source *source)
+{
+    NPG_REQUIRE(source->is_seekable);
+    if (lseek(source->fd, 0, SEEK_SET) < 0) return unreadable(source->name, errno);
+    source->begin = source->end = 0;
+    source->byte = source->line = 0;
+    source->at_end = false;
+    return NPG_OK;
+}
+
+/* A read from a pipe may last for ever; look whether the run wants to stop meanwhile. */
+static npg_status wait_for_bytes(npg_source *source)
+{
+    struct pollfd wanted = {source->fd, POLLIN, 0};
+    while (source->stopping && !source->is_seekable) {
+        if (source->stopping(source->user)) return npg_error(NPG_STOPPED, "%s: stopped", source->name);
+        int ready = poll(&wanted, 1, STOP_POLL_MS);
+        if (ready > 0 || (ready < 0 && errno != EINTR)) break;
+    }
+    return NPG_OK;
+}
+
+static npg_status read_some(npg_source *source)
+{
+    for (;;) {
+        NPG_TRY(wait_for_bytes(source));
+        ssize_t got = read(source->fd, source->window + source->end, source->capacity - source->end);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return unreadable(source->name, errno);
+        source->at_end = got == 0;
+        source->end += (size_t)got;
+        return NPG_OK;
+    }
+}
+
+npg_status npg_source_fill(npg_source *source, size_t need, size_t *available)
+{
+    while (source->end - source->begin < need && !source->at_end) {
+        if (source->begin) {
+            memmove(source->window, source->window + source->begin, source->end - source->begin);
+            source->end -= source->begin;
+            source->begin = 0;
+        }
+        if (source->end == source->capacity)
+            NPG_TRY(npg_grow(&source->window, &source->capacity, source->capacity + 1, 1, NPG_FOR_FILES));
+        NPG_TRY(read_some(source));
+    }
+    *available = source->end - source->begin;
+    return NPG_OK;
+}
+
+npg_status npg_source_skip(npg_source *source, uint64_t size, uint64_t *skipped)
+{
+    *skipped = 0;
+    while (*skipped < size) {
+        size_t available;
+        NPG_TRY(npg_source_fill(source, 1, &available));
+        if (!available) return NPG_OK;
+        uint64_t step = size - *skipped < available ? size - *skipped : available;
+        npg_source_take(source, (size_t)step);
+        *skipped += step;
+    }
+    return NPG_OK;
+}
+
+uint64_t npg_source_left(const npg_source *source)
+{
+    if (source->size == UINT64_MAX) return UINT64_MAX;
+    return source->size > source->byte ? source->size - source->byte : 0;
+}
+
+npg_status npg_source_read(npg_source *source, unsigned char **out, size_t size, size_t *got)
+{
+    size_t capacity = 0, first = npg_source_left(source) == UINT64_MAX ? WINDOW_SIZE : size;
+    npg_status status = NPG_OK;
+    *out = NULL;
+    *got = 0;
+    if (npg_source_left(source) < first) first = (size_t)npg_source_left(source);
+    while (*got < size && !status) {
+        size_t available, want = size - *got < WINDOW_SIZE ? size - *got : WINDOW_SIZE;
+        status = npg_source_fill(source, 1, &available);
+        if (status || !available) break;
+        if (available > want) available = want;
+        size_t need = *got + available > first ? *got + available : first < size ? first : size;
+        if (need > capacity) status = npg_grow(out, &capacity, need, 1, NPG_FOR_FILES);
+        if (status) break;
+        memcpy(*out + *got, npg_source_data(source), available);
+        npg_source_take(source, available);
+        *got += available;
+    }
+    if (status) npg_release(out);
+    return status;
+}
+
+npg_status npg_source_line(npg_source *source, const char **text, size_t *length)
+{
+    size_t searched = 0, available = source->end - source->begin;
+    const unsigned char *end = NULL;
+    for (;;) {
+        end = memchr(npg_source_data(source) + searched, source->line_end, available - searched);
+        if (end) break;
+        searched = available;
+        NPG_TRY(npg_source_fill(source, available + 1, &available));
+        if (available == searched) break;
+        if (searched > NPG_LINE_MAX) {
+            source->line++;
+            return npg_source_bad_line(source, "longer than %zu bytes", NPG_LINE_MAX);
+        }
+    }
+    if (!end && !available) return NPG_END;
+    *text = (const char *)npg_source_data(source);
+    size_t taken = end ? (size_t)(end - npg_source_data(source)) + 1 : available;
+    *length = end ? taken - 1 : taken;
+    while (*length && (*text)[*length - 1] == '\r') --*length;
+    npg_source_take(source, taken);
+    source->line++;
+    return NPG_OK;
+}
+
+npg_status npg_source_find_line_end(npg_source *source)
+{
+    size_t available;
+    NPG_TRY(npg_source_fill(source, (size_t)64 << 10, &available));
+    bool has_lf = memchr(npg_source_data(source), '\n', available) != NULL;
+    bool has_cr = memchr(npg_source_data(source), '\r', available) != NULL;
+    source->line_end = has_cr && !has_lf ? '\r' : '\n';
+    return NPG_OK;
+}
+
+static npg_status bad(const npg_source *source, const char *unit, uint64_t place, const char *format,
+                      va_list arguments)
+{
+    char text[512];
+    vsnprintf(text, sizeof text, format, arguments);
+    return npg_error(NPG_BAD_INPUT, "%s: %s %llu: %s", source->name, unit, (unsigned long long)place, text);
+}
+
+npg_status npg_source_bad_line(const npg_source *source, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    npg_status status = bad(source, "line", source->line, format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+npg_status npg_source_bad_byte(const npg_source *source, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    npg_status status = bad(source, "byte", source->byte, format, arguments);
+    va_end(arguments);
+    return status;
+}

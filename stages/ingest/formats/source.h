@@ -1,0 +1,74 @@
+/* Source: the bytes of one file or stream through a sliding window, with byte and line for messages.
+ *
+ * A source never holds more than its window, which grows only while one line or one binary row that really is
+ * in the file needs it.  Failures are NPG_BAD_INPUT with the source's name.  Threads: one user at a time. */
+#ifndef NPG_SOURCE_H
+#define NPG_SOURCE_H
+
+#include <stdbool.h>
+
+#include "pipeline/status.h"
+
+#define NPG_LINE_MAX ((size_t)1 << 20) /* longer lines are refused */
+
+typedef struct npg_source {
+    char *name; /* for messages; owned */
+    int fd;
+    bool owns_fd, is_seekable, at_end;
+    char line_end;         /* '\n', or '\r' for files that know no '\n' */
+    uint64_t size;         /* of the whole file; UINT64_MAX where it can't be known */
+    uint64_t byte;         /* offset of data[0] in the file */
+    uint64_t line;         /* number of the line npg_source_line() gave last, 1 for the first */
+    unsigned char *window; /* owned */
+    size_t capacity, begin, end;
+    bool (*stopping)(
+        void *user); /* asked about four times a second while a stream has nothing; may be NULL */
+    void *user;
+} npg_source;
+
+npg_status npg_source_open_file(npg_source **source, const char *path);
+
+/* fd is a loan and is read from where it stands. */
+npg_status npg_source_open_fd(npg_source **source, int fd, const char *name);
+void npg_source_close(npg_source **source);
+
+/* Go back to the first byte; only where is_seekable. */
+npg_status npg_source_rewind(npg_source *source);
+
+/* Make `need` bytes stand at npg_source_data(), fewer only at the end of the source; *available says how many
+ * do.  NPG_STOPPED when stopping() said so. */
+npg_status npg_source_fill(npg_source *source, size_t need, size_t *available);
+
+static inline const unsigned char *npg_source_data(const npg_source *source)
+{
+    return source->window + source->begin;
+}
+
+/* Step over bytes that npg_source_fill() made available. */
+static inline void npg_source_take(npg_source *source, size_t size)
+{
+    source->begin += size;
+    source->byte += size;
+}
+
+/* Step over any number of bytes; *skipped < size only at the end of the source. */
+npg_status npg_source_skip(npg_source *source, uint64_t size, uint64_t *skipped);
+
+/* Bytes from here to the end; UINT64_MAX where that can't be known. */
+uint64_t npg_source_left(const npg_source *source);
+
+/* size bytes into *out (npg_alloc, owned by the caller); takes memory only as the bytes come in where the
+ * size of the source is not known.  *got < size only at the end. */
+npg_status npg_source_read(npg_source *source, unsigned char **out, size_t size, size_t *got);
+
+/* The next line without its end, not terminated by 0; valid until the next call.  NPG_END. */
+npg_status npg_source_line(npg_source *source, const char **text, size_t *length);
+
+/* Look whether lines end with '\r' alone, from the first 64 KiB. */
+npg_status npg_source_find_line_end(npg_source *source);
+
+/* NPG_BAD_INPUT with "<name>: line <n>: ..." or "<name>: byte <n>: ...". */
+npg_status npg_source_bad_line(const npg_source *source, const char *format, ...) NPG_PRINTF(2, 3);
+npg_status npg_source_bad_byte(const npg_source *source, const char *format, ...) NPG_PRINTF(2, 3);
+
+#endif

@@ -1,0 +1,172 @@
+/* Frame files: which files are the frames of a capture, in time order, gaps included. */
+#include "ingest/frame_files.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "ingest/frame_inputs.h"
+#include "ingest/frame_names.h"
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
+
+#define SLOTS_MAX ((int64_t)10000000)
+
+/* The largest step that leads to every number from the first one; 1 for a single frame. */
+static int64_t step_of(const int64_t *numbers, size_t count)
+{
+    int64_t step = 0;
+    for (size_t i = 1; i < count; i++) step = npg_common_divisor(numbers[i] - numbers[i - 1], step);
+    return step ? step : 1;
+}
+
+static npg_status add_slot(npg_frame_files *list, size_t *capacity, char **path, int64_t number)
+{
+    NPG_TRY(npg_grow(&list->slots, capacity, list->count + 1, sizeof *list->slots, NPG_FOR_FILES));
+    list->slots[list->count++] = (npg_frame_slot){path ? *path : NULL, number};
+    list->gap_count += !path;
+    if (path) *path = NULL;
+    return NPG_OK;
+}
+
+/* Numbers between two frames that the selection wants although no frame has them. */
+static npg_status add_gaps(npg_frame_files *list, size_t *capacity, const npg_selection *selection,
+                           int64_t *position, int64_t from, int64_t to, int64_t step, int64_t count)
+{
+    for (int64_t number = from; number < to; number += step, ++*position)
+        if (npg_selection_takes(selection, *position, number, count))
+            NPG_TRY(add_slot(list, capacity, NULL, number));
+    return NPG_OK;
+}
+
+/* Selected numbers that lie outside what is there: before the first frame, or after the last. */
+static npg_status add_outside(npg_frame_files *list, size_t *capacity, const npg_selection *selection,
+                              int64_t first, int64_t last, int64_t step, bool before)
+{
+    for (size_t i = 0; i < selection->range_count; i++) {
+        int64_t from = selection->ranges[i][0], to = selection->ranges[i][1];
+        if (before && to >= first) to = first - 1;
+        if (!before && from <= last) from = last + 1;
+        from += ((first - from) % step + step) % step;
+        if (from > to) continue;
+        if ((to - from) / step >= SLOTS_MAX)
+            return npg_error(NPG_USAGE,
+                             "option frames: %lld to %lld is far from what is there (%lld to %lld)",
+                             (long long)from, (long long)to, (long long)first, (long long)last);
+        for (int64_t number = from; number <= to; number += step)
+            NPG_TRY(add_slot(list, capacity, NULL, number));
+    }
+    return NPG_OK;
+}
+
+/* All slots in time order.  Positions count gaps; numbers outside the capture have none. */
+static npg_status fill_slots(npg_frame_files *list, npg_paths *paths, const int64_t *numbers,
+                             const npg_selection *selection, bool finds_gaps)
+{
+    size_t capacity = 0;
+    int64_t step = step_of(numbers, paths->count), position = 0;
+    int64_t first = numbers[0], last = numbers[paths->count - 1];
+    int64_t count = finds_gaps ? (last - first) / step + 1 : (int64_t)paths->count;
+    if (count > SLOTS_MAX)
+        return npg_error(NPG_BAD_INPUT,
+                         "the numbers of %zu frames run from %lld to %lld: not a numbering (missing = ignore "
+                         "takes the frames as they follow each other)",
+                         paths->count, (long long)first, (long long)last);
+    if (finds_gaps) NPG_TRY(add_outside(list, &capacity, selection, first, last, step, true));
+    for (size_t i = 0; i < paths->count; i++) {
+        if (i && finds_gaps)
+            NPG_TRY(add_gaps(list, &capacity, selection, &position, numbers[i - 1] + step, numbers[i], step,
+                             count));
+        if (npg_selection_takes(selection, position++, numbers[i], count))
+            NPG_TRY(add_slot(list, &capacity, &paths->paths[i], numbers[i]));
+    }
+    return finds_gaps ? add_outside(list, &capacity, selection, first, last, step, false) : NPG_OK;
+}
+
+static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
+{
+    list->is_numbered = true;
+    if (paths->numbers) return NPG_OK;
+    NPG_TRY(npg_grow(&paths->numbers, &paths->number_capacity, paths->count, sizeof *paths->numbers,
+                     NPG_FOR_FILES));
+    return npg_number_paths(paths->numbers, &list->is_numbered, paths->paths, paths->count,
+                            !paths->is_listed);
+}
+
+static npg_status fill(npg_frame_files *list, npg_paths *paths, const char *input,
+                       const npg_selection *selection, bool finds_gaps)
+{
+    NPG_TRY(npg_paths_find(paths, input));
+    NPG_TRY(number_frames(list, paths));
+    list->left_out = paths->left_out;
+    NPG_TRY(fill_slots(list, paths, paths->numbers, selection, finds_gaps && list->is_numbered));
+    if (list->count == list->gap_count)
+        return npg_error(
+            NPG_USAGE, "option frames: chooses none of the %zu frames of %s (numbers %lld to %lld)",
+            paths->count, input, (long long)paths->numbers[0], (long long)paths->numbers[paths->count - 1]);
+    return NPG_OK;
+}
+
+npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const char *text, bool finds_gaps)
+{
+    npg_frame_files *list;
+    npg_selection selection;
+    npg_paths paths = {0};
+    *out = NULL;
+    NPG_TRY(npg_selection_parse(&selection, text));
+    npg_status status = npg_alloc(&list, NPG_FOR_FILES, sizeof *list);
+    if (!status) {
+        status = fill(list, &paths, input, &selection, finds_gaps);
+        if (status) npg_frame_files_close(&list);
+        *out = list;
+    }
+    npg_paths_clear(&paths);
+    npg_selection_clear(&selection);
+    return status;
+}
+
+npg_status npg_frame_files_confine(const npg_frame_files *list, const char *input)
+{
+    char *folder;
+    struct stat info;
+    NPG_TRY(npg_copy_text(&folder, input));
+    /* of a pattern, what comes before the first folder that is a pattern itself */
+    while (folder[0] && strcmp(folder, "/") != 0 && (stat(folder, &info) || !S_ISDIR(info.st_mode))) {
+        char *slash = strrchr(folder, '/');
+        folder[!slash ? 0 : slash == folder ? 1 : slash - folder] = 0;
+    }
+    const char *place = folder[0] ? folder : ".";
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < list->count && !status; i++)
+        if (list->slots[i].path) status = npg_path_confine(list->slots[i].path, place);
+    npg_release(&folder);
+    return status;
+}
+
+void npg_frame_files_close(npg_frame_files **slot)
+{
+    if (!*slot) return;
+    for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->slots[i].path);
+    npg_release(&(*slot)->slots);
+    npg_release(slot);
+}
+
+void npg_frame_files_gaps(char *text, size_t size, const npg_frame_files *list)
+{
+    size_t used = 0;
+    text[0] = 0;
+    for (size_t i = 0, next; i < list->count; i = next) {
+        for (next = i + 1; next < list->count && !list->slots[i].path && !list->slots[next].path;) next++;
+        if (list->slots[i].path) continue;
+        char part[64];
+        long long first = (long long)list->slots[i].number, last = (long long)list->slots[next - 1].number;
+        const char *comma = used ? ", " : "";
+        if (next == i + 1)
+            snprintf(part, sizeof part, "%s%lld", comma, first);
+        else
+            snprintf(part, sizeof part, "%s%lld%s%lld", comma, first, next == i + 2 ? ", " : "-", last);
+        bool fits = used + strlen(part) + sizeof ", ..." < size;
+        used += (size_t)snprintf(text + used, size - used, "%s", fits ? part : used ? ", ..." : "...");
+        if (!fits) return;
+    }
+}

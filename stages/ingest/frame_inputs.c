@@ -1,0 +1,406 @@
+/* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
+#include "ingest/frame_inputs.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <glob.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "ingest/formats/formats.h"
+#include "ingest/formats/number.h"
+#include "ingest/frame_names.h"
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
+
+#define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
+
+void npg_paths_clear(npg_paths *list)
+{
+    for (size_t i = 0; i < list->count; i++) npg_release(&list->paths[i]);
+    npg_release(&list->paths);
+    npg_release(&list->numbers);
+    *list = (npg_paths){0};
+}
+
+static npg_status add_path(npg_paths *list, const char *path)
+{
+    NPG_TRY(npg_grow(&list->paths, &list->capacity, list->count + 1, sizeof *list->paths, NPG_FOR_FILES));
+    NPG_TRY(npg_copy_text(&list->paths[list->count], path));
+    list->count++;
+    return NPG_OK;
+}
+
+static int by_name(const void *left, const void *right)
+{
+    const char *a = *(char *const *)left, *b = *(char *const *)right;
+    int order = npg_natural_compare(a, b);
+    return order ? order : strcmp(a, b);
+}
+
+static void sort(npg_paths *list)
+{
+    if (list->count) qsort(list->paths, list->count, sizeof *list->paths, by_name);
+}
+
+static bool is_folder(const char *path)
+{
+    struct stat info;
+    return !stat(path, &info) && S_ISDIR(info.st_mode);
+}
+
+static bool exists(const char *path)
+{
+    struct stat info;
+    return !stat(path, &info);
+}
+
+/* ---- a folder ---- */
+
+/* Names in a folder that do not begin with a dot: the sub-folders, or the files with a known ending. */
+static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders)
+{
+    DIR *directory = opendir(folder);
+    npg_status status = NPG_OK;
+    if (!directory) return npg_error(NPG_BAD_INPUT, "%s: can't be read: %s", folder, strerror(errno));
+    for (struct dirent *entry; !status && (entry = readdir(directory));) {
+        char *path;
+        if (entry->d_name[0] == '.') continue;
+        if (!wants_folders && !npg_format_by_ending(entry->d_name)) continue;
+        status = npg_join_path(&path, folder, entry->d_name);
+        if (status) break;
+        if (is_folder(path) == wants_folders) status = add_path(out, path);
+        npg_release(&path);
+    }
+    closedir(directory);
+    sort(out);
+    return status;
+}
+
+static const char *ending_of(const char *path)
+{
+    return strrchr(path, '.');
+}
+
+typedef struct ending_count {
+    const char *ending; /* into a path */
+    size_t count;
+} ending_count;
+
+enum { ENDINGS_MAX = 32 }; /* more than readers know, upper and lower case being one */
+
+static size_t count_endings(ending_count counts[ENDINGS_MAX], const npg_paths *list)
+{
+    size_t known = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        size_t k = 0;
+        while (k < known && strcasecmp(counts[k].ending, ending_of(list->paths[i])) != 0) k++;
+        if (k == ENDINGS_MAX) continue;
+        if (k == known) counts[known++] = (ending_count){ending_of(list->paths[i]), 0};
+        counts[k].count++;
+    }
+    return known;
+}
+
+static int by_count(const void *left, const void *right)
+{
+    const ending_count *a = left, *b = right;
+    return a->count > b->count ? -1 : a->count < b->count;
+}
+
+/* Frames of one capture have one ending; the others are counted, not taken. */
+static npg_status keep_one_ending(npg_paths *list, const char *folder)
+{
+    ending_count counts[ENDINGS_MAX];
+    size_t known = count_endings(counts, list), kept = 0;
+    char ending[16];
+    if (!known) return NPG_OK;
+    qsort(counts, known, sizeof *counts, by_count);
+    if (known > 1 && counts[0].count == counts[1].count)
+        return npg_error(
+            NPG_BAD_INPUT, "%s: holds %zu files *%s and as many *%s; say which with a pattern such as %s/*%s",
+            folder, counts[0].count, counts[0].ending, counts[1].ending, folder, counts[0].ending);
+    snprintf(ending, sizeof ending, "%s", counts[0].ending);
+    for (size_t i = 0; i < list->count; i++) {
+        if (!strcasecmp(ending_of(list->paths[i]), ending)) {
+            list->paths[kept++] = list->paths[i];
+        } else {
+            npg_release(&list->paths[i]);
+            list->left_out++;
+        }
+    }
+    list->count = kept;
+    return NPG_OK;
+}
+
+/* Captures often keep their clouds one level down. */
+static npg_status find_sub_folder(char **out, const char *folder)
+{
+    static const char *const usual[] = {"points", "point_clouds"};
+    npg_paths folders = {0};
+    npg_status status = list_folder(&folders, folder, true);
+    const char *found = folders.count == 1 ? folders.paths[0] : NULL;
+    for (size_t u = 0; u < 2; u++)
+        for (size_t i = 0; i < folders.count; i++)
+            if (!strcmp(strrchr(folders.paths[i], '/') + 1, usual[u]) && (!found || folders.count > 1))
+                if (!found || strcmp(strrchr(found, '/') + 1, usual[0]) != 0) found = folders.paths[i];
+    *out = NULL;
+    if (!status && found) status = npg_copy_text(out, found);
+    npg_paths_clear(&folders);
+    return status;
+}
+
+static npg_status find_in_folder(npg_paths *out, const char *folder)
+{
+    char *inner = NULL;
+    NPG_TRY(list_folder(out, folder, false));
+    if (!out->count) NPG_TRY(find_sub_folder(&inner, folder));
+    npg_status status = inner ? list_folder(out, inner, false) : NPG_OK;
+    if (!status) status = keep_one_ending(out, inner ? inner : folder);
+    if (!status && !out->count)
+        status = npg_error(NPG_BAD_INPUT, "%s: no file here has a format that can be read (" FORMATS_TEXT ")",
+                           inner ? inner : folder);
+    npg_release(&inner);
+    return status;
+}
+
+/* ---- a glob ---- */
+
+static npg_status find_by_glob(npg_paths *out, const char *pattern)
+{
+    glob_t found = {0};
+    npg_status status = NPG_OK;
+    int result = glob(pattern, GLOB_NOSORT, NULL, &found);
+    if (result == GLOB_NOSPACE) status = npg_error(NPG_MEMORY, "%s: no memory for the names", pattern);
+    for (size_t i = 0; i < found.gl_pathc && !status && !result; i++)
+        if (!is_folder(found.gl_pathv[i])) status = add_path(out, found.gl_pathv[i]);
+    globfree(&found);
+    sort(out);
+    return status;
+}
+
+/* ---- a pattern ---- */
+
+/* The place of the number in a pattern: everything before it, its least width, everything after it. */
+typedef struct pattern {
+    char *before, *after; /* owned */
+    int width;
+} pattern;
+
+static void clear_pattern(pattern *p)
+{
+    npg_release(&p->before);
+    npg_release(&p->after);
+}
+
+/* Finds %d, %04d or ####.  *found is the length of the conversion, 0 without one. */
+static const char *find_conversion(const char *text, size_t *length, int *width)
+{
+    *length = 0;
+    for (const char *at = text; *at; at++) {
+        size_t digits = *at == '%' ? strspn(at + 1, "0123456789") : 0;
+        if (*at == '%' && at[1 + digits] == 'd' && digits <= 3) {
+            *width = atoi(at + 1);
+            *length = digits + 2;
+            return at;
+        }
+        if (*at == '#') {
+            *length = strspn(at, "#");
+            *width = (int)*length;
+            return at;
+        }
+    }
+    return NULL;
+}
+
+static npg_status parse_pattern(pattern *p, const char *text)
+{
+    size_t length, other;
+    int unused;
+    const char *at = find_conversion(text, &length, &p->width);
+    if (find_conversion(at + length, &other, &unused))
+        return npg_error(NPG_USAGE, "%s: a pattern has one place for the number, not two", text);
+    NPG_TRY(npg_copy_text(&p->before, text));
+    p->before[at - text] = 0;
+    return npg_copy_text(&p->after, at + length);
+}
+
+static npg_status pattern_as_glob(char **out, const pattern *p)
+{
+    size_t at = 0;
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, 2 * (strlen(p->before) + strlen(p->after)) + 2));
+    for (int part = 0; part < 2; part++) {
+        for (const char *c = part ? p->after : p->before; *c; c++) {
+            if (strchr("*?[\\", *c)) (*out)[at++] = '\\';
+            (*out)[at++] = *c;
+        }
+        if (part == 0) (*out)[at++] = '*';
+    }
+    return NPG_OK;
+}
+
+/* The number a path has under the pattern, -1 when it does not fit ("frame_12b.ply", a wrong width). */
+static int64_t number_under(const pattern *p, const char *path)
+{
+    const char *digits = path + strlen(p->before);
+    size_t length = strspn(digits, "0123456789");
+    if (!length || length > 17 || strcmp(digits + length, p->after) != 0) return -1;
+    bool is_padded = digits[0] == '0' && length > 1;
+    if ((int)length < p->width || (is_padded && (int)length != p->width)) return -1;
+    return strtoll(digits, NULL, 10);
+}
+
+static npg_status keep_fitting(npg_paths *list, const pattern *p)
+{
+    size_t kept = 0;
+    NPG_TRY(
+        npg_grow(&list->numbers, &list->number_capacity, list->count, sizeof *list->numbers, NPG_FOR_FILES));
+    for (size_t i = 0; i < list->count; i++) {
+        int64_t number = number_under(p, list->paths[i]);
+        if (number < 0) {
+            npg_release(&list->paths[i]);
+            continue;
+        }
+        list->numbers[kept] = number;
+        list->paths[kept++] = list->paths[i];
+    }
+    list->count = kept;
+    return NPG_OK;
+}
+
+static npg_status find_by_pattern(npg_paths *out, const char *text)
+{
+    pattern p = {0};
+    char *as_glob = NULL;
+    npg_status status = parse_pattern(&p, text);
+    if (!status) status = pattern_as_glob(&as_glob, &p);
+    if (!status) status = find_by_glob(out, as_glob);
+    if (!status) status = keep_fitting(out, &p);
+    npg_release(&as_glob);
+    clear_pattern(&p);
+    return status;
+}
+
+/* ---- a list file ---- */
+
+/* A line's path as it can be opened: as it stands or beside the list; *out is NULL when it is not there. */
+static npg_status resolve(char **out, const char *list_path, const char *line)
+{
+    const char *slash = strrchr(list_path, '/');
+    *out = NULL;
+    if (*line != '/' && slash) {
+        char *folder;
+        NPG_TRY(npg_copy_text(&folder, list_path));
+        folder[slash == list_path ? 1 : slash - list_path] = 0;
+        npg_status status = npg_join_path(out, folder, line);
+        npg_release(&folder);
+        if (status) return status;
+        if (exists(*out)) return NPG_OK;
+        npg_release(out);
+    }
+    return exists(line) ? npg_copy_text(out, line) : NPG_OK;
+}
+
+/* The next line that says something, as text of its own; NPG_END. */
+static npg_status next_entry(char **out, npg_source *source)
+{
+    const char *text;
+    size_t length;
+    do {
+        NPG_TRY(npg_source_line(source, &text, &length));
+        while (length && (*text == ' ' || *text == '\t')) {
+            text++;
+            length--;
+        }
+        while (length && (text[length - 1] == ' ' || text[length - 1] == '\t')) length--;
+    } while (!length || *text == '#');
+    if (length > 4096 || memchr(text, 0, length)) return npg_source_bad_line(source, "not a path");
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, length + 1));
+    memcpy(*out, text, length);
+    return NPG_OK;
+}
+
+static npg_status read_list(npg_paths *out, npg_source *source)
+{
+    for (;;) {
+        char *line = NULL, *path = NULL;
+        npg_status status = next_entry(&line, source);
+        if (status == NPG_END) return NPG_OK;
+        if (!status) status = resolve(&path, source->name, line);
+        if (!status && !path) status = npg_source_bad_line(source, "there is no file %s", line);
+        if (!status) status = add_path(out, path);
+        npg_release(&line);
+        npg_release(&path);
+        if (status) return status;
+    }
+}
+
+/* A list, if its first line is the path of a file; any .lst or .list is one. */
+static npg_status is_list(bool *out, const char *path)
+{
+    npg_source *source;
+    const char *dot = strrchr(path, '.');
+    char *line = NULL, *found = NULL;
+    *out = dot && (!strcasecmp(dot, ".lst") || !strcasecmp(dot, ".list"));
+    const char *format = npg_format_by_ending(path);
+    if (*out || (format && strcmp(format, "xyz") != 0)) return NPG_OK;
+    NPG_TRY(npg_source_open_file(&source, path));
+    npg_status status = next_entry(&line, source);
+    if (!status) status = resolve(&found, path, line);
+    *out = !status && found;
+    npg_release(&line);
+    npg_release(&found);
+    npg_source_close(&source);
+    return status == NPG_MEMORY ? status : NPG_OK; /* what is no text is no list */
+}
+
+static npg_status find_in_list(npg_paths *out, const char *path)
+{
+    npg_source *source;
+    NPG_TRY(npg_source_open_file(&source, path));
+    out->is_listed = true;
+    npg_status status = read_list(out, source);
+    if (!status && !out->count) status = npg_error(NPG_BAD_INPUT, "%s: the list names no file", path);
+    npg_source_close(&source);
+    return status;
+}
+
+/* ---- any of them ---- */
+
+static npg_status find_file(npg_paths *out, const char *path)
+{
+    struct stat info;
+    bool list;
+    if (!stat(path, &info) && !S_ISREG(info.st_mode))
+        return npg_error(NPG_BAD_INPUT, "%s: neither a file nor a folder; for a pipe use - (standard input)",
+                         path);
+    NPG_TRY(is_list(&list, path));
+    return list ? find_in_list(out, path) : add_path(out, path);
+}
+
+static npg_status find_matches(npg_paths *out, const char *input)
+{
+    size_t length;
+    int width;
+    if (find_conversion(input, &length, &width))
+        NPG_TRY(find_by_pattern(out, input));
+    else if (strpbrk(input, "*?["))
+        NPG_TRY(find_by_glob(out, input));
+    else
+        return npg_error(NPG_BAD_INPUT, "%s: there is no such file or folder", input);
+    if (!out->count) return npg_error(NPG_BAD_INPUT, "%s: no file fits this pattern", input);
+    return NPG_OK;
+}
+
+npg_status npg_paths_find(npg_paths *out, const char *input)
+{
+    *out = (npg_paths){0};
+    npg_status status = is_folder(input) ? find_in_folder(out, input)
+                        : exists(input)  ? find_file(out, input)
+                                         : find_matches(out, input);
+    if (status) npg_paths_clear(out);
+    return status;
+}

@@ -1,0 +1,145 @@
+/* Frame selection: the text of --frames. */
+#include "ingest/frame_select.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "pipeline/memory.h"
+
+#define NUMBER_MAX ((int64_t)1 << 53)
+
+static npg_status bad(const char *text, const char *cause)
+{
+    return npg_error(NPG_USAGE,
+                     "option frames: \"%.100s\": %s (a:b:step are positions, b not included; 1-5,8 are frame "
+                     "numbers)",
+                     text, cause);
+}
+
+static const char *skip_spaces(const char *at)
+{
+    return at + strspn(at, " ");
+}
+
+/* A whole number at *at; *has tells whether there is one. */
+static bool take_number(int64_t *value, bool *has, const char **at)
+{
+    const char *text = skip_spaces(*at);
+    bool negative = *text == '-';
+    text += negative;
+    size_t digits = strspn(text, "0123456789");
+    *has = digits > 0;
+    if (!digits) return !negative;
+    *value = digits > 16 ? NUMBER_MAX : strtoll(text, NULL, 10);
+    if (*value > NUMBER_MAX) *value = NUMBER_MAX;
+    if (negative) *value = -*value;
+    *at = skip_spaces(text + digits);
+    return true;
+}
+
+static npg_status parse_slice(npg_selection *s, const char *text)
+{
+    const char *at = text;
+    bool has_step = false;
+    s->is_slice = true;
+    s->step = 1;
+    if (!take_number(&s->first, &s->has_first, &at)) return bad(text, "not a number");
+    at = skip_spaces(at);
+    if (*at++ != ':') return bad(text, "not a number");
+    if (!take_number(&s->end, &s->has_end, &at)) return bad(text, "not a number");
+    at = skip_spaces(at);
+    if (*at == ':') {
+        at++;
+        if (!take_number(&s->step, &has_step, &at)) return bad(text, "not a number");
+        at = skip_spaces(at);
+    }
+    if (*at) return bad(text, "not of the form a:b:step");
+    if (s->step < 1) return bad(text, "the step must be at least 1");
+    return NPG_OK;
+}
+
+static npg_status parse_range(int64_t range[2], const char *text, const char **at)
+{
+    bool has;
+    if (!take_number(&range[0], &has, at) || !has) return bad(text, "not a frame number");
+    range[1] = range[0];
+    if (**at == '-') {
+        ++*at;
+        if (!take_number(&range[1], &has, at) || !has) return bad(text, "a range without an end");
+    }
+    if (range[0] < 0) return bad(text, "a negative frame number");
+    if (range[1] < range[0]) return bad(text, "a range that runs backward");
+    return NPG_OK;
+}
+
+static int by_first(const void *left, const void *right)
+{
+    const int64_t *a = left, *b = right;
+    return a[0] < b[0] ? -1 : a[0] > b[0];
+}
+
+/* Sort, and join what overlaps. */
+static void tidy(npg_selection *s)
+{
+    size_t kept = 0;
+    qsort(s->ranges, s->range_count, sizeof *s->ranges, by_first);
+    for (size_t i = 1; i < s->range_count; i++) {
+        if (s->ranges[i][0] <= s->ranges[kept][1]) {
+            if (s->ranges[i][1] > s->ranges[kept][1]) s->ranges[kept][1] = s->ranges[i][1];
+        } else {
+            memcpy(s->ranges[++kept], s->ranges[i], sizeof *s->ranges);
+        }
+    }
+    s->range_count = kept + 1;
+}
+
+static npg_status parse_numbers(npg_selection *s, const char *text)
+{
+    size_t capacity = 0;
+    for (const char *at = text;; at++) {
+        NPG_TRY(npg_grow(&s->ranges, &capacity, s->range_count + 1, sizeof *s->ranges, NPG_FOR_RUN));
+        NPG_TRY(parse_range(s->ranges[s->range_count], text, &at));
+        s->range_count++;
+        if (!*at) break;
+        if (*at != ',') return bad(text, "numbers and ranges are parted by commas");
+    }
+    tidy(s);
+    return NPG_OK;
+}
+
+npg_status npg_selection_parse(npg_selection *selection, const char *text)
+{
+    *selection = (npg_selection){0};
+    if (!*skip_spaces(text)) return NPG_OK;
+    npg_status status = strchr(text, ':') ? parse_slice(selection, text) : parse_numbers(selection, text);
+    if (status) npg_selection_clear(selection);
+    return status;
+}
+
+void npg_selection_clear(npg_selection *selection)
+{
+    npg_release(&selection->ranges);
+    *selection = (npg_selection){0};
+}
+
+bool npg_selection_needs_count(const npg_selection *s)
+{
+    return s->is_slice && ((s->has_first && s->first < 0) || (s->has_end && s->end < 0));
+}
+
+static bool slice_takes(const npg_selection *s, int64_t position, int64_t count)
+{
+    int64_t first = s->has_first ? s->first : 0, end = s->has_end ? s->end : INT64_MAX;
+    if (first < 0) first = first + count < 0 ? 0 : first + count;
+    if (end < 0) end += count;
+    return position >= first && position < end && (position - first) % s->step == 0;
+}
+
+bool npg_selection_takes(const npg_selection *s, int64_t position, int64_t number, int64_t count)
+{
+    if (s->is_slice) return slice_takes(s, position, count);
+    if (!s->range_count) return true;
+    for (size_t i = 0; i < s->range_count; i++)
+        if (number >= s->ranges[i][0] && number <= s->ranges[i][1]) return true;
+    return false;
+}

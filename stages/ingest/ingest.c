@@ -1,0 +1,424 @@
+/* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
+ * from standard input, from a folder that grows, or from those that are pushed. */
+#include <string.h>
+#include <unistd.h>
+
+#include "ingest/capture.h"
+#include "ingest/follow.h"
+#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
+
+#define FILL_MAX 100000 /* frames of one gap in a live source */
+
+typedef struct state {
+    const char *frames, *follow_end;
+    double follow_idle_s, follow_settle_s;
+    int missing;
+    int64_t cache_mib;
+    int64_t next; /* place in the pass's order; live: frames emitted so far */
+    /* live */
+    npg_selection selection;
+    npg_stream *stream; /* standard input                                  */
+    npg_follow *follow; /* a folder that grows; neither: frames are pushed */
+    npg_chunk *fed;     /* the pushed chunk under way                      */
+    size_t fed_at;
+    int64_t seen;              /* frames that came or are missing, chosen or not        */
+    npg_frame waiting, before; /* the frame behind a gap; a copy of the one before it   */
+    int64_t gap_left, step;    /* missing frames before the waiting one; their distance */
+    bool is_waiting;
+} state;
+
+#define OFFSET(member) offsetof(state, member)
+
+static const npg_option ingest_options[] = {
+    {"frames",
+     "Which frames: a:b:step are positions in time as Python counts them (from 0, without b, negative from "
+     "the "
+     "end); 1-5,8 are the numbers in the file names, both ends included; empty: all",
+     NPG_OPTION_TEXT, OFFSET(frames), "", 0, 0, NULL, "SELECTION"},
+    {"missing",
+     "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, hold "
+     "repeats "
+     "the points of the frame before it, ignore takes numbers for mere names",
+     NPG_OPTION_CHOICE, OFFSET(missing), "error", 0, 0, "error|skip|hold|ignore", NULL},
+    {"cache-mib", "Memory for clouds that were read, so that the later passes need not parse files again",
+     NPG_OPTION_INT, OFFSET(cache_mib), "4", 0, 1048576, NULL, "MIB"},
+    {"follow-end", "Name of the file that ends a folder that is followed, once it is there; empty: none does",
+     NPG_OPTION_TEXT, OFFSET(follow_end), "capture.end", 0, 0, NULL, "NAME"},
+    {"follow-idle", "Seconds without any change that end a folder that is followed; 0: wait for the end file",
+     NPG_OPTION_REAL, OFFSET(follow_idle_s), "30", 0, 1e9, NULL, "SECONDS"},
+    {"follow-settle",
+     "Seconds without a change after which a file that can't be read, and that others follow, is given up",
+     NPG_OPTION_REAL, OFFSET(follow_settle_s), "2", 0, 1e6, NULL, "SECONDS"},
+    {0}};
+
+/* ---- files ---- */
+
+static void release_capture(void *thing)
+{
+    npg_capture *capture = thing;
+    npg_capture_close(&capture);
+}
+
+static size_t cache_limit(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    size_t limit = (size_t)s->cache_mib << 20,
+           budget = (size_t)npg_worker_settings(worker)->max_memory_mib << 20;
+    return budget && limit > budget / 8 ? budget / 8 : limit;
+}
+
+static void tell_list(npg_worker *worker, const npg_frame_files *list)
+{
+    char numbers[256];
+    json_t *report = npg_worker_report(worker);
+    json_object_set_new(report, "frames", json_integer((json_int_t)list->count));
+    json_object_set_new(report, "gaps", json_integer((json_int_t)list->gap_count));
+    if (list->left_out)
+        npg_worker_log(worker, NPG_LOG_INFO, -1, "%zu files with another ending are left out",
+                       list->left_out);
+    if (!list->gap_count) return;
+    const state *s = npg_worker_state(worker);
+    bool is_held = s->missing == NPG_MISSING_HOLD;
+    npg_frame_files_gaps(numbers, sizeof numbers, list);
+    json_object_set_new(report, "missing_numbers", json_string(numbers));
+    npg_worker_warn(worker, !is_held, -1, "%zu of %zu frames are missing and %s: %s", list->gap_count,
+                    list->count, is_held ? "repeat the frame before them" : "are skipped", numbers);
+}
+
+static npg_status open_capture(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_settings *settings = npg_worker_settings(worker);
+    npg_capture *capture;
+    if (npg_worker_kept(worker)) return NPG_OK;
+    NPG_TRY(npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
+                             settings->keep_going, cache_limit(worker)));
+    npg_worker_keep(worker, capture, release_capture);
+    if (settings->confine) NPG_TRY(npg_frame_files_confine(capture->list, settings->input));
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
+    tell_list(worker, capture->list);
+    return NPG_OK;
+}
+
+static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index)
+{
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    npg_status status =
+        npg_capture_read(npg_worker_kept(worker), frame, index, &facts->origin, pass == NPG_PASS_SOLVE);
+    if (status == NPG_PARTIAL) {
+        npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
+        status = NPG_OK;
+    }
+    if (pass == NPG_PASS_MEASURE && !status) facts->skipped_count += frame->is_skipped;
+    return status;
+}
+
+/* Figures of the capture as it was read; the first pass sees every frame once. */
+static void tell_capture(npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_capture *capture = npg_worker_kept(worker);
+    json_t *report = npg_worker_report(worker);
+    json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
+    json_object_set_new(report, "files_parsed", json_integer((json_int_t)capture->reads));
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE)
+        json_object_set_new(report, "cache_bytes", json_integer((json_int_t)capture->cache_bytes));
+}
+
+static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    int64_t count = pass == NPG_PASS_CHOOSE ? (int64_t)facts->choice.count : facts->frame_count;
+    if (pass == NPG_PASS_SOLVE) count = npg_plan_read_count(&facts->plan);
+    while (s->next < count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
+        npg_frame frame;
+        int64_t index = s->next;
+        if (pass == NPG_PASS_SOLVE) index = npg_plan_frame(&facts->plan, s->next);
+        if (pass == NPG_PASS_CHOOSE) index = facts->choice.frames[s->next];
+        if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
+        NPG_TRY(read_frame(worker, &frame, index));
+        npg_chunk_add(chunk, &frame);
+        s->next++;
+    }
+    if (npg_chunk_count(chunk)) return NPG_OK;
+    tell_capture(worker);
+    if (facts->skipped_count == facts->frame_count)
+        return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used",
+                         npg_worker_settings(worker)->input, (long long)facts->frame_count);
+    return NPG_END;
+}
+
+/* ---- standard input, a folder that grows, pushed frames ---- */
+
+static bool wants_stop(void *user)
+{
+    return npg_worker_stopping(user);
+}
+
+static npg_status open_follow(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_follow_settings settings = {.where = npg_worker_settings(worker)->follow,
+                                          .confine = npg_worker_settings(worker)->confine,
+                                          .end_name = s->follow_end,
+                                          .idle_s = s->follow_idle_s,
+                                          .settle_s = s->follow_settle_s,
+                                          .finds_gaps = s->missing != NPG_MISSING_IGNORE,
+                                          .stopping = wants_stop,
+                                          .user = worker};
+    if (!s->follow_end[0] && !(s->follow_idle_s > 0))
+        return npg_error(NPG_USAGE, "options follow-end and follow-idle: nothing would ever end this run");
+    return npg_follow_open(&s->follow, &settings);
+}
+
+static npg_status open_live(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_settings *settings = npg_worker_settings(worker);
+    if (!settings->input[0] && !settings->follow[0]) {
+        if (!s->frames[strspn(s->frames, " ")]) return NPG_OK;
+        return npg_error(NPG_USAGE,
+                         "option frames: pushed frames are not selected; push those that are wanted");
+    }
+    NPG_TRY(npg_selection_parse(&s->selection, s->frames));
+    if (npg_selection_needs_count(&s->selection))
+        return npg_error(NPG_USAGE, "option frames: \"%s\": a live source can't be counted from its end",
+                         s->frames);
+    if (settings->follow[0]) return open_follow(worker);
+    NPG_TRY(npg_stream_open(&s->stream, STDIN_FILENO, "standard input"));
+    npg_stream_set_stop(s->stream, wants_stop, worker);
+    return NPG_OK;
+}
+
+/* The next frame that was pushed, its arrays moved out of the chunk. */
+static npg_status next_pushed(npg_worker *worker, npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    while (!s->fed || s->fed_at == npg_chunk_count(s->fed)) {
+        npg_chunk_unref(&s->fed);
+        s->fed_at = 0;
+        NPG_TRY(npg_worker_feed(worker, &s->fed));
+    }
+    npg_frame *fed = npg_chunk_frame(s->fed, s->fed_at++);
+    *frame = *fed;
+    *fed = (npg_frame){0};
+    return NPG_OK;
+}
+
+static npg_status next_followed(npg_worker *worker, npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    npg_status status = npg_follow_next(s->follow, frame, &npg_worker_facts(worker)->origin);
+    if (status != NPG_PARTIAL) return status;
+    if (!npg_worker_settings(worker)->keep_going) {
+        npg_frame_clear(frame);
+        return NPG_BAD_INPUT; /* with the reader's own words */
+    }
+    npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
+    npg_worker_facts(worker)->skipped_count++;
+    frame->is_skipped = true;
+    frame->fields = NPG_FIELD_POINTS;
+    return NPG_OK;
+}
+
+/* Behind a frame that is torn nothing on a pipe can be told apart: with keep-going the stream ends there, and
+ * what came before is finished. */
+static npg_status next_streamed(npg_worker *worker, npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    npg_status status = npg_stream_next(s->stream, frame, &npg_worker_facts(worker)->origin);
+    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going || !s->next) return status;
+    npg_worker_warn(worker, true, s->seen, "the stream is taken to end here: %s", npg_error_text());
+    return NPG_END;
+}
+
+static npg_status next_live(npg_worker *worker, npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    NPG_TRY(s->stream   ? next_streamed(worker, frame)
+            : s->follow ? next_followed(worker, frame)
+                        : next_pushed(worker, frame));
+    frame->cleaning.read = frame->point_count;
+    return NPG_OK;
+}
+
+static npg_status refuse_gap(const state *s, int64_t gap, int64_t number)
+{
+    if (gap > FILL_MAX)
+        return npg_error(NPG_BAD_INPUT, "frame %lld comes %lld numbers after the one before it",
+                         (long long)number, (long long)gap + 1);
+    return npg_error(NPG_BAD_INPUT,
+                     "%lld frames are missing between %lld and %lld (option missing: skip or hold goes on, "
+                     "ignore takes the frames as they follow each other)",
+                     (long long)gap, (long long)s->before.number, (long long)number);
+}
+
+/* Numbers may jump: in a folder as in any capture of files; of pushed frames only skip and hold ask for those
+ * that lie between. */
+static npg_status find_gap(npg_worker *worker, const npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    int64_t step = s->follow ? npg_follow_step(s->follow) : 1;
+    bool fills = s->missing == NPG_MISSING_SKIP || s->missing == NPG_MISSING_HOLD;
+    bool is_checked = s->follow ? s->missing != NPG_MISSING_IGNORE : fills && !s->stream;
+    s->gap_left = 0;
+    if (!s->seen || !is_checked) return NPG_OK;
+    if (s->step && step != s->step) {
+        if (!fills)
+            return npg_error(
+                NPG_BAD_INPUT,
+                "frame %lld: the numbers grew by %lld before and now by %lld: frames are missing",
+                (long long)frame->number, (long long)s->step, (long long)step);
+        npg_worker_warn(worker, true, frame->number,
+                        "the numbers grew by %lld before and now by %lld: frames before it are missing",
+                        (long long)s->step, (long long)step);
+    }
+    s->step = step;
+    int64_t gap = (frame->number - s->before.number) / step - 1;
+    if (gap > FILL_MAX || (gap > 0 && !fills)) return refuse_gap(s, gap, frame->number);
+    s->gap_left = gap;
+    return NPG_OK;
+}
+
+static npg_status remember(state *s, const npg_frame *frame)
+{
+    npg_frame_clear(&s->before);
+    if (s->missing == NPG_MISSING_HOLD && !s->stream) return npg_frame_copy(&s->before, frame);
+    s->before.number = frame->number;
+    return NPG_OK;
+}
+
+static npg_status fill_gap(npg_worker *worker, npg_chunk *chunk)
+{
+    state *s = npg_worker_state(worker);
+    npg_frame frame = {.fields = NPG_FIELD_POINTS};
+    s->gap_left--;
+    int64_t number = s->before.number += s->step;
+    bool is_held = s->missing == NPG_MISSING_HOLD;
+    if (!npg_selection_takes(&s->selection, s->seen++, number, -1)) return NPG_OK;
+    if (is_held) NPG_TRY(npg_frame_copy(&frame, &s->before));
+    frame.number = number;
+    frame.index = s->next++;
+    frame.is_key = false;
+    frame.is_held = is_held;
+    frame.is_skipped = !is_held || s->before.is_skipped;
+    npg_worker_facts(worker)->skipped_count += frame.is_skipped;
+    npg_worker_warn(worker, !is_held, number, "the frame is missing and %s",
+                    is_held ? "repeats the frame before it" : "is skipped");
+    npg_chunk_add(chunk, &frame);
+    return NPG_OK;
+}
+
+static const char *source_name(const npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    return s->stream   ? "standard input"
+           : s->follow ? npg_worker_settings(worker)->follow
+                       : "the pushing program";
+}
+
+static npg_status end_live(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    json_t *report = npg_worker_report(worker);
+    size_t late_count = s->follow ? npg_follow_late_count(s->follow) : 0;
+    if (!s->next) return npg_error(NPG_BAD_INPUT, "%s: no frame came", source_name(worker));
+    if (facts->skipped_count == s->next)
+        return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used", source_name(worker),
+                         (long long)s->next);
+    if (late_count)
+        npg_worker_warn(worker, true, -1, "%zu files came after a later one had been taken and are left out",
+                        late_count);
+    facts->frame_count = s->next;
+    json_object_set_new(report, "frames", json_integer((json_int_t)s->next));
+    json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
+    return NPG_END;
+}
+
+/* One frame per chunk, so that nothing waits for frames that may come much later.  The chunk stays empty for
+ * a frame that is not chosen. */
+static npg_status step_live(npg_worker *worker, npg_chunk *chunk)
+{
+    state *s = npg_worker_state(worker);
+    if (!s->is_waiting) {
+        npg_status status = next_live(worker, &s->waiting);
+        if (status) return status == NPG_END ? end_live(worker) : status;
+        s->is_waiting = true;
+        NPG_TRY(find_gap(worker, &s->waiting));
+    }
+    if (s->gap_left > 0) return fill_gap(worker, chunk);
+    s->is_waiting = false;
+    NPG_TRY(remember(s, &s->waiting));
+    if (!npg_selection_takes(&s->selection, s->seen++, s->waiting.number, -1)) {
+        npg_frame_clear(&s->waiting);
+        return NPG_OK;
+    }
+    s->waiting.index = s->next++;
+    npg_chunk_add(chunk, &s->waiting);
+    return NPG_OK;
+}
+
+static npg_status next_from_live(npg_worker *worker, npg_chunk *chunk)
+{
+    while (!npg_chunk_count(chunk)) {
+        if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
+        NPG_TRY(step_live(worker, chunk));
+    }
+    return NPG_OK;
+}
+
+/* ---- the stage ---- */
+
+static npg_status init(npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    state *s = npg_worker_state(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) s->next = facts->resumed_read;
+    return facts->is_live ? open_live(worker) : open_capture(worker);
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    bool is_live = npg_worker_facts(worker)->is_live;
+    size_t frames = is_live ? 1 : (size_t)npg_worker_settings(worker)->chunk_frames;
+    NPG_TRY(npg_chunk_open(chunk, frames));
+    npg_status status = is_live ? next_from_live(worker, *chunk) : next_from_files(worker, *chunk);
+    if (status) npg_chunk_unref(chunk);
+    return status;
+}
+
+static void uninit(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    npg_selection_clear(&s->selection);
+    npg_stream_close(&s->stream);
+    npg_follow_close(&s->follow);
+    npg_chunk_unref(&s->fed);
+    npg_frame_clear(&s->waiting);
+    npg_frame_clear(&s->before);
+}
+
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const npg_capture *capture = npg_worker_kept(worker);
+    *chunks_held = 1;
+    return capture ? capture->cache_bytes : 0;
+}
+
+const npg_stage npg_stage_ingest = {.name = "ingest",
+                                    .help = "reads the frames",
+                                    .options = ingest_options,
+                                    .state_size = sizeof(state),
+                                    .passes =
+                                        NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
+                                    .gives = NPG_FIELD_POINTS,
+                                    .init = init,
+                                    .process = process,
+                                    .uninit = uninit,
+                                    .memory = memory};

@@ -1,0 +1,211 @@
+/* What the results of a job are made of: version, options, inputs; and whether they changed. */
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "ingest/capture.h"
+#include "job/job.h"
+#include "pipeline/file.h"
+
+/* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
+static const char *const free_options[] = {"input",  "output",    "ring",        "chunk",   "max-memory",
+                                           "pull",   "cache-mib", "overwrite",   "confine", "restart",
+                                           "append", "alarm",     "segment-min", NULL};
+
+static bool is_free(const char *name)
+{
+    for (const char *const *free_name = free_options; *free_name; free_name++)
+        if (!strcmp(name, *free_name)) return true;
+    return false;
+}
+
+/* ---- describing ---- */
+
+static json_t *describe_options(const npg_options *options)
+{
+    json_t *values = json_object();
+    npg_option_info info = {.struct_size = sizeof info};
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        if (!is_free(info.name))
+            json_object_set_new(values, info.name, npg_json_text(npg_options_get(options, info.name)));
+    return values;
+}
+
+/* The stages that a program added, "name after place" each; their code can't be told from other code. */
+static json_t *describe_own_stages(const npg_options *options)
+{
+    json_t *list = json_array();
+    const npg_own_stage *own;
+    for (size_t i = 0; (own = npg_options_own_stage(options, i)); i++)
+        json_array_append_new(list, json_sprintf("%s after %s", own->name, own->after));
+    return list;
+}
+
+static npg_status describe_file(json_t *entry, const char *path)
+{
+    struct stat info;
+    uint64_t hash;
+    char text[17];
+    const char *slash = strrchr(path, '/');
+    if (stat(path, &info)) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
+    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
+    if (status) return status == NPG_DISK ? NPG_BAD_INPUT : status;
+    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
+    json_object_set_new(entry, "name", npg_json_text(slash ? slash + 1 : path));
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)info.st_size));
+    json_object_set_new(entry, "modified_ns",
+                        json_integer((json_int_t)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec));
+    json_object_set_new(entry, "xxh3", json_string(text));
+    return NPG_OK;
+}
+
+static npg_status describe_frames(json_t *frames, const npg_frame_files *list)
+{
+    for (size_t i = 0; i < list->count; i++) {
+        json_t *entry = json_pack("{sI}", "number", (json_int_t)list->slots[i].number);
+        json_array_append_new(frames, entry);
+        if (!list->slots[i].path) continue;
+        npg_status status = describe_file(entry, list->slots[i].path);
+        /* what can't be read is for ingest to refuse or skip; here it only has to be told from what can */
+        if (status && status != NPG_BAD_INPUT) return status;
+    }
+    return NPG_OK;
+}
+
+/* The path as it reads from any folder. */
+static json_t *absolute(const char *path)
+{
+    char folder[PATH_MAX], joined[2 * PATH_MAX];
+    if (path[0] == '/' || !getcwd(folder, sizeof folder)) return npg_json_text(path);
+    snprintf(joined, sizeof joined, "%s/%s", folder, path);
+    return npg_json_text(joined);
+}
+
+npg_status npg_job_describe(json_t **out, const npg_options *options)
+{
+    npg_frame_files *list;
+    const char *input = npg_options_get(options, "input"), *missing = npg_options_get(options, "missing"),
+               *reference = npg_options_get(options, "reference");
+    *out = NULL;
+    NPG_TRY(npg_frame_files_open(&list, input, npg_options_get(options, "frames"),
+                                 strcmp(missing, "ignore") != 0));
+    npg_settings settings;
+    npg_options_fill(options, npg_run_options, &settings);
+    json_t *frames = json_array(), *mesh = json_object();
+    npg_status status = settings.confine ? npg_frame_files_confine(list, input) : NPG_OK;
+    if (!status) status = describe_frames(frames, list);
+    npg_frame_files_close(&list);
+    if (!status && reference[0]) status = describe_file(mesh, reference);
+    json_t *description = json_pack("{ss so so so so so}", "neupig", npg_version(), "input", absolute(input),
+                                    "options", describe_options(options), "own_stages",
+                                    describe_own_stages(options), "reference", mesh, "frames", frames);
+    if (!status && !description) status = npg_error(NPG_MEMORY, "no memory for the list of inputs");
+    if (status) json_decref(description);
+    if (!status) *out = description;
+    return status;
+}
+
+/* ---- comparing ---- */
+
+static const char *text_of(const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    return text ? text : "";
+}
+
+static npg_status compare_options(const json_t *then, const json_t *now)
+{
+    const char *name;
+    const json_t *value;
+    json_object_foreach((json_t *)now, name, value)
+    {
+        const char *was = text_of(then, name), *is = text_of(now, name);
+        if (!json_object_get(then, name))
+            return npg_error(NPG_USAGE, "option %s is new and is \"%s\"", name, is);
+        if (strcmp(was, is) != 0)
+            return npg_error(NPG_USAGE, "option %s was \"%s\" and is \"%s\"", name, was, is);
+    }
+    return NPG_OK;
+}
+
+/* A file that was only touched or copied is the same. */
+static bool is_same_file(const json_t *then, const json_t *now)
+{
+    return !strcmp(text_of(then, "name"), text_of(now, "name")) &&
+           json_integer_value(json_object_get(then, "bytes")) ==
+               json_integer_value(json_object_get(now, "bytes")) &&
+           !strcmp(text_of(then, "xxh3"), text_of(now, "xxh3"));
+}
+
+static npg_status compare_frames(int64_t *added, const json_t *then, const json_t *now)
+{
+    size_t was = json_array_size(then), is = json_array_size(now);
+    for (size_t i = 0; i < was && i < is; i++) {
+        const json_t *a = json_array_get(then, i), *b = json_array_get(now, i);
+        if (!json_equal(json_object_get(a, "number"), json_object_get(b, "number")))
+            return npg_error(NPG_USAGE, "frame %zu of the input had the number %lld and has %lld", i,
+                             (long long)json_integer_value(json_object_get(a, "number")),
+                             (long long)json_integer_value(json_object_get(b, "number")));
+        if (!is_same_file(a, b))
+            return npg_error(NPG_USAGE, "the input %s is not the one it was (frame %lld)",
+                             text_of(b, "name")[0] ? text_of(b, "name") : text_of(a, "name"),
+                             (long long)json_integer_value(json_object_get(a, "number")));
+    }
+    if (is < was) return npg_error(NPG_USAGE, "the input had %zu frames and has %zu", was, is);
+    *added = (int64_t)(is - was);
+    return NPG_OK;
+}
+
+npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now)
+{
+    *added = 0;
+    if (strcmp(text_of(then, "neupig"), text_of(now, "neupig")) != 0)
+        return npg_error(NPG_USAGE, "it was begun by neupig %s, and this is %s", text_of(then, "neupig"),
+                         text_of(now, "neupig"));
+    NPG_TRY(compare_options(json_object_get(then, "options"), json_object_get(now, "options")));
+    const json_t *own_then = json_object_get(then, "own_stages"),
+                 *own_now = json_object_get(now, "own_stages");
+    if ((json_array_size(own_then) || json_array_size(own_now)) && !json_equal(own_then, own_now))
+        return npg_error(NPG_USAGE, "the stages that the program added are not those that it had");
+    if (!is_same_file(json_object_get(then, "reference"), json_object_get(now, "reference")))
+        return npg_error(NPG_USAGE, "the reference mesh is not the one it was");
+    return compare_frames(added, json_object_get(then, "frames"), json_object_get(now, "frames"));
+}
+
+/* ---- taking up ---- */
+
+static npg_status set_from(npg_options *options, const json_t *job, const char *path)
+{
+    const char *name, *input = json_string_value(json_object_get(job, "input"));
+    json_t *value;
+    if (!input) return npg_error(NPG_USAGE, "%s names no input", path);
+    json_object_foreach(json_object_get(job, "options"), name, value)
+        NPG_TRY(npg_options_set(options, name, json_string_value(value) ? json_string_value(value) : ""));
+    return npg_options_set(options, "input", input);
+}
+
+npg_status npg_options_load_job(npg_options *options, const char *folder)
+{
+    char *path;
+    json_error_t error;
+    json_t *job = NULL;
+    int fd;
+    NPG_REQUIRE(options && folder);
+    NPG_TRY(npg_join_path(&path, folder, "job/job.json"));
+    npg_status status = npg_file_open_plain(&fd, path, NPG_USAGE);
+    if (!status) job = json_loadfd(fd, 0, &error);
+    if (fd >= 0) close(fd);
+    if (status)
+        status = npg_error(NPG_USAGE, "%s holds no job (%s)", folder, npg_error_text());
+    else
+        status = job ? set_from(options, job, path)
+                     : npg_error(NPG_USAGE, "%s holds no job (%s: %s)", folder, path, error.text);
+    if (!status) status = npg_options_set(options, "output", folder);
+    json_decref(job);
+    npg_release(&path);
+    return status;
+}

@@ -1,0 +1,267 @@
+/* Choose: drafts of the candidates and what becomes of them in the other frames. */
+#include "keyframe/choose.h"
+
+#include <math.h>
+
+#include "geometry/mesh_tools.h"
+#include "mesh/contact.h"
+#include "mesh/mesh_clean.h"
+#include "mesh/resurface.h"
+#include "pipeline/parallel.h"
+#include "pipeline/stage.h"
+
+#define DRAFT_DEPTH     7
+#define DRAFT_ROUNDS    1
+#define DRAFT_FACES     4000
+#define PIECE_SHARE     0.01 /* of the area, and units from the main piece: what belongs to the body */
+#define PIECE_DIST_UNIT 0.1
+#define STRETCHED       3.0  /* times its area in the candidate's frame */
+#define STRETCH_COST    0.2  /* unit lengths that a stretched area counts for */
+#define CONTACT_COST    0.1  /* unit lengths that a point in contact counts for */
+#define HANDLE_COST     0.05 /* share of the cost that a needless handle adds */
+#define MIDDLE_COST     0.3  /* share of the cost that the capture's whole length from the middle adds */
+#define LESS_CONTACT    0.7  /* times the contact of the best-scored frame */
+#define CLEARLY_LESS    0.97 /* of the cost of the best-scored frame */
+
+static const npg_tracker_settings draft_tracking = {
+    .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
+
+/* ---- the draft ---- */
+
+static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
+                             const npg_poisson_settings *settings)
+{
+    size_t moved, turned;
+    double spacing;
+    npg_pieces pieces;
+    int rounds;
+    npg_mending mending;
+    NPG_TRY(npg_cloud_spacing(&spacing, sight->points, sight->point_count));
+    NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, sight->points, sight->point_count,
+                                spacing, settings));
+    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
+    NPG_TRY(npg_mesh_handles(handles, *mesh));
+    NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
+    NPG_TRY(npg_mesh_mend(mesh, &mending));
+    npg_mesh *m = *mesh;
+    NPG_TRY(npg_alloc_array(&m->vert_normals, NPG_FOR_MESH, m->vert_count, 3 * sizeof(float)));
+    npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
+    return NPG_OK;
+}
+
+static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight *sight,
+                             const npg_poisson_settings *settings)
+{
+    npg_poisson_settings quick = *settings;
+    float *normals;
+    *mesh = NULL;
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    quick.rounds_max = DRAFT_ROUNDS;
+    NPG_TRY(npg_alloc_array(&normals, NPG_FOR_MESH, sight->point_count, 3 * sizeof(float)));
+    for (size_t i = 0; i < 3 * sight->point_count; i++) normals[i] = sight->normals[i];
+    npg_status status = draft_from(mesh, handles, sight, normals, &quick);
+    npg_release(&normals);
+    if (status) npg_mesh_unref(mesh);
+    return status;
+}
+
+/* ---- how it fares ---- */
+
+typedef struct faring {
+    const npg_mesh *mesh;
+    const npg_poisson_settings *settings; /* for the wish to stop */
+    double point_dist, vert_dist, stretched;
+    size_t frames;
+    float *dist; /* V, owned */
+} faring;
+
+static npg_status see(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
+{
+    faring *f = user;
+    double area = 0, stretched = 0, dist = 0;
+    if (f->settings->should_stop && f->settings->should_stop(f->settings->user))
+        return npg_error(NPG_STOPPED, "stopped while the keyframe was chosen");
+    for (size_t i = 0; i < f->mesh->face_count; i++) {
+        const uint32_t *face = f->mesh->faces + 3 * i;
+        double rest = npg_face_area(f->mesh->vert_pos, face), now = npg_face_area(vert_unit, face);
+        area += now;
+        if (now > STRETCHED * rest) stretched += now;
+    }
+    NPG_TRY(npg_points_dist(f->dist, vert_unit, f->mesh->vert_count, sight->points, sight->point_count));
+    for (size_t v = 0; v < f->mesh->vert_count; v++) dist += (double)f->dist[v];
+    f->vert_dist += dist / (double)f->mesh->vert_count;
+    f->point_dist += tracked->point_dist_mean;
+    f->stretched += area > 0 ? stretched / area : 0;
+    f->frames++;
+    return NPG_OK;
+}
+
+/* Follow the candidate's draft through the other frames. */
+static npg_status follow(npg_fare *fare, const npg_sights *sights, size_t at, npg_mesh *draft,
+                         const npg_poisson_settings *settings)
+{
+    faring f = {.mesh = draft, .settings = settings};
+    npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, draft->vert_count, sizeof *f.dist);
+    if (!status) status = npg_sights_follow(sights, at, draft, &draft_tracking, see, &f);
+    npg_release(&f.dist);
+    NPG_TRY(status);
+    fare->is_followed = true;
+    fare->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
+    fare->vert_dist_unit = f.vert_dist / fmax(1, (double)f.frames);
+    fare->stretched_share = f.stretched / fmax(1, (double)f.frames);
+    return NPG_OK;
+}
+
+/* A frame of which no surface can be made is no keyframe; that is no failure of the run. */
+static bool is_fatal(npg_status status)
+{
+    return status && status != NPG_BAD_INPUT && status != NPG_FAILED && status != NPG_DIVERGED;
+}
+
+/* ---- the choice ---- */
+
+typedef struct candidate {
+    npg_fare *fare;
+    size_t at;       /* in the sights */
+    npg_mesh *draft; /* NULL where none was needed or could be made; owned */
+} candidate;
+
+typedef struct choosing {
+    const npg_sights *sights;
+    const npg_poisson_settings *settings;
+    candidate list[NPG_CHOICE_MAX];
+    size_t count, scored; /* scored: place of the best-scored frame, count when it is not there */
+} choosing;
+
+/* Whether parts are further apart in a candidate than in another: what the choice is for.  Distances alone
+ * say little. */
+static bool is_less_touching(const npg_fare *a, const npg_fare *b)
+{
+    return a->contact < LESS_CONTACT * b->contact;
+}
+
+static bool is_more_apart(const npg_fare *a, const npg_fare *b)
+{
+    return a->handles < b->handles || is_less_touching(a, b);
+}
+
+static npg_status list_candidates(choosing *c, npg_fare *fares, int64_t best_scored)
+{
+    for (size_t i = 0; i < c->sights->count && c->count < NPG_CHOICE_MAX; i++) {
+        const npg_sight *sight = &c->sights->list[i];
+        if (!sight->is_candidate || !sight->normals) continue;
+        npg_fare *fare = &fares[c->count];
+        *fare = (npg_fare){.index = sight->index, .number = sight->number};
+        NPG_TRY(npg_cloud_contact(&fare->contact, sight->points, sight->normals, sight->point_count));
+        c->list[c->count++] = (candidate){.fare = fare, .at = i};
+    }
+    c->scored = 0;
+    while (c->scored < c->count && c->list[c->scored].fare->index != best_scored) c->scored++;
+    return NPG_OK;
+}
+
+/* What is done for several candidates at the same time. */
+typedef struct together {
+    choosing *c;
+    npg_status (*act)(choosing *c, candidate *one);
+    candidate *list[NPG_CHOICE_MAX];
+    size_t count;
+} together;
+
+static npg_status draft_one(choosing *c, candidate *one)
+{
+    return make_draft(&one->draft, &one->fare->handles, &c->sights->list[one->at], c->settings);
+}
+
+static npg_status follow_one(choosing *c, candidate *one)
+{
+    return follow(one->fare, c->sights, one->at, one->draft, c->settings);
+}
+
+static npg_status act_for_one(void *user, size_t part)
+{
+    const together *t = user;
+    npg_status status = t->act(t->c, t->list[part]);
+    return is_fatal(status)
+               ? npg_error_prefix(status, "frame %lld as a keyframe", (long long)t->list[part]->fare->number)
+               : NPG_OK;
+}
+
+static npg_status act_for_all(together *t)
+{
+    return npg_parallel(act_for_one, t, t->count);
+}
+
+/* Drafts are made only of candidates that could be more apart than the best-scored frame: a closed draft
+ * without handles has none to lose. */
+static npg_status make_drafts(choosing *c)
+{
+    candidate *scored = c->scored < c->count ? &c->list[c->scored] : NULL;
+    together first = {.c = c, .act = draft_one, .list = {scored}, .count = scored != NULL};
+    together others = {.c = c, .act = draft_one};
+    NPG_TRY(act_for_all(&first));
+    bool has_draft = scored && scored->draft, may_lose_handles = has_draft && scored->fare->handles > 0;
+    for (size_t i = 0; i < c->count; i++) {
+        bool is_wanted = !has_draft || may_lose_handles || is_less_touching(c->list[i].fare, scored->fare);
+        if (i != c->scored && is_wanted) others.list[others.count++] = &c->list[i];
+    }
+    NPG_TRY(act_for_all(&others));
+    for (size_t i = 0; i < others.count; i++)
+        if (has_draft && others.list[i]->draft && !is_more_apart(others.list[i]->fare, scored->fare))
+            npg_mesh_unref(&others.list[i]->draft);
+    return NPG_OK;
+}
+
+/* Followed is nobody when the best-scored frame is alone in the running. */
+static npg_status compare(choosing *c)
+{
+    together running = {.c = c, .act = follow_one};
+    for (size_t i = 0; i < c->count; i++)
+        if (c->list[i].draft) running.list[running.count++] = &c->list[i];
+    bool is_alone = running.count == 1 && running.list[0] == &c->list[c->scored];
+    return is_alone ? NPG_OK : act_for_all(&running);
+}
+
+static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
+{
+    int64_t fewest = INT64_MAX;
+    for (size_t i = 0; i < count; i++)
+        if (fares[i].is_followed && fares[i].handles < fewest) fewest = fares[i].handles;
+    for (size_t i = 0; i < count; i++) {
+        double off = (double)fares[i].index / (double)frame_count - 0.5;
+        if (!fares[i].is_followed) continue;
+        fares[i].cost = (fares[i].point_dist_unit + fares[i].vert_dist_unit +
+                         STRETCH_COST * fares[i].stretched_share + CONTACT_COST * fares[i].contact) *
+                        (1 + HANDLE_COST * (double)(fares[i].handles - fewest)) *
+                        (1 + MIDDLE_COST * off * off);
+    }
+}
+
+/* The best-scored frame, unless another costs clearly less (and has its parts more apart, or it would not
+ * have been followed). */
+static size_t cheapest(const npg_fare *fares, size_t count, size_t scored)
+{
+    bool has_scored = scored < count && fares[scored].is_followed;
+    size_t best = scored < count ? scored : 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!fares[i].is_followed || i == best) continue;
+        double bar = fares[best].is_followed ? fares[best].cost : (double)INFINITY;
+        if (has_scored) bar = fmin(bar, CLEARLY_LESS * fares[scored].cost);
+        if (fares[i].cost < bar) best = i;
+    }
+    return best;
+}
+
+npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
+                      int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings)
+{
+    choosing c = {.sights = sights, .settings = settings};
+    npg_status status = list_candidates(&c, fares, best_scored);
+    if (!status) status = make_drafts(&c);
+    if (!status) status = compare(&c);
+    for (size_t i = 0; i < c.count; i++) npg_mesh_unref(&c.list[i].draft);
+    *count = c.count;
+    add_up(fares, c.count, frame_count);
+    *best = cheapest(fares, c.count, c.scored);
+    return status;
+}

@@ -1,0 +1,455 @@
+/* Keyframe: finds the box of the capture, scores every frame and chooses the one whose surface becomes the
+ * reference.
+ *
+ * Based on: the keyframe selection of the Neu-PiG paper.  The score of frame t of T is the number of cells of
+ * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
+ * surface, near the middle in time.
+ *
+ * Not in the paper: the score hardly tells frames apart, so the frame it finds is only the first of several
+ * candidates (shortlist.h), of which the choosing pass takes the one whose surface fares best (choose.h).  A
+ * mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to (likeness.h). */
+#include <math.h>
+#include <string.h>
+
+#include "keyframe/likeness.h"
+#include "keyframe/look_ahead.h"
+#include "keyframe/shortlist.h"
+#include "pipeline/live_plan.h"
+
+#define GRID         512 /* cells per axis */
+#define CELL_WORDS   ((size_t)GRID * GRID * GRID / 64)
+#define BLOCK        1024 /* points turned into unit coordinates at a time */
+#define SHOWN_SCORES 5
+#define NO_NUMBER    (-1)
+
+enum { CHOICE_PAPER, CHOICE_APART };
+enum { WELDS_KEEP, WELDS_CUT };
+
+typedef struct candidate {
+    int64_t index, number;
+    size_t cell_count;
+    double score; /* with a mesh of the user's own: minus its distance from it, unit */
+} candidate;
+
+typedef struct keyframe_state {
+    int64_t number, window, overlap, look_ahead; /* options */
+    int choice, welds;                           /* options */
+    npg_shortlist shortlist;
+    double box_margin;            /* option */
+    uint64_t *cells;              /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
+    candidate best[SHOWN_SCORES]; /* best first */
+    size_t best_count;
+    npg_likeness *likeness; /* of the user's own mesh; owned */
+    candidate chosen;       /* the frame the user named */
+    bool is_chosen, is_chosen_skipped;
+    int64_t usable_count; /* frames that were not skipped                    */
+    int64_t passed_count; /* frames of the solving pass so far               */
+    npg_look_ahead held;  /* a live run's frames until it is their turn    */
+    bool is_planned;      /* live: the key is known                       */
+} keyframe_state;
+
+/* ---- measuring ---- */
+
+static bool is_finite_point(const float *point)
+{
+    return isfinite(point[0]) && isfinite(point[1]) && isfinite(point[2]);
+}
+
+static void measure_frame(keyframe_state *state, npg_facts *facts, const npg_frame *frame)
+{
+    if (frame->number < facts->number_min) facts->number_min = frame->number;
+    if (frame->number > facts->number_max) facts->number_max = frame->number;
+    if (frame->point_count > facts->point_count_max) facts->point_count_max = frame->point_count;
+    if (frame->is_skipped) return;
+    state->usable_count++;
+    for (size_t i = 0; i < frame->point_count; i++)
+        if (is_finite_point(frame->pos_local + 3 * i))
+            npg_bounds_add_points(&facts->bounds_local, frame->pos_local + 3 * i, 1);
+}
+
+static void report_box(json_t *report, const npg_facts *facts)
+{
+    const npg_frame_box *box = &facts->box;
+    json_t *lo = json_array(), *hi = json_array();
+    for (int a = 0; a < 3; a++) {
+        json_array_append_new(lo, json_real(facts->bounds_local.lo[a] + box->origin[a]));
+        json_array_append_new(hi, json_real(facts->bounds_local.hi[a] + box->origin[a]));
+    }
+    json_object_set_new(report, "box_lo", lo);
+    json_object_set_new(report, "box_hi", hi);
+    json_object_set_new(report, "box_diagonal", json_real(box->diagonal));
+    json_object_set_new(report, "point_count_max", json_integer((json_int_t)facts->point_count_max));
+}
+
+static npg_status close_measuring(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!state->usable_count)
+        return npg_error(NPG_BAD_INPUT, "no frame is left: every frame was skipped or the input has none");
+    NPG_TRY(npg_frame_box_set(&facts->box, &facts->origin, &facts->bounds_local));
+    report_box(npg_worker_report(worker), facts);
+    return NPG_OK;
+}
+
+/* ---- scoring ---- */
+
+static size_t cell_of(const float *unit)
+{
+    size_t cell = 0;
+    for (int a = 0; a < 3; a++) {
+        double at = floor(((double)unit[a] + 1) * (GRID / 2));
+        cell = cell * GRID + (size_t)fmin(fmax(at, 0), GRID - 1);
+    }
+    return cell;
+}
+
+/* Set or clear the cells of all finite points; the result is the number of bits that changed. */
+static size_t mark_cells(uint64_t *cells, const npg_frame_box *box, const npg_frame *frame, bool on)
+{
+    float unit[3 * BLOCK];
+    size_t changed = 0;
+    for (size_t first = 0; first < frame->point_count; first += BLOCK) {
+        size_t count = frame->point_count - first < BLOCK ? frame->point_count - first : BLOCK;
+        npg_box_local_to_unit(box, unit, frame->pos_local + 3 * first, count);
+        for (size_t i = 0; i < count; i++) {
+            if (!is_finite_point(unit + 3 * i)) continue;
+            size_t cell = cell_of(unit + 3 * i);
+            uint64_t bit = UINT64_C(1) << (cell % 64), *word = &cells[cell / 64];
+            changed += on ? !(*word & bit) : (*word & bit) != 0;
+            *word = on ? *word | bit : *word & ~bit;
+        }
+    }
+    return changed;
+}
+
+static bool is_better(const candidate *a, const candidate *b)
+{
+    return a->score > b->score || (a->score == b->score && a->index < b->index);
+}
+
+static void offer(keyframe_state *state, candidate new)
+{
+    size_t at = state->best_count;
+    if (at < SHOWN_SCORES)
+        state->best_count++;
+    else if (is_better(&new, &state->best[at - 1]))
+        at--;
+    else
+        return;
+    for (; at > 0 && is_better(&new, &state->best[at - 1]); at--) state->best[at] = state->best[at - 1];
+    state->best[at] = new;
+}
+
+/* The user's own mesh; "" where the reference is to be made (or no stage of the chain makes one). */
+static const char *own_mesh(const npg_worker *worker)
+{
+    const char *path = npg_options_get(npg_worker_options(worker), "reference");
+    return path ? path : "";
+}
+
+/* Whether there is a choosing pass, which takes files, and a keyframe that is neither named nor that of a
+ * mesh. */
+static bool has_candidates(const npg_worker *worker)
+{
+    const keyframe_state *state = npg_worker_state(worker);
+    return state->choice == CHOICE_APART && state->number == NO_NUMBER && !*own_mesh(worker);
+}
+
+/* A mesh of one's own has the pose of a frame: the nearest one is the keyframe. */
+static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    if (!state->likeness) {
+        NPG_TRY(npg_likeness_open(&state->likeness, own_mesh(worker), &facts->origin, &facts->box));
+        facts->own_verts = npg_likeness_vert_count(state->likeness);
+    }
+    double dist_unit;
+    NPG_TRY(npg_likeness_dist(&dist_unit, state->likeness, frame, &facts->box));
+    c->score = -dist_unit;
+    return NPG_OK;
+}
+
+static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    bool is_named = frame->number == state->number && state->number != NO_NUMBER;
+    if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
+    if (frame->is_skipped) return NPG_OK;
+    size_t cell_count = mark_cells(state->cells, &facts->box, frame, true);
+    mark_cells(state->cells, &facts->box, frame, false);
+    double from_middle = (double)frame->index - (double)frame_count / 2;
+    double score = (double)cell_count * exp(-0.001 * from_middle * from_middle);
+    candidate new = {frame->index, frame->number, cell_count, score};
+    if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &new, frame));
+    if (cell_count) offer(state, new);
+    if (is_named && cell_count && !state->is_chosen) {
+        state->chosen = new;
+        state->is_chosen = true;
+    }
+    if (facts->is_live || !has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count))
+        return NPG_OK;
+    return npg_shortlist_add(&state->shortlist, frame, cell_count);
+}
+
+static json_t *json_of(const candidate *c, bool is_by_mesh)
+{
+    json_t *json = json_pack("{sI sI sI}", "index", (json_int_t)c->index, "number", (json_int_t)c->number,
+                             "cells", (json_int_t)c->cell_count);
+    json_object_set_new(json, is_by_mesh ? "reference_dist_unit" : "score",
+                        json_real(is_by_mesh ? -c->score : c->score));
+    return json;
+}
+
+static npg_status choose(const keyframe_state *state, candidate *key)
+{
+    if (!state->best_count) return npg_error(NPG_BAD_INPUT, "no frame has a usable point");
+    *key = state->best[0];
+    if (state->number == NO_NUMBER) return NPG_OK;
+    *key = state->chosen;
+    if (state->is_chosen) return NPG_OK;
+    if (state->is_chosen_skipped)
+        return npg_error(NPG_BAD_INPUT, "keyframe %lld: this frame was skipped and can't be the keyframe",
+                         (long long)state->number);
+    return npg_error(NPG_USAGE, "keyframe %lld: no usable frame has this number", (long long)state->number);
+}
+
+static npg_status set_plan(npg_worker *worker, int64_t frame_count)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    candidate key = {0};
+    NPG_TRY(choose(state, &key));
+    int64_t window = state->window && state->window < frame_count ? state->window : frame_count;
+    int64_t overlap = window < frame_count ? state->overlap : 0;
+    facts->plan =
+        (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
+    bool is_own = *own_mesh(worker) != 0, is_named = state->number != NO_NUMBER;
+    bool cuts_welds = state->welds == WELDS_CUT && !is_own, is_open = has_candidates(worker);
+    if (!facts->is_live && frame_count > 1 && (is_open || cuts_welds)) {
+        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count, !is_open);
+        facts->choice.cut_welds = cuts_welds;
+    }
+    json_t *report = npg_worker_report(worker), *scores = json_array();
+    for (size_t i = 0; i < state->best_count; i++)
+        json_array_append_new(scores, json_of(&state->best[i], is_own));
+    json_object_set_new(report, "key", json_of(&key, is_own));
+    json_object_set_new(report, "best", scores);
+    json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
+    const char *what = is_own && !is_named                 ? "is the keyframe, nearest to the reference"
+                       : facts->choice.candidate_count > 1 ? "has the best score"
+                                                           : "is the keyframe";
+    npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.4g)", what,
+                   (long long)frame_count, key.cell_count, key.score);
+    return NPG_OK;
+}
+
+/* ---- solving pass, from files ---- */
+
+static npg_status mark_key(npg_worker *worker, npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    int64_t key = npg_worker_facts(worker)->plan.key;
+    bool is_first = state->passed_count++ == 0 && !npg_worker_facts(worker)->is_resumed;
+    frame->is_key = frame->index == key;
+    frame->fields |= NPG_FIELD_KEY;
+    if (is_first != frame->is_key)
+        return npg_error(NPG_FAILED, "frame %lld came %s the keyframe (index %lld) of the solving pass",
+                         (long long)frame->index, is_first ? "before" : "again as", (long long)key);
+    if (frame->is_key && frame->is_skipped)
+        return npg_error(NPG_BAD_INPUT, "%s: the keyframe could be read before but not any more",
+                         frame->path ? frame->path : "frame");
+    return NPG_OK;
+}
+
+/* ---- solving pass of a live run: hold the look-ahead, then pass on in the plan's order ---- */
+
+/* The source goes on: what comes later needs room, too. */
+static void widen_box(const keyframe_state *state, npg_bounds *bounds)
+{
+    double longest = 0;
+    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds->hi[a] - bounds->lo[a]);
+    for (int a = 0; a < 3; a++) {
+        bounds->lo[a] -= state->box_margin / 100 * longest;
+        bounds->hi[a] += state->box_margin / 100 * longest;
+    }
+}
+
+static npg_status refuse_one_window(const keyframe_state *state)
+{
+    return npg_error(NPG_USAGE,
+                     "the live capture is longer than the look-ahead of %lld frames, and one window over all "
+                     "frames needs all of them: set the option window, raise look-ahead (each frame is held "
+                     "in memory), or write the frames to files and give those as input",
+                     (long long)state->look_ahead);
+}
+
+/* Box, keyframe and plan from the frames held.  is_open: the source goes on behind them. */
+static npg_status plan_live(npg_worker *worker, bool is_open)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    int64_t frame_count = npg_look_ahead_frame_count(&state->held);
+    double diagonal = npg_bounds_diagonal(&facts->bounds_local); /* figures don't depend on the margin */
+    if (is_open && !state->window) return refuse_one_window(state);
+    if (is_open && state->usable_count) widen_box(state, &facts->bounds_local);
+    NPG_TRY(close_measuring(worker));
+    facts->box.diagonal = diagonal;
+    if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
+    for (size_t i = 0; i < state->held.count; i++)
+        NPG_TRY(score_frame(worker, frame_count, &state->held.frames[i]));
+    npg_status status = set_plan(worker, frame_count);
+    if (status && is_open)
+        return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
+    NPG_TRY(status);
+    if (is_open)
+        facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
+                                 .key = facts->plan.key,
+                                 .window = state->window,
+                                 .overlap = state->overlap};
+    json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
+    state->is_planned = true;
+    npg_release(&state->cells);
+    npg_worker_announce_memory(worker);
+    return NPG_OK;
+}
+
+/* Facts may not change behind the plan: other stages read them. */
+static npg_status take_live(npg_worker *worker, npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    size_t limit = (size_t)state->look_ahead;
+    if (!state->is_planned && state->held.count < limit) {
+        measure_frame(state, npg_worker_facts(worker), frame);
+        return npg_look_ahead_add(&state->held, frame);
+    }
+    if (!state->is_planned) NPG_TRY(plan_live(worker, true));
+    npg_look_ahead_watch(worker, &state->held, frame);
+    NPG_TRY(npg_look_ahead_add(&state->held, frame));
+    return npg_look_ahead_release(worker, &state->held, limit + (size_t)state->window, false);
+}
+
+static npg_status end_live(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (!state->is_planned) NPG_TRY(plan_live(worker, false));
+    json_object_set_new(npg_worker_report(worker), "windows",
+                        json_integer((json_int_t)npg_live_window_count(&facts->plan, facts->frame_count)));
+    npg_look_ahead_tell_outside(worker, &state->held);
+    return npg_look_ahead_release(worker, &state->held, 0, true);
+}
+
+/* ---- the stage ---- */
+
+static npg_status init(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    if (state->window && state->overlap >= state->window)
+        return npg_error(NPG_USAGE, "option overlap: %lld frames don't fit in windows of %lld",
+                         (long long)state->overlap, (long long)state->window);
+    if (pass == NPG_PASS_MEASURE || (pass == NPG_PASS_SOLVE && facts->is_live)) {
+        facts->bounds_local = npg_bounds_empty();
+        facts->point_count_max = 0;
+        facts->number_min = INT64_MAX;
+        facts->number_max = INT64_MIN;
+    }
+    if (pass == NPG_PASS_SCORE || (pass == NPG_PASS_SOLVE && facts->is_live))
+        NPG_TRY(npg_alloc_array(&state->cells, NPG_FOR_RUN, CELL_WORDS, sizeof *state->cells));
+    return NPG_OK;
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        if (pass == NPG_PASS_MEASURE)
+            measure_frame(state, facts, frame);
+        else if (pass == NPG_PASS_SCORE)
+            NPG_TRY(score_frame(worker, facts->frame_count, frame));
+        else
+            NPG_TRY(facts->is_live ? take_live(worker, frame) : mark_key(worker, frame));
+    }
+    if (pass == NPG_PASS_SOLVE && facts->is_live) npg_chunk_unref(chunk);
+    return NPG_OK;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    npg_facts *facts = npg_worker_facts(worker);
+    switch (npg_worker_pass(worker)) {
+    case NPG_PASS_MEASURE: return close_measuring(worker);
+    case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
+    case NPG_PASS_CHOOSE:
+    case NPG_PASS_SOLVE: break;
+    }
+    return facts->is_live ? end_live(worker) : NPG_OK;
+}
+
+static void uninit(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_look_ahead_clear(&state->held);
+    npg_likeness_close(&state->likeness);
+    npg_release(&state->cells);
+}
+
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const keyframe_state *state = npg_worker_state(worker);
+    if (!npg_worker_facts(worker)->is_live) return 0;
+    int64_t per_chunk = npg_worker_settings(worker)->chunk_frames;
+    *chunks_held =
+        (size_t)((state->look_ahead + per_chunk - 1) / per_chunk) + 1; /* live chunks hold a frame */
+    return CELL_WORDS * sizeof(uint64_t);
+}
+
+#define OFFSET(member) offsetof(keyframe_state, member)
+
+static const npg_option options[] = {
+    {"keyframe",
+     "Number of the frame whose surface is the reference, as in the file names; -1: by score, or, with a "
+     "reference of one's own, the frame that it is nearest to",
+     NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
+    {"keyframe-choice",
+     "Take the frame with the best score (paper), or the one of several good frames whose surface fares best "
+     "in the "
+     "others, so that limbs which touch in one frame are not joined for the whole capture (apart; not for "
+     "live runs)",
+     NPG_OPTION_CHOICE, OFFSET(choice), "apart", 0, 0, "paper|apart", NULL},
+    {"welds",
+     "Surface of the reference that other frames stretch far from all points: cut it and close the holes, or "
+     "keep it "
+     "(live runs keep it)",
+     NPG_OPTION_CHOICE, OFFSET(welds), "cut", 0, 0, "keep|cut", NULL},
+    {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
+     OFFSET(window), "24", 0, 1e6, NULL, NULL},
+    {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
+     1e6, NULL, NULL},
+    {"look-ahead", "Live runs: frames that are held while box and keyframe are chosen among them",
+     NPG_OPTION_INT, OFFSET(look_ahead), "64", 1, 1e6, NULL, NULL},
+    {"box-margin",
+     "Live runs that go on behind the look-ahead: room left around its box, in per cent of its longest side",
+     NPG_OPTION_REAL, OFFSET(box_margin), "10", 0, 1000, NULL, "PERCENT"},
+    {0}};
+
+extern const npg_stage npg_stage_keyframe;
+const npg_stage npg_stage_keyframe = {.name = "keyframe",
+                                      .help = "Find the capture's box and choose the keyframe",
+                                      .options = options,
+                                      .state_size = sizeof(keyframe_state),
+                                      .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_SOLVE,
+                                      .needs = NPG_FIELD_POINTS,
+                                      .gives = NPG_FIELD_KEY,
+                                      .init = init,
+                                      .process = process,
+                                      .flush = flush,
+                                      .uninit = uninit,
+                                      .memory = memory};

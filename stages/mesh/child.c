@@ -1,0 +1,240 @@
+/* Child: run a helper program with bytes in, bytes out, a time limit and a way to stop it. */
+#include "mesh/child.h"
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "pipeline/clock.h"
+#include "pipeline/memory.h"
+
+extern char **environ;
+
+#define POLL_MS 100
+
+typedef struct child {
+    const npg_child_job *job;
+    pid_t pid;
+    int in, out, words; /* our ends; -1: closed */
+    size_t sent;
+    size_t capacity;
+    size_t word_count;
+    npg_child_result *result;
+} child;
+
+/* ---- where the program is ---- */
+
+static const char library_mark[] = "an address in this library";
+
+static bool is_program(const char *path)
+{
+    return access(path, X_OK) == 0;
+}
+
+/* Beside a file (a build folder), or where an installation puts the helpers: PREFIX/libexec/neupig, seen from
+ * PREFIX/bin, PREFIX/lib or PREFIX/lib/<machine>. */
+static bool find_near(char path[4096], const char *file, const char *name)
+{
+    static const char *const ways[] = {"", "../libexec/neupig/", "../../libexec/neupig/"};
+    const char *slash = strrchr(file, '/');
+    for (size_t i = 0; slash && i < sizeof ways / sizeof *ways; i++) {
+        int length = snprintf(path, 4096, "%.*s%s%s", (int)(slash - file + 1), file, ways[i], name);
+        if (length < 4096 && is_program(path)) return true;
+    }
+    return false;
+}
+
+/* Beside this program, or beside the shared library that this code lies in: what was installed can be moved,
+ * and the program may be anybody's. */
+static npg_status find_program(char path[4096], const char *name)
+{
+    char self[PATH_MAX];
+    Dl_info library = {.dli_fname = NULL};
+    snprintf(path, 4096, "%s", name);
+    if (*name == '/') return is_program(name) ? NPG_OK : npg_error(NPG_FAILED, "%s is no program", name);
+    ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    self[length > 0 ? length : 0] = 0;
+    if (find_near(path, self, name)) return NPG_OK;
+    if (dladdr(library_mark, &library) && library.dli_fname && find_near(path, library.dli_fname, name))
+        return NPG_OK;
+    snprintf(path, 4096, "%s/%s", NPG_LIBEXEC_DIR, name);
+    if (is_program(path)) return NPG_OK;
+    return npg_error(NPG_FAILED, "the helper program %s is neither beside %s nor beside %s nor in %s", name,
+                     self, library.dli_fname ? library.dli_fname : "the library", NPG_LIBEXEC_DIR);
+}
+
+/* ---- start ---- */
+
+static void close_end(int *fd)
+{
+    if (*fd >= 0) close(*fd);
+    *fd = -1;
+}
+
+/* Signals that the host blocks or ignores must not change what the child does. */
+static npg_status spawn(child *c, const char *path, int in, int out, int words)
+{
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    sigset_t none, all;
+    char *arguments[] = {(char *)(uintptr_t)path, NULL};
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    posix_spawn_file_actions_adddup2(&actions, in, 0);
+    posix_spawn_file_actions_adddup2(&actions, out, 1);
+    posix_spawn_file_actions_adddup2(&actions, words, 2);
+    posix_spawn_file_actions_addclosefrom_np(&actions, 3);
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setsigdefault(&attributes, &all);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    int error = posix_spawn(&c->pid, path, &actions, &attributes, arguments, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    errno = error;
+    return error ? npg_error_errno(NPG_FAILED, "can't start %s", path) : NPG_OK;
+}
+
+/* Sockets instead of pipes: a write to a dead child must not raise SIGPIPE in the host. */
+static npg_status start(child *c, const char *path)
+{
+    int in[2] = {-1, -1}, out[2] = {-1, -1}, words[2] = {-1, -1};
+    npg_status status = NPG_OK;
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) || pipe2(out, O_CLOEXEC) ||
+        pipe2(words, O_CLOEXEC))
+        status = npg_error_errno(NPG_FAILED, "can't make a pipe to %s", path);
+    if (!status) status = spawn(c, path, in[1], out[1], words[1]);
+    close_end(&in[1]);
+    close_end(&out[1]);
+    close_end(&words[1]);
+    c->in = in[0];
+    c->out = out[0];
+    c->words = words[0];
+    if (status) return status;
+    fcntl(c->in, F_SETFL, O_NONBLOCK);
+    fcntl(c->out, F_SETFL, O_NONBLOCK);
+    fcntl(c->words, F_SETFL, O_NONBLOCK);
+    return NPG_OK;
+}
+
+/* ---- talk ---- */
+
+static void send_some(child *c)
+{
+    const npg_child_job *job = c->job;
+    size_t first = job->input_size[0], part = c->sent >= first, skip = part ? c->sent - first : c->sent;
+    size_t left = job->input_size[part] - skip;
+    ssize_t put = left ? send(c->in, (const char *)job->input[part] + skip, left, MSG_NOSIGNAL) : 0;
+    if (put > 0) c->sent += (size_t)put;
+    bool broken = put < 0 && errno != EAGAIN && errno != EINTR;
+    if (broken || c->sent == first + job->input_size[1]) close_end(&c->in);
+}
+
+static npg_status receive_some(child *c)
+{
+    npg_child_result *r = c->result;
+    if (c->capacity - r->output_size < 65536)
+        NPG_TRY(npg_grow(&r->output, &c->capacity, r->output_size + 65536, 1, NPG_FOR_MESH));
+    ssize_t got = read(c->out, r->output + r->output_size, c->capacity - r->output_size);
+    if (got > 0) r->output_size += (size_t)got;
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) close_end(&c->out);
+    if (r->output_size > c->job->output_max)
+        return npg_error(NPG_FAILED, "%s answers with more than %zu bytes", c->job->program,
+                         c->job->output_max);
+    return NPG_OK;
+}
+
+/* Keeps the end of what is said. */
+static void hear_some(child *c)
+{
+    char text[256], *kept = c->result->words;
+    size_t room = sizeof c->result->words - 1;
+    ssize_t got = read(c->words, text, sizeof text);
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) close_end(&c->words);
+    for (ssize_t i = 0; i < got; i++) {
+        if (c->word_count == room) memmove(kept, kept + 1, --c->word_count);
+        kept[c->word_count++] = text[i];
+    }
+}
+
+static npg_status talk(child *c)
+{
+    double end_s = npg_clock_s() + c->job->time_limit_s;
+    while (c->out >= 0 || c->words >= 0) {
+        struct pollfd ends[3] = {{c->in, POLLOUT, 0}, {c->out, POLLIN, 0}, {c->words, POLLIN, 0}};
+        poll(ends, 3, POLL_MS);
+        if (c->job->should_stop && c->job->should_stop(c->job->user)) return NPG_STOPPED;
+        if (npg_clock_s() > end_s)
+            return npg_error(NPG_FAILED, "%s was not done after %g s and was stopped", c->job->program,
+                             c->job->time_limit_s);
+        if (ends[0].revents) send_some(c);
+        if (ends[1].revents) NPG_TRY(receive_some(c));
+        if (ends[2].revents) hear_some(c);
+    }
+    return NPG_OK;
+}
+
+/* ---- end ---- */
+
+static void keep_last_line(char *words)
+{
+    size_t length = strlen(words);
+    while (length && (words[length - 1] == '\n' || words[length - 1] == '\r')) words[--length] = 0;
+    char *line = strrchr(words, '\n');
+    if (line) memmove(words, line + 1, strlen(line));
+}
+
+static npg_status judge(const child *c, int how)
+{
+    const char *program = c->job->program, *words = c->result->words;
+    if (WIFEXITED(how) && WEXITSTATUS(how) == 0) return NPG_OK;
+    if (WIFSIGNALED(how))
+        return npg_error(NPG_FAILED, "%s was killed by signal %d (%s)%s%s", program, WTERMSIG(how),
+                         strsignal(WTERMSIG(how)), *words ? ": " : "", words);
+    return npg_error(WEXITSTATUS(how) == 6 ? NPG_MEMORY : NPG_FAILED, "%s ended with exit code %d%s%s",
+                     program, WEXITSTATUS(how), *words ? ": " : "", words);
+}
+
+/* A host that ignores SIGCHLD gets no exit status: then the answer's own end mark must do. */
+static npg_status finish(child *c, npg_status status)
+{
+    int how = 0;
+    pid_t pid;
+    close_end(&c->in);
+    close_end(&c->out);
+    close_end(&c->words);
+    if (status) kill(c->pid, SIGKILL);
+    do pid = waitpid(c->pid, &how, 0);
+    while (pid < 0 && errno == EINTR);
+    keep_last_line(c->result->words);
+    return status || pid < 0 ? status : judge(c, how);
+}
+
+npg_status npg_child_run(npg_child_result *result, const npg_child_job *job)
+{
+    char path[4096];
+    child c = {.job = job, .in = -1, .out = -1, .words = -1, .result = result};
+    memset(result, 0, sizeof *result);
+    NPG_TRY(find_program(path, job->program));
+    npg_status status = start(&c, path);
+    if (!status) {
+        status = finish(&c, talk(&c));
+    } else {
+        close_end(&c.in);
+        close_end(&c.out);
+        close_end(&c.words);
+    }
+    if (status) npg_release(&result->output);
+    return status;
+}

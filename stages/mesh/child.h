@@ -1,0 +1,33 @@
+/* Child: run a helper program with bytes in, bytes out, a time limit and a way to stop it. */
+#ifndef NPG_CHILD_H
+#define NPG_CHILD_H
+
+#include <stdbool.h>
+
+#include "pipeline/status.h"
+
+typedef struct npg_child_job {
+    const char *program;  /* name of the helper, "neupig-poisson", or an absolute path; a name is looked for
+                             beside this program and this library, in their ../libexec/neupig (or
+                             ../../libexec/neupig), and where it was to be installed */
+    const void *input[2]; /* written one after the other, then standard input is closed */
+    size_t input_size[2];
+    size_t output_max; /* more output than this is a failure */
+    double time_limit_s;
+    bool (*should_stop)(void *user); /* asked several times a second; may be NULL */
+    void *user;
+} npg_child_job;
+
+typedef struct npg_child_result {
+    uint8_t *output; /* owned by the caller: npg_release */
+    size_t output_size;
+    char words[400]; /* the last line on standard error, "" if none */
+} npg_child_result;
+
+/* Run to the end.  NPG_OK: exit code 0.  NPG_MEMORY: exit code 6.  NPG_STOPPED: should_stop said so.
+ * NPG_FAILED says: not found, exit code, signal, or time limit (the child is then killed), with the child's
+ * last words.  No process, descriptor or signal is left behind; the caller's SIGPIPE setting does not matter.
+ * Threads: any number at a time. */
+npg_status npg_child_run(npg_child_result *result, const npg_child_job *job);
+
+#endif

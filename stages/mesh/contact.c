@@ -1,0 +1,68 @@
+/* Contact: pairs of points that face each other. */
+#include "mesh/contact.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/kdtree.h"
+#include "pipeline/memory.h"
+
+#define POINTS_MOST 5000
+#define NEIGHBOURS  24
+#define AGAINST     (-0.3f) /* cosine of two normals that face each other */
+#define ACROSS      0.5f    /* cosine of a normal and the way across the gap */
+
+bool npg_points_face(const float *p, const float *n, const float *q, const float *m)
+{
+    float d[3], along_n = 0, along_m = 0, cosine = 0, length = 0;
+    for (int a = 0; a < 3; a++) {
+        d[a] = q[a] - p[a];
+        length += d[a] * d[a];
+        along_n += d[a] * n[a];
+        along_m += d[a] * m[a];
+        cosine += n[a] * m[a];
+    }
+    length = sqrtf(length);
+    return cosine < AGAINST && along_n > ACROSS * length && along_m < -ACROSS * length;
+}
+
+static void thin(float *out, const float *in, size_t kept, size_t count)
+{
+    for (size_t i = 0; i < kept; i++) memcpy(out + 3 * i, in + 3 * (i * count / kept), 3 * sizeof(float));
+}
+
+npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count)
+{
+    npg_kdtree *tree = NULL;
+    float *p = NULL, *n = NULL, *dist_sq = NULL;
+    uint32_t *near = NULL;
+    npg_status status;
+    size_t count = point_count < POINTS_MOST ? point_count : POINTS_MOST, facing = 0;
+    *share = 0;
+    NPG_REQUIRE(count);
+    NPG_TRY_OR(done, status, npg_alloc_array(&p, NPG_FOR_QUERY, count, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&n, NPG_FOR_QUERY, count, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&near, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(uint32_t)));
+    thin(p, points, count, point_count);
+    thin(n, normals, count, point_count);
+    NPG_TRY_OR(done, status, npg_kdtree_open(&tree, p, count));
+    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, near, dist_sq, p, count, NEIGHBOURS, 0));
+    for (size_t i = 0; i < count; i++) {
+        size_t k = 0;
+        while (k < NEIGHBOURS) {
+            size_t j = near[NEIGHBOURS * i + k];
+            if (j < count && npg_points_face(p + 3 * i, n + 3 * i, p + 3 * j, n + 3 * j)) break;
+            k++;
+        }
+        facing += k < NEIGHBOURS;
+    }
+    *share = (double)facing / (double)count;
+done:
+    npg_kdtree_close(&tree);
+    npg_release(&p);
+    npg_release(&n);
+    npg_release(&dist_sq);
+    npg_release(&near);
+    return status;
+}

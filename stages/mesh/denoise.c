@@ -1,0 +1,183 @@
+/* Denoise: how noisy a cloud is, and a smoother version of an oriented one. */
+#include "mesh/denoise.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/kdtree.h"
+#include "outlier/normals.h"
+#include "pipeline/memory.h"
+
+#define BATCH       4096
+#define NEAR        8
+#define WIDE        24
+#define ASKED_MAX   4000
+#define TERMS       6
+#define SIDE_COS    0.3f /* neighbours whose normal is nearer than this belong to the same sheet */
+#define SUPPORT_MIN 9    /* neighbours of the same sheet that a quadric takes */
+
+/* ---- noise ---- */
+
+/* Mean squared distance of the first k of a point's neighbours to their own best plane, without bias. */
+static double plane_residual(const float *points, const uint32_t *index, size_t k)
+{
+    float normal[3], around[3 * WIDE];
+    double mean[3] = {0}, sum = 0;
+    for (size_t i = 0; i < k; i++)
+        for (size_t a = 0; a < 3; a++) {
+            around[3 * i + a] = points[3 * (size_t)index[i] + a];
+            mean[a] += (double)around[3 * i + a] / (double)k;
+        }
+    npg_normal_of(normal, around, k);
+    for (size_t i = 0; i < k; i++) {
+        double off = 0;
+        for (size_t a = 0; a < 3; a++) off += (double)normal[a] * ((double)around[3 * i + a] - mean[a]);
+        sum += off * off;
+    }
+    return sum / (double)(k - 3);
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+npg_status npg_cloud_noise(double *sigma, const float *points, size_t n)
+{
+    npg_kdtree *tree = NULL;
+    uint32_t index[WIDE];
+    float dist_sq[WIDE];
+    double *near = NULL, *wide = NULL;
+    npg_status status;
+    size_t asked = n < ASKED_MAX ? n : ASKED_MAX;
+    *sigma = 0;
+    if (n < WIDE) return NPG_OK;
+    NPG_TRY(npg_kdtree_open(&tree, points, n));
+    NPG_TRY_OR(done, status, npg_alloc_array(&near, NPG_FOR_FRAMES, asked, sizeof *near));
+    NPG_TRY_OR(done, status, npg_alloc_array(&wide, NPG_FOR_FRAMES, asked, sizeof *wide));
+    for (size_t i = 0; i < asked; i++) {
+        const float *p = points + 3 * (n * i / asked);
+        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, p, 1, WIDE, 1));
+        near[i] = plane_residual(points, index, NEAR);
+        wide[i] = plane_residual(points, index, WIDE);
+    }
+    qsort(near, asked, sizeof *near, by_value);
+    qsort(wide, asked, sizeof *wide, by_value);
+    /* residual = sigma^2 + c k^2, at two k */
+    double ratio = (double)(WIDE * WIDE) / (NEAR * NEAR);
+    double noise = (ratio * near[asked / 2] - wide[asked / 2]) / (ratio - 1);
+    *sigma = noise > 0 ? sqrt(noise) : 0;
+done:
+    npg_kdtree_close(&tree);
+    npg_release(&near);
+    npg_release(&wide);
+    return status;
+}
+
+/* ---- smooth ---- */
+
+/* Solve the symmetric system in place by Cholesky; false when it is singular. */
+static bool solve(double m[TERMS][TERMS], double b[TERMS])
+{
+    for (int i = 0; i < TERMS; i++) {
+        double scale = m[i][i];
+        for (int k = 0; k < i; k++) m[i][i] -= m[i][k] * m[i][k];
+        if (!(m[i][i] > 1e-9 * scale)) return false;
+        m[i][i] = sqrt(m[i][i]);
+        for (int j = i + 1; j < TERMS; j++) {
+            for (int k = 0; k < i; k++) m[j][i] -= m[i][k] * m[j][k];
+            m[j][i] /= m[i][i];
+        }
+    }
+    for (int i = 0; i < TERMS; i++) {
+        for (int k = 0; k < i; k++) b[i] -= m[i][k] * b[k];
+        b[i] /= m[i][i];
+    }
+    for (int i = TERMS - 1; i >= 0; i--) {
+        for (int k = i + 1; k < TERMS; k++) b[i] -= m[k][i] * b[k];
+        b[i] /= m[i][i];
+    }
+    return true;
+}
+
+/* Two unit vectors that span the plane across n. */
+static void span_plane(double x[3], double y[3], const float n[3])
+{
+    int least = fabsf(n[0]) < fabsf(n[1]) ? 0 : 1;
+    if (fabsf(n[2]) < fabsf(n[least])) least = 2;
+    double axis[3] = {least == 0, least == 1, least == 2}, length = 0;
+    for (int i = 0; i < 3; i++)
+        x[i] = axis[(i + 1) % 3] * (double)n[(i + 2) % 3] - axis[(i + 2) % 3] * (double)n[(i + 1) % 3];
+    for (int i = 0; i < 3; i++) length += x[i] * x[i];
+    for (int i = 0; i < 3; i++) x[i] /= sqrt(length);
+    for (int i = 0; i < 3; i++)
+        y[i] = (double)n[(i + 1) % 3] * x[(i + 2) % 3] - (double)n[(i + 2) % 3] * x[(i + 1) % 3];
+}
+
+/* The quadric's height and slope at the point itself, from the neighbours of its side. */
+static void fit(float *out_point, float *out_normal, size_t i, const float *points, const float *normals,
+                const uint32_t *index, const float *dist_sq, size_t k)
+{
+    const float *p = points + 3 * i, *n = normals + 3 * i;
+    double x[3], y[3], m[TERMS][TERMS] = {{0}}, b[TERMS] = {0}, r = sqrt((double)dist_sq[k - 1]);
+    size_t support = 0;
+    span_plane(x, y, n);
+    for (size_t j = 0; j < k && r > 0; j++) {
+        const float *q = points + 3 * (size_t)index[j], *o = normals + 3 * (size_t)index[j];
+        if (n[0] * o[0] + n[1] * o[1] + n[2] * o[2] < SIDE_COS) continue;
+        double u = 0, v = 0, h = 0, weight = exp(-2 * (double)dist_sq[j] / (r * r));
+        for (int a = 0; a < 3; a++) {
+            double d = ((double)q[a] - (double)p[a]) / r;
+            u += d * x[a];
+            v += d * y[a];
+            h += d * (double)n[a];
+        }
+        const double terms[TERMS] = {1, u, v, u * u, u * v, v * v};
+        for (int s = 0; s < TERMS; s++) {
+            b[s] += weight * terms[s] * h;
+            for (int t = 0; t < TERMS; t++) m[s][t] += weight * terms[s] * terms[t];
+        }
+        support++;
+    }
+    memcpy(out_point, p, 3 * sizeof *p);
+    memcpy(out_normal, n, 3 * sizeof *n);
+    if (support < SUPPORT_MIN || !solve(m, b) || !(fabs(b[0]) < 0.5)) return;
+    double length = sqrt(1 + b[1] * b[1] + b[2] * b[2]);
+    for (int a = 0; a < 3; a++) {
+        out_point[a] = (float)((double)p[a] + r * b[0] * (double)n[a]);
+        out_normal[a] = (float)(((double)n[a] - b[1] * x[a] - b[2] * y[a]) / length);
+    }
+}
+
+npg_status npg_cloud_smooth(float *points, float *normals, size_t n, int neighbours)
+{
+    npg_kdtree *tree = NULL;
+    uint32_t *index = NULL;
+    float *dist_sq = NULL, *new_points = NULL, *new_normals = NULL;
+    npg_status status;
+    size_t k = (size_t)neighbours < n ? (size_t)neighbours : n;
+    NPG_TRY(npg_kdtree_open(&tree, points, n));
+    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index));
+    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq));
+    NPG_TRY_OR(done, status, npg_alloc_array(&new_points, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&new_normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
+    for (size_t first = 0; first < n; first += BATCH) {
+        size_t count = n - first < BATCH ? n - first : BATCH;
+        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0));
+        for (size_t i = 0; i < count; i++)
+            fit(new_points + 3 * (first + i), new_normals + 3 * (first + i), first + i, points, normals,
+                index + k * i, dist_sq + k * i, k);
+    }
+    memcpy(points, new_points, n * 3 * sizeof *points);
+    memcpy(normals, new_normals, n * 3 * sizeof *normals);
+done:
+    npg_kdtree_close(&tree);
+    npg_release(&index);
+    npg_release(&dist_sq);
+    npg_release(&new_points);
+    npg_release(&new_normals);
+    return status;
+}

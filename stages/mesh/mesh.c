@@ -1,0 +1,557 @@
+/* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
+ * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
+#include <math.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "ingest/formats/reader.h"
+#include "keyframe/choose.h"
+#include "mesh/denoise.h"
+#include "mesh/mesh_clean.h"
+#include "mesh/resurface.h"
+#include "mesh/vdb.h"
+#include "mesh/weld.h"
+#include "pipeline/clock.h"
+#include "pipeline/stage.h"
+
+#define POINTS_MAX        80000
+#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
+#define SMOOTH_NEIGHBOURS 24
+#define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
+#define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
+#define PIECE_SHARE       0.01 /* of the area */
+#define PIECE_DIST        0.1  /* in diagonals */
+#define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
+#define REBUILD_AREA_MIN  0.8  /* of the area; less is not the same surface */
+#define REBUILD_VOXELS    384  /* along the longest side of the unit box */
+
+enum { UNSEEN_AUTO, UNSEEN_KEEP, UNSEEN_TRIM };
+enum { PIECES_NEAR, PIECES_MAIN };
+enum { MESHER_POISSON, MESHER_VDB };
+
+typedef struct mesh_state {
+    const char *reference;
+    int mesher, unseen, pieces;
+    int64_t depth, face_max, time_limit_s, memory_limit_mib;
+    double point_weight, trim, invented_max;
+    int apart; /* npg_apart_way */
+    bool smooth;
+} mesh_state;
+
+#define OFFSET(member) offsetof(mesh_state, member)
+
+static const npg_option mesh_options[] = {
+    {"reference", "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one",
+     NPG_OPTION_TEXT, OFFSET(reference), "", 0, 0, NULL, "FILE"},
+    {"mesher",
+     "How the keyframe's surface is made: Poisson, or Poisson taken through an OpenVDB level set (even "
+     "triangles, no self-contact)",
+     NPG_OPTION_CHOICE, OFFSET(mesher), "poisson", 0, 0, "poisson|vdb", NULL},
+    {"poisson-depth", "Depth of the Poisson octree", NPG_OPTION_INT, OFFSET(depth), "10", 4, 13, NULL, NULL},
+    {"poisson-weight", "How closely the Poisson surface follows the points", NPG_OPTION_REAL,
+     OFFSET(point_weight), "10", 0, 1000, NULL, NULL},
+    {"poisson-time", "Stop the reconstruction after this many seconds", NPG_OPTION_INT, OFFSET(time_limit_s),
+     "600", 1, 1e6, NULL, "SECONDS"},
+    {"poisson-memory", "Address space the reconstruction may use", NPG_OPTION_INT, OFFSET(memory_limit_mib),
+     "8192", 64, 1e7, NULL, "MIB"},
+    {"pieces",
+     "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, within a "
+     "tenth of the diagonal), or the main one alone",
+     NPG_OPTION_CHOICE, OFFSET(pieces), "near", 0, 0, "near|main", NULL},
+    {"smooth", "Smooth the keyframe's points for the reconstruction when they are noisy", NPG_OPTION_FLAG,
+     OFFSET(smooth), "yes", 0, 0, NULL, NULL},
+    {"hold-apart",
+     "Hold parts that nearly touch apart while the surface is made, so that they are not joined; after that "
+     "bring it back to its points (tight), or nearly so, which leaves a little of the gap (loose)",
+     NPG_OPTION_CHOICE, OFFSET(apart), "tight", 0, 0, "tight|loose|no", NULL},
+    {"faces", "Faces of the reference mesh at most (and no more than 4 per point)", NPG_OPTION_INT,
+     OFFSET(face_max), "20000", 16, 1e8, NULL, NULL},
+    {"trim",
+     "Drop surface farther than this from every point of the keyframe, in diagonals of the keyframe's box",
+     NPG_OPTION_REAL, OFFSET(trim), "0.15", 0.001, 100, NULL, "SHARE"},
+    {"unseen",
+     "Surface without points near it (holes, the far side of a single view): keep it, trim it, or trim it "
+     "when "
+     "it is more than a quarter of the area; it is reported in any case",
+     NPG_OPTION_CHOICE, OFFSET(unseen), "auto", 0, 0, "auto|keep|trim", NULL},
+    {"max-invented",
+     "The reference is good when at most this share of its area is surface that no point of the keyframe saw "
+     "and that was kept, in per cent; above it the run ends with exit code 7",
+     NPG_OPTION_REAL, OFFSET(invented_max), "10", 0, 100, NULL, "PERCENT"},
+    {0}};
+
+#define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
+
+typedef struct making { /* what is known while the reference is made */
+    npg_worker *worker;
+    const mesh_state *state;
+    const npg_frame *frame;
+    size_t count;    /* N, of the points used */
+    float *points;   /* N x 3, unit, owned */
+    float *normals;  /* N x 3 or NULL, owned */
+    double spacing;  /* of the points */
+    double diagonal; /* of the points */
+    double invented; /* share of the mesh that no point saw, once it is trimmed */
+    npg_mesh *mesh;  /* owned */
+} making;
+
+/* ---- report ---- */
+
+static void note(making *m, const char *key, double value)
+{
+    json_object_set_new(npg_worker_report(m->worker), key, json_real(value));
+}
+
+static void note_count(making *m, const char *key, size_t value)
+{
+    json_object_set_new(npg_worker_report(m->worker), key, json_integer((json_int_t)value));
+}
+
+static bool should_stop(void *worker)
+{
+    return npg_worker_stopping(worker);
+}
+
+/* ---- steps ---- */
+
+/* The points to reconstruct from, in unit coordinates, with their normals.  Frames with more than POINTS_MAX
+ * give an even choice: the face budget could not hold more detail, and Poisson's time goes with the points.
+ */
+static npg_status take_points(making *m)
+{
+    const npg_frame *frame = m->frame;
+    size_t n = frame->point_count;
+    m->count = n < POINTS_MAX ? n : POINTS_MAX;
+    NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    for (size_t i = 0; i < m->count; i++) {
+        size_t from = (size_t)((uint64_t)n * i / m->count);
+        memcpy(m->points + 3 * i, frame->pos_local + 3 * from, 3 * sizeof(float));
+        if (m->normals) memcpy(m->normals + 3 * i, frame->normals + 3 * from, 3 * sizeof(float));
+    }
+    npg_box_local_to_unit(&npg_worker_facts(m->worker)->box, m->points, m->points, m->count);
+    return NPG_OK;
+}
+
+static npg_status measure_points(making *m)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, m->points, m->count);
+    m->diagonal = npg_bounds_diagonal(&bounds);
+    note_count(m, "points", m->frame->point_count);
+    note_count(m, "points_used", m->count);
+    NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->count));
+    note(m, "point_spacing_unit", m->spacing);
+    return NPG_OK;
+}
+
+static npg_poisson_settings poisson_settings(npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    return (npg_poisson_settings){.depth = (int)s->depth,
+                                  .point_weight = s->point_weight,
+                                  .apart = (npg_apart_way)s->apart,
+                                  .time_limit_s = (double)s->time_limit_s,
+                                  .memory_limit = (size_t)s->memory_limit_mib << 20,
+                                  .should_stop = should_stop,
+                                  .user = worker};
+}
+
+/* Noise would become bumps of the surface that every frame then carries. */
+static npg_status smooth(making *m)
+{
+    double sigma;
+    size_t n = m->count;
+    NPG_TRY(npg_cloud_noise(&sigma, m->points, n));
+    note(m, "noise_unit", sigma);
+    if (!m->state->smooth || sigma < NOISE_MIN * m->spacing) return NPG_OK;
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                   "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   sigma);
+    return npg_cloud_smooth(m->points, m->normals, n, SMOOTH_NEIGHBOURS);
+}
+
+static npg_status reconstruct(making *m)
+{
+    npg_poisson_settings settings = poisson_settings(m->worker);
+    if (!m->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
+    double since = npg_clock_s();
+    size_t n = m->count, turned, moved;
+    int rounds;
+    NPG_TRY(smooth(m));
+    NPG_TRY(npg_resurface_apart(&m->mesh, &moved, &turned, &rounds, m->normals, m->points, n, m->spacing,
+                                &settings));
+    note_count(m, "points_held_apart", moved);
+    note_count(m, "poisson_rounds", (size_t)rounds);
+    note_count(m, "normals_turned", turned);
+    note(m, "poisson_s", npg_clock_s() - since);
+    note_count(m, "faces_reconstructed", m->mesh->face_count);
+    return NPG_OK;
+}
+
+static npg_status keep_main(making *m, const char *when)
+{
+    npg_pieces pieces;
+    double dist_max = m->state->pieces == PIECES_NEAR ? PIECE_DIST * m->diagonal : 0;
+    NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, PIECE_SHARE, dist_max));
+    note_count(m, "components", pieces.kept);
+    if (pieces.kept > 1)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+    if (pieces.lost_share > LOST_TOLERATED)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+                        pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
+    return NPG_OK;
+}
+
+/* What no point saw: measured on the closed surface, before anything is trimmed. */
+static npg_status judge_unseen(making *m, bool *trim_unseen)
+{
+    double share, seen_dist = SEEN_SPACINGS * m->spacing;
+    NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->count, seen_dist));
+    *trim_unseen =
+        m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
+    note(m, "unseen_share", share);
+    json_object_set_new(npg_worker_report(m->worker), "unseen",
+                        json_string(*trim_unseen ? "trimmed" : "kept"));
+    if (share > UNSEEN_TOLERATED)
+        npg_worker_warn(
+            m->worker, false, m->frame->number,
+            "%.1f %% of the reconstructed surface has no point near it: unseen in the keyframe, %s",
+            100 * share, *trim_unseen ? "trimmed off" : "kept as Poisson closed it");
+    return NPG_OK;
+}
+
+static npg_status trim(making *m)
+{
+    bool trim_unseen;
+    double limit = m->state->trim * m->diagonal, share;
+    NPG_TRY(judge_unseen(m, &trim_unseen));
+    if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->spacing);
+    NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->count, limit));
+    note(m, "trimmed_share", share);
+    if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
+    NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
+    if (!trim_unseen && share > LOST_TOLERATED)
+        npg_worker_warn(
+            m->worker, false, m->frame->number,
+            "%.1f %% of the reconstructed surface is farther than %g diagonals from every point and "
+            "was trimmed off",
+            100 * share, m->state->trim);
+    return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
+}
+
+/* A level set knows inside from outside only where the surface is closed. */
+static npg_status is_closed(bool *closed, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    *closed = !manifold.border_edges;
+    return NPG_OK;
+}
+
+static npg_status rebuild(making *m)
+{
+    double voxel = 2 * NPG_UNIT_EXTENT / REBUILD_VOXELS, area = npg_mesh_area(m->mesh);
+    NPG_TRY(npg_vdb_remesh(&m->mesh, voxel));
+    note_count(m, "faces_rebuilt", m->mesh->face_count);
+    double ratio = npg_mesh_area(m->mesh) / area;
+    if (ratio < REBUILD_AREA_MIN || ratio > 1 / REBUILD_AREA_MIN)
+        return npg_error(NPG_FAILED, "rebuilt through a level set, the surface has %.0f %% of its area",
+                         100 * ratio);
+    return NPG_OK;
+}
+
+static npg_status rebuild_on_request(making *m)
+{
+    bool closed;
+    npg_mending mending;
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    NPG_TRY(is_closed(&closed, m->mesh));
+    if (!closed)
+        return npg_error(NPG_FAILED,
+                         "mesher vdb takes a closed surface, but Poisson's is open (a single view?)");
+    return rebuild(m);
+}
+
+static npg_status decimate(making *m)
+{
+    npg_mending mending;
+    size_t budget = 4 * m->frame->point_count;
+    if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending)); /* closes small holes before the faces are counted */
+    size_t holes = mending.holes;
+    for (int round = 0; round < 4 && (!round || m->mesh->face_count > budget); round++) {
+        NPG_TRY(npg_mesh_decimate(&m->mesh, budget - budget / 200 * (size_t)round));
+        NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+        holes += mending.holes;
+    }
+    note_count(m, "mended_degenerate", mending.degenerate);
+    note_count(m, "mended_duplicate", mending.duplicate);
+    note_count(m, "mended_vertices", mending.split_vertices);
+    note_count(m, "mended_holes", holes);
+    note_count(m, "mended_flipped", mending.flipped);
+    return keep_main(m, "after decimation");
+}
+
+/* True where the mesh is one that can be deformed. */
+static npg_status is_sound(bool *sound, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    size_t flipped;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(npg_mesh_flipped(&flipped, NULL, mesh));
+    *sound = !manifold.crowded_edges && !manifold.misoriented_edges && !manifold.degenerate_faces && !flipped;
+    return NPG_OK;
+}
+
+static npg_status shape(making *m, bool *sound)
+{
+    NPG_TRY(trim(m));
+    NPG_TRY(decimate(m));
+    return is_sound(sound, m->mesh);
+}
+
+/* Try again from the whole surface, taken through a level set. */
+static npg_status make_again(making *m, npg_mesh **whole, bool *sound)
+{
+    npg_mesh_unref(&m->mesh);
+    m->mesh = *whole;
+    *whole = NULL;
+    NPG_TRY(rebuild(m));
+    return shape(m, sound);
+}
+
+/* Surface that stays although nothing was seen there is the mesher's invention: a run that carries much of it
+ * through all frames is not a good one.  What was trimmed off is reported and is not in the result. */
+static void judge_invented(making *m)
+{
+    npg_worker_facts(m->worker)->unseen_share = m->invented;
+    note(m, "invented_share", m->invented);
+    if (100 * m->invented > m->state->invented_max)
+        npg_worker_warn(
+            m->worker, true, m->frame->number,
+            "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, and it "
+            "was kept (the bar is %g %%; --unseen trim leaves it out)",
+            100 * m->invented, m->state->invented_max);
+}
+
+/* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
+ * through a level set and the same is done again. */
+static npg_status make(making *m)
+{
+    npg_mesh *whole = NULL;
+    bool sound = false, closed = false;
+    NPG_TRY(reconstruct(m));
+    NPG_TRY(keep_main(m, "as reconstructed"));
+    if (m->state->mesher == MESHER_VDB) NPG_TRY(rebuild_on_request(m));
+    NPG_TRY(npg_mesh_copy(&whole, m->mesh));
+    npg_status status = shape(m, &sound);
+    if (!status && !sound) status = is_closed(&closed, whole);
+    if (!status && !sound && closed) status = make_again(m, &whole, &sound);
+    if (!status && !sound)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "the reference mesh still has flipped or degenerate faces after all mending");
+    if (!status) judge_invented(m);
+    npg_mesh_unref(&whole);
+    return status;
+}
+
+/* ---- welds ---- */
+
+static void tell_welds(making *m, const npg_weld_cut *cut)
+{
+    note(m, "handles", (double)cut->handles);
+    note_count(m, "weld_frames", cut->frames);
+    note_count(m, "welds_cut", cut->patches);
+    note_count(m, "weld_faces_cut", cut->faces);
+    note(m, "weld_area_share", cut->area_share);
+    note_count(m, "welds_refused", cut->refused);
+    if (cut->patches)
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                       "%zu welds that other frames pull apart were cut: %zu faces, %.2f %% of the area",
+                       cut->patches, cut->faces, 100 * cut->area_share);
+    if (cut->refused)
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                       "%zu patches that other frames stretch could not be cut cleanly and stay",
+                       cut->refused);
+}
+
+/* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
+static npg_status cut_welds(making *m)
+{
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    npg_sights *sights = npg_worker_kept(m->worker);
+    npg_weld_settings settings = {.spacing_unit = m->spacing, .should_stop = should_stop, .user = m->worker};
+    npg_weld_cut done;
+    if (!sights || !facts->choice.cut_welds) return NPG_OK;
+    size_t at = npg_sights_find(sights, m->frame->index);
+    double since = npg_clock_s();
+    npg_status status =
+        at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
+    if (!status && at < sights->count) tell_welds(m, &done);
+    note(m, "welds_s", npg_clock_s() - since);
+    npg_sights_clear(sights);
+    return status == NPG_DIVERGED ? NPG_OK : status;
+}
+
+/* ---- the user's own mesh ---- */
+
+static npg_status read_reference(making *m)
+{
+    const char *path = m->state->reference;
+    npg_facts *facts = npg_worker_facts(m->worker);
+    NPG_TRY(npg_read_mesh(&m->mesh, path, &facts->origin));
+    for (size_t i = 0; i < 3 * m->mesh->vert_count; i++)
+        if (!isfinite(m->mesh->vert_pos[i]))
+            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
+    npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
+    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
+    note(m, "unseen_share", facts->unseen_share);
+    if (facts->unseen_share > 0.5)
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
+                        100 * facts->unseen_share, path);
+    return NPG_OK;
+}
+
+/* ---- the result ---- */
+
+static npg_status finish(making *m)
+{
+    npg_manifold manifold;
+    npg_mesh *mesh = m->mesh;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    npg_release(&mesh->vert_normals);
+    NPG_TRY(npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
+    npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
+                            mesh->face_count);
+    note_count(m, "vertices", mesh->vert_count);
+    note_count(m, "faces", mesh->face_count);
+    note_count(m, "border_edges", manifold.border_edges);
+    note(m, "area_unit", npg_mesh_area(mesh));
+    note(m, "volume_unit", npg_mesh_volume(mesh));
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
+                   "reference mesh: %zu vertices, %zu faces, %zu border edges", mesh->vert_count,
+                   mesh->face_count, manifold.border_edges);
+    return NPG_OK;
+}
+
+static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
+{
+    making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame};
+    npg_facts *facts = npg_worker_facts(worker);
+    double since = npg_clock_s();
+    npg_status status = take_points(&m);
+    if (!status) status = measure_points(&m);
+    if (!status) status = *m.state->reference ? read_reference(&m) : make(&m);
+    if (!status && !*m.state->reference) status = cut_welds(&m);
+    if (!status) status = finish(&m);
+    note(&m, "seconds", npg_clock_s() - since);
+    npg_release(&m.points);
+    npg_release(&m.normals);
+    if (status) npg_mesh_unref(&m.mesh);
+    facts->reference = m.mesh;
+    return npg_error_prefix(status, "keyframe %lld (%s)", (long long)frame->number,
+                            frame->path ? frame->path : "pushed");
+}
+
+/* ---- the choosing pass ---- */
+
+static void release_sights(void *thing)
+{
+    npg_sights_clear(thing);
+    npg_release(&thing);
+}
+
+static npg_status look_at(npg_worker *worker, npg_chunk *chunk)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_sights *sights = npg_worker_kept(worker);
+    if (!sights) {
+        NPG_TRY(npg_alloc(&sights, NPG_FOR_RUN, sizeof *sights));
+        npg_worker_keep(worker, sights, release_sights);
+    }
+    for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
+        const npg_frame *frame = npg_chunk_frame(chunk, i);
+        const npg_choice *choice = &facts->choice;
+        bool is_candidate = false;
+        for (size_t k = 0; k < choice->count; k++)
+            if (choice->frames[k] == frame->index) is_candidate = choice->is_candidate[k];
+        NPG_TRY(npg_sights_add(sights, frame, &facts->box, is_candidate));
+    }
+    return NPG_OK;
+}
+
+static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count, size_t best, double seconds)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < count; i++)
+        json_array_append_new(
+            list,
+            json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number, "followed",
+                      fares[i].is_followed, "point_dist_unit", fares[i].point_dist_unit, "vert_dist_unit",
+                      fares[i].vert_dist_unit, "stretched_share", fares[i].stretched_share, "contact",
+                      fares[i].contact, "handles", (json_int_t)fares[i].handles, "cost", fares[i].cost));
+    json_object_set_new(npg_worker_report(worker), "candidates", list);
+    json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
+    npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
+                   "is the keyframe, of %zu candidates (%.2f %% of its points in contact)", count,
+                   100 * fares[best].contact);
+}
+
+/* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */
+static npg_status choose_key(npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    npg_fare fares[NPG_CHOICE_MAX];
+    size_t count, best;
+    double since = npg_clock_s();
+    if (npg_worker_pass(worker) != NPG_PASS_CHOOSE || facts->choice.candidate_count < 2) return NPG_OK;
+    if (*s->reference || !npg_worker_kept(worker)) return NPG_OK;
+    const npg_poisson_settings settings = poisson_settings(worker);
+    NPG_TRY(npg_choose(fares, &count, &best, npg_worker_kept(worker), facts->plan.key, facts->frame_count,
+                       &settings));
+    if (!count) return NPG_OK;
+    facts->plan.key = fares[best].index;
+    tell_choice(worker, fares, count, best, npg_clock_s() - since);
+    return NPG_OK;
+}
+
+/* ---- the stage ---- */
+
+static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) return look_at(worker, *chunk);
+    for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
+        const npg_frame *frame = npg_chunk_frame(*chunk, i);
+        if (!frame->is_key) continue;
+        if (frame->is_skipped || !frame->point_count)
+            return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)frame->number);
+        NPG_TRY(make_reference(worker, frame));
+    }
+    if (!facts->reference) return npg_error(NPG_FAILED, "the keyframe does not come first");
+    return NPG_OK;
+}
+
+/* The raw reconstruction is the largest thing held: about 16 faces per point at depth 10. */
+static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
+{
+    *chunks_held = 1;
+    return npg_worker_facts(worker)->point_count_max * 16 * 80;
+}
+
+const npg_stage npg_stage_mesh = {.name = "mesh",
+                                  .help = "Reference surface of the keyframe",
+                                  .options = mesh_options,
+                                  .state_size = sizeof(mesh_state),
+                                  .passes = NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
+                                  .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
+                                  .gives = NPG_FIELD_REFERENCE,
+                                  .process = mesh_process,
+                                  .flush = choose_key,
+                                  .memory = mesh_memory};

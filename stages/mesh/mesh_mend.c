@@ -1,0 +1,474 @@
+/* Mesh mend: make a mesh manifold and unfolded. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "geometry/sets.h"
+#include "mesh/mesh_clean.h"
+
+#define SMOOTH_ROUNDS 12
+#define MEND_ROUNDS   12
+#define HOLE_MAX      32     /* edges of a hole that is filled */
+#define FLIPPED_COS   (-0.2) /* against the mean normal of the faces around */
+
+/* ---- duplicate and degenerate faces ---- */
+
+typedef struct face_key {
+    uint32_t sorted[3], face;
+    int parity; /* 0: an even permutation of sorted, 1: the other way round */
+} face_key;
+
+static face_key key_of(const uint32_t *face, uint32_t f)
+{
+    face_key key = {{face[0], face[1], face[2]}, f, 0};
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++)
+            if (key.sorted[k] > key.sorted[k + 1]) {
+                uint32_t swap = key.sorted[k];
+                key.sorted[k] = key.sorted[k + 1];
+                key.sorted[k + 1] = swap;
+                key.parity ^= 1;
+            }
+    return key;
+}
+
+static int same_face(const face_key *a, const face_key *b)
+{
+    return !memcmp(a->sorted, b->sorted, sizeof a->sorted);
+}
+
+static int by_face(const void *left, const void *right)
+{
+    const face_key *a = left, *b = right;
+    for (int i = 0; i < 3; i++)
+        if (a->sorted[i] != b->sorted[i]) return a->sorted[i] < b->sorted[i] ? -1 : 1;
+    return a->face < b->face ? -1 : a->face > b->face;
+}
+
+/* Of faces over the same three vertices, opposite ones cancel (every edge keeps its balance of directions)
+ * and at most one is left. */
+static void keep_one_of(const face_key *keys, size_t count, uint8_t *keep_face, npg_mending *done)
+{
+    ptrdiff_t balance = 0;
+    for (size_t i = 0; i < count; i++) balance += keys[i].parity ? -1 : 1;
+    for (size_t i = 0; i < count; i++) keep_face[keys[i].face] = 0;
+    for (size_t i = 0; i < count && balance; i++)
+        if (keys[i].parity == (balance < 0)) {
+            keep_face[keys[i].face] = 1;
+            break;
+        }
+    done->duplicate += count - (balance != 0);
+}
+
+static npg_status drop_faces(npg_mesh **mesh, npg_mending *done)
+{
+    face_key *keys = NULL;
+    uint8_t *keep_face = NULL;
+    npg_status status;
+    size_t count = (*mesh)->face_count, before = done->degenerate + done->duplicate;
+    NPG_TRY_OR(end, status, npg_alloc_array(&keys, NPG_FOR_MESH, count, sizeof *keys));
+    NPG_TRY_OR(end, status, npg_alloc(&keep_face, NPG_FOR_MESH, count));
+    for (size_t f = 0; f < count; f++) {
+        keys[f] = key_of((*mesh)->faces + 3 * f, (uint32_t)f);
+        keep_face[f] = keys[f].sorted[0] != keys[f].sorted[1] && keys[f].sorted[1] != keys[f].sorted[2];
+        done->degenerate += !keep_face[f];
+    }
+    if (count) qsort(keys, count, sizeof *keys, by_face);
+    for (size_t i = 0, next; i < count; i = next) {
+        for (next = i + 1; next < count && same_face(&keys[i], &keys[next]);) next++;
+        if (next - i > 1 && keep_face[keys[i].face]) keep_one_of(keys + i, next - i, keep_face, done);
+    }
+    if (done->degenerate + done->duplicate > before) status = npg_mesh_keep_faces(mesh, keep_face);
+end:
+    npg_release(&keys);
+    npg_release(&keep_face);
+    return status;
+}
+
+/* ---- one fan per vertex ---- */
+
+typedef struct side { /* a directed edge with the corner it starts at */
+    uint32_t from, to, corner;
+} side;
+
+static int same_ends(const side *a, const side *b)
+{
+    return a->from == b->from && a->to == b->to;
+}
+
+static int by_ends(const void *left, const void *right)
+{
+    const side *a = left, *b = right;
+    if (a->from != b->from) return a->from < b->from ? -1 : 1;
+    if (a->to != b->to) return a->to < b->to ? -1 : 1;
+    return a->corner < b->corner ? -1 : a->corner > b->corner;
+}
+
+static uint32_t next_corner(uint32_t corner)
+{
+    return corner - corner % 3 + (corner + 1) % 3;
+}
+
+static npg_status sorted_sides(side **out, const npg_mesh *mesh)
+{
+    size_t count = 3 * mesh->face_count;
+    side *sides;
+    NPG_TRY(npg_alloc_array(&sides, NPG_FOR_MESH, count, sizeof *sides));
+    for (uint32_t c = 0; c < count; c++) sides[c] = (side){mesh->faces[c], mesh->faces[next_corner(c)], c};
+    if (count) qsort(sides, count, sizeof *sides, by_ends);
+    *out = sides;
+    return NPG_OK;
+}
+
+/* The first side with these ends, or where it would be. */
+static size_t find_side(const side *sides, size_t count, uint32_t from, uint32_t to)
+{
+    size_t lo = 0, hi = count;
+    while (lo < hi) {
+        size_t middle = lo + (hi - lo) / 2;
+        const side *s = &sides[middle];
+        if (s->from < from || (s->from == from && s->to < to))
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo;
+}
+
+/* Join the corners that two faces share along an edge both use in opposite directions.  Where more than two
+ * faces meet, they are taken in pairs in their order and the pairs come apart. */
+static npg_status join_corners(uint32_t *parent, const npg_mesh *mesh)
+{
+    side *sides;
+    size_t count = 3 * mesh->face_count;
+    NPG_TRY(sorted_sides(&sides, mesh));
+    for (uint32_t c = 0; c < count; c++) parent[c] = c;
+    for (size_t i = 0, next; i < count; i = next) {
+        for (next = i + 1; next < count && same_ends(&sides[i], &sides[next]);) next++;
+        if (sides[i].to < sides[i].from) continue;
+        size_t back = find_side(sides, count, sides[i].to, sides[i].from);
+        for (size_t k = i; k < next && back < count; k++, back++) {
+            if (sides[back].from != sides[i].to || sides[back].to != sides[i].from) break;
+            npg_set_join(parent, sides[k].corner, next_corner(sides[back].corner));
+            npg_set_join(parent, next_corner(sides[k].corner), sides[back].corner);
+        }
+    }
+    npg_release(&sides);
+    return NPG_OK;
+}
+
+/* The corners of each fan become one vertex; the first fan of a vertex keeps it, others get a copy. */
+static npg_status split(npg_mesh **slot, npg_mending *done)
+{
+    npg_mesh *mesh = *slot, *out = NULL;
+    uint32_t *parent = NULL, *number = NULL, *first = NULL;
+    size_t corners = 3 * mesh->face_count, extra = 0;
+    npg_status status;
+    NPG_TRY_OR(end, status, npg_alloc_array(&parent, NPG_FOR_MESH, corners, sizeof *parent));
+    NPG_TRY_OR(end, status, npg_alloc_array(&number, NPG_FOR_MESH, corners, sizeof *number));
+    NPG_TRY_OR(end, status, npg_alloc_array(&first, NPG_FOR_MESH, mesh->vert_count, sizeof *first));
+    NPG_TRY_OR(end, status, join_corners(parent, mesh));
+    memset(first, 0xff, mesh->vert_count * sizeof *first);
+    for (uint32_t c = 0; c < corners; c++) {
+        uint32_t root = npg_set_root(parent, c), v = mesh->faces[c];
+        if (root != c) continue;
+        number[c] = first[v] == UINT32_MAX ? v : (uint32_t)(mesh->vert_count + extra++);
+        if (first[v] == UINT32_MAX) first[v] = c;
+    }
+    if (!extra) goto end;
+    NPG_TRY_OR(end, status, npg_mesh_open(&out, mesh->vert_count + extra, mesh->face_count));
+    memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
+    for (uint32_t c = 0; c < corners; c++) {
+        out->faces[c] = number[npg_set_root(parent, c)];
+        memcpy(out->vert_pos + 3 * (size_t)out->faces[c], mesh->vert_pos + 3 * (size_t)mesh->faces[c],
+               3 * sizeof(float));
+    }
+    done->split_vertices += extra;
+    npg_mesh_unref(slot);
+    *slot = out;
+end:
+    npg_release(&parent);
+    npg_release(&number);
+    npg_release(&first);
+    return status;
+}
+
+/* ---- small holes ---- */
+
+/* The border's successor of a vertex: a face uses next -> vertex and none uses vertex -> next. */
+static npg_status find_border(uint32_t *next, const npg_mesh *mesh)
+{
+    side *sides;
+    size_t count = 3 * mesh->face_count;
+    memset(next, 0xff, mesh->vert_count * sizeof *next);
+    NPG_TRY(sorted_sides(&sides, mesh));
+    for (size_t i = 0; i < count; i++) {
+        size_t back = find_side(sides, count, sides[i].to, sides[i].from);
+        bool is_border = back == count || sides[back].from != sides[i].to || sides[back].to != sides[i].from;
+        if (is_border) next[sides[i].to] = sides[i].from;
+    }
+    npg_release(&sides);
+    return NPG_OK;
+}
+
+/* The closed loop along the border from a vertex, its length; 0 if it is longer than HOLE_MAX or comes back
+ * elsewhere. */
+static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
+{
+    size_t count = 0;
+    uint32_t at = from;
+    do {
+        if (count == HOLE_MAX || at == UINT32_MAX) return 0;
+        loop[count++] = at;
+        at = next[at];
+    } while (at != from);
+    return count >= 3 ? count : 0;
+}
+
+/* Holes of a few edges get a vertex in their middle (three edges: just the face).  Larger ones are openings.
+ */
+static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
+{
+    npg_mesh *mesh = *slot, *out = NULL;
+    uint32_t *next = NULL, loop[HOLE_MAX];
+    npg_status status;
+    size_t hole_count = 0, edge_count = 0;
+    NPG_TRY_OR(end, status, npg_alloc_array(&next, NPG_FOR_MESH, mesh->vert_count, sizeof *next));
+    NPG_TRY_OR(end, status, find_border(next, mesh));
+    for (uint32_t v = 0; v < mesh->vert_count; v++) edge_count += next[v] != UINT32_MAX;
+    if (!edge_count) goto end;
+    NPG_TRY_OR(end, status,
+               npg_mesh_open(&out, mesh->vert_count + edge_count, mesh->face_count + edge_count));
+    memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
+    memcpy(out->faces, mesh->faces, mesh->face_count * 3 * sizeof(uint32_t));
+    size_t vert_count = mesh->vert_count, face_count = mesh->face_count;
+    for (uint32_t v = 0; v < mesh->vert_count; v++) {
+        size_t count = next[v] == UINT32_MAX ? 0 : follow(loop, next, v);
+        if (!count) continue;
+        for (size_t k = 0; k < count; k++) next[loop[k]] = UINT32_MAX;
+        hole_count++;
+        if (count == 3) {
+            memcpy(out->faces + 3 * face_count++, loop, 3 * sizeof *loop);
+            continue;
+        }
+        for (size_t k = 0; k < count; k++) {
+            uint32_t face[3] = {(uint32_t)vert_count, loop[k], loop[(k + 1) % count]};
+            memcpy(out->faces + 3 * face_count++, face, sizeof face);
+            for (size_t a = 0; a < 3; a++)
+                out->vert_pos[3 * vert_count + a] += mesh->vert_pos[3 * (size_t)loop[k] + a] / (float)count;
+        }
+        vert_count++;
+    }
+    out->vert_count = vert_count;
+    out->face_count = face_count;
+    done->holes += hole_count;
+    npg_mesh_unref(slot);
+    *slot = out;
+    out = NULL;
+end:
+    npg_mesh_unref(&out);
+    npg_release(&next);
+    return status;
+}
+
+/* ---- folds ---- */
+
+static double face_normal(double n[3], const npg_mesh *mesh, size_t f)
+{
+    const uint32_t *face = mesh->faces + 3 * f;
+    double u[3], v[3];
+    for (size_t i = 0; i < 3; i++) {
+        double a = (double)mesh->vert_pos[3 * (size_t)face[0] + i];
+        u[i] = (double)mesh->vert_pos[3 * (size_t)face[1] + i] - a;
+        v[i] = (double)mesh->vert_pos[3 * (size_t)face[2] + i] - a;
+    }
+    for (int i = 0; i < 3; i++) n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+    double area2 = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    double edges = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    return edges > 0 ? area2 / edges : 0; /* shape: 0 without area, 0.43 for an equilateral one */
+}
+
+/* Sum of the area-weighted face normals at every vertex. */
+static void sum_at_vertices(double *sum, const npg_mesh *mesh)
+{
+    memset(sum, 0, mesh->vert_count * 3 * sizeof *sum);
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        double n[3];
+        face_normal(n, mesh, f);
+        for (size_t k = 0; k < 3; k++)
+            for (size_t a = 0; a < 3; a++) sum[3 * (size_t)mesh->faces[3 * f + k] + a] += n[a];
+    }
+}
+
+/* The face's normal against what the other faces around its corners say. */
+static bool is_turned(const double *sum, const npg_mesh *mesh, size_t f)
+{
+    double n[3], others[3] = {0}, dot = 0, nn = 0, oo = 0;
+    if (face_normal(n, mesh, f) < 1e-6) return true;
+    for (size_t a = 0; a < 3; a++) {
+        for (size_t k = 0; k < 3; k++) others[a] += sum[3 * (size_t)mesh->faces[3 * f + k] + a] - n[a];
+        dot += n[a] * others[a];
+        nn += n[a] * n[a];
+        oo += others[a] * others[a];
+    }
+    return dot < FLIPPED_COS * sqrt(nn * oo);
+}
+
+static size_t find_flipped(uint8_t *is_flipped, double *sum, const npg_mesh *mesh)
+{
+    size_t count = 0;
+    sum_at_vertices(sum, mesh);
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        bool turned = is_turned(sum, mesh, f);
+        if (is_flipped) is_flipped[f] = turned;
+        count += turned;
+    }
+    return count;
+}
+
+npg_status npg_mesh_flipped(size_t *count, uint8_t *is_flipped, const npg_mesh *mesh)
+{
+    double *sum;
+    NPG_TRY(npg_alloc_array(&sum, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *sum));
+    *count = find_flipped(is_flipped, sum, mesh);
+    npg_release(&sum);
+    return NPG_OK;
+}
+
+/* One round: every vertex of a turned face goes to the middle of the neighbours it has over faces. */
+static void smooth_round(npg_mesh *mesh, const uint8_t *is_flipped, double *sum, uint32_t *weight)
+{
+    memset(sum, 0, mesh->vert_count * 3 * sizeof *sum);
+    memset(weight, 0, mesh->vert_count * sizeof *weight);
+    for (size_t c = 0; c < 3 * mesh->face_count; c++) {
+        uint32_t v = mesh->faces[c], to = mesh->faces[next_corner((uint32_t)c)];
+        for (size_t a = 0; a < 3; a++) {
+            sum[3 * (size_t)v + a] += (double)mesh->vert_pos[3 * (size_t)to + a];
+            sum[3 * (size_t)to + a] += (double)mesh->vert_pos[3 * (size_t)v + a];
+        }
+        weight[v]++;
+        weight[to]++;
+    }
+    for (size_t c = 0; c < 3 * mesh->face_count; c++)
+        for (size_t a = 0; a < 3 && is_flipped[c / 3]; a++) {
+            size_t v = mesh->faces[c];
+            mesh->vert_pos[3 * v + a] = (float)(sum[3 * v + a] / weight[v]);
+        }
+}
+
+/* Where smoothing does not help, the turned face's shortest edge shrinks to its middle. */
+static void collapse_flipped(npg_mesh *mesh, const uint8_t *is_flipped)
+{
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        uint32_t *face = mesh->faces + 3 * f;
+        float least = INFINITY;
+        size_t at = 0;
+        for (size_t k = 0; k < 3 && is_flipped[f]; k++) {
+            const float *p = mesh->vert_pos + 3 * (size_t)face[k],
+                        *q = mesh->vert_pos + 3 * (size_t)face[(k + 1) % 3];
+            float d[3] = {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
+            float length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            if (length_sq < least) {
+                least = length_sq;
+                at = k;
+            }
+        }
+        uint32_t keep = face[at], gone = face[(at + 1) % 3];
+        if (!is_flipped[f] || keep == gone) continue;
+        for (size_t a = 0; a < 3; a++) {
+            float *to = mesh->vert_pos + 3 * (size_t)keep + a;
+            *to = 0.5f * (*to + mesh->vert_pos[3 * (size_t)gone + a]);
+        }
+        for (size_t c = 0; c < 3 * mesh->face_count; c++)
+            if (mesh->faces[c] == gone) mesh->faces[c] = keep;
+    }
+}
+
+/* *left is the number of faces that are still turned; their shortest edges are then collapsed. */
+static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
+{
+    double *sum = NULL;
+    uint8_t *is_flipped = NULL;
+    uint32_t *weight = NULL;
+    npg_status status;
+    NPG_TRY_OR(end, status, npg_alloc_array(&sum, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *sum));
+    NPG_TRY_OR(end, status, npg_alloc_array(&weight, NPG_FOR_MESH, mesh->vert_count, sizeof *weight));
+    NPG_TRY_OR(end, status, npg_alloc(&is_flipped, NPG_FOR_MESH, mesh->face_count));
+    *left = find_flipped(is_flipped, sum, mesh);
+    done->flipped += *left;
+    for (int round = 0; round < SMOOTH_ROUNDS && *left; round++) {
+        smooth_round(mesh, is_flipped, sum, weight);
+        *left = find_flipped(is_flipped, sum, mesh);
+    }
+    if (*left) collapse_flipped(mesh, is_flipped);
+end:
+    npg_release(&sum);
+    npg_release(&weight);
+    npg_release(&is_flipped);
+    return status;
+}
+
+/* ---- edges of more than two faces that splitting could not part ---- */
+
+/* Of the faces that use an edge in one direction only the first is kept. */
+static npg_status drop_crowded(npg_mesh **mesh, npg_mending *done, size_t *dropped)
+{
+    side *sides;
+    uint8_t *keep_face = NULL;
+    size_t face_count = (*mesh)->face_count;
+    *dropped = 0;
+    NPG_TRY(sorted_sides(&sides, *mesh));
+    npg_status status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
+    if (!status) memset(keep_face, 1, face_count);
+    for (size_t i = 1; i < 3 * face_count && !status; i++) {
+        uint32_t face = sides[i].corner / 3;
+        if (!same_ends(&sides[i - 1], &sides[i]) || !keep_face[face]) continue;
+        keep_face[face] = 0;
+        ++*dropped;
+    }
+    done->duplicate += *dropped;
+    if (!status && *dropped) status = npg_mesh_keep_faces(mesh, keep_face);
+    npg_release(&sides);
+    npg_release(&keep_face);
+    return status;
+}
+
+npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done)
+{
+    memset(done, 0, sizeof *done);
+    for (int round = 0; round < MEND_ROUNDS; round++) {
+        size_t dropped, left;
+        NPG_TRY(drop_faces(mesh, done));
+        NPG_TRY(split(mesh, done));
+        NPG_TRY(drop_crowded(mesh, done, &dropped));
+        if (dropped) NPG_TRY(split(mesh, done));
+        NPG_TRY(fill_holes(mesh, done));
+        NPG_TRY(unfold(*mesh, done, &left));
+        if (!left) break;
+    }
+    return NPG_OK;
+}
+
+/* ---- check ---- */
+
+npg_status npg_mesh_require_manifold(const npg_mesh *mesh, const char *name)
+{
+    side *sides;
+    size_t count = 3 * mesh->face_count;
+    npg_status status = NPG_OK;
+    NPG_TRY(sorted_sides(&sides, mesh));
+    for (size_t i = 0; i < count && !status; i++) {
+        uint32_t face = sides[i].corner / 3;
+        if (sides[i].from == sides[i].to)
+            status = npg_error(NPG_BAD_INPUT, "%s: face %u uses vertex %u twice", name, face, sides[i].from);
+        /* A directed edge used once at most means: two faces at most, and they agree on the outside. */
+        else if (i && same_ends(&sides[i - 1], &sides[i]))
+            status = npg_error(NPG_BAD_INPUT,
+                               "%s is not a manifold: faces %u and %u both use the edge from vertex %u to "
+                               "vertex %u in this direction",
+                               name, sides[i - 1].corner / 3, face, sides[i].from, sides[i].to);
+    }
+    npg_release(&sides);
+    return status;
+}

@@ -1,0 +1,108 @@
+/* Resurface: Poisson again and again, until points and surface agree on which side is out. */
+#include "mesh/resurface.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "geometry/query.h"
+#include "mesh/apart.h"
+
+#define ROUNDS_MAX  4
+#define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
+#define CLEARLY     (-0.3f)
+#define SETTLED     0.0005 /* share of turned normals that ends it */
+#define ALMOST      0.002  /* the same where a draft is all that is wanted */
+#define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
+
+/* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */
+static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const float *n)
+{
+    float sum = 0;
+    for (size_t k = 0; k < 3; k++) {
+        const float *v = mesh->vert_normals + 3 * (size_t)mesh->faces[3 * (size_t)hit->face + k];
+        sum += hit->weights[k] * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2]);
+    }
+    return sum;
+}
+
+static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh *mesh, const float *points,
+                                  size_t n)
+{
+    npg_surface *surface = NULL;
+    npg_surface_hit *hits = NULL;
+    npg_status status;
+    *turned = 0;
+    NPG_TRY_OR(done, status, npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits));
+    NPG_TRY_OR(done, status,
+               npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
+    NPG_TRY_OR(done, status, npg_surface_closest_near(surface, hits, points, n, NULL, NULL, 0));
+    for (size_t i = 0; i < n; i++) {
+        if (side_at(mesh, &hits[i], normals + 3 * i) >= CLEARLY) continue;
+        for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
+        ++*turned;
+    }
+done:
+    npg_surface_close(&surface);
+    npg_release(&hits);
+    return status;
+}
+
+/* A surface that only serves the normals. */
+static npg_status draft(npg_mesh **mesh, size_t *turned, float *normals, const float *points, size_t n,
+                        const npg_poisson_settings *settings)
+{
+    npg_poisson_settings quick = *settings;
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    NPG_TRY(npg_poisson(mesh, points, normals, n, &quick));
+    npg_mesh *m = *mesh;
+    npg_status status = npg_alloc_array(&m->vert_normals, NPG_FOR_MESH, m->vert_count, 3 * sizeof(float));
+    if (!status) {
+        npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
+        status = turn_to_surface(turned, normals, m, points, n);
+    }
+    npg_release(&m->vert_normals);
+    if (status) npg_mesh_unref(mesh);
+    return status;
+}
+
+npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *normals, const float *points,
+                         size_t point_count, const npg_poisson_settings *settings)
+{
+    size_t now = point_count, before = SIZE_MAX;
+    bool is_draft = settings->depth <= DRAFT_DEPTH;
+    double settled = (is_draft ? ALMOST : SETTLED) * (double)point_count;
+    int rounds_max = settings->rounds_max ? settings->rounds_max : ROUNDS_MAX;
+    *mesh = NULL;
+    *turned = 0;
+    for (*rounds = 0; *rounds < rounds_max && (double)now > settled; ++*rounds) {
+        if (now >= before && (double)now < RESTLESS * (double)point_count) break;
+        before = now;
+        npg_mesh_unref(mesh);
+        NPG_TRY(draft(mesh, &now, normals, points, point_count, settings));
+        *turned += now;
+    }
+    if (is_draft && (double)now <= settled) return NPG_OK; /* the last draft is as good */
+    npg_mesh_unref(mesh);
+    ++*rounds;
+    return npg_poisson(mesh, points, normals, point_count, settings);
+}
+
+npg_status npg_resurface_apart(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
+                               const float *points, size_t n, double spacing,
+                               const npg_poisson_settings *settings)
+{
+    npg_apart apart;
+    *mesh = NULL;
+    *moved = 0;
+    if (settings->apart == NPG_APART_NOT)
+        return npg_resurface(mesh, turned, rounds, normals, points, n, settings);
+    NPG_TRY(npg_apart_open(&apart, points, normals, n, spacing, settings->apart));
+    *moved = apart.moved;
+    npg_status status = npg_resurface(mesh, turned, rounds, normals, apart.shifted, n, settings);
+    if (!status) status = npg_apart_bring_back(&apart, *mesh);
+    if (status) npg_mesh_unref(mesh);
+    npg_apart_close(&apart);
+    return status;
+}

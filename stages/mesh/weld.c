@@ -1,0 +1,520 @@
+/* Weld: hearing the frames, gathering patches, cutting and closing. */
+#include "mesh/weld.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
+#include "mesh/loop_fill.h"
+#include "mesh/mesh_clean.h"
+
+#define LONGER        2.0 /* times its length: an edge that speaks against its face     */
+#define FAR_SPACINGS  1.0 /* mean distance of a face's corners from the points          */
+#define EXPLAINED     0.5 /* spacings from points to surface, in a frame that is heard  */
+#define LEAN_LONGER   1.4 /* the same, for faces that go with those beside them          */
+#define LEAN_SPACINGS 0.6
+#define FRAMES_LEAST  3   /* that speak against a face                                  */
+#define SEEDS_LEAST   2   /* faces of a patch that are spoken against                   */
+#define BORDER_NEAR   0.7 /* times the faces' distance from the points, for the border around them */
+#define SAVED_LEAST   0.7 /* the new faces' area, at most, of the patch in its worst pose */
+#define LOOPS_LEAST   2   /* of its border: a tube between two parts; a cap or a crease is left */
+#define TIDY_ROUNDS   10
+#define ISLAND_MOST   0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
+#define PATCH_MOST    0.2  /* of the faces: more is no weld but a surface that fits nowhere */
+
+static const npg_tracker_settings weld_tracking = {
+    .nodes = 250, .samples = 2000, .steps = 12, .stiffness = 0.0005, .along = 0.1};
+
+typedef struct hearing {
+    const npg_weld_settings *settings;
+    const npg_mesh *mesh;
+    uint8_t *against; /* F: frames that speak against a face                 */
+    uint8_t *leaning; /* F: frames that do so or nearly                      */
+    double *dist_sum; /* V: over the heard frames                            */
+    float *poses;     /* frames x V x 3: the mesh in the heard frames        */
+    size_t frames, room;
+    float *dist_sq; /* V */
+    uint32_t *near; /* V */
+} hearing;
+
+/* ---- what a frame says ---- */
+
+static double edge_growth(const float *rest, const float *now, uint32_t a, uint32_t b)
+{
+    double before = 0, after = 0;
+    for (size_t i = 0; i < 3; i++) {
+        double x = (double)rest[3 * (size_t)a + i] - (double)rest[3 * (size_t)b + i];
+        double y = (double)now[3 * (size_t)a + i] - (double)now[3 * (size_t)b + i];
+        before += x * x;
+        after += y * y;
+    }
+    return before > 0 ? sqrt(after / before) : 0;
+}
+
+/* Count what a frame says of a face: `against`, and with half the distance and less growth, `leaning`. */
+static void count_face(hearing *h, size_t f, const float *now)
+{
+    const uint32_t *face = h->mesh->faces + 3 * f;
+    double growth = 0, dist = 0;
+    for (int k = 0; k < 3; k++) {
+        growth = fmax(growth, edge_growth(h->mesh->vert_pos, now, face[k], face[(k + 1) % 3]));
+        dist += sqrt((double)h->dist_sq[face[k]]) / 3;
+    }
+    dist /= h->settings->spacing_unit;
+    h->against[f] += growth >= LONGER && dist > FAR_SPACINGS;
+    h->leaning[f] += growth >= LEAN_LONGER && dist > LEAN_SPACINGS;
+}
+
+static npg_status hear(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
+{
+    hearing *h = user;
+    npg_kdtree *tree;
+    size_t v = h->mesh->vert_count;
+    if (h->settings->should_stop && h->settings->should_stop(h->settings->user))
+        return npg_error(NPG_STOPPED, "stopped while welds were looked for");
+    if (tracked->point_dist_mean > EXPLAINED * h->settings->spacing_unit || h->frames == h->room)
+        return NPG_OK;
+    NPG_TRY(npg_kdtree_open(&tree, sight->points, sight->point_count));
+    npg_status status = npg_kdtree_nearest(tree, h->near, h->dist_sq, vert_unit, v, 1, 0);
+    npg_kdtree_close(&tree);
+    NPG_TRY(status);
+    for (size_t i = 0; i < v; i++) h->dist_sum[i] += sqrt((double)h->dist_sq[i]);
+    for (size_t f = 0; f < h->mesh->face_count; f++) count_face(h, f, vert_unit);
+    memcpy(h->poses + h->frames++ * v * 3, vert_unit, v * 3 * sizeof(float));
+    return NPG_OK;
+}
+
+static npg_status open_hearing(hearing *h, size_t room)
+{
+    size_t v = h->mesh->vert_count;
+    h->room = room;
+    NPG_TRY(npg_alloc_array(&h->against, NPG_FOR_MESH, h->mesh->face_count, 1));
+    NPG_TRY(npg_alloc_array(&h->leaning, NPG_FOR_MESH, h->mesh->face_count, 1));
+    NPG_TRY(npg_alloc_array(&h->dist_sum, NPG_FOR_MESH, v, sizeof *h->dist_sum));
+    NPG_TRY(npg_alloc_array(&h->dist_sq, NPG_FOR_MESH, v, sizeof *h->dist_sq));
+    NPG_TRY(npg_alloc_array(&h->near, NPG_FOR_MESH, v, sizeof *h->near));
+    return npg_alloc_array(&h->poses, NPG_FOR_MESH, room * v, 3 * sizeof(float));
+}
+
+static void close_hearing(hearing *h)
+{
+    npg_release(&h->against);
+    npg_release(&h->leaning);
+    npg_release(&h->dist_sum);
+    npg_release(&h->dist_sq);
+    npg_release(&h->near);
+    npg_release(&h->poses);
+}
+
+/* ---- patches ---- */
+
+#define NO_PATCH UINT32_MAX
+
+typedef struct patches {
+    uint8_t *is_in;    /* F: the faces spoken against and those around them    */
+    uint8_t *is_near;  /* V: scratch                                           */
+    uint32_t *of_vert; /* V: patch of a vertex of such faces, NO_PATCH         */
+    uint32_t *of_face; /* F                                                    */
+    size_t count;
+} patches;
+
+static void close_patches(patches *p)
+{
+    npg_release(&p->is_in);
+    npg_release(&p->is_near);
+    npg_release(&p->of_vert);
+    npg_release(&p->of_face);
+}
+
+/* Take in all faces that share a vertex with those that are in. */
+static void widen(patches *p, const npg_mesh *mesh)
+{
+    memset(p->is_near, 0, mesh->vert_count);
+    for (size_t i = 0; i < 3 * mesh->face_count; i++)
+        if (p->is_in[i / 3]) p->is_near[mesh->faces[i]] = 1;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *face = mesh->faces + 3 * f;
+        p->is_in[f] = p->is_near[face[0]] || p->is_near[face[1]] || p->is_near[face[2]];
+    }
+}
+
+/* Number the patches: faces that are in and connected by vertices. */
+static npg_status number_patches(patches *p, const npg_mesh *mesh)
+{
+    uint32_t *some = NULL, *component = NULL;
+    size_t count = 0, components, v = mesh->vert_count;
+    npg_status status;
+    NPG_TRY_OR(done, status, npg_alloc_array(&some, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *some));
+    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, v, sizeof *component));
+    for (size_t f = 0; f < mesh->face_count; f++)
+        if (p->is_in[f]) memcpy(some + 3 * count++, mesh->faces + 3 * f, 3 * sizeof *some);
+    NPG_TRY_OR(done, status, npg_mesh_components(component, &components, v, some, count));
+    for (size_t i = 0; i < v; i++) p->of_vert[i] = NO_PATCH;
+    for (size_t i = 0; i < 3 * count; i++) p->of_vert[some[i]] = component[some[i]];
+    /* components count lone vertices, too: number those of faces from 0 on */
+    memset(component, 0xff, v * sizeof *component);
+    for (size_t i = 0; i < v; i++) {
+        uint32_t *patch = &p->of_vert[i];
+        if (*patch == NO_PATCH) continue;
+        if (component[*patch] == NO_PATCH) component[*patch] = (uint32_t)p->count++;
+        *patch = component[*patch];
+    }
+    for (size_t f = 0; f < mesh->face_count; f++)
+        p->of_face[f] = p->is_in[f] ? p->of_vert[mesh->faces[3 * f]] : NO_PATCH;
+done:
+    npg_release(&some);
+    npg_release(&component);
+    return status;
+}
+
+/* Take in what is left inside a patch: pieces of the rest that are small. */
+static npg_status take_islands(patches *p, const npg_mesh *mesh)
+{
+    uint32_t *rest = NULL, *component = NULL;
+    size_t *size = NULL, count = 0, components;
+    npg_status status;
+    NPG_TRY_OR(done, status, npg_alloc_array(&rest, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *rest));
+    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
+    NPG_TRY_OR(done, status, npg_alloc_array(&size, NPG_FOR_MESH, mesh->vert_count, sizeof *size));
+    for (size_t f = 0; f < mesh->face_count; f++)
+        if (!p->is_in[f]) memcpy(rest + 3 * count++, mesh->faces + 3 * f, 3 * sizeof *rest);
+    NPG_TRY_OR(done, status, npg_mesh_components(component, &components, mesh->vert_count, rest, count));
+    for (size_t f = 0; f < count; f++) size[component[rest[3 * f]]]++;
+    for (size_t f = 0; f < mesh->face_count; f++)
+        if (!p->is_in[f] &&
+            (double)size[component[mesh->faces[3 * f]]] < ISLAND_MOST * (double)mesh->face_count)
+            p->is_in[f] = 1;
+done:
+    npg_release(&rest);
+    npg_release(&component);
+    npg_release(&size);
+    return status;
+}
+
+/* Where a border passes a vertex twice, take in all faces around it.  Returns how many such vertices there
+ * were. */
+static size_t take_pinches(patches *p, const npg_mesh *mesh, const uint32_t *twin)
+{
+    size_t pinches = 0;
+    memset(p->is_near, 0, mesh->vert_count);
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (!p->is_in[i / 3] || twin[i] == UINT32_MAX || p->is_in[twin[i] / 3]) continue;
+        pinches += p->is_near[mesh->faces[i]] == 1;
+        if (p->is_near[mesh->faces[i]] < 2) p->is_near[mesh->faces[i]]++;
+    }
+    for (size_t i = 0; i < 3 * mesh->face_count; i++)
+        if (p->is_near[mesh->faces[i]] == 2) p->is_in[i / 3] = 1;
+    return pinches;
+}
+
+/* Make the borders simple loops. */
+static npg_status tidy(patches *p, const npg_mesh *mesh)
+{
+    uint32_t *twin;
+    NPG_TRY(npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
+    npg_status status = npg_mesh_twins(twin, mesh->faces, mesh->face_count);
+    for (int round = 0; round < TIDY_ROUNDS && !status; round++) {
+        status = take_islands(p, mesh);
+        if (!status && !take_pinches(p, mesh, twin)) break;
+    }
+    npg_release(&twin);
+    return status;
+}
+
+static npg_status gather(patches *p, const hearing *h)
+{
+    const npg_mesh *mesh = h->mesh;
+    size_t seeds = 0;
+    NPG_TRY(npg_alloc(&p->is_in, NPG_FOR_MESH, mesh->face_count));
+    NPG_TRY(npg_alloc(&p->is_near, NPG_FOR_MESH, mesh->vert_count));
+    NPG_TRY(npg_alloc_array(&p->of_vert, NPG_FOR_MESH, mesh->vert_count, sizeof *p->of_vert));
+    NPG_TRY(npg_alloc_array(&p->of_face, NPG_FOR_MESH, mesh->face_count, sizeof *p->of_face));
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        seeds += h->against[f] >= FRAMES_LEAST;
+        p->is_in[f] = h->leaning[f] >= FRAMES_LEAST;
+    }
+    if (!seeds) return NPG_OK;
+    widen(p, mesh);
+    NPG_TRY(tidy(p, mesh));
+    return number_patches(p, mesh);
+}
+
+/* ---- one patch ---- */
+
+/* The pose in which the patch is largest, and its area there. */
+static double worst_pose(const float **pose, const hearing *h, const patches *p, uint32_t patch)
+{
+    double worst = -1;
+    for (size_t i = 0; i < h->frames; i++) {
+        const float *at = h->poses + i * h->mesh->vert_count * 3;
+        double area = 0;
+        for (size_t f = 0; f < h->mesh->face_count; f++)
+            if (p->of_face[f] == patch) area += npg_face_area(at, h->mesh->faces + 3 * f);
+        if (!(area > worst)) continue;
+        worst = area;
+        *pose = at;
+    }
+    return worst;
+}
+
+/* next[v] = the vertex after v on the patch's border, in the direction of the patch's own faces; all of them
+ * once. False where the border is no set of simple loops. */
+static bool link_border(uint32_t *next, size_t *border_count, const npg_mesh *mesh, const patches *p,
+                        uint32_t patch, const uint32_t *twin)
+{
+    *border_count = 0;
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        if (p->of_face[i / 3] != patch) continue;
+        if (twin[i] == UINT32_MAX) return false; /* a border of the mesh */
+        if (p->of_face[twin[i] / 3] == patch) continue;
+        uint32_t from = mesh->faces[i], to = mesh->faces[i - i % 3 + (i + 1) % 3];
+        if (next[from] != UINT32_MAX) return false;
+        next[from] = to;
+        ++*border_count;
+    }
+    return *border_count > 0;
+}
+
+typedef struct cutting {
+    const hearing *hearing;
+    const patches *patches;
+    uint32_t *twin, *next, *loop; /* 3 F, V, V; owned */
+    uint32_t (*edges)[2];         /* owned            */
+    size_t edge_count;
+    uint32_t *new_faces; /* owned */
+    size_t new_count, new_capacity;
+    uint8_t *is_cut; /* F; owned */
+} cutting;
+
+/* Fill every loop of the border; *area of all. */
+static npg_status fill_loops(cutting *c, double *area, size_t *loop_count, bool *is_filled, const float *pose)
+{
+    const npg_mesh *mesh = c->hearing->mesh;
+    *area = 0;
+    *loop_count = 0;
+    *is_filled = true;
+    for (size_t v = 0; v < mesh->vert_count && *is_filled; v++) {
+        size_t count = 0;
+        double this_area;
+        for (uint32_t at = (uint32_t)v; c->next[at] != UINT32_MAX;) {
+            uint32_t to = c->next[at];
+            c->loop[count++] = at;
+            c->next[at] = UINT32_MAX;
+            at = to;
+        }
+        if (!count) continue;
+        NPG_TRY(npg_grow(&c->new_faces, &c->new_capacity, c->new_count + count, 3 * sizeof(uint32_t),
+                         NPG_FOR_MESH));
+        NPG_TRY(npg_loop_fill(c->new_faces + 3 * c->new_count, &this_area, is_filled,
+                              (npg_loop){c->loop, count}, pose, (const uint32_t(*)[2])c->edges,
+                              c->edge_count));
+        c->new_count += count - 2;
+        *area += this_area;
+        ++*loop_count;
+    }
+    return NPG_OK;
+}
+
+static size_t count_seeds(const cutting *c, uint32_t patch)
+{
+    size_t seeds = 0;
+    for (size_t f = 0; f < c->hearing->mesh->face_count; f++)
+        seeds += c->patches->of_face[f] == patch && c->hearing->against[f] >= FRAMES_LEAST;
+    return seeds;
+}
+
+/* Whether the border lies much nearer the points than the faces that are spoken against. */
+static bool is_worth(const cutting *c, uint32_t patch)
+{
+    const hearing *h = c->hearing;
+    size_t seeds = count_seeds(c, patch), border = 0;
+    double border_dist = 0, seed_dist = 0;
+    for (size_t f = 0; f < h->mesh->face_count; f++)
+        for (size_t k = 0; k < 3 && c->patches->of_face[f] == patch && h->against[f] >= FRAMES_LEAST; k++)
+            seed_dist += h->dist_sum[h->mesh->faces[3 * f + k]] / 3;
+    for (size_t v = 0; v < h->mesh->vert_count; v++) {
+        if (c->next[v] == UINT32_MAX) continue;
+        border++;
+        border_dist += h->dist_sum[v];
+    }
+    return border_dist * (double)seeds < BORDER_NEAR * seed_dist * (double)border;
+}
+
+/* ---- all of them ---- */
+
+static npg_status open_cutting(cutting *c)
+{
+    const npg_mesh *mesh = c->hearing->mesh;
+    NPG_TRY(npg_alloc_array(&c->twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *c->twin));
+    NPG_TRY(npg_alloc_array(&c->next, NPG_FOR_MESH, mesh->vert_count, sizeof *c->next));
+    NPG_TRY(npg_alloc_array(&c->loop, NPG_FOR_MESH, mesh->vert_count, sizeof *c->loop));
+    NPG_TRY(npg_alloc(&c->is_cut, NPG_FOR_MESH, mesh->face_count));
+    NPG_TRY(npg_mesh_edges(&c->edges, &c->edge_count, mesh->faces, mesh->face_count));
+    return npg_mesh_twins(c->twin, mesh->faces, mesh->face_count);
+}
+
+static void close_cutting(cutting *c)
+{
+    void *all[] = {&c->twin, &c->next, &c->loop, &c->edges, &c->new_faces, &c->is_cut};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+}
+
+/* The mesh without the cut faces and with the new ones. */
+static npg_status rebuild(npg_mesh **out, const cutting *c, size_t cut_count)
+{
+    const npg_mesh *mesh = c->hearing->mesh;
+    size_t at = 0, face_count = mesh->face_count - cut_count + c->new_count;
+    NPG_TRY(npg_mesh_open(out, mesh->vert_count, face_count));
+    memcpy((*out)->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
+    for (size_t f = 0; f < mesh->face_count; f++)
+        if (!c->is_cut[f]) memcpy((*out)->faces + 3 * at++, mesh->faces + 3 * f, 3 * sizeof(uint32_t));
+    memcpy((*out)->faces + 3 * at, c->new_faces, c->new_count * 3 * sizeof(uint32_t));
+    uint8_t *keep;
+    npg_status status = npg_alloc(&keep, NPG_FOR_MESH, face_count);
+    if (!status) {
+        memset(keep, 1, face_count);
+        status = npg_mesh_keep_faces(out, keep); /* drops the vertices inside the patches */
+        npg_release(&keep);
+    }
+    if (status) npg_mesh_unref(out);
+    return status;
+}
+
+/* Whether the mesh is no worse than before: no edge that is wrong, no new border, in as many pieces. */
+static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *after)
+{
+    npg_manifold old, new;
+    const npg_mesh *both[2] = {before, after};
+    size_t pieces[2];
+    NPG_TRY(npg_mesh_manifold(&old, before));
+    NPG_TRY(npg_mesh_manifold(&new, after));
+    for (int i = 0; i < 2; i++) {
+        uint32_t *component;
+        NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, both[i]->vert_count, sizeof *component));
+        npg_status status = npg_mesh_components(component, &pieces[i], both[i]->vert_count, both[i]->faces,
+                                                both[i]->face_count);
+        npg_release(&component);
+        NPG_TRY(status);
+    }
+    *yes = new.crowded_edges <= old.crowded_edges &&new.misoriented_edges <=
+           old.misoriented_edges &&new.border_edges <= old.border_edges &&new.degenerate_faces <=
+           old.degenerate_faces &&pieces[1] <= pieces[0];
+    return NPG_OK;
+}
+
+/* Mark the patch's faces as cut or not; returns how many there are. */
+static size_t mark_cut(cutting *c, uint32_t patch, uint8_t value)
+{
+    size_t count = 0;
+    for (size_t f = 0; f < c->hearing->mesh->face_count; f++) {
+        if (c->patches->of_face[f] != patch) continue;
+        c->is_cut[f] = value;
+        count++;
+    }
+    return count;
+}
+
+static npg_status try_patch(bool *is_cut, cutting *c, const npg_weld_cut *done, uint32_t patch)
+{
+    const npg_mesh *mesh = c->hearing->mesh;
+    const float *pose = NULL;
+    size_t border_count, loop_count;
+    double area;
+    *is_cut = false;
+    memset(c->next, 0xff, mesh->vert_count * sizeof *c->next);
+    if (!link_border(c->next, &border_count, mesh, c->patches, patch, c->twin) || !is_worth(c, patch))
+        return NPG_OK;
+    double worst = worst_pose(&pose, c->hearing, c->patches, patch);
+    NPG_TRY(fill_loops(c, &area, &loop_count, is_cut, pose));
+    *is_cut = *is_cut && loop_count >= LOOPS_LEAST && area < SAVED_LEAST * worst;
+    if (!*is_cut) return NPG_OK;
+    npg_mesh *after;
+    size_t count = done->faces + mark_cut(c, patch, 1);
+    *is_cut = (double)count <= PATCH_MOST * (double)mesh->face_count;
+    if (!*is_cut) return NPG_OK;
+    NPG_TRY(rebuild(&after, c, count));
+    npg_status status = is_as_good(is_cut, mesh, after);
+    npg_mesh_unref(&after);
+    return status;
+}
+
+static npg_status cut_patch(cutting *c, npg_weld_cut *done, uint32_t patch)
+{
+    size_t before = c->new_count;
+    bool is_cut;
+    if (count_seeds(c, patch) < SEEDS_LEAST) return NPG_OK;
+    NPG_TRY(try_patch(&is_cut, c, done, patch));
+    size_t count = mark_cut(c, patch, is_cut);
+    if (is_cut) {
+        done->patches++;
+        done->faces += count;
+    } else {
+        c->new_count = before;
+        done->refused++;
+    }
+    return NPG_OK;
+}
+
+static double cut_area(const cutting *c)
+{
+    const npg_mesh *mesh = c->hearing->mesh;
+    double all = 0, cut = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        double area = npg_face_area(mesh->vert_pos, mesh->faces + 3 * f);
+        all += area;
+        cut += c->is_cut[f] ? area : 0;
+    }
+    return all > 0 ? cut / all : 0;
+}
+
+static npg_status replace(npg_mesh **mesh, npg_weld_cut *done, const cutting *c)
+{
+    npg_mesh *after;
+    if (!done->patches) return NPG_OK;
+    done->area_share = cut_area(c);
+    NPG_TRY(rebuild(&after, c, done->faces));
+    npg_mesh_unref(mesh);
+    *mesh = after;
+    return NPG_OK;
+}
+
+static npg_status cut(npg_mesh **mesh, npg_weld_cut *done, const hearing *h)
+{
+    patches p = {0};
+    cutting c = {.hearing = h, .patches = &p};
+    npg_status status = gather(&p, h);
+    if (!status && p.count) status = open_cutting(&c);
+    for (size_t i = 0; i < p.count && !status; i++) status = cut_patch(&c, done, (uint32_t)i);
+    if (!status) status = replace(mesh, done, &c);
+    close_cutting(&c);
+    close_patches(&p);
+    return status;
+}
+
+npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_sights *sights, size_t at,
+                            const npg_weld_settings *settings)
+{
+    npg_mesh *followed;
+    hearing h = {.settings = settings};
+    *done = (npg_weld_cut){0};
+    NPG_REQUIRE(at < sights->count && settings->spacing_unit > 0);
+    NPG_TRY(npg_mesh_handles(&done->handles, *mesh));
+    if (done->handles < 1) return NPG_OK;
+    NPG_TRY(npg_mesh_copy(&followed, *mesh));
+    h.mesh = followed;
+    npg_release(&followed->vert_normals);
+    npg_status status =
+        npg_alloc_array(&followed->vert_normals, NPG_FOR_MESH, followed->vert_count, 3 * sizeof(float));
+    if (!status) {
+        npg_mesh_vertex_normals(followed->vert_normals, followed->vert_pos, followed->vert_count,
+                                followed->faces, followed->face_count);
+        status = open_hearing(&h, sights->count);
+    }
+    if (!status) status = npg_sights_follow(sights, at, followed, &weld_tracking, hear, &h);
+    done->frames = h.frames;
+    if (!status && h.frames >= FRAMES_LEAST) status = cut(mesh, done, &h);
+    close_hearing(&h);
+    npg_mesh_unref(&followed);
+    return status;
+}

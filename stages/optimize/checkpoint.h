@@ -1,0 +1,32 @@
+/* Checkpoint: the state of a run after a closed window, to the job's folder and back (job.h). */
+#ifndef NPG_CHECKPOINT_H
+#define NPG_CHECKPOINT_H
+
+#include "job/job.h"
+#include "optimize/window.h"
+
+/* What the optimize stage has in hand. */
+typedef struct npg_hand {
+    npg_held *held; /* owned by the stage, grown here when it is restored */
+    size_t held_count, held_capacity;
+    int64_t window_at; /* the window that was just solved, of facts.plan */
+    int64_t emitted;   /* frames passed on before it closed              */
+    double last_chamfer, last_isometry;
+    bool is_aligned;
+    npg_figure figure; /* the grids' coordinates; of a hand to save */
+} npg_hand;
+
+/* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until
+ * all frames passed on before are on disk, so that what is solved is never lost.  Held frames that no window
+ * has solved yet are read again by a run that goes on.  NPG_DISK, NPG_STOPPED. */
+npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit);
+
+/* Restore facts, reference mesh, reports and warnings from the job's open archive (stage job, before the
+ * first pass).  NPG_BAD_INPUT. */
+npg_status npg_checkpoint_restore_facts(npg_worker *worker);
+
+/* Restore what the optimize stage had in hand; with appended frames only those which the first new window
+ * shares.  The plan of facts tells which. */
+npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand);
+
+#endif

@@ -1,0 +1,628 @@
+/* Fit: grids, decoder and motion put together; one epoch is a walk over all frames, in batches from the key
+ * outward.
+ */
+#include "optimize/fit.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "kernels/adam.h"
+#include "kernels/latent.h"
+#include "kernels/mlp.h"
+#include "kernels/sobolev.h"
+#include "optimize/fit_least.h"
+#include "optimize/fit_weights.h"
+#include "pipeline/random.h"
+
+#define HASH_LEVELS    15
+#define HASH_ROWS      16384
+#define HASH_FIRST     16
+#define HASH_GROWTH    1.35
+#define POSITION_FIRST 0 /* channels of the position grids */
+#define POSITION_END   30
+#define NORMAL_END     32 /* channels of the normal grid: 30, 31 */
+
+struct npg_fit {
+    npg_fit_settings settings;
+    npg_device *device;   /* loan */
+    size_t real, rows;    /* V, V padded to blocks */
+    uint32_t *order;      /* order[i]: vertex of the reference at row i; Morton order; owned */
+    uint32_t *row_of;     /* its inverse, owned */
+    float *rest;          /* V x 3 in that order, owned */
+    uint32_t (*edges)[2]; /* between rows, owned */
+    size_t edge_count;
+    npg_levels levels;
+    npg_latent latent;
+    npg_sobolev sobolev;
+    npg_buffer u, nodes, dnodes; /* differential coordinates, features, gradient: [nodes][32] */
+    npg_adam grid_adam, mlp_adam;
+    npg_time_code *time_code;
+    float *params; /* decoder's parameters between windows, owned */
+    uint64_t seed;
+    /* of the window */
+    npg_mlp mlp;
+    npg_motion motion;
+    npg_buffer dcode;
+    size_t frame_count;
+    npg_fit_step result;                /* what the present state measures; of a run that keeps the least */
+    bool is_pulled;                     /* by known correspondences, from bases */
+    size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
+    size_t *rank;                       /* its inverse */
+    int64_t *index;                     /* by k */
+    double *times;                      /* by k */
+    float *cd, *gains, *codes, *packed; /* by k; packed: one frame's positions */
+    bool *has_points;                   /* by k */
+};
+
+/* ---- opening: what does not depend on the window ---- */
+
+/* The two numbers of a level's smoothing matrix (levels.h). */
+static double screen_of(const npg_fit_settings *s, double lambda)
+{
+    return s->smoothing == NPG_SMOOTHING_SCREENED ? 1 + 6 * lambda : 1;
+}
+
+static double degree_of(const npg_fit_settings *s)
+{
+    return s->smoothing == NPG_SMOOTHING_DOUBLED ? 2 : 1;
+}
+
+static void add_grids(npg_levels *levels, const npg_fit_settings *s)
+{
+    bool single = s->encoding == NPG_ENCODING_SINGLE;
+    for (int64_t l = single ? s->grid_levels - 1 : 0; l < s->grid_levels; l++)
+        npg_levels_add(levels,
+                       (npg_level){.kind = NPG_LEVEL_POSITION,
+                                   .nodes = (int)(s->grid_base + l * s->grid_step),
+                                   .channel_first = POSITION_FIRST,
+                                   .channel_end = POSITION_END,
+                                   .share = single ? 1.0 : 1.0 / (double)s->grid_levels,
+                                   .lambda = s->lambda * pow(s->lambda_growth, (double)l),
+                                   .screen = screen_of(s, s->lambda * pow(s->lambda_growth, (double)l)),
+                                   .degree = degree_of(s),
+                                   .rate = s->grid_rate * pow(s->grid_rate_growth, (double)l)},
+                       0);
+}
+
+static void add_hash(npg_levels *levels, const npg_fit_settings *s)
+{
+    for (int l = 0; l < HASH_LEVELS; l++)
+        npg_levels_add(levels,
+                       (npg_level){.kind = NPG_LEVEL_HASHED,
+                                   .nodes = (int)floor(HASH_FIRST * pow(HASH_GROWTH, l)),
+                                   .channel_first = 2 * l,
+                                   .channel_end = 2 * l + 2,
+                                   .share = 1,
+                                   .rate = s->grid_rate},
+                       HASH_ROWS);
+}
+
+static void choose_levels(npg_levels *levels, const npg_fit_settings *s)
+{
+    if (s->encoding == NPG_ENCODING_HASH)
+        add_hash(levels, s);
+    else
+        add_grids(levels, s);
+    if (!s->normal_grid) return;
+    npg_levels_add(levels,
+                   (npg_level){.kind = NPG_LEVEL_NORMAL,
+                               .nodes = (int)s->normal_nodes,
+                               .channel_first = POSITION_END,
+                               .channel_end = NORMAL_END,
+                               .share = 1,
+                               .lambda = s->lambda,
+                               .screen = screen_of(s, s->lambda),
+                               .degree = degree_of(s),
+                               .rate = s->grid_rate},
+                   0);
+}
+
+static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **normals)
+{
+    NPG_TRY(npg_alloc_array(&fit->order, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
+    NPG_TRY(npg_alloc_array(&fit->rest, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(normals, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
+    NPG_TRY(npg_morton_order(fit->order, mesh->vert_pos, fit->real));
+    for (size_t i = 0; i < 3 * fit->real; i++) {
+        fit->rest[i] = mesh->vert_pos[3 * fit->order[i / 3] + i % 3];
+        (*normals)[i] = mesh->vert_normals[3 * fit->order[i / 3] + i % 3];
+    }
+    NPG_TRY(npg_mesh_edges(&fit->edges, &fit->edge_count, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_alloc_array(&fit->row_of, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
+    for (size_t i = 0; i < fit->real; i++) fit->row_of[fit->order[i]] = (uint32_t)i;
+    for (size_t e = 0; e < 2 * fit->edge_count; e++)
+        fit->edges[e / 2][e % 2] = fit->row_of[fit->edges[e / 2][e % 2]];
+    return NPG_OK;
+}
+
+static npg_status open_grid_adam(npg_fit *fit)
+{
+    float *rates;
+    size_t rows = fit->levels.row_count;
+    NPG_TRY(npg_alloc_array(&rates, NPG_FOR_FIT, rows, sizeof(float)));
+    for (int l = 0; l < fit->levels.count; l++)
+        for (size_t i = 0; i < fit->levels.level[l].row_count; i++)
+            rates[fit->levels.level[l].first_row + i] = (float)fit->levels.level[l].rate;
+    npg_status status =
+        npg_adam_open(&fit->grid_adam, fit->device, rates, NPG_LATENT_CHANNELS, rows * NPG_LATENT_CHANNELS);
+    npg_release(&rates);
+    return status;
+}
+
+/* Features that differ from place to place from the start; with a head of zero the motion still begins at
+ * rest. */
+static npg_status draw_features(npg_fit *fit)
+{
+    float *values;
+    size_t count = fit->levels.row_count * NPG_LATENT_CHANNELS;
+    npg_random random = npg_random_stream(fit->seed, 2, 0);
+    if (fit->settings.feature_start <= 0) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_FIT, count, sizeof *values));
+    for (int l = 0; l < fit->levels.count; l++) {
+        const npg_level *level = &fit->levels.level[l];
+        for (size_t row = level->first_row; row < level->first_row + level->row_count; row++)
+            for (int c = level->channel_first; c < level->channel_end; c++)
+                values[row * NPG_LATENT_CHANNELS + (size_t)c] =
+                    (float)(fit->settings.feature_start * (2 * npg_random_real(&random) - 1));
+    }
+    npg_status status = npg_buffer_write(&fit->u, 0, values, count * sizeof *values);
+    npg_release(&values);
+    return status;
+}
+
+static npg_status open_grids(npg_fit *fit, const float *normals)
+{
+    npg_samples samples;
+    size_t bytes = fit->levels.row_count * NPG_LATENT_CHANNELS * sizeof(float);
+    NPG_TRY(npg_samples_open(&samples, &fit->levels, fit->rest, normals, fit->real, fit->rows));
+    npg_status status = npg_latent_open(&fit->latent, fit->device, &samples);
+    npg_samples_close(&samples);
+    if (status) return status;
+    NPG_TRY(npg_sobolev_open(&fit->sobolev, fit->device, &fit->levels));
+    NPG_TRY(npg_buffer_open(&fit->u, fit->device, bytes));
+    NPG_TRY(npg_buffer_open(&fit->nodes, fit->device, bytes));
+    NPG_TRY(npg_buffer_open(&fit->dnodes, fit->device, bytes));
+    NPG_TRY(draw_features(fit));
+    return open_grid_adam(fit);
+}
+
+static npg_mlp_shape shape_of(const npg_fit_settings *s)
+{
+    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies,
+                           (float)s->slope};
+}
+
+/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all begins as the identity.
+ */
+static npg_status draw_params(npg_fit *fit)
+{
+    npg_mlp_shape s = shape_of(&fit->settings);
+    npg_random random = npg_random_stream(fit->seed, 0, 0);
+    size_t count = npg_mlp_param_count(&s);
+    double first = 1 / sqrt((double)(NPG_LATENT_CHANNELS + s.code_size)), second = 1 / sqrt((double)s.w1);
+    NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
+    for (size_t i = 0; i < count; i++) {
+        double value = 2 * npg_random_real(&random) - 1;
+        bool head = (i >= npg_mlp_at_w3(&s) && i < npg_mlp_at_b2(&s)) ||
+                    (i >= npg_mlp_at_b3(&s) && i < npg_mlp_at_w1z(&s));
+        fit->params[i] = head ? 0 : (float)(value * (i >= npg_mlp_at_w1z(&s) ? first : second));
+    }
+    float rate = (float)fit->settings.mlp_rate;
+    return npg_adam_open(&fit->mlp_adam, fit->device, &rate, count, count);
+}
+
+npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_settings *settings,
+                        const npg_mesh *reference, uint64_t seed)
+{
+    npg_fit *fit;
+    float *normals = NULL;
+    *out = NULL;
+    NPG_REQUIRE(reference->vert_normals && reference->vert_count);
+    NPG_TRY(npg_alloc(&fit, NPG_FOR_FIT, sizeof *fit));
+    fit->settings = *settings;
+    fit->device = device;
+    fit->seed = seed;
+    fit->real = reference->vert_count;
+    fit->rows = npg_mlp_rows(device, fit->real);
+    choose_levels(&fit->levels, settings);
+    npg_status status = sort_vertices(fit, reference, &normals);
+    if (!status) status = open_grids(fit, normals);
+    if (!status) status = draw_params(fit);
+    if (!status)
+        status = npg_time_code_open(&fit->time_code, (npg_time_kind)settings->time_code,
+                                    (size_t)settings->frequencies, seed);
+    npg_release(&normals);
+    if (status) npg_fit_close(&fit);
+    *out = fit;
+    return status;
+}
+
+static void close_window(npg_fit *fit)
+{
+    npg_mlp_close(&fit->mlp);
+    npg_motion_close(&fit->motion);
+    npg_buffer_close(&fit->dcode);
+    npg_release(&fit->place);
+    npg_release(&fit->rank);
+    npg_release(&fit->index);
+    npg_release(&fit->times);
+    npg_release(&fit->cd);
+    npg_release(&fit->gains);
+    npg_release(&fit->codes);
+    npg_release(&fit->packed);
+    npg_release(&fit->has_points);
+    fit->frame_count = 0;
+}
+
+void npg_fit_close(npg_fit **slot)
+{
+    if (!slot || !*slot) return;
+    npg_fit *fit = *slot;
+    close_window(fit);
+    npg_latent_close(&fit->latent);
+    npg_sobolev_close(&fit->sobolev);
+    npg_adam_close(&fit->grid_adam);
+    npg_adam_close(&fit->mlp_adam);
+    npg_buffer_close(&fit->u);
+    npg_buffer_close(&fit->nodes);
+    npg_buffer_close(&fit->dnodes);
+    npg_time_code_close(&fit->time_code);
+    npg_release(&fit->params);
+    npg_release(&fit->order);
+    npg_release(&fit->row_of);
+    npg_release(&fit->rest);
+    npg_release(&fit->edges);
+    npg_release(slot);
+}
+
+/* ---- opening a window ---- */
+
+static npg_status alloc_window(npg_fit *fit, size_t count)
+{
+    size_t code = 2 * (size_t)fit->settings.frequencies;
+    NPG_TRY(npg_alloc_array(&fit->place, NPG_FOR_FIT, count, sizeof(size_t)));
+    NPG_TRY(npg_alloc_array(&fit->rank, NPG_FOR_FIT, count, sizeof(size_t)));
+    NPG_TRY(npg_alloc_array(&fit->index, NPG_FOR_FIT, count, sizeof(int64_t)));
+    NPG_TRY(npg_alloc_array(&fit->times, NPG_FOR_FIT, count, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&fit->cd, NPG_FOR_FIT, count, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fit->gains, NPG_FOR_FIT, count, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fit->codes, NPG_FOR_FIT, count * code, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fit->packed, NPG_FOR_FIT, fit->rows, 3 * sizeof(float)));
+    return npg_alloc_array(&fit->has_points, NPG_FOR_FIT, count, sizeof(bool));
+}
+
+/* The caller's frames from the key outward: nearest first, the earlier one on ties. */
+static void sort_outward(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+{
+    for (size_t i = 0; i < count; i++) {
+        size_t k = i;
+        for (; k > 0; k--) {
+            int64_t before = frames[fit->place[k - 1]].index;
+            if (llabs(before - key) <= llabs(frames[i].index - key)) break;
+            fit->place[k] = fit->place[k - 1];
+        }
+        fit->place[k] = i;
+    }
+    for (size_t k = 0; k < count; k++) {
+        const npg_fit_frame *frame = &frames[fit->place[k]];
+        fit->rank[fit->place[k]] = k;
+        fit->index[k] = frame->index;
+        fit->times[k] = frame->time;
+        fit->has_points[k] = frame->count > 0;
+    }
+}
+
+/* A frame's points in Morton order; an empty frame gets one point that the confidence then ignores. */
+static npg_status copy_target(npg_target *target, const npg_fit_frame *frame)
+{
+    static const float nowhere[3] = {0, 0, 0};
+    uint32_t *order = NULL;
+    float *points = NULL;
+    size_t count = frame->count ? frame->count : 1;
+    const float *from = frame->count ? frame->points : nowhere;
+    npg_status status = npg_alloc_array(&order, NPG_FOR_FIT, count, sizeof *order);
+    if (!status) status = npg_alloc_array(&points, NPG_FOR_FIT, count, 3 * sizeof *points);
+    if (!status) status = npg_morton_order(order, from, count);
+    for (size_t i = 0; !status && i < 3 * count; i++) points[i] = from[3 * order[i / 3] + i % 3];
+    npg_release(&order);
+    *target = (npg_target){points, count};
+    return status;
+}
+
+static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
+{
+    return npg_motion_open(&fit->motion, fit->device, (npg_rotation)fit->settings.rotation, fit->rest,
+                           fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count, targets,
+                           fit->frame_count);
+}
+
+static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
+{
+    npg_target *targets;
+    size_t count = fit->frame_count;
+    NPG_TRY(npg_alloc_array(&targets, NPG_FOR_FIT, count, sizeof *targets));
+    npg_status status = NPG_OK;
+    for (size_t k = 0; k < count && !status; k++) status = copy_target(&targets[k], &frames[fit->place[k]]);
+    if (!status) status = open_motion_on(fit, targets);
+    for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
+    npg_release(&targets);
+    return status;
+}
+
+/* The bases in the order of rows and outward. */
+static npg_status open_bases(npg_fit *fit, const npg_fit_frame *frames)
+{
+    float *bases;
+    size_t size = 3 * fit->real;
+    NPG_TRY(open_motion_on(fit, NULL));
+    NPG_TRY(npg_alloc_array(&bases, NPG_FOR_FIT, fit->frame_count, size * sizeof(float)));
+    for (size_t k = 0; k < fit->frame_count; k++)
+        for (size_t i = 0; i < size; i++)
+            bases[k * size + i] = frames[fit->place[k]].base[3 * fit->order[i / 3] + i % 3];
+    npg_status status = npg_motion_set_bases(&fit->motion, bases);
+    npg_release(&bases);
+    return status;
+}
+
+npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+{
+    NPG_REQUIRE(fit && frames && count);
+    npg_mlp_shape shape = shape_of(&fit->settings);
+    size_t batch = (size_t)fit->settings.batch < count ? (size_t)fit->settings.batch : count;
+    close_window(fit);
+    fit->frame_count = count;
+    fit->is_pulled = frames[0].base != NULL;
+    NPG_TRY(alloc_window(fit, count));
+    sort_outward(fit, frames, count, key);
+    NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count, batch));
+    NPG_TRY(npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float)));
+    if (npg_time_code_learns(fit->time_code))
+        NPG_TRY(npg_buffer_open(&fit->dcode, fit->device, count * shape.code_size * sizeof(float)));
+    return fit->is_pulled ? open_bases(fit, frames) : open_targets(fit, frames);
+}
+
+npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start)
+{
+    npg_pull *sorted;
+    int32_t *starts;
+    size_t count = fit->frame_count, at = 0;
+    NPG_REQUIRE(fit->is_pulled && start[count] < INT32_MAX);
+    NPG_TRY(npg_alloc_array(&sorted, NPG_FOR_FIT, start[count] + 1, sizeof *sorted));
+    npg_status status = npg_alloc_array(&starts, NPG_FOR_FIT, count + 1, sizeof *starts);
+    for (size_t k = 0; k < count && !status; k++) {
+        size_t from = fit->place[k];
+        for (size_t i = start[from]; i < start[from + 1]; i++) {
+            for (int c = 0; c < 3; c++) pulls[i].vertex[c] = (int32_t)fit->row_of[pulls[i].vertex[c]];
+            sorted[at++] = pulls[i];
+        }
+        starts[k + 1] = (int32_t)at;
+        fit->has_points[k] = start[from + 1] > start[from];
+    }
+    if (!status) status = npg_motion_set_pulls(&fit->motion, sorted, starts);
+    npg_release(&sorted);
+    npg_release(&starts);
+    return status;
+}
+
+/* ---- one epoch ---- */
+
+static npg_status begin_epoch(npg_fit *fit)
+{
+    npg_time_code_fill(fit->time_code, fit->codes, fit->times, fit->frame_count);
+    NPG_TRY(npg_buffer_write(&fit->mlp.code, 0, fit->codes,
+                             fit->frame_count * fit->mlp.shape.code_size * sizeof(float)));
+    NPG_TRY(npg_sobolev_solve(&fit->sobolev, &fit->nodes, &fit->u));
+    NPG_TRY(npg_latent_sample(&fit->latent, &fit->mlp.z, &fit->nodes));
+    return npg_mlp_begin(&fit->mlp);
+}
+
+static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, int64_t epoch)
+{
+    for (size_t k = first; k < first + count; k++)
+        if (!isfinite(fit->cd[k]))
+            return npg_error(NPG_DIVERGED, "the loss of frame %lld is not finite in epoch %lld",
+                             (long long)fit->index[k], (long long)epoch);
+    return NPG_OK;
+}
+
+/* Positions, losses, and the gradient at the decoder's end. */
+static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
+{
+    const npg_fit_settings *s = &fit->settings;
+    double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
+    NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
+    NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
+    NPG_TRY(fit->is_pulled ? npg_motion_pull(&fit->motion, first, count)
+                           : npg_motion_chamfer(&fit->motion, s->alpha, first, count));
+    NPG_TRY(npg_buffer_read(&fit->motion.cd, first * sizeof(float), fit->cd + first, count * sizeof(float)));
+    NPG_TRY(check_losses(fit, first, count, epoch));
+    for (size_t k = first; k < first + count; k++)
+        fit->gains[k] = (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
+    return npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first,
+                           count);
+}
+
+static npg_status step_time_code(npg_fit *fit)
+{
+    if (!npg_time_code_learns(fit->time_code)) return NPG_OK;
+    size_t bytes = fit->frame_count * fit->mlp.shape.code_size * sizeof(float);
+    NPG_TRY(npg_mlp_code_back(&fit->mlp, &fit->dcode));
+    NPG_TRY(npg_buffer_read(&fit->dcode, 0, fit->codes, bytes));
+    return npg_time_code_step(fit->time_code, fit->codes, fit->times, fit->frame_count,
+                              fit->settings.mlp_rate);
+}
+
+static npg_status end_epoch(npg_fit *fit)
+{
+    NPG_TRY(npg_mlp_end(&fit->mlp));
+    NPG_TRY(npg_latent_back(&fit->latent, &fit->dnodes, &fit->mlp.dz, &fit->mlp.z));
+    NPG_TRY(npg_sobolev_solve(&fit->sobolev, &fit->dnodes, &fit->dnodes));
+    NPG_TRY(step_time_code(fit));
+    NPG_TRY(npg_adam_step(&fit->grid_adam, &fit->u, &fit->dnodes));
+    return npg_adam_step(&fit->mlp_adam, &fit->mlp.params, &fit->mlp.grad);
+}
+
+static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
+{
+    size_t blocks = fit->rows / 16, solved = 0, all = fit->frame_count * blocks;
+    float *part;
+    double sum = 0, weighted = 0;
+    NPG_TRY(npg_alloc_array(&part, NPG_FOR_FIT, all, sizeof(float)));
+    npg_status status = npg_buffer_read(&fit->motion.part, 0, part, all * sizeof(float));
+    for (size_t i = 0; !status && i < all; i++) sum += (double)part[i];
+    npg_release(&part);
+    step->chamfer = 0;
+    for (size_t k = 0; k < fit->frame_count; k++) {
+        if (!fit->has_points[k]) continue;
+        step->chamfer += (double)fit->cd[k];
+        weighted += (double)(fit->cd[k] * fit->gains[k]);
+        solved++;
+    }
+    step->chamfer /= solved ? (double)solved : 1;
+    step->isometry = 0.5 * sum / ((double)fit->frame_count * (double)fit->edge_count);
+    step->loss = weighted + fit->settings.isometry * step->isometry;
+    return status;
+}
+
+/* What the present state measures; with is_learning the gradients for a step, too. */
+static npg_status look(npg_fit *fit, npg_fit_step *step, bool is_learning)
+{
+    npg_weights weights;
+    double progress = (double)step->epoch / (double)step->epochs;
+    npg_weights_begin(&weights, &fit->settings, progress, fit->index[0], fit->frame_count);
+    NPG_TRY(begin_epoch(fit));
+    for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
+        size_t left = fit->frame_count - first, count = left < fit->mlp.batch ? left : fit->mlp.batch;
+        NPG_TRY(measure_batch(fit, &weights, first, count, step->epoch));
+        if (is_learning) NPG_TRY(npg_mlp_backward(&fit->mlp, first, count));
+    }
+    return sum_up(fit, step);
+}
+
+/* The positions that follow from the parameters after the last step. */
+static npg_status decode(npg_fit *fit)
+{
+    NPG_TRY(begin_epoch(fit));
+    for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
+        size_t left = fit->frame_count - first, count = left < fit->mlp.batch ? left : fit->mlp.batch;
+        NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
+        NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
+    }
+    return npg_device_finish(fit->device);
+}
+
+/* Half a cosine from 1 down to rate_end. */
+static double rate_at(const npg_fit_settings *s, int64_t epoch)
+{
+    double part = s->epochs > 1 ? (double)epoch / (double)(s->epochs - 1) : 0;
+    return s->rate_end + (1 - s->rate_end) * 0.5 * (1 + cos(M_PI * part));
+}
+
+static npg_fit_knowns knowns_of(npg_fit *fit)
+{
+    return (npg_fit_knowns){&fit->u, &fit->mlp.params, fit->time_code};
+}
+
+/* The state that step measured, where it is the best so far. */
+static npg_status offer(npg_fit *fit, npg_fit_least *least, const npg_fit_step *step)
+{
+    npg_fit_knowns now = knowns_of(fit);
+    if (!least) return NPG_OK;
+    return npg_fit_least_offer(least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
+}
+
+static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_least *least,
+                             npg_fit_watch *watch, void *user)
+{
+    for (; step->epoch < end; step->epoch++) {
+        fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
+        NPG_TRY(look(fit, step, true));
+        NPG_TRY(offer(fit, least, step));
+        NPG_TRY(end_epoch(fit));
+        if (watch) NPG_TRY(watch(user, step));
+    }
+    return NPG_OK;
+}
+
+/* The last step's outcome is looked at as well; then the fit goes back to the state with the least loss. */
+static npg_status go_back(npg_fit *fit, npg_fit_least *least, npg_fit_step *step)
+{
+    npg_fit_knowns now = knowns_of(fit);
+    NPG_TRY(look(fit, step, false));
+    NPG_TRY(offer(fit, least, step));
+    fit->result = least->step;
+    return npg_fit_least_restore(least, &now);
+}
+
+npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
+{
+    npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
+    npg_fit_least least = {.rows = NULL};
+    bool is_kept = fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled && end > first;
+    fit->result.epochs = 0;
+    npg_status status = run_epochs(fit, &step, end, is_kept ? &least : NULL, watch, user);
+    if (!status && is_kept) status = go_back(fit, &least, &step);
+    npg_fit_least_clear(&least);
+    if (status) return status;
+    NPG_TRY(npg_buffer_read(&fit->mlp.params, 0, fit->params,
+                            npg_mlp_param_count(&fit->mlp.shape) * sizeof(float)));
+    return decode(fit);
+}
+
+const npg_fit_step *npg_fit_result(const npg_fit *fit)
+{
+    return fit->result.epochs ? &fit->result : NULL;
+}
+
+npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
+{
+    NPG_REQUIRE(i < fit->frame_count);
+    size_t bytes = fit->rows * 3 * sizeof(float);
+    NPG_TRY(npg_buffer_read(&fit->motion.x, fit->rank[i] * bytes, fit->packed, bytes));
+    for (size_t row = 0; row < fit->real; row++)
+        for (size_t axis = 0; axis < 3; axis++) {
+            float at = fit->packed[row / 16 * 48 + axis * 16 + row % 16];
+            if (!isfinite(at)) return npg_error(NPG_DIVERGED, "a vertex of frame %zu is not finite", i);
+            vert_unit[3 * fit->order[row] + axis] = at;
+        }
+    return NPG_OK;
+}
+
+npg_status npg_fit_features(npg_fit *fit, float *features)
+{
+    size_t row_size = NPG_LATENT_CHANNELS * sizeof(float);
+    float *rows;
+    NPG_REQUIRE(fit->frame_count);
+    NPG_TRY(npg_alloc(&rows, NPG_FOR_FIT, fit->real * row_size));
+    npg_status status = npg_buffer_read(&fit->mlp.z, 0, rows, fit->real * row_size);
+    for (size_t row = 0; row < fit->real && !status; row++)
+        memcpy(features + NPG_LATENT_CHANNELS * fit->order[row], rows + NPG_LATENT_CHANNELS * row, row_size);
+    npg_release(&rows);
+    return status;
+}
+
+npg_fit_parts npg_fit_open_parts(npg_fit *fit)
+{
+    npg_mlp_shape shape = shape_of(&fit->settings);
+    return (npg_fit_parts){&fit->levels,   &fit->u,     &fit->grid_adam,
+                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape),
+                           fit->time_code};
+}
+
+size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frames, size_t points, int units)
+{
+    npg_levels levels = {0};
+    npg_mlp_shape shape = shape_of(s);
+    choose_levels(&levels, s);
+    const npg_tuning *tuning = &npg_tuning_wide; /* a processor: elsewhere the device has memory of its own */
+    size_t block = (size_t)tuning->mlp_rows, groups = (size_t)(tuning->mlp_groups * units);
+    size_t rows = (vert_count + block - 1) / block * block;
+    size_t batch = (size_t)s->batch < frames ? (size_t)s->batch : frames;
+    size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
+    size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
+    size_t per_group = npg_mlp_param_count(&shape) + 2 * block * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
+    size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_param_count(&shape) * 7;
+    return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
+}

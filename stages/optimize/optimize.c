@@ -1,0 +1,443 @@
+/* optimize: slides windows over time and finds the deformation of the reference in every frame (paper,
+ * method).
+ *
+ * Holds the frames of one window, fits them jointly on the OpenCL device, writes vertices into each frame and
+ * passes on what no later window needs. */
+#include <math.h>
+#include <string.h>
+
+#include "kernels/kernels.h"
+#include "optimize/checkpoint.h"
+#include "optimize/fit_state.h"
+#include "optimize/record.h"
+#include "optimize/window.h"
+#include "pipeline/live_plan.h"
+
+typedef struct state {
+    npg_window_settings window_settings;
+    npg_device *device;
+    npg_window_solver *solver;
+    npg_held *held; /* owned, with what they own; in order of arrival */
+    size_t held_count, held_capacity;
+    npg_window window;
+    int64_t window_at, window_count;
+    bool is_aligned;
+    int64_t total; /* frames of the capture, -1 until the stream has ended */
+    double last_chamfer, last_isometry;
+    int64_t emitted;
+} state;
+
+/* ---- options ---- */
+
+#define AT(field)     offsetof(state, window_settings.fit.field)
+#define MATCH(field)  offsetof(state, window_settings.match.field)
+#define INT_OPTION    NPG_OPTION_INT
+#define REAL_OPTION   NPG_OPTION_REAL
+#define CHOICE_OPTION NPG_OPTION_CHOICE
+
+static const npg_option options[] = {
+    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "10", 0, 1e6, NULL, "N"},
+    {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
+     0, "quaternion|cayley|exponential", NULL},
+    {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,
+     "fourier|polynomial|gaussian|learned", NULL},
+    {"time-frequencies", "frequencies of the time code; it has twice as many values", INT_OPTION,
+     AT(frequencies), "4", 1, 16, NULL, "M"},
+    {"encoding", "features: a hierarchy of grids, its finest grid alone, or a hash table", CHOICE_OPTION,
+     AT(encoding), "grid", 0, 0, "grid|single|hash", NULL},
+    {"grid-levels", "levels of the position grid", INT_OPTION, AT(grid_levels), "8", 1, 16, NULL, "L"},
+    {"grid-base", "nodes per axis of the coarsest level", INT_OPTION, AT(grid_base), "2", 2, 64, NULL, "N"},
+    {"grid-step", "nodes per axis that each level adds", INT_OPTION, AT(grid_step), "3", 0, 16, NULL, "N"},
+    {"grid-rate", "learning rate of the coarsest level", REAL_OPTION, AT(grid_rate), "0.005", 0, 10, NULL,
+     NULL},
+    {"grid-rate-growth", "its growth per level", REAL_OPTION, AT(grid_rate_growth), "2.5", 0.1, 10, NULL,
+     NULL},
+    {"lambda", "smoothing of the coarsest level, 0 for none", REAL_OPTION, AT(lambda), "0.4", 0, 1e4, NULL,
+     NULL},
+    {"lambda-growth", "its growth per level", REAL_OPTION, AT(lambda_growth), "1.5", 0.1, 10, NULL, NULL},
+    {"smoothing",
+     "matrix of the smoothing: I + lambda (D - A), the same with 6 lambda more on the diagonal, or I + "
+     "lambda "
+     "(2 D - A)",
+     CHOICE_OPTION, AT(smoothing), "screened", 0, 0, "graph|screened|doubled", NULL},
+    {"normal-grid", "features by normal direction beside those by position", NPG_OPTION_FLAG, AT(normal_grid),
+     "yes", 0, 0, NULL, NULL},
+    {"normal-nodes", "nodes per axis of the normal grid", INT_OPTION, AT(normal_nodes), "4", 2, 32, NULL,
+     "N"},
+    {"width-1", "units of the first hidden layer", INT_OPTION, AT(width_1), "512", 32, 4096, NULL, "N"},
+    {"width-2", "units of the second hidden layer", INT_OPTION, AT(width_2), "512", 32, 4096, NULL, "N"},
+    {"mlp-rate", "learning rate of the decoder", REAL_OPTION, AT(mlp_rate), "0.001", 0, 1, NULL, NULL},
+    {"slope", "slope of the leaky rectifier below 0", REAL_OPTION, AT(slope), "0.01", 0, 1, NULL, NULL},
+    {"isometry", "weight of the change of edge lengths", REAL_OPTION, AT(isometry), "5", 0, 1e6, NULL, NULL},
+    {"welsch", "width of the robust weight on squared unit distances, 0 for none", REAL_OPTION, AT(alpha),
+     "0.3", 0, 1e3, NULL, NULL},
+    {"confidence", "weight of a frame by how well it and those nearer the key fit", CHOICE_OPTION,
+     AT(confidence), "constant", 0, 0, "cumulative|single|delta|constant", NULL},
+    {"catch-up", "how the confidence opens with the epochs", CHOICE_OPTION, AT(catch_up), "root", 0, 0,
+     "root|constant|linear|exponential|interpolated", NULL},
+    {"feature-start", "grid features begin spread over +- this; 0 as in the paper", REAL_OPTION,
+     AT(feature_start), "3", 0, 1e3, NULL, NULL},
+    {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
+     AT(rate_end), "0.1", 0, 1, NULL, NULL},
+    {"deliver",
+     "result of a joint fit by Chamfer distance: of all the states between its steps the one with the least "
+     "loss, or the last",
+     CHOICE_OPTION, AT(deliver), "least", 0, 0, "least|last", NULL},
+    {"aligned-rate",
+     "share of the learning rates where frames come aligned: the fit then starts beside its goal, and full "
+     "steps would first lead away from it",
+     REAL_OPTION, offsetof(state, window_settings.aligned_rate), "0.1", 0, 100, NULL, NULL},
+    {"samples", "vertices of aligned frames that are fitted and carry the others, 0: all", INT_OPTION,
+     offsetof(state, window_settings.samples), "1500", 0, 1e6, NULL, "N"},
+    {"rounds", "times in a window's fit that aligned frames are matched with their points", INT_OPTION,
+     offsetof(state, window_settings.rounds), "2", 1, 1000, NULL, "N"},
+    {"match-points", "most points of an aligned frame that pull at the surface", INT_OPTION, MATCH(points),
+     "5000", 10, 1e7, NULL, "N"},
+    {"match-along", "share of distances along the surface, 0 to 1", REAL_OPTION, MATCH(along), "0.02", 0, 1,
+     NULL, NULL},
+    {"match-reverse", "weight of surface to points against points to surface", REAL_OPTION, MATCH(reverse),
+     "0.5", 0, 100, NULL, NULL},
+    {"match-total", "weight of all points of an aligned frame", REAL_OPTION, MATCH(total), "5000", 1, 1e9,
+     NULL, NULL},
+    {"match-tie", "weight of staying where the window before has put a frame, against its points",
+     REAL_OPTION, MATCH(tie), "1", 0, 1e6, NULL, NULL},
+    {"fit-batch", "frames whose hidden layer is kept at a time", INT_OPTION, AT(batch), "4", 1, 64, NULL,
+     "N"},
+    {0}};
+
+void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
+{
+    state filled = {0};
+    npg_options_fill(from, options, &filled);
+    *settings = filled.window_settings.fit;
+}
+
+/* ---- opening ---- */
+
+static npg_status check_widths(const npg_fit_settings *s)
+{
+    if (s->width_1 % 32 || s->width_2 % 32)
+        return npg_error(NPG_USAGE, "option width-%d: %lld is not a multiple of 32", s->width_1 % 32 ? 1 : 2,
+                         (long long)(s->width_1 % 32 ? s->width_1 : s->width_2));
+    return NPG_OK;
+}
+
+static npg_status go_on(npg_worker *worker);
+
+/* Which parameters the kernels have; a file that could not be used is a warning. */
+static void note_tuning(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const char *source = npg_device_tuning_source(s->device);
+    json_object_set_new(npg_worker_report(worker), "tuning", npg_json_text(source));
+    npg_worker_log(worker, strstr(source, "(not used") ? NPG_LOG_WARNING : NPG_LOG_INFO, -1, "tuning %s",
+                   source);
+}
+
+static npg_status init(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    s->total = -1;
+    NPG_TRY(check_widths(&s->window_settings.fit));
+    NPG_TRY(npg_device_open_tuned(&s->device, npg_worker_settings(worker)->device,
+                                  npg_worker_settings(worker)->tuning));
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
+    bool is_resumed = npg_worker_facts(worker)->is_resumed;
+    if (npg_worker_facts(worker)->is_live || is_resumed) NPG_TRY(npg_kernels_self_test(s->device));
+    const npg_device_info *info = npg_device_facts(s->device);
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
+                   info->units);
+    json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
+    note_tuning(worker);
+    return is_resumed ? go_on(worker) : NPG_OK;
+}
+
+static void clear_held(npg_held *held)
+{
+    npg_frame_clear(&held->frame);
+    npg_release(&held->solved);
+}
+
+static void uninit(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    npg_window_solver_close(&s->solver);
+    npg_device_close(&s->device);
+    for (size_t i = 0; i < s->held_count; i++) clear_held(&s->held[i]);
+    npg_release(&s->held);
+}
+
+static npg_status open_solver(npg_worker *worker, bool is_aligned)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    s->is_aligned = is_aligned;
+    s->window_count = npg_live_window_count(&facts->plan, s->total);
+    s->window = npg_live_window(&facts->plan, 0, s->total);
+    NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
+                                   (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
+    json_object_set_new(npg_worker_report(worker), "samples",
+                        json_integer((json_int_t)npg_window_sample_count(s->solver)));
+    return NPG_OK;
+}
+
+/* ---- a window ---- */
+
+static npg_held *held_frame(state *s, int64_t index)
+{
+    for (size_t i = 0; i < s->held_count; i++)
+        if (s->held[i].frame.index == index) return &s->held[i];
+    return NULL;
+}
+
+static bool window_is_complete(state *s)
+{
+    for (int64_t t = s->window.first; t <= s->window.last; t++)
+        if (!held_frame(s, t)) return false;
+    return true;
+}
+
+static void report_epoch(npg_worker *worker, const npg_fit_step *step)
+{
+    state *s = npg_worker_state(worker);
+    double of_window = (double)(step->epoch + 1) / (double)step->epochs;
+    s->last_chamfer = step->chamfer;
+    s->last_isometry = step->isometry;
+    npg_progress progress = {.share = ((double)s->window_at + of_window) / (double)s->window_count,
+                             .step = step->epoch + 1,
+                             .steps = step->epochs,
+                             .window = s->window_at,
+                             .windows = s->window_count,
+                             .frames_done = s->emitted,
+                             .frames = npg_worker_facts(worker)->frame_count,
+                             .loss = step->loss};
+    npg_worker_progress(worker, &progress);
+    if (step->epoch % 25 == 0 || step->epoch + 1 == step->epochs)
+        npg_worker_log(
+            worker, NPG_LOG_DEBUG, -1, "window %lld epoch %lld: chamfer %.4g isometry %.4g loss %.4g",
+            (long long)s->window_at, (long long)step->epoch, step->chamfer, step->isometry, step->loss);
+}
+
+static npg_status watch(void *user, const npg_fit_step *step)
+{
+    npg_worker *worker = user;
+    report_epoch(worker, step);
+    return npg_worker_stopping(worker) ? NPG_STOPPED : NPG_OK;
+}
+
+static void note_result(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_fit_step *result = npg_fit_result(npg_window_fit(s->solver));
+    if (!result) return;
+    s->last_chamfer = result->chamfer;
+    s->last_isometry = result->isometry;
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "window %lld: least loss after %lld of %lld steps, kept: chamfer %.4g isometry %.4g",
+                   (long long)s->window_at, (long long)result->epoch, (long long)result->epochs,
+                   result->chamfer, result->isometry);
+}
+
+static npg_status solve_window(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    size_t count = (size_t)(s->window.last - s->window.first + 1);
+    npg_held **frames;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
+    for (size_t i = 0; i < count; i++) frames[i] = held_frame(s, s->window.first + (int64_t)i);
+    npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
+    npg_release(&frames);
+    if (!status) note_result(worker);
+    return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
+                            (long long)s->window.first, (long long)s->window.last);
+}
+
+/* ---- passing on ---- */
+
+static bool is_needed_later(npg_worker *worker, int64_t index)
+{
+    state *s = npg_worker_state(worker);
+    const npg_plan *plan = &npg_worker_facts(worker)->plan;
+    return npg_live_is_needed_after(plan, index, s->window_at, s->total);
+}
+
+/* Pass a solved frame on; its vertices are now the solved ones. */
+static npg_status emit(npg_worker *worker, npg_held *held)
+{
+    state *s = npg_worker_state(worker);
+    npg_chunk *chunk;
+    NPG_TRY(npg_chunk_open(&chunk, 1));
+    npg_release(&held->frame.vert_unit);
+    held->frame.vert_unit = held->solved;
+    held->frame.vert_count = npg_worker_facts(worker)->reference->vert_count;
+    held->frame.fields |= NPG_FIELD_VERTICES;
+    held->solved = NULL;
+    npg_chunk_add(chunk, &held->frame);
+    s->emitted++;
+    npg_status status = npg_worker_push(worker, &chunk);
+    npg_chunk_unref(&chunk);
+    return status;
+}
+
+static npg_status emit_done(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    size_t kept = 0;
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < s->held_count; i++) {
+        npg_held *held = &s->held[i];
+        if (!status && held->solved && !is_needed_later(worker, held->frame.index)) {
+            status = emit(worker, held);
+            clear_held(held);
+        } else {
+            npg_held moved = *held;
+            memset(held, 0, sizeof *held);
+            s->held[kept++] = moved;
+        }
+    }
+    s->held_count = kept;
+    return status;
+}
+
+/* ---- states on disk ---- */
+
+/* The motion of the window for neupig apply, before the state says that the window is solved. */
+static npg_status save_record(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_record_source source = {s->solver,
+                                      &s->window_settings.fit,
+                                      facts,
+                                      &s->window,
+                                      s->held,
+                                      s->held_count,
+                                      (uint64_t)npg_worker_settings(worker)->seed};
+    char *path;
+    NPG_TRY(npg_job_motion_path(facts->job, &path));
+    npg_status status = npg_record_save(path, &source);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status save_state(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    if (!npg_worker_facts(worker)->job) return NPG_OK;
+    NPG_TRY(save_record(worker));
+    const npg_hand hand = {s->held,          s->held_count, s->held_capacity,
+                           s->window_at,     s->emitted,    s->last_chamfer,
+                           s->last_isometry, s->is_aligned, npg_window_figure(s->solver)};
+    return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));
+}
+
+/* Where the state on disk was taken: the window is solved, its frames are not passed on. */
+static npg_status go_on(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_hand hand = {0};
+    npg_status status = npg_checkpoint_restore_hand(worker, &hand);
+    s->held = hand.held;
+    s->held_count = hand.held_count;
+    s->held_capacity = hand.held_capacity;
+    s->emitted = hand.emitted;
+    s->last_chamfer = hand.last_chamfer;
+    s->last_isometry = hand.last_isometry;
+    if (!status) status = open_solver(worker, hand.is_aligned);
+    if (!status)
+        status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(facts->job),
+                                 npg_job_grids_path(facts->job));
+    if (status) return npg_error_prefix(status, "the state to go on from");
+    s->window_at = hand.window_at;
+    if (s->window_at >= 0) NPG_TRY(emit_done(worker));
+    if (++s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
+    return NPG_OK;
+}
+
+static npg_status solve_complete_windows(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    while (s->window_at < s->window_count && window_is_complete(s)) {
+        NPG_TRY(solve_window(worker));
+        NPG_TRY(save_state(worker));
+        NPG_TRY(emit_done(worker));
+        if (++s->window_at < s->window_count)
+            s->window = npg_live_window(&npg_worker_facts(worker)->plan, s->window_at, s->total);
+    }
+    return NPG_OK;
+}
+
+/* The last window of an open plan is as long as what came; frames that waited for one more go on. */
+static npg_status solve_the_rest(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    s->total = facts->frame_count;
+    s->window_count = npg_live_window_count(&facts->plan, s->total);
+    if (s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
+    NPG_TRY(solve_complete_windows(worker));
+    return emit_done(worker);
+}
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    state *s = npg_worker_state(worker);
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
+    size_t count = npg_chunk_count(*chunk);
+    if (count && !s->solver)
+        NPG_TRY(open_solver(worker, npg_chunk_frame(*chunk, 0)->fields & NPG_FIELD_POSE));
+    NPG_TRY(npg_grow(&s->held, &s->held_capacity, s->held_count + count, sizeof *s->held, NPG_FOR_FRAMES));
+    for (size_t i = 0; i < count; i++) {
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        s->held[s->held_count++] = (npg_held){.frame = *frame};
+        memset(frame, 0, sizeof *frame);
+    }
+    npg_chunk_unref(chunk);
+    return solve_complete_windows(worker);
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
+    if (npg_plan_is_open(&npg_worker_facts(worker)->plan)) NPG_TRY(solve_the_rest(worker));
+    if (s->held_count)
+        return npg_error(NPG_FAILED, "window %lld (frames %lld to %lld) did not get all its frames",
+                         (long long)s->window_at, (long long)s->window.first, (long long)s->window.last);
+    json_t *report = npg_worker_report(worker);
+    json_object_set_new(report, "windows", json_integer(s->window_count));
+    json_object_set_new(report, "epochs", json_integer(s->window_settings.fit.epochs));
+    json_object_set_new(report, "last_chamfer", json_real(s->last_chamfer));
+    json_object_set_new(report, "last_isometry", json_real(s->last_isometry));
+    return NPG_OK;
+}
+
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_plan *plan = &facts->plan;
+    npg_window window = npg_live_window(plan, 0, -1);
+    size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
+    size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
+    *chunks_held = (frames + chunk - 1) / chunk + 1;
+    const char *align = npg_options_get(npg_worker_options(worker), "align");
+    return npg_window_memory(&s->window_settings, align && !strcmp(align, "yes"),
+                             npg_worker_verts_at_most(worker), frames, facts->point_count_max);
+}
+
+const npg_stage npg_stage_optimize = {
+    .name = "optimize",
+    .help = "fits the motion of the reference to all frames, window by window",
+    .options = options,
+    .state_size = sizeof(state),
+    .passes = NPG_PASS_MEASURE | NPG_PASS_SOLVE,
+    .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
+    .gives = NPG_FIELD_VERTICES,
+    .init = init,
+    .process = process,
+    .flush = flush,
+    .uninit = uninit,
+    .memory = memory,
+};

@@ -1,0 +1,36 @@
+/* Replay: the deformation of a finished run at any time, from the records of its windows alone (record.h).
+ *
+ *     x(t) = the windows around t, one after the other in the order they were solved: x + share_w(t) (x_w(t)
+ * - x) x_w(t) = y(t), carried by the samples that w's decoder moves at t       (y: the coarse alignment)
+ *
+ * At a frame that is what the run has written, but for rounding.  Between frames the decoder is asked for
+ * that very time - it is a function of it - and y is the cubic through the alignments of the frames around
+ * (Catmull-Rom); without alignment y is the reference, and the motion the decoder's alone.  In overlaps the
+ * windows fade as they do at frames, so the motion is continuous.
+ *
+ * Memory: the reference, and the records of a few windows.  Threads: one at a time. */
+#ifndef NPG_REPLAY_H
+#define NPG_REPLAY_H
+
+#include "kernels/runtime/device.h"
+
+typedef struct npg_replay npg_replay;
+
+/* The records in a folder (OUT/job); the device is a loan.  NPG_END when there are none, NPG_BAD_INPUT names
+ * one that is damaged or does not belong to the others. */
+npg_status npg_replay_open(npg_replay **replay, npg_device *device, const char *folder);
+void npg_replay_close(npg_replay **replay);
+
+size_t npg_replay_vert_count(const npg_replay *replay);
+
+/* The reference, V x 3, unit coordinates; a loan. */
+const float *npg_replay_rest(const npg_replay *replay);
+
+/* Frames that have a motion: first <= index <= last. */
+void npg_replay_range(const npg_replay *replay, int64_t *first, int64_t *last);
+
+/* vert_unit (V x 3) at a frame or between two: index is a real number in that range.  NPG_BAD_INPUT outside,
+ * and where a record on the way is missing. */
+npg_status npg_replay_vertices(npg_replay *replay, float *vert_unit, double index);
+
+#endif

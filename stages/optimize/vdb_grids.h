@@ -1,0 +1,37 @@
+/* Latent grids as OpenVDB files that other programs open. */
+#ifndef NPG_VDB_GRIDS_H
+#define NPG_VDB_GRIDS_H
+
+#include "kernels/levels.h"
+#include "pipeline/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What the grids belong to, for the metadata. */
+typedef struct npg_vdb_place {
+    double world_centre[3]; /* world position of the grids' 0                    */
+    double unit_per_world;  /* scale                                         */
+    int64_t frame_first, frame_last, window;
+} npg_vdb_place;
+
+/* Write all dense levels of rows [row_count][32] to a file.  Three channels at a time make a Vec3 grid
+ * "position_L05_c03" (level 5, channels 3 to 5), what is left over makes float grids "normal_L08_c30".  The
+ * voxel (i, j, k) is node (i, j, k) of the level; the transform takes it to world coordinates (grids over
+ * normal directions: to the cube [-1, 1]^3).  Every grid has the metadata npg_level, npg_nodes, npg_lambda,
+ * npg_screen and npg_degree (a and b of a I + lambda (b D - A)), npg_channel_first, npg_frame_first,
+ * npg_frame_last; the file has npg_window, npg_levels, npg_world_centre, npg_unit_per_world.  Values are the
+ * unknowns of the fit, differential coordinates: the features are that matrix, inverted, times them.  Single
+ * precision, exact.  Hashed levels are not written. */
+npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const float *rows,
+                               const npg_vdb_place *place);
+
+/* Read the same grids back into rows; other rows are left alone.  NPG_BAD_INPUT when a grid is missing or
+ * has another size. */
+npg_status npg_vdb_load_levels(const char *path, const npg_levels *levels, float *rows);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,185 @@
+/* Normals: principal components, and the view from a sensor. */
+#include "outlier/normals.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/kdtree.h"
+#include "kernels/jacobi.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/memory.h"
+
+#define BATCH         4096 /* queries at a time: bounds the memory for neighbours */
+#define JACOBI_ROUNDS 12
+
+/* ---- smallest eigenvector of a symmetric 3 x 3 matrix ---- */
+
+static void smallest_axis(float axis[3], double m[3][3])
+{
+    double v[3][3];
+    npg_jacobi(m[0], v[0], 3, JACOBI_ROUNDS);
+    int least = m[0][0] <= m[1][1] ? 0 : 1;
+    if (m[2][2] < m[least][least]) least = 2;
+    double length = sqrt(v[0][least] * v[0][least] + v[1][least] * v[1][least] + v[2][least] * v[2][least]);
+    for (int a = 0; a < 3; a++) axis[a] = (float)(v[a][least] / length);
+}
+
+/* ---- estimate ---- */
+
+void npg_normal_of(float normal[3], const float *points, size_t count)
+{
+    double mean[3] = {0}, m[3][3] = {{0}};
+    for (size_t i = 0; i < 3 * count; i++) mean[i % 3] += (double)points[i] / (double)count;
+    for (size_t i = 0; i < count; i++) {
+        double d[3];
+        for (size_t a = 0; a < 3; a++) d[a] = (double)points[3 * i + a] - mean[a];
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++) m[a][b] += d[a] * d[b];
+    }
+    smallest_axis(normal, m);
+}
+
+/* From the points with these indices; around: room for k points. */
+static void normal_from(float normal[3], float *around, const float *points, const uint32_t *index, size_t k)
+{
+    size_t count = 0;
+    for (; count < k && index[count] != UINT32_MAX; count++)
+        memcpy(around + 3 * count, points + 3 * (size_t)index[count], 3 * sizeof *around);
+    npg_normal_of(normal, around, count);
+}
+
+npg_status npg_normals_estimate(float *normals, const float *points, size_t n, int neighbours)
+{
+    npg_kdtree *tree = NULL;
+    uint32_t *index = NULL;
+    float *dist_sq = NULL, *around = NULL;
+    npg_status status;
+    size_t k = (size_t)neighbours;
+    NPG_REQUIRE(neighbours >= 3);
+    NPG_TRY(npg_kdtree_open(&tree, points, n));
+    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index));
+    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq));
+    NPG_TRY_OR(done, status, npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around));
+    for (size_t first = 0; first < n; first += BATCH) {
+        size_t count = n - first < BATCH ? n - first : BATCH;
+        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0));
+        for (size_t i = 0; i < count; i++)
+            normal_from(normals + 3 * (first + i), around, points, index + k * i, k);
+    }
+done:
+    npg_kdtree_close(&tree);
+    npg_release(&index);
+    npg_release(&dist_sq);
+    npg_release(&around);
+    return status;
+}
+
+/* ---- sensor ---- */
+
+void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t n,
+                             const double sensor[3])
+{
+    *flipped = 0;
+    for (size_t i = 0; i < n; i++) {
+        double toward = 0;
+        for (size_t a = 0; a < 3; a++)
+            toward += (double)normals[3 * i + a] * (sensor[a] - (double)points[3 * i + a]);
+        if (toward >= 0) continue;
+        for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
+        ++*flipped;
+    }
+}
+
+#define VIEW_CELLS_MAX 512 /* per side of the picture */
+#define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
+#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half */
+
+typedef struct view { /* a pinhole picture toward the middle of the cloud */
+    double right[3], up[3], forward[3], sensor[3];
+    double half_width; /* tangent of half the angle */
+    size_t cells;      /* per side */
+    double cell_width; /* at the cloud's middle */
+} view;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(double out[3], const double a[3], const double b[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+static void scale_to_unit(double a[3])
+{
+    double length = sqrt(dot(a, a));
+    for (int i = 0; i < 3; i++) a[i] /= length;
+}
+
+/* False when the sensor is inside the box or so near that the picture would be wider than 120 degrees. */
+static bool aim(view *v, const npg_bounds *bounds, const double sensor[3], size_t point_count)
+{
+    double middle[3], radius = npg_bounds_diagonal(bounds) / 2;
+    for (int a = 0; a < 3; a++) {
+        middle[a] = (bounds->lo[a] + bounds->hi[a]) / 2;
+        v->forward[a] = middle[a] - sensor[a];
+        v->sensor[a] = sensor[a];
+    }
+    double distance = sqrt(dot(v->forward, v->forward));
+    if (!(distance > 1.15 * radius)) return false;
+    int least = fabs(v->forward[0]) < fabs(v->forward[1]) ? 0 : 1;
+    if (fabs(v->forward[2]) < fabs(v->forward[least])) least = 2;
+    double axis[3] = {least == 0, least == 1, least == 2};
+    scale_to_unit(v->forward);
+    cross(v->right, axis, v->forward);
+    scale_to_unit(v->right);
+    cross(v->up, v->forward, v->right);
+    v->half_width = radius / sqrt(distance * distance - radius * radius);
+    v->cells = (size_t)sqrt((double)point_count / 4);
+    if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
+    v->cell_width = 2 * v->half_width * distance / (double)v->cells;
+    return v->cells >= 4;
+}
+
+/* The cell a point falls into, and its depth. */
+static size_t project(double *depth, const view *v, const float *p)
+{
+    double d[3], at[2];
+    for (int a = 0; a < 3; a++) d[a] = (double)p[a] - v->sensor[a];
+    *depth = dot(d, v->forward);
+    at[0] = dot(d, v->right) / *depth;
+    at[1] = dot(d, v->up) / *depth;
+    size_t cell = 0;
+    for (int i = 0; i < 2; i++) {
+        double x = (at[i] / v->half_width + 1) / 2 * (double)v->cells;
+        size_t c = x < 0 ? 0 : x >= (double)v->cells ? v->cells - 1 : (size_t)x;
+        cell = cell * v->cells + c;
+    }
+    return cell;
+}
+
+npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, const double sensor[3])
+{
+    view v;
+    float *nearest;
+    size_t hidden = 0;
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, points, n);
+    *yes = false;
+    if (!aim(&v, &bounds, sensor, n)) return NPG_OK;
+    double depth, hidden_depth = HIDDEN_CELLS * v.cell_width;
+    NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));
+    for (size_t i = 0; i < v.cells * v.cells; i++) nearest[i] = INFINITY;
+    for (size_t i = 0; i < n; i++) {
+        size_t cell = project(&depth, &v, points + 3 * i);
+        nearest[cell] = fminf(nearest[cell], (float)depth);
+    }
+    for (size_t i = 0; i < n; i++) {
+        size_t cell = project(&depth, &v, points + 3 * i);
+        hidden += depth > (double)nearest[cell] + hidden_depth;
+    }
+    npg_release(&nearest);
+    *yes = (double)hidden < HIDDEN_MAX * (double)n;
+    return NPG_OK;
+}

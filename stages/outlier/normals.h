@@ -1,0 +1,41 @@
+/* Normals: direction by principal components, side by agreement with neighbours and by the winding number of
+ * the whole cloud (closed bodies: outward) or by the sensor (single views: toward it).
+ *
+ * points and normals: N x 3, points finite.  Every function gives the same result for every number of threads
+ * and may fail with NPG_MEMORY only, unless said otherwise. */
+#ifndef NPG_NORMALS_H
+#define NPG_NORMALS_H
+
+#include <stdbool.h>
+
+#include "pipeline/status.h"
+
+/* The direction in which a few points spread least. */
+void npg_normal_of(float normal[3], const float *points, size_t point_count);
+
+/* Unit normals without a side: the direction in which the `neighbours` nearest points spread least. */
+npg_status npg_normals_estimate(float *normals, const float *points, size_t point_count, int neighbours);
+
+/* Turn every normal toward the sensor (same coordinates as the points).  *flipped counts the turned ones. */
+void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t point_count,
+                             const double sensor[3]);
+
+/* Give normals without sides their sides: a spanning tree over neighbours, surest agreement first, then whole
+ * patches and single points by the winding number, then the sign of the whole.  Outward for closed bodies, to
+ * the convex side for open ones.  *score tells how well the sides fit together, to compare results by. */
+npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count);
+
+/* Estimate and orient with several numbers of neighbours and keep the result of the best score: few follow
+ * thin limbs, many see through noise. */
+npg_status npg_normals_make(float *normals, const float *points, size_t point_count);
+
+/* Find normals on the wrong side among given ones and turn them: by neighbours and winding number, beginning
+ * from the sides given.  *flipped counts the turned ones. */
+npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t point_count);
+
+/* Whether the cloud looks like one view from a sensor: hardly a point is hidden behind another as seen from
+ * there, and the sensor is outside the cloud's box. */
+npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point_count,
+                                    const double sensor[3]);
+
+#endif

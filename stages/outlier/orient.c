@@ -1,0 +1,326 @@
+/* Orient: which side of a surface is out, decided for all points of a npg_sided_cloud together.
+ *
+ * Neighbours say how their sides go together: reflected at the plane halfway between two points, a normal
+ * comes to lie on its neighbour's where the surface curves like a circle, and the two sides of a thin sheet
+ * come to agree as opposite.  The winding number says which side is out: the solid angle that the whole
+ * oriented npg_sided_cloud covers, seen from a point on it, is positive where the point's surroundings face
+ * out.
+ *
+ * Based on: H. Hoppe et al., Surface Reconstruction from Unorganized Points, 1992 (spanning tree); A.
+ * Jacobson et al., Robust Inside-Outside Segmentation Using Generalized Winding Numbers, 2013. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/kdtree.h"
+#include "outlier/normals.h"
+#include "outlier/sides.h"
+#include "pipeline/memory.h"
+
+#define NEIGHBOURS     NPG_SIDE_NEIGHBOURS
+#define CORE_MAX       8000 /* points that are oriented together: pairs of them are looked at */
+#define POINT_ROUNDS   30
+#define MEND_ROUNDS    6
+#define DOUBT_ROUNDS   4
+#define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given */
+#define MISFIT_WEIGHT  4.0
+#define WINDING_WEIGHT 0.6 /* of the winding number beside the neighbours' vote, for single points */
+
+/* ---- neighbours ---- */
+
+static npg_status find_neighbours(npg_sided_cloud *c)
+{
+    npg_kdtree *tree = NULL;
+    float *dist_sq = NULL;
+    npg_status status;
+    double mean = 0;
+    NPG_TRY(npg_kdtree_open(&tree, c->points, c->count));
+    NPG_TRY_OR(done, status,
+               npg_alloc_array(&c->index, NPG_FOR_FRAMES, c->count, NEIGHBOURS * sizeof *c->index));
+    NPG_TRY_OR(done, status, npg_alloc_array(&c->area, NPG_FOR_FRAMES, c->count, sizeof *c->area));
+    NPG_TRY_OR(done, status, npg_alloc_array(&c->winding, NPG_FOR_FRAMES, c->count, sizeof *c->winding));
+    NPG_TRY_OR(done, status,
+               npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, c->count, NEIGHBOURS * sizeof *dist_sq));
+    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, c->index, dist_sq, c->points, c->count, NEIGHBOURS, 0));
+    for (size_t i = 0; i < c->count; i++) {
+        size_t last = c->count < NEIGHBOURS ? c->count - 1 : NEIGHBOURS - 1;
+        c->area[i] = 3.14159265f * dist_sq[NEIGHBOURS * i + last] / (float)last;
+        mean += (double)c->area[i] / (double)c->count;
+    }
+    /* Far outliers have a large disc around them: no point may outweigh many. */
+    for (size_t i = 0; i < c->count; i++) c->area[i] = fminf(c->area[i], 3 * (float)mean);
+    c->soft_sq = 0.5f * (float)mean;
+done:
+    npg_kdtree_close(&tree);
+    npg_release(&dist_sq);
+    return status;
+}
+
+static void close_cloud(npg_sided_cloud *c)
+{
+    npg_release(&c->index);
+    npg_release(&c->area);
+    npg_release(&c->winding);
+    npg_release(&c->links);
+}
+
+static int surest_first(const void *left, const void *right)
+{
+    const npg_link *a = left, *b = right;
+    float x = fabsf(a->agreement), y = fabsf(b->agreement);
+    if (x != y) return x > y ? -1 : 1;
+    if (a->a != b->a) return a->a < b->a ? -1 : 1;
+    return a->b < b->b ? -1 : a->b > b->b;
+}
+
+static npg_status make_links(npg_sided_cloud *c)
+{
+    NPG_TRY(npg_alloc_array(&c->links, NPG_FOR_FRAMES, c->count, NEIGHBOURS * sizeof *c->links));
+    c->link_count = 0;
+    for (uint32_t i = 0; i < c->count; i++)
+        for (size_t k = 0; k < NEIGHBOURS; k++) {
+            uint32_t j = c->index[NEIGHBOURS * (size_t)i + k];
+            if (j == UINT32_MAX || j == i) continue;
+            c->links[c->link_count++] = (npg_link){i, j, agreement(c, i, j)};
+        }
+    qsort(c->links, c->link_count, sizeof *c->links, surest_first);
+    return NPG_OK;
+}
+
+/* ---- whole npg_sided_cloud, single points ---- */
+
+static double total_winding(const npg_sided_cloud *c)
+{
+    double sum = 0;
+    for (size_t i = 0; i < c->count; i++) sum += (double)c->area[i] * (double)c->winding[i];
+    return sum;
+}
+
+static npg_status face_out(npg_sided_cloud *c)
+{
+    NPG_TRY(npg_sided_winding(c));
+    if (total_winding(c) >= 0) return NPG_OK;
+    for (size_t i = 0; i < c->count; i++) turn(c, i);
+    for (size_t i = 0; i < c->count; i++) c->winding[i] = -c->winding[i];
+    return NPG_OK;
+}
+
+/* What neighbours and winding number say about one point's side: negative means the other. */
+static double vote(const npg_sided_cloud *c, uint32_t i)
+{
+    double sum = 0, weight = 0;
+    for (size_t k = 0; k < NEIGHBOURS; k++) {
+        uint32_t j = c->index[NEIGHBOURS * (size_t)i + k];
+        if (j == UINT32_MAX || j == i) continue;
+        double a = (double)agreement(c, i, j);
+        sum += a * fabs(a);
+        weight += fabs(a);
+    }
+    double winding = 2 * (double)c->winding[i];
+    return (weight > 0 ? sum / weight : 0) + WINDING_WEIGHT * fmax(-1, fmin(1, winding));
+}
+
+/* Turn single points that their surroundings vote against, until none is left. */
+static size_t turn_points(npg_sided_cloud *c)
+{
+    size_t all = 0;
+    for (int round = 0; round < POINT_ROUNDS; round++) {
+        size_t turned = 0;
+        double bar = round < 3 ? -0.5 : round < 6 ? -0.25 : 0; /* the clear cases first */
+        for (uint32_t i = 0; i < c->count; i++)
+            if (vote(c, i) < bar) {
+                turn(c, i);
+                turned++;
+            }
+        all += turned;
+        if (!turned && bar >= 0) break;
+    }
+    return all;
+}
+
+/* Single points against their surroundings, and the sign of the whole. */
+static npg_status settle_points(npg_sided_cloud *c)
+{
+    for (int round = 0; round < MEND_ROUNDS; round++) {
+        NPG_TRY(npg_sided_winding(c));
+        if (!turn_points(c)) break;
+    }
+    return face_out(c);
+}
+
+/* Sides from directions alone. */
+static npg_status orient_from_nothing(npg_sided_cloud *c)
+{
+    static const float sure[] = {0.3f, 0.6f, 0.8f, 0.92f}; /* large patches first, then their parts */
+    uint32_t *patch_of;
+    NPG_TRY(npg_alloc_array(&patch_of, NPG_FOR_FRAMES, c->count, sizeof *patch_of));
+    npg_status status = make_links(c);
+    if (!status) status = npg_sided_grow_tree(c);
+    if (!status) status = face_out(c);
+    for (size_t i = 0; i < sizeof sure / sizeof *sure && !status; i++) {
+        status = npg_sided_patches(patch_of, c, NULL, sure[i]);
+        if (!status) status = npg_sided_turn_patches(c, patch_of, 0);
+    }
+    if (!status) status = settle_points(c);
+    npg_release(&patch_of);
+    return status;
+}
+
+/* ---- given sides ---- */
+
+/* Keep given sides unless a whole patch, or then a single point, is clearly on the wrong one. */
+static npg_status orient_from_given(npg_sided_cloud *c)
+{
+    float *given = NULL;
+    uint8_t *in_doubt = NULL;
+    uint32_t *patch_of = NULL;
+    npg_status status;
+    size_t n = c->count;
+    NPG_TRY(face_out(c));
+    NPG_TRY_OR(done, status, npg_alloc_array(&given, NPG_FOR_FRAMES, n, 3 * sizeof *given));
+    NPG_TRY_OR(done, status, npg_alloc_array(&patch_of, NPG_FOR_FRAMES, n, sizeof *patch_of));
+    NPG_TRY_OR(done, status, npg_alloc(&in_doubt, NPG_FOR_FRAMES, n));
+    memcpy(given, c->normals, n * 3 * sizeof *given);
+    NPG_TRY_OR(done, status, orient_from_nothing(c));
+    for (size_t i = 0; i < n; i++)
+        in_doubt[i] = memcmp(given + 3 * i, c->normals + 3 * i, 3 * sizeof *given) != 0;
+    memcpy(c->normals, given, n * 3 * sizeof *given);
+    NPG_TRY_OR(done, status, npg_sided_patches(patch_of, c, in_doubt, 0.5f));
+    NPG_TRY_OR(done, status, npg_sided_turn_patches(c, patch_of, GIVEN_TRUST));
+    status = settle_points(c);
+done:
+    npg_release(&given);
+    npg_release(&in_doubt);
+    npg_release(&patch_of);
+    return status;
+}
+
+/* How well the sides fit together, larger is better: agreement of neighbours less the misfit of the winding
+ * number.  Its weight is such that a limb turned inside out costs more than rough normals. */
+static npg_status score_of(double *score, npg_sided_cloud *c)
+{
+    double lost = 0, area = 0, votes = 0;
+    NPG_TRY(npg_sided_winding(c));
+    for (uint32_t i = 0; i < c->count; i++) {
+        lost += (double)c->area[i] * misfit(c->winding[i]);
+        area += (double)c->area[i];
+        votes += vote(c, i);
+    }
+    *score = votes / (double)c->count - MISFIT_WEIGHT * lost / area;
+    return NPG_OK;
+}
+
+static npg_status orient_core(npg_sided_cloud *c, bool from_given, double *score)
+{
+    npg_status status = find_neighbours(c);
+    if (!status) status = from_given ? orient_from_given(c) : orient_from_nothing(c);
+    if (!status && score) status = score_of(score, c);
+    close_cloud(c);
+    return status;
+}
+
+/* ---- large clouds: a core is oriented, the rest follows ---- */
+
+/* Evenly spread by index: clouds come in scan or random order, both spread over the surface. */
+static void take_core(float *points, float *normals, uint32_t *from, size_t core_count,
+                      const float *all_points, const float *all_normals, size_t n)
+{
+    for (size_t i = 0; i < core_count; i++) {
+        from[i] = (uint32_t)((uint64_t)n * i / core_count);
+        memcpy(points + 3 * i, all_points + 3 * (size_t)from[i], 3 * sizeof *points);
+        memcpy(normals + 3 * i, all_normals + 3 * (size_t)from[i], 3 * sizeof *normals);
+    }
+}
+
+/* Every other point takes the side its nearest core points agree on. */
+static npg_status follow_core(float *all_normals, const float *all_points, size_t n, const float *points,
+                              const float *normals, size_t core_count)
+{
+    enum { NEAR = 5, BATCH = 4096 };
+    npg_kdtree *tree = NULL;
+    uint32_t *index = NULL;
+    float *dist_sq = NULL;
+    npg_status status;
+    NPG_TRY(npg_kdtree_open(&tree, points, core_count));
+    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, NEAR * sizeof *index));
+    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, NEAR * sizeof *dist_sq));
+    for (size_t first = 0; first < n; first += BATCH) {
+        size_t count = n - first < BATCH ? n - first : BATCH;
+        NPG_TRY_OR(done, status,
+                   npg_kdtree_nearest(tree, index, dist_sq, all_points + 3 * first, count, NEAR, 0));
+        for (size_t i = 0; i < count; i++) {
+            float *m = all_normals + 3 * (first + i), sum = 0;
+            for (size_t k = 0; k < NEAR; k++) {
+                const float *o = normals + 3 * (size_t)index[NEAR * i + k];
+                float along = m[0] * o[0] + m[1] * o[1] + m[2] * o[2];
+                sum += along * fabsf(along) / (dist_sq[NEAR * i + k] + 1e-20f);
+            }
+            for (size_t a = 0; a < 3 && sum < 0; a++) m[a] = -m[a];
+        }
+    }
+done:
+    npg_kdtree_close(&tree);
+    npg_release(&index);
+    npg_release(&dist_sq);
+    return status;
+}
+
+static npg_status orient(float *normals, double *score, const float *points, size_t n, bool from_given)
+{
+    float *core_points = NULL, *core_normals = NULL;
+    uint32_t *from = NULL;
+    npg_status status;
+    npg_sided_cloud whole = {.count = n, .points = points, .normals = normals};
+    if (n < 4) return NPG_OK;
+    if (n <= CORE_MAX) return orient_core(&whole, from_given, score);
+    NPG_TRY_OR(done, status, npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
+    NPG_TRY_OR(done, status, npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from));
+    take_core(core_points, core_normals, from, CORE_MAX, points, normals, n);
+    npg_sided_cloud core = {.count = CORE_MAX, .points = core_points, .normals = core_normals};
+    NPG_TRY_OR(done, status, orient_core(&core, from_given, score));
+    status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
+done:
+    npg_release(&core_points);
+    npg_release(&core_normals);
+    npg_release(&from);
+    return status;
+}
+
+npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count)
+{
+    *score = 0;
+    return orient(normals, score, points, point_count, false);
+}
+
+npg_status npg_normals_make(float *normals, const float *points, size_t n)
+{
+    static const int neighbours[] = {10, 12, 16, 24};
+    float *trial;
+    double best = -INFINITY;
+    npg_status status = NPG_OK;
+    NPG_TRY(npg_alloc_array(&trial, NPG_FOR_FRAMES, n, 3 * sizeof *trial));
+    for (size_t i = 0; i < sizeof neighbours / sizeof *neighbours && !status; i++) {
+        double score;
+        status = npg_normals_estimate(trial, points, n, neighbours[i]);
+        if (!status) status = npg_normals_orient(trial, &score, points, n);
+        if (status || !(score > best)) continue;
+        best = score;
+        memcpy(normals, trial, n * 3 * sizeof *normals);
+    }
+    npg_release(&trial);
+    return status;
+}
+
+npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t n)
+{
+    float *before;
+    *flipped = 0;
+    NPG_TRY(npg_alloc_array(&before, NPG_FOR_FRAMES, n, 3 * sizeof *before));
+    memcpy(before, normals, n * 3 * sizeof *before);
+    npg_status status = orient(normals, NULL, points, n, true);
+    for (size_t i = 0; i < n; i++)
+        *flipped += memcmp(before + 3 * i, normals + 3 * i, 3 * sizeof *before) != 0;
+    npg_release(&before);
+    return status;
+}

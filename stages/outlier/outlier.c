@@ -1,0 +1,369 @@
+/* Outlier: drops what is no point of the surface, thins where asked or where a frame is too large, and makes
+ * or mends normals.
+ *
+ * The cheap cleaning takes part in every pass, so that box and keyframe are those of clean points; it gives
+ * the same points each time.  Normals are made for the keyframe alone (or all, if asked), and in the choosing
+ * pass for the frames that may become it. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "outlier/cleaning.h"
+#include "outlier/isolated.h"
+#include "outlier/normals.h"
+#include "pipeline/clock.h"
+#include "pipeline/parallel.h"
+#include "pipeline/stage.h"
+
+enum { NORMALS_AUTO, NORMALS_ESTIMATE, NORMALS_GIVEN };
+enum { FOR_KEY, FOR_ALL };
+
+typedef struct outlier_state {
+    const char *sensor_text;
+    bool drop_isolated;
+    int normals, normals_for;
+    int64_t neighbours, normal_neighbours, point_max;
+    double ratio, voxel;
+    /* what was found so far, over the pass */
+    enum { SENSOR_AUTO, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
+    double sensor_world[3];
+    npg_cleaning sum;
+    size_t frames, skipped;
+    double normals_s;
+} outlier_state;
+
+#define OFFSET(member) offsetof(outlier_state, member)
+
+static const npg_option outlier_options[] = {
+    {"outliers", "Drop isolated points (PCL's statistical filter, repeated until it finds no more)",
+     NPG_OPTION_FLAG, OFFSET(drop_isolated), "yes", 0, 0, NULL, NULL},
+    {"outlier-neighbours", "Neighbours whose mean distance tells whether a point is isolated", NPG_OPTION_INT,
+     OFFSET(neighbours), "12", 2, 200, NULL, NULL},
+    {"outlier-ratio", "Standard deviations above the mean at which a point is isolated", NPG_OPTION_REAL,
+     OFFSET(ratio), "5", 0.5, 100, NULL, NULL},
+    {"voxel", "Keep one point per cube of this side, in the capture's unit; 0: all", NPG_OPTION_REAL,
+     OFFSET(voxel), "0", 0, 1e12, NULL, "LENGTH"},
+    {"points-max", "Thin frames with more points than this, with a warning", NPG_OPTION_INT,
+     OFFSET(point_max), "250000", 1000, 4e9, NULL, NULL},
+    {"normals", "Use given normals (checked and mended) or estimate them; auto: given where there are any",
+     NPG_OPTION_CHOICE, OFFSET(normals), "auto", 0, 0, "auto|estimate|given", NULL},
+    {"normals-for", "Make and mend normals for the keyframe alone or for all frames", NPG_OPTION_CHOICE,
+     OFFSET(normals_for), "key", 0, 0, "key|all", NULL},
+    {"normal-neighbours", "Points a normal is estimated from, 4 or more; 0: several numbers are tried",
+     NPG_OPTION_INT, OFFSET(normal_neighbours), "0", 0, 200, NULL, NULL},
+    {"sensor",
+     "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; none: "
+     "the "
+     "body is closed; auto: the origin, if the points look like one view from it",
+     NPG_OPTION_TEXT, OFFSET(sensor_text), "auto", 0, 0, NULL, "X,Y,Z"},
+    {0}};
+
+/* ---- set-up ---- */
+
+static npg_status parse_sensor(outlier_state *s)
+{
+    const char *at = s->sensor_text;
+    char *end = NULL;
+    s->sensor_kind = SENSOR_AUTO;
+    if (!strcmp(at, "auto")) return NPG_OK;
+    s->sensor_kind = SENSOR_NONE;
+    if (!strcmp(at, "none")) return NPG_OK;
+    s->sensor_kind = SENSOR_GIVEN;
+    for (int a = 0; a < 3; a++) {
+        s->sensor_world[a] = strtod(at, &end);
+        bool good = end != at && isfinite(s->sensor_world[a]) && *end == (a < 2 ? ',' : 0);
+        if (!good)
+            return npg_error(NPG_USAGE, "option sensor: \"%s\" is neither x,y,z nor auto nor none",
+                             s->sensor_text);
+        at = end + 1;
+    }
+    return NPG_OK;
+}
+
+#define REMEMBERED_MAX ((size_t)4 << 20) /* bytes of what the statistical filter found */
+
+static void release_isolated(void *thing)
+{
+    npg_isolated *isolated = thing;
+    npg_isolated_close(&isolated);
+}
+
+static npg_status open_isolated(npg_worker *worker)
+{
+    npg_isolated *isolated;
+    if (npg_worker_kept(worker)) return NPG_OK;
+    NPG_TRY(npg_isolated_open(&isolated, npg_worker_facts(worker)->is_live ? 0 : REMEMBERED_MAX));
+    npg_worker_keep(worker, isolated, release_isolated);
+    return NPG_OK;
+}
+
+static npg_status outlier_init(npg_worker *worker)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    if (s->normal_neighbours && s->normal_neighbours < 4)
+        return npg_error(NPG_USAGE, "option normal-neighbours: %lld is neither 0 nor at least 4",
+                         (long long)s->normal_neighbours);
+    NPG_TRY(open_isolated(worker));
+    return parse_sensor(npg_worker_state(worker));
+}
+
+/* What a pass says again and again is said once: in the first pass that sees the frames. */
+static bool is_first_pass(npg_worker *worker)
+{
+    return npg_worker_pass(worker) == NPG_PASS_MEASURE || npg_worker_facts(worker)->is_live;
+}
+
+/* ---- points ---- */
+
+static npg_status clean(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    size_t read = frame->point_count;
+    double side;
+    frame->cleaning = (npg_cleaning){.read = read};
+    NPG_TRY(npg_clean_finite(frame));
+    NPG_TRY(npg_clean_duplicates(frame));
+    if (s->voxel > 0) NPG_TRY(npg_clean_voxels(frame, s->voxel));
+    NPG_TRY(npg_clean_cap(frame, &side, (size_t)s->point_max));
+    if (side > 0 && is_first_pass(worker))
+        npg_worker_warn(worker, false, frame->number,
+                        "%zu points are more than points-max %lld: thinned to %zu, one per cube of side %g",
+                        read, (long long)s->point_max, frame->point_count, side);
+    return NPG_OK;
+}
+
+/* ---- normals ---- */
+
+/* Unit length; a normal that is no direction takes that of the estimate.  *bad counts them. */
+static void repair_directions(float *normals, size_t *bad, const float *estimate, size_t n)
+{
+    *bad = 0;
+    for (size_t i = 0; i < n; i++) {
+        float *d = normals + 3 * i, length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        bool good = isfinite(length) && length > 1e-6f;
+        for (size_t a = 0; a < 3; a++) d[a] = good ? d[a] / length : estimate[3 * i + a];
+        *bad += !good;
+    }
+}
+
+static npg_status find_sensor(npg_worker *worker, const npg_frame *frame, double sensor[3], bool *has_sensor)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    *has_sensor = s->sensor_kind == SENSOR_GIVEN;
+    for (int a = 0; a < 3; a++) sensor[a] = s->sensor_world[a] - facts->origin.world[a];
+    if (s->sensor_kind != SENSOR_AUTO) return NPG_OK;
+    NPG_TRY(npg_cloud_is_single_view(has_sensor, frame->pos_local, frame->point_count, sensor));
+    if (*has_sensor)
+        npg_worker_log(worker, NPG_LOG_INFO, frame->number,
+                       "the points look like one view from 0,0,0: normals point there (option sensor)");
+    return NPG_OK;
+}
+
+static int neighbours_of(const outlier_state *s)
+{
+    return s->normal_neighbours ? (int)s->normal_neighbours : 16;
+}
+
+static npg_status make_normals(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    size_t n = frame->point_count;
+    double sensor[3];
+    bool has_sensor;
+    NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
+    frame->cleaning.normals_estimated = n;
+    NPG_TRY(find_sensor(worker, frame, sensor, &has_sensor));
+    if (!has_sensor && !s->normal_neighbours) return npg_normals_make(frame->normals, frame->pos_local, n);
+    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, neighbours_of(s)));
+    double score;
+    if (!has_sensor) return npg_normals_orient(frame->normals, &score, frame->pos_local, n);
+    size_t turned;
+    npg_normals_face_sensor(frame->normals, &turned, frame->pos_local, n, sensor);
+    return NPG_OK;
+}
+
+static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    size_t n = frame->point_count, bad;
+    float *estimate;
+    double sensor[3];
+    bool has_sensor;
+    NPG_TRY(npg_alloc_array(&estimate, NPG_FOR_FRAMES, n, 3 * sizeof *estimate));
+    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, neighbours_of(s));
+    if (!status) repair_directions(frame->normals, &bad, estimate, n);
+    npg_release(&estimate);
+    NPG_TRY(status);
+    frame->cleaning.normals_given = n - bad;
+    frame->cleaning.normals_estimated = bad;
+    NPG_TRY(find_sensor(worker, frame, sensor, &has_sensor));
+    if (has_sensor) {
+        npg_normals_face_sensor(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n,
+                                sensor);
+        return NPG_OK;
+    }
+    return npg_normals_mend(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n);
+}
+
+static npg_status do_normals(npg_worker *worker, npg_frame *frame)
+{
+    outlier_state *s = npg_worker_state(worker);
+    double since = npg_clock_s();
+    if (s->normals == NORMALS_GIVEN && !frame->normals)
+        return npg_error(NPG_BAD_INPUT, "there are no normals, but option normals is given");
+    if (s->normals == NORMALS_ESTIMATE) npg_release(&frame->normals);
+    NPG_TRY(frame->normals ? mend_normals(worker, frame) : make_normals(worker, frame));
+    s->normals_s += npg_clock_s() - since;
+    const npg_cleaning *c = &frame->cleaning;
+    if (c->normals_given)
+        npg_worker_log(worker, NPG_LOG_INFO, frame->number, "%zu of %zu given normals were on the wrong side",
+                       c->normals_flipped, c->normals_given);
+    return NPG_OK;
+}
+
+/* A live run chooses its keyframe only after this stage, so there every frame may be the one. */
+static bool needs_normals(npg_worker *worker, const npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_choice *choice = &facts->choice;
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) {
+        for (size_t i = 0; i < choice->count; i++)
+            if (choice->frames[i] == frame->index) return choice->is_candidate[i];
+        return false;
+    }
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return false;
+    bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
+    return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || is_planned_key;
+}
+
+/* ---- the stage ---- */
+
+static void count(outlier_state *s, const npg_cleaning *c)
+{
+    npg_cleaning *sum = &s->sum;
+    sum->read += c->read;
+    sum->not_finite += c->not_finite;
+    sum->duplicate += c->duplicate;
+    sum->isolated += c->isolated;
+    sum->thinned += c->thinned;
+    sum->normals_given += c->normals_given;
+    sum->normals_flipped += c->normals_flipped;
+    sum->normals_estimated += c->normals_estimated;
+    s->frames++;
+}
+
+static npg_status name_frame(npg_status status, const npg_frame *frame)
+{
+    return npg_error_prefix(status, "frame %lld (%s)", (long long)frame->number,
+                            frame->path ? frame->path : "pushed");
+}
+
+/* A frame that can't be used is skipped under --keep-going, else it ends the run. */
+static npg_status refuse(npg_worker *worker, npg_frame *frame, npg_status status)
+{
+    outlier_state *s = npg_worker_state(worker);
+    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return name_frame(status, frame);
+    if (is_first_pass(worker))
+        npg_worker_warn(worker, true, frame->number, "skipped %s: %s",
+                        frame->path ? frame->path : "what was pushed", npg_error_text());
+    frame->is_skipped = true;
+    frame->point_count = 0;
+    npg_release(&frame->pos_local);
+    npg_release(&frame->normals);
+    s->skipped++;
+    return NPG_OK;
+}
+
+static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
+{
+    npg_status status = frame->is_skipped ? NPG_OK : clean(worker, frame);
+    return status ? refuse(worker, frame, status) : NPG_OK;
+}
+
+static npg_status finish_frame(npg_worker *worker, npg_frame *frame)
+{
+    if (frame->is_skipped) return NPG_OK;
+    npg_status status = npg_clean_check(frame);
+    if (!status && needs_normals(worker, frame)) status = do_normals(worker, frame);
+    if (status) return refuse(worker, frame, status);
+    frame->fields |= NPG_FIELD_CLEAN;
+    count(npg_worker_state(worker), &frame->cleaning);
+    return NPG_OK;
+}
+
+static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    size_t frame_count = npg_chunk_count(chunk);
+    npg_frame **frames;
+    if (!s->drop_isolated) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
+    for (size_t i = 0; i < frame_count; i++) frames[i] = npg_chunk_frame(chunk, i);
+    npg_status status =
+        npg_isolated_drop(npg_worker_kept(worker), frames, frame_count, (int)s->neighbours, s->ratio);
+    npg_release(&frames);
+    return status;
+}
+
+static npg_status outlier_process(npg_worker *worker, npg_chunk **chunk)
+{
+    size_t frame_count = npg_chunk_count(*chunk);
+    for (size_t i = 0; i < frame_count; i++) NPG_TRY(clean_frame(worker, npg_chunk_frame(*chunk, i)));
+    NPG_TRY(drop_isolated(worker, *chunk));
+    for (size_t i = 0; i < frame_count; i++) {
+        if (npg_worker_stopping(worker)) return NPG_STOPPED;
+        NPG_TRY(finish_frame(worker, npg_chunk_frame(*chunk, i)));
+    }
+    return NPG_OK;
+}
+
+/* The figures of the pass replace those of the pass before: they are the same points. */
+static npg_status outlier_flush(npg_worker *worker)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    json_t *r = npg_worker_report(worker);
+    const struct {
+        const char *name;
+        size_t value;
+    } figures[] = {{"frames", s->frames},
+                   {"frames_skipped", s->skipped},
+                   {"points_read", s->sum.read},
+                   {"not_finite", s->sum.not_finite},
+                   {"duplicate", s->sum.duplicate},
+                   {"thinned", s->sum.thinned},
+                   {"isolated", s->sum.isolated},
+                   {"normals_given", s->sum.normals_given},
+                   {"normals_flipped", s->sum.normals_flipped},
+                   {"normals_estimated", s->sum.normals_estimated}};
+    for (size_t i = 0; i < sizeof figures / sizeof *figures; i++)
+        json_object_set_new(r, figures[i].name, json_integer((json_int_t)figures[i].value));
+    json_object_set_new(r, "normals_s", json_real(s->normals_s));
+    return NPG_OK;
+}
+
+/* One frame at work: the hash table and the normals; as many as there are threads with PCL's copy and tree;
+ * what is remembered of all. */
+static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    size_t points = npg_worker_facts(worker)->point_count_max;
+    size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
+    size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
+    *chunks_held = 1;
+    return 17 * points + 120 * thinned * threads + REMEMBERED_MAX;
+}
+
+const npg_stage npg_stage_outlier = {.name = "outlier",
+                                     .help = "Cleans points, makes and mends normals",
+                                     .options = outlier_options,
+                                     .state_size = sizeof(outlier_state),
+                                     .passes =
+                                         NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
+                                     .needs = NPG_FIELD_POINTS,
+                                     .gives = NPG_FIELD_CLEAN,
+                                     .init = outlier_init,
+                                     .process = outlier_process,
+                                     .flush = outlier_flush,
+                                     .memory = outlier_memory};

@@ -1,0 +1,250 @@
+/* Sides: spanning tree, patches and winding number of a npg_sided_cloud whose normals look for their sides.
+ */
+#include "outlier/sides.h"
+
+#include <string.h>
+
+#include "pipeline/memory.h"
+#include "pipeline/parallel.h"
+
+#define NEIGHBOURS    NPG_SIDE_NEIGHBOURS
+#define PATCH_ROUNDS  4
+#define BORDER_WEIGHT 0.1 /* of a patch's border beside its winding number */
+
+/* ---- winding number ---- */
+
+#define LANES 16 /* sums side by side: what a wide processor adds at once */
+
+/* Points and their normals times area, each coordinate by itself, filled up with points without area. */
+typedef struct panel {
+    float *x, *y, *z, *nx, *ny, *nz; /* in one allocation, x owns it */
+    size_t padded;                   /* a multiple of LANES         */
+} panel;
+
+static npg_status open_panel(panel *p, size_t count_max)
+{
+    size_t room = (count_max + LANES - 1) / LANES * LANES;
+    NPG_TRY(npg_alloc_array(&p->x, NPG_FOR_FRAMES, room, 6 * sizeof(float)));
+    p->y = p->x + room;
+    p->z = p->y + room;
+    p->nx = p->z + room;
+    p->ny = p->nx + room;
+    p->nz = p->ny + room;
+    return NPG_OK;
+}
+
+/* The points with these indices; NULL: all. */
+static void fill_panel(panel *p, const npg_sided_cloud *c, const uint32_t *index, size_t count)
+{
+    p->padded = (count + LANES - 1) / LANES * LANES;
+    for (size_t i = 0; i < p->padded; i++) {
+        size_t j = i >= count ? 0 : index ? index[i] : i;
+        float area = i < count ? c->area[j] : 0;
+        p->x[i] = c->points[3 * j];
+        p->y[i] = c->points[3 * j + 1];
+        p->z[i] = c->points[3 * j + 2];
+        p->nx[i] = area * c->normals[3 * j];
+        p->ny[i] = area * c->normals[3 * j + 1];
+        p->nz[i] = area * c->normals[3 * j + 2];
+    }
+}
+
+/* sum_j A_j (p_j - at) . n_j / (|p_j - at|^2 + soft^2)^(3/2). */
+NPG_WIDE static float sum_panel(const panel *p, const float *at, float soft_sq)
+{
+    const float *x = p->x, *y = p->y, *z = p->z, *nx = p->nx, *ny = p->ny, *nz = p->nz;
+    float sums[LANES] = {0}, ax = at[0], ay = at[1], az = at[2];
+    double all = 0;
+    for (size_t first = 0; first < p->padded; first += LANES)
+        for (size_t lane = 0; lane < LANES; lane++) {
+            size_t j = first + lane;
+            float dx = x[j] - ax, dy = y[j] - ay, dz = z[j] - az;
+            float d_sq = dx * dx + dy * dy + dz * dz + soft_sq;
+            sums[lane] += (dx * nx[j] + dy * ny[j] + dz * nz[j]) / (d_sq * sqrtf(d_sq));
+        }
+    for (size_t lane = 0; lane < LANES; lane++) all += (double)sums[lane];
+    return (float)all;
+}
+
+npg_status npg_sided_winding(npg_sided_cloud *c)
+{
+    panel all;
+    NPG_TRY(open_panel(&all, c->count));
+    fill_panel(&all, c, NULL, c->count);
+    for (size_t i = 0; i < c->count; i++)
+        c->winding[i] = sum_panel(&all, c->points + 3 * i, c->soft_sq) / 12.5663706f;
+    npg_release(&all.x);
+    return NPG_OK;
+}
+
+/* ---- spanning tree ---- */
+
+typedef struct forest { /* union-find whose members know their side relative to the root */
+    uint32_t *parent;
+    uint8_t *is_turned; /* against the parent */
+} forest;
+
+static uint32_t root_of(const forest *f, uint32_t i, uint8_t *is_turned)
+{
+    uint8_t turned = 0;
+    for (; f->parent[i] != i; i = f->parent[i]) turned ^= f->is_turned[i];
+    *is_turned = turned;
+    return i;
+}
+
+/* The older (lower) root stays, so the result has one form; paths are shortened by hanging i under its root.
+ */
+static void join(forest *f, const npg_link *l)
+{
+    uint8_t side_a, side_b;
+    uint32_t a = root_of(f, l->a, &side_a), b = root_of(f, l->b, &side_b);
+    if (l->a != a) {
+        f->parent[l->a] = a;
+        f->is_turned[l->a] = side_a;
+    }
+    if (l->b != b) {
+        f->parent[l->b] = b;
+        f->is_turned[l->b] = side_b;
+    }
+    if (a == b) return;
+    uint32_t lo = a < b ? a : b, hi = a < b ? b : a;
+    f->parent[hi] = lo;
+    f->is_turned[hi] = side_a ^ side_b ^ (l->agreement < 0);
+}
+
+static npg_status open_forest(forest *f, size_t count)
+{
+    f->is_turned = NULL;
+    NPG_TRY(npg_alloc_array(&f->parent, NPG_FOR_FRAMES, count, sizeof *f->parent));
+    for (uint32_t k = 0; k < count; k++) f->parent[k] = k;
+    return npg_alloc(&f->is_turned, NPG_FOR_FRAMES, count);
+}
+
+static void close_forest(forest *f)
+{
+    npg_release(&f->parent);
+    npg_release(&f->is_turned);
+}
+
+npg_status npg_sided_grow_tree(npg_sided_cloud *c)
+{
+    forest f = {NULL, NULL};
+    uint8_t turned;
+    npg_status status = open_forest(&f, c->count);
+    for (size_t i = 0; i < c->link_count && !status; i++) join(&f, &c->links[i]);
+    for (uint32_t k = 0; k < c->count && !status; k++) {
+        root_of(&f, k, &turned);
+        if (turned) turn(c, k);
+    }
+    close_forest(&f);
+    return status;
+}
+
+npg_status npg_sided_patches(uint32_t *patch_of, const npg_sided_cloud *c, const uint8_t *among, float sure)
+{
+    forest f = {NULL, NULL};
+    uint8_t turned;
+    npg_status status = open_forest(&f, c->count);
+    for (uint32_t i = 0; i < c->count && !status; i++)
+        for (size_t k = 0; k < NEIGHBOURS && (!among || among[i]); k++) {
+            uint32_t j = c->index[NEIGHBOURS * (size_t)i + k];
+            if (j == UINT32_MAX || (among && !among[j]) || !(agreement(c, i, j) > sure)) continue;
+            join(&f, &(npg_link){i, j, 1});
+        }
+    for (uint32_t k = 0; k < c->count && !status; k++)
+        patch_of[k] = !among || among[k] ? root_of(&f, k, &turned) : UINT32_MAX;
+    close_forest(&f);
+    return status;
+}
+
+/* ---- patches ---- */
+
+typedef struct patches { /* sets of points that can only be turned together */
+    uint32_t *members;   /* point indices, patch after patch */
+    size_t *first;       /* patch_count + 1 */
+    size_t count;
+    float *change; /* of the winding number at every point, room for one patch at a time */
+    panel panel;   /* the members of one patch */
+} patches;
+
+static void close_patches(patches *p)
+{
+    npg_release(&p->members);
+    npg_release(&p->first);
+    npg_release(&p->change);
+    npg_release(&p->panel.x);
+}
+
+/* From the lowest member of each point's patch; points with UINT32_MAX belong to none. */
+static npg_status open_patches(patches *p, const uint32_t *patch_of, size_t n)
+{
+    uint32_t *number = NULL;
+    npg_status status;
+    NPG_TRY_OR(done, status, npg_alloc_array(&p->members, NPG_FOR_FRAMES, n, sizeof *p->members));
+    NPG_TRY_OR(done, status, npg_alloc_array(&p->first, NPG_FOR_FRAMES, n + 2, sizeof *p->first));
+    NPG_TRY_OR(done, status, npg_alloc_array(&p->change, NPG_FOR_FRAMES, n, sizeof *p->change));
+    NPG_TRY_OR(done, status, open_panel(&p->panel, n));
+    NPG_TRY_OR(done, status, npg_alloc_array(&number, NPG_FOR_FRAMES, n, sizeof *number));
+    for (size_t i = 0; i < n; i++)
+        if (patch_of[i] == i) number[i] = (uint32_t)p->count++;
+    for (size_t i = 0; i < n; i++)
+        if (patch_of[i] != UINT32_MAX) p->first[number[patch_of[i]] + 2]++;
+    for (size_t k = 2; k < p->count + 2; k++) p->first[k] += p->first[k - 1];
+    for (size_t i = 0; i < n; i++)
+        if (patch_of[i] != UINT32_MAX) p->members[p->first[number[patch_of[i]] + 1]++] = (uint32_t)i;
+done:
+    npg_release(&number);
+    if (status) close_patches(p);
+    return status;
+}
+
+/* p->change = what turning patch k adds to the winding number everywhere.  Returns the change of the misfit,
+ * summed over all points by area, per area of the patch. */
+static double try_patch(const npg_sided_cloud *c, patches *p, size_t k)
+{
+    double sum = 0, area = 0;
+    fill_panel(&p->panel, c, p->members + p->first[k], p->first[k + 1] - p->first[k]);
+    for (size_t i = 0; i < c->count; i++) {
+        p->change[i] = -2 * sum_panel(&p->panel, c->points + 3 * i, c->soft_sq) / 12.5663706f;
+        sum += (double)c->area[i] * (misfit(c->winding[i] + p->change[i]) - misfit(c->winding[i]));
+    }
+    for (size_t m = p->first[k]; m < p->first[k + 1]; m++) area += (double)c->area[p->members[m]];
+    return sum / area;
+}
+
+/* How well patch k agrees with its surroundings, -1..1. */
+static double border_of(const npg_sided_cloud *c, const patches *p, size_t k, const uint32_t *patch_of)
+{
+    double sum = 0, weight = 0;
+    for (size_t m = p->first[k]; m < p->first[k + 1]; m++)
+        for (size_t n = 0; n < NEIGHBOURS; n++) {
+            uint32_t i = p->members[m], j = c->index[NEIGHBOURS * (size_t)i + n];
+            if (j == UINT32_MAX || patch_of[j] == patch_of[i]) continue;
+            double a = (double)agreement(c, i, j);
+            sum += a * fabs(a);
+            weight += fabs(a);
+        }
+    return weight > 0 ? sum / weight : 0;
+}
+
+npg_status npg_sided_turn_patches(npg_sided_cloud *c, const uint32_t *patch_of, double bar)
+{
+    patches p = {0};
+    size_t turned = 1;
+    NPG_TRY(open_patches(&p, patch_of, c->count));
+    npg_status status = npg_sided_winding(c);
+    for (int round = 0; round < PATCH_ROUNDS && turned && !status; round++) {
+        turned = 0;
+        for (size_t k = 0; k < p.count; k++) {
+            if (2 * (p.first[k + 1] - p.first[k]) > c->count)
+                continue; /* the whole's sign is decided apart */
+            double border = border_of(c, &p, k, patch_of), gain = -try_patch(c, &p, k);
+            if (gain - BORDER_WEIGHT * border <= bar) continue;
+            for (size_t m = p.first[k]; m < p.first[k + 1]; m++) turn(c, p.members[m]);
+            for (size_t i = 0; i < c->count; i++) c->winding[i] += p.change[i];
+            turned++;
+        }
+    }
+    close_patches(&p);
+    return status;
+}

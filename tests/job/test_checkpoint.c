@@ -1,0 +1,251 @@
+/* Archives notice every damage; grids come back from OpenVDB bit by bit; plans of appended frames. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "optimize/vdb_grids.h"
+#include "pipeline/archive.h"
+#include "pipeline/plan.h"
+#include "pipeline/random.h"
+#include "tests/support/group_folder.h"
+
+/* ---- archives ---- */
+
+static npg_status write_archive(const char *path)
+{
+    npg_archive_writer *writer;
+    const double numbers[3] = {1.5, -0.0, 3e300};
+    NPG_TRY(npg_archive_create(&writer, path));
+    npg_archive_put(writer, "text", "seven b", 7);
+    npg_archive_put(writer, "nothing", NULL, 0);
+    npg_archive_put(writer, "numbers", numbers, sizeof numbers);
+    return npg_archive_commit(&writer);
+}
+
+static void what_is_put_is_found(void **state)
+{
+    (void)state;
+    npg_archive *archive;
+    double numbers[3];
+    size_t size;
+    const char *path = in_folder(&folder, "whole.npg");
+    assert_int_equal(write_archive(path), NPG_OK);
+    assert_int_equal(npg_archive_open(&archive, path), NPG_OK);
+    assert_memory_equal(npg_archive_find(archive, "text", &size), "seven b", 7);
+    assert_int_equal(size, 7);
+    assert_non_null(npg_archive_find(archive, "nothing", &size));
+    assert_int_equal(size, 0);
+    assert_int_equal(npg_archive_get(archive, "numbers", numbers, sizeof numbers), NPG_OK);
+    assert_true(numbers[0] == 1.5 && 1 / numbers[1] < 0 && numbers[2] == 3e300);
+    assert_int_equal(npg_archive_get(archive, "numbers", numbers, 8), NPG_BAD_INPUT);
+    assert_null(npg_archive_find(archive, "other", &size));
+    assert_int_equal(npg_archive_get(archive, "other", numbers, 8), NPG_BAD_INPUT);
+    npg_archive_close(&archive);
+}
+
+static size_t read_bytes(unsigned char *bytes, size_t most, const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    size_t size = fread(bytes, 1, most, file);
+    fclose(file);
+    return size;
+}
+
+static void write_bytes(const unsigned char *bytes, size_t size, const char *path)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    fclose(file);
+}
+
+static void every_damage_is_noticed(void **state)
+{
+    (void)state;
+    unsigned char bytes[4096];
+    npg_archive *archive;
+    char path[512], damaged[512];
+    snprintf(path, sizeof path, "%s", in_folder(&folder, "good.npg"));
+    snprintf(damaged, sizeof damaged, "%s", in_folder(&folder, "bad.npg"));
+    assert_int_equal(write_archive(path), NPG_OK);
+    size_t size = read_bytes(bytes, sizeof bytes, path);
+    assert_true(size > 100 && size < sizeof bytes);
+    for (size_t i = 0; i < size; i++) {
+        bytes[i] ^= 1 << i % 8;
+        write_bytes(bytes, size, damaged);
+        bytes[i] ^= 1 << i % 8;
+        assert_int_equal(npg_archive_open(&archive, damaged), NPG_BAD_INPUT);
+        assert_null(archive);
+        assert_non_null(strstr(npg_error_text(), damaged));
+    }
+    for (size_t cut = 0; cut < size; cut++) {
+        write_bytes(bytes, cut, damaged);
+        assert_int_equal(npg_archive_open(&archive, damaged), NPG_BAD_INPUT);
+    }
+    assert_int_equal(npg_archive_open(&archive, in_folder(&folder, "nowhere")), NPG_BAD_INPUT);
+}
+
+static void an_archive_given_up_leaves_nothing(void **state)
+{
+    (void)state;
+    npg_archive_writer *writer;
+    const char *path = in_folder(&folder, "never.npg");
+    assert_int_equal(npg_archive_create(&writer, path), NPG_OK);
+    npg_archive_put(writer, "a", "b", 1);
+    npg_archive_discard(&writer);
+    assert_false(exists(path));
+    assert_false(exists(in_folder(&folder, ".never.npg.part")));
+    assert_int_equal(npg_archive_create(&writer, "/nonexistent/a"), NPG_DISK);
+    assert_null(writer);
+}
+
+static void without_memory_nothing_remains(void **state)
+{
+    (void)state;
+    npg_archive *archive;
+    const char *path = in_folder(&folder, "memory.npg");
+    size_t before = npg_memory_used();
+    npg_status status = NPG_MEMORY;
+    for (uint64_t n = 1; status == NPG_MEMORY; n++) {
+        npg_memory_fail_at(n, true);
+        status = write_archive(path);
+        if (!status) status = npg_archive_open(&archive, path);
+        npg_memory_fail_at(0, false);
+        if (!status) npg_archive_close(&archive);
+        assert_int_equal(npg_memory_used(), before);
+        assert_true(n < 100);
+    }
+    assert_int_equal(status, NPG_OK);
+}
+
+/* ---- grids ---- */
+
+static npg_levels some_levels(void)
+{
+    npg_levels levels = {0};
+    npg_levels_add(&levels, (npg_level){.nodes = 2, .channel_end = 30, .lambda = 0.4}, 0);
+    npg_levels_add(&levels, (npg_level){.nodes = 11, .channel_end = 30, .lambda = 0.6}, 0);
+    npg_levels_add(&levels,
+                   (npg_level){.kind = NPG_LEVEL_NORMAL, .nodes = 4, .channel_first = 30, .channel_end = 32},
+                   0);
+    return levels;
+}
+
+static bool is_filled(const npg_levels *levels, size_t row, int channel)
+{
+    for (int l = 0; l < levels->count; l++) {
+        const npg_level *level = &levels->level[l];
+        if (row >= level->first_row && row < level->first_row + level->row_count)
+            return channel >= level->channel_first && channel < level->channel_end;
+    }
+    return false;
+}
+
+static void grids_come_back_bit_by_bit(void **state)
+{
+    (void)state;
+    npg_levels levels = some_levels();
+    size_t count = levels.row_count * NPG_LATENT_CHANNELS;
+    const npg_vdb_place place = {{10, 20, 30}, 0.5, 3, 8, 1};
+    float *rows = calloc(count, sizeof *rows), *read = calloc(count, sizeof *read);
+    npg_random random = npg_random_stream(7, 0, 0);
+    for (size_t i = 0; i < count; i++)
+        if (is_filled(&levels, i / NPG_LATENT_CHANNELS, (int)(i % NPG_LATENT_CHANNELS)))
+            rows[i] = i % 5 ? (float)npg_random_gauss(&random) * 1e-3f : i % 2 ? -0.0f : 0.0f;
+    const char *path = in_folder(&folder, "grids.vdb");
+    assert_int_equal(npg_vdb_save_levels(path, &levels, rows, &place), NPG_OK);
+    assert_int_equal(npg_vdb_load_levels(path, &levels, read), NPG_OK);
+    assert_memory_equal(rows, read, count * sizeof *rows);
+    levels.level[1].nodes = 10;
+    assert_int_equal(npg_vdb_load_levels(path, &levels, read), NPG_BAD_INPUT);
+    assert_non_null(strstr(npg_error_text(), "position_L01"));
+    free(rows);
+    free(read);
+}
+
+static void a_file_that_is_no_vdb_is_said(void **state)
+{
+    (void)state;
+    npg_levels levels = some_levels();
+    float *read = calloc(levels.row_count * NPG_LATENT_CHANNELS, sizeof *read);
+    const char *path = in_folder(&folder, "no.vdb");
+    assert_int_equal(write_text_file(path, "these are no grids, but some text that is long enough"), 0);
+    assert_true(npg_vdb_load_levels(path, &levels, read) < 0);
+    free(read);
+}
+
+/* ---- plans ---- */
+
+/* Appended frames are read once each, after what they share is solved. */
+static void check_appended(npg_plan plan)
+{
+    int64_t next = 0, solved = plan.appended_at;
+    assert_int_equal(npg_plan_read_count(&plan), plan.frame_count - plan.appended_at);
+    for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
+        npg_window window = npg_plan_window(&plan, w);
+        assert_int_equal(window.new_first, solved);
+        assert_true(window.first >= window.new_first - plan.overlap && window.first >= 0);
+        assert_int_equal(window.last, window.new_last);
+        for (int64_t i = window.new_first; i <= window.new_last; i++)
+            assert_int_equal(npg_plan_frame(&plan, next++), i);
+        assert_int_equal(npg_plan_read_before(&plan, w), next);
+        solved = window.new_last + 1;
+        assert_int_equal(npg_plan_is_last_forward(&plan, w), solved == plan.frame_count);
+    }
+    assert_int_equal(solved, plan.frame_count);
+}
+
+static void appended_frames_get_windows_of_their_own(void **state)
+{
+    (void)state;
+    for (int64_t frames = 1; frames <= 20; frames++)
+        for (int64_t key = 0; key < frames; key += 2)
+            for (int64_t overlap = 0; overlap < 5; overlap++)
+                for (int64_t more = 1; more < 12; more++) {
+                    npg_plan first = {.frame_count = frames, .key = key, .window = 6, .overlap = overlap};
+                    npg_plan longer = npg_plan_append(&first, frames + more);
+                    npg_plan longest = npg_plan_append(&longer, frames + more + 3);
+                    npg_window was = npg_plan_key_window(&first), is = npg_plan_key_window(&longest);
+                    check_appended(longer);
+                    check_appended(longest);
+                    assert_int_equal(was.first, is.first);
+                    assert_int_equal(was.last, is.last);
+                }
+}
+
+static void windows_say_what_is_read_before_them(void **state)
+{
+    (void)state;
+    for (int64_t frames = 1; frames <= 30; frames++)
+        for (int64_t key = 0; key < frames; key++) {
+            npg_plan plan = {.frame_count = frames, .key = key, .window = 6, .overlap = 2};
+            int64_t sum = 0, ends = 0;
+            for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
+                npg_window window = npg_plan_window(&plan, w);
+                sum += window.new_last - window.new_first + 1;
+                assert_int_equal(npg_plan_read_before(&plan, w), sum);
+                ends += npg_plan_is_last_forward(&plan, w);
+            }
+            assert_int_equal(ends, 1);
+            assert_int_equal(sum, npg_plan_read_count(&plan));
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_put_is_found),
+        cmocka_unit_test(every_damage_is_noticed),
+        cmocka_unit_test(an_archive_given_up_leaves_nothing),
+        cmocka_unit_test(without_memory_nothing_remains),
+        cmocka_unit_test(grids_come_back_bit_by_bit),
+        cmocka_unit_test(a_file_that_is_no_vdb_is_said),
+        cmocka_unit_test(appended_frames_get_windows_of_their_own),
+        cmocka_unit_test(windows_say_what_is_read_before_them),
+    };
+    return cmocka_run_group_tests(tests, open_folder, close_folder);
+}

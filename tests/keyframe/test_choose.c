@@ -1,0 +1,102 @@
+/* Choosing the keyframe and cutting welds, through the stages. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#include "geometry/mesh_tools.h"
+#include "tests/support/legs.h"
+#include "tests/support/test_chain.h"
+
+extern const npg_stage npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh;
+static const npg_stage *const chain[] = {&test_source,    &npg_stage_outlier, &npg_stage_keyframe,
+                                         &npg_stage_mesh, &test_sink,         NULL};
+
+typedef struct seen {
+    int64_t key;
+    int64_t euler;
+    npg_manifold manifold;
+    size_t frames;
+} seen;
+
+static npg_status see(npg_worker *worker, npg_frame *frame, void *user)
+{
+    seen *s = user;
+    const npg_facts *facts = npg_worker_facts(worker);
+    s->frames++;
+    s->key = facts->plan.key;
+    if (!frame->is_key) return NPG_OK;
+    NPG_TRY(npg_mesh_manifold(&s->manifold, facts->reference));
+    s->euler = (int64_t)facts->reference->vert_count - (int64_t)s->manifold.edge_count +
+               (int64_t)facts->reference->face_count;
+    return NPG_OK;
+}
+
+/* The feet overlap in the frames 3 to 6 of 10. */
+static double feet_at(int64_t index)
+{
+    return index >= 3 && index <= 6 ? 0.1
+           : index < 3              ? 0.1 + 0.13 * (double)(3 - index)
+                                    : 0.1 + 0.13 * (double)(index - 6);
+}
+
+static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
+{
+    (void)user;
+    facts->origin.known = true;
+    return legs_frame(frame, feet_at(index), 77 + (uint64_t)index);
+}
+
+static seen run(const char *choice, const char *welds)
+{
+    seen s = {0};
+    char text[1024];
+    const char *settings[][2] = {
+        {"keyframe-choice", choice}, {"welds", welds},  {"pull", "no"}, {"output", "unused"},
+        {"input", "unused"},         {"faces", "6000"}, {NULL, NULL}};
+    script = (test_script){.frame_count = 10, .make = make, .see = see, .user = &s};
+    npg_status status = run_chain(chain, settings, text);
+    if (status) print_message("%s\n", text);
+    assert_int_equal(status, NPG_OK);
+    assert_int_equal(s.frames, 10);
+    return s;
+}
+
+static void the_score_alone_takes_touching_feet(void **state)
+{
+    (void)state;
+    seen s = run("paper", "keep");
+    assert_in_range(s.key, 3, 6);
+    assert_true(s.euler < 2);
+}
+
+static void a_frame_with_feet_apart_is_chosen(void **state)
+{
+    (void)state;
+    seen s = run("apart", "keep");
+    assert_true(s.key < 3 || s.key > 6);
+    assert_int_equal(s.euler, 2);
+    assert_int_equal(s.manifold.border_edges, 0);
+}
+
+static void a_weld_that_other_frames_pull_apart_is_cut(void **state)
+{
+    (void)state;
+    seen s = run("paper", "cut");
+    assert_in_range(s.key, 3, 6);
+    assert_int_equal(s.euler, 2);
+    assert_int_equal(s.manifold.border_edges, 0);
+    assert_int_equal(s.manifold.crowded_edges + s.manifold.misoriented_edges + s.manifold.degenerate_faces,
+                     0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_score_alone_takes_touching_feet),
+        cmocka_unit_test(a_frame_with_feet_apart_is_chosen),
+        cmocka_unit_test(a_weld_that_other_frames_pull_apart_is_cut),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

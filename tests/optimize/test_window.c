@@ -1,0 +1,439 @@
+/* Window: the terms that tie frames which two windows share - their gradient through the whole decoder, what
+ * they hold - and the warm start, exact on the overlap. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <math.h>
+
+#include "geometry/mesh_tools.h"
+#include "kernels/check.h"
+#include "kernels/latent.h"
+#include "kernels/mlp.h"
+#include "optimize/fit_least.h"
+#include "optimize/match.h"
+#include "optimize/window.h"
+#include "tests/support/ball_mesh.h"
+#include "tests/support/group_device.h"
+
+enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 3 };
+
+/* ---- gradients through the overlap's terms ---- */
+
+/* One frame: loss(decoder, features, code) = sum of the ties at the samples that the decoder has moved. */
+typedef struct tied {
+    npg_mlp_shape shape;
+    size_t samples, param_count;
+    npg_carry *carry;
+    npg_matcher *matcher;
+    npg_pull *pulls;
+    size_t pull_count;
+    float *base, *solved; /* S x 3: aligned, and where the window before has put them */
+    double *params, *z, code[4], *base_wide, *x, *g, *out;
+    double *grad, *dz, dcode[4];
+} tied;
+
+static double tied_loss(void *user)
+{
+    tied *t = user;
+    for (size_t s = 0; s < t->samples; s++) {
+        npg_mlp_forward_ref(t->out + 7 * s, t->z + NPG_LATENT_CHANNELS * s, t->code, t->params, &t->shape);
+        npg_transform_ref(t->x + 3 * s, t->out + 7 * s, t->base_wide + 3 * s, NPG_ROTATION_QUATERNION);
+    }
+    return npg_pull_ref(t->g, t->x, t->samples, t->pulls, t->pull_count);
+}
+
+/* By the twins' backward ways; after tied_loss(). */
+static void tied_slopes(tied *t)
+{
+    for (size_t s = 0; s < t->samples; s++) {
+        double dout[7] = {0};
+        npg_transform_back_ref(dout, t->g + 3 * s, t->out + 7 * s, t->base_wide + 3 * s,
+                               NPG_ROTATION_QUATERNION);
+        npg_mlp_backward_ref(t->grad, t->dz + NPG_LATENT_CHANNELS * s, t->dcode, dout,
+                             t->z + NPG_LATENT_CHANNELS * s, t->code, t->params, &t->shape);
+    }
+}
+
+static double *wide_array(size_t count)
+{
+    double *values;
+    assert_int_equal(npg_alloc_array(&values, NPG_FOR_RUN, count, sizeof *values), 0);
+    return values;
+}
+
+static void fill(double *values, size_t count, double scale, npg_random *random)
+{
+    for (size_t i = 0; i < count; i++) values[i] = (double)(float)(scale * (2 * npg_random_real(random) - 1));
+}
+
+static void open_tied(tied *t, npg_mesh *ball)
+{
+    const npg_match_settings match = {200, 0.02, 0.5, 5000, 0.7};
+    npg_random random = npg_random_stream(11, 0, 0);
+    float dense[3 * VERTS], before[3 * VERTS];
+    *t = (tied){.shape = {32, 64, 4, 0.01f}};
+    assert_int_equal(npg_carry_open(&t->carry, ball, 60, 0), 0);
+    assert_int_equal(npg_matcher_open(&t->matcher, t->carry, &match), 0);
+    size_t s = t->samples = t->carry->samples->mesh->vert_count;
+    t->param_count = npg_mlp_param_count(&t->shape);
+    assert_int_equal(npg_alloc_array(&t->base, NPG_FOR_RUN, s, 3 * sizeof(float)), 0);
+    assert_int_equal(npg_alloc_array(&t->solved, NPG_FOR_RUN, s, 3 * sizeof(float)), 0);
+    assert_int_equal(npg_alloc_array(&t->pulls, NPG_FOR_RUN, npg_matcher_most(t->matcher), sizeof *t->pulls),
+                     0);
+    pose_ball(dense, ball->vert_pos, VERTS, 1);
+    pose_ball(before, ball->vert_pos, VERTS, 1.5);
+    npg_carry_gather(t->carry, t->base, dense);
+    npg_carry_gather(t->carry, t->solved, before);
+    npg_match_tie(t->matcher, t->pulls, &t->pull_count, t->solved);
+    assert_int_equal(t->pull_count, s);
+    t->params = wide_array(t->param_count), t->grad = wide_array(t->param_count);
+    t->z = wide_array(s * NPG_LATENT_CHANNELS), t->dz = wide_array(s * NPG_LATENT_CHANNELS);
+    t->base_wide = wide_array(3 * s), t->x = wide_array(3 * s), t->g = wide_array(3 * s);
+    t->out = wide_array(7 * s);
+    fill(t->params, t->param_count, 0.3, &random);
+    fill(t->z, s * NPG_LATENT_CHANNELS, 0.9, &random);
+    fill(t->code, 4, 1, &random);
+    for (size_t i = 0; i < 3 * s; i++) t->base_wide[i] = (double)t->base[i];
+}
+
+static void close_tied(tied *t)
+{
+    void *all[] = {&t->pulls, &t->base, &t->solved, &t->params, &t->z, &t->base_wide,
+                   &t->x,     &t->g,    &t->out,    &t->grad,   &t->dz};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_matcher_close(&t->matcher);
+    npg_carry_close(&t->carry);
+}
+
+static void ties_are_the_squared_way_back(void **state)
+{
+    tied t;
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    double sum = 0;
+    (void)state;
+    open_tied(&t, ball);
+    for (size_t i = 0; i < 3 * t.samples; i++) {
+        double off = (double)t.base[i] - (double)t.solved[i];
+        sum += off * off * 0.7 * 5000 / (double)t.samples;
+    }
+    assert_true(sum > 1);
+    assert_true(fabs(npg_pull_ref(t.g, t.base_wide, t.samples, t.pulls, t.pull_count) - sum) < 1e-4 * sum);
+    for (size_t i = 0; i < 3 * t.samples; i++) t.base_wide[i] = (double)t.solved[i];
+    assert_true(npg_pull_ref(t.g, t.base_wide, t.samples, t.pulls, t.pull_count) < 1e-9);
+    close_tied(&t);
+    npg_mesh_unref(&ball);
+}
+
+static void gradients_through_the_ties_are_slopes(void **state)
+{
+    tied t;
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    double error = 0;
+    (void)state;
+    open_tied(&t, ball);
+    assert_true(tied_loss(&t) > 1);
+    tied_slopes(&t);
+    npg_check_slope(&error, t.params, t.grad, t.param_count, 7, 1e-6, tied_loss, &t);
+    npg_check_slope(&error, t.z, t.dz, t.samples * NPG_LATENT_CHANNELS, 13, 1e-6, tied_loss, &t);
+    npg_check_slope(&error, t.code, t.dcode, 4, 1, 1e-6, tied_loss, &t);
+    print_message("ties: gradient off by %.2g\n", error);
+    assert_true(error < 1e-5);
+    close_tied(&t);
+    npg_mesh_unref(&ball);
+}
+
+/* The way back of the device through the same terms, against the twins'. */
+static npg_status device_slopes(tied *t, npg_mlp *mlp, npg_motion *motion)
+{
+    const size_t size = NPG_LATENT_CHANNELS * sizeof(float);
+    const int32_t start[2] = {0, (int32_t)t->pull_count};
+    const uint32_t edges[1][2] = {{0, 1}};
+    const float gain = 1;
+    size_t rows = npg_mlp_rows(device, t->samples);
+    float row[NPG_LATENT_CHANNELS], code[4], *params;
+    NPG_TRY(npg_mlp_open(mlp, device, &t->shape, rows, 1, 1));
+    NPG_TRY(npg_motion_open(motion, device, NPG_ROTATION_QUATERNION, t->base, t->samples, rows, edges, 1,
+                            NULL, 1));
+    NPG_TRY(npg_alloc_array(&params, NPG_FOR_RUN, t->param_count, sizeof *params));
+    for (size_t i = 0; i < t->param_count; i++) params[i] = (float)t->params[i];
+    npg_status status = npg_buffer_write(&mlp->params, 0, params, t->param_count * sizeof *params);
+    npg_release(&params);
+    for (size_t r = 0; r < rows && !status; r++) {
+        size_t from = r < t->samples ? r : t->samples - 1;
+        for (size_t c = 0; c < NPG_LATENT_CHANNELS; c++) row[c] = (float)t->z[from * NPG_LATENT_CHANNELS + c];
+        status = npg_buffer_write(&mlp->z, r * size, row, size);
+    }
+    for (int c = 0; c < 4; c++) code[c] = (float)t->code[c];
+    if (!status) status = npg_buffer_write(&mlp->code, 0, code, sizeof code);
+    if (!status) status = npg_motion_set_pulls(motion, t->pulls, start);
+    if (!status) status = npg_mlp_begin(mlp);
+    if (!status) status = npg_mlp_forward(mlp, 0, 1);
+    if (!status) status = npg_motion_apply(motion, &mlp->out, 0, 1);
+    if (!status) status = npg_motion_pull(motion, 0, 1);
+    if (!status) status = npg_motion_back(motion, &mlp->dout, &mlp->out, &gain, 0, 0, 1);
+    if (!status) status = npg_mlp_backward(mlp, 0, 1);
+    return status ? status : npg_mlp_end(mlp);
+}
+
+static void the_device_has_the_same_gradient(void **state)
+{
+    tied t;
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    npg_mlp mlp = {0};
+    npg_motion motion = {0};
+    double loss, loss_error = 0, grad_error = 0, dz_error = 0;
+    (void)state;
+    open_tied(&t, ball);
+    loss = tied_loss(&t);
+    tied_slopes(&t);
+    if (device_slopes(&t, &mlp, &motion)) fail_msg("%s", npg_error_text());
+    assert_int_equal(npg_check_buffer(&loss_error, &motion.cd, &loss, 1), 0);
+    assert_int_equal(npg_check_buffer(&grad_error, &mlp.grad, t.grad, t.param_count), 0);
+    assert_int_equal(npg_check_buffer(&dz_error, &mlp.dz, t.dz, t.samples * NPG_LATENT_CHANNELS), 0);
+    print_message("ties on the device: loss off by %.2g, decoder %.2g, features %.2g\n", loss_error,
+                  grad_error, dz_error);
+    assert_true(loss_error < 2e-5 && grad_error < 2e-5 && dz_error < 2e-5);
+    npg_mlp_close(&mlp);
+    npg_motion_close(&motion);
+    close_tied(&t);
+    npg_mesh_unref(&ball);
+}
+
+/* ---- windows ---- */
+
+static const npg_fit_settings small = {.epochs = 12,
+                                       .frequencies = 4,
+                                       .encoding = NPG_ENCODING_GRID,
+                                       .confidence = NPG_CONFIDENCE_CONSTANT,
+                                       .smoothing = NPG_SMOOTHING_SCREENED,
+                                       .grid_base = 2,
+                                       .grid_step = 3,
+                                       .grid_levels = 3,
+                                       .normal_nodes = 4,
+                                       .normal_grid = true,
+                                       .lambda = 0.4,
+                                       .lambda_growth = 1.5,
+                                       .grid_rate = 0.005,
+                                       .grid_rate_growth = 2.5,
+                                       .mlp_rate = 1e-3,
+                                       .slope = 0.01,
+                                       .isometry = 5,
+                                       .alpha = 0.3,
+                                       .width_1 = 32,
+                                       .width_2 = 32,
+                                       .rate_end = 0.1,
+                                       .feature_start = 3,
+                                       .batch = 2};
+
+static void the_warm_start_is_exact_on_the_overlap(void **state)
+{
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    npg_fit *fit;
+    npg_fit_frame frames[FRAMES];
+    float points[FRAMES][3 * VERTS], end[FRAMES][3 * VERTS], again[3 * VERTS], worst = 0, moved = 0;
+    (void)state;
+    for (int i = 0; i < FRAMES; i++) {
+        pose_ball(points[i], ball->vert_pos, VERTS, i);
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+    }
+    assert_int_equal(npg_fit_open(&fit, device, &small, ball, 3), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
+    assert_int_equal(npg_fit_run(fit, 0, small.epochs, NULL, NULL), 0);
+    for (size_t i = 0; i < FRAMES; i++) assert_int_equal(npg_fit_vertices(fit, end[i], i), 0);
+    for (int i = 0; i < FRAMES; i++) frames[i].index++, frames[i].time += 0.5; /* the next window */
+    for (int i = 0; i + 1 < FRAMES; i++) frames[i].points = points[i + 1];
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
+    assert_int_equal(npg_fit_run(fit, 0, 0, NULL, NULL), 0);
+    for (size_t i = 0; i + 1 < FRAMES; i++) {
+        assert_int_equal(npg_fit_vertices(fit, again, i), 0);
+        for (size_t k = 0; k < 3 * VERTS; k++) {
+            worst = fmaxf(worst, fabsf(again[k] - end[i + 1][k]));
+            moved = fmaxf(moved, fabsf(again[k] - ball->vert_pos[k]));
+        }
+    }
+    print_message("moved by %.2g, another start by %.2g\n", (double)moved, (double)worst);
+    assert_true(moved > 1e-3f && worst < 1e-6f);
+    npg_fit_close(&fit);
+    npg_mesh_unref(&ball);
+}
+
+typedef struct seen {
+    npg_fit_step steps[100];
+    size_t count;
+} seen;
+
+static npg_status note(void *user, const npg_fit_step *step)
+{
+    seen *s = user;
+    s->steps[s->count++] = *step;
+    return NPG_OK;
+}
+
+/* Runs a fit of the first `end` of 40 epochs that overshoot, and takes the vertices of its last frame. */
+static void overshoot(npg_mesh *ball, npg_deliver deliver, npg_time_kind time_code, int64_t end, seen *s,
+                      float *verts, npg_fit_step *result)
+{
+    npg_fit_settings settings = small;
+    npg_fit *fit;
+    npg_fit_frame frames[FRAMES];
+    float points[FRAMES][3 * VERTS];
+    settings.epochs = 40;
+    settings.rate_end = 1;
+    settings.mlp_rate = 0.03;
+    settings.deliver = deliver;
+    settings.time_code = time_code;
+    for (int i = 0; i < FRAMES; i++) {
+        pose_ball(points[i], ball->vert_pos, VERTS, i);
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+    }
+    assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
+    assert_int_equal(npg_fit_run(fit, 0, end, s ? note : NULL, s), 0);
+    assert_int_equal(npg_fit_vertices(fit, verts, FRAMES - 1), 0);
+    assert_true((npg_fit_result(fit) != NULL) == (deliver == NPG_DELIVER_LEAST));
+    if (npg_fit_result(fit)) *result = *npg_fit_result(fit);
+    npg_fit_close(&fit);
+}
+
+/* The result is the state with the least loss: that of a run that stops there, byte by byte. */
+static void a_fit_ends_with_its_least_loss(void **state)
+{
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    (void)state;
+    for (int kind = 0; kind < 2; kind++) {
+        npg_time_kind code = kind ? NPG_TIME_LEARNED : NPG_TIME_FOURIER;
+        seen s = {.count = 0};
+        npg_fit_step result, none;
+        float verts[3 * VERTS], again[3 * VERTS], last[3 * VERTS];
+        overshoot(ball, NPG_DELIVER_LEAST, code, 40, &s, verts, &result);
+        print_message("kept after %d steps: chamfer %.4g; last step's %.4g\n", (int)result.epoch,
+                      result.chamfer, s.steps[39].chamfer);
+        assert_int_equal(s.count, 40);
+        for (size_t e = 0; e < s.count; e++)
+            assert_true(npg_fit_plain_loss(&s.steps[e], 5) >= npg_fit_plain_loss(&result, 5));
+        assert_true(result.epoch > 0 && result.epoch < 40); /* or the settings no longer overshoot */
+        overshoot(ball, NPG_DELIVER_LAST, code, result.epoch, NULL, again, &none);
+        overshoot(ball, NPG_DELIVER_LAST, code, 40, NULL, last, &none);
+        assert_memory_equal(verts, again, sizeof verts);
+        assert_memory_not_equal(verts, last, sizeof verts);
+    }
+    npg_mesh_unref(&ball);
+}
+
+/* Two windows over frames of which they share one; the second sees that frame's points elsewhere.  How far
+ * its solved vertices then are from the first's, in the mean. */
+static double way_from_the_first(npg_mesh *ball, double tie)
+{
+    npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, tie}, 100, 2, 1};
+    npg_facts facts = {.reference = ball, .plan = {.frame_count = 3, .window = 2, .overlap = 1}};
+    const npg_window first = {0, 1, -1, 0, 1, 0}, second = {1, 2, 0, 2, 2, 1};
+    npg_window_solver *solver;
+    npg_held held[FRAMES] = {{{0}, NULL}};
+    float solved[3 * VERTS];
+    double sum = 0;
+    npg_bounds bounds = npg_bounds_empty();
+    settings.fit.epochs = 60;
+    npg_bounds_add_points(&bounds, (const float[]){-1, -1, -1, 1, 1, 1}, 2);
+    assert_int_equal(npg_frame_box_set(&facts.box, &facts.origin, &bounds), 0);
+    for (int i = 0; i < FRAMES; i++) {
+        npg_frame *frame = &held[i].frame;
+        *frame = (npg_frame){.index = i, .number = i, .point_count = VERTS, .vert_count = VERTS};
+        assert_int_equal(npg_alloc_array(&frame->pos_local, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
+        assert_int_equal(npg_alloc_array(&frame->vert_unit, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
+        pose_ball(frame->pos_local, ball->vert_pos, VERTS, i);
+        npg_box_local_to_unit(&facts.box, frame->vert_unit, frame->pos_local, VERTS);
+    }
+    if (npg_window_solver_open(&solver, device, &settings, &facts, 3, true)) fail_msg("%s", npg_error_text());
+    npg_held *of_first[] = {&held[0], &held[1]}, *of_second[] = {&held[1], &held[2]};
+    if (npg_window_solve(solver, of_first, &first, NULL, NULL)) fail_msg("%s", npg_error_text());
+    memcpy(solved, held[1].solved, sizeof solved);
+    for (int v = 0; v < VERTS; v++) held[1].frame.pos_local[3 * v] += 0.1f;
+    if (npg_window_solve(solver, of_second, &second, NULL, NULL)) fail_msg("%s", npg_error_text());
+    for (int v = 0; v < VERTS; v++) {
+        const float *a = held[1].solved + 3 * v, *b = solved + 3 * v;
+        sum += sqrt(pow((double)(a[0] - b[0]), 2) + pow((double)(a[1] - b[1]), 2) +
+                    pow((double)(a[2] - b[2]), 2));
+    }
+    npg_window_solver_close(&solver);
+    for (int i = 0; i < FRAMES; i++) {
+        npg_frame_clear(&held[i].frame);
+        npg_release(&held[i].solved);
+    }
+    return sum / VERTS;
+}
+
+static void ties_hold_what_is_solved(void **state)
+{
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    (void)state;
+    double free = way_from_the_first(ball, 0), tied_way = way_from_the_first(ball, 1),
+           held = way_from_the_first(ball, 30);
+    print_message("without ties %.4f, with them %.4f, with strong ones %.4f\n", free, tied_way, held);
+    assert_true(free > 0.002 && tied_way < 0.8 * free && held < 0.3 * free);
+    npg_mesh_unref(&ball);
+}
+
+/* One window over frames that have all gone `way` along x: where it puts the last one's first vertices. */
+static void solve_gone(float solved[3 * VERTS], npg_mesh *ball, float way)
+{
+    const npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, 1}, 100, 2, 1};
+    npg_facts facts = {.reference = ball, .plan = {.frame_count = 2, .window = 2}};
+    const npg_window window = {0, 1, -1, 0, 1, 0};
+    npg_window_solver *solver;
+    npg_held held[2] = {{{0}, NULL}};
+    npg_held *in_time[] = {&held[0], &held[1]};
+    facts.box.scale = 1;
+    for (int i = 0; i < 2; i++) {
+        npg_frame *frame = &held[i].frame;
+        *frame = (npg_frame){.index = i, .number = i, .point_count = VERTS, .vert_count = VERTS};
+        assert_int_equal(npg_alloc_array(&frame->pos_local, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
+        assert_int_equal(npg_alloc_array(&frame->vert_unit, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
+        pose_ball(frame->vert_unit, ball->vert_pos, VERTS, i);
+        pose_ball(frame->pos_local, ball->vert_pos, VERTS, i + 0.5); /* what is left to find */
+        for (int v = 0; v < VERTS; v++) frame->vert_unit[3 * v] += way, frame->pos_local[3 * v] += way;
+    }
+    if (npg_window_solver_open(&solver, device, &settings, &facts, 3, true)) fail_msg("%s", npg_error_text());
+    if (npg_window_solve(solver, in_time, &window, NULL, NULL)) fail_msg("%s", npg_error_text());
+    for (int i = 0; i < 3 * VERTS; i++) solved[i] = held[1].solved[i] - (i % 3 ? 0 : way);
+    npg_window_solver_close(&solver);
+    for (int i = 0; i < 2; i++) {
+        npg_frame_clear(&held[i].frame);
+        npg_release(&held[i].solved);
+    }
+}
+
+static void where_the_surface_is_does_not_matter(void **state)
+{
+    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
+    float here[3 * VERTS], far[3 * VERTS], start[3 * VERTS], worst = 0, moved = 0;
+    (void)state;
+    solve_gone(here, ball, 0);
+    solve_gone(far, ball, 8);
+    pose_ball(start, ball->vert_pos, VERTS, 1);
+    for (int i = 0; i < 3 * VERTS; i++) {
+        worst = fmaxf(worst, fabsf(far[i] - here[i]));
+        moved = fmaxf(moved, fabsf(here[i] - start[i]));
+    }
+    print_message("moved by %.2g, 8 units away another by %.2g\n", (double)moved, (double)worst);
+    assert_true(moved > 2e-3f && worst < 0.05f * moved);
+    npg_mesh_unref(&ball);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ties_are_the_squared_way_back),
+        cmocka_unit_test(gradients_through_the_ties_are_slopes),
+        cmocka_unit_test(the_device_has_the_same_gradient),
+        cmocka_unit_test(the_warm_start_is_exact_on_the_overlap),
+        cmocka_unit_test(a_fit_ends_with_its_least_loss),
+        cmocka_unit_test(ties_hold_what_is_solved),
+        cmocka_unit_test(where_the_surface_is_does_not_matter),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}

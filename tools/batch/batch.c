@@ -1,0 +1,172 @@
+/* Batch: the list of captures, whatever it was made from. */
+#include "tools/batch/batch.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
+#include "pipeline/run_settings.h"
+
+npg_status npg_path_from(char **path, const char *folder, const char *text)
+{
+    char here[PATH_MAX], *joined;
+    if (*text == '/') return npg_copy_text(path, text);
+    if (*folder == '/') return npg_join_path(path, folder, text);
+    if (!getcwd(here, sizeof here)) return npg_error_errno(NPG_FAILED, "the working folder has no name");
+    NPG_TRY(npg_join_path(&joined, here, strcmp(folder, ".") ? folder : ""));
+    npg_status status = npg_join_path(path, joined, text);
+    npg_release(&joined);
+    return status;
+}
+
+/* ---- captures ---- */
+
+/* A name becomes a folder and stands in commands and tables. */
+static npg_status check_name(const npg_batch *batch, const char *name)
+{
+    if (!*name) return npg_error(NPG_USAGE, "the capture's name is empty");
+    if (strlen(name) > 200) return npg_error(NPG_USAGE, "the name %.40s... is longer than 200 bytes", name);
+    if (*name == '.' || *name == '-')
+        return npg_error(NPG_USAGE, "the name %s begins with \"%c\"", name, *name);
+    for (const char *c = name; *c; c++)
+        if (*c == '/' || (unsigned char)*c < 32 || *c == 127)
+            return npg_error(NPG_USAGE, "the name %s has a slash or a control character in it", name);
+    for (size_t i = 0; i < batch->count; i++)
+        if (!strcmp(batch->captures[i].name, name))
+            return npg_error(NPG_USAGE, "two captures have the name %s; give one another \"name\"", name);
+    return NPG_OK;
+}
+
+npg_status npg_batch_add(npg_batch *batch, npg_capture **out, const char *name)
+{
+    NPG_TRY(check_name(batch, name));
+    NPG_TRY(
+        npg_grow(&batch->captures, &batch->capacity, batch->count + 1, sizeof *batch->captures, NPG_FOR_RUN));
+    npg_capture *capture = &batch->captures[batch->count++];
+    NPG_TRY(npg_copy_text(&capture->name, name));
+    *out = capture;
+    return npg_options_open(&capture->options);
+}
+
+/* What the command line sets wins; where results go is the batch's business. */
+static npg_status set_given(npg_options *options, const npg_options *given)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        if (strcmp(info.name, "output") != 0 && npg_options_is_set(given, info.name))
+            NPG_TRY(npg_options_set(options, info.name, npg_options_get(given, info.name)));
+    return NPG_OK;
+}
+
+/* A run of a batch reads files and is alone with its output. */
+static npg_status check_options(const npg_options *options)
+{
+    static const char *const refused[] = {"follow", "pull", "append"};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+        if (npg_options_is_set(options, refused[i]))
+            return npg_error(NPG_USAGE, "option %s is not for a batch", refused[i]);
+    return NPG_OK;
+}
+
+/* Captures come from others: what leads out of a capture's folder is not read unless the batch says so. */
+static npg_status confine(bool *is_confined, npg_options *options)
+{
+    npg_settings settings;
+    if (!npg_options_is_set(options, "confine")) NPG_TRY(npg_options_set(options, "confine", "yes"));
+    npg_options_fill(options, npg_run_options, &settings);
+    *is_confined = settings.confine;
+    return NPG_OK;
+}
+
+/* Of a batch that is a folder, whoever fills it, a capture is not read that is a link out of it. */
+static npg_status find_input(char **input, const npg_batch *batch, npg_capture *capture, const char *path,
+                             bool is_confined)
+{
+    struct stat info;
+    if (stat(path, &info) || !S_ISDIR(info.st_mode)) return npg_copy_text(input, path);
+    if (is_confined && batch->is_folder) NPG_TRY(npg_path_confine(path, batch->path));
+    return npg_batch_look_inside(capture, input, path, is_confined);
+}
+
+npg_status npg_batch_finish(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
+                            const npg_batch_given *given)
+{
+    char *path;
+    bool is_confined;
+    NPG_TRY(set_given(capture->options, given->options));
+    NPG_TRY(check_options(capture->options));
+    NPG_TRY(confine(&is_confined, capture->options));
+    if (given->max_time_s >= 0) capture->max_time_s = given->max_time_s;
+    if (given->segments) capture->segments = given->segments;
+    NPG_TRY(npg_path_from(&path, folder, text));
+    npg_status status = find_input(&capture->input, batch, capture, path, is_confined);
+    if (status == NPG_BAD_INPUT) {
+        status = npg_copy_text(&capture->refusal, npg_error_text());
+        if (!status) status = npg_copy_text(&capture->input, path);
+    }
+    npg_release(&path);
+    NPG_TRY(status);
+    NPG_TRY(npg_join_path(&capture->output, batch->output, capture->name));
+    NPG_TRY(npg_options_set(capture->options, "input", capture->input));
+    return npg_options_set(capture->options, "output", capture->output);
+}
+
+/* ---- the batch ---- */
+
+bool npg_batch_is_mine(const npg_batch *batch, size_t i)
+{
+    return i % batch->task_count == batch->task_index;
+}
+
+static npg_status set_output(npg_batch *batch, const npg_batch_given *given)
+{
+    const char *text = npg_options_get(given->options, "output");
+    return text[0] ? npg_path_from(&batch->output, ".", text) : NPG_OK;
+}
+
+static npg_status fill(npg_batch *batch, const char *path, const npg_batch_given *given)
+{
+    struct stat info;
+    batch->task_count = 1;
+    NPG_TRY(npg_copy_text(&batch->path, path));
+    NPG_TRY(set_output(batch, given));
+    if (stat(path, &info)) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
+    batch->is_folder = S_ISDIR(info.st_mode);
+    return batch->is_folder ? npg_batch_read_folder(batch, given) : npg_batch_read_manifest(batch, given);
+}
+
+npg_status npg_batch_open(npg_batch **out, const char *path, const npg_batch_given *given)
+{
+    npg_batch *batch;
+    *out = NULL;
+    if (npg_options_is_set(given->options, "input"))
+        return npg_error(NPG_USAGE, "option input is not for a batch: its captures have theirs");
+    NPG_TRY(npg_alloc(&batch, NPG_FOR_RUN, sizeof *batch));
+    npg_status status = fill(batch, path, given);
+    if (status) npg_batch_close(&batch);
+    *out = batch;
+    return status;
+}
+
+void npg_batch_close(npg_batch **slot)
+{
+    npg_batch *batch = *slot;
+    if (!batch) return;
+    for (size_t i = 0; i < batch->count; i++) {
+        npg_capture *capture = &batch->captures[i];
+        npg_release(&capture->name);
+        npg_release(&capture->input);
+        npg_release(&capture->output);
+        npg_release(&capture->refusal);
+        npg_options_close(&capture->options);
+    }
+    npg_release(&batch->captures);
+    npg_release(&batch->path);
+    npg_release(&batch->output);
+    npg_release(slot);
+}

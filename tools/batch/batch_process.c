@@ -1,0 +1,362 @@
+/* Process of one capture: neupig run in a child, what it says, its memory, and how it is stopped. */
+#include "tools/batch/batch_process.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "pipeline/clock.h"
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
+#include "pipeline/stage.h"
+#include "tools/log_file.h"
+#include "tools/run_job.h"
+
+#define GRACE_SECONDS 10 /* a run that was asked ends within 5 s; then it is killed */
+
+extern char **environ;
+
+/* ---- the command ---- */
+
+typedef struct command {
+    char **words; /* each owned; ends with NULL */
+    size_t count, room;
+} command;
+
+static npg_status add_word(command *c, const char *name, const char *value)
+{
+    char *word;
+    size_t size = strlen(name) + strlen(value) + 4;
+    NPG_TRY(npg_grow(&c->words, &c->room, c->count + 2, sizeof *c->words, NPG_FOR_RUN));
+    NPG_TRY(npg_alloc(&word, NPG_FOR_RUN, size));
+    snprintf(word, size, "%s%s%s%s", *value ? "--" : "", name, *value ? "=" : "", value);
+    c->words[c->count++] = word;
+    return NPG_OK;
+}
+
+static void clear_command(command *c)
+{
+    for (size_t i = 0; i < c->count; i++) npg_release(&c->words[i]);
+    npg_release(&c->words);
+}
+
+/* neupig run --progress=json --quiet --log-file=OUT/log.jsonl --<option>=<value>... -- INPUT */
+static npg_status make_command(command *c, const npg_capture *capture, const char *log_path)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    NPG_TRY(add_word(c, "neupig", ""));
+    NPG_TRY(add_word(c, "run", ""));
+    NPG_TRY(add_word(c, "progress", "json"));
+    NPG_TRY(add_word(c, "quiet", "yes"));
+    NPG_TRY(add_word(c, "log-file", log_path));
+    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO) NPG_TRY(add_word(c, "segments", "auto"));
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++) {
+        const char *value = npg_options_get(capture->options, info.name);
+        bool is_set = npg_options_is_set(capture->options, info.name) && strcmp(info.name, "input") != 0;
+        if (is_set && *value) NPG_TRY(add_word(c, info.name, value));
+    }
+    NPG_TRY(add_word(c, "--", ""));
+    return add_word(c, capture->input, "");
+}
+
+/* ---- start ---- */
+
+static void note_done(long long facts[3], const npg_capture *capture)
+{
+    char *path;
+    struct stat info;
+    memset(facts, 0, 3 * sizeof *facts);
+    if (npg_join_path(&path, capture->output, "done.json")) return;
+    if (!stat(path, &info)) {
+        facts[0] = (long long)info.st_dev;
+        facts[1] = (long long)info.st_ino;
+        facts[2] = (long long)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec;
+    }
+    npg_release(&path);
+}
+
+static void log_record(const npg_capture *capture, json_t *record)
+{
+    char *path;
+    int fd = -1;
+    if (!npg_join_path(&path, capture->output, "log.jsonl"))
+        fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    npg_log_file_write(&fd, record);
+    if (fd >= 0) close(fd);
+    npg_release(&path);
+}
+
+static void log_command(const npg_capture *capture, const command *c)
+{
+    json_t *words = json_array();
+    for (size_t i = 0; i < c->count; i++) json_array_append_new(words, npg_json_text(c->words[i]));
+    log_record(capture, json_pack("{s:s,s:o}", "event", "command", "command", words));
+}
+
+/* In a process group of its own, so that a signal from the terminal reaches it through us alone and that it
+ * can be killed with all that it has started; with no signal blocked. */
+static npg_status spawn(npg_process *p, const command *c, int out, int err)
+{
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    sigset_t none;
+    char parent[32];
+    snprintf(parent, sizeof parent, "%ld", (long)getpid());
+    setenv(NPG_PARENT_VARIABLE, parent, 1);
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions, out, 1);
+    posix_spawn_file_actions_adddup2(&actions, err, 2);
+    posix_spawn_file_actions_addclosefrom_np(&actions, 3);
+    sigemptyset(&none);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setpgroup(&attributes, 0);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
+    int error = posix_spawn(&p->pid, "/proc/self/exe", &actions, &attributes, c->words, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    unsetenv(NPG_PARENT_VARIABLE);
+    errno = error;
+    return error ? npg_error_errno(NPG_FAILED, "can't start neupig run") : NPG_OK;
+}
+
+static npg_status open_pipes(npg_process *p, const command *c)
+{
+    int out[2] = {-1, -1}, err[2] = {-1, -1};
+    npg_status status = NPG_OK;
+    if (pipe2(out, O_CLOEXEC) || pipe2(err, O_CLOEXEC))
+        status = npg_error_errno(NPG_FAILED, "can't make a pipe to neupig run");
+    if (!status) status = spawn(p, c, out[1], err[1]);
+    if (out[1] >= 0) close(out[1]);
+    if (err[1] >= 0) close(err[1]);
+    p->out = out[0];
+    p->err = err[0];
+    if (p->out >= 0) fcntl(p->out, F_SETFL, O_NONBLOCK);
+    if (p->err >= 0) fcntl(p->err, F_SETFL, O_NONBLOCK);
+    return status;
+}
+
+static void clear(npg_process *p)
+{
+    if (p->out >= 0) close(p->out);
+    if (p->err >= 0) close(p->err);
+    json_decref(p->progress);
+    json_decref(p->end);
+    *p = (npg_process){.out = -1, .err = -1};
+}
+
+npg_status npg_process_start(npg_process *p, npg_capture *capture)
+{
+    command c = {0};
+    char *log_path = NULL;
+    *p = (npg_process){.capture = capture, .out = -1, .err = -1, .begun_s = npg_clock_s()};
+    npg_status status = npg_make_folder(capture->output);
+    if (!status) note_done(p->done_before, capture);
+    if (!status && !p->done_before[1]) status = npg_verdict_remove(capture);
+    if (!status) status = npg_join_path(&log_path, capture->output, "log.jsonl");
+    if (!status) status = make_command(&c, capture, log_path);
+    if (!status) log_command(capture, &c);
+    if (!status) status = open_pipes(p, &c);
+    clear_command(&c);
+    npg_release(&log_path);
+    if (status) clear(p);
+    return status;
+}
+
+/* ---- what it says ---- */
+
+static void take_record(npg_process *p, const char *line, bool *advanced)
+{
+    json_t *record = json_loads(line, 0, NULL);
+    const char *event = json_string_value(json_object_get(record, "event"));
+    json_t **kept = event && !strcmp(event, "progress") ? &p->progress
+                    : event && !strcmp(event, "end")    ? &p->end
+                                                        : NULL;
+    if (kept == &p->progress && kept) *advanced = true;
+    if (kept) {
+        json_decref(*kept);
+        *kept = json_incref(record);
+    }
+    json_decref(record);
+}
+
+/* Read what there is; false at the end of the stream. */
+static bool read_some(int *fd, char *text, size_t size, size_t *got)
+{
+    ssize_t count = *fd >= 0 ? read(*fd, text, size) : 0;
+    *got = count > 0 ? (size_t)count : 0;
+    if (count > 0) return true;
+    if (*fd >= 0 && (count == 0 || (errno != EAGAIN && errno != EINTR))) {
+        close(*fd);
+        *fd = -1;
+    }
+    return false;
+}
+
+/* Lines that are too long are cut. */
+static bool add_to_line(char *line, size_t size, size_t *length, char c)
+{
+    if (c == '\n') {
+        line[*length] = 0;
+        *length = 0;
+        return true;
+    }
+    if (*length + 1 < size) line[(*length)++] = c;
+    return false;
+}
+
+void npg_process_hear(npg_process *p, bool *advanced)
+{
+    char text[4096];
+    size_t got;
+    *advanced = false;
+    while (read_some(&p->out, text, sizeof text, &got))
+        for (size_t i = 0; i < got; i++)
+            if (add_to_line(p->line, sizeof p->line, &p->line_length, text[i]))
+                take_record(p, p->line, advanced);
+    while (read_some(&p->err, text, sizeof text, &got))
+        for (size_t i = 0; i < got; i++)
+            if (add_to_line(p->err_line, sizeof p->err_line, &p->err_length, text[i]) && p->err_line[0])
+                snprintf(p->words, sizeof p->words, "%s", p->err_line);
+}
+
+/* Why it failed: its closing record, or the last that it wrote to standard error. */
+static const char *last_words(const npg_process *p)
+{
+    const char *message = json_string_value(json_object_get(p->end, "message"));
+    const char *prefix = "neupig run: ";
+    if (message) return message;
+    return !strncmp(p->words, prefix, strlen(prefix)) ? p->words + strlen(prefix) : p->words;
+}
+
+/* ---- limits ---- */
+
+static size_t resident_bytes(const char *pid)
+{
+    char path[80], text[128];
+    unsigned long long whole = 0, resident = 0;
+    snprintf(path, sizeof path, "/proc/%.20s/statm", pid);
+    FILE *file = fopen(path, "re");
+    if (!file) return 0;
+    if (!fgets(text, sizeof text, file) || sscanf(text, "%llu %llu", &whole, &resident) != 2) resident = 0;
+    fclose(file);
+    return (size_t)resident * (size_t)sysconf(_SC_PAGESIZE);
+}
+
+/* The helper processes that one of its threads has started. */
+static size_t children_bytes(const char *pid, const char *thread)
+{
+    char path[96], child[24];
+    size_t sum = 0;
+    snprintf(path, sizeof path, "/proc/%.20s/task/%.20s/children", pid, thread);
+    FILE *file = fopen(path, "re");
+    while (file && fscanf(file, "%23s", child) == 1) sum += resident_bytes(child);
+    if (file) fclose(file);
+    return sum;
+}
+
+static size_t memory_of(pid_t process)
+{
+    char pid[24], path[64];
+    snprintf(pid, sizeof pid, "%ld", (long)process);
+    snprintf(path, sizeof path, "/proc/%s/task", pid);
+    size_t sum = resident_bytes(pid);
+    DIR *threads = opendir(path);
+    for (struct dirent *entry; threads && (entry = readdir(threads));)
+        if (entry->d_name[0] != '.') sum += children_bytes(pid, entry->d_name);
+    if (threads) closedir(threads);
+    return sum;
+}
+
+static double limit_mib(const npg_capture *capture)
+{
+    return strtod(npg_options_get(capture->options, "max-memory"), NULL);
+}
+
+static void kill_all(npg_process *p)
+{
+    kill(-p->pid, SIGKILL);
+    p->was_killed = true;
+}
+
+void npg_process_stop(npg_process *p, npg_stop_cause cause)
+{
+    if (p->asked_s > 0) {
+        kill_all(p);
+        return;
+    }
+    p->asked_s = npg_clock_s();
+    p->cause = cause;
+    kill(p->pid, SIGTERM);
+}
+
+void npg_process_watch(npg_process *p)
+{
+    double now_s = npg_clock_s(), most = 0x1p20 * limit_mib(p->capture), time = p->capture->max_time_s;
+    size_t bytes = memory_of(p->pid);
+    if (bytes > p->peak_bytes) p->peak_bytes = bytes;
+    if (p->asked_s > 0) {
+        if (now_s > p->asked_s + GRACE_SECONDS && !p->was_killed) kill_all(p);
+    } else if (most > 0 && (double)bytes > most) {
+        npg_process_stop(p, NPG_STOP_MEMORY);
+    } else if (time > 0 && now_s > p->begun_s + time) {
+        npg_process_stop(p, NPG_STOP_TIME);
+    }
+}
+
+/* ---- end ---- */
+
+/* It was done before and nothing was done to it: the earlier verdict's time and memory still hold. */
+static bool was_done(const npg_process *p, int how)
+{
+    long long now[3];
+    note_done(now, p->capture);
+    bool good = WIFEXITED(how) && (WEXITSTATUS(how) == 0 || WEXITSTATUS(how) == 7);
+    return good && now[1] && !memcmp(now, p->done_before, sizeof now);
+}
+
+static npg_status conclude(npg_process *p, int how, const struct rusage *used)
+{
+    npg_capture *capture = p->capture;
+    npg_verdict *v = &capture->verdict, before;
+    size_t own = (size_t)used->ru_maxrss << 10;
+    npg_verdict_read(&before, capture);
+    npg_verdict_judge(v, capture, how, p->cause, last_words(p));
+    v->was_done = was_done(p, how);
+    bool keeps = v->was_done && before.is_known;
+    v->seconds = keeps ? before.seconds : npg_clock_s() - p->begun_s;
+    v->peak_bytes = keeps ? before.peak_bytes : own > p->peak_bytes ? own : p->peak_bytes;
+    log_record(capture,
+               json_pack("{s:s,s:s,s:i,s:o,s:f,s:I,s:b}", "event", "verdict", "verdict", v->word, "exit_code",
+                         v->exit_code, "message", npg_json_text(v->message), "seconds", v->seconds,
+                         "peak_memory_bytes", (json_int_t)v->peak_bytes, "was_done", (int)v->was_done));
+    return npg_verdict_write(capture);
+}
+
+npg_status npg_process_reap(npg_process *p, bool *ended)
+{
+    int how;
+    bool unused;
+    struct rusage used;
+    siginfo_t info = {.si_pid = 0};
+    waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT);
+    *ended = info.si_pid == p->pid;
+    if (!*ended) return NPG_OK;
+    npg_process_hear(p, &unused);
+    kill(-p->pid, SIGKILL); /* a helper that outlived it; the group is ours until the process is waited for */
+    if (wait4(p->pid, &how, 0, &used) != p->pid)
+        return npg_error_errno(NPG_FAILED, "%s: its run can't be waited for", p->capture->name);
+    npg_status status = conclude(p, how, &used);
+    clear(p);
+    return status;
+}

@@ -1,0 +1,274 @@
+/* Run of a batch: which captures are at work, signals, progress. */
+#include "tools/batch/batch_run.h"
+
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include "pipeline/clock.h"
+#include "pipeline/memory.h"
+#include "pipeline/stage.h"
+#include "tools/batch/batch_process.h"
+
+#define TICK_MS        200
+#define AGAIN_SECONDS  1   /* a second signal sooner than that is the first on another way */
+#define RECORD_SECONDS 0.5 /* between two records of one capture's progress */
+
+typedef struct work {
+    npg_batch *batch;
+    npg_reporter *reporter;
+    npg_hooks hooks;
+    npg_process *processes; /* `places` of them, owned */
+    double *told_s;         /* when each one's progress was told last, owned */
+    size_t places, running, next, mine, ended;
+    size_t worked; /* captures ended that were not done before */
+    int signals;   /* signalfd, -1: none */
+    double begun_s, stopped_s;
+    bool stopped;
+} work;
+
+/* ---- telling ---- */
+
+static NPG_PRINTF(4, 5) void tell(work *w, npg_log_level level, const char *name, const char *format, ...)
+{
+    char text[900];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    npg_log_record record = {sizeof record, level, npg_clock_s() - w->begun_s, name, -1, text};
+    w->hooks.log(w->hooks.user, &record);
+}
+
+static void print_record(work *w, json_t *record)
+{
+    char *text =
+        w->reporter->show == NPG_SHOW_JSON ? json_dumps(record, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
+    if (text) puts(text);
+    fflush(stdout);
+    free(text);
+    json_decref(record);
+}
+
+static void tell_start(work *w, const npg_capture *capture)
+{
+    tell(w, NPG_LOG_INFO, capture->name, "started (%zu of %zu)", w->ended + w->running + 1, w->mine);
+    if (capture->of_mesh_vertices)
+        tell(w, NPG_LOG_WARNING, capture->name,
+             "%s holds meshes and no clouds: their vertices are the points", capture->input);
+    print_record(w, json_pack("{s:s,s:o}", "event", "start", "name", npg_json_text(capture->name)));
+}
+
+static void tell_end(work *w, const npg_capture *capture)
+{
+    const npg_verdict *v = &capture->verdict;
+    npg_log_level level = v->exit_code == 0   ? NPG_LOG_INFO
+                          : v->exit_code == 7 ? NPG_LOG_WARNING
+                                              : NPG_LOG_ERROR;
+    if (v->was_done)
+        tell(w, level, capture->name, "was done already%s%s", *v->message ? ": " : "", v->message);
+    else
+        tell(w, level, capture->name, "%s after %.0f s%s%s", v->word, v->seconds, *v->message ? ": " : "",
+             v->message);
+    json_t *record = npg_verdict_json(capture);
+    json_object_set_new(record, "event", json_string("verdict"));
+    json_object_set_new(record, "was_done", json_boolean(v->was_done));
+    print_record(w, record);
+}
+
+/* ---- progress ---- */
+
+static double share_of(const npg_process *p)
+{
+    return p->capture && p->progress ? json_number_value(json_object_get(p->progress, "share")) : 0;
+}
+
+/* What was done before took no time and tells nothing about the rest. */
+static void tell_progress(work *w)
+{
+    double done = (double)w->worked, skipped = (double)(w->ended - w->worked),
+           elapsed_s = npg_clock_s() - w->begun_s;
+    const char *name = "";
+    for (size_t i = 0; i < w->places; i++) {
+        done += share_of(&w->processes[i]);
+        if (w->processes[i].capture) name = w->processes[i].capture->name;
+    }
+    double all = (double)w->mine - skipped;
+    npg_progress progress = {.struct_size = sizeof progress,
+                             .stage = name,
+                             .share = w->mine ? (done + skipped) / (double)w->mine : 1,
+                             .elapsed_s = elapsed_s,
+                             .left_s = done > 0 ? elapsed_s * (all - done) / done : -1,
+                             .step = (int64_t)w->ended,
+                             .steps = (int64_t)w->mine,
+                             .loss = (double)NAN};
+    if (w->reporter->show == NPG_SHOW_BAR) w->hooks.progress(w->hooks.user, &progress);
+}
+
+static void pass_on_progress(work *w, size_t i)
+{
+    npg_process *p = &w->processes[i];
+    double now_s = npg_clock_s();
+    if (w->reporter->show != NPG_SHOW_JSON || now_s < w->told_s[i] + RECORD_SECONDS) return;
+    w->told_s[i] = now_s;
+    json_t *record = json_pack("{s:s,s:o}", "event", "progress", "name", npg_json_text(p->capture->name));
+    json_object_update_missing(record, p->progress);
+    print_record(w, record);
+}
+
+/* ---- signals ---- */
+
+static npg_status take_signals(work *w, sigset_t *before)
+{
+    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+    sigset_t all;
+    sigemptyset(&all);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction now;
+        if (!sigaction(numbers[i], NULL, &now) && now.sa_handler != SIG_IGN) sigaddset(&all, numbers[i]);
+    }
+    sigprocmask(SIG_BLOCK, &all, before);
+    w->signals = signalfd(-1, &all, SFD_CLOEXEC | SFD_NONBLOCK);
+    return w->signals >= 0 ? NPG_OK : npg_error_errno(NPG_FAILED, "signals can't be read");
+}
+
+static void ask_all(work *w)
+{
+    for (size_t i = 0; i < w->places; i++)
+        if (w->processes[i].capture) npg_process_stop(&w->processes[i], NPG_STOP_REQUEST);
+}
+
+static void hear_signals(work *w)
+{
+    struct signalfd_siginfo info;
+    while (read(w->signals, &info, sizeof info) == sizeof info) {
+        double now_s = npg_clock_s();
+        if (w->stopped && now_s < w->stopped_s + AGAIN_SECONDS) continue;
+        if (!w->stopped)
+            tell(w, NPG_LOG_WARNING, "batch", "stopping on request: the runs write their states");
+        w->stopped = true;
+        w->stopped_s = now_s;
+        ask_all(w);
+    }
+}
+
+/* ---- captures ---- */
+
+static void end_badly(npg_capture *capture, npg_status status)
+{
+    npg_verdict *v = &capture->verdict;
+    *v = (npg_verdict){.is_known = true, .exit_code = npg_status_exit_code(status)};
+    snprintf(v->word, sizeof v->word, "%s", npg_status_name(status));
+    snprintf(v->message, sizeof v->message, "%s", npg_error_text());
+}
+
+static void count_end(work *w, const npg_capture *capture)
+{
+    w->ended++;
+    w->worked += !capture->verdict.was_done;
+    tell_end(w, capture);
+}
+
+static void start_next(work *w, size_t place)
+{
+    while (w->next < w->batch->count && !npg_batch_is_mine(w->batch, w->next)) w->next++;
+    if (w->next == w->batch->count) return;
+    npg_capture *capture = &w->batch->captures[w->next++];
+    tell_start(w, capture);
+    npg_status status =
+        capture->refusal ? npg_verdict_refuse(capture) : npg_process_start(&w->processes[place], capture);
+    w->told_s[place] = 0;
+    if (!status && !capture->refusal) {
+        w->running++;
+        return;
+    }
+    if (status) end_badly(capture, status);
+    count_end(w, capture);
+}
+
+static void start_some(work *w)
+{
+    for (size_t i = 0; i < w->places && !w->stopped; i++)
+        while (!w->processes[i].capture && w->next < w->batch->count) start_next(w, i);
+}
+
+static void look_after(work *w, size_t i)
+{
+    npg_process *p = &w->processes[i];
+    npg_capture *capture = p->capture;
+    bool advanced, ended;
+    npg_process_hear(p, &advanced);
+    if (advanced) pass_on_progress(w, i);
+    npg_process_watch(p);
+    npg_status status = npg_process_reap(p, &ended);
+    if (!ended) return;
+    if (status) end_badly(capture, status);
+    p->capture = NULL;
+    w->running--;
+    count_end(w, capture);
+}
+
+static void wait_some(work *w)
+{
+    enum { ENDS_MAX = 512 };
+    struct pollfd ends[ENDS_MAX + 1] = {{w->signals, POLLIN, 0}};
+    nfds_t count = 1;
+    for (size_t i = 0; i < w->places && count + 1 < ENDS_MAX; i++) {
+        if (!w->processes[i].capture) continue;
+        ends[count++] = (struct pollfd){w->processes[i].out, POLLIN, 0};
+        ends[count++] = (struct pollfd){w->processes[i].err, POLLIN, 0};
+    }
+    poll(ends, count, TICK_MS);
+}
+
+static void work_off(work *w)
+{
+    for (;;) {
+        hear_signals(w);
+        start_some(w);
+        if (!w->running) return;
+        tell_progress(w);
+        wait_some(w);
+        for (size_t i = 0; i < w->places; i++)
+            if (w->processes[i].capture) look_after(w, i);
+    }
+}
+
+static npg_status open_places(work *w, size_t jobs)
+{
+    for (size_t i = 0; i < w->batch->count; i++) w->mine += npg_batch_is_mine(w->batch, i);
+    w->places = jobs < w->mine ? jobs : w->mine;
+    NPG_TRY(npg_alloc_array(&w->processes, NPG_FOR_RUN, w->places, sizeof *w->processes));
+    return npg_alloc_array(&w->told_s, NPG_FOR_RUN, w->places, sizeof *w->told_s);
+}
+
+npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, bool *stopped)
+{
+    work w = {.batch = batch,
+              .reporter = reporter,
+              .hooks = npg_reporter_hooks(reporter),
+              .signals = -1,
+              .begun_s = npg_clock_s()};
+    sigset_t before;
+    npg_status status = open_places(&w, jobs);
+    if (!status) status = take_signals(&w, &before);
+    if (!status) {
+        work_off(&w);
+        hear_signals(&w); /* one that came at the very end */
+        close(w.signals);
+        sigprocmask(SIG_SETMASK, &before, NULL);
+    }
+    for (size_t i = 0; i < batch->count; i++)
+        if (!batch->captures[i].verdict.is_known)
+            npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
+    *stopped = w.stopped;
+    npg_release(&w.processes);
+    npg_release(&w.told_s);
+    return status;
+}

@@ -1,0 +1,171 @@
+/* Verdicts: how a capture's run ended, in a word, and OUT/<name>/verdict.json. */
+#include "tools/batch/batch_verdict.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "pipeline/file.h"
+#include "pipeline/json_file.h"
+#include "pipeline/memory.h"
+#include "pipeline/stage.h"
+#include "tools/batch/batch_segments.h"
+
+#define FILE_NAME "verdict.json"
+
+/* ---- judging ---- */
+
+static const char *word_of(int exit_code)
+{
+    static const struct {
+        int code;
+        const char *word;
+    } words[] = {{0, "done"}, {1, "failed"}, {2, "usage"},   {3, "bad input"}, {4, "device"},
+                 {5, "disk"}, {6, "memory"}, {7, "partial"}, {75, "stopped"}};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (words[i].code == exit_code) return words[i].word;
+    return "failed";
+}
+
+static void set(npg_verdict *v, const char *word, int exit_code, const char *message)
+{
+    snprintf(v->word, sizeof v->word, "%s", word);
+    snprintf(v->message, sizeof v->message, "%s", message);
+    v->exit_code = exit_code;
+}
+
+/* Of a capture with one reference for all frames: where that ended to explain them, and what helps. */
+static void tell_topology(npg_verdict *v, const npg_capture *capture)
+{
+    static const char *const directions[] = {"forward", "backward"};
+    char *path;
+    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO || npg_join_path(&path, capture->output, "report.json"))
+        return;
+    json_t *report = json_load_file(path, 0, NULL), *stages = json_object_get(report, "stages");
+    const json_t *told = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    for (int d = 1; d >= 0; d--) {
+        const json_t *alarm = json_object_get(told, directions[d]);
+        if (json_is_object(alarm))
+            snprintf(v->message, sizeof v->message,
+                     "from frame %lld %s the reference no longer explains the points; \"segments\": "
+                     "\"auto\" takes another there",
+                     (long long)json_integer_value(json_object_get(alarm, "from_frame")), d ? "back" : "on");
+    }
+    json_decref(report);
+    npg_release(&path);
+}
+
+void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_stop_cause cause,
+                       const char *words)
+{
+    char text[sizeof v->message];
+    int code = WIFEXITED(how) ? WEXITSTATUS(how) : 128 + WTERMSIG(how);
+    v->is_known = true;
+    if (code == 0) {
+        set(v, "done", 0, "");
+    } else if (code == 7) {
+        set(v, "partial", 7, "frames were skipped, are unexplained or below the quality bar");
+        tell_topology(v, capture);
+    } else if (cause == NPG_STOP_TIME) {
+        snprintf(text, sizeof text, "not done after %g s (max-time)%s; started again it goes on",
+                 capture->max_time_s, code == 75 ? "" : " and had to be killed");
+        set(v, "time", 75, text);
+    } else if (cause == NPG_STOP_MEMORY) {
+        snprintf(text, sizeof text, "took more than %s MiB (max-memory)%s",
+                 npg_options_get(capture->options, "max-memory"), code == 75 ? "" : " and had to be killed");
+        set(v, "memory", 6, text);
+    } else if (cause == NPG_STOP_REQUEST || code == 75) {
+        set(v, "stopped", code, "stopped on request; started again it goes on");
+    } else if (WIFSIGNALED(how)) {
+        snprintf(text, sizeof text, "killed by signal %d (%s)%s%s", WTERMSIG(how), strsignal(WTERMSIG(how)),
+                 *words ? ": " : "", words);
+        set(v, "killed", code, text);
+    } else {
+        set(v, word_of(code), code, words);
+    }
+}
+
+npg_status npg_verdict_refuse(npg_capture *capture)
+{
+    capture->verdict = (npg_verdict){.is_known = true};
+    set(&capture->verdict, word_of(3), 3, capture->refusal);
+    NPG_TRY(npg_make_folder(capture->output));
+    return npg_verdict_write(capture);
+}
+
+bool npg_verdict_is_done(const npg_verdict *v)
+{
+    return v->is_known && (v->exit_code == 0 || v->exit_code == 7);
+}
+
+int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
+{
+    int code = 0;
+    for (size_t i = 0; i < batch->count; i++) {
+        const npg_verdict *v = &batch->captures[i].verdict;
+        if (!of_all && !npg_batch_is_mine(batch, i)) continue;
+        if (!npg_verdict_is_done(v))
+            code = 1;
+        else if (v->exit_code == 7 && !code)
+            code = 7;
+    }
+    return stopped && code == 1 ? npg_status_exit_code(NPG_STOPPED) : code;
+}
+
+/* ---- the file ---- */
+
+json_t *npg_verdict_json(const npg_capture *capture)
+{
+    const npg_verdict *v = &capture->verdict;
+    json_t *object = json_pack("{so so so}", "name", npg_json_text(capture->name), "input",
+                               npg_json_text(capture->input), "output", npg_json_text(capture->output));
+    if (!object || !v->is_known) return object;
+    json_object_set_new(object, "verdict", json_string(v->word));
+    json_object_set_new(object, "exit_code", json_integer(v->exit_code));
+    json_object_set_new(object, "message", npg_json_text(v->message));
+    json_object_set_new(object, "seconds", npg_json_real(v->seconds));
+    json_object_set_new(object, "peak_memory_bytes", json_integer((json_int_t)v->peak_bytes));
+    json_t *segments = npg_verdict_is_done(v) ? npg_batch_segments(capture) : NULL;
+    if (segments) json_object_set_new(object, "segments", segments);
+    return object;
+}
+
+npg_status npg_verdict_write(const npg_capture *capture)
+{
+    json_t *object = npg_verdict_json(capture);
+    npg_status status = object ? npg_json_write(capture->output, FILE_NAME, object)
+                               : npg_error(NPG_MEMORY, "no memory for a verdict");
+    json_decref(object);
+    return status;
+}
+
+npg_status npg_verdict_remove(const npg_capture *capture)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, capture->output, FILE_NAME));
+    npg_status status = NPG_OK;
+    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
+    npg_release(&path);
+    return status;
+}
+
+void npg_verdict_read(npg_verdict *v, const npg_capture *capture)
+{
+    char *path;
+    memset(v, 0, sizeof *v);
+    if (npg_join_path(&path, capture->output, FILE_NAME)) return;
+    json_t *object = json_load_file(path, 0, NULL);
+    const char *word = json_string_value(json_object_get(object, "verdict"));
+    const char *message = json_string_value(json_object_get(object, "message"));
+    if (word) {
+        set(v, word, (int)json_integer_value(json_object_get(object, "exit_code")), message ? message : "");
+        v->is_known = true;
+        v->seconds = json_number_value(json_object_get(object, "seconds"));
+        v->peak_bytes = (size_t)json_integer_value(json_object_get(object, "peak_memory_bytes"));
+    }
+    json_decref(object);
+    npg_release(&path);
+}

@@ -1,0 +1,82 @@
+/* Probe of a capture's files, and what a run of it would take. */
+#include "tools/probe/probe_capture.h"
+
+#include <stdlib.h>
+
+#include "ingest/formats/reader.h"
+#include "pipeline/run_settings.h"
+#include "tools/listing.h"
+
+npg_status npg_probe_note(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
+                          int64_t number)
+{
+    if (status == NPG_BAD_INPUT) {
+        npg_probe_add_fault(probe, number);
+        status = NPG_OK;
+    } else if (!status) {
+        status = npg_probe_add(probe, frame, format, number);
+    }
+    npg_frame_clear(frame);
+    return status;
+}
+
+npg_status npg_probe_files(npg_probe *probe, npg_frame_files **out, const char *input,
+                           const npg_options *options)
+{
+    const char *selection = npg_options_get(options, "frames");
+    npg_settings settings;
+    npg_options_fill(options, npg_run_options, &settings);
+    NPG_TRY(npg_frame_files_open(out, input, selection ? selection : "", true));
+    if (settings.confine) NPG_TRY(npg_frame_files_confine(*out, input));
+    const npg_frame_files *list = *out;
+    for (size_t i = 0; i < list->count; i++) {
+        const npg_frame_slot *slot = &list->slots[i];
+        npg_frame frame = {0};
+        if (!slot->path) continue;
+        const char *format = npg_reader_for(slot->path);
+        probe->bytes += npg_file_bytes(slot->path);
+        npg_status status = npg_read_cloud(&frame, slot->path, &probe->origin);
+        NPG_TRY(npg_probe_note(probe, status, &frame, format ? format : "unknown", slot->number));
+    }
+    if (list->gap_count) {
+        char gaps[256];
+        npg_frame_files_gaps(gaps, sizeof gaps, list);
+        npg_probe_attend(probe, "%zu frames are missing in the numbering: %s", list->gap_count, gaps);
+    }
+    if (list->left_out) npg_probe_attend(probe, "%zu files with other endings were left out", list->left_out);
+    return NPG_OK;
+}
+
+void npg_probe_judge(npg_probe *probe)
+{
+    size_t readable = probe->frames - probe->unreadable;
+    npg_probe_spread counts = npg_probe_counts(probe);
+    if (probe->not_finite)
+        npg_probe_attend(probe, "%zu points have coordinates that are not finite", probe->not_finite);
+    if (probe->zero_normals) npg_probe_attend(probe, "%zu normals have no direction", probe->zero_normals);
+    if (probe->with_normals && probe->with_normals < readable)
+        npg_probe_attend(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
+    if (counts.most > 10 * counts.least)
+        npg_probe_attend(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
+                         counts.most);
+}
+
+/* ---- what a run would take ---- */
+
+/* The value of a run's option as a number, or `otherwise` where it is not one. */
+static int64_t option_number(const npg_options *options, const char *name, int64_t otherwise)
+{
+    const char *text = npg_options_get(options, name);
+    char *end = NULL;
+    long long value = text ? strtoll(text, &end, 10) : 0;
+    return text && end != text && value > 0 ? value : otherwise;
+}
+
+void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_options *options)
+{
+    /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
+    size_t faces = (size_t)option_number(options, "faces", 20000), most = npg_probe_counts(probe).most;
+    npg_probe_estimate(estimate, probe, (faces < 4 * most ? faces : 4 * most) / 2,
+                       (size_t)option_number(options, "epochs", 250),
+                       (size_t)option_number(options, "window", INT64_MAX));
+}

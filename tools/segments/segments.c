@@ -1,0 +1,319 @@
+/* Segments: a capture whose topology changes, as several runs with a reference each. */
+#include "tools/segments/segments.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "pipeline/file.h"
+#include "pipeline/run_settings.h"
+
+static void say(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
+static void say(npg_reporter *reporter, const char *format, ...)
+{
+    char text[512];
+    npg_hooks hooks = npg_reporter_hooks(reporter);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    npg_log_record record = {sizeof record, NPG_LOG_INFO, 0, "segments", -1, text};
+    hooks.log(hooks.user, &record);
+}
+
+static int64_t option_number(const npg_options *options, const char *name)
+{
+    return strtoll(npg_options_get(options, name), NULL, 10);
+}
+
+/* ---- the frames of a segment, as --frames has them ---- */
+
+static npg_status count_all(int64_t *count, const npg_options *options, bool finds_gaps)
+{
+    npg_frame_files *all;
+    NPG_TRY(npg_frame_files_open(&all, npg_options_get(options, "input"), "", finds_gaps));
+    *count = (int64_t)all->count;
+    npg_frame_files_close(&all);
+    return NPG_OK;
+}
+
+static npg_status slice_text(char **text, const npg_selection *slice, const npg_options *options,
+                             int64_t first, int64_t last)
+{
+    int64_t step = slice->is_slice ? slice->step : 1, begin = slice->has_first ? slice->first : 0, count;
+    bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
+    if (begin < 0) {
+        NPG_TRY(count_all(&count, options, finds_gaps));
+        begin = begin + count < 0 ? 0 : begin + count;
+    }
+    NPG_TRY(npg_alloc(text, NPG_FOR_RUN, 80));
+    snprintf(*text, 80, "%lld:%lld:%lld", (long long)(begin + first * step),
+             (long long)(begin + last * step + 1), (long long)step);
+    return NPG_OK;
+}
+
+static npg_status number_text(char **text, const npg_segments *s, int64_t first, int64_t last)
+{
+    size_t size = 24 * (size_t)(last - first + 1) + 1, used = 0;
+    NPG_TRY(npg_alloc(text, NPG_FOR_RUN, size));
+    for (int64_t i = first; i <= last; i++)
+        used += (size_t)snprintf(*text + used, size - used, "%s%lld", used ? "," : "",
+                                 (long long)npg_segment_number(s, i));
+    return NPG_OK;
+}
+
+static npg_status frames_text(char **text, const npg_segments *s, const npg_options *options, int64_t first,
+                              int64_t last)
+{
+    npg_selection selection;
+    NPG_TRY(npg_selection_parse(&selection, s->selection));
+    npg_status status = selection.range_count ? number_text(text, s, first, last)
+                                              : slice_text(text, &selection, options, first, last);
+    npg_selection_clear(&selection);
+    return status;
+}
+
+/* ---- one segment ---- */
+
+static npg_status set_number(npg_options *options, const char *name, int64_t value)
+{
+    char text[32];
+    snprintf(text, sizeof text, "%lld", (long long)value);
+    return npg_options_set(options, name, text);
+}
+
+/* What makes the options of the whole those of a segment. */
+static npg_status narrow(npg_options *options, const npg_segments *s, const npg_segment *segment)
+{
+    char *frames, *path;
+    if (!strcmp(segment->folder, ".")) return npg_options_set(options, "alarm", "split");
+    NPG_TRY(frames_text(&frames, s, options, segment->first - segment->shared_first,
+                        segment->last + segment->shared_last));
+    npg_status status = npg_options_set(options, "frames", frames);
+    npg_release(&frames);
+    NPG_TRY(status);
+    NPG_TRY(npg_segment_path(&path, s, segment));
+    status = npg_options_set(options, "output", path);
+    npg_release(&path);
+    NPG_TRY(status);
+    NPG_TRY(set_number(options, "shared-first", segment->shared_first));
+    NPG_TRY(set_number(options, "shared-last", segment->shared_last));
+    NPG_TRY(set_number(options, "keyframe", segment->keyframe));
+    NPG_TRY(npg_options_set(options, "restart", "no"));
+    return npg_options_set(options, "alarm", "split");
+}
+
+/* With option confine, what stands in the place of a folder of ours must not be a link. */
+static npg_status check_own(const npg_segments *s, const npg_options *options, const char *name)
+{
+    npg_settings settings;
+    char *folder;
+    npg_options_fill(options, npg_run_options, &settings);
+    if (!settings.confine || !strcmp(name, ".")) return NPG_OK;
+    NPG_TRY(npg_join_path(&folder, s->output, name));
+    npg_status status = npg_folder_is_own(folder);
+    npg_release(&folder);
+    return status;
+}
+
+static npg_status run_segment(const npg_segments *s, const npg_segment *segment, const npg_options *options,
+                              npg_reporter *reporter)
+{
+    npg_options *own;
+    bool is_open;
+    NPG_TRY(check_own(s, options, segment->folder));
+    NPG_TRY(npg_options_copy(&own, options));
+    npg_status status = narrow(own, s, segment);
+    if (!status && strcmp(segment->folder, ".") != 0)
+        say(reporter, "%s: frames %lld to %lld", segment->folder,
+            (long long)npg_segment_number(s, segment->first),
+            (long long)npg_segment_number(s, segment->last));
+    if (!status) status = npg_run_once(own, reporter, &is_open);
+    npg_options_close(&own);
+    return status;
+}
+
+/* ---- cutting ---- */
+
+static npg_status read_topology(json_t **told, const npg_segments *s, const npg_segment *segment)
+{
+    char *folder, *path;
+    json_error_t error;
+    *told = NULL;
+    NPG_TRY(npg_segment_path(&folder, s, segment));
+    npg_status status = npg_join_path(&path, folder, "topology.json");
+    npg_release(&folder);
+    NPG_TRY(status);
+    *told = json_load_file(path, 0, &error);
+    if (!*told) status = npg_error(NPG_DISK, "can't read back %s: %s", path, error.text);
+    npg_release(&path);
+    return status;
+}
+
+static int64_t least(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* The segment of the keyframe keeps its side of the cut; the result is the other. */
+static npg_segment cut(npg_segment *kept, const json_t *told, int64_t overlap)
+{
+    npg_segment rest = *kept;
+    const json_t *alarm = json_object_get(told, "alarm");
+    int64_t begin = kept->first - kept->shared_first;
+    int64_t from = begin + (int64_t)json_integer_value(json_object_get(alarm, "from_index"));
+    rest.keyframe = -1;
+    rest.alarm = json_deep_copy(alarm);
+    if (!strcmp(json_string_value(json_object_get(told, "direction")), "forward")) {
+        rest.first = from;
+        kept->last = from - 1;
+        rest.shared_first = least(overlap, from - kept->first);
+        kept->shared_last = 0;
+    } else {
+        rest.last = from;
+        kept->first = from + 1;
+        rest.shared_last = least(overlap, kept->last - from);
+        kept->shared_first = 0;
+    }
+    return rest;
+}
+
+/* What the broken off run left goes first: killed in between, it is made and broken off again. */
+static npg_status split(npg_segments *s, size_t at, const npg_options *options, npg_reporter *reporter)
+{
+    json_t *told;
+    npg_segment *segment = &s->list[at];
+    NPG_TRY(read_topology(&told, s, segment));
+    json_decref(s->overlaps);
+    s->overlaps = NULL;
+    int64_t key = segment->first - segment->shared_first +
+                  (int64_t)json_integer_value(json_object_get(told, "key_index"));
+    NPG_TRY(npg_segment_remove(s, segment));
+    npg_segment rest = cut(segment, told, option_number(options, "overlap"));
+    segment->keyframe = npg_segment_number(s, key);
+    npg_segment_name(segment, s);
+    npg_segment_name(&rest, s);
+    json_decref(told);
+    say(reporter, "a new reference for frames %lld to %lld", (long long)npg_segment_number(s, rest.first),
+        (long long)npg_segment_number(s, rest.last));
+    npg_status status = npg_segments_insert(s, rest.first > segment->first ? at + 1 : at, &rest);
+    if (status) json_decref(rest.alarm);
+    return status ? status : npg_segments_save(s);
+}
+
+/* ---- all of them ---- */
+
+/* Done before without segments, and there was an alarm: what it left makes way for the segments. */
+static npg_status solve_anew(const npg_segments *s, const npg_options *options, npg_reporter *reporter)
+{
+    say(reporter, "%s was done with one reference, which does not explain all frames: it is done anew",
+        s->output);
+    NPG_TRY(npg_segment_remove(s, &s->list[0]));
+    return run_segment(s, &s->list[0], options, reporter);
+}
+
+static npg_status solve_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
+{
+    for (size_t i = 0; i < s->count;) {
+        npg_status status = run_segment(s, &s->list[i], options, reporter);
+        if (status == NPG_PARTIAL && !strcmp(s->list[i].folder, ".") && npg_segments_was_alarmed(s))
+            status = solve_anew(s, options, reporter);
+        if (status == NPG_CHANGED) {
+            NPG_TRY(split(s, i, options, reporter));
+            i = 0; /* those before are done and say so at once */
+            continue;
+        }
+        if (status && status != NPG_PARTIAL) return status;
+        s->list[i++].is_partial = status == NPG_PARTIAL;
+    }
+    return NPG_OK;
+}
+
+static npg_status begin(npg_segments *s, const npg_options *options)
+{
+    bool restarts = !strcmp(npg_options_get(options, "restart"), "yes");
+    npg_segment whole = {
+        .last = (int64_t)s->frames->count - 1, .keyframe = option_number(options, "keyframe"), .folder = "."};
+    npg_status status = npg_segments_load(s);
+    if (status && !(status == NPG_USAGE && restarts)) return status;
+    if (restarts && s->count) NPG_TRY(npg_segments_remove(s));
+    if (s->count && !restarts) return NPG_OK;
+    for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
+    json_decref(s->overlaps);
+    s->overlaps = NULL;
+    s->count = 0;
+    return npg_segments_insert(s, 0, &whole);
+}
+
+static npg_status take_lock(int *fd, const char *output)
+{
+    char *path;
+    NPG_TRY(npg_make_folder(output));
+    NPG_TRY(npg_join_path(&path, output, ".segments.lock"));
+    npg_status status = NPG_OK;
+    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (*fd < 0)
+        status = npg_error_errno(NPG_DISK, "can't open %s", path);
+    else if (flock(*fd, LOCK_EX | LOCK_NB))
+        status = npg_error(NPG_USAGE, "another run is at work on %s", output);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status work(npg_segments *s, const npg_options *options, npg_reporter *reporter)
+{
+    json_t *overlaps = NULL;
+    bool is_partial = false;
+    bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
+    NPG_TRY(npg_frame_files_open(&s->frames, npg_options_get(options, "input"), s->selection, finds_gaps));
+    NPG_TRY(begin(s, options));
+    NPG_TRY(check_own(s, options, "links"));
+    NPG_TRY(solve_all(s, options, reporter));
+    for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;
+    npg_status status = NPG_OK;
+    if (npg_segments_are_linked(s))
+        overlaps = json_incref(s->overlaps);
+    else
+        status = npg_segments_link(&overlaps, s);
+    if (!status) status = npg_segments_conclude(s, overlaps, is_partial);
+    json_decref(overlaps);
+    return status ? status : is_partial ? NPG_PARTIAL : NPG_OK;
+}
+
+npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter)
+{
+    npg_segments s = {.output = npg_options_get(options, "output"),
+                      .selection = npg_options_get(options, "frames")};
+    int lock = -1;
+    const char *input = npg_options_get(options, "input");
+    npg_status status = NPG_OK;
+    if (!input[0] || !strcmp(input, "-"))
+        status =
+            npg_error(NPG_USAGE, "segments = auto reads frames again; a live source can't give them again");
+    if (!status) status = take_lock(&lock, s.output);
+    if (!status) status = work(&s, options, reporter);
+    if (lock >= 0) close(lock);
+    npg_segments_clear(&s);
+    npg_reporter_end(reporter, status, npg_options_get(options, "output"));
+    return status;
+}
+
+npg_status npg_segments_make_way(const npg_options *options)
+{
+    npg_segments s = {.output = npg_options_get(options, "output"), .selection = NULL};
+    npg_status status = npg_segments_load(&s);
+    bool are_many = s.count > 1, restarts = !strcmp(npg_options_get(options, "restart"), "yes");
+    if (!status && are_many && !restarts)
+        status = npg_error(NPG_USAGE,
+                           "%s holds a capture in %zu segments: give --segments auto to go on with it, "
+                           "--restart to discard it, or choose another output folder",
+                           s.output, s.count);
+    if (!status && restarts && s.count) status = npg_segments_remove(&s);
+    npg_segments_clear(&s);
+    return status;
+}

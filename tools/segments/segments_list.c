@@ -1,0 +1,369 @@
+/* The list of segments, and the folders they lie in. */
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "export/export.h"
+#include "pipeline/file.h"
+#include "pipeline/folder.h"
+#include "pipeline/json_file.h"
+#include "pipeline/stage.h"
+#include "tools/listing.h"
+#include "tools/segments/segments.h"
+
+#define WHOLE   "segments.json"
+#define PARTIAL "segments.partial.json"
+
+void npg_segments_clear(npg_segments *s)
+{
+    for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
+    json_decref(s->overlaps);
+    npg_release(&s->list);
+    npg_frame_files_close(&s->frames);
+}
+
+npg_status npg_segment_path(char **path, const npg_segments *s, const npg_segment *segment)
+{
+    if (!strcmp(segment->folder, ".")) return npg_copy_text(path, s->output);
+    return npg_join_path(path, s->output, segment->folder);
+}
+
+int64_t npg_segment_number(const npg_segments *s, int64_t place)
+{
+    return s->frames->slots[place].number;
+}
+
+npg_status npg_segments_insert(npg_segments *s, size_t at, const npg_segment *segment)
+{
+    NPG_TRY(npg_grow(&s->list, &s->capacity, s->count + 1, sizeof *s->list, NPG_FOR_RUN));
+    memmove(s->list + at + 1, s->list + at, (s->count - at) * sizeof *s->list);
+    s->list[at] = *segment;
+    s->count++;
+    return NPG_OK;
+}
+
+void npg_segment_name(npg_segment *segment, const npg_segments *s)
+{
+    int width = npg_number_width(npg_segment_number(s, (int64_t)s->frames->count - 1));
+    snprintf(segment->folder, sizeof segment->folder, "segment_%0*lld", width,
+             (long long)npg_segment_number(s, segment->first));
+}
+
+/* ---- reading ---- */
+
+static int64_t number_in(const json_t *object, const char *key)
+{
+    return (int64_t)json_integer_value(json_object_get(object, key));
+}
+
+static npg_status take(npg_segments *s, const json_t *entry)
+{
+    const char *folder = json_string_value(json_object_get(entry, "folder"));
+    npg_segment segment = {.first = number_in(entry, "first"),
+                           .last = number_in(entry, "last"),
+                           .shared_first = number_in(entry, "shared_first"),
+                           .shared_last = number_in(entry, "shared_last"),
+                           .keyframe = number_in(entry, "keyframe_wanted")};
+    if (!folder || strchr(folder, '/') || strlen(folder) >= sizeof segment.folder || folder[0] == 0 ||
+        !strcmp(folder, ".."))
+        return npg_error(NPG_USAGE, "%s/%s is damaged; --restart discards what is there", s->output, WHOLE);
+    strcpy(segment.folder, folder);
+    if (json_is_object(json_object_get(entry, "alarm")))
+        segment.alarm = json_deep_copy(json_object_get(entry, "alarm"));
+    return npg_segments_insert(s, s->count, &segment);
+}
+
+static bool is_of_these(const npg_segments *s, const json_t *told)
+{
+    const char *selection = json_string_value(json_object_get(told, "selection"));
+    return !s->frames || (selection && !strcmp(selection, s->selection) &&
+                          number_in(told, "frames") == (int64_t)s->frames->count);
+}
+
+static npg_status load(npg_segments *s, const char *name)
+{
+    char *path;
+    json_error_t error;
+    NPG_TRY(npg_join_path(&path, s->output, name));
+    npg_status status = NPG_OK;
+    json_t *told = access(path, F_OK) == 0 ? json_load_file(path, 0, &error) : json_null();
+    if (!told)
+        status =
+            npg_error(NPG_USAGE, "%s is damaged (%s); --restart discards what is there", path, error.text);
+    const json_t *list = json_object_get(told, "segments");
+    for (size_t i = 0; i < json_array_size(list) && !status; i++) status = take(s, json_array_get(list, i));
+    if (!status && s->count && !is_of_these(s, told))
+        status = npg_error(NPG_USAGE,
+                           "%s holds segments of other frames; give --restart to discard what is there, or "
+                           "choose another output folder",
+                           s->output);
+    if (!status && s->count && !strcmp(name, WHOLE))
+        s->overlaps = json_incref(json_object_get(told, "overlaps"));
+    json_decref(told);
+    npg_release(&path);
+    return status;
+}
+
+npg_status npg_segments_load(npg_segments *s)
+{
+    NPG_TRY(load(s, PARTIAL));
+    return s->count ? NPG_OK : load(s, WHOLE);
+}
+
+bool npg_segments_are_linked(const npg_segments *s)
+{
+    size_t i, k;
+    json_t *overlap, *link;
+    json_array_foreach(s->overlaps, i, overlap)
+    {
+        json_array_foreach(json_object_get(overlap, "links"), k, link)
+        {
+            char *path;
+            const char *name = json_string_value(json_object_get(link, "file"));
+            if (!name || npg_join_path(&path, s->output, name)) return false;
+            bool is_there = (int64_t)npg_file_bytes(path) == number_in(link, "bytes");
+            npg_release(&path);
+            if (!is_there) return false;
+        }
+    }
+    return s->overlaps != NULL;
+}
+
+/* NULL where there is none, or none that can be read. */
+static json_t *read_in(const char *folder, const char *name)
+{
+    char *path;
+    if (npg_join_path(&path, folder, name)) return NULL;
+    json_t *told = json_load_file(path, 0, NULL);
+    npg_release(&path);
+    return told;
+}
+
+bool npg_segments_was_alarmed(const npg_segments *s)
+{
+    json_t *done = read_in(s->output, "done.json"), *report = read_in(s->output, "report.json");
+    const char *mode = json_string_value(json_object_get(json_object_get(done, "options"), "alarm"));
+    const json_t *stages = json_object_get(report, "stages"),
+                 *told = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    bool was = mode && !strcmp(mode, "report") &&
+               (json_is_object(json_object_get(told, "forward")) ||
+                json_is_object(json_object_get(told, "backward")));
+    json_decref(done);
+    json_decref(report);
+    return was;
+}
+
+/* ---- files ---- */
+
+static npg_status remove_in(const char *folder, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    npg_status status = npg_folder_remove(path);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- other verbs ---- */
+
+static bool is_part(const char *folder)
+{
+    char *above;
+    char *real = realpath(folder, NULL);
+    const char *slash = real ? strrchr(real, '/') : NULL;
+    bool found = false;
+    if (slash && slash > real && !npg_copy_text(&above, real)) {
+        above[slash - real] = 0;
+        json_t *told = read_in(above, WHOLE);
+        const json_t *list = json_object_get(told, "segments");
+        for (size_t i = 0; i < json_array_size(list); i++) {
+            const char *name = json_string_value(json_object_get(json_array_get(list, i), "folder"));
+            found = found || (name && !strcmp(name, slash + 1));
+        }
+        json_decref(told);
+        npg_release(&above);
+    }
+    free(real);
+    return found;
+}
+
+/* "OUT/segment_0000 (frames 0 to 6), ...", as many as there is room for. */
+static void spell(char *text, size_t size, const json_t *list, const char *output)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < json_array_size(list) && used < size; i++) {
+        const json_t *entry = json_array_get(list, i);
+        const char *folder = json_string_value(json_object_get(entry, "folder"));
+        used += (size_t)snprintf(text + used, size - used, "%s%s/%s (frames %lld to %lld)", i ? ", " : "",
+                                 output, folder ? folder : "", (long long)number_in(entry, "first_frame"),
+                                 (long long)number_in(entry, "last_frame"));
+    }
+}
+
+npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone)
+{
+    json_t *told = read_in(folder, WHOLE), *open = read_in(folder, PARTIAL);
+    const json_t *list = json_object_get(open ? open : told, "segments");
+    npg_status status = NPG_OK;
+    char text[512];
+    if (json_array_size(list) > 1 && !is_alone) {
+        spell(text, sizeof text, list, folder);
+        status = npg_error(NPG_USAGE,
+                           "%s holds a capture in %zu segments with a reference each; neupig %s takes one of "
+                           "them: %s",
+                           folder, json_array_size(list), verb, text);
+    } else if (json_array_size(list) > 1) {
+        status =
+            npg_error(NPG_USAGE,
+                      "%s holds a capture in %zu segments, and neupig %s goes on with one reference: run "
+                      "the frames that came later into a folder of their own (neupig run INPUT -o "
+                      "NEW --segments auto --frames FIRST:), or all of them anew (--restart)",
+                      folder, json_array_size(list), verb);
+    } else if (is_alone && is_part(folder)) {
+        status = npg_error(NPG_USAGE,
+                           "%s is one segment of a capture; neupig %s would part it from the others: run the "
+                           "frames that came later into a folder of their own",
+                           folder, verb);
+    }
+    json_decref(told);
+    json_decref(open);
+    return status;
+}
+
+npg_status npg_segments_forget(const char *output)
+{
+    json_t *told = read_in(output, WHOLE), *done = read_in(output, "done.json");
+    bool is_old = told && number_in(told, "frames") != number_in(done, "frames");
+    json_decref(told);
+    json_decref(done);
+    return is_old ? remove_in(output, WHOLE) : NPG_OK;
+}
+
+/* ---- writing ---- */
+
+static json_t *json_of(const npg_segments *s, const npg_segment *segment)
+{
+    return json_pack("{ss sI sI sI sI sI sI sI sO?}", "folder", segment->folder, "first",
+                     (json_int_t)segment->first, "last", (json_int_t)segment->last, "first_frame",
+                     (json_int_t)npg_segment_number(s, segment->first), "last_frame",
+                     (json_int_t)npg_segment_number(s, segment->last), "shared_first",
+                     (json_int_t)segment->shared_first, "shared_last", (json_int_t)segment->shared_last,
+                     "keyframe_wanted", (json_int_t)segment->keyframe, "alarm", segment->alarm);
+}
+
+static json_t *json_of_all(const npg_segments *s)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < s->count; i++) json_array_append_new(list, json_of(s, &s->list[i]));
+    return json_pack("{ss sI so}", "selection", s->selection, "frames", (json_int_t)s->frames->count,
+                     "segments", list);
+}
+
+npg_status npg_segments_save(const npg_segments *s)
+{
+    json_t *told = json_of_all(s);
+    npg_status status = npg_json_write(s->output, PARTIAL, told);
+    json_decref(told);
+    return status;
+}
+
+/* ---- removing ---- */
+
+/* OUT itself may hold more than what a run left. */
+npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment)
+{
+    if (strcmp(segment->folder, ".") != 0) return remove_in(s->output, segment->folder);
+    NPG_TRY(remove_in(s->output, "job"));
+    NPG_TRY(npg_folder_clear(s->output));
+    char *meshes;
+    NPG_TRY(npg_join_path(&meshes, s->output, "meshes"));
+    rmdir(meshes); /* stays where it holds files of others */
+    npg_release(&meshes);
+    return remove_in(s->output, "topology.json");
+}
+
+npg_status npg_segments_remove(const npg_segments *s)
+{
+    NPG_TRY(remove_in(s->output, "done.json"));
+    NPG_TRY(remove_in(s->output, "links"));
+    for (size_t i = 0; i < s->count; i++)
+        if (strcmp(s->list[i].folder, ".") != 0) NPG_TRY(remove_in(s->output, s->list[i].folder));
+    NPG_TRY(remove_in(s->output, WHOLE));
+    return remove_in(s->output, PARTIAL);
+}
+
+/* ---- the end ---- */
+
+/* What a reader wants to know of a segment without opening its folder. */
+static npg_status add_report(json_t *entry, const npg_segments *s, const npg_segment *segment)
+{
+    char *folder, *path = NULL;
+    NPG_TRY(npg_segment_path(&folder, s, segment));
+    npg_status status = npg_join_path(&path, folder, "report.json");
+    npg_release(&folder);
+    NPG_TRY(status);
+    json_t *report = json_load_file(path, 0, NULL), *stages = json_object_get(report, "stages");
+    if (!report) status = npg_error(NPG_DISK, "can't read back %s", path);
+    npg_release(&path);
+    json_object_set(entry, "status", json_object_get(report, "status"));
+    json_object_set(entry, "keyframe",
+                    json_object_get(json_object_get(json_object_get(stages, "keyframe"), "key"), "number"));
+    json_object_set(entry, "topology", json_object_get(json_object_get(stages, "evaluate"), "topology"));
+    json_decref(report);
+    return status;
+}
+
+/* What is there and says the same stays as it is: a capture that was done is not touched. */
+static npg_status write_if_new(const npg_segments *s, const char *name, const json_t *value)
+{
+    json_t *before = read_in(s->output, name);
+    bool is_same = before && json_equal(before, value);
+    json_decref(before);
+    return is_same ? NPG_OK : npg_json_write(s->output, name, value);
+}
+
+static void remove_done(const npg_segments *s)
+{
+    char *path;
+    if (npg_join_path(&path, s->output, "done.json")) return;
+    unlink(path);
+    npg_release(&path);
+}
+
+static npg_status write_done(const npg_segments *s, bool is_partial)
+{
+    json_t *files = json_array();
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i <= s->count && !status; i++) {
+        char name[64] = WHOLE;
+        if (i) snprintf(name, sizeof name, "%s/done.json", s->list[i - 1].folder);
+        json_t *entry = json_pack("{ss}", "path", name);
+        status = npg_file_facts(entry, s->output, name);
+        json_array_append_new(files, entry);
+    }
+    json_t *done = json_pack("{ss ss si sI sI so}", "neupig", npg_version(), "status",
+                             is_partial ? "partial" : "ok", "exit_code", is_partial ? 7 : 0, "frames",
+                             (json_int_t)s->frames->count, "segments", (json_int_t)s->count, "files", files);
+    if (!status) status = write_if_new(s, "done.json", done);
+    if (status) remove_done(s); /* whole it may be, but what fails at its last step is not done */
+    json_decref(done);
+    return status;
+}
+
+npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool is_partial)
+{
+    json_t *told = json_of_all(s), *list = json_object_get(told, "segments");
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < s->count && !status; i++)
+        status = add_report(json_array_get(list, i), s, &s->list[i]);
+    json_object_set(told, "overlaps", overlaps);
+    json_object_set_new(told, "status", json_string(is_partial ? "partial" : "ok"));
+    if (!status) status = write_if_new(s, WHOLE, told);
+    json_decref(told);
+    if (!status && s->count > 1) status = write_done(s, is_partial);
+    return status ? status : remove_in(s->output, PARTIAL);
+}

@@ -1,0 +1,138 @@
+/* Synthetic cameras: a ring of depth cameras around the body, each with a depth buffer of its own. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pipeline/random.h"
+#include "tools/synth/synth_points.h"
+
+#define PI 3.14159265358979323846
+
+typedef struct camera {
+    double eye[3], right[3], up[3], ahead[3];
+    double focal; /* pixels */
+    int64_t width;
+} camera;
+
+typedef struct picture {
+    double *depth;  /* along `ahead`; infinity where nothing is seen */
+    uint32_t *face; /* the face seen */
+} picture;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The i-th of a ring at half the diagonal's height above the middle, turned to the middle. */
+static camera camera_of_ring(const npg_scan *capture, int64_t i)
+{
+    const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
+    double angle = 2 * PI * (double)i / (double)capture->cameras;
+    camera c = {.width = capture->width, .focal = 0.95 * (double)capture->width};
+    double ahead[3] = {-sin(angle), -lift, -cos(angle)}, length = sqrt(dot(ahead, ahead));
+    for (int k = 0; k < 3; k++) {
+        c.ahead[k] = ahead[k] / length;
+        c.eye[k] = capture->centre[k] - distance * c.ahead[k];
+    }
+    c.right[0] = -cos(angle);
+    c.right[2] = sin(angle);
+    c.up[0] = c.right[1] * c.ahead[2] - c.right[2] * c.ahead[1];
+    c.up[1] = c.right[2] * c.ahead[0] - c.right[0] * c.ahead[2];
+    c.up[2] = c.right[0] * c.ahead[1] - c.right[1] * c.ahead[0];
+    return c;
+}
+
+/* Pixel coordinates (x, y) and depth (z) of a point. */
+static void project(double out[3], const camera *c, const float *p)
+{
+    double from_eye[3] = {(double)p[0] - c->eye[0], (double)p[1] - c->eye[1], (double)p[2] - c->eye[2]};
+    out[2] = dot(from_eye, c->ahead);
+    out[0] = 0.5 * (double)c->width + c->focal * dot(from_eye, c->right) / out[2];
+    out[1] = 0.5 * (double)c->width + c->focal * dot(from_eye, c->up) / out[2];
+}
+
+static double cross_2d(const double a[3], const double b[3], double x, double y)
+{
+    return (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+}
+
+/* Draw one face into the depth buffer; pixel centres, 1 / depth is linear on the picture. */
+static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint32_t f)
+{
+    double v[3][3], lo[2], hi[2];
+    for (int k = 0; k < 3; k++) {
+        project(v[k], c, mesh->vert_pos + 3 * (size_t)mesh->faces[3 * (size_t)f + (size_t)k]);
+        if (v[k][2] <= 0) return;
+    }
+    double area = cross_2d(v[0], v[1], v[2][0], v[2][1]);
+    if (area == 0) return;
+    for (int k = 0; k < 2; k++) {
+        lo[k] = fmax(ceil(fmin(fmin(v[0][k], v[1][k]), v[2][k]) - 0.5), 0);
+        hi[k] = fmin(floor(fmax(fmax(v[0][k], v[1][k]), v[2][k]) - 0.5), (double)(c->width - 1));
+    }
+    for (int64_t y = (int64_t)lo[1]; y <= (int64_t)hi[1]; y++)
+        for (int64_t x = (int64_t)lo[0]; x <= (int64_t)hi[0]; x++) {
+            double px = (double)x + 0.5, py = (double)y + 0.5;
+            double a = cross_2d(v[1], v[2], px, py) / area, b = cross_2d(v[2], v[0], px, py) / area;
+            if (a < 0 || b < 0 || a + b > 1) continue;
+            double depth = 1 / (a / v[0][2] + b / v[1][2] + (1 - a - b) / v[2][2]);
+            size_t at = (size_t)(y * c->width + x);
+            if (depth >= out->depth[at]) continue;
+            out->depth[at] = depth;
+            out->face[at] = f;
+        }
+}
+
+static void face_normal(double normal[3], const npg_mesh *mesh, uint32_t f)
+{
+    const uint32_t *face = mesh->faces + 3 * (size_t)f;
+    double u[3], w[3];
+    for (size_t k = 0; k < 3; k++) {
+        u[k] =
+            (double)mesh->vert_pos[3 * (size_t)face[1] + k] - (double)mesh->vert_pos[3 * (size_t)face[0] + k];
+        w[k] =
+            (double)mesh->vert_pos[3 * (size_t)face[2] + k] - (double)mesh->vert_pos[3 * (size_t)face[0] + k];
+    }
+    double cross[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
+    double length = fmax(sqrt(dot(cross, cross)), 1e-30);
+    for (int k = 0; k < 3; k++) normal[k] = cross[k] / length;
+}
+
+/* The surface point behind every pixel that sees a front side, with noise along its ray. */
+static npg_status take_points(npg_scanned *points, const picture *seen, const camera *c, const npg_mesh *mesh,
+                              double noise, npg_random *random)
+{
+    for (int64_t at = 0; at < c->width * c->width; at++) {
+        double depth = seen->depth[at], pos[3], normal[3];
+        if (isinf(depth)) continue;
+        if (noise > 0) depth += noise * npg_random_gauss(random);
+        double x = ((double)(at % c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
+        double y = ((double)(at / c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
+        for (int k = 0; k < 3; k++)
+            pos[k] = c->eye[k] + depth * (c->ahead[k] + x * c->right[k] + y * c->up[k]);
+        face_normal(normal, mesh, seen->face[at]);
+        double facing = 0;
+        for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
+        if (facing > 0) NPG_TRY(npg_scanned_add(points, pos, normal));
+    }
+    return NPG_OK;
+}
+
+npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame)
+{
+    picture seen = {0};
+    size_t pixels = (size_t)(capture->width * capture->width);
+    npg_random random = npg_random_stream(capture->seed, frame, 10);
+    npg_status status = npg_alloc_array(&seen.depth, NPG_FOR_FRAMES, pixels, sizeof *seen.depth);
+    if (!status) status = npg_alloc_array(&seen.face, NPG_FOR_FRAMES, pixels, sizeof *seen.face);
+    for (int64_t i = 0; i < capture->cameras && !status; i++) {
+        camera c = camera_of_ring(capture, i);
+        for (size_t p = 0; p < pixels; p++) seen.depth[p] = INFINITY;
+        for (size_t f = 0; f < mesh->face_count; f++) draw_face(&seen, &c, mesh, (uint32_t)f);
+        status = take_points(points, &seen, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
+    }
+    npg_release(&seen.depth);
+    npg_release(&seen.face);
+    return status;
+}
