@@ -71,6 +71,7 @@ void npg_frame_clear(npg_frame *frame)
     npg_release(&frame->pos_local);
     npg_release(&frame->normals);
     npg_release(&frame->vert_unit);
+    npg_release(&frame->align_state);
     *frame = (npg_frame){0};
 }
 
@@ -88,6 +89,8 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     *out = *frame;
     out->path = NULL;
     out->pos_local = out->normals = out->vert_unit = NULL;
+    out->align_state = NULL; /* belongs to one frame on its way, not to copies */
+    out->align_state_size = 0;
     if (frame->path) NPG_TRY_OR(fail, status, npg_copy_text(&out->path, frame->path));
     NPG_TRY_OR(fail, status, copy_rows(&out->pos_local, frame->pos_local, frame->point_count));
     NPG_TRY_OR(fail, status, copy_rows(&out->normals, frame->normals, frame->point_count));

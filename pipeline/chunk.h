@@ -64,6 +64,9 @@ typedef struct npg_frame {
     size_t vert_count; /* V                                                                               */
     float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates                       */
     npg_figures figures;
+    void *
+        align_state; /* on the last frame that a window waits for: what stage align needs to be resumed after it */
+    size_t align_state_size; /* bytes, owned; NULL on all others */
 } npg_frame;
 
 typedef struct npg_chunk npg_chunk;
@@ -83,7 +86,7 @@ void npg_chunk_add(npg_chunk *chunk, npg_frame *frame);
 /* Free what a frame owns and empty it. */
 void npg_frame_clear(npg_frame *frame);
 
-/* A copy with its own arrays. */
+/* A copy with its own arrays, without align_state. */
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame);
 
 /* Keep the points whose keep[i] is not 0, in order, with their normals. */

@@ -78,7 +78,7 @@ NPG_API const char *npg_status_name(npg_status status);
 /* The text of the last failure on this thread; "" when there was none.  Valid until the next failure. */
 NPG_API const char *npg_error_text(void);
 
-/* For callbacks that fail (npg_own_stage): make text the calling thread's failure and return status. */
+/* For callbacks that fail (npg_custom_stage): make text the calling thread's failure and return status. */
 NPG_API npg_status npg_error_set(npg_status status, const char *text);
 
 /* "0.1.0". */
@@ -173,7 +173,7 @@ typedef struct npg_frame_view {
     double residual, coverage; /* as in npg_result; NaN before evaluate                               */
 } npg_frame_view;
 
-typedef struct npg_own_stage {
+typedef struct npg_custom_stage {
     size_t struct_size;
     const char *name;  /* for log and report: small letters, digits and dashes; no other stage's      */
     const char *after; /* the stage it follows: ingest, outlier, keyframe, mesh, align, optimize, evaluate or
@@ -182,7 +182,7 @@ typedef struct npg_own_stage {
     /* One frame.  NPG_OK passes it on; a failure ends the run with this status and the text of
      * npg_error_set(); NPG_STOPPED stops it. */
     npg_status (*frame)(void *user, npg_frame_view *frame);
-} npg_own_stage;
+} npg_custom_stage;
 
 /* Put a stage into the chain of every run opened with these options; the struct and its texts are copied,
  * what user points to must outlive the runs.  Several after the same stage work in the order they were added.
@@ -196,7 +196,7 @@ typedef struct npg_own_stage {
  *
  * A run that goes on where an earlier one was needs the same stages (by name and place).
  * NPG_USAGE: a name that is taken, a place that is not there, too many stages. */
-NPG_API npg_status npg_options_add_stage(npg_options *options, const npg_own_stage *stage);
+NPG_API npg_status npg_options_add_stage(npg_options *options, const npg_custom_stage *stage);
 
 /* ---- logs and progress ---- */
 

@@ -11,36 +11,45 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pipeline/custom_stage.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/own_stage.h"
 #include "pipeline/run_settings.h"
 #include "pipeline/struct_size.h"
 
 struct npg_options {
     const npg_stage *const *chain; /* whose tables count */
     size_t count;
-    char **texts;                          /* count of them: what the user set, or NULL; owned */
-    npg_own_stage own[NPG_OWN_STAGES_MAX]; /* own_count of them, their texts owned */
-    size_t own_count;
+    char **texts;                                   /* count of them: what the user set, or NULL; owned */
+    npg_custom_stage custom[NPG_CUSTOM_STAGES_MAX]; /* custom_count of them, their texts owned */
+    size_t custom_count;
 };
 
 /* ---- the tables as one list ---- */
 
+/* The i-th option of a table, or NULL with i less by as many as the table has. */
+static const npg_option *in_table(const npg_option *table, size_t *i)
+{
+    for (; table && table->name; table++)
+        if ((*i)-- == 0) return table;
+    return NULL;
+}
+
+/* The run's, then those of its services, then the stages'. */
 static const npg_option *option_at(const npg_stage *const *chain, size_t i, const char **stage)
 {
-    const npg_option *table = npg_run_options;
     const char *name = "run";
-    for (;; chain++) {
-        for (; table && table->name; table++)
-            if (i-- == 0) {
-                if (stage) *stage = name;
-                return table;
-            }
-        if (!*chain) return NULL;
-        table = (*chain)->options;
+    const npg_option *option = in_table(npg_run_options, &i);
+    for (const npg_service *const *s = npg_services_of(chain); !option && *s; s++) {
+        option = in_table((*s)->options, &i);
+        name = (*s)->name;
+    }
+    for (; !option && *chain; chain++) {
+        option = in_table((*chain)->options, &i);
         name = (*chain)->name;
     }
+    if (option && stage) *stage = name;
+    return option;
 }
 
 const npg_option *npg_option_at(size_t i, const char **stage)
@@ -154,16 +163,16 @@ npg_status npg_options_open_chain(npg_options **out, const npg_stage *const *cha
     return status;
 }
 
-/* ---- stages of a program's own ---- */
+/* ---- custom stages ---- */
 
 /* The texts of a copied stage are ours, whatever the public struct says. */
-static void release_own(npg_own_stage *own)
+static void release_custom(npg_custom_stage *custom)
 {
-    npg_release(&own->name);
-    npg_release(&own->after);
+    npg_release(&custom->name);
+    npg_release(&custom->after);
 }
 
-static npg_status copy_own(npg_options *options, const npg_own_stage *given)
+static npg_status copy_custom(npg_options *options, const npg_custom_stage *given)
 {
     char *name, *after;
     NPG_TRY(npg_copy_text(&name, given->name));
@@ -172,31 +181,32 @@ static npg_status copy_own(npg_options *options, const npg_own_stage *given)
         npg_release(&name);
         return status;
     }
-    npg_own_stage *own = &options->own[options->own_count++];
-    *own = *given;
-    own->name = name;
-    own->after = after;
+    npg_custom_stage *custom = &options->custom[options->custom_count++];
+    *custom = *given;
+    custom->name = name;
+    custom->after = after;
     return NPG_OK;
 }
 
-npg_status npg_options_add_stage(npg_options *options, const npg_own_stage *stage)
+npg_status npg_options_add_stage(npg_options *options, const npg_custom_stage *stage)
 {
-    npg_own_stage given;
+    npg_custom_stage given;
     NPG_REQUIRE(options);
-    NPG_TRY(npg_struct_take(&given, sizeof given, stage, NPG_SIZE_UP_TO(npg_own_stage, frame), "the stage"));
-    NPG_TRY(npg_own_check(&given, options->chain));
-    for (size_t i = 0; i < options->own_count; i++)
-        if (!strcmp(options->own[i].name, given.name))
+    NPG_TRY(
+        npg_struct_take(&given, sizeof given, stage, NPG_SIZE_UP_TO(npg_custom_stage, frame), "the stage"));
+    NPG_TRY(npg_custom_check(&given, options->chain));
+    for (size_t i = 0; i < options->custom_count; i++)
+        if (!strcmp(options->custom[i].name, given.name))
             return npg_error(NPG_USAGE, "stage %s: the name is taken", given.name);
-    if (options->own_count == NPG_OWN_STAGES_MAX)
+    if (options->custom_count == NPG_CUSTOM_STAGES_MAX)
         return npg_error(NPG_USAGE, "stage %s: no more than %d stages can be added", given.name,
-                         NPG_OWN_STAGES_MAX);
-    return copy_own(options, &given);
+                         NPG_CUSTOM_STAGES_MAX);
+    return copy_custom(options, &given);
 }
 
-const npg_own_stage *npg_options_own_stage(const npg_options *options, size_t i)
+const npg_custom_stage *npg_options_custom_stage(const npg_options *options, size_t i)
 {
-    return options && i < options->own_count ? &options->own[i] : NULL;
+    return options && i < options->custom_count ? &options->custom[i] : NULL;
 }
 
 void npg_options_close(npg_options **slot)
@@ -204,7 +214,7 @@ void npg_options_close(npg_options **slot)
     if (!slot || !*slot) return;
     for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
     npg_release(&(*slot)->texts);
-    for (size_t i = 0; i < (*slot)->own_count; i++) release_own(&(*slot)->own[i]);
+    for (size_t i = 0; i < (*slot)->custom_count; i++) release_custom(&(*slot)->custom[i]);
     npg_release(slot);
 }
 
@@ -215,8 +225,8 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options)
     NPG_TRY(npg_options_open_chain(&copy, options ? options->chain : npg_chain));
     for (size_t i = 0; i < copy->count && !status; i++)
         if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
-    for (size_t i = 0; options && i < options->own_count && !status; i++)
-        status = copy_own(copy, &options->own[i]);
+    for (size_t i = 0; options && i < options->custom_count && !status; i++)
+        status = copy_custom(copy, &options->custom[i]);
     if (status) npg_options_close(&copy);
     *out = copy;
     return status;

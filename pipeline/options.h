@@ -52,7 +52,7 @@ void npg_option_store(const npg_option *option, const char *text, void *state);
 npg_status npg_options_copy(npg_options **out, const npg_options *options);
 
 /* The i-th stage that a program added, a loan; NULL after the last. */
-const npg_own_stage *npg_options_own_stage(const npg_options *options, size_t i);
+const npg_custom_stage *npg_options_custom_stage(const npg_options *options, size_t i);
 
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);

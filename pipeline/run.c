@@ -22,6 +22,8 @@ const npg_option npg_run_options[] = {
      "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): its files are frames as they are "
      "complete; takes the place of the input",
      NPG_OPTION_TEXT, OFFSET(follow), "", 0, 0, NULL, "DIR"},
+    {"reference", "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one",
+     NPG_OPTION_TEXT, OFFSET(reference), "", 0, 0, NULL, "FILE"},
     {"output", "Folder for the results; empty: results are only pulled", NPG_OPTION_TEXT, OFFSET(output), "",
      0, 0, NULL, "DIR"},
     {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "default", 0, 0,
@@ -66,6 +68,7 @@ void npg_run_fail(npg_run *run, const char *stage, npg_status status)
     for (size_t i = 0; i < run->ring_count; i++) npg_ring_abort(run->rings[i]);
     if (run->feed) npg_ring_abort(run->feed);
     if (run->results) npg_ring_abort(run->results);
+    for (size_t i = 0; i < run->latch_count; i++) npg_latch_abort(run->latches[i]);
     pthread_mutex_unlock(&run->lock);
 }
 
@@ -80,12 +83,21 @@ void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t f
 
 /* ---- one pass ---- */
 
+static npg_status open_state(npg_worker *worker, size_t size, const npg_option *options)
+{
+    NPG_TRY(npg_alloc(&worker->state, NPG_FOR_RUN, size + 1)); /* a stage may have none */
+    npg_options_fill(worker->run->options, options, worker->state);
+    return NPG_OK;
+}
+
+/* States of all stages, those that sit this pass out as well: others may ask them (memory, verts_at_most). */
 static npg_status open_worker_states(npg_run *run)
 {
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
-        NPG_TRY(npg_alloc(&worker->state, NPG_FOR_RUN, worker->stage->state_size + 1));
-        npg_options_fill(run->options, worker->stage->options, worker->state);
+        const npg_stage *stage = worker->stage;
+        NPG_TRY(open_state(worker, stage->state_size, stage->options));
+        worker->is_in_pass = (stage->passes & run->pass) && (!stage->takes_part || stage->takes_part(worker));
     }
     return NPG_OK;
 }
@@ -96,7 +108,7 @@ static npg_status open_rings(npg_run *run)
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
         worker->in = worker->out = NULL;
-        if (!(worker->stage->passes & run->pass)) continue;
+        if (!worker->is_in_pass) continue;
         if (last) {
             npg_ring *ring;
             NPG_TRY(npg_ring_open(&ring, (size_t)run->settings.ring_capacity));
@@ -125,11 +137,15 @@ static void note_waits(const npg_worker *worker)
     json_object_set_new(r, "waited_for_next_s", json_real(push_s));
 }
 
-/* Somebody outside may be what a stage waits for; after a request to stop it must not be. */
+/* Somebody outside may be what a stage waits for, or another stage that waits for somebody outside; after a
+ * request to stop it must not be. */
 static void close_ends(npg_run *run)
 {
     if (run->feed) npg_ring_abort(run->feed);
     if (run->results) npg_ring_abort(run->results);
+    pthread_mutex_lock(&run->lock);
+    for (size_t i = 0; i < run->latch_count; i++) npg_latch_abort(run->latches[i]);
+    pthread_mutex_unlock(&run->lock);
 }
 
 static void wait_for_workers(npg_run *run)
@@ -169,9 +185,9 @@ static npg_status start_threads(npg_run *run)
 {
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
-        if (!(worker->stage->passes & run->pass)) continue;
+        if (!worker->is_in_pass) continue;
         if (pthread_create(&worker->thread, NULL, npg_worker_main, worker))
-            return npg_error(NPG_FAILED, "can't start the thread of stage %s", worker->stage->name);
+            return npg_error(NPG_FAILED, "can't start the thread of stage %s", worker->name);
         worker->started = true;
     }
     return NPG_OK;
@@ -202,13 +218,12 @@ void npg_run_announce_memory(npg_run *run)
     json_t *parts = json_object();
     for (size_t i = 0; i < run->worker_count; i++) {
         const npg_worker *worker = &run->workers[i];
-        if (!(worker->stage->passes & NPG_PASS_SOLVE)) continue;
+        if (!worker->is_in_pass) continue;
         size_t chunks = 1, bytes = worker->stage->memory ? worker->stage->memory(worker, &chunks) : 0;
         rings += (size_t)run->settings.ring_capacity;
         held += chunks;
         stages += bytes;
-        json_object_set_new(parts, worker->stage->name,
-                            json_integer((json_int_t)(bytes + chunks * chunk_bytes)));
+        json_object_set_new(parts, worker->name, json_integer((json_int_t)(bytes + chunks * chunk_bytes)));
     }
     size_t total = (rings + held) * chunk_bytes + stages;
     char text[256];
@@ -251,14 +266,14 @@ static npg_status conclude(npg_run *run)
 
 static npg_status begin(npg_run *run)
 {
-    npg_status status = open_worker_states(run);
-    if (status) npg_run_fail(run, "run", status);
-    for (size_t i = 0; i < run->worker_count && !status; i++) {
-        npg_worker *worker = &run->workers[i];
-        if (worker->stage->begin) status = worker->stage->begin(worker);
-        if (status && status != NPG_END) npg_run_fail(run, worker->stage->name, status);
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < run->service_count && !status; i++) {
+        npg_worker *worker = &run->services[i];
+        status = open_state(worker, worker->service->state_size, worker->service->options);
+        if (!status) status = worker->service->begin(worker);
+        if (status && status != NPG_END) npg_run_fail(run, worker->name, status);
+        npg_release(&worker->state);
     }
-    for (size_t i = 0; i < run->worker_count; i++) npg_release(&run->workers[i].state);
     return status;
 }
 
@@ -271,7 +286,7 @@ static npg_status do_passes(npg_run *run)
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
         if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
     }
-    run->told = json_deep_copy(json_object_get(run->report, "stages"));
+    run->closed_reports = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));
     npg_status status = conclude(run);
     if (status) npg_run_fail(run, "run", status);
@@ -310,19 +325,38 @@ static npg_status add_worker(npg_run *run, const npg_stage *stage)
     if (run->worker_count == NPG_STAGES_MAX)
         return npg_error(NPG_USAGE, "more than %d stages", NPG_STAGES_MAX);
     npg_worker *worker = &run->workers[run->worker_count++];
-    *worker = (npg_worker){.run = run, .stage = stage, .report = json_object()};
+    *worker = (npg_worker){.run = run, .name = stage->name, .stage = stage, .report = json_object()};
     json_object_set_new(stages, stage->name, worker->report);
     return NPG_OK;
 }
 
 /* The stages that the program wants right after this one. */
-static npg_status add_own(npg_run *run, const npg_stage *before, uint32_t fields)
+static npg_status add_custom(npg_run *run, const npg_stage *before, uint32_t fields)
 {
-    const npg_own_stage *given;
-    for (size_t i = 0; (given = npg_options_own_stage(run->options, i)); i++) {
+    const npg_custom_stage *given;
+    for (size_t i = 0; (given = npg_options_custom_stage(run->options, i)); i++) {
         if (strcmp(given->after, before->name) != 0) continue;
-        run->own[i] = npg_own_make(given, before, fields);
-        NPG_TRY(add_worker(run, &run->own[i].stage));
+        run->custom[i] = npg_custom_make(given, before, fields);
+        NPG_TRY(add_worker(run, &run->custom[i].stage));
+    }
+    return NPG_OK;
+}
+
+const npg_service *const *npg_services_of(const npg_stage *const *chain)
+{
+    static const npg_service *const none[] = {NULL};
+    return chain == npg_chain ? npg_services : none;
+}
+
+static npg_status open_services(npg_run *run, const npg_service *const *services)
+{
+    for (; *services; services++) {
+        if (run->service_count == NPG_SERVICES_MAX)
+            return npg_error(NPG_USAGE, "more than %d services", NPG_SERVICES_MAX);
+        npg_worker *worker = &run->services[run->service_count++];
+        *worker = (npg_worker){
+            .run = run, .name = (*services)->name, .service = *services, .report = json_object()};
+        json_object_set_new(run->report, worker->name, worker->report);
     }
     return NPG_OK;
 }
@@ -330,11 +364,12 @@ static npg_status add_own(npg_run *run, const npg_stage *before, uint32_t fields
 static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
 {
     uint32_t fields = 0;
+    NPG_TRY(open_services(run, npg_services_of(chain)));
     json_object_set_new(run->report, "stages", json_object());
     for (; *chain; chain++) {
         fields |= (*chain)->gives;
         NPG_TRY(add_worker(run, *chain));
-        NPG_TRY(add_own(run, *chain, fields));
+        NPG_TRY(add_custom(run, *chain, fields));
     }
     return check_chain(run);
 }
@@ -460,6 +495,14 @@ static npg_status why_closed(npg_run *run)
     return status < 0 ? status : npg_error(NPG_STOPPED, "stopped on request");
 }
 
+static void release_facts(npg_run *run)
+{
+    for (size_t i = 0; i < run->published_count; i++) {
+        npg_published *fact = &run->published[i];
+        if (fact->value) fact->kind->release(fact->value);
+    }
+}
+
 void npg_run_close(npg_run **slot)
 {
     if (!slot || !*slot) return;
@@ -467,14 +510,16 @@ void npg_run_close(npg_run **slot)
     npg_run_stop(run);
     close_ends(run);
     join_conductor(run);
+    release_facts(run);
     for (size_t i = 0; i < run->worker_count; i++)
         if (run->workers[i].kept) run->workers[i].release_kept(run->workers[i].kept);
+    for (size_t i = 0; i < run->latch_count; i++) npg_latch_close(&run->latches[i]);
     npg_chunk_unref(&run->pulled);
     npg_ring_close(&run->feed);
     npg_ring_close(&run->results);
     npg_mesh_unref(&run->facts.reference);
     json_decref(run->warnings);
-    json_decref(run->told);
+    json_decref(run->closed_reports);
     json_decref(run->report);
     npg_options_close(&run->options);
     sem_destroy(&run->event);

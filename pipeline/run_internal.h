@@ -6,16 +6,23 @@
 #include <semaphore.h>
 #include <stdatomic.h>
 
-#include "pipeline/own_stage.h"
+#include "pipeline/custom_stage.h"
 #include "pipeline/ring.h"
 
 #define NPG_STAGES_MAX   16
+#define NPG_SERVICES_MAX 2
+#define NPG_FACTS_MAX    8 /* of stages' own kinds */
+#define NPG_LATCHES_MAX  4
 #define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */
 
+/* One stage at work, or a service that begins. */
 struct npg_worker {
     npg_run *run;
-    const npg_stage *stage;
-    void *state;        /* stage->state_size bytes, owned, for one pass */
+    const char *name;
+    const npg_stage *stage;     /* NULL for a service */
+    const npg_service *service; /* NULL for a stage   */
+    bool is_in_pass;
+    void *state;        /* state_size bytes of the stage or service, owned, for one pass */
     npg_ring *in, *out; /* loans; in is NULL for the first, out for the last without pull */
     pthread_t thread;
     bool started;
@@ -24,6 +31,11 @@ struct npg_worker {
     void *kept;           /* owned for the run's whole life, see npg_worker_keep */
     void (*release_kept)(void *thing);
 };
+
+typedef struct npg_published {
+    const npg_fact_kind *kind;
+    void *value; /* owned; NULL once it was taken */
+} npg_published;
 
 struct npg_run {
     npg_options *options; /* owned */
@@ -39,7 +51,9 @@ struct npg_run {
     int64_t warning_count;
     npg_progress progress;     /* the first word of it: what is left is told from the pace since */
     json_t *report, *warnings; /* owned */
-    json_t *told;              /* the stages' reports before the solving pass, owned */
+    json_t *closed_reports;    /* of stages: before the solving pass, or as they were closed; owned */
+    npg_published published[NPG_FACTS_MAX];
+    size_t published_count;
 
     atomic_bool stop;
     atomic_size_t ended_count; /* workers of the pass that have ended */
@@ -47,7 +61,11 @@ struct npg_run {
     npg_pass pass;
     npg_worker workers[NPG_STAGES_MAX];
     size_t worker_count;
-    npg_own own[NPG_OWN_STAGES_MAX]; /* what some of the workers' stages point to */
+    npg_worker services[NPG_SERVICES_MAX];
+    size_t service_count;
+    npg_custom custom[NPG_CUSTOM_STAGES_MAX]; /* what some of the workers' stages point to */
+    npg_latch *latches[NPG_LATCHES_MAX];      /* owned, for the run's whole life; only under lock */
+    size_t latch_count;
     npg_ring *
         rings[NPG_STAGES_MAX]; /* rings[i] leads from worker i to i + 1 of the pass; owned; only under lock */
     size_t ring_count;
@@ -63,7 +81,7 @@ struct npg_run {
     size_t pulled_at;
 };
 
-/* npg_run_open() with stages of one's own in place of npg_chain. */
+/* npg_run_open() with another chain in place of npg_chain. */
 npg_status npg_run_open_chain(npg_run **run, const npg_options *options, const npg_hooks *hooks,
                               const npg_stage *const *chain);
 

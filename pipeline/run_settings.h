@@ -6,7 +6,8 @@
 
 typedef struct npg_settings {
     const char *input, *follow, *output, *device, *tuning;
-    int preset, quality; /* places of their words */
+    const char *reference; /* the user's own mesh; "": one is to be made */
+    int preset, quality;   /* places of their words */
     int64_t seed;
     int64_t ring_capacity;  /* chunks per ring                        */
     int64_t chunk_frames;   /* frames per chunk                       */

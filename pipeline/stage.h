@@ -8,8 +8,10 @@
 #include <jansson.h>
 #include <stdatomic.h>
 
+#include "pipeline/archive.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
+#include "pipeline/latch.h"
 #include "pipeline/mesh.h"
 #include "pipeline/options.h"
 #include "pipeline/plan.h"
@@ -49,22 +51,29 @@ typedef struct npg_facts {
     int64_t number_min, number_max; /* of all frames                                          */
     npg_bounds bounds_local;        /* of all usable points                                          */
     npg_frame_box box;
-    npg_plan plan;     /* with the keyframe by score                                    */
-    npg_choice choice; /* what the choosing pass should look at                        */
-    size_t own_verts;  /* vertices of the user's own mesh; 0: the reference is to be made */
-    /* mesh; it also sets plan.key at the end of the choosing pass */
+    npg_plan plan;                       /* its key is the one by score until the choosing pass has ended */
+    int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture */
+    npg_choice choice;                   /* what the choosing pass should look at                        */
+    size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
+    /* mesh */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
     double unseen_share; /* share of the reference's area that no point of its frame saw  */
     /* evaluate, at the end of the solving pass; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ...               */
     int64_t changed_at[2]; /* ... from the frame of this index on                                   */
-    /* job, before the first pass */
-    struct npg_job *job;  /* what is kept on disk to go on from; NULL: nothing (live, or no output)  */
+    /* the service job, before the first pass */
     bool is_resumed;      /* all facts above are known; only the solving pass is walked              */
     int64_t resumed_read; /* frames of the plan that need not be read again                          */
 } npg_facts;
 
 typedef struct npg_worker npg_worker;
+
+/* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it, and it
+ * is written once in a run. */
+typedef struct npg_fact_kind {
+    const char *name, *owner;
+    void (*release)(void *value); /* when the run closes */
+} npg_fact_kind;
 
 typedef struct npg_stage {
     const char *name, *help;
@@ -73,9 +82,9 @@ typedef struct npg_stage {
     unsigned passes;   /* NPG_PASS_* it takes part in                                                    */
     uint32_t needs, gives; /* NPG_FIELD_*, in the solving pass */
 
-    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run
-     * ends well at once; with facts.is_resumed only the solving pass is walked.  May be NULL. */
-    npg_status (*begin)(npg_worker *worker);
+    /* False: under these options the stage is left out of all passes.  The state has the options, nothing else
+     * is known yet.  NULL: it always takes part. */
+    bool (*takes_part)(const npg_worker *worker);
     /* Take what the pass needs.  Called on the stage's own thread.  May be NULL. */
     npg_status (*init)(npg_worker *worker);
     /* Take one chunk.  Left in *chunk, it is passed on; nulled, the stage kept it (or pushed it itself).
@@ -88,13 +97,33 @@ typedef struct npg_stage {
     /* Bytes the stage holds at most in the solving pass, and how many chunks of them it may hold back; facts
      * up to the plan are known.  The run prints the sum before it begins.  May be NULL. */
     size_t (*memory)(const npg_worker *worker, size_t *chunks_held);
+    /* Of the stage that gives NPG_FIELD_REFERENCE: how many vertices it will have at most.  Read from options
+     * and facts alone, from any thread. */
+    size_t (*verts_at_most)(const npg_worker *worker);
+    /* Add to a state on disk what this stage must find there when the run is resumed.  Called from the thread
+     * that writes the state, while this stage has seen the frames that are written and no other.  May be NULL. */
+    npg_status (*save)(const npg_worker *worker, npg_archive_writer *out);
     /* After all stages ended well: the last word (files that must come last).  May be NULL. */
     npg_status (*conclude)(npg_worker *worker);
 } npg_stage;
 
-/* In the order of the data's way, NULL at the end (stages/chain.c). */
+/* What a run has beside its stages: no frame passes through it. */
+typedef struct npg_service {
+    const char *name, *help;
+    const npg_option *options; /* may be NULL */
+    size_t state_size;         /* zeroed, filled from the options, then given to begin */
+    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run ends
+     * well at once; with facts.is_resumed only the solving pass is walked. */
+    npg_status (*begin)(npg_worker *worker);
+} npg_service;
+
+/* In the order of the data's way, NULL at the end (stages/chain.c); the services of a run with that chain. */
 extern const npg_stage *const npg_chain[];
+extern const npg_service *const npg_services[];
 extern const npg_preset npg_presets[];
+
+/* Of a run with this chain: npg_services with npg_chain, none with any other. */
+const npg_service *const *npg_services_of(const npg_stage *const *chain);
 
 /* ---- what a stage may ask of its worker ---- */
 
@@ -104,9 +133,23 @@ const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);
 
-/* Vertices of the reference mesh; before it is known, those of the user's own mesh, or as many as the option
- * faces and the points let it have. */
+/* Vertices of the reference mesh; before it is known, as many as the stage that makes it may give it. */
 size_t npg_worker_verts_at_most(const npg_worker *worker);
+
+/* Whether frames have this field (NPG_FIELD_*) when they come to the worker's stage in this run. */
+bool npg_worker_has_field(const npg_worker *worker, uint32_t field);
+
+/* Write a fact of the stage's own kind.  The run owns the value from now on, in case of failure, too. */
+npg_status npg_worker_publish(npg_worker *worker, const npg_fact_kind *kind, void *value);
+
+/* Read one: NULL while nobody has written it.  A loan for the run's whole life. */
+void *npg_worker_fact(const npg_worker *worker, const npg_fact_kind *kind);
+
+/* Read it for the last time: the caller releases the value, and the fact is gone. */
+void *npg_worker_take_fact(npg_worker *worker, const npg_fact_kind *kind);
+
+/* A latch that the run aborts when it stops or fails.  A loan for the run's whole life. */
+npg_status npg_worker_open_latch(npg_worker *worker, npg_latch **latch, int64_t count);
 
 /* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called
  * on the thing when the run closes. */
@@ -139,11 +182,17 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
 json_t *npg_worker_report(npg_worker *worker);
 
-/* What a run that goes on must say again of what came before: the stages' reports, the warnings, and whether
- * it is partial, as one JSON object (a new reference).  The reports are those of the moment before the
- * solving pass, but for the stage named, which must not change its own any more. */
-json_t *npg_worker_whole_story(npg_worker *worker, const char *finished_stage);
-void npg_worker_retell(npg_worker *worker, const json_t *story);
+/* This stage will not change its report again in this pass: states on disk have it from now on. */
+void npg_worker_close_report(npg_worker *worker);
+
+/* What a resumed run must report again of what came before: warnings, whether the run is partial, and the
+ * stages' reports, as they were before the solving pass or when they were closed.  One JSON object (a new
+ * reference). */
+json_t *npg_worker_save_reports(npg_worker *worker);
+void npg_worker_restore_reports(npg_worker *worker, const json_t *saved);
+
+/* Let every stage add to a state on disk what it needs to be resumed (npg_stage.save). */
+npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out);
 
 /* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never lost.  NULL
  * gives null. */
@@ -158,6 +207,6 @@ json_t *npg_json_real(double value);
 void npg_worker_announce_memory(npg_worker *worker);
 
 /* The whole report, for conclude(). */
-json_t *npg_worker_whole_report(npg_worker *worker);
+json_t *npg_worker_run_report(npg_worker *worker);
 
 #endif

@@ -36,20 +36,83 @@ json_t *npg_worker_report(npg_worker *worker)
 {
     return worker->report;
 }
-json_t *npg_worker_whole_report(npg_worker *worker)
+json_t *npg_worker_run_report(npg_worker *worker)
 {
     return worker->run->report;
 }
 
 size_t npg_worker_verts_at_most(const npg_worker *worker)
 {
-    const npg_facts *facts = &worker->run->facts;
-    const char *text = npg_options_get(worker->run->options, "faces");
-    size_t faces = text ? (size_t)strtoull(text, NULL, 10) : 0, by_points = 4 * facts->point_count_max;
-    if (facts->reference) return facts->reference->vert_count;
-    if (facts->own_verts) return facts->own_verts;
-    if (by_points && faces > by_points) faces = by_points;
-    return faces ? faces / 2 + 2 : 0; /* a closed mesh has half as many vertices as faces */
+    const npg_run *run = worker->run;
+    if (run->facts.reference) return run->facts.reference->vert_count;
+    for (size_t i = 0; i < run->worker_count; i++)
+        if (run->workers[i].stage->verts_at_most)
+            return run->workers[i].stage->verts_at_most(&run->workers[i]);
+    return 0;
+}
+
+bool npg_worker_has_field(const npg_worker *worker, uint32_t field)
+{
+    for (const npg_worker *before = worker->run->workers; before < worker; before++)
+        if (before->is_in_pass && (before->stage->gives & field)) return true;
+    return false;
+}
+
+/* ---- facts of stages' own kinds ---- */
+
+static npg_published *find_fact(npg_run *run, const npg_fact_kind *kind)
+{
+    for (size_t i = 0; i < run->published_count; i++)
+        if (run->published[i].kind == kind) return &run->published[i];
+    return NULL;
+}
+
+npg_status npg_worker_publish(npg_worker *worker, const npg_fact_kind *kind, void *value)
+{
+    npg_run *run = worker->run;
+    npg_status status = NPG_OK;
+    pthread_mutex_lock(&run->lock);
+    if (strcmp(kind->owner, worker->name) != 0 || find_fact(run, kind) ||
+        run->published_count == NPG_FACTS_MAX)
+        status = npg_error(NPG_USAGE, "the fact %s is not stage %s's to write, or is written", kind->name,
+                           worker->name);
+    else
+        run->published[run->published_count++] = (npg_published){kind, value};
+    pthread_mutex_unlock(&run->lock);
+    if (status) kind->release(value);
+    return status;
+}
+
+void *npg_worker_fact(const npg_worker *worker, const npg_fact_kind *kind)
+{
+    npg_run *run = worker->run;
+    pthread_mutex_lock(&run->lock);
+    const npg_published *fact = find_fact(run, kind);
+    void *value = fact ? fact->value : NULL;
+    pthread_mutex_unlock(&run->lock);
+    return value;
+}
+
+void *npg_worker_take_fact(npg_worker *worker, const npg_fact_kind *kind)
+{
+    npg_run *run = worker->run;
+    pthread_mutex_lock(&run->lock);
+    npg_published *fact = find_fact(run, kind);
+    void *value = fact ? fact->value : NULL;
+    if (fact) fact->value = NULL;
+    pthread_mutex_unlock(&run->lock);
+    return value;
+}
+
+npg_status npg_worker_open_latch(npg_worker *worker, npg_latch **latch, int64_t count)
+{
+    npg_run *run = worker->run;
+    NPG_REQUIRE(run->latch_count < NPG_LATCHES_MAX);
+    NPG_TRY(npg_latch_open(latch, count));
+    pthread_mutex_lock(&run->lock);
+    run->latches[run->latch_count++] = *latch;
+    pthread_mutex_unlock(&run->lock);
+    return NPG_OK;
 }
 
 void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing))
@@ -75,7 +138,7 @@ npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk)
     return npg_ring_pop(worker->run->feed, chunk);
 }
 
-/* ---- log, warnings, progress ---- */
+/* ---- log and warnings ---- */
 
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
 {
@@ -84,7 +147,7 @@ void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, cons
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    npg_run_log(worker->run, level, worker->stage->name, frame, text);
+    npg_run_log(worker->run, level, worker->name, frame, text);
 }
 
 static bool is_listed(const json_t *warnings, const json_t *entry)
@@ -101,13 +164,13 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    npg_run_log(worker->run, NPG_LOG_WARNING, worker->stage->name, frame, text);
+    npg_run_log(worker->run, NPG_LOG_WARNING, worker->name, frame, text);
     json_t *entry = json_object();
-    json_object_set_new(entry, "stage", json_string(worker->stage->name));
+    json_object_set_new(entry, "stage", json_string(worker->name));
     json_object_set_new(entry, "message", npg_json_text(text));
     if (frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
     pthread_mutex_lock(&worker->run->lock);
-    /* what a run that goes on was told before it stopped may come again */
+    /* what a resumed run has warned of before it stopped may come again */
     if (!worker->run->facts.is_resumed || !is_listed(worker->run->warnings, entry)) {
         if (json_array_size(worker->run->warnings) < NPG_WARNINGS_MAX)
             json_array_append(worker->run->warnings, entry);
@@ -118,32 +181,50 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     pthread_mutex_unlock(&worker->run->lock);
 }
 
-json_t *npg_worker_whole_story(npg_worker *worker, const char *finished_stage)
+/* ---- what a resumed run must have again ---- */
+
+void npg_worker_close_report(npg_worker *worker)
 {
     npg_run *run = worker->run;
     pthread_mutex_lock(&run->lock);
-    json_t *stages = json_deep_copy(run->told);
-    for (size_t i = 0; i < run->worker_count; i++)
-        if (!strcmp(run->workers[i].stage->name, finished_stage))
-            json_object_set_new(stages, finished_stage, json_deep_copy(run->workers[i].report));
-    json_t *story = json_pack("{so so sb}", "stages", stages, "warnings", json_deep_copy(run->warnings),
-                              "partial", (int)run->is_partial);
+    if (run->closed_reports)
+        json_object_set_new(run->closed_reports, worker->name, json_deep_copy(worker->report));
     pthread_mutex_unlock(&run->lock);
-    return story;
 }
 
-void npg_worker_retell(npg_worker *worker, const json_t *story)
+json_t *npg_worker_save_reports(npg_worker *worker)
+{
+    npg_run *run = worker->run;
+    pthread_mutex_lock(&run->lock);
+    json_t *saved = json_pack("{so so sb}", "stages", json_deep_copy(run->closed_reports), "warnings",
+                              json_deep_copy(run->warnings), "partial", (int)run->is_partial);
+    pthread_mutex_unlock(&run->lock);
+    return saved;
+}
+
+void npg_worker_restore_reports(npg_worker *worker, const json_t *saved)
 {
     npg_run *run = worker->run;
     pthread_mutex_lock(&run->lock);
     for (size_t i = 0; i < run->worker_count; i++)
         json_object_update(run->workers[i].report,
-                           json_object_get(json_object_get(story, "stages"), run->workers[i].stage->name));
-    json_array_extend(run->warnings, json_object_get(story, "warnings"));
-    run->warning_count += json_array_size(json_object_get(story, "warnings"));
-    run->is_partial |= json_is_true(json_object_get(story, "partial"));
+                           json_object_get(json_object_get(saved, "stages"), run->workers[i].name));
+    json_array_extend(run->warnings, json_object_get(saved, "warnings"));
+    run->warning_count += json_array_size(json_object_get(saved, "warnings"));
+    run->is_partial |= json_is_true(json_object_get(saved, "partial"));
     pthread_mutex_unlock(&run->lock);
 }
+
+npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out)
+{
+    const npg_run *run = worker->run;
+    for (size_t i = 0; i < run->worker_count; i++)
+        if (run->workers[i].is_in_pass && run->workers[i].stage->save)
+            NPG_TRY(run->workers[i].stage->save(&run->workers[i], out));
+    return NPG_OK;
+}
+
+/* ---- progress ---- */
 
 /* Seconds left by the pace since the run's first word of progress; -1 while there is no pace yet.  Called
  * under the lock. */
@@ -161,7 +242,7 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     if (!run->hooks.progress) return;
     npg_progress now = *progress;
     now.struct_size = sizeof now;
-    now.stage = worker->stage->name;
+    now.stage = worker->name;
     now.elapsed_s = npg_clock_s() - run->opened_s;
     pthread_mutex_lock(&run->lock);
     now.left_s = time_left(run, &now);
@@ -216,7 +297,7 @@ void *npg_worker_main(void *argument)
     double since = npg_clock_s();
     npg_status status = work(worker);
     if (status) {
-        npg_run_fail(worker->run, worker->stage->name, status);
+        npg_run_fail(worker->run, worker->name, status);
     } else if (worker->out && worker->out != worker->run->results) {
         npg_ring_end(worker->out); /* the results end with the run, when its last files are written */
     }

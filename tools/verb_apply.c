@@ -14,6 +14,8 @@
 #include "geometry/attach.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
+#include "job/file_facts.h"
+#include "job/frame_log.h"
 #include "pipeline/file.h"
 #include "tools/cli.h"
 #include "tools/job_motion.h"

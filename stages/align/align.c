@@ -65,20 +65,20 @@ static void uninit(npg_worker *worker)
     npg_release(&s->trial);
 }
 
-/* ---- what a run that goes on needs: both sides and the figures so far ---- */
+/* ---- what a resumed run needs: both sides and the figures so far ---- */
 
 static size_t pose_bytes(const state *s)
 {
     return npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
 }
 
-/* After the last frame that a window waits for. */
-static npg_status leave(npg_worker *worker)
+/* The last frame that a window waits for takes it along: it comes to the stage that writes the state just when the
+ * window can be solved. */
+static npg_status attach_state(const state *s, npg_frame *frame)
 {
-    const state *s = npg_worker_state(worker);
-    size_t bytes = pose_bytes(s), at = 0;
+    size_t bytes = pose_bytes(s), at = 0, size = 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum;
     unsigned char *all;
-    NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum));
+    NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, size));
     for (int i = 0; i < 2; i++) {
         const side plain = {.index = s->sides[i].index,
                             .has_before = s->sides[i].has_before,
@@ -89,19 +89,18 @@ static npg_status leave(npg_worker *worker)
         at += sizeof plain + 2 * bytes;
     }
     memcpy(all + at, &s->sum, sizeof s->sum);
-    npg_status status = npg_job_leave_poses(npg_worker_facts(worker)->job, s->read, all, at + sizeof s->sum);
-    npg_release(&all);
-    return status;
+    frame->align_state = all;
+    frame->align_state_size = size;
+    return NPG_OK;
 }
 
-static npg_status take_up(npg_worker *worker)
+static npg_status restore_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     size_t bytes = pose_bytes(s), size, at = 0;
-    const unsigned char *all =
-        npg_archive_find(npg_job_archive(npg_worker_facts(worker)->job), "poses", &size);
+    const unsigned char *all = npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN, &size);
     if (!all || size != 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum)
-        return npg_error(NPG_BAD_INPUT, "the state to go on from has no poses for this reference");
+        return npg_error(NPG_BAD_INPUT, "the state to resume from has no poses for this reference");
     for (int i = 0; i < 2; i++) {
         side plain;
         memcpy(&plain, all + at, sizeof plain);
@@ -138,7 +137,7 @@ static npg_status open_tracker(npg_worker *worker)
     NPG_TRY(npg_alloc_array(&s->start, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
     NPG_TRY(npg_alloc_array(&s->trial, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
-    return npg_worker_facts(worker)->is_resumed ? take_up(worker) : NPG_OK;
+    return npg_worker_facts(worker)->is_resumed ? restore_state(worker) : NPG_OK;
 }
 
 /* The pose to start from becomes `now`, the last one `before`. */
@@ -249,7 +248,6 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    if (!s->is_on) return NPG_OK;
     if (!s->tracker) {
         s->read = facts->resumed_read;
         NPG_TRY(open_tracker(worker));
@@ -258,7 +256,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)frame->number));
         s->read++;
-        if (facts->job && closes_window(&facts->plan, s->read)) NPG_TRY(leave(worker));
+        if (npg_job_of(worker) && closes_window(&facts->plan, s->read)) NPG_TRY(attach_state(s, frame));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     return NPG_OK;
@@ -276,13 +274,18 @@ static npg_status flush(npg_worker *worker)
     return NPG_OK;
 }
 
+static bool takes_part(const npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    return s->is_on;
+}
+
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     size_t verts = npg_worker_verts_at_most(worker), nodes = (size_t)s->nodes;
     *chunks_held = 1;
-    if (!s->is_on) return 0;
     /* two sides of two poses; blocks of the equations, about 20 pairs a node; per vertex weights and the
      * graph's search for them, positions, normals */
     return nodes * (4 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 320 +
@@ -298,6 +301,7 @@ const npg_stage npg_stage_align = {
     .passes = NPG_PASS_SOLVE,
     .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
     .gives = NPG_FIELD_POSE,
+    .takes_part = takes_part,
     .process = process,
     .flush = flush,
     .uninit = uninit,

@@ -39,14 +39,29 @@ npg_status npg_sights_add(npg_sights *sights, const npg_frame *frame, const npg_
     return copy_points(sight, frame, box);
 }
 
-void npg_sights_clear(npg_sights *sights)
+static void release_sights(void *value)
 {
+    npg_sights *sights = value;
+    npg_sights_close(&sights);
+}
+
+const npg_fact_kind npg_fact_sights = {"sights", "keyframe", release_sights};
+
+npg_status npg_sights_open(npg_sights **sights)
+{
+    return npg_alloc(sights, NPG_FOR_RUN, sizeof **sights);
+}
+
+void npg_sights_close(npg_sights **slot)
+{
+    npg_sights *sights = *slot;
+    if (!sights) return;
     for (size_t i = 0; i < sights->count; i++) {
         npg_release(&sights->list[i].points);
         npg_release(&sights->list[i].normals);
     }
     npg_release(&sights->list);
-    *sights = (npg_sights){0};
+    npg_release(slot);
 }
 
 size_t npg_sights_find(const npg_sights *sights, int64_t index)

@@ -10,6 +10,7 @@
 #include "align/tracker.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
+#include "pipeline/stage.h"
 
 #define NPG_SIGHT_POINTS 8000 /* of a frame, at most */
 
@@ -29,7 +30,11 @@ typedef struct npg_sights {
 /* Copy a cleaned frame's points, evenly thinned.  Skipped frames are left out.  NPG_MEMORY. */
 npg_status npg_sights_add(npg_sights *sights, const npg_frame *frame, const npg_frame_box *box,
                           bool is_candidate);
-void npg_sights_clear(npg_sights *sights);
+/* What stage keyframe saw in the choosing pass, for the stage that cuts welds; not there where nothing is cut. */
+extern const npg_fact_kind npg_fact_sights;
+
+npg_status npg_sights_open(npg_sights **sights);
+void npg_sights_close(npg_sights **sights);
 
 /* Where the frame with this index is in the list; count when it is not there. */
 size_t npg_sights_find(const npg_sights *sights, int64_t index);

@@ -4,13 +4,14 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "evaluate/evaluate.h"
 #include "evaluate/misfit.h"
 #include "evaluate/topology.h"
-#include "export/export.h"
 #include "geometry/kdtree.h"
 #include "geometry/thin.h"
+#include "job/frame_log.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/order.h"
@@ -57,7 +58,11 @@ typedef struct evaluate_state {
     npg_misfit_finder *finder;
     npg_topology *topology;
     npg_truth *truth;
-    bool is_tied;          /* the truth, in a frame */
+    bool is_tied; /* the truth, in a frame */
+    float *
+        tied_vert_unit; /* V x 3, owned: the surface in that frame, or in that of the run that is resumed; NULL before */
+    size_t tied_count;
+    int64_t tied_number;
     float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
     npg_surface_hit *hits; /* N; owned */
     float *vert_unit;      /* W x 3; owned */
@@ -225,23 +230,59 @@ static npg_figures no_figures(void)
     return figures;
 }
 
-/* The truth is tied in the first frame that is compared; a run that goes on ties it in the same one. */
+/* Correspondence is tied in the first frame that is compared; a resumed run ties it in the same one. */
+static npg_status tie(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    size_t size = frame->vert_count * 3 * sizeof(float);
+    if (state->tied_vert_unit) return NPG_OK;
+    NPG_TRY(npg_alloc(&state->tied_vert_unit, NPG_FOR_MESH, size));
+    memcpy(state->tied_vert_unit, frame->vert_unit, size);
+    state->tied_count = frame->vert_count;
+    state->tied_number = frame->number;
+    return NPG_OK;
+}
+
 static npg_status compare_truth(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     uint64_t seed = (uint64_t)npg_worker_settings(worker)->seed;
-    int64_t number;
-    size_t vert_count;
-    const float *tied = facts->job ? npg_job_tied(facts->job, &number, &vert_count) : NULL;
-    if (facts->job && !tied)
-        NPG_TRY(npg_job_leave_tied(facts->job, frame->number, frame->vert_unit, frame->vert_count));
-    if (tied && !state->is_tied) {
-        npg_frame first = {.number = number, .vert_count = vert_count, .vert_unit = (float *)tied};
+    bool is_restored = state->tied_vert_unit && !state->is_tied;
+    NPG_TRY(tie(worker, frame));
+    if (is_restored) {
+        npg_frame first = {.number = state->tied_number,
+                           .vert_count = state->tied_count,
+                           .vert_unit = state->tied_vert_unit};
         NPG_TRY(npg_truth_compare(state->truth, &first, facts, seed));
     }
     state->is_tied = true;
     return npg_truth_compare(state->truth, frame, facts, seed);
+}
+
+/* ---- the state on disk ---- */
+
+#define BLOCK_TIED        "evaluate.tied"
+#define BLOCK_TIED_NUMBER "evaluate.tied.number"
+
+static npg_status save(const npg_worker *worker, npg_archive_writer *out)
+{
+    const evaluate_state *state = npg_worker_state(worker);
+    if (!state->tied_vert_unit) return NPG_OK;
+    NPG_TRY(npg_archive_put(out, BLOCK_TIED, state->tied_vert_unit, state->tied_count * 3 * sizeof(float)));
+    return npg_archive_put(out, BLOCK_TIED_NUMBER, &state->tied_number, sizeof state->tied_number);
+}
+
+static npg_status restore_tied(evaluate_state *state, const npg_archive *in)
+{
+    size_t size;
+    const float *tied = npg_archive_find(in, BLOCK_TIED, &size);
+    if (!tied) return NPG_OK;
+    NPG_TRY(npg_archive_get(in, BLOCK_TIED_NUMBER, &state->tied_number, sizeof state->tied_number));
+    NPG_TRY(npg_alloc(&state->tied_vert_unit, NPG_FOR_MESH, size));
+    memcpy(state->tied_vert_unit, tied, size);
+    state->tied_count = size / (3 * sizeof(float));
+    return NPG_OK;
 }
 
 static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
@@ -397,19 +438,17 @@ static npg_status take_line(void *user, const json_t *line, const char *text, si
     state->good_count += is_good;
     state->skipped_count += is_skipped;
     if (!is_good && !is_skipped) NPG_TRY(note_bad(state, frame.number));
-    npg_misfits_take(&frame.figures, json_object_get(line, "misfits"));
+    npg_frame_line_misfits(&frame.figures, json_object_get(line, "misfits"));
     return watch(worker, &frame);
 }
 
-static npg_status take_up(npg_worker *worker)
+static npg_status restore(npg_worker *worker)
 {
-    char *path;
+    npg_job *job = npg_job_of(worker);
     int64_t count, bytes;
-    npg_job_exported(npg_worker_facts(worker)->job, &count, &bytes);
-    NPG_TRY(npg_join_path(&path, npg_worker_settings(worker)->output, "frames.partial.jsonl"));
-    npg_status status = npg_frame_lines_each(path, bytes, take_line, worker);
-    npg_release(&path);
-    return status;
+    NPG_TRY(restore_tied(npg_worker_state(worker), npg_job_archive(job)));
+    npg_job_exported(job, &count, &bytes);
+    return npg_frame_log_each(npg_worker_settings(worker)->output, bytes, take_line, worker);
 }
 
 /* ---- the stage ---- */
@@ -417,7 +456,7 @@ static npg_status take_up(npg_worker *worker)
 static npg_status init(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
-    if (npg_worker_facts(worker)->is_resumed) NPG_TRY(take_up(worker));
+    if (npg_worker_facts(worker)->is_resumed) NPG_TRY(restore(worker));
     if (!state->truth_folder[0]) return NPG_OK;
     return npg_truth_open(&state->truth, state->truth_folder, npg_worker_settings(worker)->confine);
 }
@@ -455,6 +494,7 @@ static void uninit(npg_worker *worker)
     npg_release(&state->nearest);
     npg_release(&state->vert_areas);
     npg_release(&state->bad);
+    npg_release(&state->tied_vert_unit);
 }
 
 /* Points, hits and distances, with the k-d tree about as much again; per vertex of the reference the shape,
@@ -519,4 +559,5 @@ const npg_stage npg_stage_evaluate = {.name = "evaluate",
                                       .process = process,
                                       .flush = flush,
                                       .uninit = uninit,
+                                      .save = save,
                                       .memory = memory};

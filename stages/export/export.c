@@ -10,6 +10,7 @@
 #include "export/forms/writer.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
+#include "job/frame_log.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
@@ -59,12 +60,12 @@ static npg_status check_prefix(const char *prefix)
 static npg_status read_options(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    const char *reference = npg_options_get(npg_worker_options(worker), "reference"), *format = NULL;
+    const char *reference = npg_worker_settings(worker)->reference, *format = NULL;
     NPG_TRY(npg_placement_parse(&state->map, state->axes));
     state->map.scale = state->scale;
     NPG_TRY(check_prefix(state->prefix));
     NPG_TRY(npg_forms_choose(&state->choice, state->exports, state->format));
-    if (reference && reference[0]) format = npg_reader_for(reference);
+    if (reference[0]) format = npg_reader_for(reference);
     state->like = format && !strcmp(format, "obj") ? reference : NULL;
     state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
     return NPG_OK;
@@ -119,8 +120,8 @@ static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
 static npg_status check_reference(const npg_worker *worker)
 {
     static const char *const names[] = {"reference.ply", "reference.obj"};
-    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
-    for (size_t i = 0; reference && reference[0] && i < sizeof names / sizeof *names; i++) {
+    const char *reference = npg_worker_settings(worker)->reference;
+    for (size_t i = 0; reference[0] && i < sizeof names / sizeof *names; i++) {
         char *path;
         NPG_TRY(npg_join_path(&path, output_of(worker), names[i]));
         bool is_ours = is_same_file(path, reference);
@@ -190,7 +191,7 @@ static npg_form_facts form_facts(const npg_worker *worker)
                             .diagonal = is_known ? state->scale * box->diagonal : 0,
                             .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
                             .voxel_share = state->voxel_share,
-                            .has_grids = facts->job != NULL,
+                            .has_grids = npg_job_of(worker) != NULL,
                             .placement = &state->map};
 }
 
@@ -200,10 +201,9 @@ static uint64_t bytes_of_meshes(const npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    const char *reference = npg_options_get(npg_worker_options(worker), "reference");
     bool is_obj = state->choice.is_obj;
     uint64_t verts = npg_worker_verts_at_most(worker), per_vert = is_obj ? 30 : 12;
-    if (facts->frame_count < 0 || (reference && reference[0])) return 0;
+    if (facts->frame_count < 0 || npg_worker_settings(worker)->reference[0]) return 0;
     if (state->with_normals) per_vert *= 2;
     npg_form_facts of_forms = form_facts(worker);
     return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (is_obj ? 20 : 13)) +
@@ -217,6 +217,12 @@ static npg_status check_forms(npg_worker *worker)
     set_centre(state, &npg_worker_facts(worker)->box);
     npg_form_facts of_forms = form_facts(worker);
     return npg_forms_check(&state->choice, &of_forms);
+}
+
+/* The form vdb has the latent grids of all windows. */
+static bool keeps_grids(const export_state *state)
+{
+    return npg_forms_name(state->exports, "vdb");
 }
 
 static npg_status prepare_folder(npg_worker *worker)
@@ -234,23 +240,23 @@ static npg_status prepare_folder(npg_worker *worker)
     npg_release(&meshes);
     NPG_TRY(status);
     NPG_TRY(npg_frame_log_open(&state->list, output));
-    npg_job *job = npg_worker_facts(worker)->job;
-    return job ? npg_job_write(job) : NPG_OK;
+    npg_job *job = npg_job_of(worker);
+    return job ? npg_job_write(job, keeps_grids(state)) : NPG_OK;
 }
 
 /* What an earlier run of the same job wrote stays. */
-static npg_status take_up_folder(npg_worker *worker)
+static npg_status resume_folder(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     const char *output = output_of(worker);
-    npg_job *job = npg_worker_facts(worker)->job;
+    npg_job *job = npg_job_of(worker);
     int64_t count, bytes;
     NPG_TRY(check_forms(worker));
     NPG_TRY(npg_folder_probe(output));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     npg_job_exported(job, &count, &bytes);
     NPG_TRY(npg_frame_log_resume(&state->list, output, bytes, &state->mesh_count, &state->skipped_count));
-    return npg_job_write(job);
+    return npg_job_write(job, keeps_grids(state));
 }
 
 static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit, bool with_normals,
@@ -299,11 +305,11 @@ static npg_status begin_meshes(npg_worker *worker)
 static npg_status list_frame(npg_worker *worker, const npg_frame *frame, const char *file)
 {
     export_state *state = npg_worker_state(worker);
-    npg_job *job = npg_worker_facts(worker)->job;
+    npg_job *job = npg_job_of(worker);
     int64_t lines, bytes;
     NPG_TRY(npg_frame_log_add(state->list, frame, output_of(worker), file));
     npg_frame_log_size(state->list, &lines, &bytes);
-    if (job) npg_job_note_exported(job, lines, bytes);
+    if (job) npg_job_set_exported(job, lines, bytes);
     return NPG_OK;
 }
 
@@ -420,7 +426,7 @@ static json_t *json_of_options(const npg_options *options)
 static npg_status conclude(npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);
-    json_t *whole = npg_worker_whole_report(worker), *head = json_object();
+    json_t *whole = npg_worker_run_report(worker), *head = json_object();
     if (!output_of(worker)[0]) {
         json_decref(head);
         return NPG_OK;
@@ -465,7 +471,7 @@ static npg_status init(npg_worker *worker)
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
         NPG_TRY(npg_folder_probe(output_of(worker)));
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
-    return facts->is_resumed ? take_up_folder(worker) : prepare_folder(worker);
+    return facts->is_resumed ? resume_folder(worker) : prepare_folder(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
@@ -501,7 +507,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     int64_t frame_count = npg_worker_facts(worker)->frame_count;
     *chunks_held = 1;
     size_t verts = npg_worker_verts_at_most(worker);
-    bool has_forms = npg_options_get(npg_worker_options(worker), "export")[0];
+    const export_state *state = npg_worker_state(worker);
+    bool has_forms = state->exports[0];
     return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + (60 + (has_forms ? 200 : 0)) * verts +
            (has_forms ? 4 << 20 : 512 << 10);
 }

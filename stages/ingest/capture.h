@@ -5,6 +5,7 @@
 #include "ingest/frame_files.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
+#include "pipeline/options.h"
 
 /* What to do about numbers that no file has. */
 typedef enum npg_missing {
@@ -23,6 +24,10 @@ typedef struct npg_capture {
     size_t cache_bytes, cache_limit;
     uint64_t reads; /* files parsed so far */
 } npg_capture;
+
+/* The files that the options of a run (input, frames, missing, confine) name as its frames; nothing is read.  As
+ * npg_frame_files_open() and, with confine, npg_frame_files_confine(). */
+npg_status npg_capture_list(npg_frame_files **list, const npg_options *options);
 
 /* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open. */
 npg_status npg_capture_open(npg_capture **capture, const char *input, const char *selection,

@@ -86,6 +86,18 @@ static void tell_list(npg_worker *worker, const npg_frame_files *list)
                     list->count, is_held ? "repeat the frame before them" : "are skipped", numbers);
 }
 
+npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
+{
+    npg_settings settings;
+    state s = {0};
+    npg_options_fill(options, npg_run_options, &settings);
+    npg_options_fill(options, ingest_options, &s);
+    NPG_TRY(npg_frame_files_open(list, settings.input, s.frames, s.missing != NPG_MISSING_IGNORE));
+    npg_status status = settings.confine ? npg_frame_files_confine(*list, settings.input) : NPG_OK;
+    if (status) npg_frame_files_close(list);
+    return status;
+}
+
 static npg_status open_capture(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);

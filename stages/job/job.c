@@ -1,596 +1,119 @@
-/* Job: the folder OUT/job, its lock, its states, and what stages leave for them. */
+/* job: the service that, before anything else, finds out whether an earlier run of the same job can be resumed. */
 #include "job/job.h"
 
-#include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
-#include "export/forms/forms.h"
-#include "optimize/record.h"
+#include "job/frame_log.h"
 #include "pipeline/file.h"
 
-#define STATE_NAME "window_%06lld.%s"
+typedef struct job_state {
+    bool restart, append;
+} job_state;
 
-typedef struct left_poses { /* what align left for a moment */
-    int64_t read;
-    void *bytes; /* owned */
-    size_t size;
-} left_poses;
+static const npg_option options[] = {
+    {"restart",
+     "Discard what an earlier run left in the output folder; without it a run of the same job goes on where "
+     "that one was",
+     NPG_OPTION_FLAG, offsetof(job_state, restart), "no", 0, 0, NULL, NULL},
+    {"append", "Go on with frames that came since the job was done (neupig append)", NPG_OPTION_FLAG,
+     offsetof(job_state, append), "no", 0, 0, NULL, NULL},
+    {0}};
 
-struct npg_job {
-    char *output, *folder; /* owned */
-    int lock_fd;
-    json_t *then, *now;   /* owned; what an earlier run was made of, and this one; NULL once written */
-    int64_t frame_count;  /* of the input, gaps included */
-    npg_archive *archive; /* owned */
-    char *grids_path;     /* of the archive, owned */
-    int64_t serial;       /* of the newest state in place, -1: none */
-    int64_t forward_serial;
-    bool keeps_grids; /* of all windows, for the form vdb */
-    bool forgets;     /* older states go when the job is written */
-
-    pthread_mutex_t lock; /* guards what follows */
-    pthread_cond_t changed;
-    bool is_written;
-    int64_t exported_count, list_bytes;
-    left_poses *poses; /* owned */
-    size_t pose_count, pose_capacity;
-    float *tied; /* owned */
-    size_t tied_count;
-    int64_t tied_number;
-};
-
-/* ---- paths ---- */
-
-static npg_status state_path(char **path, const npg_job *job, int64_t serial, const char *ending)
+static void release_job(void *value)
 {
-    char name[64];
-    snprintf(name, sizeof name, STATE_NAME, (long long)serial, ending);
-    return npg_join_path(path, job->folder, name);
+    npg_job *job = value;
+    npg_job_close(&job);
 }
 
-/* The serial of a state's file (also of its hidden, unfinished form), -1 for other files. */
-static int64_t serial_of(const char *name)
+static const npg_fact_kind job_fact = {"job", "job", release_job};
+
+npg_job *npg_job_of(const npg_worker *worker)
 {
-    char ending[8], rest[8];
-    long long serial;
-    if (name[0] == '.') name++;
-    int fields = sscanf(name, "window_%lld.%3[a-z]%7s", &serial, ending, rest);
-    if (fields < 2 || serial < 0 || (strcmp(ending, "npg") != 0 && strcmp(ending, "vdb") != 0)) return -1;
-    return fields == 2 || !strcmp(rest, ".part") ? serial : -1;
+    return npg_worker_fact(worker, &job_fact);
 }
 
-/* Records of windows, also their hidden, unfinished form. */
-static bool is_motion(const char *name)
+/* ---- resuming ---- */
+
+static void report_place(npg_worker *worker, npg_job *job)
 {
-    return !strncmp(name + (name[0] == '.'), "motion_", 7);
+    const npg_facts *facts = npg_worker_facts(worker);
+    int64_t count, bytes;
+    npg_job_exported(job, &count, &bytes);
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "resumes an earlier run: %lld of %lld frames are solved and %lld written",
+                   (long long)(facts->plan.appended_at + facts->resumed_read), (long long)facts->frame_count,
+                   (long long)count);
+    json_object_set_new(npg_worker_report(worker), "resumed_frames",
+                        json_integer((json_int_t)(facts->plan.appended_at + facts->resumed_read)));
 }
 
-/* Call visit(job, name, serial) for every file of a state. */
-static npg_status each_state(npg_job *job,
-                             npg_status (*visit)(npg_job *job, const char *name, int64_t serial))
+/* Where a capture was one joint window, the frames that follow get windows as long, or as the options say. */
+static void widen_plan(npg_plan *plan, int64_t window_asked, int64_t overlap_asked)
 {
-    npg_status status = NPG_OK;
-    DIR *listing = opendir(job->folder);
-    if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
-    for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (serial_of(entry->d_name) >= 0) status = visit(job, entry->d_name, serial_of(entry->d_name));
-    closedir(listing);
-    return status;
+    if (plan->window < plan->frame_count) return;
+    if (window_asked > plan->window) plan->window = window_asked;
+    plan->overlap = overlap_asked < plan->frame_count ? overlap_asked : plan->frame_count - 1;
+    if (plan->overlap >= plan->window) plan->overlap = plan->window - 1;
 }
 
-static npg_status remove_file(const npg_job *job, const char *name)
+static npg_status remove_done(npg_worker *worker)
 {
     char *path;
-    NPG_TRY(npg_join_path(&path, job->folder, name));
+    NPG_TRY(npg_join_path(&path, npg_worker_settings(worker)->output, "done.json"));
     npg_status status = NPG_OK;
     if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
     npg_release(&path);
     return status;
 }
 
-static npg_status remove_state(npg_job *job, const char *name, int64_t serial)
+/* Each step can be broken off and done again: job.json first says that there are more frames. */
+static npg_status begin_append(npg_worker *worker, npg_job *job)
 {
-    (void)serial;
-    return remove_file(job, name);
-}
-
-static npg_status remove_motions(npg_job *job)
-{
-    npg_status status = NPG_OK;
-    DIR *listing = opendir(job->folder);
-    if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
-    for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (is_motion(entry->d_name)) status = remove_file(job, entry->d_name);
-    closedir(listing);
-    return status;
-}
-
-/* Keep the two newest and the one that later frames go on from; grids that are to be exported stay, too. */
-static npg_status remove_old(npg_job *job, const char *name, int64_t serial)
-{
-    bool stays = serial == job->serial || serial == job->serial - 1 || serial == job->forward_serial;
-    stays = stays || (job->keeps_grids && strstr(name, ".vdb"));
-    return stays && name[0] != '.' ? NPG_OK : remove_file(job, name);
-}
-
-/* ---- the lock ---- */
-
-static npg_status take_lock(npg_job *job)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, job->folder, "lock"));
-    npg_status status = NPG_OK;
-    job->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (job->lock_fd < 0)
-        status = npg_error_errno(NPG_DISK, "can't open %s", path);
-    else if (flock(job->lock_fd, LOCK_EX | LOCK_NB))
-        status = errno == EWOULDBLOCK ? npg_error(NPG_USAGE,
-                                                  "another run is at work on %s: wait for its end, or choose "
-                                                  "another output folder",
-                                                  job->output)
-                                      : npg_error_errno(NPG_DISK, "can't lock %s", path);
-    npg_release(&path);
-    return status;
-}
-
-/* ---- what is there ---- */
-
-static npg_status read_json(json_t **value, const char *folder, const char *name)
-{
-    char *path;
-    json_error_t error;
-    *value = NULL;
-    NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = NPG_OK;
-    if (access(path, F_OK) == 0) {
-        int fd;
-        status = npg_file_open_plain(&fd, path, NPG_USAGE);
-        *value = status ? NULL : json_loadfd(fd, 0, &error);
-        if (fd >= 0) close(fd);
-        if (!status && !json_is_object(*value))
-            status = npg_error(NPG_USAGE, "%s is damaged (line %d: %s)", path, error.line, error.text);
-    } else if (errno != ENOENT) {
-        status = npg_error_errno(NPG_DISK, "can't look for %s", path);
-    }
-    if (status) json_decref(*value);
-    if (status) *value = NULL;
-    npg_release(&path);
-    return status;
-}
-
-static npg_status check_listed(const npg_job *job, const json_t *files)
-{
-    for (size_t i = 0; i < json_array_size(files); i++) {
-        const json_t *entry = json_array_get(files, i);
-        const char *name = json_string_value(json_object_get(entry, "path"));
-        struct stat info;
-        char *path;
-        NPG_TRY(npg_join_path(&path, job->output, name ? name : ""));
-        bool is_there = name && npg_path_stays(name) && !stat(path, &info) &&
-                        info.st_size == (off_t)json_integer_value(json_object_get(entry, "bytes"));
-        npg_release(&path);
-        if (!is_there)
-            return npg_error(NPG_USAGE, "%s/%s is missing or has another size than when it was done",
-                             job->output, name ? name : "?");
-    }
+    npg_facts *facts = npg_worker_facts(worker);
+    int64_t lines, bytes, frame_count = npg_job_frame_count(job);
+    NPG_TRY(npg_job_open_forward(job));
+    NPG_TRY(npg_job_restore_facts(worker, job));
+    npg_plan plan = facts->plan;
+    widen_plan(&plan, facts->window_asked, facts->overlap_asked);
+    facts->plan = npg_plan_append(&plan, frame_count);
+    facts->frame_count = frame_count;
+    facts->resumed_read = 0;
+    NPG_TRY(npg_job_extend(job));
+    NPG_TRY(remove_done(worker));
+    NPG_TRY(npg_frame_log_shorten(npg_worker_settings(worker)->output, npg_plan_window(&facts->plan, 0).first,
+                                  &lines, &bytes));
+    npg_job_set_exported(job, lines, bytes);
     return NPG_OK;
 }
 
-/* Whether the earlier run ended well, and how. */
-static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_partial)
+static npg_status begin(npg_worker *worker)
 {
-    json_t *done;
-    *is_done = *was_partial = false;
-    NPG_TRY(read_json(&done, job->output, "done.json"));
-    if (!done) return NPG_OK;
-    size_t frames = json_array_size(json_object_get(job->then, "frames"));
-    *is_done = json_integer_value(json_object_get(done, "frames")) == (json_int_t)frames;
-    *was_partial = json_integer_value(json_object_get(done, "exit_code")) == 7;
-    npg_status status = *is_done ? check_listed(job, json_object_get(done, "files")) : NPG_OK;
-    json_decref(done);
-    return status;
-}
-
-/* ---- reading states ---- */
-
-static npg_status check_list(const npg_job *job, const npg_archive *archive)
-{
-    npg_job_list list;
-    int64_t planned;
-    uint64_t hash;
-    char *path;
-    NPG_TRY(npg_archive_get(archive, "planned", &planned, sizeof planned));
-    /* frames are being appended: the list is made anew from that of the frames done */
-    if (planned < (int64_t)json_array_size(json_object_get(job->then, "frames"))) return NPG_OK;
-    NPG_TRY(npg_archive_get(archive, "list", &list, sizeof list));
-    NPG_TRY(npg_join_path(&path, job->output, "frames.partial.jsonl"));
-    npg_status status = npg_hash_file(&hash, path, (uint64_t)list.bytes);
-    if (!status && hash != list.hash)
-        status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
-    npg_release(&path);
-    return status;
-}
-
-static npg_status check_grids(const npg_archive *archive, const char *path)
-{
-    uint64_t wanted, hash;
-    NPG_TRY(npg_archive_get(archive, "grids.hash", &wanted, sizeof wanted));
-    NPG_TRY(npg_hash_file(&hash, path, UINT64_MAX));
-    return hash == wanted ? NPG_OK
-                          : npg_error(NPG_BAD_INPUT, "%s is damaged: its checksum does not match", path);
-}
-
-static npg_status open_state(npg_job *job, int64_t serial, bool with_list)
-{
-    char *path = NULL, *grids = NULL;
-    npg_archive *archive = NULL;
-    npg_status status = state_path(&path, job, serial, "npg");
-    if (!status) status = state_path(&grids, job, serial, "vdb");
-    if (!status) status = npg_archive_open(&archive, path);
-    if (!status) status = npg_error_prefix(check_grids(archive, grids), "%s", path);
-    if (!status) status = npg_archive_get(archive, "forward", &job->forward_serial, sizeof(int64_t));
-    if (!status && with_list) status = npg_error_prefix(check_list(job, archive), "%s", path);
-    npg_release(&path);
-    if (status) {
-        npg_archive_close(&archive);
-        npg_release(&grids);
-        return status;
-    }
-    npg_archive_close(&job->archive);
-    npg_release(&job->grids_path);
-    job->archive = archive;
-    job->grids_path = grids;
-    return NPG_OK;
-}
-
-static npg_status note_serial(npg_job *job, const char *name, int64_t serial)
-{
-    /* the archive comes last: without it the state was never whole */
-    if (name[0] != '.' && strstr(name, ".npg") && serial > job->serial) job->serial = serial;
-    return NPG_OK;
-}
-
-/* The newest state that is whole.  What is damaged is said and passed over: the work since is done again. */
-static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_list)
-{
-    NPG_TRY(each_state(job, note_serial));
-    int64_t newest = job->serial;
-    for (int64_t serial = newest; serial >= 0 && serial > newest - 2 && !job->archive; serial--) {
-        npg_status status = open_state(job, serial, with_list);
-        if (status == NPG_MEMORY) return status;
-        if (status && serial == 0)
-            npg_worker_warn(worker, false, -1, "%s; the job starts over", npg_error_text());
-        else if (status)
-            npg_worker_warn(worker, false, -1, "%s; the job goes on from the window before",
-                            npg_error_text());
-        else
-            job->serial = serial;
-    }
-    if (job->archive || newest < 0) return NPG_OK;
-    if (newest > 0)
-        npg_worker_warn(worker, false, -1, "%s: no state is whole; the job starts over", job->folder);
-    return NPG_OK;
-}
-
-int64_t npg_job_frame_count(const npg_job *job)
-{
-    return job->frame_count;
-}
-
-const npg_archive *npg_job_archive(const npg_job *job)
-{
-    return job->archive;
-}
-
-const char *npg_job_grids_path(const npg_job *job)
-{
-    return job->grids_path;
-}
-
-npg_status npg_job_open_forward(npg_job *job)
-{
-    if (job->forward_serial < 0)
-        return npg_error(NPG_USAGE, "%s: there is no state that later frames can go on from", job->folder);
-    return open_state(job, job->forward_serial, false);
-}
-
-/* ---- opening ---- */
-
-static npg_status differs(const npg_job *job)
-{
-    char text[1024];
-    snprintf(text, sizeof text, "%s", npg_error_text());
-    return npg_error(NPG_USAGE,
-                     "%s holds another job: %s; give --restart to discard what is there, or choose another "
-                     "output folder",
-                     job->output, text);
-}
-
-/* What a run of the same job does that was begun before, whose state is open if there is one. */
-static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *worker, bool is_done,
-                               bool append)
-{
-    int64_t added, planned;
-    npg_status status = npg_job_compare(&added, job->then, job->now);
-    if (status == NPG_USAGE) return differs(job);
-    NPG_TRY(status);
-    *start = is_done ? NPG_JOB_DONE : NPG_JOB_RESUME;
-    if (added && is_done && !append)
-        return npg_error(NPG_USAGE,
-                         "%s is done, but the input has %lld frames more than then: neupig append %s goes on "
-                         "with them, --restart starts over",
-                         job->output, (long long)added, job->output);
-    if (added && !is_done)
-        npg_worker_warn(worker, false, -1,
-                        "%lld frames came since the job was begun; neupig append goes on with them when it "
-                        "is done",
-                        (long long)added);
-    if (job->archive) NPG_TRY(npg_archive_get(job->archive, "planned", &planned, sizeof planned));
-    bool is_longer = job->archive && planned < (int64_t)json_array_size(json_object_get(job->then, "frames"));
-    if ((added && is_done) || (is_longer && !is_done)) *start = NPG_JOB_APPEND;
-    if (*start == NPG_JOB_APPEND && !job->archive)
-        return npg_error(NPG_USAGE, "%s: there is no state left to go on from; --restart starts over",
-                         job->folder);
-    return NPG_OK;
-}
-
-static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *worker, bool append)
-{
-    bool is_done, was_partial;
-    *start = NPG_JOB_FRESH;
-    npg_status status = read_json(&job->then, job->folder, "job.json");
-    if (!status && !job->then) return NPG_OK;
-    if (!status) status = look_for_end(job, &is_done, &was_partial);
-    if (status == NPG_USAGE) return differs(job);
-    NPG_TRY(status);
-    NPG_TRY(open_newest(job, worker, !is_done));
-    if (!job->archive && !is_done) return NPG_OK;
-    NPG_TRY(choose_start(job, start, worker, is_done, append));
-    if (*start == NPG_JOB_DONE && was_partial)
-        npg_worker_warn(worker, true, -1, "the job was done with frames skipped or below the quality bar");
-    return NPG_OK;
-}
-
-/* Waits on it are by the clock that nobody sets. */
-static void init_changed(pthread_cond_t *changed)
-{
-    pthread_condattr_t plain;
-    pthread_condattr_init(&plain);
-    pthread_condattr_setclock(&plain, CLOCK_MONOTONIC);
-    pthread_cond_init(changed, &plain);
-    pthread_condattr_destroy(&plain);
-}
-
-static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, bool restart, bool append)
-{
-    const char *exports = npg_options_get(npg_worker_options(worker), "export");
-    job->lock_fd = -1;
-    job->keeps_grids = exports && npg_forms_name(exports, "vdb");
-    job->serial = job->forward_serial = -1;
-    pthread_mutex_init(&job->lock, NULL);
-    init_changed(&job->changed);
-    NPG_TRY(npg_copy_text(&job->output, npg_worker_settings(worker)->output));
-    NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
-    NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
-    job->frame_count = (int64_t)json_array_size(json_object_get(job->now, "frames"));
-    if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
-    NPG_TRY(npg_make_folder(job->folder));
-    NPG_TRY(take_lock(job));
-    *start = NPG_JOB_FRESH;
-    if (!restart) NPG_TRY(look_around(job, start, worker, append));
-    job->forgets = *start == NPG_JOB_FRESH;
-    return NPG_OK;
-}
-
-npg_status npg_job_open(npg_job **out, npg_job_start *start, npg_worker *worker, bool restart, bool append)
-{
+    const job_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_settings *settings = npg_worker_settings(worker);
+    npg_job_start start;
     npg_job *job;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&job, NPG_FOR_RUN, sizeof *job));
-    npg_status status = fill(job, start, worker, restart, append);
-    if (status) npg_job_close(&job);
-    *out = job;
-    return status;
-}
-
-void npg_job_close(npg_job **slot)
-{
-    npg_job *job = *slot;
-    if (!job) return;
-    for (size_t i = 0; i < job->pose_count; i++) npg_release(&job->poses[i].bytes);
-    npg_release(&job->poses);
-    npg_release(&job->tied);
-    npg_archive_close(&job->archive);
-    npg_release(&job->grids_path);
-    json_decref(job->then);
-    json_decref(job->now);
-    if (job->lock_fd >= 0) close(job->lock_fd);
-    npg_release(&job->folder);
-    npg_release(&job->output);
-    pthread_cond_destroy(&job->changed);
-    pthread_mutex_destroy(&job->lock);
-    npg_release(slot);
-}
-
-/* ---- writing ---- */
-
-static npg_status write_description(const npg_job *job)
-{
-    char *path;
-    npg_file *file = NULL;
-    char *text = json_dumps(job->now, JSON_INDENT(1));
-    if (!text) return npg_error(NPG_MEMORY, "no memory for job.json");
-    npg_status status = npg_join_path(&path, job->folder, "job.json");
-    if (!status) status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
+    if (facts->is_live || !settings->output[0] || settings->pull) return NPG_OK;
+    NPG_TRY(npg_job_open(&job, &start, worker, state->restart, state->append));
+    NPG_TRY(npg_worker_publish(worker, &job_fact, job));
+    switch (start) {
+    case NPG_JOB_FRESH: return NPG_OK;
+    case NPG_JOB_DONE:
+        npg_worker_log(worker, NPG_LOG_INFO, -1, "%s is done already: nothing is left to do",
+                       settings->output);
+        return NPG_END;
+    case NPG_JOB_RESUME: NPG_TRY(npg_job_restore_facts(worker, job)); break;
+    case NPG_JOB_APPEND: NPG_TRY(begin_append(worker, job)); break;
     }
-    npg_release(&path);
-    free(text);
-    return status;
-}
-
-/* They have about a KiB for every frame, and nobody asks for them any more. */
-static void forget_descriptions(npg_job *job)
-{
-    json_decref(job->then);
-    json_decref(job->now);
-    job->then = job->now = NULL;
-}
-
-npg_status npg_job_write(npg_job *job)
-{
-    if (job->forgets) {
-        NPG_TRY(remove_file(job, "job.json"));
-        NPG_TRY(each_state(job, remove_state));
-        NPG_TRY(remove_motions(job));
-        job->serial = job->forward_serial = -1;
-        NPG_TRY(write_description(job));
-    }
-    forget_descriptions(job);
-    pthread_mutex_lock(&job->lock);
-    job->is_written = true;
-    pthread_cond_broadcast(&job->changed);
-    pthread_mutex_unlock(&job->lock);
+    report_place(worker, job);
     return NPG_OK;
 }
 
-npg_status npg_job_extend(npg_job *job)
-{
-    return write_description(job);
-}
-
-npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path)
-{
-    *serial = job->serial + 1;
-    *archive_path = *grids_path = NULL;
-    NPG_TRY(state_path(archive_path, job, *serial, "npg"));
-    npg_status status = state_path(grids_path, job, *serial, "vdb");
-    if (status) npg_release(archive_path);
-    return status;
-}
-
-npg_status npg_job_motion_path(const npg_job *job, char **path)
-{
-    char name[64];
-    snprintf(name, sizeof name, NPG_MOTION_NAME, (long long)job->serial + 1);
-    return npg_join_path(path, job->folder, name);
-}
-
-npg_status npg_job_commit(npg_job *job, bool is_forward_end)
-{
-    job->serial++;
-    if (is_forward_end) job->forward_serial = job->serial;
-    return each_state(job, remove_old);
-}
-
-int64_t npg_job_forward_serial(const npg_job *job)
-{
-    return job->forward_serial;
-}
-
-/* ---- what stages leave ---- */
-
-npg_status npg_job_leave_poses(npg_job *job, int64_t read, const void *bytes, size_t size)
-{
-    left_poses left = {.read = read, .size = size};
-    NPG_TRY(npg_alloc(&left.bytes, NPG_FOR_FIT, size));
-    memcpy(left.bytes, bytes, size);
-    pthread_mutex_lock(&job->lock);
-    npg_status status =
-        npg_grow(&job->poses, &job->pose_capacity, job->pose_count + 1, sizeof *job->poses, NPG_FOR_FIT);
-    if (!status) job->poses[job->pose_count++] = left;
-    pthread_mutex_unlock(&job->lock);
-    if (status) npg_release(&left.bytes);
-    return status;
-}
-
-void *npg_job_take_poses(npg_job *job, int64_t read, size_t *size)
-{
-    void *found = NULL;
-    size_t kept = 0;
-    pthread_mutex_lock(&job->lock);
-    for (size_t i = 0; i < job->pose_count; i++) {
-        left_poses *left = &job->poses[i];
-        if (left->read > read) {
-            job->poses[kept++] = *left;
-        } else if (left->read == read && !found) {
-            found = left->bytes;
-            *size = left->size;
-        } else {
-            npg_release(&left->bytes);
-        }
-    }
-    job->pose_count = kept;
-    pthread_mutex_unlock(&job->lock);
-    return found;
-}
-
-npg_status npg_job_leave_tied(npg_job *job, int64_t number, const float *vert_unit, size_t vert_count)
-{
-    float *copy;
-    NPG_TRY(npg_alloc_array(&copy, NPG_FOR_MESH, vert_count, 3 * sizeof *copy));
-    memcpy(copy, vert_unit, vert_count * 3 * sizeof *copy);
-    pthread_mutex_lock(&job->lock);
-    npg_release(&job->tied);
-    job->tied = copy;
-    job->tied_count = vert_count;
-    job->tied_number = number;
-    pthread_mutex_unlock(&job->lock);
-    return NPG_OK;
-}
-
-const float *npg_job_tied(const npg_job *job, int64_t *number, size_t *vert_count)
-{
-    *vert_count = job->tied_count;
-    *number = job->tied_number;
-    return job->tied;
-}
-
-void npg_job_note_exported(npg_job *job, int64_t count, int64_t list_bytes)
-{
-    pthread_mutex_lock(&job->lock);
-    job->exported_count = count;
-    job->list_bytes = list_bytes;
-    pthread_cond_broadcast(&job->changed);
-    pthread_mutex_unlock(&job->lock);
-}
-
-void npg_job_exported(npg_job *job, int64_t *count, int64_t *list_bytes)
-{
-    pthread_mutex_lock(&job->lock);
-    *count = job->exported_count;
-    *list_bytes = job->list_bytes;
-    pthread_mutex_unlock(&job->lock);
-}
-
-npg_status npg_job_wait_exported(npg_job *job, const npg_worker *worker, int64_t count, int64_t *list_bytes)
-{
-    npg_status status = NPG_OK;
-    pthread_mutex_lock(&job->lock);
-    while (!status && (!job->is_written || job->exported_count < count)) {
-        struct timespec until;
-        clock_gettime(CLOCK_MONOTONIC, &until);
-        until.tv_nsec += 100000000; /* looks for a stop ten times a second */
-        if (until.tv_nsec >= 1000000000) {
-            until.tv_nsec -= 1000000000;
-            until.tv_sec++;
-        }
-        pthread_cond_timedwait(&job->changed, &job->lock, &until);
-        if (npg_worker_stopping(worker)) status = NPG_STOPPED;
-    }
-    *list_bytes = job->list_bytes;
-    pthread_mutex_unlock(&job->lock);
-    return status;
-}
+extern const npg_service npg_service_job;
+const npg_service npg_service_job = {.name = "job",
+                                     .help = "resumes an earlier run of the same job",
+                                     .options = options,
+                                     .state_size = sizeof(job_state),
+                                     .begin = begin};

@@ -1,22 +1,22 @@
-/* Job: what OUT/job/ holds so that a run which was stopped, killed or broken off goes on by itself.
+/* Job: what OUT/job/ holds so that a run which was stopped, killed or broken off is resumed by itself.  A service
+ * of the run, not a stage: no frame passes through it.
  *
- *     OUT/job/lock                 empty; the run at work holds a lock (flock) on it, which ends with its
- * process OUT/job/job.json             what the results are made of: version, options, and the inputs with
- * their sizes, times and checksums OUT/job/window_000012.npg    state after the 12th closed window: an
- * archive (pipeline/archive.h) with the facts of the capture, the reference mesh in unit coordinates, the
- * optimiser, the coarse alignment's poses and the frames that the next windows share
- *     OUT/job/window_000012.vdb    the latent grids of the same moment (stages/shims/vdb_grids.h)
+ *     OUT/job/lock                 empty; the run at work holds a lock (flock) on it, which ends with its process
+ *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their sizes,
+ *                                  times and checksums
+ *     OUT/job/window_000012.npg    state after the 12th solved window: an archive (pipeline/archive.h) with the facts
+ *                                  of the capture, the reference mesh in unit coordinates, what stages need to be
+ *                                  resumed, the optimiser, and the frames that the next windows share
+ *     OUT/job/window_000012.vdb    the latent grids of the same moment (optimize/vdb_grids.h)
+ *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those of all
+ *                                  windows stay, for neupig apply
  *
- *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (record.h); those of all
- * windows stay, for neupig apply
+ * The two newest windows stay, and the one that later frames start from (neupig append); where grids are to be
+ * exported, those of all.  Each file appears whole or not at all; the archive names the checksum of its grids and of
+ * the frame log, so that a damaged one is noticed and the one before it used.  No file says that a run is at work.
  *
- * The two newest windows stay, and the one that later frames go on from (neupig append); where grids are to
- * be exported, those of all.  Each file appears whole or not at all; the archive names the checksum of its
- * grids and of the list of frames, so that a damaged one is noticed and the one before it taken.  No file
- * says that a run is at work.
- *
- * Threads: the functions marked so may be called from any stage's thread; the others are called by one stage
- * alone. */
+ * Threads: a run's npg_job belongs to the service until the passes begin.  From then on stage optimize writes states,
+ * stage export says how many frames are on disk; functions marked so may be called from any thread. */
 #ifndef NPG_JOB_H
 #define NPG_JOB_H
 
@@ -25,18 +25,22 @@
 
 typedef struct npg_job npg_job;
 
-/* ---- the job as a whole (the stage job) ---- */
+/* The job of the worker's run; NULL where nothing is kept on disk (live, pulled from, or no output).  Written by
+ * the service job before the first pass. */
+npg_job *npg_job_of(const npg_worker *worker);
+
+/* ---- the job as a whole (job_folder.c) ---- */
 
 /* What a run finds of an earlier one. */
 typedef enum npg_job_start {
-    NPG_JOB_FRESH,  /* nothing that it could go on from             */
-    NPG_JOB_RESUME, /* it goes on where the earlier one was         */
-    NPG_JOB_APPEND, /* the earlier one is done, frames came since   */
-    NPG_JOB_DONE    /* nothing is left to do                        */
+    NPG_JOB_FRESH,  /* nothing that it could be resumed from      */
+    NPG_JOB_RESUME, /* it continues where the earlier one was      */
+    NPG_JOB_APPEND, /* the earlier one is done, frames came since  */
+    NPG_JOB_DONE    /* nothing is left to do                       */
 } npg_job_start;
 
-/* Open OUT/job, lock it and compare.  NPG_USAGE: another run is at work there, or the inputs, options or the
- * version are others than those that what is there was made of; the text says which. */
+/* Open OUT/job, lock it and compare.  NPG_USAGE: another run is at work there, or the inputs, options or the version
+ * are others than those that what is there was made of; the text says which. */
 npg_status npg_job_open(npg_job **job, npg_job_start *start, npg_worker *worker, bool restart, bool append);
 void npg_job_close(npg_job **job);
 
@@ -49,68 +53,71 @@ const npg_archive *npg_job_archive(const npg_job *job);
 /* Its latent grids. */
 const char *npg_job_grids_path(const npg_job *job);
 
-/* From now on the job is of this run: forget older states and write job.json.  Any thread. */
-npg_status npg_job_write(npg_job *job);
+/* From now on the job is of this run: forget older states and write job.json.  keeps_grids: those of all windows
+ * stay.  Any thread. */
+npg_status npg_job_write(npg_job *job, bool keeps_grids);
 
 /* The job goes on with frames that came since: write job.json with them. */
 npg_status npg_job_extend(npg_job *job);
 
-/* ---- what the stages leave for a state ---- */
+/* Open the state that later frames start from in place of the newest one. */
+npg_status npg_job_open_forward(npg_job *job);
 
-/* align: what it needs to go on after `read` frames of the plan (size bytes, copied).  Any thread. */
-npg_status npg_job_leave_poses(npg_job *job, int64_t read, const void *bytes, size_t size);
+/* ---- frames on disk ---- */
 
-/* Take it (give it to npg_release()), NULL when there is none; what was left for earlier moments goes.  Any
- * thread. */
-void *npg_job_take_poses(npg_job *job, int64_t read, size_t *size);
+/* Stage export: the results of `count` frames are on disk, the frame log has `log_bytes`.  Any thread. */
+void npg_job_set_exported(npg_job *job, int64_t count, int64_t log_bytes);
 
-/* evaluate: number and vertices (V x 3, unit, copied) of the frame that the truth is tied in.  Any thread. */
-npg_status npg_job_leave_tied(npg_job *job, int64_t number, const float *vert_unit, size_t vert_count);
+/* What was set last.  Any thread. */
+void npg_job_exported(npg_job *job, int64_t *count, int64_t *log_bytes);
 
-/* NULL before that; a loan while evaluate rests. */
-const float *npg_job_tied(const npg_job *job, int64_t *number, size_t *vert_count);
+/* Wait until job.json is written and `count` frames are on disk; *log_bytes gets the frame log's size then.
+ * NPG_ABORTED when the run stops before.  Any thread. */
+npg_status npg_job_wait_exported(npg_job *job, int64_t count, int64_t *log_bytes);
 
-/* export: the list of frames now has `count` lines and its file `list_bytes`.  Any thread. */
-void npg_job_note_exported(npg_job *job, int64_t count, int64_t list_bytes);
+/* ---- states (job_state.c) ---- */
 
-/* What was noted last. */
-void npg_job_exported(npg_job *job, int64_t *count, int64_t *list_bytes);
+/* Where a run is when a state is written. */
+typedef struct npg_job_moment {
+    int64_t emitted;     /* frames that have been passed on to evaluate and export     */
+    int64_t read;        /* frames of the plan that need not be read again             */
+    bool is_forward_end; /* later frames start from this state (neupig append)         */
+} npg_job_moment;
 
-/* Wait until job.json is written and export has noted `count` frames; *list_bytes gets the list's size then.
- * NPG_STOPPED when the run stops before.  Any thread. */
-npg_status npg_job_wait_exported(npg_job *job, const npg_worker *worker, int64_t count, int64_t *list_bytes);
+/* Adds to the state what the stage that writes it knows; grids_path is where its latent grids go. */
+typedef npg_status npg_job_write_state(void *user, npg_archive_writer *out, const char *grids_path);
 
-/* ---- states ---- */
+/* Write the next state: waits until the frames passed on are on disk, so that what is solved is never lost, then
+ * facts, reports, reference, what stages save (npg_stage.save), and what write() adds.  The file appears whole or not
+ * at all.  NPG_DISK, NPG_ABORTED. */
+npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
+                              void *user);
 
-/* Block "list" of a state: the list of frames (OUT/frames.partial.jsonl) that goes with it. */
-typedef struct npg_job_list {
-    int64_t bytes, count;
-    uint64_t hash; /* XXH3 of these bytes */
-} npg_job_list;
+/* Facts, reference, reports and warnings from the open archive; before the first pass.  NPG_BAD_INPUT. */
+npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job);
 
-/* The number and the paths (to npg_release()) of the next state. */
-npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path);
-
-/* Where the record of the next window goes (record.h); to npg_release(). */
+/* Where the record of the next window goes (optimize/record.h); to npg_release(). */
 npg_status npg_job_motion_path(const npg_job *job, char **path);
 
-/* Both files of the next state are in place: count it and remove states that nobody goes on from any more.
- * is_forward_end: later frames go on from it. */
+/* Block of a state: what stage align needs (npg_frame.align_state). */
+#define NPG_BLOCK_ALIGN "align"
+
+/* What job_state.c needs of the folder: block "log" of a state, paths of the next one, what is kept. */
+typedef struct npg_job_log {
+    int64_t bytes, count; /* of the frame log that goes with the state */
+    uint64_t hash;        /* XXH3 of these bytes                       */
+} npg_job_log;
+npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path);
 npg_status npg_job_commit(npg_job *job, bool is_forward_end);
-
-/* The state that later frames go on from; -1 while there is none. */
-int64_t npg_job_forward_serial(const npg_job *job);
-
-/* Open that state in place of the newest one. */
-npg_status npg_job_open_forward(npg_job *job);
+int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 
 /* ---- what the results are made of (job_inputs.c) ---- */
 
 /* A new JSON object.  */
 npg_status npg_job_describe(json_t **description, const npg_options *options);
 
-/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.
- * NPG_USAGE says what differs first. */
+/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.  NPG_USAGE
+ * says what differs first. */
 npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now);
 
 #endif

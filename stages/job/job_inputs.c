@@ -36,11 +36,11 @@ static json_t *describe_options(const npg_options *options)
 }
 
 /* The stages that a program added, "name after place" each; their code can't be told from other code. */
-static json_t *describe_own_stages(const npg_options *options)
+static json_t *describe_custom_stages(const npg_options *options)
 {
     json_t *list = json_array();
-    const npg_own_stage *own;
-    for (size_t i = 0; (own = npg_options_own_stage(options, i)); i++)
+    const npg_custom_stage *own;
+    for (size_t i = 0; (own = npg_options_custom_stage(options, i)); i++)
         json_array_append_new(list, json_sprintf("%s after %s", own->name, own->after));
     return list;
 }
@@ -88,21 +88,18 @@ static json_t *absolute(const char *path)
 npg_status npg_job_describe(json_t **out, const npg_options *options)
 {
     npg_frame_files *list;
-    const char *input = npg_options_get(options, "input"), *missing = npg_options_get(options, "missing"),
-               *reference = npg_options_get(options, "reference");
-    *out = NULL;
-    NPG_TRY(npg_frame_files_open(&list, input, npg_options_get(options, "frames"),
-                                 strcmp(missing, "ignore") != 0));
     npg_settings settings;
+    *out = NULL;
     npg_options_fill(options, npg_run_options, &settings);
+    NPG_TRY(npg_capture_list(&list, options));
     json_t *frames = json_array(), *mesh = json_object();
-    npg_status status = settings.confine ? npg_frame_files_confine(list, input) : NPG_OK;
-    if (!status) status = describe_frames(frames, list);
+    npg_status status = describe_frames(frames, list);
     npg_frame_files_close(&list);
-    if (!status && reference[0]) status = describe_file(mesh, reference);
-    json_t *description = json_pack("{ss so so so so so}", "neupig", npg_version(), "input", absolute(input),
-                                    "options", describe_options(options), "own_stages",
-                                    describe_own_stages(options), "reference", mesh, "frames", frames);
+    if (!status && settings.reference[0]) status = describe_file(mesh, settings.reference);
+    json_t *description =
+        json_pack("{ss so so so so so}", "neupig", npg_version(), "input", absolute(settings.input),
+                  "options", describe_options(options), "custom_stages", describe_custom_stages(options),
+                  "reference", mesh, "frames", frames);
     if (!status && !description) status = npg_error(NPG_MEMORY, "no memory for the list of inputs");
     if (status) json_decref(description);
     if (!status) *out = description;
@@ -167,8 +164,8 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
         return npg_error(NPG_USAGE, "it was begun by neupig %s, and this is %s", text_of(then, "neupig"),
                          text_of(now, "neupig"));
     NPG_TRY(compare_options(json_object_get(then, "options"), json_object_get(now, "options")));
-    const json_t *own_then = json_object_get(then, "own_stages"),
-                 *own_now = json_object_get(now, "own_stages");
+    const json_t *own_then = json_object_get(then, "custom_stages"),
+                 *own_now = json_object_get(now, "custom_stages");
     if ((json_array_size(own_then) || json_array_size(own_now)) && !json_equal(own_then, own_now))
         return npg_error(NPG_USAGE, "the stages that the program added are not those that it had");
     if (!is_same_file(json_object_get(then, "reference"), json_object_get(now, "reference")))

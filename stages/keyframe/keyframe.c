@@ -11,6 +11,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "keyframe/choose_pass.h"
 #include "keyframe/likeness.h"
 #include "keyframe/look_ahead.h"
 #include "keyframe/shortlist.h"
@@ -40,7 +41,8 @@ typedef struct keyframe_state {
     candidate best[SHOWN_SCORES]; /* best first */
     size_t best_count;
     npg_likeness *likeness; /* of the user's own mesh; owned */
-    candidate chosen;       /* the frame the user named */
+    npg_choose_pass choosing;
+    candidate chosen; /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
     int64_t usable_count; /* frames that were not skipped                    */
     int64_t passed_count; /* frames of the solving pass so far               */
@@ -141,11 +143,10 @@ static void offer(keyframe_state *state, candidate new)
     state->best[at] = new;
 }
 
-/* The user's own mesh; "" where the reference is to be made (or no stage of the chain makes one). */
+/* Path of the user's own mesh; "" where the reference is to be made. */
 static const char *own_mesh(const npg_worker *worker)
 {
-    const char *path = npg_options_get(npg_worker_options(worker), "reference");
-    return path ? path : "";
+    return npg_worker_settings(worker)->reference;
 }
 
 /* Whether there is a choosing pass, which takes files, and a keyframe that is neither named nor that of a
@@ -171,6 +172,13 @@ static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_fram
     return NPG_OK;
 }
 
+/* The paper's: many cells, near the middle in time. */
+static double score_of(size_t cell_count, int64_t index, int64_t frame_count)
+{
+    double from_middle = (double)index - (double)frame_count / 2;
+    return (double)cell_count * exp(-0.001 * from_middle * from_middle);
+}
+
 static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
@@ -180,9 +188,8 @@ static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg
     if (frame->is_skipped) return NPG_OK;
     size_t cell_count = mark_cells(state->cells, &facts->box, frame, true);
     mark_cells(state->cells, &facts->box, frame, false);
-    double from_middle = (double)frame->index - (double)frame_count / 2;
-    double score = (double)cell_count * exp(-0.001 * from_middle * from_middle);
-    candidate new = {frame->index, frame->number, cell_count, score};
+    candidate new = {frame->index, frame->number, cell_count,
+                     score_of(cell_count, frame->index, frame_count)};
     if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &new, frame));
     if (cell_count) offer(state, new);
     if (is_named && cell_count && !state->is_chosen) {
@@ -216,6 +223,13 @@ static npg_status choose(const keyframe_state *state, candidate *key)
     return npg_error(NPG_USAGE, "keyframe %lld: no usable frame has this number", (long long)state->number);
 }
 
+static void report_windows(npg_worker *worker)
+{
+    const npg_plan *plan = &npg_worker_facts(worker)->plan;
+    json_object_set_new(npg_worker_report(worker), "windows",
+                        json_integer((json_int_t)npg_plan_window_count(plan)));
+}
+
 static npg_status set_plan(npg_worker *worker, int64_t frame_count)
 {
     keyframe_state *state = npg_worker_state(worker);
@@ -226,6 +240,8 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
     int64_t overlap = window < frame_count ? state->overlap : 0;
     facts->plan =
         (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
+    facts->window_asked = state->window;
+    facts->overlap_asked = state->overlap;
     bool is_own = *own_mesh(worker) != 0, is_named = state->number != NO_NUMBER;
     bool cuts_welds = state->welds == WELDS_CUT && !is_own, is_open = has_candidates(worker);
     if (!facts->is_live && frame_count > 1 && (is_open || cuts_welds)) {
@@ -237,12 +253,31 @@ static npg_status set_plan(npg_worker *worker, int64_t frame_count)
         json_array_append_new(scores, json_of(&state->best[i], is_own));
     json_object_set_new(report, "key", json_of(&key, is_own));
     json_object_set_new(report, "best", scores);
-    json_object_set_new(report, "windows", json_integer((json_int_t)npg_plan_window_count(&facts->plan)));
+    report_windows(worker);
     const char *what = is_own && !is_named                 ? "is the keyframe, nearest to the reference"
                        : facts->choice.candidate_count > 1 ? "has the best score"
                                                            : "is the keyframe";
     npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.4g)", what,
                    (long long)frame_count, key.cell_count, key.score);
+    return NPG_OK;
+}
+
+/* ---- choosing pass: the last word on the keyframe ---- */
+
+static npg_status close_choosing(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    json_t *report = npg_worker_report(worker), *by_score = json_object_get(report, "key");
+    npg_fare fare;
+    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &fare));
+    if (fare.index < 0 || fare.index == facts->plan.key) return NPG_OK;
+    json_object_set(report, "key_by_score", by_score);
+    facts->plan.key = fare.index;
+    json_object_set_new(report, "key",
+                        json_pack("{sI sI sf}", "index", (json_int_t)fare.index, "number",
+                                  (json_int_t)fare.number, "cost", fare.cost));
+    report_windows(worker); /* they lie around the keyframe */
     return NPG_OK;
 }
 
@@ -368,6 +403,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
+    if (pass == NPG_PASS_CHOOSE) return npg_choose_pass_add(&state->choosing, facts, *chunk);
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (pass == NPG_PASS_MEASURE)
@@ -387,7 +423,7 @@ static npg_status flush(npg_worker *worker)
     switch (npg_worker_pass(worker)) {
     case NPG_PASS_MEASURE: return close_measuring(worker);
     case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
-    case NPG_PASS_CHOOSE:
+    case NPG_PASS_CHOOSE: return close_choosing(worker);
     case NPG_PASS_SOLVE: break;
     }
     return facts->is_live ? end_live(worker) : NPG_OK;
@@ -398,6 +434,7 @@ static void uninit(npg_worker *worker)
     keyframe_state *state = npg_worker_state(worker);
     npg_look_ahead_clear(&state->held);
     npg_likeness_close(&state->likeness);
+    npg_choose_pass_clear(&state->choosing);
     npg_release(&state->cells);
 }
 
@@ -445,7 +482,8 @@ const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .help = "Find the capture's box and choose the keyframe",
                                       .options = options,
                                       .state_size = sizeof(keyframe_state),
-                                      .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_SOLVE,
+                                      .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
+                                                NPG_PASS_SOLVE,
                                       .needs = NPG_FIELD_POINTS,
                                       .gives = NPG_FIELD_KEY,
                                       .init = init,

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/sights.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
-#include "keyframe/choose.h"
 #include "mesh/denoise.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
@@ -23,6 +23,7 @@
 #define PIECE_DIST        0.1  /* in diagonals */
 #define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
 #define REBUILD_AREA_MIN  0.8  /* of the area; less is not the same surface */
+#define FACES_PER_POINT   4    /* of the reference at most: more would be the mesher's, not the points' */
 #define REBUILD_VOXELS    384  /* along the longest side of the unit box */
 
 enum { UNSEEN_AUTO, UNSEEN_KEEP, UNSEEN_TRIM };
@@ -30,7 +31,6 @@ enum { PIECES_NEAR, PIECES_MAIN };
 enum { MESHER_POISSON, MESHER_VDB };
 
 typedef struct mesh_state {
-    const char *reference;
     int mesher, unseen, pieces;
     int64_t depth, face_max, time_limit_s, memory_limit_mib;
     double point_weight, trim, invented_max;
@@ -41,8 +41,6 @@ typedef struct mesh_state {
 #define OFFSET(member) offsetof(mesh_state, member)
 
 static const npg_option mesh_options[] = {
-    {"reference", "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one",
-     NPG_OPTION_TEXT, OFFSET(reference), "", 0, 0, NULL, "FILE"},
     {"mesher",
      "How the keyframe's surface is made: Poisson, or Poisson taken through an OpenVDB level set (even "
      "triangles, no self-contact)",
@@ -145,16 +143,20 @@ static npg_status measure_points(making *m)
     return NPG_OK;
 }
 
-static npg_poisson_settings poisson_settings(npg_worker *worker)
+static npg_poisson_settings settings_of(const mesh_state *s)
 {
-    const mesh_state *s = npg_worker_state(worker);
     return (npg_poisson_settings){.depth = (int)s->depth,
                                   .point_weight = s->point_weight,
                                   .apart = (npg_apart_way)s->apart,
                                   .time_limit_s = (double)s->time_limit_s,
-                                  .memory_limit = (size_t)s->memory_limit_mib << 20,
-                                  .should_stop = should_stop,
-                                  .user = worker};
+                                  .memory_limit = (size_t)s->memory_limit_mib << 20};
+}
+
+npg_poisson_settings npg_poisson_settings_of(const npg_options *options)
+{
+    mesh_state s = {0};
+    npg_options_fill(options, mesh_options, &s);
+    return settings_of(&s);
 }
 
 /* Noise would become bumps of the surface that every frame then carries. */
@@ -173,7 +175,9 @@ static npg_status smooth(making *m)
 
 static npg_status reconstruct(making *m)
 {
-    npg_poisson_settings settings = poisson_settings(m->worker);
+    npg_poisson_settings settings = settings_of(m->state);
+    settings.should_stop = should_stop;
+    settings.user = m->worker;
     if (!m->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t n = m->count, turned, moved;
@@ -278,7 +282,7 @@ static npg_status rebuild_on_request(making *m)
 static npg_status decimate(making *m)
 {
     npg_mending mending;
-    size_t budget = 4 * m->frame->point_count;
+    size_t budget = FACES_PER_POINT * m->frame->point_count;
     if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
     NPG_TRY(npg_mesh_mend(&m->mesh, &mending)); /* closes small holes before the faces are counted */
     size_t holes = mending.holes;
@@ -360,7 +364,7 @@ static npg_status make(making *m)
 
 /* ---- welds ---- */
 
-static void tell_welds(making *m, const npg_weld_cut *cut)
+static void report_welds(making *m, const npg_weld_cut *cut)
 {
     note(m, "handles", (double)cut->handles);
     note_count(m, "weld_frames", cut->frames);
@@ -381,18 +385,17 @@ static void tell_welds(making *m, const npg_weld_cut *cut)
 /* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
 static npg_status cut_welds(making *m)
 {
-    const npg_facts *facts = npg_worker_facts(m->worker);
-    npg_sights *sights = npg_worker_kept(m->worker);
+    npg_sights *sights = npg_worker_take_fact(m->worker, &npg_fact_sights);
     npg_weld_settings settings = {.spacing_unit = m->spacing, .should_stop = should_stop, .user = m->worker};
     npg_weld_cut done;
-    if (!sights || !facts->choice.cut_welds) return NPG_OK;
+    if (!sights) return NPG_OK;
     size_t at = npg_sights_find(sights, m->frame->index);
     double since = npg_clock_s();
     npg_status status =
         at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
-    if (!status && at < sights->count) tell_welds(m, &done);
+    if (!status && at < sights->count) report_welds(m, &done);
     note(m, "welds_s", npg_clock_s() - since);
-    npg_sights_clear(sights);
+    npg_sights_close(&sights); /* a few MB that no later frame needs */
     return status == NPG_DIVERGED ? NPG_OK : status;
 }
 
@@ -400,7 +403,7 @@ static npg_status cut_welds(making *m)
 
 static npg_status read_reference(making *m)
 {
-    const char *path = m->state->reference;
+    const char *path = npg_worker_settings(m->worker)->reference;
     npg_facts *facts = npg_worker_facts(m->worker);
     NPG_TRY(npg_read_mesh(&m->mesh, path, &facts->origin));
     for (size_t i = 0; i < 3 * m->mesh->vert_count; i++)
@@ -419,7 +422,7 @@ static npg_status read_reference(making *m)
 
 /* ---- the result ---- */
 
-static npg_status finish(making *m)
+static npg_status measure_reference(making *m)
 {
     npg_manifold manifold;
     npg_mesh *mesh = m->mesh;
@@ -443,82 +446,21 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
 {
     making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame};
     npg_facts *facts = npg_worker_facts(worker);
+    bool is_given = npg_worker_settings(worker)->reference[0];
     double since = npg_clock_s();
     npg_status status = take_points(&m);
     if (!status) status = measure_points(&m);
-    if (!status) status = *m.state->reference ? read_reference(&m) : make(&m);
-    if (!status && !*m.state->reference) status = cut_welds(&m);
-    if (!status) status = finish(&m);
+    if (!status) status = is_given ? read_reference(&m) : make(&m);
+    if (!status && !is_given) status = cut_welds(&m);
+    if (!status) status = measure_reference(&m);
     note(&m, "seconds", npg_clock_s() - since);
     npg_release(&m.points);
     npg_release(&m.normals);
     if (status) npg_mesh_unref(&m.mesh);
     facts->reference = m.mesh;
+    if (!status) npg_worker_close_report(worker);
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)frame->number,
                             frame->path ? frame->path : "pushed");
-}
-
-/* ---- the choosing pass ---- */
-
-static void release_sights(void *thing)
-{
-    npg_sights_clear(thing);
-    npg_release(&thing);
-}
-
-static npg_status look_at(npg_worker *worker, npg_chunk *chunk)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    npg_sights *sights = npg_worker_kept(worker);
-    if (!sights) {
-        NPG_TRY(npg_alloc(&sights, NPG_FOR_RUN, sizeof *sights));
-        npg_worker_keep(worker, sights, release_sights);
-    }
-    for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
-        const npg_frame *frame = npg_chunk_frame(chunk, i);
-        const npg_choice *choice = &facts->choice;
-        bool is_candidate = false;
-        for (size_t k = 0; k < choice->count; k++)
-            if (choice->frames[k] == frame->index) is_candidate = choice->is_candidate[k];
-        NPG_TRY(npg_sights_add(sights, frame, &facts->box, is_candidate));
-    }
-    return NPG_OK;
-}
-
-static void tell_choice(npg_worker *worker, const npg_fare *fares, size_t count, size_t best, double seconds)
-{
-    json_t *list = json_array();
-    for (size_t i = 0; i < count; i++)
-        json_array_append_new(
-            list,
-            json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number, "followed",
-                      fares[i].is_followed, "point_dist_unit", fares[i].point_dist_unit, "vert_dist_unit",
-                      fares[i].vert_dist_unit, "stretched_share", fares[i].stretched_share, "contact",
-                      fares[i].contact, "handles", (json_int_t)fares[i].handles, "cost", fares[i].cost));
-    json_object_set_new(npg_worker_report(worker), "candidates", list);
-    json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
-    npg_worker_log(worker, NPG_LOG_INFO, fares[best].number,
-                   "is the keyframe, of %zu candidates (%.2f %% of its points in contact)", count,
-                   100 * fares[best].contact);
-}
-
-/* The keyframe among the candidates; with one, or with the user's own mesh, it stays what the score says. */
-static npg_status choose_key(npg_worker *worker)
-{
-    const mesh_state *s = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
-    npg_fare fares[NPG_CHOICE_MAX];
-    size_t count, best;
-    double since = npg_clock_s();
-    if (npg_worker_pass(worker) != NPG_PASS_CHOOSE || facts->choice.candidate_count < 2) return NPG_OK;
-    if (*s->reference || !npg_worker_kept(worker)) return NPG_OK;
-    const npg_poisson_settings settings = poisson_settings(worker);
-    NPG_TRY(npg_choose(fares, &count, &best, npg_worker_kept(worker), facts->plan.key, facts->frame_count,
-                       &settings));
-    if (!count) return NPG_OK;
-    facts->plan.key = fares[best].index;
-    tell_choice(worker, fares, count, best, npg_clock_s() - since);
-    return NPG_OK;
 }
 
 /* ---- the stage ---- */
@@ -526,7 +468,6 @@ static npg_status choose_key(npg_worker *worker)
 static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) return look_at(worker, *chunk);
     for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
@@ -538,20 +479,35 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
     return NPG_OK;
 }
 
-/* The raw reconstruction is the largest thing held: about 16 faces per point at depth 10. */
+/* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point, and 80 bytes a
+ * face with its share of vertices, normals and the links that mending needs. */
+#define RAW_FACES_PER_POINT 16
+#define BYTES_PER_RAW_FACE  80
+
 static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
 {
     *chunks_held = 1;
-    return npg_worker_facts(worker)->point_count_max * 16 * 80;
+    return npg_worker_facts(worker)->point_count_max * RAW_FACES_PER_POINT * BYTES_PER_RAW_FACE;
+}
+
+/* A closed mesh has half as many vertices as faces, and two; the budget is decimate()'s. */
+static size_t verts_at_most(const npg_worker *worker)
+{
+    const mesh_state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    size_t faces = (size_t)s->face_max, by_points = FACES_PER_POINT * facts->point_count_max;
+    if (facts->own_verts) return facts->own_verts;
+    if (by_points && faces > by_points) faces = by_points;
+    return faces / 2 + 2;
 }
 
 const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
                                   .state_size = sizeof(mesh_state),
-                                  .passes = NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
+                                  .passes = NPG_PASS_SOLVE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,
-                                  .flush = choose_key,
-                                  .memory = mesh_memory};
+                                  .memory = mesh_memory,
+                                  .verts_at_most = verts_at_most};

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 
 #include "mesh/apart.h"
+#include "pipeline/options.h"
 
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                                         */
@@ -22,6 +23,9 @@ typedef struct npg_poisson_settings {
     bool (*should_stop)(void *user);
     void *user;
 } npg_poisson_settings;
+
+/* As the mesh stage's options say (poisson-*, hold-apart); whom to ask for a stop is left to the caller. */
+npg_poisson_settings npg_poisson_settings_of(const npg_options *options);
 
 /* *mesh (owned by the caller, without normals, faces counter-clockwise from outside) through N points with
  * outward unit normals (N x 3 each).  The same input gives the same mesh.

@@ -1,4 +1,4 @@
-/* Checkpoint: the state of a run after a closed window, to the job's folder and back (job.h). */
+/* Checkpoint: what stage optimize adds to the state of a run after a solved window, and takes back (job/job.h). */
 #ifndef NPG_CHECKPOINT_H
 #define NPG_CHECKPOINT_H
 
@@ -18,12 +18,8 @@ typedef struct npg_hand {
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until
  * all frames passed on before are on disk, so that what is solved is never lost.  Held frames that no window
- * has solved yet are read again by a run that goes on.  NPG_DISK, NPG_STOPPED. */
+ * has solved yet are read again by a run that goes on.  NPG_DISK, NPG_ABORTED. */
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit);
-
-/* Restore facts, reference mesh, reports and warnings from the job's open archive (stage job, before the
- * first pass).  NPG_BAD_INPUT. */
-npg_status npg_checkpoint_restore_facts(npg_worker *worker);
 
 /* Restore what the optimize stage had in hand; with appended frames only those which the first new window
  * shares.  The plan of facts tells which. */

@@ -122,7 +122,7 @@ static npg_status check_widths(const npg_fit_settings *s)
     return NPG_OK;
 }
 
-static npg_status go_on(npg_worker *worker);
+static npg_status resume(npg_worker *worker);
 
 /* Which parameters the kernels have; a file that could not be used is a warning. */
 static void note_tuning(npg_worker *worker)
@@ -149,7 +149,7 @@ static npg_status init(npg_worker *worker)
                    info->units);
     json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
     note_tuning(worker);
-    return is_resumed ? go_on(worker) : NPG_OK;
+    return is_resumed ? resume(worker) : NPG_OK;
 }
 
 static void clear_held(npg_held *held)
@@ -267,6 +267,7 @@ static npg_status emit(npg_worker *worker, npg_held *held)
     state *s = npg_worker_state(worker);
     npg_chunk *chunk;
     NPG_TRY(npg_chunk_open(&chunk, 1));
+    npg_release(&held->frame.align_state); /* was for the state of the window that waited for this frame */
     npg_release(&held->frame.vert_unit);
     held->frame.vert_unit = held->solved;
     held->frame.vert_count = npg_worker_facts(worker)->reference->vert_count;
@@ -314,7 +315,7 @@ static npg_status save_record(npg_worker *worker)
                                       s->held_count,
                                       (uint64_t)npg_worker_settings(worker)->seed};
     char *path;
-    NPG_TRY(npg_job_motion_path(facts->job, &path));
+    NPG_TRY(npg_job_motion_path(npg_job_of(worker), &path));
     npg_status status = npg_record_save(path, &source);
     npg_release(&path);
     return status;
@@ -323,7 +324,7 @@ static npg_status save_record(npg_worker *worker)
 static npg_status save_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    if (!npg_worker_facts(worker)->job) return NPG_OK;
+    if (!npg_job_of(worker)) return NPG_OK;
     NPG_TRY(save_record(worker));
     const npg_hand hand = {s->held,          s->held_count, s->held_capacity,
                            s->window_at,     s->emitted,    s->last_chamfer,
@@ -332,10 +333,11 @@ static npg_status save_state(npg_worker *worker)
 }
 
 /* Where the state on disk was taken: the window is solved, its frames are not passed on. */
-static npg_status go_on(npg_worker *worker)
+static npg_status resume(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
+    const npg_job *job = npg_job_of(worker);
     npg_hand hand = {0};
     npg_status status = npg_checkpoint_restore_hand(worker, &hand);
     s->held = hand.held;
@@ -346,9 +348,8 @@ static npg_status go_on(npg_worker *worker)
     s->last_isometry = hand.last_isometry;
     if (!status) status = open_solver(worker, hand.is_aligned);
     if (!status)
-        status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(facts->job),
-                                 npg_job_grids_path(facts->job));
-    if (status) return npg_error_prefix(status, "the state to go on from");
+        status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(job), npg_job_grids_path(job));
+    if (status) return npg_error_prefix(status, "the state to resume from");
     s->window_at = hand.window_at;
     if (s->window_at >= 0) NPG_TRY(emit_done(worker));
     if (++s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
@@ -422,8 +423,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;
-    const char *align = npg_options_get(npg_worker_options(worker), "align");
-    return npg_window_memory(&s->window_settings, align && !strcmp(align, "yes"),
+    return npg_window_memory(&s->window_settings, npg_worker_has_field(worker, NPG_FIELD_POSE),
                              npg_worker_verts_at_most(worker), frames, facts->point_count_max);
 }
 

@@ -19,8 +19,6 @@
 
 #include "optimize/window.h"
 
-#define NPG_MOTION_NAME "motion_%06lld.npg"
-
 typedef struct npg_record_facts {                        /* no padding: the same bytes every time */
     int64_t first, last, new_first, new_last, direction; /* as npg_window                   */
     npg_plan time_plan;                                  /* what npg_window_time() needs    */

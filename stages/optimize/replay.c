@@ -13,7 +13,8 @@
 #include "pipeline/file.h"
 #include "pipeline/folder.h"
 
-#define OPEN_MOST 6 /* records that are kept open: those around a moment, and of their frames' neighbours */
+#define MOTION_NAME "motion_%06lld.npg" /* as job/job.h says */
+#define OPEN_MOST   6 /* records that are kept open: those around a moment, and of their frames' neighbours */
 
 typedef struct record {
     int64_t serial;
@@ -45,14 +46,14 @@ struct npg_replay {
 static npg_status path_of(const npg_replay *r, char **path, int64_t serial)
 {
     char name[64];
-    snprintf(name, sizeof name, NPG_MOTION_NAME, (long long)serial);
+    snprintf(name, sizeof name, MOTION_NAME, (long long)serial);
     return npg_join_path(path, r->folder, name);
 }
 
 static npg_status bad(int64_t serial, const char *what)
 {
     char name[64];
-    snprintf(name, sizeof name, NPG_MOTION_NAME, (long long)serial);
+    snprintf(name, sizeof name, MOTION_NAME, (long long)serial);
     return npg_error(NPG_BAD_INPUT, "job/%s: %s", name, what);
 }
 

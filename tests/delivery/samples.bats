@@ -39,7 +39,7 @@ run_for() {
 highest() { sed -n 's/.*highest vertex at y = //p' <<<"$output"; }
 
 @test "stages of one's own see what they should and take points away" {
-    run_for "0 7" "$samples/sample_own_stage" capture/points own 0
+    run_for "0 7" "$samples/sample_custom_stage" capture/points own 0
     [[ "$output" == "3 frames, "*  || "$output" == *$'\n'"3 frames, "* ]]
     awk -v y="$(highest)" 'BEGIN { exit !(y > 0.5 && y < 1.5) }'
     dropped=$(grep -A 3 '"floor": {' own/report.json | sed -n 's/.*"points_dropped": \([0-9]*\).*/\1/p')
@@ -48,18 +48,18 @@ highest() { sed -n 's/.*highest vertex at y = //p' <<<"$output"; }
     # the end that the floor took)
     "$NEUPIG" probe own/reference.ply --json >probe.json || [ $? -eq 7 ]
     awk '/"low"/ { getline; getline; exit !($1 + 0 > -0.3) }' probe.json
-    grep -q '"own_stages":' own/job/job.json
+    grep -q '"custom_stages":' own/job/job.json
 }
 
 @test "a run does not go on from one with other stages" {
-    run_for 0 "$samples/sample_own_stage" capture/points again -5
+    run_for 0 "$samples/sample_custom_stage" capture/points again -5
     run_for 2 "$NEUPIG" run capture/points -o again --epochs 10 --faces 800 --width-1 64 --width-2 64
     [[ "$output" == *"the stages that the program added"* ]]
-    run_for "0 7" "$samples/sample_own_stage" capture/points again -5
+    run_for "0 7" "$samples/sample_custom_stage" capture/points again -5
 }
 
 @test "a stage that finds nothing left ends the run with its name" {
-    run_for 3 "$samples/sample_own_stage" capture/points none 1000
+    run_for 3 "$samples/sample_custom_stage" capture/points none 1000
     [ ! -e none/done.json ]
 }
 

@@ -222,7 +222,7 @@ static npg_status see(npg_worker *worker, npg_frame *frame, void *user)
 static npg_status read_report(npg_worker *worker)
 {
     scene *s = script.user;
-    json_t *stages = json_object_get(npg_worker_whole_report(worker), "stages");
+    json_t *stages = json_object_get(npg_worker_run_report(worker), "stages");
     json_t *own = json_object_get(stages, "evaluate");
     json_t *median = json_object_get(json_object_get(own, "figures"), "point_dist_median");
     s->bad_count = json_array_size(json_object_get(own, "bad"));

@@ -14,7 +14,7 @@ static const npg_stage *const chain[] = {&test_source,    &npg_stage_outlier, &n
                                          &npg_stage_mesh, &test_sink,         NULL};
 
 typedef struct seen {
-    int64_t key;
+    int64_t key, reported_key;
     int64_t euler;
     npg_manifold manifold;
     size_t frames;
@@ -26,6 +26,9 @@ static npg_status see(npg_worker *worker, npg_frame *frame, void *user)
     const npg_facts *facts = npg_worker_facts(worker);
     s->frames++;
     s->key = facts->plan.key;
+    const json_t *stages = json_object_get(npg_worker_run_report(worker), "stages");
+    const json_t *key = json_object_get(json_object_get(stages, "keyframe"), "key");
+    s->reported_key = (int64_t)json_integer_value(json_object_get(key, "index"));
     if (!frame->is_key) return NPG_OK;
     NPG_TRY(npg_mesh_manifold(&s->manifold, facts->reference));
     s->euler = (int64_t)facts->reference->vert_count - (int64_t)s->manifold.edge_count +
@@ -60,6 +63,7 @@ static seen run(const char *choice, const char *welds)
     if (status) print_message("%s\n", text);
     assert_int_equal(status, NPG_OK);
     assert_int_equal(s.frames, 10);
+    assert_int_equal(s.reported_key, s.key); /* one decision, one figure */
     return s;
 }
 

@@ -69,7 +69,7 @@ static npg_status see(npg_worker *worker, npg_frame *frame, void *user)
 {
     scene *s = user;
     const npg_facts *facts = npg_worker_facts(worker);
-    const json_t *stages = json_object_get(npg_worker_whole_report(worker), "stages");
+    const json_t *stages = json_object_get(npg_worker_run_report(worker), "stages");
     const json_t *best = json_array_get(json_object_get(json_object_get(stages, "keyframe"), "best"), 0);
     if (s->seen_count < FRAMES) s->order[s->seen_count++] = frame->index;
     if (frame->is_key) {

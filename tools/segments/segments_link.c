@@ -9,6 +9,8 @@
 #include "export/export.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
+#include "job/file_facts.h"
+#include "job/frame_log.h"
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"
 #include "tools/segments/segments.h"

@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include "export/export.h"
+#include "job/file_facts.h"
+#include "job/frame_log.h"
 #include "pipeline/file.h"
 #include "pipeline/folder.h"
 #include "pipeline/json_file.h"

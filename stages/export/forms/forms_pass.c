@@ -9,9 +9,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "export/export.h"
 #include "export/forms/forms.h"
 #include "ingest/formats/reader.h"
+#include "job/file_facts.h"
+#include "job/frame_log.h"
 #include "pipeline/file.h"
 
 struct npg_form_log {

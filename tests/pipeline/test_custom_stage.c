@@ -101,7 +101,7 @@ static npg_status check_odd(npg_worker *worker, npg_frame *frame, void *user)
 }
 
 /* A run over files with these stages; the options are gone before it begins to be waited for. */
-static npg_status run_with(const npg_own_stage *stages, size_t count, char text[1024])
+static npg_status run_with(const npg_custom_stage *stages, size_t count, char text[1024])
 {
     npg_options *options = NULL;
     npg_run *run = NULL;
@@ -129,8 +129,8 @@ static void it_sees_every_pass_until_the_keyframe_is_known_and_the_last_one_afte
     seen early = {0}, late = {0};
     (void)state;
     set_script(NULL);
-    const npg_own_stage stages[] = {{sizeof *stages, early_name, "cleaner", &early, count_frames},
-                                    {sizeof *stages, "late", "keyer", &late, count_frames}};
+    const npg_custom_stage stages[] = {{sizeof *stages, early_name, "cleaner", &early, count_frames},
+                                       {sizeof *stages, "late", "keyer", &late, count_frames}};
     assert_int_equal(run_with(stages, 2, text), NPG_OK);
     assert_int_equal(early.frames, 3 * FRAMES);
     assert_int_equal(late.frames, FRAMES);
@@ -144,8 +144,8 @@ static void what_it_drops_and_moves_the_stages_behind_get(void **state)
     (void)state;
     set_script(&counted);
     script.see = check_odd;
-    const npg_own_stage stages[] = {{sizeof *stages, "odd", "source", NULL, keep_odd},
-                                    {sizeof *stages, "count", "source", &counted, count_frames}};
+    const npg_custom_stage stages[] = {{sizeof *stages, "odd", "source", NULL, keep_odd},
+                                       {sizeof *stages, "count", "source", &counted, count_frames}};
     assert_int_equal(run_with(stages, 2, text), NPG_OK);
     assert_int_equal(counted.points_at_end, FRAMES * POINTS / 2);
     assert_int_equal(counted.points, 3 * FRAMES * POINTS / 2); /* of what the first left */
@@ -155,7 +155,7 @@ static void check_failure(seen how, npg_status expected, const char *words)
 {
     char text[1024];
     set_script(NULL);
-    const npg_own_stage stage = {sizeof stage, "mine", "cleaner", &how, misbehave};
+    const npg_custom_stage stage = {sizeof stage, "mine", "cleaner", &how, misbehave};
     assert_int_equal(run_with(&stage, 1, text), expected);
     if (!strstr(text, words)) print_error("%s\n", text);
     assert_non_null(strstr(text, words));
@@ -172,7 +172,7 @@ static void its_failures_end_the_run_with_its_words(void **state)
     check_failure((seen){.first_only_kept = true}, NPG_BAD_INPUT, "mine: frame 3: dropped every point");
 }
 
-static void check_refused(npg_options *options, npg_own_stage stage, const char *words)
+static void check_refused(npg_options *options, npg_custom_stage stage, const char *words)
 {
     assert_int_equal(npg_options_add_stage(options, &stage), NPG_USAGE);
     if (!strstr(npg_error_text(), words)) print_error("%s\n", npg_error_text());
@@ -183,27 +183,27 @@ static void what_makes_no_sense_is_refused(void **state)
 {
     npg_options *options;
     char name[] = "more-0";
-    const size_t size = sizeof(npg_own_stage);
+    const size_t size = sizeof(npg_custom_stage);
     (void)state;
     assert_int_equal(npg_options_open_chain(&options, chain), NPG_OK);
-    check_refused(options, (npg_own_stage){size, "a", "nowhere", NULL, keep_odd}, "no stage nowhere");
-    check_refused(options, (npg_own_stage){size, "a", "absent", NULL, keep_odd}, "no stage absent");
-    check_refused(options, (npg_own_stage){size, "keyer", "source", NULL, keep_odd}, "taken");
-    check_refused(options, (npg_own_stage){size, "run", "source", NULL, keep_odd}, "taken");
-    check_refused(options, (npg_own_stage){size, "Two words", "source", NULL, keep_odd}, "small letters");
-    check_refused(options, (npg_own_stage){size, "", "source", NULL, keep_odd}, "small letters");
-    check_refused(options, (npg_own_stage){size, "a", "source", NULL, NULL}, "needs");
-    check_refused(options, (npg_own_stage){size, NULL, "source", NULL, keep_odd}, "needs");
-    check_refused(options, (npg_own_stage){size - 1, "a", "source", NULL, keep_odd}, "struct_size");
+    check_refused(options, (npg_custom_stage){size, "a", "nowhere", NULL, keep_odd}, "no stage nowhere");
+    check_refused(options, (npg_custom_stage){size, "a", "absent", NULL, keep_odd}, "no stage absent");
+    check_refused(options, (npg_custom_stage){size, "keyer", "source", NULL, keep_odd}, "taken");
+    check_refused(options, (npg_custom_stage){size, "run", "source", NULL, keep_odd}, "taken");
+    check_refused(options, (npg_custom_stage){size, "Two words", "source", NULL, keep_odd}, "small letters");
+    check_refused(options, (npg_custom_stage){size, "", "source", NULL, keep_odd}, "small letters");
+    check_refused(options, (npg_custom_stage){size, "a", "source", NULL, NULL}, "needs");
+    check_refused(options, (npg_custom_stage){size, NULL, "source", NULL, keep_odd}, "needs");
+    check_refused(options, (npg_custom_stage){size - 1, "a", "source", NULL, keep_odd}, "struct_size");
     assert_int_equal(npg_options_add_stage(options, NULL), NPG_USAGE);
     assert_int_equal(npg_options_add_stage(NULL, NULL), NPG_USAGE);
-    for (int i = 0; i < NPG_OWN_STAGES_MAX; i++) {
+    for (int i = 0; i < NPG_CUSTOM_STAGES_MAX; i++) {
         name[5] = (char)('0' + i);
-        npg_own_stage stage = {size, name, "source", NULL, keep_odd};
+        npg_custom_stage stage = {size, name, "source", NULL, keep_odd};
         assert_int_equal(npg_options_add_stage(options, &stage), NPG_OK);
         check_refused(options, stage, "taken");
     }
-    check_refused(options, (npg_own_stage){size, "last", "source", NULL, keep_odd}, "no more than");
+    check_refused(options, (npg_custom_stage){size, "last", "source", NULL, keep_odd}, "no more than");
     npg_options_close(&options);
     assert_int_equal(npg_memory_used(), 0);
 }

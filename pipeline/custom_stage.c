@@ -1,27 +1,27 @@
 /* Own stage: a stage that a program adds to the chain; shows each frame to a callback. */
-#include "pipeline/own_stage.h"
+#include "pipeline/custom_stage.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "pipeline/run_internal.h"
 
-typedef struct own_state {
+typedef struct custom_state {
     uint8_t *keep; /* owned */
     size_t keep_capacity;
     int64_t frames, points_dropped;
-} own_state;
+} custom_state;
 
-static const npg_own *own_of(const npg_worker *worker)
+static const npg_custom *custom_of(const npg_worker *worker)
 {
-    return (const npg_own *)(const void *)worker->stage;
+    return (const npg_custom *)(const void *)worker->stage;
 }
 
 /* ---- one frame ---- */
 
 static npg_status show_points(npg_frame_view *view, npg_worker *worker, npg_frame *frame)
 {
-    own_state *s = npg_worker_state(worker);
+    custom_state *s = npg_worker_state(worker);
     view->point_count = frame->point_count;
     view->points = frame->pos_local;
     view->normals = frame->normals;
@@ -52,8 +52,8 @@ static npg_status check_finite(const float *values, size_t count, const char *wh
 
 static npg_status take_back(npg_worker *worker, npg_frame *frame)
 {
-    own_state *s = npg_worker_state(worker);
-    bool is_clean = own_of(worker)->fields & NPG_FIELD_CLEAN;
+    custom_state *s = npg_worker_state(worker);
+    bool is_clean = custom_of(worker)->fields & NPG_FIELD_CLEAN;
     size_t before = frame->point_count;
     npg_frame_keep(frame, s->keep);
     s->frames++;
@@ -73,7 +73,7 @@ static npg_status result_of(npg_status status)
 
 static npg_status do_frame(npg_worker *worker, npg_frame *frame)
 {
-    const npg_own *own = own_of(worker);
+    const npg_custom *custom = custom_of(worker);
     bool has_figures = frame->fields & NPG_FIELD_FIGURES;
     npg_frame_view view = {.struct_size = sizeof view,
                            .index = frame->index,
@@ -84,7 +84,7 @@ static npg_status do_frame(npg_worker *worker, npg_frame *frame)
     NPG_TRY(show_points(&view, worker, frame));
     if (frame->vert_unit) show_vertices(&view, npg_worker_facts(worker), frame);
     npg_error_restore(NPG_OK, "");
-    NPG_TRY(result_of(own->given.frame(own->given.user, &view)));
+    NPG_TRY(result_of(custom->given.frame(custom->given.user, &view)));
     return take_back(worker, frame);
 }
 
@@ -105,7 +105,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 
 static npg_status flush(npg_worker *worker)
 {
-    const own_state *s = npg_worker_state(worker);
+    const custom_state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "frames", json_integer((json_int_t)s->frames));
     json_object_set_new(report, "points_dropped", json_integer((json_int_t)s->points_dropped));
@@ -114,7 +114,7 @@ static npg_status flush(npg_worker *worker)
 
 static void uninit(npg_worker *worker)
 {
-    own_state *s = npg_worker_state(worker);
+    custom_state *s = npg_worker_state(worker);
     npg_release(&s->keep);
 }
 
@@ -124,19 +124,19 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     return npg_worker_facts(worker)->point_count_max;
 }
 
-npg_own npg_own_make(const npg_own_stage *given, const npg_stage *before, uint32_t fields)
+npg_custom npg_custom_make(const npg_custom_stage *given, const npg_stage *before, uint32_t fields)
 {
     /* Only what is ahead of the keyframe shapes what the passes before the last find out. */
-    return (npg_own){.stage = {.name = given->name,
-                               .help = "a stage of the program's own",
-                               .state_size = sizeof(own_state),
-                               .passes = fields & NPG_FIELD_KEY ? NPG_PASS_SOLVE : before->passes,
-                               .process = process,
-                               .flush = flush,
-                               .uninit = uninit,
-                               .memory = memory},
-                     .given = *given,
-                     .fields = fields};
+    return (npg_custom){.stage = {.name = given->name,
+                                  .help = "a stage that the program added",
+                                  .state_size = sizeof(custom_state),
+                                  .passes = fields & NPG_FIELD_KEY ? NPG_PASS_SOLVE : before->passes,
+                                  .process = process,
+                                  .flush = flush,
+                                  .uninit = uninit,
+                                  .memory = memory},
+                        .given = *given,
+                        .fields = fields};
 }
 
 /* ---- what a program gives ---- */
@@ -148,7 +148,7 @@ static const npg_stage *find(const npg_stage *const *chain, const char *name)
     return NULL;
 }
 
-npg_status npg_own_check(const npg_own_stage *given, const npg_stage *const *chain)
+npg_status npg_custom_check(const npg_custom_stage *given, const npg_stage *const *chain)
 {
     NPG_REQUIRE(given->name && given->after && given->frame);
     size_t length = strlen(given->name);

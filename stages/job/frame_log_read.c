@@ -1,12 +1,14 @@
-/* The list of frames as a run that goes on finds it. */
+/* Frame log: the lines of an earlier run. */
+#include "job/frame_log.h"
+
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "export/export.h"
 #include "pipeline/file.h"
 
 npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line *visit, void *user)
@@ -37,7 +39,43 @@ npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line 
     return status;
 }
 
-/* ---- going back to where appended frames begin ---- */
+npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_visit_line *visit, void *user)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
+    npg_status status = npg_frame_lines_each(path, bytes, visit, user);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- the log that goes with a state ---- */
+
+npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
+    int fd = open(path, O_RDWR | O_CLOEXEC);
+    npg_status status = NPG_OK;
+    if (fd < 0 || fdatasync(fd)) status = npg_error_errno(NPG_DISK, "can't sync %s", path);
+    if (fd >= 0) close(fd);
+    if (!status) status = npg_hash_file(hash, path, (uint64_t)bytes);
+    npg_release(&path);
+    return status;
+}
+
+npg_status npg_frame_log_check(const char *output, int64_t bytes, uint64_t hash)
+{
+    uint64_t now;
+    char *path;
+    NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
+    npg_status status = npg_hash_file(&now, path, (uint64_t)bytes);
+    if (!status && now != hash)
+        status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- appended frames ---- */
 
 typedef struct shortened {
     npg_file *file;
@@ -69,11 +107,11 @@ static npg_status shorten(const char *from, const char *to, int64_t below, int64
     return status;
 }
 
-npg_status npg_frame_log_go_back(const char *output, int64_t below, int64_t *lines, int64_t *bytes)
+npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lines, int64_t *bytes)
 {
     char *whole, *partial = NULL;
     NPG_TRY(npg_join_path(&whole, output, "frames.jsonl"));
-    npg_status status = npg_join_path(&partial, output, "frames.partial.jsonl");
+    npg_status status = npg_join_path(&partial, output, NPG_FRAME_LOG_NAME);
     bool is_whole = !status && access(whole, F_OK) == 0;
     if (!status) status = shorten(is_whole ? whole : partial, partial, below, lines, bytes);
     if (!status && is_whole && unlink(whole)) status = npg_error_errno(NPG_DISK, "can't remove %s", whole);

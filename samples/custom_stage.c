@@ -1,9 +1,9 @@
 /* Stages of one's own in the chain: one takes the floor away before anything else looks at the points, one
  * watches the finished meshes go by.
  *
- *     own_stage CAPTURE OUT FLOOR      points with y below FLOOR are dropped
+ *     custom_stage CAPTURE OUT FLOOR      points with y below FLOOR are dropped
  *
- * Build:  cc own_stage.c -o own_stage $(pkg-config --cflags --libs neupig) */
+ * Build:  cc custom_stage.c -o custom_stage $(pkg-config --cflags --libs neupig) */
 #include <neupig.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,12 +54,12 @@ int main(int argc, char **argv)
 {
     double floor_y = argc > 3 ? atof(argv[3]) : 0;
     watch seen = {0, 0};
-    npg_own_stage floor_stage = {sizeof floor_stage, "floor", "ingest", &floor_y, drop_floor};
-    npg_own_stage watch_stage = {sizeof watch_stage, "watch", "evaluate", &seen, note_height};
+    npg_custom_stage floor_stage = {sizeof floor_stage, "floor", "ingest", &floor_y, drop_floor};
+    npg_custom_stage watch_stage = {sizeof watch_stage, "watch", "evaluate", &seen, note_height};
     npg_options *options = NULL;
     npg_run *run = NULL;
     if (argc < 4) {
-        fprintf(stderr, "usage: own_stage CAPTURE OUT FLOOR\n");
+        fprintf(stderr, "usage: custom_stage CAPTURE OUT FLOOR\n");
         return 2;
     }
     npg_status status = open_options(&options, argv[1], argv[2]);
@@ -69,7 +69,7 @@ int main(int argc, char **argv)
     if (!status) status = npg_run_open(&run, options, NULL);
     if (!status) status = npg_run_wait(run); /* the stages' threads are done when this returns */
     if (status >= 0) printf("%lld frames, the highest vertex at y = %.3f\n", seen.frames, seen.highest);
-    if (status < 0) fprintf(stderr, "own_stage: %s\n", npg_error_text());
+    if (status < 0) fprintf(stderr, "custom_stage: %s\n", npg_error_text());
     npg_run_close(&run);
     npg_options_close(&options);
     return npg_status_exit_code(status);

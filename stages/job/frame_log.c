@@ -1,15 +1,15 @@
-/* The list of frames and the last file of a run. */
+/* Frame log: one line for every frame whose results are on disk. */
+#include "job/frame_log.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
 
-#include "export/export.h"
+#include "job/file_facts.h"
 #include "pipeline/file.h"
 
 typedef struct line_place { /* a frame's line in the partial list */
@@ -25,61 +25,6 @@ struct npg_frame_log {
     line_place *lines; /* owned */
     size_t line_count, line_capacity;
 };
-
-/* ---- checksums ---- */
-
-static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
-{
-    unsigned char block[16 << 10];
-    XXH3_state_t *state = XXH3_createState();
-    if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
-    XXH3_64bits_reset(state);
-    int fd;
-    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
-    *size = 0;
-    while (!status) {
-        ssize_t got = read(fd, block, sizeof block);
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-        if (got <= 0) break;
-        XXH3_64bits_update(state, block, (size_t)got);
-        *size += got;
-    }
-    if (fd >= 0) close(fd);
-    *hash = XXH3_64bits_digest(state);
-    XXH3_freeState(state);
-    return status;
-}
-
-npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
-{
-    char *path, text[17];
-    XXH64_hash_t hash;
-    int64_t size;
-    NPG_TRY(npg_join_path(&path, output, file));
-    npg_status status = hash_file(&hash, &size, path);
-    npg_release(&path);
-    NPG_TRY(status);
-    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
-    json_object_set_new(entry, "bytes", json_integer((json_int_t)size));
-    json_object_set_new(entry, "xxh3", json_string(text));
-    return NPG_OK;
-}
-
-npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
-{
-    if (!npg_path_stays(file))
-        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
-    json_t *now = json_object();
-    npg_status status = npg_file_facts(now, output, file);
-    if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
-                    !json_equal(json_object_get(now, "xxh3"), json_object_get(entry, "xxh3"))))
-        status = npg_error(NPG_BAD_INPUT,
-                           "%s/%s was changed since it was written; --restart discards what is there", output,
-                           file);
-    json_decref(now);
-    return status == NPG_DISK ? NPG_BAD_INPUT : status;
-}
 
 /* ---- one line ---- */
 
@@ -136,7 +81,7 @@ static double real_of(const json_t *value)
     return json_is_number(value) ? (double)(float)json_number_value(value) : (double)NAN;
 }
 
-void npg_misfits_take(npg_figures *figures, const json_t *misfits)
+void npg_frame_line_misfits(npg_figures *figures, const json_t *misfits)
 {
     for (int i = 0; i < NPG_MISFITS; i++) {
         const json_t *misfit = json_object_get(misfits, misfit_names[i]);
@@ -176,7 +121,7 @@ static npg_status open_list(npg_frame_log **out, const char *output, int flags)
     NPG_TRY(npg_alloc(&list, NPG_FOR_FILES, sizeof *list));
     list->fd = -1;
     NPG_TRY_OR(fail, status, npg_copy_text(&list->output, output));
-    NPG_TRY_OR(fail, status, npg_join_path(&list->partial_path, output, "frames.partial.jsonl"));
+    NPG_TRY_OR(fail, status, npg_join_path(&list->partial_path, output, NPG_FRAME_LOG_NAME));
     list->fd = open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
     if (list->fd < 0) {
         status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
@@ -332,97 +277,5 @@ npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts)
         npg_file_discard(&file);
     else
         status = npg_file_commit(&file);
-    return status;
-}
-
-/* ---- done.json ---- */
-
-static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)
-{
-    char *text = json_dumps(entry, JSON_COMPACT);
-    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
-    npg_status status = npg_file_print(file, "%s\n    ", *is_first ? "" : ",");
-    if (!status) status = npg_file_write(file, text, strlen(text));
-    *is_first = false;
-    free(text);
-    return status;
-}
-
-static npg_status write_file_entry(npg_file *file, const char *output, const char *name, bool *is_first)
-{
-    json_t *entry = json_pack("{ss}", "path", name);
-    npg_status status = npg_file_facts(entry, output, name);
-    if (!status) status = write_entry(file, entry, is_first);
-    json_decref(entry);
-    return status;
-}
-
-/* Sizes and checksums of the meshes or of the other forms' files, from the lines of the list that has them.
- */
-static npg_status write_entries(npg_file *file, const char *output, const char *list_name, bool *is_first)
-{
-    char *path, *line = NULL;
-    size_t capacity = 0;
-    npg_status status = NPG_OK;
-    NPG_TRY(npg_join_path(&path, output, list_name));
-    FILE *list = fopen(path, "re");
-    if (!list) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-    while (!status && getline(&line, &capacity, list) > 0) {
-        json_t *frame = json_loads(line, 0, NULL), *name = json_object_get(frame, "file");
-        if (!frame) status = npg_error(NPG_DISK, "%s was changed while the run wrote it", path);
-        if (json_is_string(name)) {
-            json_t *entry = json_pack("{sO sO sO}", "path", name, "bytes", json_object_get(frame, "bytes"),
-                                      "xxh3", json_object_get(frame, "xxh3"));
-            status =
-                entry ? write_entry(file, entry, is_first) : npg_error(NPG_MEMORY, "no memory for done.json");
-            json_decref(entry);
-        }
-        json_decref(frame);
-    }
-    if (list && !status && ferror(list)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-    if (list) fclose(list);
-    free(line);
-    npg_release(&path);
-    return status;
-}
-
-static npg_status write_done(npg_file *file, const char *output, const json_t *head, bool has_forms)
-{
-    static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
-    bool is_first = true;
-    char *text = json_dumps(head, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
-    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
-    size_t size = strlen(text) - 2; /* without the last newline and brace: the files are added */
-    npg_status status = npg_file_write(file, text, size);
-    free(text);
-    if (!status) status = npg_file_print(file, ",\n  \"files\": [");
-    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++)
-        status = write_file_entry(file, output, names[i], &is_first);
-    if (!status) status = write_entries(file, output, "frames.jsonl", &is_first);
-    if (!status && has_forms) status = write_file_entry(file, output, "exports.jsonl", &is_first);
-    if (!status && has_forms) status = write_entries(file, output, "exports.jsonl", &is_first);
-    return status ? status : npg_file_print(file, "\n  ]\n}\n");
-}
-
-/* The partial list is what an interrupted run goes on from: it goes when nothing is left to go on with. */
-npg_status npg_done_write(const char *output, json_t *head, bool has_forms)
-{
-    char *path = NULL, *partial = NULL;
-    npg_file *file = NULL;
-    npg_status status = npg_join_path(&path, output, "done.json");
-    if (!status) status = npg_join_path(&partial, output, "frames.partial.jsonl");
-    if (!status) status = npg_file_open(&file, path);
-    if (!status) status = write_done(file, output, head, has_forms);
-    if (!status) {
-        status = npg_file_commit(&file);
-        if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */
-    } else {
-        npg_file_discard(&file);
-    }
-    if (!status && unlink(partial) && errno != ENOENT)
-        status = npg_error_errno(NPG_DISK, "can't remove %s", partial);
-    npg_release(&path);
-    npg_release(&partial);
-    json_decref(head);
     return status;
 }
