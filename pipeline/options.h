@@ -19,6 +19,39 @@ typedef struct npg_option {
     const char *value_name; /* for the help: N, DIR, FILE; NULL: by the type */
 } npg_option;
 
+/* The rows of a table, a macro for each type: name, place of the value, default, what the value may be, and
+ * on lines of its own the help.  "shown" stands for the value in the help (value_name above).  Tables are
+ * aligned by hand, between "clang-format off" and "on":
+ *
+ *     type         name      place        default  least  most  shown as or words
+ *     NPG_ROW_INT ("epochs", AT(epochs),  "10",    0,     1e6,  "N",
+ *         "help"),
+ */
+#define NPG_ROW_FLAG(word, place, initial, text)                                                             \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = NPG_OPTION_FLAG, .offset = (place),                          \
+        .default_text = (initial)                                                                            \
+    }
+#define NPG_ROW_INT(word, place, initial, least, most, shown, text)                                          \
+    NPG_ROW_NUMBER(NPG_OPTION_INT, word, place, initial, least, most, shown, text)
+#define NPG_ROW_REAL(word, place, initial, least, most, shown, text)                                         \
+    NPG_ROW_NUMBER(NPG_OPTION_REAL, word, place, initial, least, most, shown, text)
+#define NPG_ROW_NUMBER(kind, word, place, initial, least, most, shown, text)                                 \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = (kind), .offset = (place), .default_text = (initial),        \
+        .min = (least), .max = (most), .value_name = (shown)                                                 \
+    }
+#define NPG_ROW_CHOICE(word, place, initial, words, text)                                                    \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = NPG_OPTION_CHOICE, .offset = (place),                        \
+        .default_text = (initial), .choices = (words)                                                        \
+    }
+#define NPG_ROW_TEXT(word, place, initial, shown, text)                                                      \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = NPG_OPTION_TEXT, .offset = (place),                          \
+        .default_text = (initial), .value_name = (shown)                                                     \
+    }
+
 /* A named set of values; what the user sets himself wins.  The list ends with a name of NULL, as does each
  * set. */
 typedef struct npg_preset_value {

@@ -36,30 +36,32 @@ static const char *const between_words[] = {"auto", "windows", "curve", "line"};
 
 #define AT(member) offsetof(settings, member)
 
+/* clang-format off */
 const npg_option npg_apply_options[] = {
-    {"mesh",
-     "Mesh (PLY, OBJ) or points (also XYZ, NPY, PCD) to carry, in the coordinates of JOB/reference.ply",
-     NPG_OPTION_TEXT, AT(mesh), "", 0, 0, NULL, "FILE"},
-    {"output", "Folder for the carried meshes (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "OUT"},
-    {"fps-scale",
-     "Steps from each frame to the next; more than 1 adds in-between frames and numbers the files 0, 1, 2 "
-     "...",
-     NPG_OPTION_INT, AT(fps_scale), "1", 1, 1000, NULL, "K"},
-    {"between",
-     "Where in-between frames come from: the saved windows, whose decoders know every time; or the run's "
-     "meshes, by "
-     "Catmull-Rom curves or straight lines; auto: the windows where the run has left them, else curves",
-     NPG_OPTION_CHOICE, AT(between), "auto", 0, 0, "auto|windows|curve|line", NULL},
-    {"device", "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name",
-     NPG_OPTION_TEXT, AT(device), "auto", 0, 0, NULL, "DEVICE"},
-    {"far", "Points farther from the reference than this share of its diagonal are said (exit code 7)",
-     NPG_OPTION_REAL, AT(far_share), "0.05", 0, 1e6, NULL, "SHARE"},
-    {"format", "Format of the files; mesh: as the mesh that is carried (PLY for other points)",
-     NPG_OPTION_CHOICE, AT(format), "mesh", 0, 0, "mesh|ply|obj", NULL},
-    {"prefix", "First part of the files' names", NPG_OPTION_TEXT, AT(prefix), "frame", 0, 0, NULL, "NAME"},
-    {"overwrite", "Remove files of the same prefix that lie in the output folder", NPG_OPTION_FLAG,
-     AT(overwrite), "no", 0, 0, NULL, NULL},
+    /* type        name         place          default  least  most  shown as or words */
+    NPG_ROW_TEXT  ("mesh",      AT(mesh),      "",      "FILE",
+        "Mesh (PLY, OBJ) or points (also XYZ, NPY, PCD) to carry, in the coordinates of JOB/reference.ply"),
+    NPG_ROW_TEXT  ("output",    AT(output),    "",      "OUT",
+        "Folder for the carried meshes (also -o)"),
+    NPG_ROW_INT   ("fps-scale", AT(fps_scale), "1",     1,     1000, "K",
+        "Steps from each frame to the next; "
+        "more than 1 adds in-between frames and numbers the files 0, 1, 2 ..."),
+    NPG_ROW_CHOICE("between",   AT(between),   "auto",  "auto|windows|curve|line",
+        "Where in-between frames come from: the saved windows, whose decoders know every time; "
+        "or the run's meshes, by Catmull-Rom curves or straight lines; "
+        "auto: the windows where the run has left them, else curves"),
+    NPG_ROW_TEXT  ("device",    AT(device),    "auto",  "DEVICE",
+        "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name"),
+    NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
+        "Points farther from the reference than this share of its diagonal are said (exit code 7)"),
+    NPG_ROW_CHOICE("format",    AT(format),    "mesh",  "mesh|ply|obj",
+        "Format of the files; mesh: as the mesh that is carried (PLY for other points)"),
+    NPG_ROW_TEXT  ("prefix",    AT(prefix),    "frame", "NAME",
+        "First part of the files' names"),
+    NPG_ROW_FLAG  ("overwrite", AT(overwrite), "no",
+        "Remove files of the same prefix that lie in the output folder"),
     {0}};
+/* clang-format on */
 
 typedef struct moment { /* a solved frame */
     bool is_there;

@@ -11,10 +11,15 @@ typedef struct settings {
     int completion;
 } settings;
 
-const npg_option npg_man_options[] = {{"completion", "Print completion for a shell instead",
-                                       NPG_OPTION_CHOICE, offsetof(settings, completion), "none", 0, 0,
-                                       "none|bash|zsh", NULL},
-                                      {0}};
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
+const npg_option npg_man_options[] = {
+    /* type        name          place           default  words */
+    NPG_ROW_CHOICE("completion", AT(completion), "none",  "none|bash|zsh",
+        "Print completion for a shell instead"),
+    {0}};
+/* clang-format on */
 
 /* Text as roff shows it letter by letter. */
 static void put_text(const char *text)

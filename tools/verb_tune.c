@@ -15,23 +15,29 @@ typedef struct settings {
     const char *device, *tuning, *output, *only;
 } settings;
 
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
 const npg_option npg_tune_options[] = {
-    {"output", "write the set to this file instead of the cache, where runs look for it", NPG_OPTION_TEXT,
-     offsetof(settings, output), "", 0, 0, NULL, "FILE"},
-    {"only", "tune only this: decoder, or names of other numbers of a set, parted by commas", NPG_OPTION_TEXT,
-     offsetof(settings, only), "", 0, 0, NULL, "NAMES"},
-    {"vertices", "vertices of the mesh that is timed", NPG_OPTION_INT, offsetof(settings, vertices), "1500",
-     16, 1e6, NULL, NULL},
-    {"points", "points of each frame", NPG_OPTION_INT, offsetof(settings, points), "5000", 1, 1e6, NULL,
-     NULL},
-    {"frames", "frames of the window", NPG_OPTION_INT, offsetof(settings, frames), "8", 1, 1000, NULL, NULL},
-    {"repeat", "times each is taken; the median counts", NPG_OPTION_INT, offsetof(settings, repeat), "7", 1,
-     1000, NULL, NULL},
-    {"device", "OpenCL device: auto, cpu, gpu, a number or a part of its name", NPG_OPTION_TEXT,
-     offsetof(settings, device), "auto", 0, 0, NULL, "NAME"},
-    {"tuning", "the set to begin with: auto, wide, narrow, gpu or a file", NPG_OPTION_TEXT,
-     offsetof(settings, tuning), "auto", 0, 0, NULL, "SET"},
+    /* type      name        place         default  least  most  shown as */
+    NPG_ROW_TEXT("output",   AT(output),   "",      "FILE",
+        "write the set to this file instead of the cache, where runs look for it"),
+    NPG_ROW_TEXT("only",     AT(only),     "",      "NAMES",
+        "tune only this: decoder, or names of other numbers of a set, parted by commas"),
+    NPG_ROW_INT ("vertices", AT(vertices), "1500",  16,    1e6,  NULL,
+        "vertices of the mesh that is timed"),
+    NPG_ROW_INT ("points",   AT(points),   "5000",  1,     1e6,  NULL,
+        "points of each frame"),
+    NPG_ROW_INT ("frames",   AT(frames),   "8",     1,     1000, NULL,
+        "frames of the window"),
+    NPG_ROW_INT ("repeat",   AT(repeat),   "7",     1,     1000, NULL,
+        "times each is taken; the median counts"),
+    NPG_ROW_TEXT("device",   AT(device),   "auto",  "NAME",
+        "OpenCL device: auto, cpu, gpu, a number or a part of its name"),
+    NPG_ROW_TEXT("tuning",   AT(tuning),   "auto",  "SET",
+        "the set to begin with: auto, wide, narrow, gpu or a file"),
     {0}};
+/* clang-format on */
 
 typedef struct tune {
     settings s;

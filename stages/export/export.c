@@ -506,42 +506,41 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
            (has_forms ? 4 << 20 : 512 << 10);
 }
 
-#define OFFSET(member) offsetof(export_state, member)
+#define AT(member) offsetof(export_state, member)
 
+/* clang-format off */
 static const npg_option options[] = {
-    {"export",
-     "What to write, any of ply, obj (sequences), pc2, mdd (point caches), glb, usda, npz, vdb, with commas; "
-     "a "
-     "sequence is always there (see format)",
-     NPG_OPTION_TEXT, OFFSET(exports), "", 0, 0, NULL, "LIST"},
-    {"format", "Format of the mesh sequence where export names none", NPG_OPTION_CHOICE, OFFSET(format),
-     "ply", 0, 0, "ply|obj", NULL},
-    {"prefix", "First part of the mesh files' names", NPG_OPTION_TEXT, OFFSET(prefix), "frame", 0, 0, NULL,
-     "NAME"},
-    {"numbering", "Number of a mesh file: as in the input's name, or the place in the sequence",
-     NPG_OPTION_CHOICE, OFFSET(numbering), "file", 0, 0, "file|index", NULL},
-    {"scale", "Multiply all written coordinates by this", NPG_OPTION_REAL, OFFSET(scale), "1", 1e-12, 1e12,
-     NULL, NULL},
-    {"axes", "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up", NPG_OPTION_TEXT,
-     OFFSET(axes), "xyz", 0, 0, NULL, "AXES"},
-    {"fps", "Frames per second of the capture, for the report and formats that carry time", NPG_OPTION_REAL,
-     OFFSET(fps), "30", 1e-3, 1e6, NULL, NULL},
-    {"up", "Axis that points up in the written coordinates, for forms that can say it", NPG_OPTION_CHOICE,
-     OFFSET(up), "y", 0, 0, "y|z", NULL},
-    {"unit", "Unit of the written coordinates, for forms that can say it", NPG_OPTION_CHOICE, OFFSET(unit),
-     "m", 0, 0, "m|dm|cm|mm|km|in|ft", NULL},
-    {"centre",
-     "Write coordinates relative to the middle of the capture's box, which done.json then names: for "
-     "captures "
-     "far from 0",
-     NPG_OPTION_FLAG, OFFSET(is_centred), "no", 0, 0, NULL, NULL},
-    {"vdb-voxel", "Voxel of the level sets, as a share of the longest side of the capture's box",
-     NPG_OPTION_REAL, OFFSET(voxel_share), "0.005", 1e-4, 0.25, NULL, "SHARE"},
-    {"mesh-normals", "Write vertex normals into every mesh", NPG_OPTION_FLAG, OFFSET(with_normals), "no", 0,
-     0, NULL, NULL},
-    {"overwrite", "Remove meshes that an earlier run left in the output folder", NPG_OPTION_FLAG,
-     OFFSET(overwrite), "no", 0, 0, NULL, NULL},
+    /* type        name            place             default  least  most  shown as or words */
+    NPG_ROW_TEXT  ("export",       AT(exports),      "",      "LIST",
+        "What to write, any of ply, obj (sequences), pc2, mdd (point caches), "
+        "glb, usda, npz, vdb, with commas; a sequence is always there (see format)"),
+    NPG_ROW_CHOICE("format",       AT(format),       "ply",   "ply|obj",
+        "Format of the mesh sequence where export names none"),
+    NPG_ROW_TEXT  ("prefix",       AT(prefix),       "frame", "NAME",
+        "First part of the mesh files' names"),
+    NPG_ROW_CHOICE("numbering",    AT(numbering),    "file",  "file|index",
+        "Number of a mesh file: as in the input's name, or the place in the sequence"),
+    NPG_ROW_REAL  ("scale",        AT(scale),        "1",     1e-12, 1e12, NULL,
+        "Multiply all written coordinates by this"),
+    NPG_ROW_TEXT  ("axes",         AT(axes),         "xyz",   "AXES",
+        "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up"),
+    NPG_ROW_REAL  ("fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
+        "Frames per second of the capture, for the report and formats that carry time"),
+    NPG_ROW_CHOICE("up",           AT(up),           "y",     "y|z",
+        "Axis that points up in the written coordinates, for forms that can say it"),
+    NPG_ROW_CHOICE("unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
+        "Unit of the written coordinates, for forms that can say it"),
+    NPG_ROW_FLAG  ("centre",       AT(is_centred),   "no",
+        "Write coordinates relative to the middle of the capture's box, which done.json then names: "
+        "for captures far from 0"),
+    NPG_ROW_REAL  ("vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
+        "Voxel of the level sets, as a share of the longest side of the capture's box"),
+    NPG_ROW_FLAG  ("mesh-normals", AT(with_normals), "no",
+        "Write vertex normals into every mesh"),
+    NPG_ROW_FLAG  ("overwrite",    AT(overwrite),    "no",
+        "Remove meshes that an earlier run left in the output folder"),
     {0}};
+/* clang-format on */
 
 extern const npg_stage npg_stage_export;
 const npg_stage npg_stage_export = {.name = "export",

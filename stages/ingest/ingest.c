@@ -28,29 +28,28 @@ typedef struct state {
     bool is_waiting;
 } state;
 
-#define OFFSET(member) offsetof(state, member)
+#define AT(member) offsetof(state, member)
 
+/* clang-format off */
 static const npg_option ingest_options[] = {
-    {"frames",
-     "Which frames: a:b:step are positions in time as Python counts them (from 0, without b, negative from "
-     "the "
-     "end); 1-5,8 are the numbers in the file names, both ends included; empty: all",
-     NPG_OPTION_TEXT, OFFSET(frames), "", 0, 0, NULL, "SELECTION"},
-    {"missing",
-     "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, hold "
-     "repeats "
-     "the points of the frame before it, ignore takes numbers for mere names",
-     NPG_OPTION_CHOICE, OFFSET(missing), "error", 0, 0, "error|skip|hold|ignore", NULL},
-    {"cache-mib", "Memory for clouds that were read, so that the later passes need not parse files again",
-     NPG_OPTION_INT, OFFSET(cache_mib), "4", 0, 1048576, NULL, "MIB"},
-    {"follow-end", "Name of the file that ends a folder that is followed, once it is there; empty: none does",
-     NPG_OPTION_TEXT, OFFSET(follow_end), "capture.end", 0, 0, NULL, "NAME"},
-    {"follow-idle", "Seconds without any change that end a folder that is followed; 0: wait for the end file",
-     NPG_OPTION_REAL, OFFSET(follow_idle_s), "30", 0, 1e9, NULL, "SECONDS"},
-    {"follow-settle",
-     "Seconds without a change after which a file that can't be read, and that others follow, is given up",
-     NPG_OPTION_REAL, OFFSET(follow_settle_s), "2", 0, 1e6, NULL, "SECONDS"},
+    /* type        name             place                default        least  most     shown as or words */
+    NPG_ROW_TEXT  ("frames",        AT(frames),          "",            "SELECTION",
+        "Which frames: a:b:step are positions in time as Python counts them (from 0, without b, "
+        "negative from the end); 1-5,8 are the numbers in the file names, both ends included; empty: all"),
+    NPG_ROW_CHOICE("missing",       AT(missing),         "error",       "error|skip|hold|ignore",
+        "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, "
+        "hold repeats the points of the frame before it, ignore takes numbers for mere names"),
+    NPG_ROW_INT   ("cache-mib",     AT(cache_mib),       "4",           0,     1048576, "MIB",
+        "Memory for clouds that were read, so that the later passes need not parse files again"),
+    NPG_ROW_TEXT  ("follow-end",    AT(follow_end),      "capture.end", "NAME",
+        "Name of the file that ends a folder that is followed, once it is there; empty: none does"),
+    NPG_ROW_REAL  ("follow-idle",   AT(follow_idle_s),   "30",          0,     1e9,     "SECONDS",
+        "Seconds without any change that end a folder that is followed; 0: wait for the end file"),
+    NPG_ROW_REAL  ("follow-settle", AT(follow_settle_s), "2",           0,     1e6,     "SECONDS",
+        "Seconds without a change after which a file that can't be read, "
+        "and that others follow, is given up"),
     {0}};
+/* clang-format on */
 
 /* ---- files ---- */
 

@@ -411,34 +411,33 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     return CELL_WORDS * sizeof(uint64_t);
 }
 
-#define OFFSET(member) offsetof(keyframe_state, member)
+#define AT(member) offsetof(keyframe_state, member)
 
+/* clang-format off */
 static const npg_option options[] = {
-    {"keyframe",
-     "Number of the frame whose surface is the reference, as in the file names; -1: by score, or, with a "
-     "reference of one's own, the frame that it is nearest to",
-     NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
-    {"keyframe-choice",
-     "Take the frame with the best score (paper), or the one of several good frames whose surface fares best "
-     "in the "
-     "others, so that limbs which touch in one frame are not joined for the whole capture (apart; not for "
-     "live runs)",
-     NPG_OPTION_CHOICE, OFFSET(choice), "apart", 0, 0, "paper|apart", NULL},
-    {"welds",
-     "Surface of the reference that other frames stretch far from all points: cut it and close the holes, or "
-     "keep it "
-     "(live runs keep it)",
-     NPG_OPTION_CHOICE, OFFSET(welds), "cut", 0, 0, "keep|cut", NULL},
-    {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
-     OFFSET(window), "24", 0, 1e6, NULL, NULL},
-    {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
-     1e6, NULL, NULL},
-    {"look-ahead", "Live runs: frames that are held while box and keyframe are chosen among them",
-     NPG_OPTION_INT, OFFSET(look_ahead), "64", 1, 1e6, NULL, NULL},
-    {"box-margin",
-     "Live runs that go on behind the look-ahead: room left around its box, in per cent of its longest side",
-     NPG_OPTION_REAL, OFFSET(box_margin), "10", 0, 1000, NULL, "PERCENT"},
+    /* type        name               place           default  least  most  shown as or words */
+    NPG_ROW_INT   ("keyframe",        AT(number),     "-1",    -1,    1e15, NULL,
+        "Number of the frame whose surface is the reference, as in the file names; "
+        "-1: by score, or, with a reference of one's own, the frame that it is nearest to"),
+    NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
+        "Take the frame with the best score (paper), "
+        "or the one of several good frames whose surface fares best in the others, "
+        "so that limbs which touch in one frame are not joined for the whole capture "
+        "(apart; not for live runs)"),
+    NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",
+        "Surface of the reference that other frames stretch far from all points: "
+        "cut it and close the holes, or keep it (live runs keep it)"),
+    NPG_ROW_INT   ("window",          AT(window),     "24",    0,     1e6,  NULL,
+        "Frames that are solved together; 0: all of them in one window"),
+    NPG_ROW_INT   ("overlap",         AT(overlap),    "4",     0,     1e6,  NULL,
+        "Frames that a window shares with its neighbour"),
+    NPG_ROW_INT   ("look-ahead",      AT(look_ahead), "64",    1,     1e6,  NULL,
+        "Live runs: frames that are held while box and keyframe are chosen among them"),
+    NPG_ROW_REAL  ("box-margin",      AT(box_margin), "10",    0,     1000, "PERCENT",
+        "Live runs that go on behind the look-ahead: "
+        "room left around its box, in per cent of its longest side"),
     {0}};
+/* clang-format on */
 
 extern const npg_stage npg_stage_keyframe;
 const npg_stage npg_stage_keyframe = {.name = "keyframe",

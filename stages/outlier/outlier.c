@@ -32,31 +32,32 @@ typedef struct outlier_state {
     double normals_s;
 } outlier_state;
 
-#define OFFSET(member) offsetof(outlier_state, member)
+#define AT(member) offsetof(outlier_state, member)
 
+/* clang-format off */
 static const npg_option outlier_options[] = {
-    {"outliers", "Drop isolated points (PCL's statistical filter, repeated until it finds no more)",
-     NPG_OPTION_FLAG, OFFSET(drop_isolated), "yes", 0, 0, NULL, NULL},
-    {"outlier-neighbours", "Neighbours whose mean distance tells whether a point is isolated", NPG_OPTION_INT,
-     OFFSET(neighbours), "12", 2, 200, NULL, NULL},
-    {"outlier-ratio", "Standard deviations above the mean at which a point is isolated", NPG_OPTION_REAL,
-     OFFSET(ratio), "5", 0.5, 100, NULL, NULL},
-    {"voxel", "Keep one point per cube of this side, in the capture's unit; 0: all", NPG_OPTION_REAL,
-     OFFSET(voxel), "0", 0, 1e12, NULL, "LENGTH"},
-    {"points-max", "Thin frames with more points than this, with a warning", NPG_OPTION_INT,
-     OFFSET(point_max), "250000", 1000, 4e9, NULL, NULL},
-    {"normals", "Use given normals (checked and mended) or estimate them; auto: given where there are any",
-     NPG_OPTION_CHOICE, OFFSET(normals), "auto", 0, 0, "auto|estimate|given", NULL},
-    {"normals-for", "Make and mend normals for the keyframe alone or for all frames", NPG_OPTION_CHOICE,
-     OFFSET(normals_for), "key", 0, 0, "key|all", NULL},
-    {"normal-neighbours", "Points a normal is estimated from, 4 or more; 0: several numbers are tried",
-     NPG_OPTION_INT, OFFSET(normal_neighbours), "0", 0, 200, NULL, NULL},
-    {"sensor",
-     "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; none: "
-     "the "
-     "body is closed; auto: the origin, if the points look like one view from it",
-     NPG_OPTION_TEXT, OFFSET(sensor_text), "auto", 0, 0, NULL, "X,Y,Z"},
+    /* type        name                  place                  default   least  most  shown as or words */
+    NPG_ROW_FLAG  ("outliers",           AT(drop_isolated),     "yes",
+        "Drop isolated points (PCL's statistical filter, repeated until it finds no more)"),
+    NPG_ROW_INT   ("outlier-neighbours", AT(neighbours),        "12",     2,     200,  NULL,
+        "Neighbours whose mean distance tells whether a point is isolated"),
+    NPG_ROW_REAL  ("outlier-ratio",      AT(ratio),             "5",      0.5,   100,  NULL,
+        "Standard deviations above the mean at which a point is isolated"),
+    NPG_ROW_REAL  ("voxel",              AT(voxel),             "0",      0,     1e12, "LENGTH",
+        "Keep one point per cube of this side, in the capture's unit; 0: all"),
+    NPG_ROW_INT   ("points-max",         AT(point_max),         "250000", 1000,  4e9,  NULL,
+        "Thin frames with more points than this, with a warning"),
+    NPG_ROW_CHOICE("normals",            AT(normals),           "auto",   "auto|estimate|given",
+        "Use given normals (checked and mended) or estimate them; auto: given where there are any"),
+    NPG_ROW_CHOICE("normals-for",        AT(normals_for),       "key",    "key|all",
+        "Make and mend normals for the keyframe alone or for all frames"),
+    NPG_ROW_INT   ("normal-neighbours",  AT(normal_neighbours), "0",      0,     200,  NULL,
+        "Points a normal is estimated from, 4 or more; 0: several numbers are tried"),
+    NPG_ROW_TEXT  ("sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
+        "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; "
+        "none: the body is closed; auto: the origin, if the points look like one view from it"),
     {0}};
+/* clang-format on */
 
 /* ---- set-up ---- */
 
