@@ -12,8 +12,8 @@ typedef struct npg_own {
     uint32_t fields; /* NPG_FIELD_* that frames and facts have where it stands */
 } npg_own;
 
-/* A stage for `given` (a loan that outlives it), to stand right after `before` in a chain that has `fields`
- * there. */
+/* A stage for `given` (a loan that outlives it), to stand right after `before` in a chain
+ * that has `fields` there. */
 npg_own npg_own_make(const npg_own_stage *given, const npg_stage *before, uint32_t fields);
 
 /* Check what a program gives: name, place in the chain, callback.  NPG_USAGE. */

@@ -1,5 +1,5 @@
-/* Run: builds the chain, walks the capture through it in passes, and is what the public interface talks to.
- */
+/* Run: builds the chain, walks the capture through it in passes, and is what the public
+ * interface talks to. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -226,8 +226,8 @@ void npg_run_announce_memory(npg_run *run)
 
 /* ---- the conductor ---- */
 
-/* What the process ever had resident: other libraries, compiled kernels and free pages of the heap as well.
- */
+/* What the process ever had resident: other libraries, compiled kernels and free pages
+ * of the heap as well. */
 static json_int_t resident_peak(void)
 {
     struct rusage usage;

@@ -8,12 +8,12 @@ typedef struct npg_settings {
     const char *input, *follow, *output, *device, *tuning;
     int preset, quality; /* places of their words */
     int64_t seed;
-    int64_t ring_capacity;  /* chunks per ring                        */
-    int64_t chunk_frames;   /* frames per chunk                       */
-    int64_t max_memory_mib; /* 0: no limit                            */
-    bool keep_going;        /* skip frames that can't be used         */
-    bool confine;           /* refuse what lies outside its folder    */
-    bool pull;              /* finished frames are also to be pulled  */
+    int64_t ring_capacity;  /* chunks per ring                       */
+    int64_t chunk_frames;   /* frames per chunk                      */
+    int64_t max_memory_mib; /* 0: no limit                           */
+    bool keep_going;        /* skip frames that can't be used        */
+    bool confine;           /* refuse what lies outside its folder   */
+    bool pull;              /* finished frames are also to be pulled */
 } npg_settings;
 
 extern const npg_option npg_run_options[];

@@ -75,14 +75,14 @@ typedef struct applying {
     npg_origin origin;
     npg_mesh *reference, *carried;
     npg_attachment *attachment;
-    npg_job_motion *motion; /* where the saved windows are needed */
+    npg_job_motion *motion; /* where the saved windows are needed                                     */
     moment window[4];       /* in time; [1] and [2] are the two frames that are being written between */
-    float *between;         /* reference's V x 3                                                     */
-    double *pos;            /* carried's V x 3                                                       */
-    float *pos_float;       /* the same, where normals are made from it                              */
-    float *normals;         /* carried's V x 3, or NULL                                              */
-    bool turns_normals;     /* they are the file's own                                               */
-    bool is_like;           /* OBJ from OBJ: the file's lines are kept                               */
+    float *between;         /* reference's V x 3                                                      */
+    double *pos;            /* carried's V x 3                                                        */
+    float *pos_float;       /* the same, where normals are made from it                               */
+    float *normals;         /* carried's V x 3, or NULL                                               */
+    bool turns_normals;     /* they are the file's own                                                */
+    bool is_like;           /* OBJ from OBJ: the file's lines are kept                                */
     npg_mesh_names names;
     npg_file *done; /* collects OUT/done.json; appears last */
     size_t frame_count, written, far_count,
@@ -385,9 +385,9 @@ static double slope(const moment *window, int k, size_t i)
            (double)(after->index - before->index);
 }
 
-/* The reference at share 0..1 of the way from window[1] to window[2]: the cubic that has the two positions
- * and the slopes there (Catmull-Rom; the slopes count missing frames, so that a gap does not bend the curve).
- */
+/* The reference at share 0..1 of the way from window[1] to window[2]: the cubic that has the two
+ * positions and the slopes there (Catmull-Rom; the slopes count missing frames, so that a gap does
+ * not bend the curve). */
 static void make_curve(applying *a, double share)
 {
     const moment *w = a->window;

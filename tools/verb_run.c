@@ -90,9 +90,9 @@ static int wait_for_second(const watcher *w)
     }
 }
 
-/* The first signal stops the run in good order; the second ends the process the usual way.  Where something
- * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
- * moment. */
+/* The first signal stops the run in good order; the second ends the process the usual way.
+ * Where something that can't be interrupted takes too long the process ends, too:
+ * all that is on disk is whole at every moment. */
 static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to go on\n";

@@ -50,8 +50,8 @@ typedef struct tune {
 
 /* ---- what is tried ---- */
 
-/* Values of the decoder that belong together: rows, vector, tile vectors, tile rows, grad rows, head rows,
- * local. */
+/* Values of the decoder that belong together: rows, vector, tile vectors, tile rows,
+ * grad rows, head rows, local. */
 typedef struct tile_set {
     int values[7];
 } tile_set;
@@ -66,8 +66,8 @@ static const tile_set tiles_of_gpus[] = {{{64, 4, 1, 8, 8, 1, 128}},  {{32, 4, 1
                                          {{64, 4, 2, 8, 8, 1, 64}},   {{64, 4, 1, 4, 4, 1, 128}},
                                          {{64, 4, 1, 8, 16, 1, 256}}, {{0}}};
 
-/* One number alone: its name, the rows that show it, the ops to check, the values for processors and for
- * GPUs. */
+/* One number alone: its name, the rows that show it, the ops to check, the values
+ * for processors and for GPUs. */
 typedef struct one_number {
     const char *field, *row, *op;
     int processors[6], gpus[6];

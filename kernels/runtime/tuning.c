@@ -37,8 +37,8 @@ const npg_tuning npg_tuning_narrow = {.mlp_rows = 192,
                                       .span = 16,
                                       .local = 1};
 
-/* 128 items side by side in one row of 512 columns, loads of neighbours adjacent; small blocks give many
- * groups. */
+/* 128 items side by side in one row of 512 columns, loads of neighbours adjacent;
+ * small blocks give many groups. */
 const npg_tuning npg_tuning_gpu = {.mlp_rows = 64,
                                    .mlp_vector = 4,
                                    .mlp_tile_vectors = 1,

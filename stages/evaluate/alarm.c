@@ -10,11 +10,11 @@
 
 #define HISTORY  64 /* explained frames that the usual level is taken from */
 #define SPREADS  6.0
-#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation */
-#define SUSPECT  0.5    /* of the bound */
-#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere   */
-#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't */
-#define CLEARLY  2.0    /* times the misfit on the other side */
+#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation   */
+#define SUSPECT  0.5    /* of the bound                                               */
+#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere */
+#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't         */
+#define CLEARLY  2.0    /* times the misfit on the other side                         */
 #define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES)
 
 static const struct {
@@ -37,8 +37,8 @@ typedef struct level {
 } level;
 
 typedef struct side {
-    int64_t next;    /* the index whose turn it is                     */
-    record *waiting; /* came ahead of their turn; owned                */
+    int64_t next;    /* the index whose turn it is      */
+    record *waiting; /* came ahead of their turn; owned */
     size_t waiting_count, waiting_room;
     double history[NPG_MISFITS][HISTORY];
     size_t history_count; /* ever */

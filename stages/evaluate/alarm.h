@@ -49,18 +49,18 @@ void npg_alarm_finish(npg_alarm *alarm);
 
 /* What raised it. */
 typedef struct npg_alarm_cause {
-    int64_t index, number;           /* of the first unexplained frame                         */
-    int64_t seen_index, seen_number; /* of the unexplained frame with the clearest misfit  */
-    int misfit;                      /* NPG_MISFIT_*                                           */
-    double value, usual, bound;      /* shares, in the frame seen                              */
-    double at[3];                    /* where, in world coordinates                            */
+    int64_t index, number;           /* of the first unexplained frame                    */
+    int64_t seen_index, seen_number; /* of the unexplained frame with the clearest misfit */
+    int misfit;                      /* NPG_MISFIT_*                                      */
+    double value, usual, bound;      /* shares, in the frame seen                         */
+    double at[3];                    /* where, in world coordinates                       */
 } npg_alarm_cause;
 
 /* NULL while it is not raised; a loan. */
 const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction);
 
-/* "12.5 % of the points are far from the surface in one place, around (0.1, 2, 3) in frame 17; usual is 0 %".
- */
+/* "12.5 % of the points are far from the surface in one place, around (0.1, 2, 3)
+ * in frame 17; usual is 0 %". */
 void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause);
 
 /* {from_frame, from_index, figure, value, usual, bound, frame, at, cause}; JSON null for NULL. */

@@ -11,35 +11,35 @@
 #define REACH_SPACINGS 3.0
 #define REACH_SIZE     0.015 /* of the reference's diagonal */
 #define REACH_MEDIANS  5.0
-#define REACH_MOST     2.0  /* times what it is without noise */
-#define LINK_SPACINGS  2.0  /* between neighbours in a cluster of far points */
-#define LINKS          6    /* neighbours that are looked at                 */
+#define REACH_MOST     2.0  /* times what it is without noise                                        */
+#define LINK_SPACINGS  2.0  /* between neighbours in a cluster of far points                         */
+#define LINKS          6    /* neighbours that are looked at                                         */
 #define UNSEEN_MOST    0.02 /* of the reference: more than that, and it is of cameras that see parts */
 #define BESIDE_SIZE    0.15 /* of the diagonal: as far beyond a border lies surface not seen before  */
-#define TORN           1.5  /* times its length in the reference                */
-#define OFF_SHARE      0.6  /* of the reach: torn surface lies off the points   */
-#define LEAST_FAR      12   /* points in a place                                */
-#define LEAST_MISSED   20   /* points that would lie on a place of the surface  */
-#define LEAST_VERTS    6    /* vertices whose mean area it has                  */
-#define FEW            0.6  /* of the points that a part should have            */
+#define TORN           1.5  /* times its length in the reference                                     */
+#define OFF_SHARE      0.6  /* of the reach: torn surface lies off the points                        */
+#define LEAST_FAR      12   /* points in a place                                                     */
+#define LEAST_MISSED   20   /* points that would lie on a place of the surface                       */
+#define LEAST_VERTS    6    /* vertices whose mean area it has                                       */
+#define FEW            0.6  /* of the points that a part should have                                 */
 
 struct npg_misfit_finder {
-    const npg_mesh *reference; /* loan */
-    double size;               /* its diagonal                                       */
-    bool is_closed;            /* has no border, and its frame saw all of it         */
-    uint8_t *is_border;        /* V: on the border of what its frame saw; owned      */
-    uint32_t (*edges)[2];      /* E x 2; owned */
+    const npg_mesh *reference; /* loan                                          */
+    double size;               /* its diagonal                                  */
+    bool is_closed;            /* has no border, and its frame saw all of it    */
+    uint8_t *is_border;        /* V: on the border of what its frame saw; owned */
+    uint32_t (*edges)[2];      /* E x 2; owned                                  */
     size_t edge_count;
     float *edge_lengths; /* E, of the reference; owned */
     uint32_t *part_of;   /* V: which part of the reference; owned */
     size_t part_count;
     double *part_sums; /* of each part: area, area x position, points; x 5; owned */
     /* scratch, owned */
-    uint32_t *parents; /* of the places so far: max(N, V)        */
-    double *sums;      /* their size and weighted middle: x 4    */
-    uint8_t *flags;    /* V                                      */
-    float *far;        /* far points x 3                         */
-    uint32_t *links;   /* far points x LINKS                     */
+    uint32_t *parents; /* of the places so far: max(N, V)     */
+    double *sums;      /* their size and weighted middle: x 4 */
+    uint8_t *flags;    /* V                                   */
+    float *far;        /* far points x 3                      */
+    uint32_t *links;   /* far points x LINKS                  */
     float *link_sq;
     size_t parents_room, sums_room, far_room, links_room, link_sq_room;
 };

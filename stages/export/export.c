@@ -194,8 +194,8 @@ static npg_form_facts form_facts(const npg_worker *worker)
                             .placement = &state->map};
 }
 
-/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be
- * told. */
+/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.
+ * 0 where it can't be told. */
 static uint64_t bytes_of_meshes(const npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);

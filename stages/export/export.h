@@ -4,7 +4,7 @@
  *     OUT/reference.ply                      the reference mesh
  *     OUT/frames.jsonl                       one line per frame, in the order of time
  *     OUT/frames.partial.jsonl               the same while the run goes on, in the order of solving
- *     OUT/exports.jsonl and what it lists     other forms (forms.h)
+ *     OUT/exports.jsonl and what it lists    other forms (forms/forms.h)
  *     OUT/report.json                        the run's report
  *     OUT/done.json                          last of all: what was made, with sizes and checksums */
 #ifndef NPG_EXPORT_H

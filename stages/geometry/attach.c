@@ -48,8 +48,8 @@ static void mix(double out[3], const float *rows, const uint32_t *face, const fl
 /* ---- the frame of a place on the surface ---- */
 
 typedef struct local_frame {
-    double axes[3][3];    /* two tangents and the normal, orthonormal and right-handed      */
-    double corners[3][2]; /* of the face around their middle, in the plane of the tangents  */
+    double axes[3][3];    /* two tangents and the normal, orthonormal and right-handed     */
+    double corners[3][2]; /* of the face around their middle, in the plane of the tangents */
 } local_frame;
 
 static void face_corners(local_frame *frame, const float *vert_pos, const uint32_t *face)
@@ -122,8 +122,8 @@ static bool looks_along(const npg_mesh *rest, uint32_t face_number, const float 
     return dot(out, n) >= 0;
 }
 
-/* Two rays from every such point, along its normal and against it; the nearer face that looks its way wins.
- */
+/* Two rays from every such point, along its normal and against it; the nearer face
+ * that looks its way wins. */
 static npg_status try_rays(npg_attachment *t, const npg_surface *surface, const float *points,
                            const uint32_t *wrong, size_t wrong_count, float reach)
 {

@@ -1,5 +1,5 @@
-/* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures of the method's paper.
- */
+/* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures
+ * of the method's paper. */
 #include "geometry/metrics.h"
 
 #include <math.h>

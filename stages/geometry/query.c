@@ -81,8 +81,8 @@ static npg_status build(npg_surface *surface)
     surface->geometry = rtcNewGeometry(surface->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     if (!surface->scene || !surface->geometry) return check(surface, "making a scene");
     rtcSetSceneFlags(surface->scene, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST);
-    /* Only scenes of low quality ask a geometry for its own, and so refit it; others are built anew each
-     * time. */
+    /* Only scenes of low quality ask a geometry for its own, and so refit it;
+     * others are built anew each time. */
     rtcSetSceneBuildQuality(surface->scene, RTC_BUILD_QUALITY_LOW);
     rtcSetGeometryBuildQuality(surface->geometry, RTC_BUILD_QUALITY_REFIT);
     rtcSetSharedGeometryBuffer(surface->geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -185,8 +185,8 @@ static void offer(search *s, uint32_t face)
         s->best = hit;
 }
 
-/* A little more than the best distance, so that faces at an equal distance are all seen and the lowest wins.
- */
+/* A little more than the best distance, so that faces at an equal distance are all seen
+ * and the lowest wins. */
 static float radius_of(const search *s)
 {
     return sqrtf(s->best.dist_sq) * 1.00001f + 1e-18f;

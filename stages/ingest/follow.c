@@ -280,8 +280,8 @@ static int64_t number_of(const npg_follow *follow, const file *f)
     return number < 0 ? (int64_t)follow->taken_count : number;
 }
 
-/* The ending that most of the first files have is the frames'; the last run of digits that grows is the
- * number. */
+/* The ending that most of the first files have is the frames'; the last run of digits that
+ * grows is the number. */
 static void settle_names(npg_follow *follow)
 {
     size_t best = 0, best_count = 0;

@@ -17,12 +17,12 @@
 enum { NPG_FOLLOW_LATE = 8 };
 
 typedef struct npg_follow_settings {
-    const char *where;    /* a folder, or <folder>/<pattern of names>                    */
-    bool confine;         /* a file that leads out of the folder is refused */
-    const char *end_name; /* a file of this name ends the source; "": none does          */
-    double idle_s;        /* seconds without any change that end it; 0: none             */
-    double settle_s;      /* seconds without a change after which a bad file stays bad   */
-    bool finds_gaps;      /* wait for numbers that are left out                          */
+    const char *where;    /* a folder, or <folder>/<pattern of names>                  */
+    bool confine;         /* a file that leads out of the folder is refused            */
+    const char *end_name; /* a file of this name ends the source; "": none does        */
+    double idle_s;        /* seconds without any change that end it; 0: none           */
+    double settle_s;      /* seconds without a change after which a bad file stays bad */
+    bool finds_gaps;      /* wait for numbers that are left out                        */
     bool (*stopping)(void *user);
     void *user;
 } npg_follow_settings;

@@ -1,22 +1,24 @@
 /* Job: what OUT/job/ holds so that a run which was stopped, killed or broken off goes on by itself.
  *
  *     OUT/job/lock                 empty; the run at work holds a lock (flock) on it, which ends with its
- * process OUT/job/job.json             what the results are made of: version, options, and the inputs with
- * their sizes, times and checksums OUT/job/window_000012.npg    state after the 12th closed window: an
- * archive (pipeline/archive.h) with the facts of the capture, the reference mesh in unit coordinates, the
- * optimiser, the coarse alignment's poses and the frames that the next windows share
- *     OUT/job/window_000012.vdb    the latent grids of the same moment (stages/shims/vdb_grids.h)
- *
- *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (record.h); those of all
- * windows stay, for neupig apply
+ *                                  process
+ *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
+ *                                  sizes, times and checksums
+ *     OUT/job/window_000012.npg    state after the 12th closed window: an archive (pipeline/archive.h) with
+ *                                  the facts of the capture, the reference mesh in unit coordinates, the
+ *                                  optimiser, the coarse alignment's poses and the frames that the next
+ *                                  windows share
+ *     OUT/job/window_000012.vdb    the latent grids of the same moment (optimize/vdb_grids.h)
+ *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those
+ *                                  of all windows stay, for neupig apply
  *
  * The two newest windows stay, and the one that later frames go on from (neupig append); where grids are to
  * be exported, those of all.  Each file appears whole or not at all; the archive names the checksum of its
  * grids and of the list of frames, so that a damaged one is noticed and the one before it taken.  No file
  * says that a run is at work.
  *
- * Threads: the functions marked so may be called from any stage's thread; the others are called by one stage
- * alone. */
+ * Threads: the functions marked so may be called from any stage's thread;
+ * the others are called by one stage alone. */
 #ifndef NPG_JOB_H
 #define NPG_JOB_H
 
@@ -29,10 +31,10 @@ typedef struct npg_job npg_job;
 
 /* What a run finds of an earlier one. */
 typedef enum npg_job_start {
-    NPG_JOB_FRESH,  /* nothing that it could go on from             */
-    NPG_JOB_RESUME, /* it goes on where the earlier one was         */
-    NPG_JOB_APPEND, /* the earlier one is done, frames came since   */
-    NPG_JOB_DONE    /* nothing is left to do                        */
+    NPG_JOB_FRESH,  /* nothing that it could go on from           */
+    NPG_JOB_RESUME, /* it goes on where the earlier one was       */
+    NPG_JOB_APPEND, /* the earlier one is done, frames came since */
+    NPG_JOB_DONE    /* nothing is left to do                      */
 } npg_job_start;
 
 /* Open OUT/job, lock it and compare.  NPG_USAGE: another run is at work there, or the inputs, options or the
@@ -60,8 +62,8 @@ npg_status npg_job_extend(npg_job *job);
 /* align: what it needs to go on after `read` frames of the plan (size bytes, copied).  Any thread. */
 npg_status npg_job_leave_poses(npg_job *job, int64_t read, const void *bytes, size_t size);
 
-/* Take it (give it to npg_release()), NULL when there is none; what was left for earlier moments goes.  Any
- * thread. */
+/* Take it (give it to npg_release()), NULL when there is none; what was left for earlier
+ * moments goes.  Any thread. */
 void *npg_job_take_poses(npg_job *job, int64_t read, size_t *size);
 
 /* evaluate: number and vertices (V x 3, unit, copied) of the frame that the truth is tied in.  Any thread. */

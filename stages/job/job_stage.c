@@ -1,5 +1,5 @@
-/* job: before anything else, finds out whether an earlier run of the same job can be gone on from; takes part
- * in no pass. */
+/* job: before anything else, finds out whether an earlier run of the same job can be gone on from;
+ * takes part in no pass. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

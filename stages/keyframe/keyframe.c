@@ -1,5 +1,5 @@
-/* Keyframe: finds the box of the capture, scores every frame and chooses the one whose surface becomes the
- * reference.
+/* Keyframe: finds the box of the capture, scores every frame and chooses the one whose surface
+ * becomes the reference.
  *
  * Based on: the keyframe selection of the Neu-PiG paper.  The score of frame t of T is the number of cells of
  * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
@@ -42,10 +42,10 @@ typedef struct keyframe_state {
     npg_likeness *likeness; /* of the user's own mesh; owned */
     candidate chosen;       /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
-    int64_t usable_count; /* frames that were not skipped                    */
-    int64_t passed_count; /* frames of the solving pass so far               */
-    npg_look_ahead held;  /* a live run's frames until it is their turn    */
-    bool is_planned;      /* live: the key is known                       */
+    int64_t usable_count; /* frames that were not skipped               */
+    int64_t passed_count; /* frames of the solving pass so far          */
+    npg_look_ahead held;  /* a live run's frames until it is their turn */
+    bool is_planned;      /* live: the key is known                     */
 } keyframe_state;
 
 /* ---- measuring ---- */
@@ -148,8 +148,8 @@ static const char *own_mesh(const npg_worker *worker)
     return path ? path : "";
 }
 
-/* Whether there is a choosing pass, which takes files, and a keyframe that is neither named nor that of a
- * mesh. */
+/* Whether there is a choosing pass, which takes files, and a keyframe that is neither
+ * named nor that of a mesh. */
 static bool has_candidates(const npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);

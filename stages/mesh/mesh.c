@@ -115,9 +115,9 @@ static bool should_stop(void *worker)
 
 /* ---- steps ---- */
 
-/* The points to reconstruct from, in unit coordinates, with their normals.  Frames with more than POINTS_MAX
- * give an even choice: the face budget could not hold more detail, and Poisson's time goes with the points.
- */
+/* The points to reconstruct from, in unit coordinates, with their normals.
+ * Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
+ * and Poisson's time goes with the points. */
 static npg_status take_points(making *m)
 {
     const npg_frame *frame = m->frame;

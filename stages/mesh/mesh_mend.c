@@ -212,8 +212,8 @@ static npg_status find_border(uint32_t *next, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-/* The closed loop along the border from a vertex, its length; 0 if it is longer than HOLE_MAX or comes back
- * elsewhere. */
+/* The closed loop along the border from a vertex, its length; 0 if it is longer than HOLE_MAX
+ * or comes back elsewhere. */
 static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
 {
     size_t count = 0;
@@ -226,8 +226,8 @@ static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
     return count >= 3 ? count : 0;
 }
 
-/* Holes of a few edges get a vertex in their middle (three edges: just the face).  Larger ones are openings.
- */
+/* Holes of a few edges get a vertex in their middle (three edges: just the face).
+ * Larger ones are openings. */
 static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
 {
     npg_mesh *mesh = *slot, *out = NULL;

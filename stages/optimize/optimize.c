@@ -1,5 +1,5 @@
-/* optimize: slides windows over time and finds the deformation of the reference in every frame (paper,
- * method).
+/* optimize: slides windows over time and finds the deformation of the reference in every
+ * frame (paper, method).
  *
  * Holds the frames of one window, fits them jointly on the OpenCL device, writes vertices into each frame and
  * passes on what no later window needs. */

@@ -77,8 +77,8 @@ static bool enter(grid *g, uint32_t i)
     }
 }
 
-/* keep[i] (may be NULL) = point i is the first of its cell; *count of those.  Stops early beyond count_max.
- */
+/* keep[i] (may be NULL) = point i is the first of its cell; *count of those.
+ * Stops early beyond count_max. */
 static npg_status first_of_cells(uint8_t *keep, size_t *count, const npg_frame *frame, double side,
                                  size_t count_max)
 {
@@ -161,8 +161,8 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     return npg_clean_voxels(frame, enough);
 }
 
-/* Of the points that are left drop those whose keep is 0, and say so in keep_all, which is about all points.
- */
+/* Of the points that are left drop those whose keep is 0, and say so in keep_all,
+ * which is about all points. */
 static size_t compact(float *left, uint8_t *keep_all, size_t count, const uint8_t *keep)
 {
     size_t at = 0, kept = 0;

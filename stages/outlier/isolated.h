@@ -13,7 +13,7 @@ void npg_isolated_close(npg_isolated **isolated);
 
 /* Drop the isolated points of frames that have been cleaned of all else (cleaning.h), several at a time in
  * threads; skipped and empty frames are left alone.  A frame is known by its index and the hash of its
- * points. NPG_MEMORY; errors name the frame. */
+ * points.  NPG_MEMORY; errors name the frame. */
 npg_status npg_isolated_drop(npg_isolated *isolated, npg_frame *const *frames, size_t count, int neighbours,
                              double ratio);
 

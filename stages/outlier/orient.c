@@ -1,10 +1,10 @@
 /* Orient: which side of a surface is out, decided for all points of a npg_sided_cloud together.
  *
- * Neighbours say how their sides go together: reflected at the plane halfway between two points, a normal
- * comes to lie on its neighbour's where the surface curves like a circle, and the two sides of a thin sheet
- * come to agree as opposite.  The winding number says which side is out: the solid angle that the whole
- * oriented npg_sided_cloud covers, seen from a point on it, is positive where the point's surroundings face
- * out.
+ * Neighbours say how their sides go together: reflected at the plane halfway between two points,
+ * a normal comes to lie on its neighbour's where the surface curves like a circle, and the two sides
+ * of a thin sheet come to agree as opposite.  The winding number says which side is out: the solid angle
+ * that the whole oriented npg_sided_cloud covers, seen from a point on it, is positive where the point's
+ * surroundings face out.
  *
  * Based on: H. Hoppe et al., Surface Reconstruction from Unorganized Points, 1992 (spanning tree); A.
  * Jacobson et al., Robust Inside-Outside Segmentation Using Generalized Winding Numbers, 2013. */

@@ -1,5 +1,5 @@
-/* Sides: spanning tree, patches and winding number of a npg_sided_cloud whose normals look for their sides.
- */
+/* Sides: spanning tree, patches and winding number of a npg_sided_cloud whose normals
+ * look for their sides. */
 #include "outlier/sides.h"
 
 #include <string.h>
@@ -18,7 +18,7 @@
 /* Points and their normals times area, each coordinate by itself, filled up with points without area. */
 typedef struct panel {
     float *x, *y, *z, *nx, *ny, *nz; /* in one allocation, x owns it */
-    size_t padded;                   /* a multiple of LANES         */
+    size_t padded;                   /* a multiple of LANES          */
 } panel;
 
 static npg_status open_panel(panel *p, size_t count_max)
@@ -92,8 +92,8 @@ static uint32_t root_of(const forest *f, uint32_t i, uint8_t *is_turned)
     return i;
 }
 
-/* The older (lower) root stays, so the result has one form; paths are shortened by hanging i under its root.
- */
+/* The older (lower) root stays, so the result has one form; paths are shortened
+ * by hanging i under its root. */
 static void join(forest *f, const npg_link *l)
 {
     uint8_t side_a, side_b;

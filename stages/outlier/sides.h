@@ -44,8 +44,8 @@ static inline void turn(npg_sided_cloud *c, size_t i)
     for (size_t a = 0; a < 3; a++) c->normals[3 * i + a] = -c->normals[3 * i + a];
 }
 
-/* How far the winding number at a point is from that of a surface that faces out; spikes count no more
- * than 2. */
+/* How far the winding number at a point is from that of a surface that faces out;
+ * spikes count no more than 2. */
 static inline double misfit(float winding)
 {
     double off = fmax(-2, fmin(2, (double)winding - 0.5));

@@ -62,8 +62,8 @@ static npg_status run(const char *input, const char *output, char **pairs, int p
     return status;
 }
 
-/* Whether what is under a final name in OUT is byte for byte that of the whole run; with all of it, or not.
- */
+/* Whether what is under a final name in OUT is byte for byte that of the whole run;
+ * with all of it, or not. */
 static int results_are_whole(const char *output, const char *whole, int is_all)
 {
     setenv("OUT", output, 1);

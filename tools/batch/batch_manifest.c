@@ -28,7 +28,7 @@
 typedef struct manifest {
     npg_batch *batch;
     const npg_batch_given *given;
-    char *folder;     /* of the file; owned                        */
+    char *folder;     /* of the file; owned                          */
     npg_capture base; /* what "defaults" says; its options are owned */
 } manifest;
 

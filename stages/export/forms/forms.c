@@ -12,10 +12,10 @@ extern const npg_form npg_form_obj, npg_form_pc2, npg_form_mdd, npg_form_glb, np
 const npg_form *const npg_forms[] = {&npg_form_obj,  /* beside PLY                           */
                                      &npg_form_pc2,  /* 3ds Max, Blender, Marvelous Designer */
                                      &npg_form_mdd,  /* LightWave, Blender, three.js         */
-                                     &npg_form_glb,  /* the web, Blender, Unreal */
-                                     &npg_form_usda, /* USD tools, Unreal */
+                                     &npg_form_glb,  /* the web, Blender, Unreal             */
+                                     &npg_form_usda, /* USD tools, Unreal                    */
                                      &npg_form_npz,  /* NumPy                                */
-                                     &npg_form_vdb,  /* Houdini, Blender */
+                                     &npg_form_vdb,  /* Houdini, Blender                     */
                                      NULL};
 
 /* ---- choosing ---- */

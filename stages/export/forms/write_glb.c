@@ -23,9 +23,9 @@
 typedef struct glb_state {
     const npg_form_facts *facts;
     npg_corner_split split;
-    size_t poses_most;      /* in one file                      */
-    int64_t done, segments; /* poses so far; files in all       */
-    size_t at;              /* poses in the file under way      */
+    size_t poses_most;      /* in one file                 */
+    int64_t done, segments; /* poses so far; files in all  */
+    size_t at;              /* poses in the file under way */
     npg_glb_layout layout;
     char name[32];
     npg_file *file;

@@ -1,13 +1,18 @@
 /* NPZ writer: arrays for numpy.load("motion.npz").
  *
- *     vertices      (T, V, 3) float32    as written, T frames that have a mesh
- *     faces         (F, 3) int32
- *     reference     (V, 3) float32       the surface at the keyframe
- *     rotation      (T, 3, 3) float64    with translation the rigid motion that takes the reference closest
- * to translation   (T, 3) float64       the frame: vertices[t] is about reference @ rotation[t].T +
- * translation[t] index, number (T,) int64           place in time, number of the input's file time (T,)
- * float64         seconds, index / fps fps, metres_per_unit () float64, up () one letter colours       (V, 4)
- * uint8, uvs (V, 2) float32, corner_uvs (F, 3, 2) float32  where the reference has them
+ *     vertices          (T, V, 3) float32    as written, T frames that have a mesh
+ *     faces             (F, 3) int32
+ *     reference         (V, 3) float32       the surface at the keyframe
+ *     rotation          (T, 3, 3) float64    the rigid motion that takes the reference closest to the frame:
+ *     translation       (T, 3) float64       vertices[t] is about reference @ rotation[t].T + translation[t]
+ *     index, number     (T,) int64           place in time, number of the input's file
+ *     time              (T,) float64         seconds, index / fps
+ *     fps               () float64
+ *     metres_per_unit   () float64
+ *     up                () one letter
+ *     colours           (V, 4) uint8         where the reference has them
+ *     uvs               (V, 2) float32       where the reference has them
+ *     corner_uvs        (F, 3, 2) float32    where the reference has them
  */
 #include <stdio.h>
 

@@ -1,7 +1,7 @@
 /* PC2 writer: a point cache, little-endian, for the mesh OUT/reference.obj.
  *
- *     "POINTCACHE2\0", int32 version 1, int32 points, float32 first sample's frame, float32 frames per
- * sample, int32 samples; then samples x points x 3 float32
+ *     "POINTCACHE2\0", int32 version 1, int32 points, float32 first sample's frame,
+ *     float32 frames per sample, int32 samples; then samples x points x 3 float32
  *
  * The form has neither times nor units: sample k is frame first + k. */
 #include "export/forms/point_cache.h"

@@ -2,8 +2,8 @@
  *
  *     /capture          Xform, the default prim
  *     /capture/surface  Mesh: points.timeSamples and extent.timeSamples with the frame's index as the time
- * code, faces once, no subdivision, primvars:displayColor and primvars:st where the reference has colours and
- * UVs
+ *                       code, faces once, no subdivision, primvars:displayColor and primvars:st where the
+ *                       reference has colours and UVs
  *
  * timeCodesPerSecond is the rate of the capture, metersPerUnit and upAxis as the options say.  Floats have
  * nine digits and so come back as they were.  Samples of the extent stand before those of the points, each

@@ -6,7 +6,7 @@
 
 /* A number beyond this is damage, not a place: as origin it would swallow every other point. */
 #define ORIGIN_MAX 1e15
-#define SAMPLES    1001 /* of a cloud, for its median                                                    */
+#define SAMPLES    1001 /* of a cloud, for its median                                                   */
 #define AWAY_MAX   16   /* spreads between origin and median; float then still keeps 1e-6 of the spread */
 
 npg_status npg_points_reserve(npg_point_list *list, size_t more)

@@ -48,7 +48,7 @@ typedef struct reader {
     npg_source *source;
     npg_ply_header *header;
     const npg_ply_element *vertex, *face; /* into header; face is NULL when a cloud is read */
-    int slot_of[NPG_PLY_PROPERTIES];      /* of each vertex property, -1: of no interest     */
+    int slot_of[NPG_PLY_PROPERTIES];      /* of each vertex property, -1: of no interest    */
     const npg_ply_property *in_slot[SLOTS];
     npg_point_list points;     /* where vertices go when a cloud is read */
     npg_mesh_builder *builder; /* or when a mesh is read; NULL else      */

@@ -1,5 +1,5 @@
-/* XYZ reader: one point per line, columns by blanks, commas or semicolons; normals where columns 4 to 6 are.
- */
+/* XYZ reader: one point per line, columns by blanks, commas or semicolons;
+ * normals where columns 4 to 6 are. */
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -18,7 +18,7 @@ typedef struct reader {
     bool wants_normals;
     int columns;                    /* of the first row, at most COLUMNS_MAX; 0 before it */
     uint64_t claimed_count;         /* .pts: its first line; UINT64_MAX without           */
-    uint64_t unit_rows, blank_rows; /* rows whose normal has unit length, or none at all */
+    uint64_t unit_rows, blank_rows; /* rows whose normal has unit length, or none at all  */
 } reader;
 
 static bool is_comment(const char *at, const char *end)

@@ -117,9 +117,9 @@ static npg_status read_points(npg_frame *frame, const char *path, npg_origin *or
     return status;
 }
 
-/* The first file settles the origin.  Where its first point turns out to lie far off (many sensors write
- * 0 0 0 for a pixel they could not see), float has lost the detail of all others: read again around the
- * median. */
+/* The first file settles the origin.  Where its first point turns out to lie far off
+ * (many sensors write 0 0 0 for a pixel they could not see), float has lost the detail of all others:
+ * read again around the median. */
 static npg_status read_first(npg_frame *frame, const char *path, npg_origin *origin)
 {
     struct stat info;
