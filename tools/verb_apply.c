@@ -243,8 +243,8 @@ static npg_status tie(applying *a)
     npg_attach_far(a->attachment, a->s.far_share * diagonal, &a->far_count, &worst, &worst_dist);
     if (a->far_count)
         fprintf(stderr,
-                "neupig apply: %zu of %zu points of %s lie farther than %g diagonals from the reference; the "
-                "worst, point %zu, %.3g away (%.3g diagonals)\n",
+                "neupig apply: %zu of %zu points of %s lie farther than %g diagonals from the reference; "
+                "the worst, point %zu, %.3g away (%.3g diagonals)\n",
                 a->far_count, mesh->vert_count, a->s.mesh, a->s.far_share, worst, worst_dist,
                 worst_dist / diagonal);
     return NPG_OK;
@@ -296,8 +296,8 @@ static npg_status clear_files(const applying *a)
         status = path_of(path, a->s.output, entry->d_name);
         if (!status && !a->s.overwrite)
             status = npg_error(NPG_USAGE,
-                               "%s lies there already and would mix with the new files: choose "
-                               "another folder, or --overwrite removes what is there",
+                               "%s lies there already and would mix with the new files: "
+                               "choose another folder, or --overwrite removes what is there",
                                path);
         if (!status && unlink(path)) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
     }

@@ -84,8 +84,8 @@ static npg_status run(npg_batch *batch, const settings *s)
     if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to go on\n", stderr);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; see "
-                "%s/batch.html\n",
+                "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; "
+                "see %s/batch.html\n",
                 batch->output);
     return status;
 }

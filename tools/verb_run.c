@@ -146,8 +146,8 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
     if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; see the "
-                "warnings, or %s/report.json\n",
+                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; "
+                "see the warnings, or %s/report.json\n",
                 verb, output);
     if (status == NPG_CHANGED)
         fprintf(stderr, "neupig %s: ended where the topology changed; see %s/topology.json\n", verb, output);

@@ -172,11 +172,10 @@ static npg_status make_capture(const settings *s)
     npg_status status = make_folders(s);
     if (!status) status = make_frames(s, &f, &points, &total);
     if (!status)
-        printf(
-            "%lld frames, %.0f points each, truth of %zu vertices and %zu faces\npoints  %s/points\ntruth   "
-            "%s/truth\n",
-            (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count, f.mesh->face_count,
-            s->output, s->output);
+        printf("%lld frames, %.0f points each, truth of %zu vertices and %zu faces\n"
+               "points  %s/points\ntruth   %s/truth\n",
+               (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count,
+               f.mesh->face_count, s->output, s->output);
     if (!status && change_of(s) < s->frames) printf("changes at frame %lld\n", (long long)change_of(s));
     npg_scanned_close(&points);
     close_figure(&f);

@@ -107,8 +107,8 @@ static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
     npg_status status = npg_join_path(&meshes, output, "meshes");
     if (!status && is_same_file(folder, meshes))
         status = npg_error(NPG_USAGE,
-                           "%s is an input, and this run's meshes would be written over it: choose another "
-                           "output folder than %s",
+                           "%s is an input, and this run's meshes would be written over it: "
+                           "choose another output folder than %s",
                            frame->path, output);
     npg_release(&folder);
     npg_release(&meshes);
@@ -127,8 +127,8 @@ static npg_status check_reference(const npg_worker *worker)
         npg_release(&path);
         if (is_ours)
             return npg_error(NPG_USAGE,
-                             "option reference: %s lies where this run writes: copy it, or choose another "
-                             "output folder",
+                             "option reference: %s lies where this run writes: "
+                             "copy it, or choose another output folder",
                              reference);
     }
     return NPG_OK;
@@ -153,8 +153,7 @@ static npg_status check_numbers(npg_worker *worker)
         if (state->numbers[i] == state->numbers[i - 1])
             return npg_error(
                 NPG_BAD_INPUT,
-                "two frames have the number %lld and would be written to one file: set numbering "
-                "to index",
+                "two frames have the number %lld and would be written to one file: set numbering to index",
                 (long long)state->numbers[i]);
     set_width(state, npg_worker_facts(worker));
     if (state->overwrite) return NPG_OK;
@@ -388,8 +387,8 @@ static npg_status write_forms(npg_worker *worker)
             "vdb has no latent grids: a run without a job folder (live, or pulled from) keeps none");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
-                        "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
-                        "times",
+                        "%lld frames without a mesh repeat the one before them in pc2 and mdd, "
+                        "which have no times",
                         (long long)watch.repeated);
     return status;
 }

@@ -69,8 +69,8 @@ static npg_status fill_slots(npg_frame_files *list, npg_paths *paths, const int6
     int64_t count = finds_gaps ? (last - first) / step + 1 : (int64_t)paths->count;
     if (count > SLOTS_MAX)
         return npg_error(NPG_BAD_INPUT,
-                         "the numbers of %zu frames run from %lld to %lld: not a numbering (missing = ignore "
-                         "takes the frames as they follow each other)",
+                         "the numbers of %zu frames run from %lld to %lld: "
+                         "not a numbering (missing = ignore takes the frames as they follow each other)",
                          paths->count, (long long)first, (long long)last);
     if (finds_gaps) NPG_TRY(add_outside(list, &capacity, selection, first, last, step, true));
     for (size_t i = 0; i < paths->count; i++) {

@@ -11,8 +11,8 @@
 static npg_status bad(const char *text, const char *cause)
 {
     return npg_error(NPG_USAGE,
-                     "option frames: \"%.100s\": %s (a:b:step are positions, b not included; 1-5,8 are frame "
-                     "numbers)",
+                     "option frames: \"%.100s\": %s "
+                     "(a:b:step are positions, b not included; 1-5,8 are frame numbers)",
                      text, cause);
 }
 

@@ -252,7 +252,8 @@ static npg_status refuse_gap(const state *s, int64_t gap, int64_t number)
         return npg_error(NPG_BAD_INPUT, "frame %lld comes %lld numbers after the one before it",
                          (long long)number, (long long)gap + 1);
     return npg_error(NPG_BAD_INPUT,
-                     "%lld frames are missing between %lld and %lld (option missing: skip or hold goes on, "
+                     "%lld frames are missing between %lld and %lld "
+                     "(option missing: skip or hold goes on, "
                      "ignore takes the frames as they follow each other)",
                      (long long)gap, (long long)s->before.number, (long long)number);
 }

@@ -280,9 +280,10 @@ static void widen_box(const keyframe_state *state, npg_bounds *bounds)
 static npg_status refuse_one_window(const keyframe_state *state)
 {
     return npg_error(NPG_USAGE,
-                     "the live capture is longer than the look-ahead of %lld frames, and one window over all "
-                     "frames needs all of them: set the option window, raise look-ahead (each frame is held "
-                     "in memory), or write the frames to files and give those as input",
+                     "the live capture is longer than the look-ahead of %lld frames, "
+                     "and one window over all frames needs all of them: "
+                     "set the option window, raise look-ahead (each frame is held in memory), "
+                     "or write the frames to files and give those as input",
                      (long long)state->look_ahead);
 }
 

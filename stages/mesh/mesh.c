@@ -235,11 +235,10 @@ static npg_status trim(making *m)
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
     NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
     if (!trim_unseen && share > LOST_TOLERATED)
-        npg_worker_warn(
-            m->worker, false, m->frame->number,
-            "%.1f %% of the reconstructed surface is farther than %g diagonals from every point and "
-            "was trimmed off",
-            100 * share, m->state->trim);
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
+                        "and was trimmed off",
+                        100 * share, m->state->trim);
     return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
 }
 
@@ -331,11 +330,10 @@ static void judge_invented(making *m)
     npg_worker_facts(m->worker)->unseen_share = m->invented;
     note(m, "invented_share", m->invented);
     if (100 * m->invented > m->state->invented_max)
-        npg_worker_warn(
-            m->worker, true, m->frame->number,
-            "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, and it "
-            "was kept (the bar is %g %%; --unseen trim leaves it out)",
-            100 * m->invented, m->state->invented_max);
+        npg_worker_warn(m->worker, true, m->frame->number,
+                        "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, "
+                        "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
+                        100 * m->invented, m->state->invented_max);
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt

@@ -465,8 +465,9 @@ npg_status npg_mesh_require_manifold(const npg_mesh *mesh, const char *name)
         /* A directed edge used once at most means: two faces at most, and they agree on the outside. */
         else if (i && same_ends(&sides[i - 1], &sides[i]))
             status = npg_error(NPG_BAD_INPUT,
-                               "%s is not a manifold: faces %u and %u both use the edge from vertex %u to "
-                               "vertex %u in this direction",
+                               "%s is not a manifold: "
+                               "faces %u and %u both use the edge from vertex %u to vertex %u "
+                               "in this direction",
                                name, sides[i - 1].corner / 3, face, sides[i].from, sides[i].to);
     }
     npg_release(&sides);

@@ -69,8 +69,8 @@ static int results_are_whole(const char *output, const char *whole, int is_all)
     setenv("OUT", output, 1);
     setenv("WHOLE", whole, 1);
     if (is_all)
-        return system("diff -r \"$OUT/meshes\" \"$WHOLE/meshes\" && cmp \"$OUT/frames.jsonl\" "
-                      "\"$WHOLE/frames.jsonl\"") == 0;
+        return system("diff -r \"$OUT/meshes\" \"$WHOLE/meshes\" && "
+                      "cmp \"$OUT/frames.jsonl\" \"$WHOLE/frames.jsonl\"") == 0;
     return system(
                "cd \"$OUT\" 2>/dev/null || exit 0; for file in reference.ply frames.jsonl meshes/*.ply; do "
                "[ ! -e \"$file\" ] || cmp \"$file\" \"$WHOLE/$file\" || exit 1; done") == 0;

@@ -203,8 +203,8 @@ static npg_status check_closed(const npg_mesh *mesh)
     if (facts.border_edges || facts.crowded_edges || facts.misoriented_edges || facts.degenerate_faces ||
         components != 1 || npg_mesh_volume(mesh) <= 0)
         return npg_error(NPG_FAILED,
-                         "the body's surface is not one closed manifold (%zu border, %zu crowded, %zu turned "
-                         "edges, %zu faces without area, %zu parts); try a smaller --cell",
+                         "the body's surface is not one closed manifold (%zu border, %zu crowded, "
+                         "%zu turned edges, %zu faces without area, %zu parts); try a smaller --cell",
                          facts.border_edges, facts.crowded_edges, facts.misoriented_edges,
                          facts.degenerate_faces, components);
     return NPG_OK;

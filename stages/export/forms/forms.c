@@ -92,9 +92,10 @@ static npg_status check_floats(const npg_form *form, const npg_form_facts *facts
 {
     if (facts->largest / FLOAT_STEPS <= KEPT_SHARE * facts->diagonal) return NPG_OK;
     return npg_error(NPG_USAGE,
-                     "%s can't hold the capture: its numbers have 24 bits, and coordinates up to %g in a box "
-                     "of diagonal %g would lose more than a millionth of it; set centre to write them around "
-                     "0",
+                     "%s can't hold the capture: its numbers have 24 bits, "
+                     "and coordinates up to %g in a box of diagonal %g "
+                     "would lose more than a millionth of it; "
+                     "set centre to write them around 0",
                      form->name, facts->largest, facts->diagonal);
 }
 

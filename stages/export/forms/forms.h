@@ -1,7 +1,7 @@
 /* Forms: what other programs read, made of a run's meshes in one pass over the frames.
  *
  *     OUT/motion.pc2, motion.mdd     point caches for OUT/reference.obj, same order of the vertices
- *     OUT/motion.glb                 glTF with morph targets; several files of a long capture: motion_000.glb ...
+ *     OUT/motion.glb                 glTF with morph targets; motion_000.glb and so on when it is long
  *     OUT/motion.usda                points as time samples
  *     OUT/motion.npz                 arrays for NumPy
  *     OUT/obj/<prefix>_0000.obj      a second sequence, where the first one is PLY

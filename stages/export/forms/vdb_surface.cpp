@@ -41,8 +41,8 @@ npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *s)
         auto grid = make_grid(*s);
         if (!has_inside(*grid))
             return npg_error(NPG_FAILED,
-                             "OpenVDB: frame %lld: nothing is inside the surface; voxels of %g are too large "
-                             "for it",
+                             "OpenVDB: frame %lld: nothing is inside the surface; "
+                             "voxels of %g are too large for it",
                              (long long)s->number, s->voxel);
         openvdb::MetaMap about;
         about.insertMeta("npg_version", openvdb::StringMetadata(npg_version()));
