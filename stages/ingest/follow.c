@@ -149,9 +149,9 @@ static void compare(npg_follow *follow, file *f, const struct stat *now)
 static npg_status add(npg_follow *follow, const char *name)
 {
     NPG_TRY(npg_grow(&follow->files, &follow->capacity, follow->count + 1, sizeof(file), NPG_FOR_FILES));
-    file *new = &follow->files[follow->count];
-    *new = (file){0};
-    NPG_TRY(npg_copy_text(&new->name, name));
+    file *added = &follow->files[follow->count];
+    *added = (file){0};
+    NPG_TRY(npg_copy_text(&added->name, name));
     follow->count++;
     return NPG_OK;
 }

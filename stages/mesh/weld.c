@@ -384,11 +384,11 @@ static npg_status rebuild(npg_mesh **out, const cutting *c, size_t cut_count)
 /* Whether the mesh is no worse than before: no edge that is wrong, no new border, in as many pieces. */
 static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *after)
 {
-    npg_manifold old, new;
+    npg_manifold was, now;
     const npg_mesh *both[2] = {before, after};
     size_t pieces[2];
-    NPG_TRY(npg_mesh_manifold(&old, before));
-    NPG_TRY(npg_mesh_manifold(&new, after));
+    NPG_TRY(npg_mesh_manifold(&was, before));
+    NPG_TRY(npg_mesh_manifold(&now, after));
     for (int i = 0; i < 2; i++) {
         uint32_t *component;
         NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, both[i]->vert_count, sizeof *component));
@@ -397,9 +397,9 @@ static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *
         npg_release(&component);
         NPG_TRY(status);
     }
-    *yes = new.crowded_edges <= old.crowded_edges &&new.misoriented_edges <=
-           old.misoriented_edges &&new.border_edges <= old.border_edges &&new.degenerate_faces <=
-           old.degenerate_faces &&pieces[1] <= pieces[0];
+    *yes = now.crowded_edges <= was.crowded_edges && now.misoriented_edges <= was.misoriented_edges &&
+           now.border_edges <= was.border_edges && now.degenerate_faces <= was.degenerate_faces &&
+           pieces[1] <= pieces[0];
     return NPG_OK;
 }
 

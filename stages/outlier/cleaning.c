@@ -135,27 +135,26 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     *side = 0;
     if (!point_max || frame->point_count <= point_max) return NPG_OK;
     npg_bounds_add_points(&bounds, frame->pos_local, frame->point_count);
-    double try = npg_bounds_diagonal(&bounds) / sqrt(2.0 * (double)point_max);
+    double cell_side = npg_bounds_diagonal(&bounds) / sqrt(2.0 * (double)point_max);
     for (int round = 0; round < CAP_ROUNDS; round++) {
         size_t count;
-        NPG_TRY(first_of_cells(NULL, &count, frame, try, point_max));
+        NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
         if (count <= point_max) {
-            enough = try;
+            enough = cell_side;
             if (2 * count > point_max) break;
         } else {
-            too_small = try;
+            too_small = cell_side;
         }
-        double guess = count > point_max ? 1.5 *
-        try : try
-            *sqrt((double)(count + 1) / (0.8 * (double)point_max));
+        double guess = count > point_max ? 1.5 * cell_side
+                                         : cell_side * sqrt((double)(count + 1) / (0.8 * (double)point_max));
         bool between = guess > too_small && (!(enough > 0) || guess < enough);
-        try = between ? guess : sqrt(too_small * enough);
+        cell_side = between ? guess : sqrt(too_small * enough);
     }
     while (!(enough > 0)) { /* ends: one cell holds all */
         size_t count;
-        try *= 2;
-        NPG_TRY(first_of_cells(NULL, &count, frame, try, point_max));
-        if (count <= point_max) enough = try;
+        cell_side *= 2;
+        NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
+        if (count <= point_max) enough = cell_side;
     }
     *side = enough;
     return npg_clean_voxels(frame, enough);
