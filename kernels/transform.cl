@@ -9,7 +9,7 @@
  */
 
 #define AT(block, axis, lane) (((size_t)(block)*3 + (axis)) * 16 + (lane))
-#define REACH 0.1f
+#define REACH                 0.1f
 
 typedef struct turn {
     float s;     /* scalar part of the unit quaternion */
