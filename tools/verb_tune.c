@@ -56,15 +56,28 @@ typedef struct tile_set {
     int values[7];
 } tile_set;
 
+/* clang-format off */
 static const tile_set tiles_of_processors[] = {
-    {{192, 16, 2, 12, 8, 12, 1}},  {{96, 16, 2, 12, 8, 12, 1}}, {{192, 16, 2, 8, 8, 12, 1}},
-    {{192, 16, 1, 24, 16, 12, 1}}, {{192, 8, 2, 6, 4, 6, 1}},   {{192, 8, 4, 3, 2, 6, 1}},
-    {{192, 8, 2, 12, 8, 12, 1}},   {{192, 4, 2, 6, 4, 6, 1}},   {{0}}};
+    {{192, 16, 2, 12,  8, 12, 1}},
+    {{ 96, 16, 2, 12,  8, 12, 1}},
+    {{192, 16, 2,  8,  8, 12, 1}},
+    {{192, 16, 1, 24, 16, 12, 1}},
+    {{192,  8, 2,  6,  4,  6, 1}},
+    {{192,  8, 4,  3,  2,  6, 1}},
+    {{192,  8, 2, 12,  8, 12, 1}},
+    {{192,  4, 2,  6,  4,  6, 1}},
+    {{0}}};
 
-static const tile_set tiles_of_gpus[] = {{{64, 4, 1, 8, 8, 1, 128}},  {{32, 4, 1, 8, 8, 1, 128}},
-                                         {{128, 4, 1, 8, 8, 1, 128}}, {{64, 4, 1, 16, 8, 1, 128}},
-                                         {{64, 4, 2, 8, 8, 1, 64}},   {{64, 4, 1, 4, 4, 1, 128}},
-                                         {{64, 4, 1, 8, 16, 1, 256}}, {{0}}};
+static const tile_set tiles_of_gpus[] = {
+    {{ 64, 4, 1,  8,  8, 1, 128}},
+    {{ 32, 4, 1,  8,  8, 1, 128}},
+    {{128, 4, 1,  8,  8, 1, 128}},
+    {{ 64, 4, 1, 16,  8, 1, 128}},
+    {{ 64, 4, 2,  8,  8, 1,  64}},
+    {{ 64, 4, 1,  4,  4, 1, 128}},
+    {{ 64, 4, 1,  8, 16, 1, 256}},
+    {{0}}};
+/* clang-format on */
 
 /* One number alone: its name, the rows that show it, the ops to check, the values
  * for processors and for GPUs. */
@@ -73,12 +86,14 @@ typedef struct one_number {
     int processors[6], gpus[6];
 } one_number;
 
+/* clang-format off */
 static const one_number knobs[] = {
-    {"nearest_queries", "nearest_and_chamfer", "nearest", {16, 64, 256}, {1, 2, 4, 8}},
-    {"frame_local", "nearest_and_chamfer", "chamfer", {1}, {32, 64, 128, 256}},
-    {"span", "adam", "adam", {8, 16, 64, 256}, {1, 2, 4}},
-    {"local", "latent,transform,isometry,sobolev", "", {1, 4, 16, 32}, {32, 64, 128}},
+    {"nearest_queries", "nearest_and_chamfer",               "nearest", {16, 64, 256},    {1, 2, 4, 8}},
+    {"frame_local",     "nearest_and_chamfer",               "chamfer", {1},              {32, 64, 128, 256}},
+    {"span",            "adam",                              "adam",    {8, 16, 64, 256}, {1, 2, 4}},
+    {"local",           "latent,transform,isometry,sobolev", "",        {1, 4, 16, 32},   {32, 64, 128}},
     {0}};
+/* clang-format on */
 
 /* ---- one set ---- */
 

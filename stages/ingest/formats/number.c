@@ -42,13 +42,23 @@ static double by_library(const char *text)
 /* Words for numbers that are not finite. */
 static const char *parse_word(const char *text, const char *end, bool negative, double *value)
 {
+    /* clang-format off */
     static const struct {
         const char *word;
         double value;
-    } words[] = {{"nan", (double)NAN},      {"infinity", (double)INFINITY}, {"inf", (double)INFINITY},
-                 {"nan(ind)", (double)NAN}, {"nan(snan)", (double)NAN},     {"1.#ind", (double)NAN},
-                 {"1.#qnan", (double)NAN},  {"1.#inf", (double)INFINITY},   {"1.#inf00", (double)INFINITY},
-                 {"1.#qnan0", (double)NAN}, {"1.#ind00", (double)NAN}};
+    } words[] = {
+        {"nan",       (double)NAN},
+        {"inf",       (double)INFINITY},
+        {"infinity",  (double)INFINITY},
+        {"nan(ind)",  (double)NAN}, /* Windows libraries of today */
+        {"nan(snan)", (double)NAN},
+        {"1.#qnan",   (double)NAN}, /* older ones, padded to the digits asked for */
+        {"1.#qnan0",  (double)NAN},
+        {"1.#ind",    (double)NAN},
+        {"1.#ind00",  (double)NAN},
+        {"1.#inf",    (double)INFINITY},
+        {"1.#inf00",  (double)INFINITY}};
+    /* clang-format on */
     size_t length = 0;
     while (!ends(text + length, end)) length++;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {

@@ -8,15 +8,21 @@
 #define HEADER_LINES_MAX 10000
 #define WORDS_MAX        6
 
+/* Each type has its name of the first PLY files and one that tells its size. */
+/* clang-format off */
 static const struct {
     const char *name;
     npg_ply_type type;
-} type_names[] = {{"float", NPG_PLY_FLOAT},    {"float32", NPG_PLY_FLOAT}, {"double", NPG_PLY_DOUBLE},
-                  {"float64", NPG_PLY_DOUBLE}, {"uchar", NPG_PLY_UINT8},   {"uint8", NPG_PLY_UINT8},
-                  {"char", NPG_PLY_INT8},      {"int8", NPG_PLY_INT8},     {"ushort", NPG_PLY_UINT16},
-                  {"uint16", NPG_PLY_UINT16},  {"short", NPG_PLY_INT16},   {"int16", NPG_PLY_INT16},
-                  {"uint", NPG_PLY_UINT32},    {"uint32", NPG_PLY_UINT32}, {"int", NPG_PLY_INT32},
-                  {"int32", NPG_PLY_INT32}};
+} type_names[] = {
+    {"char",   NPG_PLY_INT8},   {"int8",    NPG_PLY_INT8},
+    {"uchar",  NPG_PLY_UINT8},  {"uint8",   NPG_PLY_UINT8},
+    {"short",  NPG_PLY_INT16},  {"int16",   NPG_PLY_INT16},
+    {"ushort", NPG_PLY_UINT16}, {"uint16",  NPG_PLY_UINT16},
+    {"int",    NPG_PLY_INT32},  {"int32",   NPG_PLY_INT32},
+    {"uint",   NPG_PLY_UINT32}, {"uint32",  NPG_PLY_UINT32},
+    {"float",  NPG_PLY_FLOAT},  {"float32", NPG_PLY_FLOAT},
+    {"double", NPG_PLY_DOUBLE}, {"float64", NPG_PLY_DOUBLE}};
+/* clang-format on */
 
 size_t npg_ply_type_size(npg_ply_type type)
 {

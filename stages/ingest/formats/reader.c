@@ -20,16 +20,23 @@ static npg_status read_xyzn(npg_frame *frame, npg_source *source, npg_origin *or
     return npg_xyz_read_cloud(frame, source, origin, true);
 }
 
+enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
+
+/* clang-format off */
 static const struct format {
     const char *ending, *name;
     cloud_reader read;
     bool needs_whole; /* nothing but blanks may follow */
-} formats[] = {{".ply", "ply", npg_ply_read_cloud, true}, {".obj", "obj", npg_obj_read_cloud, false},
-               {".npy", "npy", npg_npy_read_cloud, true}, {".xyz", "xyz", read_xyz, false},
-               {".xyzn", "xyz", read_xyzn, false},        {".txt", "xyz", read_xyz, false},
-               {".pts", "xyz", read_xyz, false},          {".pcd", "pcd", npg_pcd_read_cloud, false}};
-
-enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
+} formats[FORMATS] = {
+    [PLY]  = {".ply",  "ply", npg_ply_read_cloud, true},
+    [OBJ]  = {".obj",  "obj", npg_obj_read_cloud, false},
+    [NPY]  = {".npy",  "npy", npg_npy_read_cloud, true},
+    [XYZ]  = {".xyz",  "xyz", read_xyz,           false},
+    [XYZN] = {".xyzn", "xyz", read_xyzn,          false},
+    [TXT]  = {".txt",  "xyz", read_xyz,           false},
+    [PTS]  = {".pts",  "xyz", read_xyz,           false},
+    [PCD]  = {".pcd",  "pcd", npg_pcd_read_cloud, false}};
+/* clang-format on */
 
 static const struct format *by_ending(const char *path)
 {
