@@ -31,7 +31,7 @@ static bool parse_number(int64_t *value, bool *has, const char **at)
     size_t digits = strspn(text, "0123456789");
     *has = digits > 0;
     if (!digits) return !negative;
-    *value = digits > 16 ? NUMBER_MAX : strtoll(text, NULL, 10); /* 17 digits are above 2^53 */
+    *value = digits > 16 ? NUMBER_MAX : strtoll(text, NULL, 10); /* 2^53 has 16 */
     if (*value > NUMBER_MAX) *value = NUMBER_MAX;
     if (negative) *value = -*value;
     *at = skip_spaces(text + digits);

@@ -53,7 +53,7 @@ static bool looks_like_numbers(const char *text, size_t length)
         if (!text[i] || !strchr("0123456789+-.eE,; \t\r\n", text[i])) return false;
         digits += text[i] >= '0' && text[i] <= '9';
     }
-    return digits >= 3;
+    return digits >= 3; /* a point has at least three */
 }
 
 /* From the first bytes of a file. */
@@ -68,7 +68,8 @@ static const struct format *by_content(const unsigned char *data, size_t size)
     return end && looks_like_numbers(text, (size_t)(end - text)) ? &formats[XYZ] : NULL;
 }
 
-/* The ending decides; a file with another ending, or a PLY, NPY or PCD under a foreign name, shows itself. */
+/* The ending decides; of a file with another ending, or of a PLY, NPY or PCD under a foreign name, its first
+ * bytes do. */
 static npg_status find_format(const struct format **out, npg_source *source)
 {
     size_t available;
