@@ -1,4 +1,4 @@
-/* Topology: what a run does when its reference stops to explain the capture (alarm.h): it says from which
+/* Topology: what a run does when its reference no longer explains the capture (alarm.h): it says from which
  * frame, or ends there so that another reference can take over (option alarm = split;
  * tools/segments/segments.h). */
 #ifndef NPG_TOPOLOGY_H

@@ -28,7 +28,7 @@ typedef struct npg_attachment npg_attachment;
 npg_status npg_attach_open(npg_attachment **attachment, npg_mesh *rest, const float *points,
                            const float *normals, size_t point_count);
 
-#define NPG_ATTACH_REACH 0.02
+#define NPG_ATTACH_REACH 0.02 /* of the diagonal: parts that thin have two sides so near; set by trial */
 
 /* Points tied farther away than dist (in the mesh's unit), and the worst of them: its number, and the largest
  * distance of all points.  *worst is 0 without points. */

@@ -1,4 +1,4 @@
-/* Mesh tools: small facts about a triangle mesh that several stages need.  V vertices, F faces, E edges. */
+/* Mesh tools: properties of a triangle mesh that several stages need.  V vertices, F faces, E edges. */
 #ifndef NPG_MESH_TOOLS_H
 #define NPG_MESH_TOOLS_H
 
