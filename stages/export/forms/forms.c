@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-#define FLOAT_STEPS 16777216 /* float rounds by at most 1 / this of the largest coordinate */
-#define KEPT_SHARE  1e-6     /* of the box: what positions may lose                        */
+#define FLOAT_STEPS 16777216 /* 2^24: float rounds by at most 1 / this of the largest coordinate */
+#define KEPT_SHARE  1e-6     /* of the box: what positions may lose, a micrometre in a metre */
 
 extern const npg_form npg_form_obj, npg_form_pc2, npg_form_mdd, npg_form_glb, npg_form_usda, npg_form_npz,
     npg_form_vdb;
@@ -20,7 +20,7 @@ const npg_form *const npg_forms[] = {&npg_form_obj,  /* beside PLY              
 
 /* ---- choosing ---- */
 
-static int find(const char *name, size_t length)
+static int find_form(const char *name, size_t length)
 {
     for (int i = 0; npg_forms[i]; i++)
         if (strlen(npg_forms[i]->name) == length && !strncmp(npg_forms[i]->name, name, length)) return i;
@@ -41,11 +41,11 @@ static npg_status refuse_name(const char *name, size_t length)
 npg_status npg_forms_choose(npg_form_choice *choice, const char *list, bool is_obj)
 {
     bool has_ply = false;
-    int obj = find("obj", 3);
+    int obj = find_form("obj", 3);
     *choice = (npg_form_choice){.is_obj = is_obj};
     for (const char *name = list; *name;) {
         size_t length = strcspn(name, ",");
-        int form = find(name, length);
+        int form = find_form(name, length);
         bool is_ply = length == 3 && !strncmp(name, "ply", 3);
         if (form < 0 && !is_ply) return refuse_name(name, length);
         has_ply = has_ply || is_ply;

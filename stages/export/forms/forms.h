@@ -65,8 +65,8 @@ typedef struct npg_pose {
  * what is not finished. */
 typedef struct npg_form {
     const char *name, *help;
-    bool is_float;  /* keeps positions as float: far from 0 that is too coarse                   */
-    bool is_steady; /* has no times of its own: a frame without a mesh repeats the one before it */
+    bool is_float;       /* keeps positions as float: far from 0 that is too coarse                   */
+    bool has_fixed_rate; /* has no times of its own: a frame without a mesh repeats the one before it */
     size_t state_size;
     /* NPG_USAGE when the form can't hold such a capture (vert_count at most, pose_count -1 where unknown).
      * May be NULL. */
@@ -111,7 +111,7 @@ uint64_t npg_forms_bytes(const npg_form_choice *choice, const npg_form_facts *fa
 typedef struct npg_form_watch {
     bool (*should_stop)(void *user);
     void *user;
-    int64_t repeated; /* out: frames without a mesh that steady forms filled */
+    int64_t repeated; /* out: frames without a mesh that forms of a fixed rate filled */
 } npg_form_watch;
 
 /* Remove all that forms of earlier runs left in OUT. */

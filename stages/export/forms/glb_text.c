@@ -8,6 +8,7 @@
 
 #include "ingest/formats/number.h"
 
+/* Constants of OpenGL that glTF 2.0 uses. */
 enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
 enum { UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126 };
 
@@ -79,7 +80,7 @@ static void add_node(builder *b)
     const npg_form_facts *facts = b->layout->facts;
     add(b, "\"nodes\":[{\"name\":\"capture\",\"mesh\":0");
     if (facts->is_z_up) {
-        add(b, ",\"rotation\":[");
+        add(b, ",\"rotation\":["); /* x, y, z, w: a quarter turn about x, z up becomes y up */
         add_number(b, -sqrt(0.5));
         add(b, ",0,0,");
         add_number(b, sqrt(0.5));

@@ -12,6 +12,8 @@ extern "C" {
 namespace
 {
 
+constexpr float HALF_WIDTH = 3; // of the narrow band, in voxels: OpenVDB's own default
+
 openvdb::FloatGrid::Ptr make_grid(const npg_vdb_surface &s)
 {
     std::vector<openvdb::Vec3s> points(s.vert_count);
@@ -19,7 +21,7 @@ openvdb::FloatGrid::Ptr make_grid(const npg_vdb_surface &s)
     for (size_t i = 0; i < s.vert_count; i++) points[i] = openvdb::Vec3s(s.points + 3 * i);
     for (size_t f = 0; f < s.face_count; f++) triangles[f] = openvdb::Vec3I(s.faces + 3 * f);
     auto transform = openvdb::math::Transform::createLinearTransform(s.voxel);
-    auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, points, triangles, 3.0f);
+    auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, points, triangles, HALF_WIDTH);
     grid->setName("surface");
     return grid;
 }
