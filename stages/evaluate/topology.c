@@ -53,7 +53,7 @@ static bool may_split(const npg_topology *t, const npg_facts *facts, int directi
            end - cut >= t->settings.segment_min;
 }
 
-/* ---- the file that tells where ---- */
+/* ---- the end of a run for another reference: OUT/topology.json ---- */
 
 static npg_status end_for_split(npg_topology *t, npg_worker *worker, int direction)
 {

@@ -24,8 +24,8 @@ void npg_topology_close(npg_topology **topology);
 bool npg_topology_is_shared(const npg_topology_settings *settings, const npg_facts *facts, int64_t index);
 
 /* A frame with its figures; any order.  Warns when it makes the alarm go off.
- * With NPG_ALARM_SPLIT, where both segments get their least number of frames: OUT/topology.json tells where,
- * and NPG_CHANGED is the answer. */
+ * With NPG_ALARM_SPLIT, where both segments get their least number of frames: the place is written to
+ * OUT/topology.json and NPG_CHANGED returned. */
 npg_status npg_topology_add(npg_topology *topology, npg_worker *worker, const npg_frame *frame);
 
 /* After the last frame: the report's "topology", and facts->changed_at. */

@@ -19,7 +19,7 @@ struct npg_surface {
     size_t vert_count, face_count;
     float *vert_pos;        /* V x 3 and 16 bytes that Embree may read beyond them */
     uint32_t *faces;        /* F x 3 */
-    atomic_ptrdiff_t bytes; /* what Embree holds, as it told us */
+    atomic_ptrdiff_t bytes; /* what Embree holds, as it reports */
 };
 
 /* ---- Embree's memory and errors ---- */

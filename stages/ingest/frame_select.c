@@ -22,7 +22,7 @@ static const char *skip_spaces(const char *at)
     return at + strspn(at, " ");
 }
 
-/* A whole number at *at; *has tells whether there is one. */
+/* A whole number at *at; *has says whether there is one. */
 static bool parse_number(int64_t *value, bool *has, const char **at)
 {
     const char *text = skip_spaces(*at);

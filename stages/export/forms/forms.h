@@ -9,10 +9,10 @@
  *     OUT/latents/window_000000.vdb  latent grids of every window
  *     OUT/exports.jsonl              one line per file of these, with size and checksum
  *
- * The mesh sequence is written while frames are solved, which is not the order of time, and is what a run
- * that was broken off goes on from.  The other forms are made from those files when all are there: one pass
- * in the order of time writes all of them.  So no form needs a state of its own to be resumed, a broken-off
- * pass is simply made again, and the bytes do not depend on how often that happened.  One file per form
+ * The mesh sequence is written while frames are solved, which is not the order of time, and is what a
+ * resumed run continues.  The other forms are made from those files when all are there: one pass in the
+ * order of time writes all of them.  So no form needs a state of its own to be resumed, a broken-off pass is
+ * simply made again, and the bytes do not depend on how often that happened.  One file per form
  * (write_<form>.c), one row per form in forms.c.
  *
  * Threads: one pass belongs to one thread. */

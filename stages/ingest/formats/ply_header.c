@@ -9,7 +9,7 @@
 #define HEADER_LINES_MAX 10000
 #define WORDS_MAX        6 /* "property list <type> <type> <name>" has 5 */
 
-/* Each type has its name of the first PLY files and one that tells its size. */
+/* Each type has its name of the first PLY files and one that says its size. */
 /* clang-format off */
 static const struct {
     const char *name;

@@ -149,7 +149,7 @@ static npg_status check_count_and_normals(reader *r)
     if (r->claimed_count != UINT64_MAX && r->claimed_count != frame->point_count)
         return npg_error(NPG_BAD_INPUT, "%s: line 1: claims %llu points, but %zu follow", r->source->name,
                          (unsigned long long)r->claimed_count, frame->point_count);
-    /* Points without a normal, which scanners write as 0 0 0 or nan, speak neither for nor against. */
+    /* Points without a normal, which scanners write as 0 0 0 or nan, don't count. */
     double directed = (double)(frame->point_count - r->blank_rows);
     bool are_normals = r->unit_rows && (double)r->unit_rows >= UNIT_SHARE * directed;
     if (frame->normals && !r->wants_normals && !are_normals) npg_release(&frame->normals);
