@@ -9,8 +9,8 @@
 /* n values in +-scale, as float and (when `wide` is not NULL) the same in double. */
 npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random);
 
-/* *error = max(*error, max |got - want| / max |want|); a value that is not finite counts as infinitely wrong.
- */
+/* *error = max(*error, max |got - want| / max |want|); a value that is not finite counts
+ * as infinitely wrong. */
 void npg_check_compare(double *error, const float *got, const double *want, size_t n);
 
 /* The same for what is in a buffer. */

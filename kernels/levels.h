@@ -11,21 +11,21 @@
 #define NPG_LEVELS_MAX      32
 
 typedef enum npg_level_kind {
-    NPG_LEVEL_POSITION, /* dense grid over [-1, 1]^3, sampled at positions     */
-    NPG_LEVEL_NORMAL,   /* dense grid over [-1, 1]^3, sampled at normals       */
-    NPG_LEVEL_HASHED    /* nodes of a position grid hashed into a table        */
+    NPG_LEVEL_POSITION, /* dense grid over [-1, 1]^3, sampled at positions */
+    NPG_LEVEL_NORMAL,   /* dense grid over [-1, 1]^3, sampled at normals   */
+    NPG_LEVEL_HASHED    /* nodes of a position grid hashed into a table    */
 } npg_level_kind;
 
 typedef struct npg_level {
     npg_level_kind kind;
-    int nodes;                      /* n per axis                                                       */
-    size_t first_row, row_count;    /* in the table; row_count = n^3 for dense grids                    */
-    int channel_first, channel_end; /* the channels it fills                                          */
-    double share;                   /* weight of its value: 1 / L where levels are averaged             */
-    double lambda;                  /* strength of the smoothing, 0: none                               */
-    double screen, degree;          /* ... by screen I + lambda (degree D - A): D counts a node's
-                                     * neighbours inside the grid, A joins them                         */
-    double rate;                    /* learning rate                                                    */
+    int nodes;                      /* n per axis                                           */
+    size_t first_row, row_count;    /* in the table; row_count = n^3 for dense grids        */
+    int channel_first, channel_end; /* the channels it fills                                */
+    double share;                   /* weight of its value: 1 / L where levels are averaged */
+    double lambda;                  /* strength of the smoothing, 0: none                   */
+    /* ... by screen I + lambda (degree D - A): D counts a node's neighbours inside the grid, A joins them */
+    double screen, degree;
+    double rate; /* learning rate */
 } npg_level;
 
 typedef struct npg_levels {
@@ -34,13 +34,13 @@ typedef struct npg_levels {
     size_t row_count; /* of all levels */
 } npg_levels;
 
-/* Append a level; fills first_row and row_count.  table_rows is for hashed levels: the most rows it may take.
- */
+/* Append a level; fills first_row and row_count.  table_rows is for hashed levels:
+ * the most rows it may take. */
 void npg_levels_add(npg_levels *levels, npg_level level, size_t table_rows);
 
-/* The eight nodes around a point (clamped to [-1, 1]^3) of a level and their trilinear weights: rows of the
- * whole table.  Nodes lie at the corners of the cube ("align corners"); node (i, j, k) is row (i n + j) n +
- * k. */
+/* The eight nodes around a point (clamped to [-1, 1]^3) of a level and their trilinear weights:
+ * rows of the whole table.  Nodes lie at the corners of the cube ("align corners");
+ * node (i, j, k) is row (i n + j) n + k. */
 void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[8], float weights[8]);
 
 #endif

@@ -18,11 +18,11 @@
  * Padded rows take part in the products; their output gradient must be 0, then they change nothing. */
 
 #define PASTE_(a, b) a##b
-#define PASTE(a, b) PASTE_(a, b)
-#define REAL PASTE(float, VW)
-#define LOAD PASTE(vload, VW)
-#define STORE PASTE(vstore, VW)
-#define TW (VW * NV) /* columns of a tile */
+#define PASTE(a, b)  PASTE_(a, b)
+#define REAL         PASTE(float, VW)
+#define LOAD         PASTE(vload, VW)
+#define STORE        PASTE(vstore, VW)
+#define TW           (VW * NV) /* columns of a tile */
 
 /* The columns of this item among C, each tile's first: c. */
 #define FOR_COLUMNS(c, C) for (int c = ITEM * TW; c < (C); c += LOCAL * TW)
@@ -31,14 +31,14 @@
 #define COLUMN(rows, c) ((size_t)((c) / 32) * 32 * (rows) + (c) % 32)
 
 #define BLOCK(C) ((size_t)ROWS * (C))
-#define WMAX (W1 > W2 ? W1 : W2)
+#define WMAX     (W1 > W2 ? W1 : W2)
 
 /* Offsets (floats) in the parameters, in their gradient and in a group's sums of it; w1t and b1 of op "time" follow
  * in the first two. */
-#define AT_W2 0
-#define AT_W3 (AT_W2 + (size_t)W1 * W2)
-#define AT_B2 (AT_W3 + (size_t)W2 * 16)
-#define AT_B3 (AT_B2 + W2)
+#define AT_W2  0
+#define AT_W3  (AT_W2 + (size_t)W1 * W2)
+#define AT_B2  (AT_W3 + (size_t)W2 * 16)
+#define AT_B3  (AT_B2 + W2)
 #define AT_W1Z (AT_B3 + 16)
 #define AT_END (AT_W1Z + (size_t)CZ * W1)
 

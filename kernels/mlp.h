@@ -12,9 +12,9 @@
 #define NPG_MLP_OUT 8 /* floats of output per vertex, 7 used */
 
 typedef struct npg_mlp_shape {
-    size_t w1, w2;    /* widths of the hidden layers, multiples of 32       */
-    size_t code_size; /* M, length of the time code                         */
-    float slope;      /* of the leaky rectifier                             */
+    size_t w1, w2;    /* widths of the hidden layers, multiples of 32 */
+    size_t code_size; /* M, length of the time code                   */
+    float slope;      /* of the leaky rectifier                       */
 } npg_mlp_shape;
 
 size_t npg_mlp_param_count(const npg_mlp_shape *shape);
@@ -32,13 +32,13 @@ typedef struct npg_mlp {
     npg_program *program, *time;
     npg_mlp_shape shape;
     size_t rows, blocks, frames, batch, span, local, groups; /* groups of local work-items */
-    npg_buffer params, grad; /* [param count]                                         */
-    npg_buffer code;         /* [frames][M]                                           */
-    npg_buffer z, dz;        /* [rows][32]: input of all frames and its gradient       */
-    npg_buffer out, dout;    /* [frames][rows][8]                                     */
-    npg_buffer p, dp;        /* [blocks][W1 panels]: z W1z and its gradient            */
-    npg_buffer c, dc;        /* [frames][W1], [groups][frames][W1]                     */
-    npg_buffer h2;           /* [batch][blocks][W2 panels]                             */
+    npg_buffer params, grad; /* [param count]                                    */
+    npg_buffer code;         /* [frames][M]                                      */
+    npg_buffer z, dz;        /* [rows][32]: input of all frames and its gradient */
+    npg_buffer out, dout;    /* [frames][rows][8]                                */
+    npg_buffer p, dp;        /* [blocks][W1 panels]: z W1z and its gradient      */
+    npg_buffer c, dc;        /* [frames][W1], [groups][frames][W1]               */
+    npg_buffer h2;           /* [batch][blocks][W2 panels]                       */
     npg_buffer sums, transposed, scratch;
 } npg_mlp;
 

@@ -14,13 +14,13 @@ typedef enum npg_rotation {
     NPG_ROTATION_EXPONENTIAL
 } npg_rotation;
 
-/* count x 3 -> [blocks of 16][3][16], padded to `padded` points (a multiple of 16) by repeating the last; and
- * back. */
+/* count x 3 -> [blocks of 16][3][16], padded to `padded` points (a multiple of 16) by repeating
+ * the last; and back. */
 void npg_pack16(float *out, const float *points, size_t count, size_t padded);
 void npg_unpack16(float *points, const float *packed, size_t count);
 
-/* Order of points along a Morton curve of their own box: order[i] is the index of the i-th.  Points are
- * finite. */
+/* Order of points along a Morton curve of their own box: order[i] is the index of the i-th.
+ * Points are finite. */
 npg_status npg_morton_order(uint32_t *order, const float *points, size_t count);
 
 /* Box blocks (of 96 floats) of the tree over `count` points. */
@@ -29,10 +29,10 @@ size_t npg_tree_blocks(size_t count);
 /* A known correspondence: the surface point sum share x_vertex + constant, the target already taken off. */
 typedef struct npg_pull {
     int32_t vertex[3];
-    float weight;      /* of the squared distance                                            */
-    float share[3];    /* of each vertex                                                     */
-    float along;       /* share of distances along the surface, 0..1                         */
-    float constant[3]; /* what the vertices leave out of the surface point, less the target  */
+    float weight;      /* of the squared distance                                           */
+    float share[3];    /* of each vertex                                                    */
+    float along;       /* share of distances along the surface, 0..1                        */
+    float constant[3]; /* what the vertices leave out of the surface point, less the target */
     float unused_1;
     float normal[3];
     float unused_2;
@@ -40,16 +40,16 @@ typedef struct npg_pull {
 
 typedef struct npg_motion {
     npg_program *transform, *nearest, *chamfer, *isometry, *pull;
-    size_t rows, real, frames;              /* V padded, V, T */
-    npg_buffer rest;                        /* positions that are transformed, one set or one per frame  */
-    size_t rest_stride;                     /* floats between the sets of two frames, 0: one set         */
-    npg_buffer pulls, pull_start;           /* only after npg_motion_set_pulls                        */
+    size_t rows, real, frames;              /* V padded, V, T                                           */
+    npg_buffer rest;                        /* positions that are transformed, one set or one per frame */
+    size_t rest_stride;                     /* floats between the sets of two frames, 0: one set        */
+    npg_buffer pulls, pull_start;           /* only after npg_motion_set_pulls                          */
     npg_buffer x, g;                        /* [frames] positions and dL/dx                             */
     npg_buffer vert_boxes;                  /* [frames][tree blocks of V][96]                           */
-    npg_buffer points, point_boxes;         /* all targets, and their trees                        */
-    npg_buffer to_points, to_verts;         /* nearest indices, kept as candidates from step to step */
-    npg_buffer forward, reverse;            /* slots: vertex -> point, point -> vertex              */
-    npg_buffer start, neighbour, edge_rest; /* half-edges by vertex                         */
+    npg_buffer points, point_boxes;         /* all targets, and their trees                             */
+    npg_buffer to_points, to_verts;         /* nearest indices, kept as candidates from step to step    */
+    npg_buffer forward, reverse;            /* slots: vertex -> point, point -> vertex                  */
+    npg_buffer start, neighbour, edge_rest; /* half-edges by vertex                                     */
     npg_buffer cd, part, gain;
     size_t most_points, half_edges;
     size_t local, queries; /* from the tuning: work-items of a frame, searches of a work-item */

@@ -143,8 +143,8 @@ static void transform_back_twins(motion_data *d, npg_rotation rotation)
         }
 }
 
-/* The gradient that is passed back here is the positions themselves, brought in as the data term with gain 1.
- */
+/* The gradient that is passed back here is the positions themselves, brought in as the
+ * data term with gain 1. */
 static npg_status compare_transform(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
                                     npg_buffer *dout, npg_rotation rotation, double *error)
 {
@@ -348,8 +348,8 @@ npg_status npg_check_chamfer(npg_device *device, int size, uint64_t seed, double
     return check_motion(device, size, seed, compare_chamfer, error);
 }
 
-/* Without the robust weight the value and the gradient belong together (the weight is held constant in the
- * latter). */
+/* Without the robust weight the value and the gradient belong together (the weight is held
+ * constant in the latter). */
 static double chamfer_value(void *user)
 {
     motion_data *d = user;

@@ -10,7 +10,7 @@
  * 0, 0}.  Padding of the last leaf repeats the last point. */
 
 #define SLOT 8
-#define FAR 1e18f
+#define FAR  1e18f
 
 /* Build constants from the tuning of the device: QUERIES, LOCAL. */
 

@@ -13,8 +13,8 @@ extern "C" {
 #endif
 
 /* M = B^T diag(eigen) B with the orthonormal rows of basis (n x n).  degree 1, the graph's Laplacian: the
- * DCT-II, B[k][j] = s_k cos(pi (j + 1/2) k / n), s_0 = sqrt(1 / n), s_k = sqrt(2 / n), eigen[k] = 2 - 2
- * cos(pi k / n); other degrees by Jacobi's rotations.  NPG_MEMORY. */
+ * DCT-II, B[k][j] = s_k cos(pi (j + 1/2) k / n), s_0 = sqrt(1 / n), s_k = sqrt(2 / n),
+ * eigen[k] = 2 - 2 cos(pi k / n); other degrees by Jacobi's rotations.  NPG_MEMORY. */
 npg_status npg_path_spectrum(double *basis, double *eigen, int n, double degree);
 
 #ifdef __cplusplus

@@ -5,7 +5,7 @@
  * A surface point is a fixed combination of three vertices plus a constant; q is that constant less the target.  n is
  * the surface's normal there: distances along the surface count by the small share a only, so that the surface may
  * slide.  Our own; it takes the place of the Chamfer distance once a coarse alignment has brought surface and points
- * together (stages/tracker.h). */
+ * together (align/tracker.h). */
 
 /* pulls: [..][16] floats = v0 v1 v2 (as int bits) w | b0 b1 b2 a | q x y z 0 | n x y z 0, those of frame f from
  * start[f] to start[f + 1].  x, g: [frames][rows / 16][3][16]; g is overwritten.  loss: [frames].  A frame has

@@ -1,12 +1,15 @@
 /* transform: x = R(q) v + tanh(0.1 d) for every vertex of every frame (paper: "Transformation Mapping").
  *
  * out: [frames][rows][8] = four rotation values, three of translation, one unused.  Positions are in blocks of 16:
- * [rows / 16][3][16], frame after frame.  All kernels of the step work on the
- * frames first .. first + count - 1.  ROTATION 0: offset quaternion (1 + o0, o1, o2, o3) normalised;
- * 1: Cayley, the quaternion (1, o1, o2, o3) normalised; 2: exponential map of the rotation vector (o1, o2, o3). */
+ * [rows / 16][3][16], frame after frame.  All kernels of the step work on the frames first .. first + count - 1.
+ *
+ *     ROTATION 0    offset quaternion (1 + o0, o1, o2, o3), normalised
+ *     ROTATION 1    Cayley: the quaternion (1, o1, o2, o3), normalised
+ *     ROTATION 2    exponential map of the rotation vector (o1, o2, o3)
+ */
 
 #define AT(block, axis, lane) (((size_t)(block)*3 + (axis)) * 16 + (lane))
-#define REACH 0.1f
+#define REACH                 0.1f
 
 typedef struct turn {
     float s;     /* scalar part of the unit quaternion */

@@ -4,8 +4,8 @@
  *     per block: name (32 bytes, padded with 0), size (8 bytes), the bytes, padding with 0 to a multiple of 8
  *     a last block "end" of 8 bytes: XXH3 of all bytes before it
  *
- * Numbers are as the machine has them: a file belongs to the kind of machine that wrote it.  One thread at a
- * time. */
+ * Numbers are as the machine has them: a file belongs to the kind of machine that wrote it.
+ * One thread at a time. */
 #ifndef NPG_ARCHIVE_H
 #define NPG_ARCHIVE_H
 

@@ -1,9 +1,9 @@
-/* Chunk: a few consecutive frames on their way through the stages; counted references, one owner per
- * reference.
+/* Chunk: a few consecutive frames on their way through the stages; counted references,
+ * one owner per reference.
  *
- * A stage may change a chunk only while it holds the only reference.  A function that takes npg_chunk **
- * nulls the pointer when it has taken the reference; a pointer that is not NULL afterwards is still the
- * caller's. */
+ * A stage may change a chunk only while it holds the only reference.
+ * A function that takes npg_chunk ** nulls the pointer when it has taken the reference;
+ * a pointer that is not NULL afterwards is still the caller's. */
 #ifndef NPG_CHUNK_H
 #define NPG_CHUNK_H
 
@@ -11,16 +11,16 @@
 
 #include "pipeline/memory.h"
 
-/* What a frame carries.  Stages say which fields they need and give; the chain is checked when it is built.
- */
+/* What a frame carries.  Stages say which fields they need and give;
+ * the chain is checked when it is built. */
 enum {
-    NPG_FIELD_POINTS = 1 << 0,    /* pos_local                                 */
-    NPG_FIELD_CLEAN = 1 << 1,     /* pos_local holds only usable points        */
-    NPG_FIELD_KEY = 1 << 2,       /* run facts: box, keyframe and order known  */
-    NPG_FIELD_REFERENCE = 1 << 3, /* run facts: the reference mesh           */
-    NPG_FIELD_VERTICES = 1 << 4,  /* vert_unit                               */
-    NPG_FIELD_POSE = 1 << 6,      /* vert_unit, coarsely aligned               */
-    NPG_FIELD_FIGURES = 1 << 5    /* figures                                 */
+    NPG_FIELD_POINTS = 1 << 0,    /* pos_local                                */
+    NPG_FIELD_CLEAN = 1 << 1,     /* pos_local holds only usable points       */
+    NPG_FIELD_KEY = 1 << 2,       /* run facts: box, keyframe and order known */
+    NPG_FIELD_REFERENCE = 1 << 3, /* run facts: the reference mesh            */
+    NPG_FIELD_VERTICES = 1 << 4,  /* vert_unit                                */
+    NPG_FIELD_POSE = 1 << 6,      /* vert_unit, coarsely aligned              */
+    NPG_FIELD_FIGURES = 1 << 5    /* figures                                  */
 };
 
 /* What the outlier stage did to a frame, in points. */
@@ -29,7 +29,7 @@ typedef struct npg_cleaning {
     size_t normals_given, normals_flipped, normals_estimated;
 } npg_cleaning;
 
-/* Where the surface fails in one place, and not a little everywhere (stages/misfit.h). */
+/* Where the surface fails in one place, and not a little everywhere (evaluate/misfit.h). */
 enum { NPG_MISFIT_FAR, NPG_MISFIT_BARE, NPG_MISFIT_TORN, NPG_MISFIT_DESERTED, NPG_MISFITS };
 typedef struct npg_misfit {
     double share; /* of the points, or of the surface, in the largest such place; NaN: not measured */
@@ -39,30 +39,30 @@ typedef struct npg_misfit {
 /* How well a frame's surface explains its points.  Distances are in diagonals of the frame box. */
 typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
-    double vertex_dist_mean; /* surface vertices -> nearest point                */
-    double coverage; /* share of the surface area with points near it, 0..1                                 */
-    double flipped_share;   /* faces turned over against their neighbourhood's rotation, share of all   */
+    double vertex_dist_mean;                                   /* surface vertices -> nearest point */
+    double coverage;        /* share of the surface area with points near it, 0..1 */
+    double flipped_share;   /* faces turned over against their neighbourhood's rotation, share of all */
     double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, share of all */
-    double edge_change;     /* mean |length / reference length - 1|     */
-    double chamfer; /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5                   */
+    double edge_change;     /* mean |length / reference length - 1| */
+    double chamfer;         /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5 */
     double truth_cd, truth_nc, truth_f, truth_corr; /* against a ground truth; NaN without */
     npg_misfit misfits[NPG_MISFITS];
-    bool good; /* the frame is above the quality bar                                                  */
+    bool good; /* the frame is above the quality bar */
 } npg_figures;
 
 typedef struct npg_frame {
-    int64_t index;  /* place in time: 0 is the first frame of the run, gaps count                           */
-    int64_t number; /* the number in its file's name (or pushed), = index where there is none               */
-    char *path;     /* where it came from, for messages; owned, may be NULL                                 */
-    uint32_t fields; /* NPG_FIELD_* of this frame */
+    int64_t index;   /* place in time: 0 is the first frame of the run, gaps count             */
+    int64_t number;  /* the number in its file's name (or pushed), = index where there is none */
+    char *path;      /* where it came from, for messages; owned, may be NULL                   */
+    uint32_t fields; /* NPG_FIELD_* of this frame                                              */
     bool is_key, is_skipped, is_held;
     bool is_shared;     /* belongs to a neighbouring segment: measured, not judged */
-    size_t point_count; /* N                                                                               */
-    float *pos_local;   /* N x 3, owned; world - origin                                                    */
-    float *normals;     /* N x 3, owned, unit length, or NULL                                              */
+    size_t point_count; /* N                                                       */
+    float *pos_local;   /* N x 3, owned; world - origin                            */
+    float *normals;     /* N x 3, owned, unit length, or NULL                      */
     npg_cleaning cleaning;
-    size_t vert_count; /* V                                                                               */
-    float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates                       */
+    size_t vert_count; /* V                                                         */
+    float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates */
     npg_figures figures;
     void *
         align_state; /* on the last frame that a window waits for: what stage align needs to be resumed after it */

@@ -240,8 +240,8 @@ npg_status npg_path_confine(const char *path, const char *folder)
 {
     if (npg_path_is_inside(path, folder)) return NPG_OK;
     return npg_error(NPG_BAD_INPUT,
-                     "%s: leads out of %s, and option confine is set (as always in a batch, unless it says "
-                     "otherwise); --no-confine follows it",
+                     "%s: leads out of %s, and option confine is set "
+                     "(as always in a batch, unless it says otherwise); --no-confine follows it",
                      path, folder);
 }
 

@@ -32,9 +32,9 @@ npg_status npg_file_commit(npg_file **file);
 /* Give up: nothing remains.  NULL is fine. */
 void npg_file_discard(npg_file **file);
 
-/* Open a plain file for reading; *fd is the caller's, -1 on failure.  Never waits: a pipe or a device in the
- * place of a file is refused.  `failure` is what a file that can't be opened means (NPG_BAD_INPUT, NPG_DISK).
- */
+/* Open a plain file for reading; *fd is the caller's, -1 on failure.  Never waits:
+ * a pipe or a device in the place of a file is refused.  `failure` is what a file that can't be opened means
+ * (NPG_BAD_INPUT, NPG_DISK). */
 npg_status npg_file_open_plain(int *fd, const char *path, npg_status failure);
 
 /* Whether a name from a file can be added to a folder without leading out of it: not absolute, no "..". */

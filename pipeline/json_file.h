@@ -7,8 +7,8 @@
 #include "pipeline/status.h"
 
 /* Parse a file of at most `limit` bytes; comments go from // to the end of the line, a key may stand only
- * once. *text gets what was parsed, comments blanked out, lines as they were: npg_release().  The caller owns
- * the root (json_decref).  NPG_USAGE names the file, line, column and cause; both are then NULL. */
+ * once.  *text gets what was parsed, comments blanked out, lines as they were: npg_release().  The caller
+ * owns the root (json_decref).  NPG_USAGE names the file, line, column and cause; both are then NULL. */
 npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit);
 
 /* Write a file that appears whole: <folder>/<name>, or the one of this path.  NPG_DISK, NPG_MEMORY. */

@@ -1,8 +1,8 @@
 /* Live plan: the windows of a capture whose end is not known yet.
  *
- * A live source gets an ordinary plan when it ends inside the look-ahead (its results are then those of the
- * same frames from files), else an open one: plan.frame_count is NPG_FRAMES_OPEN.  Under an open plan the
- * windows are
+ * A live source gets an ordinary plan when it ends inside the look-ahead (its results are then
+ * those of the same frames from files), else an open one: plan.frame_count is NPG_FRAMES_OPEN.
+ * Under an open plan the windows are
  *   0                 around the keyframe; later frames than the look-ahead's may belong to it
  *   1 .. B            backward to frame 0; all their frames came before the plan was made
  *   B + 1, B + 2, ..  forward for as long as frames come; the first of them starts from window 0

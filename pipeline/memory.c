@@ -1,5 +1,5 @@
-/* Memory: aligned, zeroed, counted by purpose, from the user's allocator; the n-th request can be made to
- * fail. */
+/* Memory: aligned, zeroed, counted by purpose, from the user's allocator;
+ * the n-th request can be made to fail. */
 #include "pipeline/memory.h"
 
 #include <stdatomic.h>

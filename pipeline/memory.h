@@ -1,5 +1,5 @@
-/* Memory: aligned, zeroed, counted by purpose, from the user's allocator; the n-th request can be made to
- * fail.
+/* Memory: aligned, zeroed, counted by purpose, from the user's allocator;
+ * the n-th request can be made to fail.
  *
  * Threads: all functions may be called from any thread; the counters are atomic. */
 #ifndef NPG_MEMORY_H
@@ -14,13 +14,13 @@ extern "C" {
 #endif
 
 typedef enum npg_purpose {
-    NPG_FOR_FRAMES, /* points, normals and vertices of the frames in flight   */
-    NPG_FOR_MESH,   /* reference mesh and what is derived from it             */
-    NPG_FOR_FIT,    /* the optimisation, host side                            */
-    NPG_FOR_DEVICE, /* device buffers                                         */
-    NPG_FOR_QUERY,  /* search structures                                      */
-    NPG_FOR_FILES,  /* readers, writers, lists of names                       */
-    NPG_FOR_RUN,    /* everything small                                       */
+    NPG_FOR_FRAMES, /* points, normals and vertices of the frames in flight */
+    NPG_FOR_MESH,   /* reference mesh and what is derived from it           */
+    NPG_FOR_FIT,    /* the optimisation, host side                          */
+    NPG_FOR_DEVICE, /* device buffers                                       */
+    NPG_FOR_QUERY,  /* search structures                                    */
+    NPG_FOR_FILES,  /* readers, writers, lists of names                     */
+    NPG_FOR_RUN,    /* everything small                                     */
     NPG_PURPOSES
 } npg_purpose;
 
@@ -51,8 +51,8 @@ const char *npg_purpose_name(npg_purpose purpose);
 /* No more than this many bytes in use (0: no limit). */
 void npg_memory_set_limit(size_t bytes);
 
-/* Tests: the n-th request from now (1 is the next) fails, and so do all after it when `from_then_on`; 0 ends
- * that. */
+/* Tests: the n-th request from now (1 is the next) fails, and so do all after it when
+ * `from_then_on`; 0 ends that. */
 void npg_memory_fail_at(uint64_t n, bool from_then_on);
 
 /* Requests so far. */

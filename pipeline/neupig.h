@@ -17,8 +17,8 @@
  *
  * Conventions.  Functions that can fail return npg_status: 0 is success, a positive value steers the flow
  * (NPG_END), a negative value is a failure whose text npg_error_text() gives on the same thread.  A function
- * that takes T ** consumes the reference and nulls the pointer; T * is a loan until the call returns. Closers
- * accept NULL.  Arrays are row-major; letters: T frames, N points, V vertices, F faces.
+ * that takes T ** consumes the reference and nulls the pointer; T * is a loan until the call returns.
+ * Closers accept NULL.  Arrays are row-major; letters: T frames, N points, V vertices, F faces.
  *
  * Versions.  Structs that cross the border begin with struct_size: whoever fills one sets it to the sizeof he
  * was compiled with.  Later versions only add members at the end, so that a program and a library of
@@ -26,8 +26,7 @@
  * exception is npg_surface_hit, an element of arrays, which stays as it is.
  *
  * Threads.  A handle belongs to one thread at a time unless its functions say otherwise; different handles
- * have nothing in common.
- */
+ * have nothing in common. */
 #ifndef NEUPIG_H
 #define NEUPIG_H
 
@@ -54,18 +53,18 @@ extern "C" {
 
 typedef enum npg_status {
     NPG_OK = 0,
-    NPG_END = 1,        /* no more: the stream ended                                       */
-    NPG_STOPPED = 2,    /* npg_run_stop() was called; what is on disk can be gone on from  */
+    NPG_END = 1,        /* no more: the stream ended                                           */
+    NPG_STOPPED = 2,    /* npg_run_stop() was called; what is on disk can be gone on from      */
     NPG_PARTIAL = 3,    /* done, but frames were skipped, unexplained or below the quality bar */
-    NPG_CHANGED = 4,    /* ended where the topology changed (option alarm = split)         */
-    NPG_FAILED = -1,    /* an environment or library failed in a way of no class below     */
-    NPG_USAGE = -2,     /* an option, a configuration or a call that makes no sense        */
-    NPG_BAD_INPUT = -3, /* the data can't be used: the text names file, place and cause    */
-    NPG_DEVICE = -4,    /* OpenCL: no device, a failed build, a kernel that computes wrong */
-    NPG_DISK = -5,      /* writing failed: disk full, no permission                        */
-    NPG_MEMORY = -6,    /* an allocation failed or would pass the limit                    */
-    NPG_DIVERGED = -7,  /* the optimisation produced a number that is not finite           */
-    NPG_ABORTED = -8    /* another stage failed first; its status is the one to report     */
+    NPG_CHANGED = 4,    /* ended where the topology changed (option alarm = split)             */
+    NPG_FAILED = -1,    /* an environment or library failed in a way of no class below         */
+    NPG_USAGE = -2,     /* an option, a configuration or a call that makes no sense            */
+    NPG_BAD_INPUT = -3, /* the data can't be used: the text names file, place and cause        */
+    NPG_DEVICE = -4,    /* OpenCL: no device, a failed build, a kernel that computes wrong     */
+    NPG_DISK = -5,      /* writing failed: disk full, no permission                            */
+    NPG_MEMORY = -6,    /* an allocation failed or would pass the limit                        */
+    NPG_DIVERGED = -7,  /* the optimisation produced a number that is not finite               */
+    NPG_ABORTED = -8    /* another stage failed first; its status is the one to report         */
 } npg_status;
 
 /* The exit code of the command for a status: 0 done, 1 failed, 2 usage, 3 bad input, 4 device, 5 disk, 6
@@ -86,9 +85,9 @@ NPG_API const char *npg_version(void);
 
 /* ---- memory ---- */
 
-/* Where the library takes its own memory from.  alloc returns size bytes aligned to align (a power of two),
- * or NULL; release frees them.  Both are called from several threads.  Set once, before anything is opened.
- */
+/* Where the library takes its own memory from.  alloc returns size bytes aligned to align
+ * (a power of two), or NULL; release frees them.  Both are called from several threads.
+ * Set once, before anything is opened. */
 typedef struct npg_allocator {
     size_t struct_size;
     void *user;
@@ -100,8 +99,9 @@ typedef struct npg_allocator {
 NPG_API npg_status npg_memory_set_allocator(const npg_allocator *allocator);
 
 /* Bytes in use now, and the most ever in use since the process began (device buffers on the CPU included).
- * The process has more resident: code, the device's compiler, and what its heap keeps though it is free. With
- * glibc mallopt(M_MMAP_THRESHOLD, 1 << 20) at the program's start keeps that small, as the command does. */
+ * The process has more resident: code, the device's compiler, and what its heap keeps though it is free.
+ * With glibc mallopt(M_MMAP_THRESHOLD, 1 << 20) at the program's start keeps that small, as the command
+ * does. */
 NPG_API size_t npg_memory_used(void);
 NPG_API size_t npg_memory_peak(void);
 
@@ -135,18 +135,17 @@ NPG_API npg_status npg_options_set(npg_options *options, const char *name, const
  * NPG_USAGE names file, line and option. */
 NPG_API npg_status npg_options_load(npg_options *options, const char *path);
 
-/* The options that the job in the folder was begun with, its input and its output: with append = yes a run
- * then goes on with frames that came since, without it with what is left.  NPG_USAGE when the folder holds no
- * job.
- */
+/* The options that the job in the folder was begun with, its input and its output:
+ * with append = yes a run then goes on with frames that came since, without it with what is left.
+ * NPG_USAGE when the folder holds no job. */
 NPG_API npg_status npg_options_load_job(npg_options *options, const char *folder);
 
 /* The value an option has now, after presets, as text; NULL for a name that does not exist.  Valid until the
  * options change. */
 NPG_API const char *npg_options_get(const npg_options *options, const char *name);
 
-/* The i-th option of all stages, in the order of the chain; NPG_END after the last.  The texts stay for good.
- */
+/* The i-th option of all stages, in the order of the chain; NPG_END after the last.
+ * The texts stay for good. */
 NPG_API npg_status npg_options_describe(size_t i, npg_option_info *info);
 
 /* ---- a stage of one's own ---- */
@@ -159,26 +158,27 @@ NPG_API npg_status npg_options_describe(size_t i, npg_option_info *info);
  */
 typedef struct npg_frame_view {
     size_t struct_size;
-    int64_t index, number; /* position in the sequence, and the number in the file's name            */
-    const char *path;      /* of its file; NULL for a frame that was pushed                          */
-    size_t point_count;    /* N                                                                      */
-    float *points;         /* N x 3                                                                  */
-    float *normals;        /* N x 3, unit length; NULL where there are none (yet)                    */
-    uint8_t *keep;         /* N, all 1: what is set to 0 is dropped with its normal                  */
+    int64_t index, number; /* position in the sequence, and the number in the file's name */
+    const char *path;      /* of its file; NULL for a frame that was pushed               */
+    size_t point_count;    /* N                                                           */
+    float *points;         /* N x 3                                                       */
+    float *normals;        /* N x 3, unit length; NULL where there are none (yet)         */
+    uint8_t *keep;         /* N, all 1: what is set to 0 is dropped with its normal       */
     double points_origin[3];
-    size_t vertex_count, face_count; /* V, F; 0 before align                                         */
-    float *vertices;                 /* V x 3, NULL before align                                     */
-    const uint32_t *faces;           /* F x 3, the same in every frame; NULL before align            */
+    size_t vertex_count, face_count; /* V, F; 0 before align                              */
+    float *vertices;                 /* V x 3, NULL before align                          */
+    const uint32_t *faces;           /* F x 3, the same in every frame; NULL before align */
     double vertices_origin[3], vertices_unit;
-    double residual, coverage; /* as in npg_result; NaN before evaluate                               */
+    double residual, coverage; /* as in npg_result; NaN before evaluate */
 } npg_frame_view;
 
 typedef struct npg_custom_stage {
     size_t struct_size;
-    const char *name;  /* for log and report: small letters, digits and dashes; no other stage's      */
-    const char *after; /* the stage it follows: ingest, outlier, keyframe, mesh, align, optimize, evaluate or
-                          export (then it only looks: what is on disk was written before)             */
-    void *user;        /* handed to the callback                                                      */
+    const char *name; /* for log and report: small letters, digits and dashes; no other stage's */
+    /* the stage it follows: ingest, outlier, keyframe, mesh, align, optimize, evaluate or export (then it
+     * only looks: what is on disk was written before) */
+    const char *after;
+    void *user; /* handed to the callback */
     /* One frame.  NPG_OK passes it on; a failure ends the run with this status and the text of
      * npg_error_set(); NPG_STOPPED stops it. */
     npg_status (*frame)(void *user, npg_frame_view *frame);
@@ -205,21 +205,21 @@ typedef enum npg_log_level { NPG_LOG_ERROR, NPG_LOG_WARNING, NPG_LOG_INFO, NPG_L
 typedef struct npg_log_record {
     size_t struct_size;
     npg_log_level level;
-    double time_s;       /* seconds since the run was opened   */
-    const char *stage;   /* the stage that speaks              */
+    double time_s;       /* seconds since the run was opened             */
+    const char *stage;   /* the stage that speaks                        */
     int64_t frame;       /* number of the frame it speaks of, -1 if none */
-    const char *message; /* one line, no newline at its end    */
+    const char *message; /* one line, no newline at its end              */
 } npg_log_record;
 
 typedef struct npg_progress {
     size_t struct_size;
-    const char *stage;           /* the stage that decides how far the run is         */
-    double share;                /* 0..1 of the whole run                             */
-    double elapsed_s, left_s;    /* left_s < 0 while it can't be told                 */
-    int64_t frames_done, frames; /* written so far, in all (-1: not known yet)        */
-    int64_t step, steps;         /* epochs of the window at work                      */
-    int64_t window, windows;     /* the window at work, and how many there will be    */
-    double loss;                 /* last mean loss per frame; NaN before the first    */
+    const char *stage;           /* the stage that decides how far the run is      */
+    double share;                /* 0..1 of the whole run                          */
+    double elapsed_s, left_s;    /* left_s < 0 while it can't be told              */
+    int64_t frames_done, frames; /* written so far, in all (-1: not known yet)     */
+    int64_t step, steps;         /* epochs of the window at work                   */
+    int64_t window, windows;     /* the window at work, and how many there will be */
+    double loss;                 /* last mean loss per frame; NaN before the first */
 } npg_progress;
 
 /* Called from the run's threads, one call at a time for each run.  Pointers in the records are loans. */
@@ -237,22 +237,22 @@ typedef struct npg_run npg_run;
 /* A cloud handed in by npg_run_push(): N points, world coordinates. */
 typedef struct npg_cloud {
     size_t struct_size;
-    int64_t number;       /* the frame's number; numbers must grow                  */
-    size_t point_count;   /* N                                                      */
-    const double *points; /* N x 3, any unit; copied                                */
-    const float *normals; /* N x 3 or NULL; copied                                  */
+    int64_t number;       /* the frame's number; numbers must grow */
+    size_t point_count;   /* N                                     */
+    const double *points; /* N x 3, any unit; copied               */
+    const float *normals; /* N x 3 or NULL; copied                 */
 } npg_cloud;
 
 /* One frame of the moving mesh, got by npg_run_pull(). */
 typedef struct npg_result {
     size_t struct_size;
-    int64_t index, number;  /* position in the sequence, and the number in the file's name  */
-    size_t vertex_count;    /* V, the same in every frame                                   */
-    size_t face_count;      /* F                                                            */
-    const double *vertices; /* V x 3, world coordinates                                     */
-    const uint32_t *faces;  /* F x 3, the same list in every frame                          */
+    int64_t index, number;  /* position in the sequence, and the number in the file's name      */
+    size_t vertex_count;    /* V, the same in every frame                                       */
+    size_t face_count;      /* F                                                                */
+    const double *vertices; /* V x 3, world coordinates                                         */
+    const uint32_t *faces;  /* F x 3, the same list in every frame                              */
     double residual;        /* median distance points -> surface, in diagonals of the frame box */
-    double coverage;        /* share of the surface that has points near it, 0..1           */
+    double coverage;        /* share of the surface that has points near it, 0..1               */
 } npg_result;
 
 /* Check the options, build the chain and start the run's threads.  hooks may be NULL.
@@ -286,9 +286,9 @@ NPG_API void npg_run_close(npg_run **run);
 typedef struct npg_surface npg_surface;
 
 typedef struct npg_surface_hit {
-    uint32_t face;    /* the closest face                                       */
-    float weights[3]; /* barycentric weights of the closest point               */
-    float dist_sq;    /* squared distance, in the mesh's unit                   */
+    uint32_t face;    /* the closest face                         */
+    float weights[3]; /* barycentric weights of the closest point */
+    float dist_sq;    /* squared distance, in the mesh's unit     */
 } npg_surface_hit;
 
 /* A searchable surface from V vertices (V x 3) and F faces (F x 3); both are copied.  NPG_USAGE for an index

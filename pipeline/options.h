@@ -7,8 +7,8 @@
 #include "pipeline/status.h"
 
 /* One option.  A table ends with a name of NULL.  offset is where the value goes in the stage's state:
- * FLAG bool, INT int64_t, REAL double, CHOICE int (which word), TEXT const char * (a loan, lives as long as
- * the run). */
+ * FLAG bool, INT int64_t, REAL double, CHOICE int (which word), TEXT const char * (a loan, lives
+ * as long as the run). */
 typedef struct npg_option {
     const char *name, *help;
     npg_option_type type;
@@ -19,8 +19,41 @@ typedef struct npg_option {
     const char *value_name; /* for the help: N, DIR, FILE; NULL: by the type */
 } npg_option;
 
-/* A named set of values; what the user sets himself wins.  The list ends with a name of NULL, as does each
- * set. */
+/* The rows of a table, a macro for each type: name, place of the value, default, what the value may be, and
+ * on lines of its own the help.  "shown" stands for the value in the help (value_name above).  Tables are
+ * aligned by hand, between "clang-format off" and "on":
+ *
+ *     type         name      place        default  least  most  shown as or words
+ *     NPG_ROW_INT ("epochs", AT(epochs),  "10",    0,     1e6,  "N",
+ *         "help"),
+ */
+#define NPG_ROW_FLAG(word, place, initial, text)                                                             \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = NPG_OPTION_FLAG, .offset = (place),                          \
+        .default_text = (initial)                                                                            \
+    }
+#define NPG_ROW_INT(word, place, initial, least, most, shown, text)                                          \
+    NPG_ROW_NUMBER(NPG_OPTION_INT, word, place, initial, least, most, shown, text)
+#define NPG_ROW_REAL(word, place, initial, least, most, shown, text)                                         \
+    NPG_ROW_NUMBER(NPG_OPTION_REAL, word, place, initial, least, most, shown, text)
+#define NPG_ROW_NUMBER(kind, word, place, initial, least, most, shown, text)                                 \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = (kind), .offset = (place), .default_text = (initial),        \
+        .min = (least), .max = (most), .value_name = (shown)                                                 \
+    }
+#define NPG_ROW_CHOICE(word, place, initial, words, text)                                                    \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = NPG_OPTION_CHOICE, .offset = (place),                        \
+        .default_text = (initial), .choices = (words)                                                        \
+    }
+#define NPG_ROW_TEXT(word, place, initial, shown, text)                                                      \
+    {                                                                                                        \
+        .name = (word), .help = (text), .type = NPG_OPTION_TEXT, .offset = (place),                          \
+        .default_text = (initial), .value_name = (shown)                                                     \
+    }
+
+/* A named set of values; what the user sets himself wins.  The list ends with a name
+ * of NULL, as does each set. */
 typedef struct npg_preset_value {
     const char *name, *value;
 } npg_preset_value;
@@ -32,8 +65,8 @@ typedef struct npg_preset {
 
 struct npg_stage;
 
-/* Options of the tables of a chain (NULL-terminated) instead of npg_chain; npg_options_open() is this with
- * npg_chain. */
+/* Options of the tables of a chain (NULL-terminated) instead of npg_chain;
+ * npg_options_open() is this with npg_chain. */
 npg_status npg_options_open_chain(npg_options **options, const struct npg_stage *const *chain);
 
 /* The i-th option of all tables of npg_chain, the run's own first; NULL after the last.  *stage gets the
@@ -44,8 +77,8 @@ const npg_option *npg_option_at(size_t i, const char **stage);
  * chain gets its default. */
 void npg_options_fill(const npg_options *options, const npg_option *table, void *state);
 
-/* Write one value, which npg_option_check() has accepted, into state at the option's offset.  A TEXT is a
- * loan. */
+/* Write one value, which npg_option_check() has accepted, into state at the option's offset.
+ * A TEXT is a loan. */
 void npg_option_store(const npg_option *option, const char *text, void *state);
 
 /* A copy that owns its texts. */

@@ -1,9 +1,9 @@
 /* Plan: which frames are solved together, and in what order the solving pass reads the capture.
  *
- * Windows go outward from the one that holds the keyframe: window 0 is around it, then all later windows
- * forward in time, then all earlier ones backward.  A window shares `overlap` frames with the one it starts
- * from.  Windows of appended frames go on forward, each with the last `overlap` frames before its new ones.
- */
+ * Windows go outward from the one that holds the keyframe: window 0 is around it,
+ * then all later windows forward in time, then all earlier ones backward.
+ * A window shares `overlap` frames with the one it starts from.  Windows of appended frames go on forward,
+ * each with the last `overlap` frames before its new ones. */
 #ifndef NPG_PLAN_H
 #define NPG_PLAN_H
 
@@ -12,20 +12,20 @@
 #include "pipeline/status.h"
 
 typedef struct npg_plan {
-    int64_t frame_count; /* T                                                     */
-    int64_t key;         /* index of the keyframe                                 */
-    int64_t window;      /* frames per window; >= T: one joint window over all    */
-    int64_t overlap;     /* frames shared with the neighbour, < window            */
+    int64_t frame_count; /* T                                                  */
+    int64_t key;         /* index of the keyframe                              */
+    int64_t window;      /* frames per window; >= T: one joint window over all */
+    int64_t overlap;     /* frames shared with the neighbour, < window         */
     /* of a run that goes on with frames which came later; all 0 without */
     int64_t appended_at; /* frames before this one are solved; the windows are those of the rest, forward */
     int64_t first_count; /* frame_count of the first plan: it decides where the window of the keyframe lies */
 } npg_plan;
 
 typedef struct npg_window {
-    int64_t first, last;         /* frames first..last, both inclusive                               */
-    int64_t from;                /* the window it starts from, -1 for window 0                       */
-    int64_t new_first, new_last; /* the frames no earlier window has solved                        */
-    int direction;               /* 0 around the keyframe, +1 forward, -1 backward                   */
+    int64_t first, last;         /* frames first..last, both inclusive             */
+    int64_t from;                /* the window it starts from, -1 for window 0     */
+    int64_t new_first, new_last; /* the frames no earlier window has solved        */
+    int direction;               /* 0 around the keyframe, +1 forward, -1 backward */
 } npg_window;
 
 /* The plan for frame_count frames when those of `plan` are solved. */
@@ -46,9 +46,8 @@ bool npg_plan_is_last_forward(const npg_plan *plan, int64_t i);
 int64_t npg_plan_window_count(const npg_plan *plan);
 npg_window npg_plan_window(const npg_plan *plan, int64_t i);
 
-/* The i-th frame to read (0 <= i < read count): the keyframe first, then those after it in window 0 and
- * those before it, then each window's new frames; each next to one that came before.  Every frame comes once.
- */
+/* The i-th frame to read (0 <= i < read count): the keyframe first, then those after it in window 0 and those
+ * before it, then each window's new frames; each next to one that came before.  Every frame comes once. */
 int64_t npg_plan_frame(const npg_plan *plan, int64_t i);
 
 #endif

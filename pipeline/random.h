@@ -1,8 +1,8 @@
 /* Random: a small generator whose numbers are the same on every machine.
  *
  * Based on: Guy Steele, Doug Lea, Christine Flood, Fast splittable pseudorandom number generators
- * (SplitMix64). A stream is one 64-bit counter; streams of different keys are independent for our purposes.
- */
+ * (SplitMix64).  A stream is one 64-bit counter; streams of different keys are
+ * independent for our purposes. */
 #ifndef NPG_RANDOM_H
 #define NPG_RANDOM_H
 

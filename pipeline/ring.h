@@ -19,8 +19,8 @@ void npg_ring_close(npg_ring **ring);
  * NPG_ABORTED it is still the caller's.  Pushing after npg_ring_end() is NPG_USAGE. */
 npg_status npg_ring_push(npg_ring *ring, npg_chunk **chunk);
 
-/* Take the oldest chunk, waiting while the ring is empty and open.  NPG_END: ended and empty.  NPG_ABORTED.
- */
+/* Take the oldest chunk, waiting while the ring is empty and open.  NPG_END: ended
+ * and empty.  NPG_ABORTED. */
 npg_status npg_ring_pop(npg_ring *ring, npg_chunk **chunk);
 
 void npg_ring_end(npg_ring *ring);

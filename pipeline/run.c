@@ -1,5 +1,5 @@
-/* Run: builds the chain, walks the capture through it in passes, and is what the public interface talks to.
- */
+/* Run: builds the chain, walks the capture through it in passes, and is what the public
+ * interface talks to. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,45 +12,47 @@
 #include "pipeline/run_internal.h"
 #include "pipeline/struct_size.h"
 
-#define OFFSET(member) offsetof(npg_settings, member)
+#define AT(member) offsetof(npg_settings, member)
 
+/* clang-format off */
 const npg_option npg_run_options[] = {
-    {"input",
-     "Folder, pattern (frame_%04d.ply), list file, or - for standard input; empty: frames are pushed",
-     NPG_OPTION_TEXT, OFFSET(input), "", 0, 0, NULL, "PATH"},
-    {"follow",
-     "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): its files are frames as they are "
-     "complete; takes the place of the input",
-     NPG_OPTION_TEXT, OFFSET(follow), "", 0, 0, NULL, "DIR"},
-    {"reference", "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one",
-     NPG_OPTION_TEXT, OFFSET(reference), "", 0, 0, NULL, "FILE"},
-    {"output", "Folder for the results; empty: results are only pulled", NPG_OPTION_TEXT, OFFSET(output), "",
-     0, 0, NULL, "DIR"},
-    {"preset", "A named set of option values", NPG_OPTION_CHOICE, OFFSET(preset), "default", 0, 0,
-     "default|best|paper", NULL},
-    {"quality", "usual, or best: the preset of that name, slower and closer", NPG_OPTION_CHOICE,
-     OFFSET(quality), "usual", 0, 0, "usual|best", NULL},
-    {"device", "OpenCL device: part of its name, its number, or auto (neupig doctor lists them)",
-     NPG_OPTION_TEXT, OFFSET(device), "auto", 0, 0, NULL, "DEVICE"},
-    {"tuning",
-     "parameters of the kernels: auto (what neupig tune found, else by device), wide, narrow, gpu, or a file",
-     NPG_OPTION_TEXT, OFFSET(tuning), "auto", 0, 0, NULL, "SET"},
-    {"seed", "Seed of all random numbers", NPG_OPTION_INT, OFFSET(seed), "0", 0, 4294967295.0, NULL, NULL},
-    {"keep-going", "Skip frames that can't be used instead of stopping; ends with exit code 7",
-     NPG_OPTION_FLAG, OFFSET(keep_going), "no", 0, 0, NULL, NULL},
-    {"confine",
-     "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), true "
-     "meshes outside the truth's, and links in the place of the output's own folders; in a batch it is on "
-     "unless the batch says otherwise",
-     NPG_OPTION_FLAG, OFFSET(confine), "no", 0, 0, NULL, NULL},
-    {"ring", "Chunks that may wait between two stages", NPG_OPTION_INT, OFFSET(ring_capacity), "2", 1, 1024,
-     NULL, NULL},
-    {"chunk", "Frames per chunk", NPG_OPTION_INT, OFFSET(chunk_frames), "4", 1, 1024, NULL, NULL},
-    {"max-memory", "Stop rather than use more than this, in MiB; 0: no limit", NPG_OPTION_INT,
-     OFFSET(max_memory_mib), "0", 0, 1e9, NULL, "MIB"},
-    {"pull", "Finished frames are also pulled through the library", NPG_OPTION_FLAG, OFFSET(pull), "no", 0, 0,
-     NULL, NULL},
+    /* type        name          place               default    least  most          shown as or words */
+    NPG_ROW_TEXT  ("input",      AT(input),          "",        "PATH",
+        "Folder, pattern (frame_%04d.ply), list file, or - for standard input; empty: frames are pushed"),
+    NPG_ROW_TEXT  ("follow",     AT(follow),         "",        "DIR",
+        "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): "
+        "its files are frames as they are complete; takes the place of the input"),
+    NPG_ROW_TEXT  ("reference",  AT(reference),      "",        "FILE",
+        "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one"),
+    NPG_ROW_TEXT  ("output",     AT(output),         "",        "DIR",
+        "Folder for the results; empty: results are only pulled"),
+    NPG_ROW_CHOICE("preset",     AT(preset),         "default", "default|best|paper",
+        "A named set of option values"),
+    NPG_ROW_CHOICE("quality",    AT(quality),        "usual",   "usual|best",
+        "usual, or best: the preset of that name, slower and closer"),
+    NPG_ROW_TEXT  ("device",     AT(device),         "auto",    "DEVICE",
+        "OpenCL device: part of its name, its number, or auto (neupig doctor lists them)"),
+    NPG_ROW_TEXT  ("tuning",     AT(tuning),         "auto",    "SET",
+        "parameters of the kernels: auto (what neupig tune found, else by device), "
+        "wide, narrow, gpu, or a file"),
+    NPG_ROW_INT   ("seed",       AT(seed),           "0",       0,     4294967295.0, NULL,
+        "Seed of all random numbers"),
+    NPG_ROW_FLAG  ("keep-going", AT(keep_going),     "no",
+        "Skip frames that can't be used instead of stopping; ends with exit code 7"),
+    NPG_ROW_FLAG  ("confine",    AT(confine),        "no",
+        "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), "
+        "true meshes outside the truth's, and links in the place of the output's own folders; "
+        "in a batch it is on unless the batch says otherwise"),
+    NPG_ROW_INT   ("ring",       AT(ring_capacity),  "2",       1,     1024,         NULL,
+        "Chunks that may wait between two stages"),
+    NPG_ROW_INT   ("chunk",      AT(chunk_frames),   "4",       1,     1024,         NULL,
+        "Frames per chunk"),
+    NPG_ROW_INT   ("max-memory", AT(max_memory_mib), "0",       0,     1e9,          "MIB",
+        "Stop rather than use more than this, in MiB; 0: no limit"),
+    NPG_ROW_FLAG  ("pull",       AT(pull),           "no",
+        "Finished frames are also pulled through the library"),
     {0}};
+/* clang-format on */
 
 /* ---- failure and log ---- */
 
@@ -239,8 +241,8 @@ void npg_run_announce_memory(npg_run *run)
 
 /* ---- the conductor ---- */
 
-/* What the process ever had resident: other libraries, compiled kernels and free pages of the heap as well.
- */
+/* What the process ever had resident: other libraries, compiled kernels and free pages
+ * of the heap as well. */
 static json_int_t resident_peak(void)
 {
     struct rusage usage;

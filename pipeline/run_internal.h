@@ -89,8 +89,8 @@ npg_status npg_run_open_chain(npg_run **run, const npg_options *options, const n
  * where there was none, somebody closed the run's ends, and the run was stopped. */
 void npg_run_fail(npg_run *run, const char *stage, npg_status status);
 
-/* The body of a stage's thread: init, process until the end, flush, uninit.  The argument is the npg_worker.
- */
+/* The body of a stage's thread: init, process until the end, flush, uninit.
+ * The argument is the npg_worker. */
 void *npg_worker_main(void *worker);
 
 /* The bound on memory to the log and the report. */

@@ -9,12 +9,12 @@ typedef struct npg_settings {
     const char *reference; /* the user's own mesh; "": one is to be made */
     int preset, quality;   /* places of their words */
     int64_t seed;
-    int64_t ring_capacity;  /* chunks per ring                        */
-    int64_t chunk_frames;   /* frames per chunk                       */
-    int64_t max_memory_mib; /* 0: no limit                            */
-    bool keep_going;        /* skip frames that can't be used         */
-    bool confine;           /* refuse what lies outside its folder    */
-    bool pull;              /* finished frames are also to be pulled  */
+    int64_t ring_capacity;  /* chunks per ring                       */
+    int64_t chunk_frames;   /* frames per chunk                      */
+    int64_t max_memory_mib; /* 0: no limit                           */
+    bool keep_going;        /* skip frames that can't be used        */
+    bool confine;           /* refuse what lies outside its folder   */
+    bool pull;              /* finished frames are also to be pulled */
 } npg_settings;
 
 extern const npg_option npg_run_options[];

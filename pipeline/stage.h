@@ -19,37 +19,36 @@
 
 /* A pass is one walk of the capture through the stages that take part in it. */
 typedef enum npg_pass {
-    NPG_PASS_MEASURE = 1, /* files: find count, box and sizes                 */
-    NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe    */
-    NPG_PASS_SOLVE = 4,   /* the work itself; the only pass of a live source  */
-    NPG_PASS_CHOOSE = 8   /* files, after SCORE: look closer at a few frames  */
+    NPG_PASS_MEASURE = 1, /* files: find count, box and sizes                */
+    NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe   */
+    NPG_PASS_SOLVE = 4,   /* the work itself; the only pass of a live source */
+    NPG_PASS_CHOOSE = 8   /* files, after SCORE: look closer at a few frames */
 } npg_pass;
 
 /* The frames that the choosing pass reads, in time order. */
 #define NPG_CHOICE_FRAMES 25
 #define NPG_CHOICE_MAX    4 /* candidates among them */
 typedef struct npg_choice {
-    size_t count, candidate_count; /* count 0: there is no choosing pass                   */
+    size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
-    bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
-    bool cut_welds;                       /* cut from the reference what the other frames contradict      */
+    bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them        */
+    bool cut_welds;                       /* cut from the reference what the other frames contradict */
 } npg_choice;
 
 /* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
  * it passes on the first chunk (or ends the pass) that depends on it; the rings' locks publish it downstream.
  * Where a live source goes on behind the look-ahead, number_min, number_max, point_count_max and bounds_local
- * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h).
- */
+ * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h). */
 typedef struct npg_facts {
     /* ingest */
-    bool is_live;                /* frames can't be read a second time                            */
-    npg_origin origin;           /* world; a point of the first frame                             */
-    _Atomic int64_t frame_count; /* T, gaps included; -1 while a live source is open         */
-    int64_t skipped_count;       /* frames left out under --missing skip or --keep-going          */
+    bool is_live;                /* frames can't be read a second time                   */
+    npg_origin origin;           /* world; a point of the first frame                    */
+    _Atomic int64_t frame_count; /* T, gaps included; -1 while a live source is open     */
+    int64_t skipped_count;       /* frames left out under --missing skip or --keep-going */
     /* keyframe */
-    size_t point_count_max;         /* of all frames, as read                                        */
-    int64_t number_min, number_max; /* of all frames                                          */
-    npg_bounds bounds_local;        /* of all usable points                                          */
+    size_t point_count_max;         /* of all frames, as read */
+    int64_t number_min, number_max; /* of all frames          */
+    npg_bounds bounds_local;        /* of all usable points   */
     npg_frame_box box;
     npg_plan plan;                       /* its key is the one by score until the choosing pass has ended */
     int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture */
@@ -77,10 +76,10 @@ typedef struct npg_fact_kind {
 
 typedef struct npg_stage {
     const char *name, *help;
-    const npg_option *options; /* may be NULL */
-    size_t state_size; /* zeroed, filled from the options, then given to init                            */
-    unsigned passes;   /* NPG_PASS_* it takes part in                                                    */
-    uint32_t needs, gives; /* NPG_FIELD_*, in the solving pass */
+    const npg_option *options; /* may be NULL                                         */
+    size_t state_size;         /* zeroed, filled from the options, then given to init */
+    unsigned passes;           /* NPG_PASS_* it takes part in                         */
+    uint32_t needs, gives;     /* NPG_FIELD_*, in the solving pass                    */
 
     /* False: under these options the stage is left out of all passes.  The state has the options, nothing else
      * is known yet.  NULL: it always takes part. */
@@ -194,8 +193,8 @@ void npg_worker_restore_reports(npg_worker *worker, const json_t *saved);
 /* Let every stage add to a state on disk what it needs to be resumed (npg_stage.save). */
 npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out);
 
-/* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never lost.  NULL
- * gives null. */
+/* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never
+ * lost.  NULL gives null. */
 json_t *npg_json_text(const char *text);
 
 /* A JSON number, or null for one that is not finite. */

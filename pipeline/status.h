@@ -11,12 +11,12 @@ extern "C" {
 /* Set this thread's error text and return status, so that a failure is one line: return npg_error(...). */
 npg_status npg_error(npg_status status, const char *format, ...) NPG_PRINTF(2, 3);
 
-/* Put "<prefix>: " before the text of the failure under way and return status; does nothing for status >= 0.
- */
+/* Put "<prefix>: " before the text of the failure under way and return status;
+ * does nothing for status >= 0. */
 npg_status npg_error_prefix(npg_status status, const char *format, ...) NPG_PRINTF(2, 3);
 
-/* The same with the status and text of errno: NPG_DISK for a full or failing disk, NPG_MEMORY, else fallback.
- */
+/* The same with the status and text of errno: NPG_DISK for a full or failing disk,
+ * NPG_MEMORY, else fallback. */
 npg_status npg_error_errno(npg_status fallback, const char *format, ...) NPG_PRINTF(2, 3);
 
 /* Take over a text kept elsewhere (a failure that came from another thread). */

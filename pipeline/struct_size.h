@@ -20,8 +20,8 @@ static inline npg_status npg_struct_size(size_t *size, const void *given, size_t
 }
 
 /* Copy a caller's struct of any version into `own` (own_size bytes): what his version does not have is zero,
- * what ours does not have is left out.  least: the size of the first version.  NPG_USAGE for less than that,
- * or NULL. */
+ * what ours does not have is left out.  least: the size of the first version.
+ * NPG_USAGE for less than that, or NULL. */
 static inline npg_status npg_struct_take(void *own, size_t own_size, const void *given, size_t least,
                                          const char *what)
 {

@@ -2,8 +2,10 @@
  *
  *     nearest
  *
- * The surface is a ball of radius 1; how far a point at distance d from the middle is from it is known: |d -
- * 1|. Build:  cc nearest.c -o nearest $(pkg-config --cflags --libs neupig) -lm -pthread */
+ * The surface is a ball of radius 1; how far a point at distance d from the middle is from it is known:
+ * |d - 1|.
+ *
+ * Build:  cc nearest.c -o nearest $(pkg-config --cflags --libs neupig) -lm -pthread */
 #include <math.h>
 #include <neupig.h>
 #include <pthread.h>

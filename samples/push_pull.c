@@ -3,8 +3,9 @@
  *     push_pull [FRAMES]
  *
  * Pushing waits while the run is busy, and the run waits until its results are pulled, so the two belong into
- * two threads: here one stands for the camera, and main() takes the meshes. Build:  cc push_pull.c -o
- * push_pull $(pkg-config --cflags --libs neupig) -lm -pthread */
+ * two threads: here one stands for the camera, and main() takes the meshes.
+ *
+ * Build:  cc push_pull.c -o push_pull $(pkg-config --cflags --libs neupig) -lm -pthread */
 #include <math.h>
 #include <neupig.h>
 #include <pthread.h>
@@ -21,8 +22,8 @@ typedef struct camera {
     char text[512];
 } camera;
 
-/* Stand-in for a scanner: a ball of 1 m that drifts and breathes, in metres, far from the origin as surveys
- * are. */
+/* Stand-in for a scanner: a ball of 1 m that drifts and breathes, in metres,
+ * far from the origin as surveys are. */
 static void scan(double *points, float *normals, int frame)
 {
     double radius = 1 + 0.05 * sin(0.8 * frame), centre[3] = {431000 + 0.03 * frame, 5412000, 120};
@@ -55,8 +56,8 @@ static void *film(void *argument)
     return NULL;
 }
 
-/* Take every mesh.  They come as windows of frames are solved, not in the order of time: index says which it
- * is. */
+/* Take every mesh.  They come as windows of frames are solved, not in the order of time:
+ * index says which it is. */
 static npg_status take_meshes(npg_run *run)
 {
     npg_result *mesh;

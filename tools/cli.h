@@ -14,10 +14,10 @@ typedef struct npg_cli {
     int operand_count;
 } npg_cli;
 
-/* Read argv: --name VALUE, --name=VALUE, --flag, --no-flag, -o DIR, --config FILE; "--" ends the options and
- * a lone "-" is an operand.  What stands on the command line wins over the configuration file.  Fills cli,
- * values and options.  NPG_END when help was asked for and has been printed; NPG_USAGE names the nearest
- * option. */
+/* Read argv: --name VALUE, --name=VALUE, --flag, --no-flag, -o DIR, --config FILE; "--" ends the options
+ * and a lone "-" is an operand.  What stands on the command line wins over the configuration file.
+ * Fills cli, values and options.  NPG_END when help was asked for and has been printed; NPG_USAGE
+ * names the nearest option. */
 npg_status npg_cli_parse(npg_cli *cli, const char *verb, void *values, npg_options *options, int argc,
                          char **argv);
 

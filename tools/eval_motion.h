@@ -1,5 +1,5 @@
-/* Motion figures of a mesh sequence of constant topology, frame after frame in bounded memory but for `bad`.
- */
+/* Motion figures of a mesh sequence of constant topology, frame after frame in bounded
+ * memory but for `bad`. */
 #ifndef NPG_EVAL_MOTION_H
 #define NPG_EVAL_MOTION_H
 

@@ -1,5 +1,5 @@
 /* Job motion: the reference of a finished run at any time, in the coordinates of its files, from the saved
- * windows alone (stages/replay.h). */
+ * windows alone (optimize/replay.h). */
 #ifndef NPG_JOB_MOTION_H
 #define NPG_JOB_MOTION_H
 

@@ -14,26 +14,35 @@ typedef struct word {
     const char *theirs, *option, *ours; /* option NULL: what we do anyway */
 } word;
 
-static const word rotations[] = {{"quaternions", "rotation", "quaternion"},
-                                 {"cayley", "rotation", "cayley"},
-                                 {"exp", "rotation", "exponential"},
-                                 {0}};
-static const word time_codes[] = {{"fourier_features2", "time-code", "fourier"},
-                                  {"gaussian_fourier", "time-code", "gaussian"},
-                                  {"poly", "time-code", "polynomial"},
-                                  {"mlp", "time-code", "learned"},
-                                  {0}};
-static const word confidences[] = {{"pdg", "confidence", "cumulative"},
-                                   {"direct", "confidence", "single"},
-                                   {"delta_based", "confidence", "delta"},
-                                   {"constant", "confidence", "constant"},
-                                   {0}};
+/* Their word, our option, our word. */
+/* clang-format off */
+static const word rotations[] = {
+    {"quaternions", "rotation", "quaternion"},
+    {"cayley",      "rotation", "cayley"},
+    {"exp",         "rotation", "exponential"},
+    {0}};
+static const word time_codes[] = {
+    {"fourier_features2", "time-code", "fourier"},
+    {"gaussian_fourier",  "time-code", "gaussian"},
+    {"poly",              "time-code", "polynomial"},
+    {"mlp",               "time-code", "learned"},
+    {0}};
+static const word confidences[] = {
+    {"pdg",         "confidence", "cumulative"},
+    {"direct",      "confidence", "single"},
+    {"delta_based", "confidence", "delta"},
+    {"constant",    "confidence", "constant"},
+    {0}};
 /* "none" leaves every frame its full weight, whatever the confidence is */
 static const word catch_ups[] = {
-    {"pdg", "catch-up", "root"},          {"exponential", "catch-up", "exponential"},
-    {"lerp", "catch-up", "interpolated"}, {"linear", "catch-up", "linear"},
-    {"none", "confidence", "constant"},   {0}};
+    {"pdg",         "catch-up",   "root"},
+    {"exponential", "catch-up",   "exponential"},
+    {"lerp",        "catch-up",   "interpolated"},
+    {"linear",      "catch-up",   "linear"},
+    {"none",        "confidence", "constant"},
+    {0}};
 static const word descriptors[] = {{"surface", NULL, NULL}, {0}};
+/* clang-format on */
 
 typedef struct rule {
     const char *section, *key; /* section NULL: on top */
@@ -43,27 +52,30 @@ typedef struct rule {
     double fixed;              /* the only number that we can do, where there are no options */
 } rule;
 
+/* clang-format off */
 static const rule rules[] = {
-    {NULL, "descriptor", descriptors, {0}, 0, 0},
-    {NULL, "time_encoding", time_codes, {0}, 0, 0},
-    {NULL, "rotation_method", rotations, {0}, 0, 0},
-    {"optimization", "epochs", NULL, {"epochs"}, 0, 0},
-    {"optimization", "edgeloss", NULL, {"isometry"}, 0, 0},
-    {"optimization", "time_smoothing", confidences, {0}, 0, 0},
-    {"optimization", "catchup_scaling", catch_ups, {0}, 0, 0},
-    {"grid", "base_res", NULL, {"grid-base"}, 0, 0},
-    {"grid", "increase_per_level", NULL, {"grid-step"}, 0, 0},
-    {"grid", "n_level", NULL, {"grid-levels"}, 0, 0},
-    {"grid", "lr_adapt", NULL, {"grid-rate-growth"}, 0, 0},
-    {"grid", "local_lambda_adapt", NULL, {"lambda-growth"}, 0, 0},
-    {"grid", "smoothness", NULL, {"lambda"}, 0, 0},
-    {"grid", "lr", NULL, {"grid-rate"}, 0, 0},
-    {"mlp", "hidden", NULL, {"width-1", "width-2"}, 0, 0},
-    {"mlp", "layers", NULL, {0}, 0, 3},
-    {"mlp", "point_dim", NULL, {0}, 0, 30},
-    {"mlp", "normal_dim", NULL, {0}, 0, 2},
-    {"mlp", "time_dim", NULL, {"time-frequencies"}, 2, 0},
+    /* section       key                   words        options                 divide_by, fixed */
+    {NULL,           "descriptor",         descriptors, {0},                    0, 0},
+    {NULL,           "time_encoding",      time_codes,  {0},                    0, 0},
+    {NULL,           "rotation_method",    rotations,   {0},                    0, 0},
+    {"optimization", "epochs",             NULL,        {"epochs"},             0, 0},
+    {"optimization", "edgeloss",           NULL,        {"isometry"},           0, 0},
+    {"optimization", "time_smoothing",     confidences, {0},                    0, 0},
+    {"optimization", "catchup_scaling",    catch_ups,   {0},                    0, 0},
+    {"grid",         "base_res",           NULL,        {"grid-base"},          0, 0},
+    {"grid",         "increase_per_level", NULL,        {"grid-step"},          0, 0},
+    {"grid",         "n_level",            NULL,        {"grid-levels"},        0, 0},
+    {"grid",         "lr_adapt",           NULL,        {"grid-rate-growth"},   0, 0},
+    {"grid",         "local_lambda_adapt", NULL,        {"lambda-growth"},      0, 0},
+    {"grid",         "smoothness",         NULL,        {"lambda"},             0, 0},
+    {"grid",         "lr",                 NULL,        {"grid-rate"},          0, 0},
+    {"mlp",          "hidden",             NULL,        {"width-1", "width-2"}, 0, 0},
+    {"mlp",          "layers",             NULL,        {0},                    0, 3},
+    {"mlp",          "point_dim",          NULL,        {0},                    0, 30},
+    {"mlp",          "normal_dim",         NULL,        {0},                    0, 2},
+    {"mlp",          "time_dim",           NULL,        {"time-frequencies"},   2, 0},
 };
+/* clang-format on */
 enum { RULES = sizeof rules / sizeof *rules };
 
 typedef struct unmatched {

@@ -7,105 +7,93 @@
 
 const npg_verb npg_verbs[] = {
     {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",
-     "Reads the point clouds of INPUT (a folder, a pattern like frame_%04d.ply, a list file, or - for "
-     "standard "
-     "input; or --follow a folder that grows) in time order and writes one mesh per frame, all with the same "
-     "faces, to DIR/meshes, with reference.ply, report.json, frames.jsonl and, last of all, done.json beside "
-     "them.  A run that was stopped or killed goes on where it was when it is started again.  With "
-     "--segments auto, where the topology changes another reference takes over: DIR/segment_* are then runs "
-     "by themselves, and DIR/segments.json tells their frames, why they were cut, and their overlaps.",
+     "Reads the point clouds of INPUT (a folder, a pattern like frame_%04d.ply, "
+     "a list file, or - for standard input; or --follow a folder that grows) "
+     "in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, "
+     "with reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.  "
+     "A run that was stopped or killed goes on where it was when it is started again.  "
+     "With --segments auto, where the topology changes another reference takes over: DIR/segment_* are then "
+     "runs by themselves, and DIR/segments.json tells their frames, why they were cut, and their overlaps.",
      npg_run_verb_options, true, npg_verb_run},
     {"append", "DIR", 1, 1, "Go on with frames that came since a job was done",
-     "DIR is the output folder of a run.  Frames that its input has after the last one of then are solved "
-     "with "
-     "the same options, going on from the last forward window; the frames of the overlap before them are "
-     "solved "
-     "again, all other meshes stay as they are.  A job that was broken off is first brought to its end.",
+     "DIR is the output folder of a run.  "
+     "Frames that its input has after the last one of then are solved with the same options, "
+     "going on from the last forward window; the frames of the overlap before them are solved again, "
+     "all other meshes stay as they are.  A job that was broken off is first brought to its end.",
      npg_append_options, false, npg_verb_append},
     {"batch", "MANIFEST|DIR [-o DIR]", 1, 1, "Run many captures, each in a folder and a process of its own",
-     "MANIFEST is a JSON file: {\"output\": \"results\", \"defaults\": {\"epochs\": 60, \"max-time\": 7200}, "
-     "\"captures\": [{\"input\": \"dancer\"}, {\"input\": \"scan_%04d.ply\", \"name\": \"horse\"}]}; what "
-     "stands "
-     "in defaults and captures are options of neupig run, and \"config\", \"max-time\" and \"segments\"; "
-     "paths are seen from the file; the command line wins.  Of a DIR every sub-folder is a capture; the "
-     "folders of the paper's "
-     "published code "
-     "(point_clouds/ or gt/ in each) are understood, and what lies in truth/ or gt/ is compared with.  Each "
-     "capture "
-     "gets OUT/NAME with its results, log.jsonl and verdict.json; a capture that fails does not touch the "
-     "others.  What links lead out of a capture's folder is not read unless the batch says --no-confine or "
-     "\"confine\": false.  "
-     "--max-memory counts for a run with all it starts; one that takes more, or longer than --max-time, is "
-     "asked to "
-     "stop and then killed.  Started again, what is done is left alone and what was stopped goes on.  At the "
-     "end "
-     "OUT/batch.json and OUT/batch.html tell of all captures.  Exit code 0 when all are done, 7 when all are "
-     "done but "
-     "some with frames skipped or below the quality bar, 1 when one is not done, 75 after a signal.",
+     "MANIFEST is a JSON file: {\"output\": \"results\", "
+     "\"defaults\": {\"epochs\": 60, \"max-time\": 7200}, "
+     "\"captures\": [{\"input\": \"dancer\"}, {\"input\": \"scan_%04d.ply\", \"name\": \"horse\"}]}; "
+     "what stands in defaults and captures are options of neupig run, "
+     "and \"config\", \"max-time\" and \"segments\"; paths are seen from the file; the command line wins.  "
+     "Of a DIR every sub-folder is a capture; the folders of the paper's published code "
+     "(point_clouds/ or gt/ in each) are understood, and what lies in truth/ or gt/ is compared with.  "
+     "Each capture gets OUT/NAME with its results, log.jsonl and verdict.json; "
+     "a capture that fails does not touch the others.  "
+     "What links lead out of a capture's folder is not read "
+     "unless the batch says --no-confine or \"confine\": false.  "
+     "--max-memory counts for a run with all it starts; "
+     "one that takes more, or longer than --max-time, is asked to stop and then killed.  "
+     "Started again, what is done is left alone and what was stopped goes on.  "
+     "At the end OUT/batch.json and OUT/batch.html tell of all captures.  "
+     "Exit code 0 when all are done, 7 when all are done but some with frames skipped "
+     "or below the quality bar, 1 when one is not done, 75 after a signal.",
      npg_batch_options, true, npg_verb_batch},
     {"apply", "JOB --mesh FILE -o OUT", 1, 1, "Carry another mesh or points through a finished run",
-     "JOB is the output folder of a run that is done.  FILE (a mesh, or points alone) lies on or near the "
-     "reference.ply of the run; it is tied to that surface and written once per frame, OUT/frame_0000.ply "
-     "and so on, with its own faces, colours, texture coordinates and turned normals, and OUT/done.json last "
-     "of all.  An OBJ file written as OBJ keeps all its other lines: seams, polygons, groups and material "
-     "names (put the material files beside).  With --fps-scale K there "
-     "are K steps from each frame to the next, each made by the decoders of the saved windows "
-     "(JOB/job/motion_*.npg) "
-     "at that very time; where JOB/meshes is gone the frames themselves come from there, too.  Exit "
-     "code 7 when points lie far from the reference.",
+     "JOB is the output folder of a run that is done.  "
+     "FILE (a mesh, or points alone) lies on or near the reference.ply of the run; "
+     "it is tied to that surface and written once per frame, OUT/frame_0000.ply and so on, "
+     "with its own faces, colours, texture coordinates and turned normals, and OUT/done.json last of all.  "
+     "An OBJ file written as OBJ keeps all its other lines: seams, polygons, groups and material names "
+     "(put the material files beside).  With --fps-scale K there are K steps from each frame to the next, "
+     "each made by the decoders of the saved windows (JOB/job/motion_*.npg) at that very time; "
+     "where JOB/meshes is gone the frames themselves come from there, too.  "
+     "Exit code 7 when points lie far from the reference.",
      npg_apply_options, false, npg_verb_apply},
     {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
-     "Reads every frame of INPUT and says what is in it, what a run would trip over, and what it would cost "
-     "in "
-     "memory, disk and time.  Exit code 7 when something needs attention.",
+     "Reads every frame of INPUT and says what is in it, what a run would trip over, "
+     "and what it would cost in memory, disk and time.  Exit code 7 when something needs attention.",
      npg_probe_options, true, npg_verb_probe},
     {"eval", "PREDICTED TRUTH", 2, 2, "Measure a mesh sequence against a ground truth",
-     "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) with those of "
-     "TRUTH, "
-     "frame by frame, and prints Chamfer distance (x 1e5), normal consistency, F-score and correspondence "
-     "error; "
-     "lengths are in diagonals of the first ground-truth frame's box.",
+     "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) "
+     "with those of TRUTH, frame by frame, and prints Chamfer distance (x 1e5), normal consistency, "
+     "F-score and correspondence error; lengths are in diagonals of the first ground-truth frame's box.",
      npg_eval_options, false, npg_verb_eval},
     {"synth", "-o DIR", 0, 0, "Make a capture with an exact ground truth",
      "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
      "(DIR/truth).  The same options and seed give the same bytes.",
      npg_synth_options, false, npg_verb_synth},
     {"render", "FILE... -o IMAGE.png", 1, 4096, "Draw meshes or clouds to a PNG without a display",
-     "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  All "
-     "tiles "
-     "share one camera, so that motion shows.",
+     "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  "
+     "All tiles share one camera, so that motion shows.",
      npg_render_options, false, npg_verb_render},
     {"bench", "[REPORT.json]", 0, 1, "Time the kernels and the fit on this machine",
-     "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches of "
-     "the "
-     "limit that binds it, which is measured right beside (multiply-adds, or bytes copied); then how fast "
-     "dense "
-     "surfaces are carried and decoded, and the seconds of an epoch.  On processors times are processor "
-     "seconds, so "
-     "that other programs disturb little.  --compare says what is slower than in an earlier report, beyond "
-     "noise, "
-     "with exit code 7; with REPORT.json that report is compared and nothing is measured.",
+     "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches "
+     "of the limit that binds it, which is measured right beside (multiply-adds, or bytes copied); "
+     "then how fast dense surfaces are carried and decoded, and the seconds of an epoch.  "
+     "On processors times are processor seconds, so that other programs disturb little.  "
+     "--compare says what is slower than in an earlier report, beyond noise, with exit code 7; "
+     "with REPORT.json that report is compared and nothing is measured.",
      npg_bench_options, false, npg_verb_bench},
     {"tune", "", 0, 0, "Find the kernels' parameters that suit this device",
      "Tries register tiles, vector widths, work-groups and shares of work for each kernel on the device, "
-     "compares "
-     "each with the plain twins, prints a table and writes the fastest right set to a file of this device in "
-     "the "
-     "cache folder, which later runs take (run --tuning wide, narrow or gpu leaves it alone; remove the file "
-     "to be "
-     "rid of it).  The same set gives the same bytes; another set another order of sums.  A file that is "
-     "broken, or "
-     "of other kernels or another device, is not used, and the run says so.",
+     "compares each with the plain twins, prints a table "
+     "and writes the fastest right set to a file of this device in the cache folder, which later runs take "
+     "(run --tuning wide, narrow or gpu leaves it alone; remove the file to be rid of it).  "
+     "The same set gives the same bytes; another set another order of sums.  "
+     "A file that is broken, or of other kernels or another device, is not used, and the run says so.",
      npg_tune_options, false, npg_verb_tune},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
-     "Lists the OpenCL devices and the versions of the libraries in use and compares every kernel on "
-     "each device with its plain twin.  Exit code 4 when there is no device or one computes wrong.",
+     "Lists the OpenCL devices and the versions of the libraries in use and compares "
+     "every kernel on each device with its plain twin.  "
+     "Exit code 4 when there is no device or one computes wrong.",
      npg_doctor_options, false, npg_verb_doctor},
     {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
      "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page, or shell completion",
-     "Prints the manual page in roff, made from the same tables as the help.  Read it with: neupig man | man "
-     "-l -",
+     "Prints the manual page in roff, made from the same tables as the help.  "
+     "Read it with: neupig man | man -l -",
      npg_man_options, false, npg_verb_man},
     {"version", "", 0, 0, "Print the version", "Prints the version of neupig.", NULL, false,
      npg_verb_version},

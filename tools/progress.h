@@ -10,8 +10,8 @@
 enum { NPG_SHOW_AUTO, NPG_SHOW_BAR, NPG_SHOW_JSON, NPG_SHOW_NONE }; /* the words of --progress */
 
 typedef struct npg_reporter {
-    int show;            /* NPG_SHOW_*, never AUTO once set up         */
-    npg_log_level level; /* records above it are not shown             */
+    int show;            /* NPG_SHOW_*, never AUTO once set up */
+    npg_log_level level; /* records above it are not shown     */
     bool colour, bar_drawn;
     double drawn_s; /* when the bar was last drawn, in run seconds           */
     int log_fd;     /* of the log file; -1: none, or it could not be written */

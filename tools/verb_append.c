@@ -14,17 +14,21 @@ typedef struct settings {
     bool quiet, verbose;
 } settings;
 
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
 const npg_option npg_append_options[] = {
-    {"input", "Where the frames are now, if they were moved; all of them, the old ones too", NPG_OPTION_TEXT,
-     offsetof(settings, input), "", 0, 0, NULL, "PATH"},
-    {"progress",
-     "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal",
-     NPG_OPTION_CHOICE, offsetof(settings, progress), "auto", 0, 0, "auto|bar|json|none", NULL},
-    {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, offsetof(settings, quiet), "no", 0,
-     0, NULL, NULL},
-    {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
-     NULL},
+    /* type        name        place         default  words or shown as */
+    NPG_ROW_TEXT  ("input",    AT(input),    "",      "PATH",
+        "Where the frames are now, if they were moved; all of them, the old ones too"),
+    NPG_ROW_CHOICE("progress", AT(progress), "auto",  "auto|bar|json|none",
+        "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal"),
+    NPG_ROW_FLAG  ("quiet",    AT(quiet),    "no",
+        "Log warnings and errors only (also -q)"),
+    NPG_ROW_FLAG  ("verbose",  AT(verbose),  "no",
+        "Log everything (also -v)"),
     {0}};
+/* clang-format on */
 
 static bool is_done(const char *folder)
 {

@@ -38,30 +38,32 @@ static const char *const between_words[] = {"auto", "windows", "curve", "line"};
 
 #define AT(member) offsetof(settings, member)
 
+/* clang-format off */
 const npg_option npg_apply_options[] = {
-    {"mesh",
-     "Mesh (PLY, OBJ) or points (also XYZ, NPY, PCD) to carry, in the coordinates of JOB/reference.ply",
-     NPG_OPTION_TEXT, AT(mesh), "", 0, 0, NULL, "FILE"},
-    {"output", "Folder for the carried meshes (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "OUT"},
-    {"fps-scale",
-     "Steps from each frame to the next; more than 1 adds in-between frames and numbers the files 0, 1, 2 "
-     "...",
-     NPG_OPTION_INT, AT(fps_scale), "1", 1, 1000, NULL, "K"},
-    {"between",
-     "Where in-between frames come from: the saved windows, whose decoders know every time; or the run's "
-     "meshes, by "
-     "Catmull-Rom curves or straight lines; auto: the windows where the run has left them, else curves",
-     NPG_OPTION_CHOICE, AT(between), "auto", 0, 0, "auto|windows|curve|line", NULL},
-    {"device", "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name",
-     NPG_OPTION_TEXT, AT(device), "auto", 0, 0, NULL, "DEVICE"},
-    {"far", "Points farther from the reference than this share of its diagonal are said (exit code 7)",
-     NPG_OPTION_REAL, AT(far_share), "0.05", 0, 1e6, NULL, "SHARE"},
-    {"format", "Format of the files; mesh: as the mesh that is carried (PLY for other points)",
-     NPG_OPTION_CHOICE, AT(format), "mesh", 0, 0, "mesh|ply|obj", NULL},
-    {"prefix", "First part of the files' names", NPG_OPTION_TEXT, AT(prefix), "frame", 0, 0, NULL, "NAME"},
-    {"overwrite", "Remove files of the same prefix that lie in the output folder", NPG_OPTION_FLAG,
-     AT(overwrite), "no", 0, 0, NULL, NULL},
+    /* type        name         place          default  least  most  shown as or words */
+    NPG_ROW_TEXT  ("mesh",      AT(mesh),      "",      "FILE",
+        "Mesh (PLY, OBJ) or points (also XYZ, NPY, PCD) to carry, in the coordinates of JOB/reference.ply"),
+    NPG_ROW_TEXT  ("output",    AT(output),    "",      "OUT",
+        "Folder for the carried meshes (also -o)"),
+    NPG_ROW_INT   ("fps-scale", AT(fps_scale), "1",     1,     1000, "K",
+        "Steps from each frame to the next; "
+        "more than 1 adds in-between frames and numbers the files 0, 1, 2 ..."),
+    NPG_ROW_CHOICE("between",   AT(between),   "auto",  "auto|windows|curve|line",
+        "Where in-between frames come from: the saved windows, whose decoders know every time; "
+        "or the run's meshes, by Catmull-Rom curves or straight lines; "
+        "auto: the windows where the run has left them, else curves"),
+    NPG_ROW_TEXT  ("device",    AT(device),    "auto",  "DEVICE",
+        "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name"),
+    NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
+        "Points farther from the reference than this share of its diagonal are said (exit code 7)"),
+    NPG_ROW_CHOICE("format",    AT(format),    "mesh",  "mesh|ply|obj",
+        "Format of the files; mesh: as the mesh that is carried (PLY for other points)"),
+    NPG_ROW_TEXT  ("prefix",    AT(prefix),    "frame", "NAME",
+        "First part of the files' names"),
+    NPG_ROW_FLAG  ("overwrite", AT(overwrite), "no",
+        "Remove files of the same prefix that lie in the output folder"),
     {0}};
+/* clang-format on */
 
 typedef struct moment { /* a solved frame */
     bool is_there;
@@ -75,14 +77,14 @@ typedef struct applying {
     npg_origin origin;
     npg_mesh *reference, *carried;
     npg_attachment *attachment;
-    npg_job_motion *motion; /* where the saved windows are needed */
+    npg_job_motion *motion; /* where the saved windows are needed                                     */
     moment window[4];       /* in time; [1] and [2] are the two frames that are being written between */
-    float *between;         /* reference's V x 3                                                     */
-    double *pos;            /* carried's V x 3                                                       */
-    float *pos_float;       /* the same, where normals are made from it                              */
-    float *normals;         /* carried's V x 3, or NULL                                              */
-    bool turns_normals;     /* they are the file's own                                               */
-    bool is_like;           /* OBJ from OBJ: the file's lines are kept                               */
+    float *between;         /* reference's V x 3                                                      */
+    double *pos;            /* carried's V x 3                                                        */
+    float *pos_float;       /* the same, where normals are made from it                               */
+    float *normals;         /* carried's V x 3, or NULL                                               */
+    bool turns_normals;     /* they are the file's own                                                */
+    bool is_like;           /* OBJ from OBJ: the file's lines are kept                                */
     npg_mesh_names names;
     npg_file *done; /* collects OUT/done.json; appears last */
     size_t frame_count, written, far_count,
@@ -243,8 +245,8 @@ static npg_status tie(applying *a)
     npg_attach_far(a->attachment, a->s.far_share * diagonal, &a->far_count, &worst, &worst_dist);
     if (a->far_count)
         fprintf(stderr,
-                "neupig apply: %zu of %zu points of %s lie farther than %g diagonals from the reference; the "
-                "worst, point %zu, %.3g away (%.3g diagonals)\n",
+                "neupig apply: %zu of %zu points of %s lie farther than %g diagonals from the reference; "
+                "the worst, point %zu, %.3g away (%.3g diagonals)\n",
                 a->far_count, mesh->vert_count, a->s.mesh, a->s.far_share, worst, worst_dist,
                 worst_dist / diagonal);
     return NPG_OK;
@@ -296,8 +298,8 @@ static npg_status clear_files(const applying *a)
         status = path_of(path, a->s.output, entry->d_name);
         if (!status && !a->s.overwrite)
             status = npg_error(NPG_USAGE,
-                               "%s lies there already and would mix with the new files: choose "
-                               "another folder, or --overwrite removes what is there",
+                               "%s lies there already and would mix with the new files: "
+                               "choose another folder, or --overwrite removes what is there",
                                path);
         if (!status && unlink(path)) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
     }
@@ -385,9 +387,9 @@ static double slope(const moment *window, int k, size_t i)
            (double)(after->index - before->index);
 }
 
-/* The reference at share 0..1 of the way from window[1] to window[2]: the cubic that has the two positions
- * and the slopes there (Catmull-Rom; the slopes count missing frames, so that a gap does not bend the curve).
- */
+/* The reference at share 0..1 of the way from window[1] to window[2]: the cubic that has the two
+ * positions and the slopes there (Catmull-Rom; the slopes count missing frames, so that a gap does
+ * not bend the curve). */
 static void make_curve(applying *a, double share)
 {
     const moment *w = a->window;

@@ -18,41 +18,39 @@ typedef struct settings {
 
 #define AT(member) offsetof(settings, member)
 
+/* clang-format off */
 const npg_option npg_batch_options[] = {
-    {"config",
-     "Options for all captures from a JSON object in FILE, or a method configuration of the paper's "
-     "published code "
-     "(also -c)",
-     NPG_OPTION_TEXT, AT(config), "", 0, 0, NULL, "FILE"},
-    {"jobs", "Captures at work at the same time; each uses all cores", NPG_OPTION_INT, AT(jobs), "1", 1, 256,
-     NULL, "N"},
-    {"max-time",
-     "Stop a capture after this many seconds, 0: no limit; started again it goes on; -1: as the manifest "
-     "says",
-     NPG_OPTION_REAL, AT(max_time_s), "-1", -1, 1e9, NULL, "SECONDS"},
-    {"segments",
-     "Where the topology of a capture changes: one reference all the same, with an alarm (one), another "
-     "from there on (auto), or as the manifest says",
-     NPG_OPTION_CHOICE, AT(segments), "manifest", 0, 0, "manifest|one|auto",
-     NULL}, /* NPG_BATCH_SEGMENTS_.. */
-    {"dry-run", "Only say what the captures hold and would take in memory, disk and time", NPG_OPTION_FLAG,
-     AT(dry_run), "no", 0, 0, NULL, NULL},
-    {"list", "Only print the names of the captures, one per line", NPG_OPTION_FLAG, AT(list), "no", 0, 0,
-     NULL, NULL},
-    {"report",
-     "Only write batch.json and batch.html and print the table of what is there; the exit code is that of "
-     "all",
-     NPG_OPTION_FLAG, AT(report), "no", 0, 0, NULL, NULL},
-    {"task-index", "With several processes or machines: the number of this one, from 0", NPG_OPTION_INT,
-     AT(task_index), "0", 0, 1e6, NULL, "I"},
-    {"task-count", "... of so many; each capture is done by exactly one", NPG_OPTION_INT, AT(task_count), "1",
-     1, 1e6, NULL, "N"},
-    {"progress",
-     "How to show progress; json writes one line per event to standard output; auto: a bar on a terminal",
-     NPG_OPTION_CHOICE, AT(progress), "auto", 0, 0, "auto|bar|json|none", NULL},
-    {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, AT(quiet), "no", 0, 0, NULL, NULL},
-    {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, AT(verbose), "no", 0, 0, NULL, NULL},
+    /* type        name          place           default     least  most  shown as or words */
+    NPG_ROW_TEXT  ("config",     AT(config),     "",         "FILE",
+        "Options for all captures from a JSON object in FILE, "
+        "or a method configuration of the paper's published code (also -c)"),
+    NPG_ROW_INT   ("jobs",       AT(jobs),       "1",        1,     256,  "N",
+        "Captures at work at the same time; each uses all cores"),
+    NPG_ROW_REAL  ("max-time",   AT(max_time_s), "-1",       -1,    1e9,  "SECONDS",
+        "Stop a capture after this many seconds, 0: no limit; started again it goes on; "
+        "-1: as the manifest says"),
+    NPG_ROW_CHOICE("segments",   AT(segments),   "manifest", "manifest|one|auto", /* NPG_BATCH_SEGMENTS_.. */
+        "Where the topology of a capture changes: one reference all the same, "
+        "with an alarm (one), another from there on (auto), or as the manifest says"),
+    NPG_ROW_FLAG  ("dry-run",    AT(dry_run),    "no",
+        "Only say what the captures hold and would take in memory, disk and time"),
+    NPG_ROW_FLAG  ("list",       AT(list),       "no",
+        "Only print the names of the captures, one per line"),
+    NPG_ROW_FLAG  ("report",     AT(report),     "no",
+        "Only write batch.json and batch.html and print the table of what is there; "
+        "the exit code is that of all"),
+    NPG_ROW_INT   ("task-index", AT(task_index), "0",        0,     1e6,  "I",
+        "With several processes or machines: the number of this one, from 0"),
+    NPG_ROW_INT   ("task-count", AT(task_count), "1",        1,     1e6,  "N",
+        "... of so many; each capture is done by exactly one"),
+    NPG_ROW_CHOICE("progress",   AT(progress),   "auto",     "auto|bar|json|none",
+        "How to show progress; json writes one line per event to standard output; auto: a bar on a terminal"),
+    NPG_ROW_FLAG  ("quiet",      AT(quiet),      "no",
+        "Log warnings and errors only (also -q)"),
+    NPG_ROW_FLAG  ("verbose",    AT(verbose),    "no",
+        "Log everything (also -v)"),
     {0}};
+/* clang-format on */
 
 static void print_names(const npg_batch *batch)
 {
@@ -86,8 +84,8 @@ static npg_status run(npg_batch *batch, const settings *s)
     if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to go on\n", stderr);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; see "
-                "%s/batch.html\n",
+                "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; "
+                "see %s/batch.html\n",
                 batch->output);
     return status;
 }

@@ -19,33 +19,39 @@ typedef struct settings {
     bool json;
 } settings;
 
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
 const npg_option npg_bench_options[] = {
-    {"json", "print the report as JSON instead of a table", NPG_OPTION_FLAG, offsetof(settings, json), "no",
-     0, 0, NULL, NULL},
-    {"output", "write the report as JSON to this file", NPG_OPTION_TEXT, offsetof(settings, output), "", 0, 0,
-     NULL, "FILE"},
-    {"compare", "say what is slower than in this report, beyond noise: exit code 7 if anything is",
-     NPG_OPTION_TEXT, offsetof(settings, compare), "", 0, 0, NULL, "FILE"},
-    {"tolerance", "share by which the quartiles must lie apart for that", NPG_OPTION_REAL,
-     offsetof(settings, tolerance), "0.05", 0, 10, NULL, NULL},
-    {"only", "time only rows whose names begin with one of these words, parted by commas", NPG_OPTION_TEXT,
-     offsetof(settings, only), "", 0, 0, NULL, "NAME"},
-    {"vertices", "vertices of the mesh", NPG_OPTION_INT, offsetof(settings, vertices), "10000", 16, 1e6, NULL,
-     NULL},
-    {"points", "points of each frame", NPG_OPTION_INT, offsetof(settings, points), "5000", 1, 1e6, NULL,
-     NULL},
-    {"frames", "frames of the window", NPG_OPTION_INT, offsetof(settings, frames), "17", 1, 1000, NULL, NULL},
-    {"dense", "vertices of the dense surface that is carried and decoded, 0: none", NPG_OPTION_INT,
-     offsetof(settings, dense), "100000", 0, 1e7, NULL, NULL},
-    {"epochs", "epochs of the fit that is timed", NPG_OPTION_INT, offsetof(settings, epochs), "10", 1, 10000,
-     NULL, NULL},
-    {"repeat", "times each row is taken; quartiles and median count", NPG_OPTION_INT,
-     offsetof(settings, repeat), "9", 1, 1000, NULL, NULL},
-    {"device", "OpenCL device: auto, cpu, gpu, a number or a part of its name", NPG_OPTION_TEXT,
-     offsetof(settings, device), "auto", 0, 0, NULL, "NAME"},
-    {"tuning", "the kernels' parameters: auto, wide, narrow, gpu or a file of neupig tune", NPG_OPTION_TEXT,
-     offsetof(settings, tuning), "auto", 0, 0, NULL, "SET"},
+    /* type      name         place          default   least  most   shown as */
+    NPG_ROW_FLAG("json",      AT(json),      "no",
+        "print the report as JSON instead of a table"),
+    NPG_ROW_TEXT("output",    AT(output),    "",       "FILE",
+        "write the report as JSON to this file"),
+    NPG_ROW_TEXT("compare",   AT(compare),   "",       "FILE",
+        "say what is slower than in this report, beyond noise: exit code 7 if anything is"),
+    NPG_ROW_REAL("tolerance", AT(tolerance), "0.05",   0,     10,    NULL,
+        "share by which the quartiles must lie apart for that"),
+    NPG_ROW_TEXT("only",      AT(only),      "",       "NAME",
+        "time only rows whose names begin with one of these words, parted by commas"),
+    NPG_ROW_INT ("vertices",  AT(vertices),  "10000",  16,    1e6,   NULL,
+        "vertices of the mesh"),
+    NPG_ROW_INT ("points",    AT(points),    "5000",   1,     1e6,   NULL,
+        "points of each frame"),
+    NPG_ROW_INT ("frames",    AT(frames),    "17",     1,     1000,  NULL,
+        "frames of the window"),
+    NPG_ROW_INT ("dense",     AT(dense),     "100000", 0,     1e7,   NULL,
+        "vertices of the dense surface that is carried and decoded, 0: none"),
+    NPG_ROW_INT ("epochs",    AT(epochs),    "10",     1,     10000, NULL,
+        "epochs of the fit that is timed"),
+    NPG_ROW_INT ("repeat",    AT(repeat),    "9",      1,     1000,  NULL,
+        "times each row is taken; quartiles and median count"),
+    NPG_ROW_TEXT("device",    AT(device),    "auto",   "NAME",
+        "OpenCL device: auto, cpu, gpu, a number or a part of its name"),
+    NPG_ROW_TEXT("tuning",    AT(tuning),    "auto",   "SET",
+        "the kernels' parameters: auto, wide, narrow, gpu or a file of neupig tune"),
     {0}};
+/* clang-format on */
 
 typedef struct bench {
     settings s;

@@ -17,9 +17,15 @@ typedef struct settings {
     bool json;
 } settings;
 
-const npg_option npg_doctor_options[] = {{"json", "Print one JSON object instead of text", NPG_OPTION_FLAG,
-                                          offsetof(settings, json), "no", 0, 0, NULL, NULL},
-                                         {0}};
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
+const npg_option npg_doctor_options[] = {
+    /* type      name    place     default */
+    NPG_ROW_FLAG("json", AT(json), "no",
+        "Print one JSON object instead of text"),
+    {0}};
+/* clang-format on */
 
 /* ---- devices ---- */
 

@@ -20,20 +20,26 @@ typedef struct settings {
 
 #define AT(member) offsetof(settings, member)
 
+/* clang-format off */
 const npg_option npg_eval_options[] = {
-    {"points-only",
-     "The truth is point clouds: CD and F between surface samples and all its points, NC with its "
-     "normals, no Corr",
-     NPG_OPTION_FLAG, AT(points_only), "no", 0, 0, NULL, NULL},
-    {"frames",
-     "Frames of the truth to use: a:b:step as Python slices, or positions like 1-5,8 (counted from 0)",
-     NPG_OPTION_TEXT, AT(frames), "", 0, 0, NULL, "FRAMES"},
-    {"samples", "Samples on either surface", NPG_OPTION_INT, AT(samples), "100000", 1, 1e8, NULL, NULL},
-    {"tau", "Distance of the F-score, in diagonals", NPG_OPTION_REAL, AT(tau), "0.005", 0, 1, NULL, NULL},
-    {"seed", "Seed of the samples", NPG_OPTION_INT, AT(seed), "0", 0, 4294967295.0, NULL, NULL},
-    {"per-frame", "Print a line for every frame", NPG_OPTION_FLAG, AT(per_frame), "no", 0, 0, NULL, NULL},
-    {"json", "Print one JSON object instead of text", NPG_OPTION_FLAG, AT(json), "no", 0, 0, NULL, NULL},
+    /* type      name           place            default   least  most          shown as */
+    NPG_ROW_FLAG("points-only", AT(points_only), "no",
+        "The truth is point clouds: CD and F between surface samples and all its points, "
+        "NC with its normals, no Corr"),
+    NPG_ROW_TEXT("frames",      AT(frames),      "",       "FRAMES",
+        "Frames of the truth to use: a:b:step as Python slices, or positions like 1-5,8 (counted from 0)"),
+    NPG_ROW_INT ("samples",     AT(samples),     "100000", 1,     1e8,          NULL,
+        "Samples on either surface"),
+    NPG_ROW_REAL("tau",         AT(tau),         "0.005",  0,     1,            NULL,
+        "Distance of the F-score, in diagonals"),
+    NPG_ROW_INT ("seed",        AT(seed),        "0",      0,     4294967295.0, NULL,
+        "Seed of the samples"),
+    NPG_ROW_FLAG("per-frame",   AT(per_frame),   "no",
+        "Print a line for every frame"),
+    NPG_ROW_FLAG("json",        AT(json),        "no",
+        "Print one JSON object instead of text"),
     {0}};
+/* clang-format on */
 
 typedef struct evaluation {
     settings s;

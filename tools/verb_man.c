@@ -11,10 +11,15 @@ typedef struct settings {
     int completion;
 } settings;
 
-const npg_option npg_man_options[] = {{"completion", "Print completion for a shell instead",
-                                       NPG_OPTION_CHOICE, offsetof(settings, completion), "none", 0, 0,
-                                       "none|bash|zsh", NULL},
-                                      {0}};
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
+const npg_option npg_man_options[] = {
+    /* type        name          place           default  words */
+    NPG_ROW_CHOICE("completion", AT(completion), "none",  "none|bash|zsh",
+        "Print completion for a shell instead"),
+    {0}};
+/* clang-format on */
 
 /* Text as roff shows it letter by letter. */
 static void put_text(const char *text)
@@ -91,9 +96,9 @@ static void print_manual(void)
     fputs(".SH NAME\nneupig \\- one moving mesh from a long sequence of point clouds\n"
           ".SH SYNOPSIS\n.B neupig\n.I VERB\n[options] [operands]\n"
           ".SH DESCRIPTION\nTurns a sequence of point clouds into one mesh that moves through all of them, "
-          "every "
-          "vertex keeping its identity.\nOptions are written \\-\\-name VALUE or \\-\\-name=VALUE; flags "
-          "\\-\\-name or \\-\\-no\\-name.\n.SH VERBS\n",
+          "every vertex keeping its identity.\n"
+          "Options are written \\-\\-name VALUE or \\-\\-name=VALUE; flags \\-\\-name or \\-\\-no\\-name.\n"
+          ".SH VERBS\n",
           stdout);
     for (const npg_verb *verb = npg_verbs; verb->name; verb++) put_verb(verb);
     put_presets();
@@ -116,8 +121,8 @@ static void print_bash(void)
         for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) printf(" --%s", info.name);
         fputs("' ;;\n", stdout);
     }
-    fputs("    esac\n    if [[ $word == -* ]]; then\n        COMPREPLY=($(compgen -W \"$words\" -- "
-          "\"$word\"))\n"
+    fputs("    esac\n    if [[ $word == -* ]]; then\n"
+          "        COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n"
           "    else\n        COMPREPLY=($(compgen -f -- \"$word\"))\n    fi\n}\n"
           "complete -o filenames -F _neupig neupig\n",
           stdout);

@@ -13,9 +13,15 @@ typedef struct settings {
     bool json;
 } settings;
 
-const npg_option npg_probe_options[] = {{"json", "Print one JSON object instead of text", NPG_OPTION_FLAG,
-                                         offsetof(settings, json), "no", 0, 0, NULL, NULL},
-                                        {0}};
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
+const npg_option npg_probe_options[] = {
+    /* type      name    place     default */
+    NPG_ROW_FLAG("json", AT(json), "no",
+        "Print one JSON object instead of text"),
+    {0}};
+/* clang-format on */
 
 typedef struct job {
     settings s;
@@ -108,9 +114,8 @@ static void print_text(job *j, const npg_estimate *e)
                o[2] + lo[2], o[0] + hi[0], o[1] + hi[1], o[2] + hi[2], npg_bounds_diagonal(&p->bounds));
     }
     printf("files     %.1f MiB, read in %.2f s\n", (double)p->bytes / 0x1p20, p->read_s);
-    printf("estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s (%zu vertices, %zu epochs, windows of %zu "
-           "frames; "
-           "within a factor of two)\n",
+    printf("estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s "
+           "(%zu vertices, %zu epochs, windows of %zu frames; within a factor of two)\n",
            e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->epochs,
            e->window < p->frames ? e->window : p->frames);
     json_array_foreach(p->attention, i, value) printf("attention %s\n", json_string_value(value));

@@ -17,29 +17,36 @@ typedef struct settings {
 
 #define AT(member) offsetof(settings, member)
 
+/* clang-format off */
 const npg_option npg_render_options[] = {
-    {"output", "The picture (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "FILE.png"},
-    {"height", "Height of a tile, pixels", NPG_OPTION_INT, AT(height), "512", 8, 8192, NULL, "PIXELS"},
-    {"width", "Width of a tile, pixels; 0: as what is drawn needs", NPG_OPTION_INT, AT(width), "0", 0, 8192,
-     NULL, "PIXELS"},
-    {"columns", "Tiles in a row; 0: up to 8", NPG_OPTION_INT, AT(columns), "0", 0, 256, NULL, NULL},
-    {"count", "Draw this many of the files, spread evenly; 0: all", NPG_OPTION_INT, AT(count), "0", 0, 4096,
-     NULL, NULL},
-    {"view", "Where to look from; free: --azimuth and --elevation", NPG_OPTION_CHOICE, AT(view), "free", 0, 0,
-     "free|front|back|left|right|top|bottom", NULL},
-    {"azimuth", "Degrees around the upward axis; 0: from the front (+z, or -y with z up)", NPG_OPTION_REAL,
-     AT(azimuth), "25", -3600, 3600, NULL, "DEGREES"},
-    {"elevation", "Degrees above the horizon", NPG_OPTION_REAL, AT(elevation), "12", -90, 90, NULL,
-     "DEGREES"},
-    {"up", "The upward axis", NPG_OPTION_CHOICE, AT(up), "y", 0, 0, "y|z", NULL},
-    {"colour",
-     "plain; vertex: colours in the file; normal; identity: by place in the first file, to see vertices "
-     "keep their place on the body",
-     NPG_OPTION_CHOICE, AT(colour), "plain", 0, 0, "plain|vertex|normal|identity", NULL},
-    {"point-size", "Radius of a cloud's points, in % of the diagonal", NPG_OPTION_REAL, AT(point_size),
-     "0.35", 0.01, 20, NULL, "PERCENT"},
-    {"samples", "Rays per pixel and axis", NPG_OPTION_INT, AT(samples), "2", 1, 8, NULL, NULL},
+    /* type        name          place           default  least  most  shown as or words */
+    NPG_ROW_TEXT  ("output",     AT(output),     "",      "FILE.png",
+        "The picture (also -o)"),
+    NPG_ROW_INT   ("height",     AT(height),     "512",   8,     8192, "PIXELS",
+        "Height of a tile, pixels"),
+    NPG_ROW_INT   ("width",      AT(width),      "0",     0,     8192, "PIXELS",
+        "Width of a tile, pixels; 0: as what is drawn needs"),
+    NPG_ROW_INT   ("columns",    AT(columns),    "0",     0,     256,  NULL,
+        "Tiles in a row; 0: up to 8"),
+    NPG_ROW_INT   ("count",      AT(count),      "0",     0,     4096, NULL,
+        "Draw this many of the files, spread evenly; 0: all"),
+    NPG_ROW_CHOICE("view",       AT(view),       "free",  "free|front|back|left|right|top|bottom",
+        "Where to look from; free: --azimuth and --elevation"),
+    NPG_ROW_REAL  ("azimuth",    AT(azimuth),    "25",    -3600, 3600, "DEGREES",
+        "Degrees around the upward axis; 0: from the front (+z, or -y with z up)"),
+    NPG_ROW_REAL  ("elevation",  AT(elevation),  "12",    -90,   90,   "DEGREES",
+        "Degrees above the horizon"),
+    NPG_ROW_CHOICE("up",         AT(up),         "y",     "y|z",
+        "The upward axis"),
+    NPG_ROW_CHOICE("colour",     AT(colour),     "plain", "plain|vertex|normal|identity",
+        "plain; vertex: colours in the file; normal; "
+        "identity: by place in the first file, to see vertices keep their place on the body"),
+    NPG_ROW_REAL  ("point-size", AT(point_size), "0.35",  0.01,  20,   "PERCENT",
+        "Radius of a cloud's points, in % of the diagonal"),
+    NPG_ROW_INT   ("samples",    AT(samples),    "2",     1,     8,    NULL,
+        "Rays per pixel and axis"),
     {0}};
+/* clang-format on */
 
 typedef struct job {
     settings s;

@@ -20,25 +20,27 @@ typedef struct settings {
     int segments;
 } settings;
 
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
 const npg_option npg_run_verb_options[] = {
-    {"config",
-     "Read options from a JSON object in FILE, or take a method configuration of the paper's published code; "
-     "the command line wins (also -c)",
-     NPG_OPTION_TEXT, offsetof(settings, config), "", 0, 0, NULL, "FILE"},
-    {"progress",
-     "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal",
-     NPG_OPTION_CHOICE, offsetof(settings, progress), "auto", 0, 0, "auto|bar|json|none", NULL},
-    {"log-file", "Append the log to FILE, one JSON object per line", NPG_OPTION_TEXT,
-     offsetof(settings, log_file), "", 0, 0, NULL, "FILE"},
-    {"quiet", "Log warnings and errors only (also -q)", NPG_OPTION_FLAG, offsetof(settings, quiet), "no", 0,
-     0, NULL, NULL},
-    {"verbose", "Log everything (also -v)", NPG_OPTION_FLAG, offsetof(settings, verbose), "no", 0, 0, NULL,
-     NULL},
-    {"segments",
-     "Where the topology changes: one reference all the same, with an alarm (one), or another reference from "
-     "there on, each with its frames in OUT/segment_* (auto)",
-     NPG_OPTION_CHOICE, offsetof(settings, segments), "one", 0, 0, "one|auto", NULL},
+    /* type        name        place         default  words or shown as */
+    NPG_ROW_TEXT  ("config",   AT(config),   "",      "FILE",
+        "Read options from a JSON object in FILE, "
+        "or take a method configuration of the paper's published code; the command line wins (also -c)"),
+    NPG_ROW_CHOICE("progress", AT(progress), "auto",  "auto|bar|json|none",
+        "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal"),
+    NPG_ROW_TEXT  ("log-file", AT(log_file), "",      "FILE",
+        "Append the log to FILE, one JSON object per line"),
+    NPG_ROW_FLAG  ("quiet",    AT(quiet),    "no",
+        "Log warnings and errors only (also -q)"),
+    NPG_ROW_FLAG  ("verbose",  AT(verbose),  "no",
+        "Log everything (also -v)"),
+    NPG_ROW_CHOICE("segments", AT(segments), "one",   "one|auto",
+        "Where the topology changes: one reference all the same, with an alarm (one), "
+        "or another reference from there on, each with its frames in OUT/segment_* (auto)"),
     {0}};
+/* clang-format on */
 
 /* ---- signals ---- */
 
@@ -88,9 +90,9 @@ static int wait_for_second(const watcher *w)
     }
 }
 
-/* The first signal stops the run in good order; the second ends the process the usual way.  Where something
- * that can't be interrupted takes too long the process ends, too: all that is on disk is whole at every
- * moment. */
+/* The first signal stops the run in good order; the second ends the process the usual way.
+ * Where something that can't be interrupted takes too long the process ends, too:
+ * all that is on disk is whole at every moment. */
 static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to go on\n";
@@ -144,8 +146,8 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
     if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
-                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; see the "
-                "warnings, or %s/report.json\n",
+                "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; "
+                "see the warnings, or %s/report.json\n",
                 verb, output);
     if (status == NPG_CHANGED)
         fprintf(stderr, "neupig %s: ended where the topology changed; see %s/topology.json\n", verb, output);

@@ -22,38 +22,47 @@ typedef struct settings {
 
 #define AT(member) offsetof(settings, member)
 
+/* clang-format off */
 const npg_option npg_synth_options[] = {
-    {"output", "Folder for points/ and truth/ (also -o)", NPG_OPTION_TEXT, AT(output), "", 0, 0, NULL, "DIR"},
-    {"body",
-     "What moves: a walking figure, a bending bar, a figure whose hand has grown into its hip and leaves it, "
-     "the bar that a ball comes to, or one beside which a ball disappears",
-     NPG_OPTION_CHOICE, AT(body), "walker", 0, 0, "walker|bar|hands|two|gone", NULL},
-    {"change",
-     "The first frame in which the hand is off the hip, or the ball there or gone; -1: the middle one",
-     NPG_OPTION_INT, AT(change), "-1", -1, 1e6, NULL, "FRAME"},
-    {"frames", "Frames", NPG_OPTION_INT, AT(frames), "24", 1, 1e6, NULL, NULL},
-    {"points", "Points per frame", NPG_OPTION_INT, AT(points), "5000", 1, 1e8, NULL, NULL},
-    {"cycles", "Cycles of the motion over all frames", NPG_OPTION_REAL, AT(cycles), "1", 0, 1e4, NULL, NULL},
-    {"travel", "Metres the walker goes forward per cycle", NPG_OPTION_REAL, AT(travel), "0", -100, 100, NULL,
-     NULL},
-    {"cell", "Size of the truth mesh's triangles, metres", NPG_OPTION_REAL, AT(cell), "0.025", 0.004, 0.06,
-     NULL, "M"},
-    {"noise", "Gaussian noise, deviation in % of the diagonal; along the rays with cameras", NPG_OPTION_REAL,
-     AT(noise), "0", 0, 10, NULL, "PERCENT"},
-    {"outliers", "Share of points replaced by points anywhere in the box, in %", NPG_OPTION_REAL,
-     AT(outliers), "0", 0, 90, NULL, "PERCENT"},
-    {"holes", "Balls of 6 % of the diagonal cut out of every frame", NPG_OPTION_INT, AT(holes), "0", 0, 1000,
-     NULL, NULL},
-    {"vary", "Let the point count vary between half and all of --points", NPG_OPTION_FLAG, AT(vary), "no", 0,
-     0, NULL, NULL},
-    {"normals", "Write normals", NPG_OPTION_FLAG, AT(normals), "yes", 0, 0, NULL, NULL},
-    {"cameras", "See the body through a ring of this many depth cameras; 0: its whole surface",
-     NPG_OPTION_INT, AT(cameras), "0", 0, 64, NULL, NULL},
-    {"width", "Width and height of a camera's picture, pixels", NPG_OPTION_INT, AT(width), "256", 16, 4096,
-     NULL, "PIXELS"},
-    {"format", "Of the files", NPG_OPTION_CHOICE, AT(format), "ply", 0, 0, "ply|obj", NULL},
-    {"seed", "Seed of all random numbers", NPG_OPTION_INT, AT(seed), "0", 0, 4294967295.0, NULL, NULL},
+    /* type        name        place         default   least  most          shown as or words */
+    NPG_ROW_TEXT  ("output",   AT(output),   "",       "DIR",
+        "Folder for points/ and truth/ (also -o)"),
+    NPG_ROW_CHOICE("body",     AT(body),     "walker", "walker|bar|hands|two|gone",
+        "What moves: a walking figure, a bending bar, "
+        "a figure whose hand has grown into its hip and leaves it, "
+        "the bar that a ball comes to, or one beside which a ball disappears"),
+    NPG_ROW_INT   ("change",   AT(change),   "-1",     -1,    1e6,          "FRAME",
+        "The first frame in which the hand is off the hip, or the ball there or gone; -1: the middle one"),
+    NPG_ROW_INT   ("frames",   AT(frames),   "24",     1,     1e6,          NULL,
+        "Frames"),
+    NPG_ROW_INT   ("points",   AT(points),   "5000",   1,     1e8,          NULL,
+        "Points per frame"),
+    NPG_ROW_REAL  ("cycles",   AT(cycles),   "1",      0,     1e4,          NULL,
+        "Cycles of the motion over all frames"),
+    NPG_ROW_REAL  ("travel",   AT(travel),   "0",      -100,  100,          NULL,
+        "Metres the walker goes forward per cycle"),
+    NPG_ROW_REAL  ("cell",     AT(cell),     "0.025",  0.004, 0.06,         "M",
+        "Size of the truth mesh's triangles, metres"),
+    NPG_ROW_REAL  ("noise",    AT(noise),    "0",      0,     10,           "PERCENT",
+        "Gaussian noise, deviation in % of the diagonal; along the rays with cameras"),
+    NPG_ROW_REAL  ("outliers", AT(outliers), "0",      0,     90,           "PERCENT",
+        "Share of points replaced by points anywhere in the box, in %"),
+    NPG_ROW_INT   ("holes",    AT(holes),    "0",      0,     1000,         NULL,
+        "Balls of 6 % of the diagonal cut out of every frame"),
+    NPG_ROW_FLAG  ("vary",     AT(vary),     "no",
+        "Let the point count vary between half and all of --points"),
+    NPG_ROW_FLAG  ("normals",  AT(normals),  "yes",
+        "Write normals"),
+    NPG_ROW_INT   ("cameras",  AT(cameras),  "0",      0,     64,           NULL,
+        "See the body through a ring of this many depth cameras; 0: its whole surface"),
+    NPG_ROW_INT   ("width",    AT(width),    "256",    16,    4096,         "PIXELS",
+        "Width and height of a camera's picture, pixels"),
+    NPG_ROW_CHOICE("format",   AT(format),   "ply",    "ply|obj",
+        "Of the files"),
+    NPG_ROW_INT   ("seed",     AT(seed),     "0",      0,     4294967295.0, NULL,
+        "Seed of all random numbers"),
     {0}};
+/* clang-format on */
 
 static npg_status write_arrays(const char *folder, const char *kind, int64_t frame, const settings *s,
                                const float *pos, const float *normals, size_t count, const npg_mesh *mesh)
@@ -163,11 +172,10 @@ static npg_status make_capture(const settings *s)
     npg_status status = make_folders(s);
     if (!status) status = make_frames(s, &f, &points, &total);
     if (!status)
-        printf(
-            "%lld frames, %.0f points each, truth of %zu vertices and %zu faces\npoints  %s/points\ntruth   "
-            "%s/truth\n",
-            (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count, f.mesh->face_count,
-            s->output, s->output);
+        printf("%lld frames, %.0f points each, truth of %zu vertices and %zu faces\n"
+               "points  %s/points\ntruth   %s/truth\n",
+               (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count,
+               f.mesh->face_count, s->output, s->output);
     if (!status && change_of(s) < s->frames) printf("changes at frame %lld\n", (long long)change_of(s));
     npg_scanned_close(&points);
     close_figure(&f);

@@ -15,23 +15,29 @@ typedef struct settings {
     const char *device, *tuning, *output, *only;
 } settings;
 
+#define AT(member) offsetof(settings, member)
+
+/* clang-format off */
 const npg_option npg_tune_options[] = {
-    {"output", "write the set to this file instead of the cache, where runs look for it", NPG_OPTION_TEXT,
-     offsetof(settings, output), "", 0, 0, NULL, "FILE"},
-    {"only", "tune only this: decoder, or names of other numbers of a set, parted by commas", NPG_OPTION_TEXT,
-     offsetof(settings, only), "", 0, 0, NULL, "NAMES"},
-    {"vertices", "vertices of the mesh that is timed", NPG_OPTION_INT, offsetof(settings, vertices), "1500",
-     16, 1e6, NULL, NULL},
-    {"points", "points of each frame", NPG_OPTION_INT, offsetof(settings, points), "5000", 1, 1e6, NULL,
-     NULL},
-    {"frames", "frames of the window", NPG_OPTION_INT, offsetof(settings, frames), "8", 1, 1000, NULL, NULL},
-    {"repeat", "times each is taken; the median counts", NPG_OPTION_INT, offsetof(settings, repeat), "7", 1,
-     1000, NULL, NULL},
-    {"device", "OpenCL device: auto, cpu, gpu, a number or a part of its name", NPG_OPTION_TEXT,
-     offsetof(settings, device), "auto", 0, 0, NULL, "NAME"},
-    {"tuning", "the set to begin with: auto, wide, narrow, gpu or a file", NPG_OPTION_TEXT,
-     offsetof(settings, tuning), "auto", 0, 0, NULL, "SET"},
+    /* type      name        place         default  least  most  shown as */
+    NPG_ROW_TEXT("output",   AT(output),   "",      "FILE",
+        "write the set to this file instead of the cache, where runs look for it"),
+    NPG_ROW_TEXT("only",     AT(only),     "",      "NAMES",
+        "tune only this: decoder, or names of other numbers of a set, parted by commas"),
+    NPG_ROW_INT ("vertices", AT(vertices), "1500",  16,    1e6,  NULL,
+        "vertices of the mesh that is timed"),
+    NPG_ROW_INT ("points",   AT(points),   "5000",  1,     1e6,  NULL,
+        "points of each frame"),
+    NPG_ROW_INT ("frames",   AT(frames),   "8",     1,     1000, NULL,
+        "frames of the window"),
+    NPG_ROW_INT ("repeat",   AT(repeat),   "7",     1,     1000, NULL,
+        "times each is taken; the median counts"),
+    NPG_ROW_TEXT("device",   AT(device),   "auto",  "NAME",
+        "OpenCL device: auto, cpu, gpu, a number or a part of its name"),
+    NPG_ROW_TEXT("tuning",   AT(tuning),   "auto",  "SET",
+        "the set to begin with: auto, wide, narrow, gpu or a file"),
     {0}};
+/* clang-format on */
 
 typedef struct tune {
     settings s;
@@ -44,35 +50,50 @@ typedef struct tune {
 
 /* ---- what is tried ---- */
 
-/* Values of the decoder that belong together: rows, vector, tile vectors, tile rows, grad rows, head rows,
- * local. */
+/* Values of the decoder that belong together: rows, vector, tile vectors, tile rows,
+ * grad rows, head rows, local. */
 typedef struct tile_set {
     int values[7];
 } tile_set;
 
+/* clang-format off */
 static const tile_set tiles_of_processors[] = {
-    {{192, 16, 2, 12, 8, 12, 1}},  {{96, 16, 2, 12, 8, 12, 1}}, {{192, 16, 2, 8, 8, 12, 1}},
-    {{192, 16, 1, 24, 16, 12, 1}}, {{192, 8, 2, 6, 4, 6, 1}},   {{192, 8, 4, 3, 2, 6, 1}},
-    {{192, 8, 2, 12, 8, 12, 1}},   {{192, 4, 2, 6, 4, 6, 1}},   {{0}}};
+    {{192, 16, 2, 12,  8, 12, 1}},
+    {{ 96, 16, 2, 12,  8, 12, 1}},
+    {{192, 16, 2,  8,  8, 12, 1}},
+    {{192, 16, 1, 24, 16, 12, 1}},
+    {{192,  8, 2,  6,  4,  6, 1}},
+    {{192,  8, 4,  3,  2,  6, 1}},
+    {{192,  8, 2, 12,  8, 12, 1}},
+    {{192,  4, 2,  6,  4,  6, 1}},
+    {{0}}};
 
-static const tile_set tiles_of_gpus[] = {{{64, 4, 1, 8, 8, 1, 128}},  {{32, 4, 1, 8, 8, 1, 128}},
-                                         {{128, 4, 1, 8, 8, 1, 128}}, {{64, 4, 1, 16, 8, 1, 128}},
-                                         {{64, 4, 2, 8, 8, 1, 64}},   {{64, 4, 1, 4, 4, 1, 128}},
-                                         {{64, 4, 1, 8, 16, 1, 256}}, {{0}}};
+static const tile_set tiles_of_gpus[] = {
+    {{ 64, 4, 1,  8,  8, 1, 128}},
+    {{ 32, 4, 1,  8,  8, 1, 128}},
+    {{128, 4, 1,  8,  8, 1, 128}},
+    {{ 64, 4, 1, 16,  8, 1, 128}},
+    {{ 64, 4, 2,  8,  8, 1,  64}},
+    {{ 64, 4, 1,  4,  4, 1, 128}},
+    {{ 64, 4, 1,  8, 16, 1, 256}},
+    {{0}}};
+/* clang-format on */
 
-/* One number alone: its name, the rows that show it, the ops to check, the values for processors and for
- * GPUs. */
+/* One number alone: its name, the rows that show it, the ops to check, the values
+ * for processors and for GPUs. */
 typedef struct one_number {
     const char *field, *row, *op;
     int processors[6], gpus[6];
 } one_number;
 
+/* clang-format off */
 static const one_number knobs[] = {
-    {"nearest_queries", "nearest_and_chamfer", "nearest", {16, 64, 256}, {1, 2, 4, 8}},
-    {"frame_local", "nearest_and_chamfer", "chamfer", {1}, {32, 64, 128, 256}},
-    {"span", "adam", "adam", {8, 16, 64, 256}, {1, 2, 4}},
-    {"local", "latent,transform,isometry,sobolev", "", {1, 4, 16, 32}, {32, 64, 128}},
+    {"nearest_queries", "nearest_and_chamfer",               "nearest", {16, 64, 256},    {1, 2, 4, 8}},
+    {"frame_local",     "nearest_and_chamfer",               "chamfer", {1},              {32, 64, 128, 256}},
+    {"span",            "adam",                              "adam",    {8, 16, 64, 256}, {1, 2, 4}},
+    {"local",           "latent,transform,isometry,sobolev", "",        {1, 4, 16, 32},   {32, 64, 128}},
     {0}};
+/* clang-format on */
 
 /* ---- one set ---- */
 

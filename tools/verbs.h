@@ -6,13 +6,13 @@
 
 typedef struct npg_verb {
     const char *name;
-    const char *operands; /* as the usage line shows them; "" for none                   */
+    const char *operands; /* as the usage line shows them; "" for none */
     int operands_min, operands_max;
-    const char *help;                   /* one line                                               */
-    const char *text;                   /* a few sentences for the manual                         */
-    const npg_option *options;          /* the verb's own; ends with a name of NULL; may be NULL  */
-    bool with_run_options;              /* takes the options of all stages as well                */
-    int (*main)(int argc, char **argv); /* argv[0] is the verb's name; returns the exit code  */
+    const char *help;                   /* one line                                              */
+    const char *text;                   /* a few sentences for the manual                        */
+    const npg_option *options;          /* the verb's own; ends with a name of NULL; may be NULL */
+    bool with_run_options;              /* takes the options of all stages as well               */
+    int (*main)(int argc, char **argv); /* argv[0] is the verb's name; returns the exit code     */
 } npg_verb;
 
 /* In the order of the help; ends with a name of NULL (neupig.c). */

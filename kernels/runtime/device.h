@@ -16,9 +16,9 @@ typedef struct npg_program npg_program;
 typedef struct npg_device_info {
     char name[128], platform[128], version[128], driver[128];
     bool is_cpu;
-    int units;           /* compute units         */
-    int vector;          /* floats in a vector    */
-    size_t memory_bytes; /* global memory         */
+    int units;           /* compute units      */
+    int vector;          /* floats in a vector */
+    size_t memory_bytes; /* global memory      */
 } npg_device_info;
 
 /* The i-th device of all platforms; NPG_END after the last, NPG_DEVICE when there is no platform at all. */
@@ -37,13 +37,13 @@ npg_status npg_device_open_tuned(npg_device **device, const char *spec, const ch
 void npg_device_close(npg_device **device);
 const npg_device_info *npg_device_facts(const npg_device *device);
 
-/* The set in use, and where it comes from: "wide", "narrow", "gpu", a path, or what was wrong with the file.
- */
+/* The set in use, and where it comes from: "wide", "narrow", "gpu", a path, or what was
+ * wrong with the file. */
 const npg_tuning *npg_device_tuning(const npg_device *device);
 const char *npg_device_tuning_source(const npg_device *device);
 
-/* Change the set for what is opened on the device from now on; nothing that was opened before may be in use.
- */
+/* Change the set for what is opened on the device from now on; nothing that was opened
+ * before may be in use. */
 npg_status npg_device_set_tuning(npg_device *device, const npg_tuning *tuning);
 
 /* Where `neupig tune` keeps this device's set; NPG_DISK when no cache folder can be made. */

@@ -1,7 +1,7 @@
 /* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
  * between versions, so each version of neupig has a folder of its own, used by the process that holds its
- * lock; any other process works in a private folder that is removed at the end, or, if
- * it was killed, by a later one. */
+ * lock; any other process works in a private folder that is removed at the end, or, if it was killed, by a
+ * later one. */
 #ifndef NPG_KERNEL_CACHE_H
 #define NPG_KERNEL_CACHE_H
 

@@ -2,10 +2,10 @@
  * Build constants, from the tuning of the device: VW, CHAINS, LOCAL. */
 
 #define PASTE_(a, b) a##b
-#define PASTE(a, b) PASTE_(a, b)
-#define REAL PASTE(float, VW)
-#define LOAD PASTE(vload, VW)
-#define STORE PASTE(vstore, VW)
+#define PASTE(a, b)  PASTE_(a, b)
+#define REAL         PASTE(float, VW)
+#define LOAD         PASTE(vload, VW)
+#define STORE        PASTE(vstore, VW)
 
 /* CHAINS independent chains of multiply-adds on vectors of VW: 2 VW CHAINS operations a round and item.
  * Global size: groups of LOCAL items; sink: [items]. */

@@ -37,8 +37,8 @@ const npg_tuning npg_tuning_narrow = {.mlp_rows = 192,
                                       .span = 16,
                                       .local = 1};
 
-/* 128 items side by side in one row of 512 columns, loads of neighbours adjacent; small blocks give many
- * groups. */
+/* 128 items side by side in one row of 512 columns, loads of neighbours adjacent;
+ * small blocks give many groups. */
 const npg_tuning npg_tuning_gpu = {.mlp_rows = 64,
                                    .mlp_vector = 4,
                                    .mlp_tile_vectors = 1,
@@ -52,25 +52,25 @@ const npg_tuning npg_tuning_gpu = {.mlp_rows = 64,
                                    .span = 1,
                                    .local = 64};
 
-#define FIELD(name, help, min, max)                                                                          \
-    {                                                                                                        \
-#name, help, offsetof(npg_tuning, name), min, max                                                    \
-    }
+/* clang-format off */
+#define FIELD(name, least, most, help) {#name, help, offsetof(npg_tuning, name), least, most}
 
 const npg_tuning_field npg_tuning_fields[] = {
-    FIELD(mlp_rows, "vertices in a block of the decoder", 16, 1024),
-    FIELD(mlp_vector, "floats in a vector of the decoder", 4, 16),
-    FIELD(mlp_tile_vectors, "vectors in a row of a register tile", 1, 8),
-    FIELD(mlp_tile_rows, "rows of a register tile", 1, 64),
-    FIELD(mlp_grad_rows, "rows of a register tile of the weights' gradient", 1, 32),
-    FIELD(mlp_head_rows, "rows of a register tile of the last layer", 1, 64),
-    FIELD(mlp_local, "work-items that share a block", 1, 1024),
-    FIELD(mlp_groups, "blocks under way for each compute unit", 1, 64),
-    FIELD(nearest_queries, "searches of a work-item in a row", 1, 1024),
-    FIELD(frame_local, "work-items that share a frame", 1, 1024),
-    FIELD(span, "values of a work-item in a row", 1, 1024),
-    FIELD(local, "work-group of the other kernels", 1, 1024),
+    /*    name              least most  help */
+    FIELD(mlp_rows,         16,    1024, "vertices in a block of the decoder"),
+    FIELD(mlp_vector,       4,     16,   "floats in a vector of the decoder"),
+    FIELD(mlp_tile_vectors, 1,     8,    "vectors in a row of a register tile"),
+    FIELD(mlp_tile_rows,    1,     64,   "rows of a register tile"),
+    FIELD(mlp_grad_rows,    1,     32,   "rows of a register tile of the weights' gradient"),
+    FIELD(mlp_head_rows,    1,     64,   "rows of a register tile of the last layer"),
+    FIELD(mlp_local,        1,     1024, "work-items that share a block"),
+    FIELD(mlp_groups,       1,     64,   "blocks under way for each compute unit"),
+    FIELD(nearest_queries,  1,     1024, "searches of a work-item in a row"),
+    FIELD(frame_local,      1,     1024, "work-items that share a frame"),
+    FIELD(span,             1,     1024, "values of a work-item in a row"),
+    FIELD(local,            1,     1024, "work-group of the other kernels"),
     {0}};
+/* clang-format on */
 
 int npg_tuning_get(const npg_tuning *tuning, const npg_tuning_field *field)
 {

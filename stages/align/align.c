@@ -37,20 +37,25 @@ typedef struct state {
     } sum;
 } state;
 
+#define AT(member) offsetof(state, member)
+
+/* clang-format off */
 static const npg_option options[] = {
-    {"align", "bring the reference coarsely into each frame before the joint fit", NPG_OPTION_FLAG,
-     offsetof(state, is_on), "yes", 0, 0, NULL, NULL},
-    {"align-nodes", "nodes of the deformation graph, about", NPG_OPTION_INT, offsetof(state, nodes), "1600",
-     4, 20000, NULL, "N"},
-    {"align-samples", "points of a frame, and of the surface, that the coarse alignment looks at",
-     NPG_OPTION_INT, offsetof(state, samples), "5000", 100, 1e6, NULL, "N"},
-    {"align-steps", "most Gauss-Newton steps of a frame", NPG_OPTION_INT, offsetof(state, steps), "12", 1,
-     1000, NULL, "N"},
-    {"align-stiffness", "weight of the graph's edges against the distances", NPG_OPTION_REAL,
-     offsetof(state, stiffness), "0.006", 0, 1e6, NULL, NULL},
-    {"align-along", "share of distances along the surface, 0 to 1", NPG_OPTION_REAL, offsetof(state, along),
-     "0.001", 0, 1, NULL, NULL},
+    /* type      name               place          default  least  most   shown as */
+    NPG_ROW_FLAG("align",           AT(is_on),     "yes",
+        "bring the reference coarsely into each frame before the joint fit"),
+    NPG_ROW_INT ("align-nodes",     AT(nodes),     "1600",  4,     20000, "N",
+        "nodes of the deformation graph, about"),
+    NPG_ROW_INT ("align-samples",   AT(samples),   "5000",  100,   1e6,   "N",
+        "points of a frame, and of the surface, that the coarse alignment looks at"),
+    NPG_ROW_INT ("align-steps",     AT(steps),     "12",    1,     1000,  "N",
+        "most Gauss-Newton steps of a frame"),
+    NPG_ROW_REAL("align-stiffness", AT(stiffness), "0.006", 0,     1e6,   NULL,
+        "weight of the graph's edges against the distances"),
+    NPG_ROW_REAL("align-along",     AT(along),     "0.001", 0,     1,     NULL,
+        "share of distances along the surface, 0 to 1"),
     {0}};
+/* clang-format on */
 
 static void uninit(npg_worker *worker)
 {

@@ -22,16 +22,16 @@ typedef struct part {
 
 struct npg_block_system {
     size_t n, pair_count;
-    uint32_t (*pairs)[2]; /* owned, sorted                         */
-    uint32_t *first;      /* n + 1: pairs[first[a]] .. have a = a  */
+    uint32_t (*pairs)[2]; /* owned, sorted                        */
+    uint32_t *first;      /* n + 1: pairs[first[a]] .. have a = a */
     part parts[NPG_BLOCK_PARTS];
     /* of the solution */
     uint32_t *row_first;       /* n + 1: entries[row_first[a]] .. are row a's, without the diagonal */
-    uint32_t *other;           /* per entry: the column's node                                     */
-    uint32_t *place;           /* per pair: its two entries                                        */
-    float *diagonal, *inverse; /* n x CELL          */
-    float *cells;              /* 2 pair_count x CELL */
-    float *work;               /* 5 x n x LANES       */
+    uint32_t *other;           /* per entry: the column's node                                      */
+    uint32_t *place;           /* per pair: its two entries                                         */
+    float *diagonal, *inverse; /* n x CELL                                                          */
+    float *cells;              /* 2 pair_count x CELL                                               */
+    float *work;               /* 5 x n x LANES                                                     */
 };
 
 void npg_block_close(npg_block_system **slot)
@@ -147,8 +147,10 @@ NPG_WIDE static void add_outer(double *restrict block, double scale, const doubl
 }
 
 /* block += scale K(a)^T K(b), K(y) = (-[y]x, I): a turn moves by turn x arm.  In blocks of 3 x 3:
- *   a.b I - b a^T    [a]x
- *   -[b]x            I                                                                          */
+ *
+ *     a.b I - b a^T    [a]x
+ *     -[b]x            I
+ */
 static void add_arms(double *block, double scale, const double a[3], const double b[3])
 {
     double along = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -14,9 +14,9 @@
 
 typedef struct walk {
     size_t vert_count;
-    uint32_t *start, *neighbour; /* V + 1, 2 E      */
-    float *length;               /* of half-edges   */
-    float *dist;                 /* V, infinity     */
+    uint32_t *start, *neighbour; /* V + 1, 2 E                                        */
+    float *length;               /* of half-edges                                     */
+    float *dist;                 /* V, infinity                                       */
     uint32_t *heap, *where;      /* binary heap of vertices, and each one's place + 1 */
     size_t heap_size;
     uint32_t *seen; /* vertices reached by the last walk, nearest first */
@@ -162,8 +162,8 @@ static void turn_to_weights(npg_graph *graph, const float *beyond)
     }
 }
 
-/* Vertices in order become nodes unless an earlier node is within a radius; every node then offers itself
- * around. */
+/* Vertices in order become nodes unless an earlier node is within a radius;
+ * every node then offers itself around. */
 static npg_status choose_nodes(npg_graph *graph, float *beyond, walk *w, const npg_mesh *mesh)
 {
     size_t capacity = 0;

@@ -14,12 +14,12 @@
 #define NPG_GRAPH_BIND 4 /* nodes that carry a vertex */
 
 typedef struct npg_graph {
-    size_t node_count, vert_count, edge_count; /* K, V, E                                               */
-    double radius;                             /* distance between nodes, about                         */
-    float *node_pos;                           /* K x 3                                                 */
-    uint32_t *vert_node;                       /* V x 4, UINT32_MAX where there are fewer                */
-    float *vert_weight;                        /* V x 4, sum 1                                          */
-    uint32_t (*edges)[2];                      /* pairs of nodes that carry a vertex together, sorted   */
+    size_t node_count, vert_count, edge_count; /* K, V, E                                             */
+    double radius;                             /* distance between nodes, about                       */
+    float *node_pos;                           /* K x 3                                               */
+    uint32_t *vert_node;                       /* V x 4, UINT32_MAX where there are fewer             */
+    float *vert_weight;                        /* V x 4, sum 1                                        */
+    uint32_t (*edges)[2];                      /* pairs of nodes that carry a vertex together, sorted */
 } npg_graph;
 
 /* About node_target nodes.  The mesh is a loan during the call. */

@@ -1,5 +1,5 @@
-/* Sights: the frames of the choosing pass, thinned, and how a surface made from one of them fares in the
- * others.
+/* Sights: the frames of the choosing pass, thinned, and how a surface made from one of them
+ * fares in the others.
  *
  * A surface from one frame is followed from frame to frame by the coarse tracker (tracker.h), outward in both
  * directions.  Where limbs that touch in its frame were welded, the weld must either hold other frames' limbs
@@ -23,8 +23,8 @@ typedef struct npg_sight {
 
 typedef struct npg_sights {
     size_t count, capacity;
-    npg_sight *list;       /* in time order; owned                                     */
-    size_t given, flipped; /* normals of candidates: given, and on the wrong side      */
+    npg_sight *list;       /* in time order; owned                                */
+    size_t given, flipped; /* normals of candidates: given, and on the wrong side */
 } npg_sights;
 
 /* Copy a cleaned frame's points, evenly thinned.  Skipped frames are left out.  NPG_MEMORY. */

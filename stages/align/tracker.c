@@ -13,14 +13,14 @@
 #include "pipeline/parallel.h"
 
 #define STIFF_START 10.0 /* times the final stiffness at the first step */
-/* For a reference that fills the box of all frames; one that travels through it is smaller, and so are these.
- */
-#define NOISE_UNIT  0.003 /* mean distance of points at which the stiffness has doubled */
+/* For a reference that fills the box of all frames; one that travels through it is smaller,
+ * and so are these. */
+#define NOISE_UNIT  0.003 /* mean distance of points at which the stiffness has doubled       */
 #define WIDTH_START 0.08  /* of the robust weight, in units: what may move between two frames */
-#define WIDTH_END   0.01  /* at the last step, more where the points are noisy               */
-#define TURN_MAX    0.6   /* of a node in one step, radians */
-#define MOVE_MAX    0.15  /* units */
-#define REVERSE     0.5   /* weight of surface -> points against points -> surface */
+#define WIDTH_END   0.01  /* at the last step, more where the points are noisy                */
+#define TURN_MAX    0.6   /* of a node in one step, radians                                   */
+#define MOVE_MAX    0.15  /* units                                                            */
+#define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
 #define LENT_TERMS 0.18
@@ -75,8 +75,8 @@ void npg_tracker_close(npg_tracker **slot)
     npg_release(slot);
 }
 
-/* Every n-th vertex: Poisson meshes have their vertices evenly over the surface, and in no order that
- * repeats. */
+/* Every n-th vertex: Poisson meshes have their vertices evenly over the surface,
+ * and in no order that repeats. */
 static void choose_samples(npg_tracker *t)
 {
     size_t step = t->mesh->vert_count / t->settings.samples + 1;
@@ -232,8 +232,8 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
-/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the Chamfer
- * distance. */
+/* Points -> surface, targets [first, last).  tracked: their share of the mean distance
+ * and of the Chamfer distance. */
 static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t first, size_t last,
                         const double *pose, bool with_normals, double width)
 {

@@ -9,8 +9,9 @@
  * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
  * is the robust weight of Geman and McClure, whose width shrinks step by step.  Few unknowns, second order:
  * it reaches what gradient descent needs hundreds of steps for; the joint fit then needs to find only what
- * the graph can't express. Not in the paper: it replaces the slow way from the identity (paper, "Deformation
- * Loss", confidence). */
+ * the graph can't express.
+ *
+ * Not in the paper: it replaces the slow way from the identity (paper, "Deformation Loss", confidence). */
 #ifndef NPG_TRACKER_H
 #define NPG_TRACKER_H
 
@@ -28,9 +29,9 @@ typedef struct npg_tracker_settings {
 
 /* How well it went, lengths in units. */
 typedef struct npg_tracked {
-    double point_dist_mean; /* target points -> surface, mean of distances              */
-    double chamfer;         /* mean of squared distances, points -> surface and surface -> points   */
-    double change;          /* the last step's largest movement of a node               */
+    double point_dist_mean; /* target points -> surface, mean of distances                        */
+    double chamfer;         /* mean of squared distances, points -> surface and surface -> points */
+    double change;          /* the last step's largest movement of a node                         */
     int steps;
 } npg_tracked;
 
@@ -41,10 +42,10 @@ size_t npg_tracker_node_count(const npg_tracker *tracker);
 
 /* How a fit goes about it. */
 typedef struct npg_tracker_effort {
-    int steps;         /* at most                                                            */
-    double stiffness;  /* of the first step, in final stiffnesses                             */
-    double width_unit; /* of the first step's robust weight: what may move                    */
-    double along;      /* times the share of distances along the surface                      */
+    int steps;         /* at most                                          */
+    double stiffness;  /* of the first step, in final stiffnesses          */
+    double width_unit; /* of the first step's robust weight: what may move */
+    double along;      /* times the share of distances along the surface   */
 } npg_tracker_effort;
 
 /* Improve pose (K x 12) to explain the points (N x 3, unit; normals N x 3 or NULL: points whose normal speaks
@@ -55,8 +56,8 @@ npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *p
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
 
-/* next = the pose after `now`, if the motion since `before` goes on: next_k = now_k before_k^-1 now_k.  K x
- * 12 each. */
+/* next = the pose after `now`, if the motion since `before` goes on:
+ * next_k = now_k before_k^-1 now_k.  K x 12 each. */
 void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count);
 
 #endif

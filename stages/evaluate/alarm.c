@@ -8,23 +8,27 @@
 
 #include "pipeline/stage.h"
 
-#define HISTORY  64 /* explained frames that the usual level is taken from */
-#define SPREADS  6.0
-#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation */
-#define SUSPECT  0.5    /* of the bound */
-#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere   */
-#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't */
-#define CLEARLY  2.0    /* times the misfit on the other side */
-#define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES)
+/* Set by trial, but for NORMAL, on captures whose topology changes and on ones whose fit fails. */
+#define HISTORY  64     /* explained frames that the usual level is taken from        */
+#define SPREADS  6.0    /* of normal noise, above the usual level: the bound          */
+#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation   */
+#define SUSPECT  0.5    /* of the bound                                               */
+#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere */
+#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't         */
+#define CLEARLY  2.0    /* times the misfit on the other side                         */
+#define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES) /* twice as many where each weighs half */
 
+/* clang-format off */
 static const struct {
     const char *name, *what;
-    double floor, weight; /* weight: of an unexplained frame among NPG_ALARM_FRAMES */
+    double floor;  /* of the bound, where a capture has no misfit of its own; set by trial */
+    double weight; /* of an unexplained frame among NPG_ALARM_FRAMES                       */
 } kinds[NPG_MISFITS] = {
-    {"far", "of the points are far from the surface in one place", 0.01, 1},
-    {"bare", "of the surface have no points near them in one place", 0.015, 1},
-    {"torn", "of the surface are torn apart in one place", 0.003, 0.5},
+    {"far",      "of the points are far from the surface in one place",          0.01,  1},
+    {"bare",     "of the surface have no points near them in one place",         0.015, 1},
+    {"torn",     "of the surface are torn apart in one place",                   0.003, 0.5},
     {"deserted", "of the surface are one part that has lost most of its points", 0.015, 1}};
+/* clang-format on */
 
 typedef struct record {
     int64_t index, number;
@@ -37,8 +41,8 @@ typedef struct level {
 } level;
 
 typedef struct side {
-    int64_t next;    /* the index whose turn it is                     */
-    record *waiting; /* came ahead of their turn; owned                */
+    int64_t next;    /* the index whose turn it is      */
+    record *waiting; /* came ahead of their turn; owned */
     size_t waiting_count, waiting_room;
     double history[NPG_MISFITS][HISTORY];
     size_t history_count; /* ever */
@@ -98,7 +102,7 @@ static level level_of(const double *history, size_t ever, double floor)
     return (level){usual, fmax(fmax(floor, SPREADS * NORMAL * median_of(values, count)), usual)};
 }
 
-static void remember(side *s, const record *r)
+static void add_to_history(side *s, const record *r)
 {
     if (!s->history_count) s->key_fit = r->fit;
     size_t at = s->history_count++ % HISTORY;
@@ -117,8 +121,9 @@ static bool is_lost(const side *s, const record *r)
     return r->fit > fmax(LOST_FIT, LOST * s->key_fit);
 }
 
-/* Which misfits speak of the topology and not of a surface that lost the points. */
-static void judge(bool counts[NPG_MISFITS], const side *s, const record *r, const level *levels)
+/* Which misfits are a sign of another topology, and not of a surface that has lost the points: where points
+ * and surface miss each other, much is far and much is bare. */
+static void select_misfits(bool counts[NPG_MISFITS], const side *s, const record *r, const level *levels)
 {
     double far = fmax(excess(r, levels, NPG_MISFIT_FAR), 0),
            bare = fmax(excess(r, levels, NPG_MISFIT_BARE), 0);
@@ -149,7 +154,7 @@ static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
     double most = -1;
     for (int k = 0; k < NPG_MISFITS; k++)
         levels[k] = level_of(s->history[k], s->history_count, kinds[k].floor);
-    judge(counts, s, r, levels);
+    select_misfits(counts, s, r, levels);
     for (int k = 0; k < NPG_MISFITS; k++) {
         double times = excess(r, levels, k) / levels[k].bound;
         if (!counts[k] || !(times > -1) || (most > -1 && !is_clearer(k, times, cause->misfit, most)))
@@ -186,35 +191,36 @@ static void raise_alarm(side *s, size_t row)
     s->is_raised = true;
 }
 
-static void end_run(side *s)
+static void clear_suspects(side *s)
 {
-    for (size_t i = 0; i < s->run_count; i++) remember(s, &s->run[i]);
+    for (size_t i = 0; i < s->run_count; i++) add_to_history(s, &s->run[i]);
     s->run_count = s->run_length = 0;
 }
 
-/* The oldest suspect frame makes room: a long run of merely suspect frames becomes usual. */
-static void make_room(side *s)
+/* The oldest suspect frame goes into the history: a long run of merely suspect frames becomes usual. */
+static void drop_oldest_suspect(side *s)
 {
     size_t most = sizeof s->run / sizeof *s->run;
     if (s->run_count < most) return;
-    remember(s, &s->run[0]);
+    add_to_history(s, &s->run[0]);
     memmove(s->run, s->run + 1, (most - 1) * sizeof *s->run);
     memmove(s->causes, s->causes + 1, (most - 1) * sizeof *s->causes);
     memmove(s->is_unexplained, s->is_unexplained + 1, (most - 1) * sizeof *s->is_unexplained);
     s->run_count--;
 }
 
-static void take(side *s, const record *r)
+static void process_frame(side *s, const record *r)
 {
     npg_alarm_cause cause;
     if (s->is_raised || !isfinite(r->misfits[NPG_MISFIT_FAR].share)) return;
     double times = s->history_count ? clearest(&cause, s, r) : -1; /* the keyframe is what is usual */
     if (!(times > SUSPECT)) {
-        end_run(s);
-        if (!s->history_count || !is_lost(s, r)) remember(s, r);
+        clear_suspects(s);
+        /* A frame whose fit is off everywhere must not raise what is usual. */
+        if (!s->history_count || !is_lost(s, r)) add_to_history(s, r);
         return;
     }
-    make_room(s);
+    drop_oldest_suspect(s);
     s->run_length++;
     s->run[s->run_count] = *r;
     s->causes[s->run_count] = cause;
@@ -235,26 +241,26 @@ static int64_t step_of(int direction)
     return direction == NPG_FORWARD ? 1 : -1;
 }
 
-static void take_waiting(side *s, int direction, bool is_end)
+static void process_waiting(side *s, int direction, bool is_end)
 {
     size_t done = 0;
     while (done < s->waiting_count && (is_end || s->waiting[done].index == s->next)) {
         s->next = s->waiting[done].index + step_of(direction);
-        take(s, &s->waiting[done++]);
+        process_frame(s, &s->waiting[done++]);
     }
     s->waiting_count -= done;
     memmove(s->waiting, s->waiting + done, s->waiting_count * sizeof *s->waiting);
 }
 
 /* Those nearest the keyframe come first. */
-static npg_status add(side *s, int direction, const record *r)
+static npg_status queue_frame(side *s, int direction, const record *r)
 {
     NPG_TRY(npg_grow(&s->waiting, &s->waiting_room, s->waiting_count + 1, sizeof *s->waiting, NPG_FOR_RUN));
     size_t at = s->waiting_count++;
     for (; at > 0 && (s->waiting[at - 1].index - r->index) * step_of(direction) > 0; at--)
         s->waiting[at] = s->waiting[at - 1];
     s->waiting[at] = *r;
-    take_waiting(s, direction, false);
+    process_waiting(s, direction, false);
     return NPG_OK;
 }
 
@@ -262,15 +268,15 @@ npg_status npg_alarm_add(npg_alarm *alarm, const npg_frame *frame)
 {
     record r = {.index = frame->index, .number = frame->number};
     memcpy(r.misfits, frame->figures.misfits, sizeof r.misfits);
-    r.fit = (double)(float)frame->figures.point_dist_median; /* as a run reads it back that goes on */
-    if (frame->index >= alarm->key) NPG_TRY(add(&alarm->sides[NPG_FORWARD], NPG_FORWARD, &r));
-    if (frame->index <= alarm->key) NPG_TRY(add(&alarm->sides[NPG_BACKWARD], NPG_BACKWARD, &r));
+    r.fit = (double)(float)frame->figures.point_dist_median; /* as a resumed run reads it back */
+    if (frame->index >= alarm->key) NPG_TRY(queue_frame(&alarm->sides[NPG_FORWARD], NPG_FORWARD, &r));
+    if (frame->index <= alarm->key) NPG_TRY(queue_frame(&alarm->sides[NPG_BACKWARD], NPG_BACKWARD, &r));
     return NPG_OK;
 }
 
 void npg_alarm_finish(npg_alarm *alarm)
 {
-    for (int d = 0; d < NPG_DIRECTIONS; d++) take_waiting(&alarm->sides[d], d, true);
+    for (int d = 0; d < NPG_DIRECTIONS; d++) process_waiting(&alarm->sides[d], d, true);
 }
 
 const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction)
@@ -279,7 +285,7 @@ const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction)
     return s->is_raised ? &s->cause : NULL;
 }
 
-/* ---- telling ---- */
+/* ---- as text and as JSON ---- */
 
 void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause)
 {

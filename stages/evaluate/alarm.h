@@ -14,11 +14,12 @@
  * caught up with) raise none, and no level that is spread all over the surface or usual in the capture
  * (noise, holes, what cameras don't see) does.
  *
- * Nor does a surface that has lost the points, which the quality bar tells.  One shows by points and surface
- * that miss each other: what is far counts only at more than twice the excess of what is bare, and the other
- * way round; torn and deserted not beside what is far.  The other shows by points that are off everywhere:
- * bare, torn and deserted don't count when their median distance is above 0.4 % of the diagonal and above 3
- * times the keyframe's.  (A new part pulls the surface off the points, too, so far counts there.)
+ * Nor does a surface that has lost the points: that is a failed fit, which the quality bar reports.  It is
+ * known by two signs.  Points and surface miss each other: then there is much of both far and bare, so far
+ * counts only when its excess is more than twice that of bare, bare only when its excess is more than twice
+ * that of far, and torn and deserted only where far is less than suspect.  Or the points are off everywhere:
+ * bare, torn and deserted don't count when the points' median distance is above 0.4 % of the diagonal and
+ * above 3 times the keyframe's.  (A new part pulls the surface off the points, too, so far counts there.)
  *
  * Frames may come in any order: they are taken in order of their distance from the keyframe, so the result
  * does not depend on it.  Memory: the frames that came ahead of their turn. */
@@ -29,6 +30,7 @@
 
 #include "pipeline/chunk.h"
 
+/* Set by trial; what each does stands above. */
 #define NPG_ALARM_FRAMES 3
 #define NPG_ALARM_BACK   3
 #define NPG_ALARM_RISE   6
@@ -49,18 +51,18 @@ void npg_alarm_finish(npg_alarm *alarm);
 
 /* What raised it. */
 typedef struct npg_alarm_cause {
-    int64_t index, number;           /* of the first unexplained frame                         */
-    int64_t seen_index, seen_number; /* of the unexplained frame with the clearest misfit  */
-    int misfit;                      /* NPG_MISFIT_*                                           */
-    double value, usual, bound;      /* shares, in the frame seen                              */
-    double at[3];                    /* where, in world coordinates                            */
+    int64_t index, number;           /* of the first unexplained frame                    */
+    int64_t seen_index, seen_number; /* of the unexplained frame with the clearest misfit */
+    int misfit;                      /* NPG_MISFIT_*                                      */
+    double value, usual, bound;      /* shares, in the frame seen                         */
+    double at[3];                    /* where, in world coordinates                       */
 } npg_alarm_cause;
 
 /* NULL while it is not raised; a loan. */
 const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction);
 
-/* "12.5 % of the points are far from the surface in one place, around (0.1, 2, 3) in frame 17; usual is 0 %".
- */
+/* "12.5 % of the points are far from the surface in one place, around (0.1, 2, 3)
+ * in frame 17; usual is 0 %". */
 void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause);
 
 /* {from_frame, from_index, figure, value, usual, bound, frame, at, cause}; JSON null for NULL. */

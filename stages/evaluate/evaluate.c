@@ -511,40 +511,37 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
            720 * npg_worker_verts_at_most(worker);
 }
 
-#define OFFSET(member) offsetof(evaluate_state, member)
+#define AT(member) offsetof(evaluate_state, member)
 
+/* clang-format off */
 static const npg_option options[] = {
-    {"max-residual",
-     "A frame is good when the median distance of its points to the surface is at most this, "
-     "in per cent of the capture's diagonal",
-     NPG_OPTION_REAL, OFFSET(residual_max), "0.5", 0, 100, NULL, "PERCENT"},
-    {"min-coverage",
-     "... and at least this share of the surface that the keyframe saw has points near it, in "
-     "per cent",
-     NPG_OPTION_REAL, OFFSET(coverage_min), "50", 0, 100, NULL, "PERCENT"},
-    {"max-flipped", "... and at most this share of its faces is turned over, in per cent", NPG_OPTION_REAL,
-     OFFSET(flipped_max), "1", 0, 100, NULL, "PERCENT"},
-    {"max-stretched", "... and at most this share of its faces grew or shrank tenfold, in per cent",
-     NPG_OPTION_REAL, OFFSET(stretched_max), "5", 0, 100, NULL, "PERCENT"},
-    {"cover-distance", "How near a point must be to cover the surface, in per cent of the diagonal",
-     NPG_OPTION_REAL, OFFSET(cover_dist), "1", 0, 100, NULL, "PERCENT"},
-    {"evaluate-points", "Points per frame that figures are taken from, evenly spread over the file; 0: all",
-     NPG_OPTION_INT, OFFSET(point_limit), "100000", 0, 1e12, NULL, NULL},
-    {"truth", "Folder with the true meshes, numbered as the frames: their figures go into the report",
-     NPG_OPTION_TEXT, OFFSET(truth_folder), "", 0, 0, NULL, "DIR"},
-    {"alarm",
-     "Where the reference no longer explains the points: say so and go on, or end there (what --segments "
-     "auto "
-     "asks for)",
-     NPG_OPTION_CHOICE, OFFSET(watch.mode), "report", 0, 0, "report|split", NULL},
-    {"segment-min",
-     "Frames that a segment has at least; shorter ones are left to their neighbour, with exit code 7",
-     NPG_OPTION_INT, OFFSET(watch.segment_min), "8", 1, 1e9, NULL, NULL},
-    {"shared-first", "Frames at the beginning that another segment explains: solved, but not judged",
-     NPG_OPTION_INT, OFFSET(watch.shared_first), "0", 0, 1e9, NULL, NULL},
-    {"shared-last", "The same at the end", NPG_OPTION_INT, OFFSET(watch.shared_last), "0", 0, 1e9, NULL,
-     NULL},
+    /* type        name               place                   default   least  most  shown as or words */
+    NPG_ROW_REAL  ("max-residual",    AT(residual_max),       "0.5",    0,     100,  "PERCENT",
+        "A frame is good when the median distance of its points to the surface is at most this, "
+        "in per cent of the capture's diagonal"),
+    NPG_ROW_REAL  ("min-coverage",    AT(coverage_min),       "50",     0,     100,  "PERCENT",
+        "... and at least this share of the surface that the keyframe saw has points near it, in per cent"),
+    NPG_ROW_REAL  ("max-flipped",     AT(flipped_max),        "1",      0,     100,  "PERCENT",
+        "... and at most this share of its faces is turned over, in per cent"),
+    NPG_ROW_REAL  ("max-stretched",   AT(stretched_max),      "5",      0,     100,  "PERCENT",
+        "... and at most this share of its faces grew or shrank tenfold, in per cent"),
+    NPG_ROW_REAL  ("cover-distance",  AT(cover_dist),         "1",      0,     100,  "PERCENT",
+        "How near a point must be to cover the surface, in per cent of the diagonal"),
+    NPG_ROW_INT   ("evaluate-points", AT(point_limit),        "100000", 0,     1e12, NULL,
+        "Points per frame that figures are taken from, evenly spread over the file; 0: all"),
+    NPG_ROW_TEXT  ("truth",           AT(truth_folder),       "",       "DIR",
+        "Folder with the true meshes, numbered as the frames: their figures go into the report"),
+    NPG_ROW_CHOICE("alarm",           AT(watch.mode),         "report", "report|split",
+        "Where the reference no longer explains the points: "
+        "say so and go on, or end there (what --segments auto asks for)"),
+    NPG_ROW_INT   ("segment-min",     AT(watch.segment_min),  "8",      1,     1e9,  NULL,
+        "Frames that a segment has at least; shorter ones are left to their neighbour, with exit code 7"),
+    NPG_ROW_INT   ("shared-first",    AT(watch.shared_first), "0",      0,     1e9,  NULL,
+        "Frames at the beginning that another segment explains: solved, but not judged"),
+    NPG_ROW_INT   ("shared-last",     AT(watch.shared_last),  "0",      0,     1e9,  NULL,
+        "The same at the end"),
     {0}};
+/* clang-format on */
 
 extern const npg_stage npg_stage_evaluate;
 const npg_stage npg_stage_evaluate = {.name = "evaluate",

@@ -36,7 +36,7 @@ typedef struct npg_truth npg_truth;
 npg_status npg_truth_open(npg_truth **truth, const char *folder, bool is_confined);
 void npg_truth_close(npg_truth **truth);
 
-/* Fill truth_cd, truth_nc, truth_f and truth_corr of a frame by stages/metrics.h; they are NaN when the
+/* Fill truth_cd, truth_nc, truth_f and truth_corr of a frame by geometry/metrics.h; they are NaN when the
  * folder has no mesh of the frame's number.  Lengths are in diagonals of the box of the truth's mesh of the
  * run's lowest number, or of the first there is.  Corr ties vertices in the first frame that is asked for,
  * the keyframe of a run (neupig eval ties them in the first in time, which this pass sees last). */

@@ -4,8 +4,10 @@
 #include "evaluate/evaluate.h"
 #include "geometry/mesh_tools.h"
 
+/* A face is with its neighbourhood above this cosine and against it below minus that; between, as across a
+ * crease, it counts as neither.  Set by trial. */
 #define FLIP_COSINE 0.2
-#define STRETCH     10.0
+#define STRETCH     10.0 /* times the area, or a tenth of it: the measure of bad faces in neupig eval */
 
 struct npg_shape {
     const npg_mesh *reference; /* loan */
@@ -59,14 +61,14 @@ static double cosine_of(const npg_shape *shape, size_t f)
     const double *normal = shape->normals + 3 * f;
     double sum[3];
     for (int a = 0; a < 3; a++) {
-        sum[a] = -3 * shape->areas[f] * normal[a];
+        sum[a] = -3 * shape->areas[f] * normal[a]; /* the face itself is in the sum of each of its corners */
         for (int k = 0; k < 3; k++) sum[a] += shape->vert_sums[3 * (size_t)face[k] + (size_t)a];
     }
     double length = sqrt(dot(sum, sum));
     return length > 1e-9 * shape->areas[f] ? dot(sum, normal) / length : 0;
 }
 
-static npg_status take_reference(npg_shape *shape)
+static npg_status measure_reference(npg_shape *shape)
 {
     const npg_mesh *mesh = shape->reference;
     size_t v = mesh->vert_count, f = mesh->face_count;
@@ -87,7 +89,7 @@ npg_status npg_shape_open(npg_shape **out, const npg_mesh *reference)
     npg_shape *shape;
     NPG_TRY(npg_alloc(&shape, NPG_FOR_MESH, sizeof *shape));
     shape->reference = reference;
-    npg_status status = take_reference(shape);
+    npg_status status = measure_reference(shape);
     if (status) npg_shape_close(&shape);
     *out = shape;
     return status;

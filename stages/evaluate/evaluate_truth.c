@@ -11,8 +11,8 @@
 #include "ingest/formats/reader.h"
 #include "pipeline/file.h"
 
-#define SAMPLES 100000
-#define TAU     0.005
+#define SAMPLES 100000 /* of either surface, as neupig eval takes; set by trial               */
+#define TAU     0.005  /* of the F-score, in diagonals: the F-0.5 % of the paper's evaluation */
 
 typedef struct truth_file {
     int64_t number;
@@ -38,7 +38,7 @@ static bool number_of_name(int64_t *number, const char *name)
     while (end > name && !isdigit((unsigned char)end[-1])) end--;
     const char *first = end;
     while (first > name && isdigit((unsigned char)first[-1])) first--;
-    if (first == end || end - first > 18) return false;
+    if (first == end || end - first > 18) return false; /* 18 digits always fit an int64_t */
     *number = strtoll(first, NULL, 10);
     return true;
 }
@@ -135,8 +135,8 @@ static npg_status open_predicted(npg_mesh **mesh, const npg_frame *frame, const 
     return NPG_OK;
 }
 
-static npg_status compare(npg_truth *truth, npg_frame *frame, const npg_mesh *predicted,
-                          const npg_mesh *true_mesh, uint64_t seed)
+static npg_status compare_meshes(npg_truth *truth, npg_frame *frame, const npg_mesh *predicted,
+                                 const npg_mesh *true_mesh, uint64_t seed)
 {
     npg_frame_metrics found;
     npg_metrics_settings settings = {SAMPLES, TAU, truth->diagonal, seed, 0};
@@ -162,7 +162,7 @@ npg_status npg_truth_compare(npg_truth *truth, npg_frame *frame, const npg_facts
     if (!(truth->diagonal > 0)) NPG_TRY(find_diagonal(truth, facts));
     npg_status status = open_predicted(&predicted, frame, facts);
     if (!status) status = read_truth(&true_mesh, path, facts);
-    if (!status) status = compare(truth, frame, predicted, true_mesh, seed);
+    if (!status) status = compare_meshes(truth, frame, predicted, true_mesh, seed);
     npg_mesh_unref(&predicted);
     npg_mesh_unref(&true_mesh);
     return status;

@@ -8,38 +8,39 @@
 #include "geometry/sets.h"
 #include "pipeline/frame_box.h"
 
-#define REACH_SPACINGS 3.0
-#define REACH_SIZE     0.015 /* of the reference's diagonal */
-#define REACH_MEDIANS  5.0
-#define REACH_MOST     2.0  /* times what it is without noise */
-#define LINK_SPACINGS  2.0  /* between neighbours in a cluster of far points */
-#define LINKS          6    /* neighbours that are looked at                 */
-#define UNSEEN_MOST    0.02 /* of the reference: more than that, and it is of cameras that see parts */
-#define BESIDE_SIZE    0.15 /* of the diagonal: as far beyond a border lies surface not seen before  */
-#define TORN           1.5  /* times its length in the reference                */
-#define OFF_SHARE      0.6  /* of the reach: torn surface lies off the points   */
-#define LEAST_FAR      12   /* points in a place                                */
-#define LEAST_MISSED   20   /* points that would lie on a place of the surface  */
-#define LEAST_VERTS    6    /* vertices whose mean area it has                  */
-#define FEW            0.6  /* of the points that a part should have            */
+/* Set by trial.  misfit.h says how they are used. */
+#define REACH_SPACINGS 3.0   /* of the points on the surface                                          */
+#define REACH_SIZE     0.015 /* of the reference's diagonal                                           */
+#define REACH_MEDIANS  5.0   /* times the points' median distance: noise                              */
+#define REACH_MOST     2.0   /* times what it is without noise                                        */
+#define LINK_SPACINGS  2.0   /* between neighbours in a cluster of far points                         */
+#define LINKS          6     /* neighbours that are searched for others of the cluster                */
+#define UNSEEN_MOST    0.02  /* of the reference: more than that, and it is of cameras that see parts */
+#define BESIDE_SIZE    0.15  /* of the diagonal: as far beyond a border lies surface not seen before  */
+#define TORN_STRETCH   1.5   /* times an edge's length in the reference                               */
+#define OFF_SHARE      0.6   /* of the reach: torn surface lies off the points                        */
+#define LEAST_FAR      12    /* points in a place                                                     */
+#define LEAST_MISSED   20    /* points that would lie on a place of the surface                       */
+#define LEAST_VERTS    6     /* vertices whose mean area it has                                       */
+#define DESERTED_SHARE 0.6   /* of the points that a part should have                                 */
 
 struct npg_misfit_finder {
-    const npg_mesh *reference; /* loan */
-    double size;               /* its diagonal                                       */
-    bool is_closed;            /* has no border, and its frame saw all of it         */
-    uint8_t *is_border;        /* V: on the border of what its frame saw; owned      */
-    uint32_t (*edges)[2];      /* E x 2; owned */
+    const npg_mesh *reference; /* loan                                          */
+    double size;               /* its diagonal                                  */
+    bool is_closed;            /* has no border, and its frame saw all of it    */
+    uint8_t *is_border;        /* V: on the border of what its frame saw; owned */
+    uint32_t (*edges)[2];      /* E x 2; owned                                  */
     size_t edge_count;
     float *edge_lengths; /* E, of the reference; owned */
     uint32_t *part_of;   /* V: which part of the reference; owned */
     size_t part_count;
     double *part_sums; /* of each part: area, area x position, points; x 5; owned */
     /* scratch, owned */
-    uint32_t *parents; /* of the places so far: max(N, V)        */
-    double *sums;      /* their size and weighted middle: x 4    */
-    uint8_t *flags;    /* V                                      */
-    float *far;        /* far points x 3                         */
-    uint32_t *links;   /* far points x LINKS                     */
+    uint32_t *parents; /* of the places so far: max(N, V)     */
+    double *sums;      /* their size and weighted middle: x 4 */
+    uint8_t *flags;    /* V                                   */
+    float *far;        /* far points x 3                      */
+    uint32_t *links;   /* far points x LINKS                  */
     float *link_sq;
     size_t parents_room, sums_room, far_room, links_room, link_sq_room;
 };
@@ -54,7 +55,7 @@ static double length_of(const float *vert_pos, const uint32_t edge[2])
     return sqrt(sum);
 }
 
-static npg_status take_reference(npg_misfit_finder *f)
+static npg_status measure_reference(npg_misfit_finder *f)
 {
     const npg_mesh *mesh = f->reference;
     npg_bounds bounds = npg_bounds_empty();
@@ -93,7 +94,7 @@ npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, d
     NPG_TRY(npg_alloc(&finder, NPG_FOR_MESH, sizeof *finder));
     finder->reference = reference;
     finder->is_closed = unseen_share <= UNSEEN_MOST;
-    npg_status status = take_reference(finder);
+    npg_status status = measure_reference(finder);
     if (!status) status = find_borders(finder);
     if (status) npg_misfit_close(&finder);
     *out = finder;
@@ -121,16 +122,16 @@ static npg_status begin_places(npg_misfit_finder *f, size_t count)
     return NPG_OK;
 }
 
-static void add(npg_misfit_finder *f, uint32_t i, const float *pos, double weight)
+static void add_to_place(npg_misfit_finder *f, uint32_t i, const float *pos, double weight)
 {
     double *sum = f->sums + 4 * (size_t)npg_set_root(f->parents, i);
     sum[0] += weight;
     for (size_t a = 0; a < 3; a++) sum[1 + a] += weight * (double)pos[a];
 }
 
-/* least: a smaller place is none. */
-static void take_largest(npg_misfit *misfit, const npg_misfit_finder *f, size_t count, double whole,
-                         double least)
+/* The largest of the places; one that is smaller than `least` does not count. */
+static void largest_place(npg_misfit *misfit, const npg_misfit_finder *f, size_t count, double whole,
+                          double least)
 {
     const double *best = NULL;
     for (size_t i = 0; i < count; i++)
@@ -139,7 +140,7 @@ static void take_largest(npg_misfit *misfit, const npg_misfit_finder *f, size_t 
     for (size_t a = 0; a < 3; a++) misfit->at[a] = best ? best[1 + a] / best[0] : (double)NAN;
 }
 
-/* ---- the three kinds ---- */
+/* ---- the four kinds ---- */
 
 static npg_status link_far(npg_misfit_finder *f, size_t count, double link)
 {
@@ -163,6 +164,7 @@ static bool is_far(const npg_misfit_finder *f, const npg_surface_hit *hit, doubl
     const uint32_t *face = f->reference->faces + 3 * (size_t)hit->face;
     for (int k = 0; k < 3; k++)
         if (f->is_border[face[k]]) on_border += (double)hit->weights[k];
+    /* Weights of 1 on border vertices, but for rounding: the closest point is on the border itself. */
     return on_border < 0.999 || dist_sq > beside * beside;
 }
 
@@ -182,8 +184,8 @@ static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_m
         count++;
     }
     NPG_TRY(link_far(f, count, link));
-    for (size_t i = 0; i < count; i++) add(f, (uint32_t)i, f->far + 3 * i, 1);
-    take_largest(misfit, f, count, (double)frame->point_count, LEAST_FAR);
+    for (size_t i = 0; i < count; i++) add_to_place(f, (uint32_t)i, f->far + 3 * i, 1);
+    largest_place(misfit, f, count, (double)frame->point_count, LEAST_FAR);
     return NPG_OK;
 }
 
@@ -205,9 +207,9 @@ static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misf
 {
     size_t v = f->reference->vert_count;
     for (size_t i = 0; i < v; i++)
-        if (f->flags[i]) add(f, (uint32_t)i, frame->vert_unit + 3 * i, frame->vert_areas[i]);
+        if (f->flags[i]) add_to_place(f, (uint32_t)i, frame->vert_unit + 3 * i, frame->vert_areas[i]);
     double least = fmax(LEAST_MISSED / (double)frame->point_count, LEAST_VERTS / (double)v);
-    take_largest(misfit, f, v, frame->area, least * frame->area);
+    largest_place(misfit, f, v, frame->area, least * frame->area);
 }
 
 static npg_status find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
@@ -235,7 +237,7 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
     for (size_t e = 0; e < f->edge_count; e++) {
         uint32_t a = f->edges[e][0], b = f->edges[e][1];
         if (!f->flags[a] || !f->flags[b]) continue;
-        if (!(length_of(frame->vert_unit, f->edges[e]) > TORN * (double)f->edge_lengths[e])) continue;
+        if (!(length_of(frame->vert_unit, f->edges[e]) > TORN_STRETCH * (double)f->edge_lengths[e])) continue;
         f->flags[a] |= ENDS_TORN;
         f->flags[b] |= ENDS_TORN;
     }
@@ -268,7 +270,8 @@ static void find_deserted(npg_misfit_finder *f, npg_misfit *misfit, const npg_mi
         const double *sum = f->part_sums + 5 * p;
         double expected = (double)frame->point_count * sum[0] / frame->area, missing = expected - sum[4];
         double share = missing / (double)frame->point_count;
-        if (!(sum[4] < FEW * expected) || missing < LEAST_MISSED || share <= misfit->share) continue;
+        if (!(sum[4] < DESERTED_SHARE * expected) || missing < LEAST_MISSED || share <= misfit->share)
+            continue;
         misfit->share = share;
         for (size_t a = 0; a < 3; a++) misfit->at[a] = sum[1 + a] / sum[0];
     }

@@ -10,7 +10,7 @@ struct npg_topology {
     npg_topology_settings settings;
     int64_t key;
     npg_alarm *alarm; /* owned */
-    bool is_said[NPG_DIRECTIONS];
+    bool is_reported[NPG_DIRECTIONS];
 };
 
 npg_status npg_topology_open(npg_topology **out, const npg_topology_settings *settings, int64_t key)
@@ -33,7 +33,7 @@ void npg_topology_close(npg_topology **slot)
     npg_release(slot);
 }
 
-/* One behind the last frame that is the run's own. */
+/* One behind the last frame that is the run's own; open while the source is. */
 static int64_t own_end(const npg_topology_settings *settings, const npg_facts *facts)
 {
     return facts->frame_count < 0 ? INT64_MAX : facts->frame_count - settings->shared_last;
@@ -53,15 +53,15 @@ static bool may_split(const npg_topology *t, const npg_facts *facts, int directi
            end - cut >= t->settings.segment_min;
 }
 
-/* ---- the file that tells where ---- */
+/* ---- the end of a run for another reference: OUT/topology.json ---- */
 
-static npg_status split(npg_topology *t, npg_worker *worker, int direction)
+static npg_status end_for_split(npg_topology *t, npg_worker *worker, int direction)
 {
     const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, direction);
-    json_t *told = json_pack("{ss sI so}", "direction", directions[direction], "key_index",
-                             (json_int_t)t->key, "alarm", npg_alarm_json(cause));
-    npg_status status = npg_json_write(npg_worker_settings(worker)->output, "topology.json", told);
-    json_decref(told);
+    json_t *record = json_pack("{ss sI so}", "direction", directions[direction], "key_index",
+                               (json_int_t)t->key, "alarm", npg_alarm_json(cause));
+    npg_status status = npg_json_write(npg_worker_settings(worker)->output, "topology.json", record);
+    json_decref(record);
     return status
                ? status
                : npg_error(NPG_CHANGED, "the reference does not explain frame %lld: the run ends for another",
@@ -70,27 +70,27 @@ static npg_status split(npg_topology *t, npg_worker *worker, int direction)
 
 /* ---- frames ---- */
 
-static npg_status say(npg_topology *t, npg_worker *worker, int direction)
+static npg_status report_direction(npg_topology *t, npg_worker *worker, int direction)
 {
     const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, direction);
     const char *on = direction == NPG_FORWARD ? "on" : "back";
     char text[256];
-    if (!cause || t->is_said[direction]) return NPG_OK;
-    t->is_said[direction] = true;
+    if (!cause || t->is_reported[direction]) return NPG_OK;
+    t->is_reported[direction] = true;
     npg_alarm_text(text, sizeof text, cause);
     if (may_split(t, npg_worker_facts(worker), direction, cause->index)) {
         npg_worker_log(worker, NPG_LOG_INFO, cause->number,
                        "from here %s the reference no longer explains the points: %s", on, text);
-        return split(t, worker, direction);
+        return end_for_split(t, worker, direction);
     }
     npg_worker_warn(worker, true, cause->number,
                     "from here %s the reference no longer explains the points: %s", on, text);
     return NPG_OK;
 }
 
-static npg_status say_both(npg_topology *t, npg_worker *worker)
+static npg_status report_both(npg_topology *t, npg_worker *worker)
 {
-    for (int d = 0; d < NPG_DIRECTIONS; d++) NPG_TRY(say(t, worker, d));
+    for (int d = 0; d < NPG_DIRECTIONS; d++) NPG_TRY(report_direction(t, worker, d));
     return NPG_OK;
 }
 
@@ -98,20 +98,20 @@ npg_status npg_topology_add(npg_topology *t, npg_worker *worker, const npg_frame
 {
     if (frame->is_shared) return NPG_OK;
     NPG_TRY(npg_alarm_add(t->alarm, frame));
-    return say_both(t, worker);
+    return report_both(t, worker);
 }
 
 npg_status npg_topology_finish(npg_topology *t, npg_worker *worker)
 {
     npg_facts *facts = npg_worker_facts(worker);
-    json_t *told = json_object();
+    json_t *record = json_object();
     npg_alarm_finish(t->alarm);
     for (int d = 0; d < NPG_DIRECTIONS; d++) {
         const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, d);
-        json_object_set_new(told, directions[d], npg_alarm_json(cause));
+        json_object_set_new(record, directions[d], npg_alarm_json(cause));
         facts->has_changed[d] = cause != NULL;
         facts->changed_at[d] = cause ? cause->index : 0;
     }
-    json_object_set_new(npg_worker_report(worker), "topology", told);
-    return say_both(t, worker);
+    json_object_set_new(npg_worker_report(worker), "topology", record);
+    return report_both(t, worker);
 }

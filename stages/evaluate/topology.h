@@ -1,5 +1,6 @@
-/* Topology: what a run does when its reference stops to explain the capture (alarm.h): it says from which
- * frame, or ends there so that another reference can take over (option alarm = split; tools/segments.h). */
+/* Topology: what a run does when its reference no longer explains the capture (alarm.h): it says from which
+ * frame, or ends there so that another reference can take over (option alarm = split;
+ * tools/segments/segments.h). */
 #ifndef NPG_TOPOLOGY_H
 #define NPG_TOPOLOGY_H
 
@@ -22,9 +23,9 @@ void npg_topology_close(npg_topology **topology);
 /* Whether a frame belongs to another segment. */
 bool npg_topology_is_shared(const npg_topology_settings *settings, const npg_facts *facts, int64_t index);
 
-/* A frame with its figures; any order.  Warns when it makes the alarm go off.  With NPG_ALARM_SPLIT, where
- * both segments get their least number of frames: OUT/topology.json tells where, and NPG_CHANGED is the
- * answer. */
+/* A frame with its figures; any order.  Warns when it makes the alarm go off.
+ * With NPG_ALARM_SPLIT, where both segments get their least number of frames: the place is written to
+ * OUT/topology.json and NPG_CHANGED returned. */
 npg_status npg_topology_add(npg_topology *topology, npg_worker *worker, const npg_frame *frame);
 
 /* After the last frame: the report's "topology", and facts->changed_at. */

@@ -108,8 +108,8 @@ static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
     npg_status status = npg_join_path(&meshes, output, "meshes");
     if (!status && is_same_file(folder, meshes))
         status = npg_error(NPG_USAGE,
-                           "%s is an input, and this run's meshes would be written over it: choose another "
-                           "output folder than %s",
+                           "%s is an input, and this run's meshes would be written over it: "
+                           "choose another output folder than %s",
                            frame->path, output);
     npg_release(&folder);
     npg_release(&meshes);
@@ -128,8 +128,8 @@ static npg_status check_reference(const npg_worker *worker)
         npg_release(&path);
         if (is_ours)
             return npg_error(NPG_USAGE,
-                             "option reference: %s lies where this run writes: copy it, or choose another "
-                             "output folder",
+                             "option reference: %s lies where this run writes: "
+                             "copy it, or choose another output folder",
                              reference);
     }
     return NPG_OK;
@@ -154,8 +154,7 @@ static npg_status check_numbers(npg_worker *worker)
         if (state->numbers[i] == state->numbers[i - 1])
             return npg_error(
                 NPG_BAD_INPUT,
-                "two frames have the number %lld and would be written to one file: set numbering "
-                "to index",
+                "two frames have the number %lld and would be written to one file: set numbering to index",
                 (long long)state->numbers[i]);
     set_width(state, npg_worker_facts(worker));
     if (state->overwrite) return NPG_OK;
@@ -195,8 +194,8 @@ static npg_form_facts form_facts(const npg_worker *worker)
                             .placement = &state->map};
 }
 
-/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.  0 where it can't be
- * told. */
+/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.
+ * 0 where it can't be told. */
 static uint64_t bytes_of_meshes(const npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);
@@ -394,8 +393,8 @@ static npg_status write_forms(npg_worker *worker)
             "vdb has no latent grids: a run without a job folder (live, or pulled from) keeps none");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
-                        "%lld frames without a mesh repeat the one before them in pc2 and mdd, which have no "
-                        "times",
+                        "%lld frames without a mesh repeat the one before them in pc2 and mdd, "
+                        "which have no times",
                         (long long)watch.repeated);
     return status;
 }
@@ -513,42 +512,41 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
            (has_forms ? 4 << 20 : 512 << 10);
 }
 
-#define OFFSET(member) offsetof(export_state, member)
+#define AT(member) offsetof(export_state, member)
 
+/* clang-format off */
 static const npg_option options[] = {
-    {"export",
-     "What to write, any of ply, obj (sequences), pc2, mdd (point caches), glb, usda, npz, vdb, with commas; "
-     "a "
-     "sequence is always there (see format)",
-     NPG_OPTION_TEXT, OFFSET(exports), "", 0, 0, NULL, "LIST"},
-    {"format", "Format of the mesh sequence where export names none", NPG_OPTION_CHOICE, OFFSET(format),
-     "ply", 0, 0, "ply|obj", NULL},
-    {"prefix", "First part of the mesh files' names", NPG_OPTION_TEXT, OFFSET(prefix), "frame", 0, 0, NULL,
-     "NAME"},
-    {"numbering", "Number of a mesh file: as in the input's name, or the place in the sequence",
-     NPG_OPTION_CHOICE, OFFSET(numbering), "file", 0, 0, "file|index", NULL},
-    {"scale", "Multiply all written coordinates by this", NPG_OPTION_REAL, OFFSET(scale), "1", 1e-12, 1e12,
-     NULL, NULL},
-    {"axes", "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up", NPG_OPTION_TEXT,
-     OFFSET(axes), "xyz", 0, 0, NULL, "AXES"},
-    {"fps", "Frames per second of the capture, for the report and formats that carry time", NPG_OPTION_REAL,
-     OFFSET(fps), "30", 1e-3, 1e6, NULL, NULL},
-    {"up", "Axis that points up in the written coordinates, for forms that can say it", NPG_OPTION_CHOICE,
-     OFFSET(up), "y", 0, 0, "y|z", NULL},
-    {"unit", "Unit of the written coordinates, for forms that can say it", NPG_OPTION_CHOICE, OFFSET(unit),
-     "m", 0, 0, "m|dm|cm|mm|km|in|ft", NULL},
-    {"centre",
-     "Write coordinates relative to the middle of the capture's box, which done.json then names: for "
-     "captures "
-     "far from 0",
-     NPG_OPTION_FLAG, OFFSET(is_centred), "no", 0, 0, NULL, NULL},
-    {"vdb-voxel", "Voxel of the level sets, as a share of the longest side of the capture's box",
-     NPG_OPTION_REAL, OFFSET(voxel_share), "0.005", 1e-4, 0.25, NULL, "SHARE"},
-    {"mesh-normals", "Write vertex normals into every mesh", NPG_OPTION_FLAG, OFFSET(with_normals), "no", 0,
-     0, NULL, NULL},
-    {"overwrite", "Remove meshes that an earlier run left in the output folder", NPG_OPTION_FLAG,
-     OFFSET(overwrite), "no", 0, 0, NULL, NULL},
+    /* type        name            place             default  least  most  shown as or words */
+    NPG_ROW_TEXT  ("export",       AT(exports),      "",      "LIST",
+        "What to write, any of ply, obj (sequences), pc2, mdd (point caches), "
+        "glb, usda, npz, vdb, with commas; a sequence is always there (see format)"),
+    NPG_ROW_CHOICE("format",       AT(format),       "ply",   "ply|obj",
+        "Format of the mesh sequence where export names none"),
+    NPG_ROW_TEXT  ("prefix",       AT(prefix),       "frame", "NAME",
+        "First part of the mesh files' names"),
+    NPG_ROW_CHOICE("numbering",    AT(numbering),    "file",  "file|index",
+        "Number of a mesh file: as in the input's name, or the place in the sequence"),
+    NPG_ROW_REAL  ("scale",        AT(scale),        "1",     1e-12, 1e12, NULL,
+        "Multiply all written coordinates by this"),
+    NPG_ROW_TEXT  ("axes",         AT(axes),         "xyz",   "AXES",
+        "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up"),
+    NPG_ROW_REAL  ("fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
+        "Frames per second of the capture, for the report and formats that carry time"),
+    NPG_ROW_CHOICE("up",           AT(up),           "y",     "y|z",
+        "Axis that points up in the written coordinates, for forms that can say it"),
+    NPG_ROW_CHOICE("unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
+        "Unit of the written coordinates, for forms that can say it"),
+    NPG_ROW_FLAG  ("centre",       AT(is_centred),   "no",
+        "Write coordinates relative to the middle of the capture's box, which done.json then names: "
+        "for captures far from 0"),
+    NPG_ROW_REAL  ("vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
+        "Voxel of the level sets, as a share of the longest side of the capture's box"),
+    NPG_ROW_FLAG  ("mesh-normals", AT(with_normals), "no",
+        "Write vertex normals into every mesh"),
+    NPG_ROW_FLAG  ("overwrite",    AT(overwrite),    "no",
+        "Remove meshes that an earlier run left in the output folder"),
     {0}};
+/* clang-format on */
 
 extern const npg_stage npg_stage_export;
 const npg_stage npg_stage_export = {.name = "export",

@@ -99,8 +99,8 @@ static npg_status refuse_foreign(void *user, const char *folder, const char *nam
         bsearch(&number, own->numbers, own->number_count, sizeof number, npg_order_int64))
         return NPG_OK;
     return npg_error(NPG_USAGE,
-                     "%s/%s is of another run and would mix with this one's frames: choose another output "
-                     "folder, or set overwrite to remove what earlier runs left",
+                     "%s/%s is of another run and would mix with this one's frames: "
+                     "choose another output folder, or set overwrite to remove what earlier runs left",
                      folder, name);
 }
 

@@ -37,7 +37,7 @@ static bool make_unit(double v[3])
 }
 
 /* sum w_k rows[face_k] */
-static void mix(double out[3], const float *rows, const uint32_t *face, const float weights[3])
+static void interpolate(double out[3], const float *rows, const uint32_t *face, const float weights[3])
 {
     for (size_t a = 0; a < 3; a++) {
         out[a] = 0;
@@ -48,15 +48,15 @@ static void mix(double out[3], const float *rows, const uint32_t *face, const fl
 /* ---- the frame of a place on the surface ---- */
 
 typedef struct local_frame {
-    double axes[3][3];    /* two tangents and the normal, orthonormal and right-handed      */
-    double corners[3][2]; /* of the face around their middle, in the plane of the tangents  */
+    double axes[3][3];    /* two tangents and the normal, orthonormal and right-handed     */
+    double corners[3][2]; /* of the face around their middle, in the plane of the tangents */
 } local_frame;
 
 static void face_corners(local_frame *frame, const float *vert_pos, const uint32_t *face)
 {
     const float third[3] = {1 / 3.0f, 1 / 3.0f, 1 / 3.0f};
     double middle[3];
-    mix(middle, vert_pos, face, third);
+    interpolate(middle, vert_pos, face, third);
     for (int k = 0; k < 3; k++) {
         double d[3];
         for (size_t a = 0; a < 3; a++) d[a] = (double)vert_pos[3 * face[k] + a] - middle[a];
@@ -64,15 +64,15 @@ static void face_corners(local_frame *frame, const float *vert_pos, const uint32
     }
 }
 
-/* Which tangents they are does not matter: turn_between() fits the angle between those of two frames. */
+/* Which tangents they are does not matter: rotation_between() fits the angle between those of two frames. */
 static void set_frame(local_frame *frame, const float *vert_pos, const float *vert_normals,
                       const uint32_t *face, const float weights[3])
 {
     double *normal = frame->axes[2], side[3] = {0};
-    mix(normal, vert_normals, face, weights);
+    interpolate(normal, vert_normals, face, weights);
     if (!make_unit(normal))
         for (size_t a = 0; a < 3; a++) normal[a] = (double)vert_normals[3 * face[0] + a];
-    int least = 0;
+    int least = 0; /* the axis that the normal is farthest from: their cross product is not short */
     for (int a = 1; a < 3; a++)
         if (fabs(normal[a]) < fabs(normal[least])) least = a;
     side[least] = 1;
@@ -82,8 +82,9 @@ static void set_frame(local_frame *frame, const float *vert_pos, const float *ve
     face_corners(frame, vert_pos, face);
 }
 
-/* The rotation (rows) from one frame into another. */
-static void turn_between(double turn[3][3], const local_frame *from, const local_frame *to)
+/* The rotation (rows) from one frame into another.  In the plane of the tangents it is the angle that brings
+ * the corners p closest to q: its tangent is sum p x q / sum p . q. */
+static void rotation_between(double turn[3][3], const local_frame *from, const local_frame *to)
 {
     double along = 0, across = 0, tangents[2][3];
     for (int k = 0; k < 3; k++) {
@@ -103,7 +104,7 @@ static void turn_between(double turn[3][3], const local_frame *from, const local
                          to->axes[2][a] * from->axes[2][b];
 }
 
-static double turned(const double turn[3][3], int a, const float v[3])
+static double rotated(const double turn[3][3], int a, const float v[3])
 {
     return turn[a][0] * (double)v[0] + turn[a][1] * (double)v[1] + turn[a][2] * (double)v[2];
 }
@@ -122,10 +123,10 @@ static bool looks_along(const npg_mesh *rest, uint32_t face_number, const float 
     return dot(out, n) >= 0;
 }
 
-/* Two rays from every such point, along its normal and against it; the nearer face that looks its way wins.
- */
-static npg_status try_rays(npg_attachment *t, const npg_surface *surface, const float *points,
-                           const uint32_t *wrong, size_t wrong_count, float reach)
+/* Two rays from every such point, along its normal and against it; the nearer face
+ * that looks its way wins. */
+static npg_status tie_by_rays(npg_attachment *t, const npg_surface *surface, const float *points,
+                              const uint32_t *wrong, size_t wrong_count, float reach)
 {
     npg_ray *rays;
     npg_ray_hit *hits = NULL;
@@ -167,7 +168,7 @@ static double diagonal_of(const npg_mesh *mesh)
     return sqrt(sum);
 }
 
-static npg_status mend_sides(npg_attachment *t, const npg_surface *surface, const float *points)
+static npg_status tie_to_right_sides(npg_attachment *t, const npg_surface *surface, const float *points)
 {
     uint32_t *wrong;
     size_t wrong_count = 0;
@@ -175,12 +176,12 @@ static npg_status mend_sides(npg_attachment *t, const npg_surface *surface, cons
     for (size_t i = 0; i < t->point_count; i++)
         if (!looks_along(t->rest, t->at[i].face, t->normals + 3 * i)) wrong[wrong_count++] = (uint32_t)i;
     float reach = (float)(NPG_ATTACH_REACH * diagonal_of(t->rest));
-    npg_status status = wrong_count ? try_rays(t, surface, points, wrong, wrong_count, reach) : NPG_OK;
+    npg_status status = wrong_count ? tie_by_rays(t, surface, points, wrong, wrong_count, reach) : NPG_OK;
     npg_release(&wrong);
     return status;
 }
 
-static npg_status tie(npg_attachment *t, const float *points)
+static npg_status tie_points(npg_attachment *t, const float *points)
 {
     const npg_mesh *rest = t->rest;
     npg_surface *surface = NULL;
@@ -188,17 +189,17 @@ static npg_status tie(npg_attachment *t, const float *points)
     npg_status status = npg_surface_closest(surface, t->at, points, t->point_count);
     for (size_t i = 0; i < t->point_count && !status; i++)
         if (t->at[i].face == UINT32_MAX) status = npg_error(NPG_BAD_INPUT, "point %zu is not finite", i);
-    if (!status && t->normals) status = mend_sides(t, surface, points);
+    if (!status && t->normals) status = tie_to_right_sides(t, surface, points);
     npg_surface_close(&surface);
     for (size_t i = 0; i < t->point_count && !status; i++) {
         double closest[3];
-        mix(closest, rest->vert_pos, rest->faces + 3 * t->at[i].face, t->at[i].weights);
+        interpolate(closest, rest->vert_pos, rest->faces + 3 * t->at[i].face, t->at[i].weights);
         for (size_t a = 0; a < 3; a++) t->offset[3 * i + a] = (float)((double)points[3 * i + a] - closest[a]);
     }
     return status;
 }
 
-static npg_status make_room(npg_attachment *t, const float *normals)
+static npg_status alloc_arrays(npg_attachment *t, const float *normals)
 {
     size_t n = t->point_count, v = t->rest->vert_count;
     NPG_TRY(npg_alloc_array(&t->at, NPG_FOR_MESH, n, sizeof *t->at));
@@ -221,11 +222,11 @@ npg_status npg_attach_open(npg_attachment **out, npg_mesh *rest, const float *po
     NPG_TRY(npg_alloc(&t, NPG_FOR_MESH, sizeof *t));
     t->rest = npg_mesh_ref(rest);
     t->point_count = point_count;
-    npg_status status = make_room(t, normals);
+    npg_status status = alloc_arrays(t, normals);
     if (!status)
         npg_mesh_vertex_normals(t->rest_normals, rest->vert_pos, rest->vert_count, rest->faces,
                                 rest->face_count);
-    if (!status && point_count) status = tie(t, points);
+    if (!status && point_count) status = tie_points(t, points);
     if (status) npg_attach_close(&t);
     *out = t;
     return status;
@@ -272,11 +273,11 @@ npg_status npg_attach_move(npg_attachment *t, const float *vert_pos, double *pos
         double turn[3][3];
         set_frame(&before, rest->vert_pos, t->rest_normals, face, weights);
         set_frame(&now, vert_pos, t->now_normals, face, weights);
-        turn_between(turn, &before, &now);
-        mix(pos + 3 * i, vert_pos, face, weights);
+        rotation_between(turn, &before, &now);
+        interpolate(pos + 3 * i, vert_pos, face, weights);
         for (int a = 0; a < 3; a++) {
-            pos[3 * i + (size_t)a] += turned(turn, a, t->offset + 3 * i);
-            if (normals) normals[3 * i + (size_t)a] = (float)turned(turn, a, t->normals + 3 * i);
+            pos[3 * i + (size_t)a] += rotated(turn, a, t->offset + 3 * i);
+            if (normals) normals[3 * i + (size_t)a] = (float)rotated(turn, a, t->normals + 3 * i);
         }
     }
     return NPG_OK;

@@ -19,16 +19,16 @@
 
 typedef struct npg_attachment npg_attachment;
 
-/* Tie N points (N x 3, in the unit of rest->vert_pos) to a mesh at rest.  normals (N x 3, unit length) may be
- * NULL; with them a point of a thin part is tied to the side its normal looks to: where the closest face
- * looks the other way and one that looks its way lies on the line of the normal within reach
- * (NPG_ATTACH_REACH of the mesh's diagonal), it takes that one.  Both are copied; the mesh is held by
- * reference.  NPG_BAD_INPUT names the first point that is not finite; NPG_USAGE for a mesh without faces;
- * NPG_MEMORY. */
+/* Tie N points (N x 3, in the unit of rest->vert_pos) to a mesh at rest.  normals (N x 3, unit length)
+ * may be NULL; with them a point of a thin part is tied to the side its normal looks to:
+ * where the closest face looks the other way and one that looks its way lies on the line of the normal
+ * within reach (NPG_ATTACH_REACH of the mesh's diagonal), it takes that one.  Both are copied;
+ * the mesh is held by reference.  NPG_BAD_INPUT names the first point that is not finite; NPG_USAGE
+ * for a mesh without faces; NPG_MEMORY. */
 npg_status npg_attach_open(npg_attachment **attachment, npg_mesh *rest, const float *points,
                            const float *normals, size_t point_count);
 
-#define NPG_ATTACH_REACH 0.02
+#define NPG_ATTACH_REACH 0.02 /* of the diagonal: parts that thin have two sides so near; set by trial */
 
 /* Points tied farther away than dist (in the mesh's unit), and the worst of them: its number, and the largest
  * distance of all points.  *worst is 0 without points. */

@@ -49,10 +49,11 @@ static double triangle(double weights[3], double corner[3][3])
     }
     for (int i = 0; i < 3; i++) n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
     double n_sq = dot(n, n), uu = dot(u, u), vv = dot(v, v), uv = dot(u, v);
+    /* Sides within 1e-12 of parallel: doubles don't give a plane. */
     if (!(n_sq > 1e-24 * uu * vv)) return edges(weights, corner, (const bool[3]){true, true, true});
     double du = -dot(corner[0], u), dv = -dot(corner[0], v);
     double b = (vv * du - uv * dv) / n_sq, c = (uu * dv - uv * du) / n_sq;
-    const bool is_beyond[3] = {c<0, b + c> 1, b < 0};
+    const bool is_beyond[3] = {c < 0, 1 < b + c, b < 0}; /* the edges 0-1, 1-2, 2-0 */
     if (is_beyond[0] || is_beyond[1] || is_beyond[2]) return edges(weights, corner, is_beyond);
     double height = dot(n, corner[0]);
     weights[0] = 1 - b - c;

@@ -13,6 +13,8 @@
 namespace
 {
 
+constexpr size_t LEAF = 12; // points in a leaf; nanoflann advises 10 to 50
+
 struct Cloud {
     const float *points;
     size_t count;
@@ -36,6 +38,8 @@ class NearestSet
     }
     size_t size() const { return count_; }
     bool full() const { return count_ == k_; }
+    // nanoflann asks for distances below this: the next float lets equal ones through, so that the index
+    // decides.
     float worstDist() const { return std::nextafter(dist_[k_ - 1], std::numeric_limits<float>::infinity()); }
     bool addPoint(float dist, uint32_t index)
     {
@@ -58,6 +62,7 @@ class NearestSet
     size_t k_, count_;
 };
 
+// Counts points; "full" from the start, so that the radius bounds the search.
 class CountSet
 {
   public:
@@ -82,7 +87,7 @@ class CountSet
 template <class Body> void in_parts(size_t count, int threads, Body body)
 {
     size_t parts = threads > 0 ? size_t(threads) : std::max(1u, std::thread::hardware_concurrency());
-    if (count < 1024) parts = 1;
+    if (count < 1024) parts = 1; // not worth a thread; set by trial
     std::vector<std::thread> helpers;
     for (size_t p = 1; p < parts; p++)
         helpers.emplace_back([=] { body(count * p / parts, count * (p + 1) / parts); });
@@ -96,7 +101,7 @@ struct npg_kdtree {
     Cloud cloud;
     Tree tree;
     npg_kdtree(const float *points, size_t count)
-        : cloud{points, count}, tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(12))
+        : cloud{points, count}, tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(LEAF))
     {
     }
 };

@@ -144,7 +144,7 @@ double npg_mesh_volume(const npg_mesh *mesh)
         face_cross(n, mesh->vert_pos, mesh->faces + 3 * f);
         sum += n[0] * (double)a[0] + n[1] * (double)a[1] + n[2] * (double)a[2];
     }
-    return sum / 6;
+    return sum / 6; /* tetrahedra from the origin to every face: a . (b x c) / 6 = a . face_cross / 6 */
 }
 
 static void count_edge(npg_manifold *out, const half_edge *run, size_t uses)
@@ -179,7 +179,7 @@ npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh)
     return status;
 }
 
-/* Border loops: what the border's edges, as flat faces, are connected to. */
+/* Border loops: components of the border's edges, each taken as a face with two equal corners. */
 static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
 {
     uint32_t *twin = NULL, *flat = NULL, *component = NULL;
@@ -201,7 +201,7 @@ static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
         border_verts += component[flat[i]] == 0;
         component[flat[i]] = 1;
     }
-    *loops = pieces + border_verts - n; /* every other vertex is a piece of its own */
+    *loops = pieces + border_verts - n; /* every vertex off the border is a component of its own */
 done:
     npg_release(&twin);
     npg_release(&flat);

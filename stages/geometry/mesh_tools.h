@@ -1,22 +1,22 @@
-/* Mesh tools: small facts about a triangle mesh that several stages need.  V vertices, F faces, E edges. */
+/* Mesh tools: properties of a triangle mesh that several stages need.  V vertices, F faces, E edges. */
 #ifndef NPG_MESH_TOOLS_H
 #define NPG_MESH_TOOLS_H
 
 #include "pipeline/mesh.h"
 
-/* Unit vertex normals, face normals weighted by area; a vertex without area gets (0, 0, 1).  normals: V x 3.
- */
+/* Unit vertex normals, face normals weighted by area; a vertex without area gets (0, 0, 1).
+ * normals: V x 3. */
 void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
                              size_t face_count);
 
-/* The E distinct undirected edges as vertex pairs (lower index first), sorted; *edges is owned by the caller.
- */
+/* The E distinct undirected edges as vertex pairs (lower index first), sorted; *edges
+ * is owned by the caller. */
 npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces,
                           size_t face_count);
 
 /* twin[3 f + k] = the half-edge (numbered so, by its first corner) of the face on the other side of the edge
  * from corner k to the next; UINT32_MAX on a border, or where an edge is not used by two faces in opposite
- * directions. twin: F x 3. */
+ * directions.  twin: F x 3. */
 npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count);
 
 /* Component of every vertex (0.. *component_count - 1, in order of first vertex) over the faces; vertices
@@ -36,12 +36,12 @@ typedef struct npg_manifold {
 } npg_manifold;
 npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh);
 
-/* Handles of all components together, by Euler: (2 components - vertices + edges - faces - border loops) / 2.
- */
+/* Handles of all components together, by Euler:
+ * (2 components - vertices + edges - faces - border loops) / 2. */
 npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
 
-/* Keep the faces whose keep_face is not 0 and the vertices they use, in order.  Vertex data goes with them.
- */
+/* Keep the faces whose keep_face is not 0 and the vertices they use, in order.
+ * Vertex data goes with them. */
 npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
 
 /* out (count x 3) = the rows of rows (x 3) that which[] names. */

@@ -1,5 +1,5 @@
-/* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures of the method's paper.
- */
+/* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures
+ * of the method's paper. */
 #include "geometry/metrics.h"
 
 #include <math.h>
@@ -53,6 +53,7 @@ npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const 
     npg_random random = npg_random_stream(seed, frame, purpose);
     for (size_t s = 0; s < sample_count; s++) {
         size_t f = find_face(cumulated, mesh->face_count, npg_random_real(&random) * total);
+        /* Uniform in the triangle: the root makes up for its growing width (Osada et al., 2002). */
         double r = sqrt(npg_random_real(&random)), t = npg_random_real(&random);
         const uint32_t *face = mesh->faces + 3 * f;
         const float *a = mesh->vert_pos + 3 * face[0], *b = mesh->vert_pos + 3 * face[1],

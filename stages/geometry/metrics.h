@@ -1,14 +1,14 @@
 /* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures of the method's paper.
  *
- * Both surfaces are sampled uniformly by area.  With a the samples of the prediction, b those of the truth, d
- * the distance from a sample to the nearest one of the other side in units of `diagonal`, n their face
+ * Both surfaces are sampled uniformly by area.  With a the samples of the prediction, b those of the truth,
+ * d the distance from a sample to the nearest one of the other side in units of `diagonal`, n their face
  * normals:
  *
- *   CD   0.5 (mean d(a,b)^2 + mean d(b,a)^2) x 1e5
- *   NC   0.5 (mean |n_a . n_b| both ways)
- *   F    harmonic mean of precision (share of a with d <= tau) and recall (share of b with d <= tau)
- *   Corr every predicted vertex is tied to the nearest vertex of the truth in the first frame; the mean
- *        distance between the two in a later frame
+ *   CD    0.5 (mean d(a,b)^2 + mean d(b,a)^2) x 1e5
+ *   NC    0.5 (mean |n_a . n_b| both ways)
+ *   F     harmonic mean of precision (share of a with d <= tau) and recall (share of b with d <= tau)
+ *   Corr  every predicted vertex is tied to the nearest vertex of the truth in the first frame; the mean
+ *         distance between the two in a later frame
  *
  * Meshes must have been read relative to the same origin.  The same input gives the same figures. */
 #ifndef NPG_METRICS_H
@@ -17,17 +17,17 @@
 #include "pipeline/mesh.h"
 
 typedef struct npg_metrics_settings {
-    size_t sample_count; /* on either side                                                    */
-    double tau;          /* of the F-score, in diagonals: 0.005                               */
-    double diagonal;     /* of the box of the first frame's truth, in the meshes' own unit     */
+    size_t sample_count; /* on either side                                                 */
+    double tau;          /* of the F-score, in diagonals: 0.005                            */
+    double diagonal;     /* of the box of the first frame's truth, in the meshes' own unit */
     uint64_t seed;
-    int threads; /* 0: one per core; does not change the figures                               */
+    int threads; /* 0: one per core; does not change the figures */
 } npg_metrics_settings;
 
 typedef struct npg_frame_metrics {
-    double cd, cd_to_truth, cd_from_truth; /* x 1e5; predicted -> truth, truth -> predicted      */
-    double nc;                             /* NaN when the truth has no normals                  */
-    double f, precision, recall;           /* 0..1                                               */
+    double cd, cd_to_truth, cd_from_truth; /* x 1e5; predicted -> truth, truth -> predicted */
+    double nc;                             /* NaN when the truth has no normals             */
+    double f, precision, recall;           /* 0..1                                          */
 } npg_frame_metrics;
 
 /* Compare one frame.  A truth without faces is a cloud: all its points stand for the samples, and its

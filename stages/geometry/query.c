@@ -10,7 +10,7 @@
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-#define BATCH_MIN 512 /* fewer queries are not worth a thread */
+#define BATCH_MIN 512 /* fewer queries are not worth a thread; set by trial */
 
 struct npg_surface {
     RTCDevice device;
@@ -19,7 +19,7 @@ struct npg_surface {
     size_t vert_count, face_count;
     float *vert_pos;        /* V x 3 and 16 bytes that Embree may read beyond them */
     uint32_t *faces;        /* F x 3 */
-    atomic_ptrdiff_t bytes; /* what Embree holds, as it told us */
+    atomic_ptrdiff_t bytes; /* what Embree holds, as it reports */
 };
 
 /* ---- Embree's memory and errors ---- */
@@ -33,8 +33,8 @@ static bool on_memory(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-/* The failure under way on this thread's view of the device, as our status. */
-static npg_status check(const npg_surface *surface, const char *what)
+/* The error that Embree has noted for this thread, as our status. */
+static npg_status embree_status(const npg_surface *surface, const char *what)
 {
     enum RTCError error = rtcGetDeviceError(surface->device);
     if (error == RTC_ERROR_NONE) return NPG_OK;
@@ -79,10 +79,10 @@ static npg_status build(npg_surface *surface)
     rtcSetDeviceMemoryMonitorFunction(surface->device, on_memory, surface);
     surface->scene = rtcNewScene(surface->device);
     surface->geometry = rtcNewGeometry(surface->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    if (!surface->scene || !surface->geometry) return check(surface, "making a scene");
+    if (!surface->scene || !surface->geometry) return embree_status(surface, "making a scene");
     rtcSetSceneFlags(surface->scene, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST);
-    /* Only scenes of low quality ask a geometry for its own, and so refit it; others are built anew each
-     * time. */
+    /* Only scenes of low quality ask a geometry for its own, and so refit it;
+     * others are built anew each time. */
     rtcSetSceneBuildQuality(surface->scene, RTC_BUILD_QUALITY_LOW);
     rtcSetGeometryBuildQuality(surface->geometry, RTC_BUILD_QUALITY_REFIT);
     rtcSetSharedGeometryBuffer(surface->geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -92,7 +92,7 @@ static npg_status build(npg_surface *surface)
     rtcCommitGeometry(surface->geometry);
     rtcAttachGeometry(surface->scene, surface->geometry);
     rtcCommitScene(surface->scene);
-    return check(surface, "building the search tree");
+    return embree_status(surface, "building the search tree");
 }
 
 npg_status npg_surface_open(npg_surface **out, const float *vertices, size_t vertex_count,
@@ -123,7 +123,7 @@ npg_status npg_surface_move(npg_surface *surface, const float *vertices)
     rtcUpdateGeometryBuffer(surface->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
     rtcCommitGeometry(surface->geometry);
     rtcCommitScene(surface->scene);
-    return check(surface, "refitting the search tree");
+    return embree_status(surface, "refitting the search tree");
 }
 
 void npg_surface_close(npg_surface **slot)
@@ -156,17 +156,17 @@ typedef struct split {
     size_t count, parts;
 } split;
 
-static npg_status do_part(void *user, size_t part)
+static npg_status run_part(void *user, size_t part)
 {
     const split *s = user;
     s->job->body(s->job, s->count * part / s->parts, s->count * (part + 1) / s->parts);
     return NPG_OK;
 }
 
-static npg_status do_job(const job *j, size_t count, int threads)
+static npg_status run_job(const job *j, size_t count, int threads)
 {
     split s = {j, count, npg_parallel_parts(count, BATCH_MIN, threads > 0 ? (size_t)threads : 0)};
-    return npg_parallel(do_part, &s, s.parts);
+    return npg_parallel(run_part, &s, s.parts);
 }
 
 /* ---- closest points ---- */
@@ -177,7 +177,7 @@ typedef struct search {
     npg_surface_hit best;
 } search;
 
-static void offer(search *s, uint32_t face)
+static void try_face(search *s, uint32_t face)
 {
     npg_surface_hit hit;
     npg_face_closest(&hit, s->surface->vert_pos, s->surface->faces, face, s->point);
@@ -185,8 +185,8 @@ static void offer(search *s, uint32_t face)
         s->best = hit;
 }
 
-/* A little more than the best distance, so that faces at an equal distance are all seen and the lowest wins.
- */
+/* A little more than the best distance, more than floats round by, so that faces at an equal distance are all
+ * seen and the lowest wins; 1e-18: at distance 0, too. */
 static float radius_of(const search *s)
 {
     return sqrtf(s->best.dist_sq) * 1.00001f + 1e-18f;
@@ -197,7 +197,7 @@ static bool on_face(struct RTCPointQueryFunctionArguments *arguments)
 {
     search *s = arguments->userPtr;
     float before = s->best.dist_sq;
-    offer(s, arguments->primID);
+    try_face(s, arguments->primID);
     if (!(s->best.dist_sq < before)) return false;
     arguments->query->radius = radius_of(s);
     return true;
@@ -222,7 +222,7 @@ static void closest_of(const job *j, size_t i)
         return;
     }
     if (j->start_face && j->start_face[i] < j->surface->face_count) {
-        offer(&s, j->start_face[i]);
+        try_face(&s, j->start_face[i]);
         radius = radius_of(&s);
     }
     if (j->start_dist && j->start_dist[i] >= 0 && j->start_dist[i] < radius) radius = j->start_dist[i];
@@ -248,7 +248,7 @@ npg_status npg_surface_closest_near(const npg_surface *surface, npg_surface_hit 
              .start_dist = start_dist,
              .start_face = start_face,
              .hits = hits};
-    return do_job(&j, point_count, threads);
+    return run_job(&j, point_count, threads);
 }
 
 npg_status npg_surface_closest(const npg_surface *surface, npg_surface_hit *hits, const float *points,
@@ -259,7 +259,7 @@ npg_status npg_surface_closest(const npg_surface *surface, npg_surface_hit *hits
 
 /* ---- rays ---- */
 
-static void cast(const job *j, size_t i)
+static void cast_ray(const job *j, size_t i)
 {
     const npg_ray *ray = &j->rays[i];
     struct RTCIntersectContext context;
@@ -289,7 +289,7 @@ static void cast(const job *j, size_t i)
 
 static void ray_part(const job *j, size_t first, size_t last)
 {
-    for (size_t i = first; i < last; i++) cast(j, i);
+    for (size_t i = first; i < last; i++) cast_ray(j, i);
 }
 
 npg_status npg_surface_rays(const npg_surface *surface, npg_ray_hit *hits, const npg_ray *rays,
@@ -297,5 +297,5 @@ npg_status npg_surface_rays(const npg_surface *surface, npg_ray_hit *hits, const
 {
     NPG_REQUIRE(surface && ((hits && rays) || !ray_count));
     job j = {.body = ray_part, .surface = surface, .rays = rays, .ray_hits = hits};
-    return do_job(&j, ray_count, threads);
+    return run_job(&j, ray_count, threads);
 }

@@ -13,8 +13,8 @@
 /* The closest surface point (closest face: the smallest squared distance as float, ties to the lower face
  * index).  hits[i] for points[i] (N x 3).  start_face (N, or NULL) names a face that is likely near; the
  * search then begins with the distance to it.  start_dist (N, or NULL) is a distance the answer is likely
- * within. Both only save time: where they are wrong (out of range, too small, not finite) the answer is the
- * same. A point that is not finite gets face = UINT32_MAX and dist_sq = infinity.  NPG_MEMORY. */
+ * within.  Both only save time: where they are wrong (out of range, too small, not finite) the answer is the
+ * same.  A point that is not finite gets face = UINT32_MAX and dist_sq = infinity.  NPG_MEMORY. */
 npg_status npg_surface_closest_near(const npg_surface *surface, npg_surface_hit *hits, const float *points,
                                     size_t point_count, const uint32_t *start_face, const float *start_dist,
                                     int threads);
@@ -25,10 +25,10 @@ typedef struct npg_ray {
 } npg_ray;
 
 typedef struct npg_ray_hit {
-    uint32_t face;    /* UINT32_MAX: nothing hit                 */
-    float weights[3]; /* barycentric weights of the point hit    */
-    float t;          /* where; infinity without a hit           */
-    bool is_back;     /* the face was hit from its back          */
+    uint32_t face;    /* UINT32_MAX: nothing hit              */
+    float weights[3]; /* barycentric weights of the point hit */
+    float t;          /* where; infinity without a hit        */
+    bool is_back;     /* the face was hit from its back       */
 } npg_ray_hit;
 
 /* The first face each of N rays meets within t_min..t_max, from either side. */

@@ -3,7 +3,7 @@
 
 #include "kernels/jacobi.h"
 
-#define JACOBI_ROUNDS 24
+#define JACOBI_ROUNDS 24 /* sweeps, more than a 4 x 4 matrix needs */
 
 static void mean_of(double mean[3], const float *points, size_t count)
 {
@@ -24,7 +24,7 @@ static void largest_eigenvector(double out[4], double m[4][4])
     for (int k = 0; k < 4; k++) out[k] = v[k][best];
 }
 
-/* Products s[a][b] = sum (from - mean)_a (to - mean)_b into Horn's matrix. */
+/* Products s[a][b] = sum (from - mean)_a (to - mean)_b into Horn's 4 x 4 matrix. */
 static void fill_matrix(double m[4][4], double s[3][3])
 {
     m[0][0] = s[0][0] + s[1][1] + s[2][2];

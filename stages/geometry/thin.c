@@ -10,7 +10,7 @@
 /* Faces that remain, still over the whole's vertices. */
 static npg_status decimate(uint32_t **faces, size_t *face_count, const npg_mesh *whole, size_t vert_target)
 {
-    size_t indices = 3 * whole->face_count, wanted = 6 * vert_target;
+    size_t indices = 3 * whole->face_count, wanted = 6 * vert_target; /* two faces a vertex, by Euler */
     NPG_TRY(npg_alloc_array(faces, NPG_FOR_MESH, indices, sizeof **faces));
     if (!vert_target || vert_target + vert_target / 5 >= whole->vert_count || wanted >= indices) {
         memcpy(*faces, whole->faces, indices * sizeof **faces);
@@ -25,7 +25,8 @@ static npg_status decimate(uint32_t **faces, size_t *face_count, const npg_mesh 
                 : npg_error(NPG_FAILED, "the reference mesh can't be decimated to %zu vertices", vert_target);
 }
 
-static npg_status take_faces(npg_thin *thin, const npg_mesh *whole, const uint32_t *faces, size_t face_count)
+static npg_status renumber_faces(npg_thin *thin, const npg_mesh *whole, const uint32_t *faces,
+                                 size_t face_count)
 {
     uint32_t *place;
     size_t count = 0;
@@ -41,7 +42,7 @@ static npg_status take_faces(npg_thin *thin, const npg_mesh *whole, const uint32
     return status;
 }
 
-static npg_status take_vertices(npg_thin *thin, const npg_mesh *whole)
+static npg_status copy_vertices(npg_thin *thin, const npg_mesh *whole)
 {
     npg_thin_gather(thin, thin->mesh->vert_pos, whole->vert_pos);
     if (!whole->vert_normals) return NPG_OK;
@@ -59,8 +60,8 @@ npg_status npg_thin_open(npg_thin **out, const npg_mesh *whole, size_t vert_targ
     *out = NULL;
     NPG_TRY(npg_alloc(&thin, NPG_FOR_MESH, sizeof *thin));
     npg_status status = decimate(&faces, &face_count, whole, vert_target);
-    if (!status) status = take_faces(thin, whole, faces, face_count);
-    if (!status) status = take_vertices(thin, whole);
+    if (!status) status = renumber_faces(thin, whole, faces, face_count);
+    if (!status) status = copy_vertices(thin, whole);
     npg_release(&faces);
     if (status) npg_thin_close(&thin);
     *out = thin;

@@ -8,7 +8,8 @@
 #include "pipeline/mesh.h"
 
 /* Vertices of the surface that frames are aligned and matched with: where the reference has more, it is
- * thinned for that.  Above, distances to it no longer gain by more of them; time is all that they cost. */
+ * thinned for that.  By trial: above, distances to it gain nothing, and only the time grows
+ * (samples/why_these_defaults.md, "Fine references"). */
 #define NPG_THIN_SURFACE 10000
 
 typedef struct npg_thin {

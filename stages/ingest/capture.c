@@ -3,7 +3,7 @@
 
 #include "ingest/formats/reader.h"
 
-static npg_status check_gaps(const npg_capture *capture, const char *input)
+static npg_status refuse_gaps(const npg_capture *capture, const char *input)
 {
     char numbers[256];
     const npg_frame_files *list = capture->list;
@@ -25,7 +25,7 @@ npg_status npg_capture_open(npg_capture **out, const char *input, const char *se
     c->keep_going = keep_going;
     c->cache_limit = cache_limit;
     NPG_TRY_OR(fail, status, npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE));
-    NPG_TRY_OR(fail, status, check_gaps(c, input));
+    NPG_TRY_OR(fail, status, refuse_gaps(c, input));
     NPG_TRY_OR(fail, status, npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count));
     NPG_TRY_OR(fail, status, npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached));
     *out = c;
@@ -61,10 +61,10 @@ static size_t bytes_of(const npg_frame *frame)
 
 /* What fits stays: the passes walk the capture from end to end, so throwing out the oldest would leave
  * nothing for the next pass.  A copy that finds no memory is left out without harm. */
-static void cache(npg_capture *c, int64_t index, const npg_frame *frame)
+static void cache_copy(npg_capture *c, int64_t index, const npg_frame *frame)
 {
     size_t bytes = bytes_of(frame);
-    if (c->cached[index] || bytes > c->cache_limit - c->cache_bytes) return;
+    if (c->cached[index] || bytes > c->cache_limit - c->cache_bytes) return; /* cache_bytes <= cache_limit */
     if (npg_alloc(&c->cached[index], NPG_FOR_FRAMES, sizeof **c->cached)) return;
     if (npg_frame_copy(c->cached[index], frame)) {
         npg_release(&c->cached[index]);
@@ -95,7 +95,7 @@ static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg
     if (take_cached(&status, c, frame, index, is_last_use)) return status;
     c->reads++;
     NPG_TRY(npg_read_cloud(frame, c->list->slots[index].path, origin));
-    if (!is_last_use) cache(c, index, frame);
+    if (!is_last_use) cache_copy(c, index, frame);
     return NPG_OK;
 }
 
@@ -106,8 +106,9 @@ static bool is_readable(const npg_capture *c, int64_t index)
     return c->list->slots[index].path && !c->is_bad[index];
 }
 
-/* The points of the nearest usable frame before the gap, or after it where none is before. */
-static npg_status hold(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin)
+/* The points of the nearest usable frame before the gap, or after it where none is before.  They are read as
+ * not for the last time: other frames of the same gap, and the frame itself, need them again. */
+static npg_status read_held(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin)
 {
     int64_t count = (int64_t)c->list->count;
     for (int direction = -1; direction <= 1; direction += 2)
@@ -143,7 +144,7 @@ npg_status npg_capture_read(npg_capture *c, npg_frame *frame, int64_t index, npg
     if (is_readable(c, index))
         status = read_or_skip(c, frame, index, origin, is_last_use);
     else if (c->missing == NPG_MISSING_HOLD && !c->is_bad[index])
-        status = hold(c, frame, index, origin);
+        status = read_held(c, frame, index, origin);
     else
         frame->is_skipped = true;
     if (status < 0) {

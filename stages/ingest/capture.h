@@ -19,8 +19,8 @@ typedef struct npg_capture {
     npg_frame_files *list; /* owned */
     npg_missing missing;
     bool keep_going;
-    uint8_t *is_bad;    /* per slot: could not be read; owned                    */
-    npg_frame **cached; /* per slot: a copy of what was read, or NULL; owned    */
+    uint8_t *is_bad;    /* per slot: could not be read; owned                */
+    npg_frame **cached; /* per slot: a copy of what was read, or NULL; owned */
     size_t cache_bytes, cache_limit;
     uint64_t reads; /* files parsed so far */
 } npg_capture;

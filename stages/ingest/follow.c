@@ -18,7 +18,9 @@
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 
-#define LOOK_MS 250
+/* Between two scans of the folder: inotify says when files change, but not on every file system (network
+ * folders), and an unchanged size is what tells there that a file is complete. */
+#define SCAN_MS 250
 
 typedef struct file {
     char *name; /* owned */
@@ -45,7 +47,7 @@ struct npg_follow {
 
 /* ---- opening ---- */
 
-static npg_status split(npg_follow *follow, const char *where)
+static npg_status split_place(npg_follow *follow, const char *where)
 {
     struct stat info;
     NPG_TRY(npg_copy_text(&follow->folder, where));
@@ -69,12 +71,12 @@ npg_status npg_follow_open(npg_follow **out, const npg_follow_settings *settings
     NPG_TRY(npg_alloc(&follow, NPG_FOR_FILES, sizeof *follow));
     follow->settings = *settings;
     follow->watch = -1;
-    npg_status status = split(follow, settings->where);
+    npg_status status = split_place(follow, settings->where);
     if (status) {
         npg_follow_close(&follow);
         return status;
     }
-    /* Where the system can't tell of changes, the looks alone find them. */
+    /* Where inotify is not to be had, the scans alone find what changes. */
     follow->watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
     if (follow->watch >= 0)
         inotify_add_watch(follow->watch, follow->folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE);
@@ -109,7 +111,7 @@ size_t npg_follow_late_count(const npg_follow *follow)
     return follow->late_count;
 }
 
-/* ---- a look into the folder ---- */
+/* ---- scanning the folder ---- */
 
 static bool is_frame_name(const npg_follow *follow, const char *name)
 {
@@ -126,18 +128,18 @@ static int by_name(const void *left, const void *right)
     return order ? order : strcmp(a, b);
 }
 
-static file *find(npg_follow *follow, const char *name)
+static file *find_file(npg_follow *follow, const char *name)
 {
     const file key = {.name = (char *)name};
     return follow->count ? bsearch(&key, follow->files, follow->count, sizeof key, by_name) : NULL;
 }
 
-/* Size and time of the file now, beside those of the look before. */
-static void compare(npg_follow *follow, file *f, const struct stat *now)
+/* Size and time of the file now, against those of the scan before. */
+static void note_change(npg_follow *follow, file *f, const struct stat *now)
 {
     bool is_same = f->since_s > 0 && f->size == now->st_size && f->changed.tv_sec == now->st_mtim.tv_sec &&
                    f->changed.tv_nsec == now->st_mtim.tv_nsec;
-    f->is_stable = is_same && npg_clock_s() - f->since_s >= 1e-3 * LOOK_MS;
+    f->is_stable = is_same && npg_clock_s() - f->since_s >= 1e-3 * SCAN_MS;
     if (is_same) return;
     f->size = now->st_size;
     f->changed = now->st_mtim;
@@ -146,18 +148,19 @@ static void compare(npg_follow *follow, file *f, const struct stat *now)
     follow->is_changed = true;
 }
 
-static npg_status add(npg_follow *follow, const char *name)
+static npg_status add_file(npg_follow *follow, const char *name)
 {
     NPG_TRY(npg_grow(&follow->files, &follow->capacity, follow->count + 1, sizeof(file), NPG_FOR_FILES));
-    file *new = &follow->files[follow->count];
-    *new = (file){0};
-    NPG_TRY(npg_copy_text(&new->name, name));
+    file *added = &follow->files[follow->count];
+    *added = (file){0};
+    NPG_TRY(npg_copy_text(&added->name, name));
     follow->count++;
     return NPG_OK;
 }
 
-/* One name of the folder: known, new, or taken before.  *passed counts the last. */
-static npg_status meet(npg_follow *follow, const char *name, size_t known, size_t *passed)
+/* One name of the folder: known, new, or not after the last frame in natural order.  *passed counts these:
+ * frames that were accepted, and files that came too late. */
+static npg_status note_name(npg_follow *follow, const char *name, size_t known, size_t *passed)
 {
     if (!is_frame_name(follow, name)) return NPG_OK;
     if (follow->last && npg_natural_compare(name, follow->last) <= 0) {
@@ -165,13 +168,13 @@ static npg_status meet(npg_follow *follow, const char *name, size_t known, size_
         return NPG_OK;
     }
     size_t count = follow->count;
-    follow->count = known; /* only these are sorted */
-    bool is_known = find(follow, name) != NULL;
+    follow->count = known; /* find_file() needs sorted names; those added by this scan are not yet */
+    bool is_known = find_file(follow, name) != NULL;
     follow->count = count;
-    return is_known ? NPG_OK : add(follow, name);
+    return is_known ? NPG_OK : add_file(follow, name);
 }
 
-static npg_status stat_all(npg_follow *follow)
+static npg_status stat_files(npg_follow *follow)
 {
     size_t kept = 0;
     for (size_t i = 0; i < follow->count; i++) {
@@ -188,7 +191,7 @@ static npg_status stat_all(npg_follow *follow)
             npg_release(&follow->files[i].name);
             continue;
         }
-        compare(follow, &f, &info);
+        note_change(follow, &f, &info);
         follow->files[i].name = NULL;
         follow->files[kept++] = f;
     }
@@ -196,7 +199,7 @@ static npg_status stat_all(npg_follow *follow)
     return NPG_OK;
 }
 
-static bool end_is_there(const npg_follow *follow, npg_status *status)
+static bool end_file_is_there(const npg_follow *follow, npg_status *status)
 {
     char *path;
     if (!follow->settings.end_name[0]) return false;
@@ -207,34 +210,37 @@ static bool end_is_there(const npg_follow *follow, npg_status *status)
     return is_there;
 }
 
-static size_t left(const npg_follow *follow)
+static size_t waiting_count(const npg_follow *follow)
 {
     return follow->count - follow->begin;
 }
 
 static void forget_taken(npg_follow *follow)
 {
-    if (follow->begin) memmove(follow->files, follow->files + follow->begin, left(follow) * sizeof(file));
+    if (follow->begin)
+        memmove(follow->files, follow->files + follow->begin, waiting_count(follow) * sizeof(file));
     follow->count -= follow->begin;
     follow->begin = 0;
 }
 
-static npg_status look(npg_follow *follow)
+static npg_status scan_folder(npg_follow *follow)
 {
     forget_taken(follow);
     size_t known = follow->count, passed = 0;
     npg_status status = NPG_OK;
-    bool is_end = end_is_there(follow, &status); /* before the names: all of them are there then */
+    /* Asked before the names are listed: who writes the end file last has written all frames by then. */
+    bool is_end = end_file_is_there(follow, &status);
     NPG_TRY(status);
     DIR *directory = opendir(follow->folder);
     if (!directory)
         return npg_error(NPG_BAD_INPUT, "%s: can't be read any more: %s", follow->folder, strerror(errno));
     for (struct dirent *entry; !status && (entry = readdir(directory));)
-        status = meet(follow, entry->d_name, known, &passed);
+        status = note_name(follow, entry->d_name, known, &passed);
     closedir(directory);
-    if (!status) status = stat_all(follow);
+    if (!status) status = stat_files(follow);
     if (status) return status;
     if (follow->count) qsort(follow->files, follow->count, sizeof(file), by_name);
+    /* Of the names that were passed, all but the accepted ones turned up behind a later frame. */
     size_t late = passed > follow->taken_count ? passed - follow->taken_count : 0;
     if (late > follow->late_count) follow->late_count = late;
     follow->is_ended |= is_end;
@@ -244,7 +250,7 @@ static npg_status look(npg_follow *follow)
 /* ---- waiting ---- */
 
 /* Files that their writers have closed, or that were moved here whole. */
-static void take_events(npg_follow *follow)
+static void read_events(npg_follow *follow)
 {
     _Alignas(struct inotify_event) char buffer[16 << 10];
     for (ssize_t got; (got = read(follow->watch, buffer, sizeof buffer)) > 0;)
@@ -252,37 +258,37 @@ static void take_events(npg_follow *follow)
             const struct inotify_event *event = (const void *)(buffer + at);
             at += (ssize_t)(sizeof *event + event->len);
             if (!event->len || !(event->mask & (IN_CLOSE_WRITE | IN_MOVED_TO))) continue;
-            file *f = find(follow, event->name);
+            file *f = find_file(follow, event->name);
             if (f) f->is_closed = true;
         }
 }
 
-static npg_status wait_and_look(npg_follow *follow)
+static npg_status wait_and_scan(npg_follow *follow)
 {
     struct pollfd wanted = {follow->watch, POLLIN, 0};
     if (follow->settings.stopping(follow->settings.user))
         return npg_error(NPG_STOPPED, "%s: stopped", follow->folder);
-    poll(&wanted, follow->watch >= 0, LOOK_MS);
+    poll(&wanted, follow->watch >= 0, SCAN_MS);
     follow->is_changed = false;
-    NPG_TRY(look(follow));
-    if (follow->watch >= 0) take_events(follow);
+    NPG_TRY(scan_folder(follow));
+    if (follow->watch >= 0) read_events(follow);
     double now_s = npg_clock_s(), idle_s = follow->settings.idle_s;
     if (follow->is_changed) follow->idle_since_s = now_s;
     if (idle_s > 0 && now_s - follow->idle_since_s >= idle_s) follow->is_ended = true;
     return NPG_OK;
 }
 
-/* ---- taking ---- */
+/* ---- accepting files as frames ---- */
 
 static int64_t number_of(const npg_follow *follow, const file *f)
 {
     int64_t number = npg_name_number(f->name, follow->number_place);
-    return number < 0 ? (int64_t)follow->taken_count : number;
+    return number < 0 ? (int64_t)follow->taken_count : number; /* no number in the names: counted from 0 */
 }
 
-/* The ending that most of the first files have is the frames'; the last run of digits that grows is the
- * number. */
-static void settle_names(npg_follow *follow)
+/* Once, before the first frame: the ending that most of the files have is the frames', and of the runs of
+ * digits in the first two names the last one that grows is the number. */
+static void choose_ending_and_number(npg_follow *follow)
 {
     size_t best = 0, best_count = 0;
     follow->ending[0] = 0;
@@ -295,7 +301,7 @@ static void settle_names(npg_follow *follow)
             best = i;
             best_count = same;
         }
-        if (2 * best_count >= follow->count) break;
+        if (2 * best_count >= follow->count) break; /* no other can have more: the loop stays short */
     }
     if (!follow->pattern)
         strncpy(follow->ending, strrchr(follow->files[best].name, '.'), sizeof follow->ending - 1);
@@ -320,14 +326,14 @@ static bool leaves_numbers_out(const npg_follow *follow, const file *head)
     return follow->settings.finds_gaps && follow->taken_count && number_of(follow, head) > expected;
 }
 
-/* Before a number counts as missing the folder is looked at once more. */
+/* Before a number counts as missing the folder is scanned once more: its file may have come since. */
 static bool waits_for_number(npg_follow *follow, const file *head)
 {
     if (!leaves_numbers_out(follow, head)) return false;
-    if (!follow->is_ended && left(follow) <= NPG_FOLLOW_LATE) return true;
-    bool is_looked_for = follow->gap_before == number_of(follow, head);
+    if (!follow->is_ended && waiting_count(follow) <= NPG_FOLLOW_LATE) return true;
+    bool was_scanned = follow->gap_before == number_of(follow, head);
     follow->gap_before = number_of(follow, head);
-    return !is_looked_for;
+    return !was_scanned;
 }
 
 static npg_status read_file(npg_follow *follow, const file *head, npg_frame *frame, npg_origin *origin)
@@ -335,13 +341,13 @@ static npg_status read_file(npg_follow *follow, const file *head, npg_frame *fra
     char *path;
     NPG_TRY(npg_join_path(&path, follow->folder, head->name));
     npg_status status = npg_read_cloud(frame, path, origin);
-    if (status) frame->path = path;
+    if (status) frame->path = path; /* npg_read_cloud() sets it on success alone */
     if (!status) npg_release(&path);
     return status;
 }
 
 /* The head becomes *frame. */
-static npg_status take(npg_follow *follow, npg_frame *frame)
+static npg_status accept_head(npg_follow *follow, npg_frame *frame)
 {
     file head = follow->files[follow->begin];
     int64_t number = number_of(follow, &head);
@@ -360,21 +366,22 @@ static npg_status take(npg_follow *follow, npg_frame *frame)
 /* Whether a file that was refused as it is now will not get better. */
 static bool is_broken(const npg_follow *follow, const file *head)
 {
-    bool has_follower = left(follow) > 1 || follow->is_ended;
+    bool has_follower = waiting_count(follow) > 1 || follow->is_ended;
     return has_follower && npg_clock_s() - head->since_s >= follow->settings.settle_s;
 }
 
-/* *is_taken: the head was complete, or broken (NPG_PARTIAL). */
+/* *is_taken: the head was complete, or broken (NPG_PARTIAL).  A file that its reader refuses is read again
+ * only when it has changed, or when is_broken() gives it up: then for the reader's message. */
 static npg_status try_head(npg_follow *follow, npg_frame *frame, npg_origin *origin, bool *is_taken)
 {
-    if (!follow->last) settle_names(follow);
+    if (!follow->last) choose_ending_and_number(follow);
     file *head = &follow->files[follow->begin];
     *is_taken = false;
     if (waits_for_number(follow, head) || !(head->is_closed || head->is_stable)) return NPG_OK;
     bool is_known_bad = head->was_refused && head->refused_size == head->size;
     if (is_known_bad && !is_broken(follow, head)) return NPG_OK;
     npg_status status = read_file(follow, head, frame, origin);
-    bool is_empty = !status && !head->size;
+    bool is_empty = !status && !head->size; /* some writers create the file first and fill it later */
     if (status && status != NPG_BAD_INPUT) return status;
     if ((status || is_empty) && !is_known_bad) { /* perhaps it is still being written */
         npg_frame_clear(frame);
@@ -383,19 +390,19 @@ static npg_status try_head(npg_follow *follow, npg_frame *frame, npg_origin *ori
         return NPG_OK;
     }
     *is_taken = true;
-    NPG_TRY(take(follow, frame));
+    NPG_TRY(accept_head(follow, frame));
     return status ? NPG_PARTIAL : NPG_OK;
 }
 
 npg_status npg_follow_next(npg_follow *follow, npg_frame *frame, npg_origin *origin)
 {
     bool is_taken = false;
-    follow->idle_since_s = npg_clock_s();
+    follow->idle_since_s = npg_clock_s(); /* only time that the run spends waiting here counts as idle */
     for (;;) {
-        npg_status status = left(follow) ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
+        npg_status status = waiting_count(follow) ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
         if (status < 0) npg_frame_clear(frame);
         if (status || is_taken) return status;
-        if (follow->is_ended && !left(follow)) return NPG_END;
-        NPG_TRY(wait_and_look(follow));
+        if (follow->is_ended && !waiting_count(follow)) return NPG_END;
+        NPG_TRY(wait_and_scan(follow));
     }
 }

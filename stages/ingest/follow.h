@@ -1,7 +1,7 @@
 /* Follow: the frames of a folder that grows, in natural order, each as soon as its file is complete.
  *
  * A file is taken when its reader succeeds and it was closed by the program that wrote it, moved into the
- * folder, or kept its size between two looks a quarter of a second apart.  Where the numbers in the names
+ * folder, or kept its size between two scans a quarter of a second apart.  Where the numbers in the names
  * leave one out, up to NPG_FOLLOW_LATE later files wait for it; then it counts as missing.  A file that its
  * reader refuses, that a later one follows and that has not changed for settle_s is broken.  The source ends
  * when the end file is in the folder and every file has been taken, or when nothing changed for idle_s while
@@ -14,15 +14,15 @@
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 
-enum { NPG_FOLLOW_LATE = 8 };
+enum { NPG_FOLLOW_LATE = 8 }; /* set by trial */
 
 typedef struct npg_follow_settings {
-    const char *where;    /* a folder, or <folder>/<pattern of names>                    */
-    bool confine;         /* a file that leads out of the folder is refused */
-    const char *end_name; /* a file of this name ends the source; "": none does          */
-    double idle_s;        /* seconds without any change that end it; 0: none             */
-    double settle_s;      /* seconds without a change after which a bad file stays bad   */
-    bool finds_gaps;      /* wait for numbers that are left out                          */
+    const char *where;    /* a folder, or <folder>/<pattern of names>                  */
+    bool confine;         /* a file that leads out of the folder is refused            */
+    const char *end_name; /* a file of this name ends the source; "": none does        */
+    double idle_s;        /* seconds without any change that end it; 0: none           */
+    double settle_s;      /* seconds without a change after which a bad file stays bad */
+    bool finds_gaps;      /* wait for numbers that are left out                        */
     bool (*stopping)(void *user);
     void *user;
 } npg_follow_settings;

@@ -10,6 +10,8 @@
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 
+/* Slots are made for gaps as well.  Names that hold dates or identities instead of frame numbers would ask
+ * for billions of them; the limit itself is a round number far above any capture. */
 #define SLOTS_MAX ((int64_t)10000000)
 
 /* The largest step that leads to every number from the first one; 1 for a single frame. */
@@ -47,6 +49,7 @@ static npg_status add_outside(npg_frame_files *list, size_t *capacity, const npg
         int64_t from = selection->ranges[i][0], to = selection->ranges[i][1];
         if (before && to >= first) to = first - 1;
         if (!before && from <= last) from = last + 1;
+        /* Up to the next number that the capture's step leads to. */
         from += ((first - from) % step + step) % step;
         if (from > to) continue;
         if ((to - from) / step >= SLOTS_MAX)
@@ -69,8 +72,8 @@ static npg_status fill_slots(npg_frame_files *list, npg_paths *paths, const int6
     int64_t count = finds_gaps ? (last - first) / step + 1 : (int64_t)paths->count;
     if (count > SLOTS_MAX)
         return npg_error(NPG_BAD_INPUT,
-                         "the numbers of %zu frames run from %lld to %lld: not a numbering (missing = ignore "
-                         "takes the frames as they follow each other)",
+                         "the numbers of %zu frames run from %lld to %lld: "
+                         "not a numbering (missing = ignore takes the frames as they follow each other)",
                          paths->count, (long long)first, (long long)last);
     if (finds_gaps) NPG_TRY(add_outside(list, &capacity, selection, first, last, step, true));
     for (size_t i = 0; i < paths->count; i++) {
@@ -130,7 +133,7 @@ npg_status npg_frame_files_confine(const npg_frame_files *list, const char *inpu
     char *folder;
     struct stat info;
     NPG_TRY(npg_copy_text(&folder, input));
-    /* of a pattern, what comes before the first folder that is a pattern itself */
+    /* Of a pattern or a glob the longest part in front that is a folder. */
     while (folder[0] && strcmp(folder, "/") != 0 && (stat(folder, &info) || !S_ISDIR(info.st_mode))) {
         char *slash = strrchr(folder, '/');
         folder[!slash ? 0 : slash == folder ? 1 : slash - folder] = 0;
@@ -165,6 +168,7 @@ void npg_frame_files_gaps(char *text, size_t size, const npg_frame_files *list)
             snprintf(part, sizeof part, "%s%lld", comma, first);
         else
             snprintf(part, sizeof part, "%s%lld%s%lld", comma, first, next == i + 2 ? ", " : "-", last);
+        /* Room is kept for the mark of what is left out. */
         bool fits = used + strlen(part) + sizeof ", ..." < size;
         used += (size_t)snprintf(text + used, size - used, "%s", fits ? part : used ? ", ..." : "...");
         if (!fits) return;

@@ -20,10 +20,10 @@ typedef struct npg_frame_slot {
 } npg_frame_slot;
 
 typedef struct npg_frame_files {
-    size_t count, gap_count; /* slots, and how many of them are gaps */
-    npg_frame_slot *slots;   /* owned                                */
+    size_t count, gap_count; /* slots, and how many of them are gaps                              */
+    npg_frame_slot *slots;   /* owned                                                             */
     size_t left_out;         /* files of a folder with another ending that could have been frames */
-    bool is_numbered;        /* numbers come from the names, so gaps could be told */
+    bool is_numbered;        /* numbers come from the names, so gaps could be found               */
 } npg_frame_files;
 
 /* finds_gaps false: frames follow each other whatever their numbers are.

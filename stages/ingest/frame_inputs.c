@@ -41,7 +41,7 @@ static int by_name(const void *left, const void *right)
     return order ? order : strcmp(a, b);
 }
 
-static void sort(npg_paths *list)
+static void sort_paths(npg_paths *list)
 {
     if (list->count) qsort(list->paths, list->count, sizeof *list->paths, by_name);
 }
@@ -76,7 +76,7 @@ static npg_status list_folder(npg_paths *out, const char *folder, bool wants_fol
         npg_release(&path);
     }
     closedir(directory);
-    sort(out);
+    sort_paths(out);
     return status;
 }
 
@@ -136,7 +136,8 @@ static npg_status keep_one_ending(npg_paths *list, const char *folder)
     return NPG_OK;
 }
 
-/* Captures often keep their clouds one level down. */
+/* Captures often keep their clouds one level down: in points/ (ours, and that of neupig synth), in
+ * point_clouds/ (the paper's data), or in an only sub-folder. */
 static npg_status find_sub_folder(char **out, const char *folder)
 {
     static const char *const usual[] = {"points", "point_clouds"};
@@ -178,7 +179,7 @@ static npg_status find_by_glob(npg_paths *out, const char *pattern)
     for (size_t i = 0; i < found.gl_pathc && !status && !result; i++)
         if (!is_folder(found.gl_pathv[i])) status = add_path(out, found.gl_pathv[i]);
     globfree(&found);
-    sort(out);
+    sort_paths(out);
     return status;
 }
 
@@ -196,7 +197,8 @@ static void clear_pattern(pattern *p)
     npg_release(&p->after);
 }
 
-/* Finds %d, %04d or ####.  *found is the length of the conversion, 0 without one. */
+/* Finds %d, %04d or ####.  *length is that of the conversion, 0 without one; a width of more than three
+ * digits is longer than any file name. */
 static const char *find_conversion(const char *text, size_t *length, int *width)
 {
     *length = 0;
@@ -246,8 +248,9 @@ static npg_status pattern_as_glob(char **out, const pattern *p)
 static int64_t number_under(const pattern *p, const char *path)
 {
     const char *digits = path + strlen(p->before);
-    size_t length = strspn(digits, "0123456789");
+    size_t length = strspn(digits, "0123456789"); /* 17 always fit an int64_t */
     if (!length || length > 17 || strcmp(digits + length, p->after) != 0) return -1;
+    /* printf() pads with zeros up to the width and never beyond it. */
     bool is_padded = digits[0] == '0' && length > 1;
     if ((int)length < p->width || (is_padded && (int)length != p->width)) return -1;
     return strtoll(digits, NULL, 10);
@@ -345,6 +348,7 @@ static npg_status is_list(bool *out, const char *path)
     const char *dot = strrchr(path, '.');
     char *line = NULL, *found = NULL;
     *out = dot && (!strcasecmp(dot, ".lst") || !strcasecmp(dot, ".list"));
+    /* Of the endings that readers know only those of plain text may be a list. */
     const char *format = npg_format_by_ending(path);
     if (*out || (format && strcmp(format, "xyz") != 0)) return NPG_OK;
     NPG_TRY(npg_source_open_file(&source, path));

@@ -10,7 +10,7 @@ typedef struct npg_paths {
     char **paths;     /* each owned */
     int64_t *numbers; /* owned; NULL unless the input itself says the numbers (a pattern) */
     size_t count, capacity, number_capacity;
-    size_t left_out; /* see npg_frame_files                    */
+    size_t left_out; /* see npg_frame_files                     */
     bool is_listed;  /* in the order of a list file, not sorted */
 } npg_paths;
 

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define DIGITS_MAX 17
+#define DIGITS_MAX 17 /* every number of so many digits fits an int64_t, with room for sums */
 
 static bool is_digit(char c)
 {
@@ -13,7 +13,7 @@ static bool is_digit(char c)
 }
 
 /* A run of digits without its leading zeros; *text moves behind it. */
-static size_t take_run(const char **run, const char **text)
+static size_t next_run(const char **run, const char **text)
 {
     while (**text == '0' && is_digit((*text)[1])) ++*text;
     *run = *text;
@@ -26,7 +26,8 @@ int npg_natural_compare(const char *a, const char *b)
     while (*a && *b) {
         if (is_digit(*a) && is_digit(*b)) {
             const char *run_a, *run_b;
-            size_t size_a = take_run(&run_a, &a), size_b = take_run(&run_b, &b);
+            size_t size_a = next_run(&run_a, &a), size_b = next_run(&run_b, &b);
+            /* Without leading zeros the longer number is the larger one. */
             if (size_a != size_b) return size_a < size_b ? -1 : 1;
             int order = memcmp(run_a, run_b, size_a);
             if (order) return order;
@@ -44,6 +45,7 @@ int npg_natural_compare(const char *a, const char *b)
 static const char *stem_end(const char *path)
 {
     const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+    /* A dot before a digit belongs to a number (scan_1.5), one at the beginning to a hidden file's name. */
     return dot && dot != path && dot[-1] != '/' && !is_digit(dot[1]) ? dot : path + strlen(path);
 }
 
@@ -67,7 +69,8 @@ static int64_t run_value(const char *path, size_t from_end, size_t *run_count)
     return value;
 }
 
-static bool grows(int64_t *numbers, char *const *paths, size_t count, size_t from_end)
+/* Whether one run of digits numbers all paths: they have as many runs each, and its value grows. */
+static bool number_by_run(int64_t *numbers, char *const *paths, size_t count, size_t from_end)
 {
     size_t runs, first_runs;
     run_value(paths[0], 0, &first_runs);
@@ -78,7 +81,7 @@ static bool grows(int64_t *numbers, char *const *paths, size_t count, size_t fro
     return true;
 }
 
-static npg_status check_distinct(char *const *paths, size_t count)
+static npg_status refuse_equal_names(char *const *paths, size_t count)
 {
     for (size_t i = 1; i < count; i++)
         if (!npg_natural_compare(paths[i - 1], paths[i]))
@@ -92,11 +95,12 @@ npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *pa
     size_t runs = 0;
     *is_numbered = false;
     if (!count) return NPG_OK;
-    if (is_sorted) NPG_TRY(check_distinct(paths, count));
+    if (is_sorted) NPG_TRY(refuse_equal_names(paths, count));
     const char *slash = strrchr(paths[0], '/');
+    /* Of one path alone every run "grows": only those of its own name count, not its folders'. */
     run_value(count == 1 && slash ? slash + 1 : paths[0], 0, &runs);
     for (size_t from_end = 0; from_end < runs && !*is_numbered; from_end++)
-        *is_numbered = grows(numbers, paths, count, from_end);
+        *is_numbered = number_by_run(numbers, paths, count, from_end);
     for (size_t i = 0; i < count && !*is_numbered; i++) numbers[i] = (int64_t)i;
     return NPG_OK;
 }
@@ -109,6 +113,7 @@ int64_t npg_name_number(const char *name, size_t from_end)
 
 int64_t npg_common_divisor(int64_t a, int64_t b)
 {
+    /* Euclid's algorithm. */
     while (b) {
         int64_t rest = a % b;
         a = b;

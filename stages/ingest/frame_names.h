@@ -10,10 +10,10 @@
  * leading zeros are equal. */
 int npg_natural_compare(const char *a, const char *b);
 
-/* The number of every path: the last run of digits (the ending aside) that grows from each path to the next.
- * *is_numbered is false where there is none; the numbers are then 0, 1, 2 ...  One path alone is numbered by
- * the last run of its file name.  is_sorted: NPG_BAD_INPUT when two neighbours differ only in leading
- * zeros. */
+/* The number of every path: the last run of digits (the ending aside) that grows from each
+ * path to the next.  *is_numbered is false where there is none; the numbers are then 0, 1, 2 ...
+ * One path alone is numbered by the last run of its file name.  is_sorted: NPG_BAD_INPUT when two neighbours
+ * differ only in leading zeros. */
 npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *paths, size_t count,
                             bool is_sorted);
 

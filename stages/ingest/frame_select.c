@@ -6,13 +6,14 @@
 
 #include "pipeline/memory.h"
 
+/* Larger numbers count as this one, so that sums of two stay far from overflow. */
 #define NUMBER_MAX ((int64_t)1 << 53)
 
-static npg_status bad(const char *text, const char *cause)
+static npg_status refuse(const char *text, const char *cause)
 {
     return npg_error(NPG_USAGE,
-                     "option frames: \"%.100s\": %s (a:b:step are positions, b not included; 1-5,8 are frame "
-                     "numbers)",
+                     "option frames: \"%.100s\": %s "
+                     "(a:b:step are positions, b not included; 1-5,8 are frame numbers)",
                      text, cause);
 }
 
@@ -21,8 +22,8 @@ static const char *skip_spaces(const char *at)
     return at + strspn(at, " ");
 }
 
-/* A whole number at *at; *has tells whether there is one. */
-static bool take_number(int64_t *value, bool *has, const char **at)
+/* A whole number at *at; *has says whether there is one. */
+static bool parse_number(int64_t *value, bool *has, const char **at)
 {
     const char *text = skip_spaces(*at);
     bool negative = *text == '-';
@@ -30,7 +31,7 @@ static bool take_number(int64_t *value, bool *has, const char **at)
     size_t digits = strspn(text, "0123456789");
     *has = digits > 0;
     if (!digits) return !negative;
-    *value = digits > 16 ? NUMBER_MAX : strtoll(text, NULL, 10);
+    *value = digits > 16 ? NUMBER_MAX : strtoll(text, NULL, 10); /* 2^53 has 16 */
     if (*value > NUMBER_MAX) *value = NUMBER_MAX;
     if (negative) *value = -*value;
     *at = skip_spaces(text + digits);
@@ -43,32 +44,32 @@ static npg_status parse_slice(npg_selection *s, const char *text)
     bool has_step = false;
     s->is_slice = true;
     s->step = 1;
-    if (!take_number(&s->first, &s->has_first, &at)) return bad(text, "not a number");
+    if (!parse_number(&s->first, &s->has_first, &at)) return refuse(text, "not a number");
     at = skip_spaces(at);
-    if (*at++ != ':') return bad(text, "not a number");
-    if (!take_number(&s->end, &s->has_end, &at)) return bad(text, "not a number");
+    if (*at++ != ':') return refuse(text, "not a number");
+    if (!parse_number(&s->end, &s->has_end, &at)) return refuse(text, "not a number");
     at = skip_spaces(at);
     if (*at == ':') {
         at++;
-        if (!take_number(&s->step, &has_step, &at)) return bad(text, "not a number");
+        if (!parse_number(&s->step, &has_step, &at)) return refuse(text, "not a number");
         at = skip_spaces(at);
     }
-    if (*at) return bad(text, "not of the form a:b:step");
-    if (s->step < 1) return bad(text, "the step must be at least 1");
+    if (*at) return refuse(text, "not of the form a:b:step");
+    if (s->step < 1) return refuse(text, "the step must be at least 1");
     return NPG_OK;
 }
 
 static npg_status parse_range(int64_t range[2], const char *text, const char **at)
 {
     bool has;
-    if (!take_number(&range[0], &has, at) || !has) return bad(text, "not a frame number");
+    if (!parse_number(&range[0], &has, at) || !has) return refuse(text, "not a frame number");
     range[1] = range[0];
     if (**at == '-') {
         ++*at;
-        if (!take_number(&range[1], &has, at) || !has) return bad(text, "a range without an end");
+        if (!parse_number(&range[1], &has, at) || !has) return refuse(text, "a range without an end");
     }
-    if (range[0] < 0) return bad(text, "a negative frame number");
-    if (range[1] < range[0]) return bad(text, "a range that runs backward");
+    if (range[0] < 0) return refuse(text, "a negative frame number");
+    if (range[1] < range[0]) return refuse(text, "a range that runs backward");
     return NPG_OK;
 }
 
@@ -79,7 +80,7 @@ static int by_first(const void *left, const void *right)
 }
 
 /* Sort, and join what overlaps. */
-static void tidy(npg_selection *s)
+static void merge_ranges(npg_selection *s)
 {
     size_t kept = 0;
     qsort(s->ranges, s->range_count, sizeof *s->ranges, by_first);
@@ -101,9 +102,9 @@ static npg_status parse_numbers(npg_selection *s, const char *text)
         NPG_TRY(parse_range(s->ranges[s->range_count], text, &at));
         s->range_count++;
         if (!*at) break;
-        if (*at != ',') return bad(text, "numbers and ranges are parted by commas");
+        if (*at != ',') return refuse(text, "numbers and ranges are parted by commas");
     }
-    tidy(s);
+    merge_ranges(s);
     return NPG_OK;
 }
 

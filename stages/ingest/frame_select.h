@@ -3,8 +3,7 @@
  *   "a:b:step"  positions in time as Python slices them: from a up to but without b, negative ones from the
  *               end, every part may be left out; step >= 1
  *   "1-5,8"     the numbers in the files' names, both ends included
- *   ""          everything
- */
+ *   ""          everything */
 #ifndef NPG_FRAME_SELECT_H
 #define NPG_FRAME_SELECT_H
 
@@ -14,9 +13,9 @@
 
 typedef struct npg_selection {
     bool is_slice, has_first, has_end;
-    int64_t first, end, step; /* slice                                                  */
-    size_t range_count;       /* numbers; 0 and no slice: everything                    */
-    int64_t (*ranges)[2];     /* both ends included, ascending and apart; owned         */
+    int64_t first, end, step; /* slice                                          */
+    size_t range_count;       /* numbers; 0 and no slice: everything            */
+    int64_t (*ranges)[2];     /* both ends included, ascending and apart; owned */
 } npg_selection;
 
 /* NPG_USAGE says what is wrong with the text.  Clear it after success. */

@@ -8,7 +8,9 @@
 #include "ingest/formats/reader.h"
 #include "ingest/ingest.h"
 
-#define FILL_MAX 100000 /* frames of one gap in a live source */
+/* Frames of one gap in a live source.  Each becomes a frame of the run, so a number that is damaged or a time
+ * stamp must not make millions; set far above what a capture loses. */
+#define GAP_MAX 100000
 
 typedef struct state {
     const char *frames, *follow_end;
@@ -20,37 +22,36 @@ typedef struct state {
     npg_selection selection;
     npg_stream *stream; /* standard input                                  */
     npg_follow *follow; /* a folder that grows; neither: frames are pushed */
-    npg_chunk *fed;     /* the pushed chunk under way                      */
-    size_t fed_at;
-    int64_t seen;              /* frames that came or are missing, chosen or not        */
-    npg_frame waiting, before; /* the frame behind a gap; a copy of the one before it   */
-    int64_t gap_left, step;    /* missing frames before the waiting one; their distance */
+    npg_chunk *pushed;  /* the pushed chunk under way                      */
+    size_t pushed_at;
+    int64_t seen;                /* frames that came or are missing, chosen or not        */
+    npg_frame waiting, previous; /* the frame behind a gap; a copy of the one before it   */
+    int64_t gap_left, step;      /* missing frames before the waiting one; their distance */
     bool is_waiting;
 } state;
 
-#define OFFSET(member) offsetof(state, member)
+#define AT(member) offsetof(state, member)
 
+/* clang-format off */
 static const npg_option ingest_options[] = {
-    {"frames",
-     "Which frames: a:b:step are positions in time as Python counts them (from 0, without b, negative from "
-     "the "
-     "end); 1-5,8 are the numbers in the file names, both ends included; empty: all",
-     NPG_OPTION_TEXT, OFFSET(frames), "", 0, 0, NULL, "SELECTION"},
-    {"missing",
-     "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, hold "
-     "repeats "
-     "the points of the frame before it, ignore takes numbers for mere names",
-     NPG_OPTION_CHOICE, OFFSET(missing), "error", 0, 0, "error|skip|hold|ignore", NULL},
-    {"cache-mib", "Memory for clouds that were read, so that the later passes need not parse files again",
-     NPG_OPTION_INT, OFFSET(cache_mib), "4", 0, 1048576, NULL, "MIB"},
-    {"follow-end", "Name of the file that ends a folder that is followed, once it is there; empty: none does",
-     NPG_OPTION_TEXT, OFFSET(follow_end), "capture.end", 0, 0, NULL, "NAME"},
-    {"follow-idle", "Seconds without any change that end a folder that is followed; 0: wait for the end file",
-     NPG_OPTION_REAL, OFFSET(follow_idle_s), "30", 0, 1e9, NULL, "SECONDS"},
-    {"follow-settle",
-     "Seconds without a change after which a file that can't be read, and that others follow, is given up",
-     NPG_OPTION_REAL, OFFSET(follow_settle_s), "2", 0, 1e6, NULL, "SECONDS"},
+    /* type        name             place                default        least  most     shown as or words */
+    NPG_ROW_TEXT  ("frames",        AT(frames),          "",            "SELECTION",
+        "Which frames: a:b:step are positions in time as Python counts them (from 0, without b, "
+        "negative from the end); 1-5,8 are the numbers in the file names, both ends included; empty: all"),
+    NPG_ROW_CHOICE("missing",       AT(missing),         "error",       "error|skip|hold|ignore",
+        "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, "
+        "hold repeats the points of the frame before it, ignore takes numbers for mere names"),
+    NPG_ROW_INT   ("cache-mib",     AT(cache_mib),       "4",           0,     1048576, "MIB",
+        "Memory for clouds that were read, so that the later passes need not parse files again"),
+    NPG_ROW_TEXT  ("follow-end",    AT(follow_end),      "capture.end", "NAME",
+        "Name of the file that ends a folder that is followed, once it is there; empty: none does"),
+    NPG_ROW_REAL  ("follow-idle",   AT(follow_idle_s),   "30",          0,     1e9,     "SECONDS",
+        "Seconds without any change that end a folder that is followed; 0: wait for the end file"),
+    NPG_ROW_REAL  ("follow-settle", AT(follow_settle_s), "2",           0,     1e6,     "SECONDS",
+        "Seconds without a change after which a file that can't be read, "
+        "and that others follow, is given up"),
     {0}};
+/* clang-format on */
 
 /* ---- files ---- */
 
@@ -65,10 +66,11 @@ static size_t cache_limit(npg_worker *worker)
     const state *s = npg_worker_state(worker);
     size_t limit = (size_t)s->cache_mib << 20,
            budget = (size_t)npg_worker_settings(worker)->max_memory_mib << 20;
+    /* The cache only saves time: under --max-memory it takes an eighth at most (set by trial). */
     return budget && limit > budget / 8 ? budget / 8 : limit;
 }
 
-static void tell_list(npg_worker *worker, const npg_frame_files *list)
+static void report_list(npg_worker *worker, const npg_frame_files *list)
 {
     char numbers[256];
     json_t *report = npg_worker_report(worker);
@@ -109,8 +111,9 @@ static npg_status open_capture(npg_worker *worker)
     npg_worker_keep(worker, capture, release_capture);
     if (settings->confine) NPG_TRY(npg_frame_files_confine(capture->list, settings->input));
     npg_facts *facts = npg_worker_facts(worker);
+    /* A resumed run has restored it. */
     if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
-    tell_list(worker, capture->list);
+    report_list(worker, capture->list);
     return NPG_OK;
 }
 
@@ -124,12 +127,13 @@ static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index
         npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
         status = NPG_OK;
     }
+    /* Each pass reads the frame again; only the first one counts it. */
     if (pass == NPG_PASS_MEASURE && !status) facts->skipped_count += frame->is_skipped;
     return status;
 }
 
 /* Figures of the capture as it was read; the first pass sees every frame once. */
-static void tell_capture(npg_worker *worker)
+static void report_capture(npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_capture *capture = npg_worker_kept(worker);
@@ -158,7 +162,7 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
         s->next++;
     }
     if (npg_chunk_count(chunk)) return NPG_OK;
-    tell_capture(worker);
+    report_capture(worker);
     if (facts->skipped_count == facts->frame_count)
         return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used",
                          npg_worker_settings(worker)->input, (long long)facts->frame_count);
@@ -211,14 +215,14 @@ static npg_status open_live(npg_worker *worker)
 static npg_status next_pushed(npg_worker *worker, npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
-    while (!s->fed || s->fed_at == npg_chunk_count(s->fed)) {
-        npg_chunk_unref(&s->fed);
-        s->fed_at = 0;
-        NPG_TRY(npg_worker_feed(worker, &s->fed));
+    while (!s->pushed || s->pushed_at == npg_chunk_count(s->pushed)) {
+        npg_chunk_unref(&s->pushed);
+        s->pushed_at = 0;
+        NPG_TRY(npg_worker_feed(worker, &s->pushed));
     }
-    npg_frame *fed = npg_chunk_frame(s->fed, s->fed_at++);
-    *frame = *fed;
-    *fed = (npg_frame){0};
+    npg_frame *first = npg_chunk_frame(s->pushed, s->pushed_at++);
+    *frame = *first;
+    *first = (npg_frame){0};
     return NPG_OK;
 }
 
@@ -229,7 +233,7 @@ static npg_status next_followed(npg_worker *worker, npg_frame *frame)
     if (status != NPG_PARTIAL) return status;
     if (!npg_worker_settings(worker)->keep_going) {
         npg_frame_clear(frame);
-        return NPG_BAD_INPUT; /* with the reader's own words */
+        return NPG_BAD_INPUT; /* the text is the reader's */
     }
     npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
     npg_worker_facts(worker)->skipped_count++;
@@ -238,8 +242,8 @@ static npg_status next_followed(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* Behind a frame that is torn nothing on a pipe can be told apart: with keep-going the stream ends there, and
- * what came before is finished. */
+/* After a damaged frame nobody knows where the next one begins on a pipe: with keep-going the stream ends
+ * there, and what came before is finished. */
 static npg_status next_streamed(npg_worker *worker, npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
@@ -261,18 +265,19 @@ static npg_status next_live(npg_worker *worker, npg_frame *frame)
 
 static npg_status refuse_gap(const state *s, int64_t gap, int64_t number)
 {
-    if (gap > FILL_MAX)
+    if (gap > GAP_MAX)
         return npg_error(NPG_BAD_INPUT, "frame %lld comes %lld numbers after the one before it",
                          (long long)number, (long long)gap + 1);
     return npg_error(NPG_BAD_INPUT,
-                     "%lld frames are missing between %lld and %lld (option missing: skip or hold goes on, "
+                     "%lld frames are missing between %lld and %lld "
+                     "(option missing: skip or hold goes on, "
                      "ignore takes the frames as they follow each other)",
-                     (long long)gap, (long long)s->before.number, (long long)number);
+                     (long long)gap, (long long)s->previous.number, (long long)number);
 }
 
-/* Numbers may jump: in a folder as in any capture of files; of pushed frames only skip and hold ask for those
- * that lie between. */
-static npg_status find_gap(npg_worker *worker, const npg_frame *frame)
+/* How many frames are missing before this one.  Numbers may jump: in a folder as in any capture of files; of
+ * pushed frames only skip and hold ask for those that lie between; a pipe has no numbers of its own. */
+static npg_status count_gap(npg_worker *worker, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     int64_t step = s->follow ? npg_follow_step(s->follow) : 1;
@@ -280,6 +285,7 @@ static npg_status find_gap(npg_worker *worker, const npg_frame *frame)
     bool is_checked = s->follow ? s->missing != NPG_MISSING_IGNORE : fills && !s->stream;
     s->gap_left = 0;
     if (!s->seen || !is_checked) return NPG_OK;
+    /* A smaller step than so far shows that frames were missing before; they are behind us. */
     if (s->step && step != s->step) {
         if (!fills)
             return npg_error(
@@ -291,17 +297,17 @@ static npg_status find_gap(npg_worker *worker, const npg_frame *frame)
                         (long long)s->step, (long long)step);
     }
     s->step = step;
-    int64_t gap = (frame->number - s->before.number) / step - 1;
-    if (gap > FILL_MAX || (gap > 0 && !fills)) return refuse_gap(s, gap, frame->number);
+    int64_t gap = (frame->number - s->previous.number) / step - 1;
+    if (gap > GAP_MAX || (gap > 0 && !fills)) return refuse_gap(s, gap, frame->number);
     s->gap_left = gap;
     return NPG_OK;
 }
 
-static npg_status remember(state *s, const npg_frame *frame)
+static npg_status keep_previous(state *s, const npg_frame *frame)
 {
-    npg_frame_clear(&s->before);
-    if (s->missing == NPG_MISSING_HOLD && !s->stream) return npg_frame_copy(&s->before, frame);
-    s->before.number = frame->number;
+    npg_frame_clear(&s->previous);
+    if (s->missing == NPG_MISSING_HOLD && !s->stream) return npg_frame_copy(&s->previous, frame);
+    s->previous.number = frame->number;
     return NPG_OK;
 }
 
@@ -310,15 +316,15 @@ static npg_status fill_gap(npg_worker *worker, npg_chunk *chunk)
     state *s = npg_worker_state(worker);
     npg_frame frame = {.fields = NPG_FIELD_POINTS};
     s->gap_left--;
-    int64_t number = s->before.number += s->step;
+    int64_t number = s->previous.number += s->step;
     bool is_held = s->missing == NPG_MISSING_HOLD;
     if (!npg_selection_takes(&s->selection, s->seen++, number, -1)) return NPG_OK;
-    if (is_held) NPG_TRY(npg_frame_copy(&frame, &s->before));
+    if (is_held) NPG_TRY(npg_frame_copy(&frame, &s->previous));
     frame.number = number;
     frame.index = s->next++;
     frame.is_key = false;
     frame.is_held = is_held;
-    frame.is_skipped = !is_held || s->before.is_skipped;
+    frame.is_skipped = !is_held || s->previous.is_skipped;
     npg_worker_facts(worker)->skipped_count += frame.is_skipped;
     npg_worker_warn(worker, !is_held, number, "the frame is missing and %s",
                     is_held ? "repeats the frame before it" : "is skipped");
@@ -362,11 +368,11 @@ static npg_status step_live(npg_worker *worker, npg_chunk *chunk)
         npg_status status = next_live(worker, &s->waiting);
         if (status) return status == NPG_END ? end_live(worker) : status;
         s->is_waiting = true;
-        NPG_TRY(find_gap(worker, &s->waiting));
+        NPG_TRY(count_gap(worker, &s->waiting));
     }
     if (s->gap_left > 0) return fill_gap(worker, chunk);
     s->is_waiting = false;
-    NPG_TRY(remember(s, &s->waiting));
+    NPG_TRY(keep_previous(s, &s->waiting));
     if (!npg_selection_takes(&s->selection, s->seen++, s->waiting.number, -1)) {
         npg_frame_clear(&s->waiting);
         return NPG_OK;
@@ -411,9 +417,9 @@ static void uninit(npg_worker *worker)
     npg_selection_clear(&s->selection);
     npg_stream_close(&s->stream);
     npg_follow_close(&s->follow);
-    npg_chunk_unref(&s->fed);
+    npg_chunk_unref(&s->pushed);
     npg_frame_clear(&s->waiting);
-    npg_frame_clear(&s->before);
+    npg_frame_clear(&s->previous);
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)

@@ -45,6 +45,7 @@ static npg_status skip_blanks(npg_source *source)
     }
 }
 
+/* Only these two formats say in their header where they end. */
 static npg_status read_one(npg_stream *stream, npg_frame *frame, npg_origin *origin)
 {
     npg_source *source = stream->source;

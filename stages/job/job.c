@@ -12,14 +12,18 @@ typedef struct job_state {
     bool restart, append;
 } job_state;
 
+#define AT(member) offsetof(job_state, member)
+
+/* clang-format off */
 static const npg_option options[] = {
-    {"restart",
-     "Discard what an earlier run left in the output folder; without it a run of the same job goes on where "
-     "that one was",
-     NPG_OPTION_FLAG, offsetof(job_state, restart), "no", 0, 0, NULL, NULL},
-    {"append", "Go on with frames that came since the job was done (neupig append)", NPG_OPTION_FLAG,
-     offsetof(job_state, append), "no", 0, 0, NULL, NULL},
+    /* type      name       place        default */
+    NPG_ROW_FLAG("restart", AT(restart), "no",
+        "Discard what an earlier run left in the output folder; "
+        "without it a run of the same job goes on where that one was"),
+    NPG_ROW_FLAG("append",  AT(append),  "no",
+        "Go on with frames that came since the job was done (neupig append)"),
     {0}};
+/* clang-format on */
 
 static void release_job(void *value)
 {

@@ -122,8 +122,8 @@ static npg_status take_lock(npg_job *job)
         status = npg_error_errno(NPG_DISK, "can't open %s", path);
     else if (flock(job->lock_fd, LOCK_EX | LOCK_NB))
         status = errno == EWOULDBLOCK ? npg_error(NPG_USAGE,
-                                                  "another run is at work on %s: wait for its end, or choose "
-                                                  "another output folder",
+                                                  "another run is at work on %s: "
+                                                  "wait for its end, or choose another output folder",
                                                   job->output)
                                       : npg_error_errno(NPG_DISK, "can't lock %s", path);
     npg_release(&path);
@@ -291,8 +291,8 @@ static npg_status differs(const npg_job *job)
     char text[1024];
     snprintf(text, sizeof text, "%s", npg_error_text());
     return npg_error(NPG_USAGE,
-                     "%s holds another job: %s; give --restart to discard what is there, or choose another "
-                     "output folder",
+                     "%s holds another job: %s; "
+                     "give --restart to discard what is there, or choose another output folder",
                      job->output, text);
 }
 
@@ -307,13 +307,13 @@ static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *w
     *start = is_done ? NPG_JOB_DONE : NPG_JOB_RESUME;
     if (added && is_done && !append)
         return npg_error(NPG_USAGE,
-                         "%s is done, but the input has %lld frames more than then: neupig append %s goes on "
-                         "with them, --restart starts over",
+                         "%s is done, but the input has %lld frames more than then: "
+                         "neupig append %s goes on with them, --restart starts over",
                          job->output, (long long)added, job->output);
     if (added && !is_done)
         npg_worker_warn(worker, false, -1,
-                        "%lld frames came since the job was begun; neupig append goes on with them when it "
-                        "is done",
+                        "%lld frames came since the job was begun; "
+                        "neupig append goes on with them when it is done",
                         (long long)added);
     if (job->archive) NPG_TRY(npg_archive_get(job->archive, "planned", &planned, sizeof planned));
     bool is_longer = job->archive && planned < (int64_t)json_array_size(json_object_get(job->then, "frames"));

@@ -1,6 +1,5 @@
-/* VDB file: what OpenVDB writes, on disk as every other file: whole or not at all, and the same bytes each
- * time.
- */
+/* VDB file: what OpenVDB writes, on disk as every other file: whole or not at all,
+ * and the same bytes each time. */
 #include "job/vdb_file.h"
 
 #include <ctype.h>
@@ -69,8 +68,8 @@ static npg_status fix_identity(int fd)
     return NPG_OK;
 }
 
-/* OpenVDB does not tell when a disk is full: it writes to memory, and the bytes go to disk with every check.
- */
+/* OpenVDB does not tell when a disk is full: it writes to memory, and the bytes go
+ * to disk with every check. */
 npg_status npg_vdb_file_write(const char *path, uint64_t *hash,
                               npg_status (*save)(void *user, const char *memory_path), void *user)
 {

@@ -133,8 +133,8 @@ typedef struct choosing {
     size_t count, scored; /* scored: place of the best-scored frame, count when it is not there */
 } choosing;
 
-/* Whether parts are further apart in a candidate than in another: what the choice is for.  Distances alone
- * say little. */
+/* Whether parts are further apart in a candidate than in another: what the choice is for.
+ * Distances alone say little. */
 static bool is_less_touching(const npg_fare *a, const npg_fare *b)
 {
     return a->contact < LESS_CONTACT * b->contact;

@@ -1,5 +1,5 @@
-/* Choose: which of the best-scored frames makes the reference, by what their surfaces would do in other
- * frames.
+/* Choose: which of the best-scored frames makes the reference, by what their surfaces
+ * would do in other frames.
  *
  * The paper's score (keyframe.c) counts cells that hold a point; it hardly tells frames apart and knows
  * nothing of limbs that touch.  Here each candidate's points are made a draft surface, which the coarse
@@ -25,12 +25,12 @@
 typedef struct npg_fare {
     int64_t index, number;
     bool is_followed;       /* false: not in the running, or no surface could be made; the distances are 0 */
-    double point_dist_unit; /* points -> surface, mean over the other frames           */
-    double vert_dist_unit;  /* vertices -> points, mean over the other frames          */
-    double stretched_share; /* of the area, mean over the other frames                 */
-    double contact;         /* share of its own points                                 */
-    int64_t handles;        /* of the closed draft; 0 where none was made              */
-    double cost;            /* 0 when not followed                                     */
+    double point_dist_unit; /* points -> surface, mean over the other frames                               */
+    double vert_dist_unit;  /* vertices -> points, mean over the other frames                              */
+    double stretched_share; /* of the area, mean over the other frames                                     */
+    double contact;         /* share of its own points                                                     */
+    int64_t handles;        /* of the closed draft; 0 where none was made                                  */
+    double cost;            /* 0 when not followed                                                         */
 } npg_fare;
 
 /* frame_count: of the capture.  fares: room for as many as there are candidates; *count gets how many, *best

@@ -1,5 +1,5 @@
-/* Keyframe: finds the box of the capture, scores every frame and chooses the one whose surface becomes the
- * reference.
+/* Keyframe: finds the box of the capture, scores every frame and chooses the one whose surface
+ * becomes the reference.
  *
  * Based on: the keyframe selection of the Neu-PiG paper.  The score of frame t of T is the number of cells of
  * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
@@ -44,10 +44,10 @@ typedef struct keyframe_state {
     npg_choose_pass choosing;
     candidate chosen; /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
-    int64_t usable_count; /* frames that were not skipped                    */
-    int64_t passed_count; /* frames of the solving pass so far               */
-    npg_look_ahead held;  /* a live run's frames until it is their turn    */
-    bool is_planned;      /* live: the key is known                       */
+    int64_t usable_count; /* frames that were not skipped               */
+    int64_t passed_count; /* frames of the solving pass so far          */
+    npg_look_ahead held;  /* a live run's frames until it is their turn */
+    bool is_planned;      /* live: the key is known                     */
 } keyframe_state;
 
 /* ---- measuring ---- */
@@ -149,8 +149,8 @@ static const char *own_mesh(const npg_worker *worker)
     return npg_worker_settings(worker)->reference;
 }
 
-/* Whether there is a choosing pass, which takes files, and a keyframe that is neither named nor that of a
- * mesh. */
+/* Whether there is a choosing pass, which takes files, and a keyframe that is neither
+ * named nor that of a mesh. */
 static bool has_candidates(const npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
@@ -315,9 +315,10 @@ static void widen_box(const keyframe_state *state, npg_bounds *bounds)
 static npg_status refuse_one_window(const keyframe_state *state)
 {
     return npg_error(NPG_USAGE,
-                     "the live capture is longer than the look-ahead of %lld frames, and one window over all "
-                     "frames needs all of them: set the option window, raise look-ahead (each frame is held "
-                     "in memory), or write the frames to files and give those as input",
+                     "the live capture is longer than the look-ahead of %lld frames, "
+                     "and one window over all frames needs all of them: "
+                     "set the option window, raise look-ahead (each frame is held in memory), "
+                     "or write the frames to files and give those as input",
                      (long long)state->look_ahead);
 }
 
@@ -448,34 +449,33 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     return CELL_WORDS * sizeof(uint64_t);
 }
 
-#define OFFSET(member) offsetof(keyframe_state, member)
+#define AT(member) offsetof(keyframe_state, member)
 
+/* clang-format off */
 static const npg_option options[] = {
-    {"keyframe",
-     "Number of the frame whose surface is the reference, as in the file names; -1: by score, or, with a "
-     "reference of one's own, the frame that it is nearest to",
-     NPG_OPTION_INT, OFFSET(number), "-1", -1, 1e15, NULL, NULL},
-    {"keyframe-choice",
-     "Take the frame with the best score (paper), or the one of several good frames whose surface fares best "
-     "in the "
-     "others, so that limbs which touch in one frame are not joined for the whole capture (apart; not for "
-     "live runs)",
-     NPG_OPTION_CHOICE, OFFSET(choice), "apart", 0, 0, "paper|apart", NULL},
-    {"welds",
-     "Surface of the reference that other frames stretch far from all points: cut it and close the holes, or "
-     "keep it "
-     "(live runs keep it)",
-     NPG_OPTION_CHOICE, OFFSET(welds), "cut", 0, 0, "keep|cut", NULL},
-    {"window", "Frames that are solved together; 0: all of them in one window", NPG_OPTION_INT,
-     OFFSET(window), "24", 0, 1e6, NULL, NULL},
-    {"overlap", "Frames that a window shares with its neighbour", NPG_OPTION_INT, OFFSET(overlap), "4", 0,
-     1e6, NULL, NULL},
-    {"look-ahead", "Live runs: frames that are held while box and keyframe are chosen among them",
-     NPG_OPTION_INT, OFFSET(look_ahead), "64", 1, 1e6, NULL, NULL},
-    {"box-margin",
-     "Live runs that go on behind the look-ahead: room left around its box, in per cent of its longest side",
-     NPG_OPTION_REAL, OFFSET(box_margin), "10", 0, 1000, NULL, "PERCENT"},
+    /* type        name               place           default  least  most  shown as or words */
+    NPG_ROW_INT   ("keyframe",        AT(number),     "-1",    -1,    1e15, NULL,
+        "Number of the frame whose surface is the reference, as in the file names; "
+        "-1: by score, or, with a reference of one's own, the frame that it is nearest to"),
+    NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
+        "Take the frame with the best score (paper), "
+        "or the one of several good frames whose surface fares best in the others, "
+        "so that limbs which touch in one frame are not joined for the whole capture "
+        "(apart; not for live runs)"),
+    NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",
+        "Surface of the reference that other frames stretch far from all points: "
+        "cut it and close the holes, or keep it (live runs keep it)"),
+    NPG_ROW_INT   ("window",          AT(window),     "24",    0,     1e6,  NULL,
+        "Frames that are solved together; 0: all of them in one window"),
+    NPG_ROW_INT   ("overlap",         AT(overlap),    "4",     0,     1e6,  NULL,
+        "Frames that a window shares with its neighbour"),
+    NPG_ROW_INT   ("look-ahead",      AT(look_ahead), "64",    1,     1e6,  NULL,
+        "Live runs: frames that are held while box and keyframe are chosen among them"),
+    NPG_ROW_REAL  ("box-margin",      AT(box_margin), "10",    0,     1000, "PERCENT",
+        "Live runs that go on behind the look-ahead: "
+        "room left around its box, in per cent of its longest side"),
     {0}};
+/* clang-format on */
 
 extern const npg_stage npg_stage_keyframe;
 const npg_stage npg_stage_keyframe = {.name = "keyframe",

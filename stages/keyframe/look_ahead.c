@@ -96,11 +96,10 @@ void npg_look_ahead_tell_outside(npg_worker *worker, const npg_look_ahead *held)
     json_object_set_new(npg_worker_report(worker), "outside_box",
                         json_integer((json_int_t)held->outside_count));
     if (held->outside_count)
-        npg_worker_warn(
-            worker, false, held->worst_number,
-            "%lld frames leave the box that the look-ahead gave; this one by most, %.1f %% of its "
-            "longest side (option box-margin leaves more room)",
-            (long long)held->outside_count, 100 * held->worst_share);
+        npg_worker_warn(worker, false, held->worst_number,
+                        "%lld frames leave the box that the look-ahead gave; "
+                        "this one by most, %.1f %% of its longest side (option box-margin leaves more room)",
+                        (long long)held->outside_count, 100 * held->worst_share);
 }
 
 void npg_look_ahead_clear(npg_look_ahead *held)

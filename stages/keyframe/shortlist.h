@@ -8,7 +8,7 @@
 
 typedef struct npg_nearby {
     int64_t index;
-    size_t cell_count; /* as the score counts them                       */
+    size_t cell_count; /* as the score counts them                          */
     double contact;    /* npg_cloud_contact(), 0 where there are no normals */
 } npg_nearby;
 

@@ -13,13 +13,13 @@
 #define NEIGHBOURS    48 /* in which a facing point is looked for */
 #define SMOOTH_OVER   12 /* neighbours                            */
 #define SMOOTH_ROUNDS 3
-#define BACK_OVER     6  /* points around a vertex          */
+#define BACK_OVER     6  /* points around a vertex           */
 #define BACK_AMONG    16 /* nearest ones that they are among */
 
 typedef struct manner {
-    double wide;       /* a gap that survives, in spacings                          */
-    bool is_one_sided; /* a vertex goes by points on its own side of the gap alone  */
-    int rounds;        /* times that the surface is then drawn to its points        */
+    double wide;       /* a gap that survives, in spacings                         */
+    bool is_one_sided; /* a vertex goes by points on its own side of the gap alone */
+    int rounds;        /* times that the surface is then drawn to its points       */
 } manner;
 
 static const manner manners[] = {[NPG_APART_TIGHT] = {1.2, true, 2}, [NPG_APART_LOOSE] = {1.5, false, 0}};

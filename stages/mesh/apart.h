@@ -35,8 +35,8 @@ npg_status npg_apart_open(npg_apart *apart, const float *points, const float *no
                           double spacing, npg_apart_way way);
 void npg_apart_close(npg_apart *apart);
 
-/* Move the vertices of a mesh made from the shifted points back.  normals may have been turned since.
- * NPG_MEMORY. */
+/* Move the vertices of a mesh made from the shifted points back.  normals may have been
+ * turned since.  NPG_MEMORY. */
 npg_status npg_apart_bring_back(const npg_apart *apart, npg_mesh *mesh);
 
 #endif

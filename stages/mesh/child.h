@@ -7,9 +7,9 @@
 #include "pipeline/status.h"
 
 typedef struct npg_child_job {
-    const char *program;  /* name of the helper, "neupig-poisson", or an absolute path; a name is looked for
-                             beside this program and this library, in their ../libexec/neupig (or
-                             ../../libexec/neupig), and where it was to be installed */
+    /* name of the helper, "neupig-poisson", or an absolute path; a name is looked for beside this program and
+     * this library, in their ../libexec/neupig (or ../../libexec/neupig), and where it was to be installed */
+    const char *program;
     const void *input[2]; /* written one after the other, then standard input is closed */
     size_t input_size[2];
     size_t output_max; /* more output than this is a failure */

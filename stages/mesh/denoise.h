@@ -11,7 +11,7 @@ npg_status npg_cloud_noise(double *sigma, const float *points, size_t point_coun
 
 /* Move every point onto the quadric z = a + bx + cy + dx^2 + exy + fy^2 fitted over its tangent plane to its
  * `neighbours` nearest points of the same side, weighted by distance; normals follow.  In place.  Points
- * without enough neighbours of their side stay. Based on: F. Cazals, M. Pouget, Estimating Differential
+ * without enough neighbours of their side stay.  Based on: F. Cazals, M. Pouget, Estimating Differential
  * Quantities Using Polynomial Fitting of Osculating Jets, 2005. */
 npg_status npg_cloud_smooth(float *points, float *normals, size_t point_count, int neighbours);
 

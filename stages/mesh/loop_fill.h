@@ -17,7 +17,7 @@ typedef struct npg_loop {
 
 /* n - 2 faces (3 indices each) over the loop, least area with the vertices at vert_pos (V x 3).  edges: those
  * of the mesh, as npg_mesh_edges() gives them; none of them is made a second time.  *area is that of the new
- * faces. *is_filled is false when the loop is too long or nothing fits.  NPG_MEMORY. */
+ * faces.  *is_filled is false when the loop is too long or nothing fits.  NPG_MEMORY. */
 npg_status npg_loop_fill(uint32_t *faces, double *area, bool *is_filled, npg_loop loop, const float *vert_pos,
                          const uint32_t (*edges)[2], size_t edge_count);
 

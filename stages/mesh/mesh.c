@@ -38,45 +38,46 @@ typedef struct mesh_state {
     bool smooth;
 } mesh_state;
 
-#define OFFSET(member) offsetof(mesh_state, member)
+#define AT(member) offsetof(mesh_state, member)
 
+/* clang-format off */
 static const npg_option mesh_options[] = {
-    {"mesher",
-     "How the keyframe's surface is made: Poisson, or Poisson taken through an OpenVDB level set (even "
-     "triangles, no self-contact)",
-     NPG_OPTION_CHOICE, OFFSET(mesher), "poisson", 0, 0, "poisson|vdb", NULL},
-    {"poisson-depth", "Depth of the Poisson octree", NPG_OPTION_INT, OFFSET(depth), "10", 4, 13, NULL, NULL},
-    {"poisson-weight", "How closely the Poisson surface follows the points", NPG_OPTION_REAL,
-     OFFSET(point_weight), "10", 0, 1000, NULL, NULL},
-    {"poisson-time", "Stop the reconstruction after this many seconds", NPG_OPTION_INT, OFFSET(time_limit_s),
-     "600", 1, 1e6, NULL, "SECONDS"},
-    {"poisson-memory", "Address space the reconstruction may use", NPG_OPTION_INT, OFFSET(memory_limit_mib),
-     "8192", 64, 1e7, NULL, "MIB"},
-    {"pieces",
-     "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, within a "
-     "tenth of the diagonal), or the main one alone",
-     NPG_OPTION_CHOICE, OFFSET(pieces), "near", 0, 0, "near|main", NULL},
-    {"smooth", "Smooth the keyframe's points for the reconstruction when they are noisy", NPG_OPTION_FLAG,
-     OFFSET(smooth), "yes", 0, 0, NULL, NULL},
-    {"hold-apart",
-     "Hold parts that nearly touch apart while the surface is made, so that they are not joined; after that "
-     "bring it back to its points (tight), or nearly so, which leaves a little of the gap (loose)",
-     NPG_OPTION_CHOICE, OFFSET(apart), "tight", 0, 0, "tight|loose|no", NULL},
-    {"faces", "Faces of the reference mesh at most (and no more than 4 per point)", NPG_OPTION_INT,
-     OFFSET(face_max), "20000", 16, 1e8, NULL, NULL},
-    {"trim",
-     "Drop surface farther than this from every point of the keyframe, in diagonals of the keyframe's box",
-     NPG_OPTION_REAL, OFFSET(trim), "0.15", 0.001, 100, NULL, "SHARE"},
-    {"unseen",
-     "Surface without points near it (holes, the far side of a single view): keep it, trim it, or trim it "
-     "when "
-     "it is more than a quarter of the area; it is reported in any case",
-     NPG_OPTION_CHOICE, OFFSET(unseen), "auto", 0, 0, "auto|keep|trim", NULL},
-    {"max-invented",
-     "The reference is good when at most this share of its area is surface that no point of the keyframe saw "
-     "and that was kept, in per cent; above it the run ends with exit code 7",
-     NPG_OPTION_REAL, OFFSET(invented_max), "10", 0, 100, NULL, "PERCENT"},
+    /* type        name              place                 default    least  most  shown as or words */
+    NPG_ROW_CHOICE("mesher",         AT(mesher),           "poisson", "poisson|vdb",
+        "How the keyframe's surface is made: "
+        "Poisson, or Poisson taken through an OpenVDB level set (even triangles, no self-contact)"),
+    NPG_ROW_INT   ("poisson-depth",  AT(depth),            "10",      4,     13,   NULL,
+        "Depth of the Poisson octree"),
+    NPG_ROW_REAL  ("poisson-weight", AT(point_weight),     "10",      0,     1000, NULL,
+        "How closely the Poisson surface follows the points"),
+    NPG_ROW_INT   ("poisson-time",   AT(time_limit_s),     "600",     1,     1e6,  "SECONDS",
+        "Stop the reconstruction after this many seconds"),
+    NPG_ROW_INT   ("poisson-memory", AT(memory_limit_mib), "8192",    64,    1e7,  "MIB",
+        "Address space the reconstruction may use"),
+    NPG_ROW_CHOICE("pieces",         AT(pieces),           "near",    "near|main",
+        "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, "
+        "within a tenth of the diagonal), or the main one alone"),
+    NPG_ROW_FLAG  ("smooth",         AT(smooth),           "yes",
+        "Smooth the keyframe's points for the reconstruction when they are noisy"),
+    NPG_ROW_CHOICE("hold-apart",     AT(apart),            "tight",   "tight|loose|no",
+        "Hold parts that nearly touch apart while the surface is made, so that they are not joined; "
+        "after that bring it back to its points (tight), "
+        "or nearly so, which leaves a little of the gap (loose)"),
+    NPG_ROW_INT   ("faces",          AT(face_max),         "20000",   16,    1e8,  NULL,
+        "Faces of the reference mesh at most (and no more than 4 per point)"),
+    NPG_ROW_REAL  ("trim",           AT(trim),             "0.15",    0.001, 100,  "SHARE",
+        "Drop surface farther than this from every point of the keyframe, "
+        "in diagonals of the keyframe's box"),
+    NPG_ROW_CHOICE("unseen",         AT(unseen),           "auto",    "auto|keep|trim",
+        "Surface without points near it (holes, the far side of a single view): "
+        "keep it, trim it, or trim it when it is more than a quarter of the area; "
+        "it is reported in any case"),
+    NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
+        "The reference is good when at most this share of its area is surface "
+        "that no point of the keyframe saw and that was kept, in per cent; "
+        "above it the run ends with exit code 7"),
     {0}};
+/* clang-format on */
 
 #define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
 
@@ -112,9 +113,9 @@ static bool should_stop(void *worker)
 
 /* ---- steps ---- */
 
-/* The points to reconstruct from, in unit coordinates, with their normals.  Frames with more than POINTS_MAX
- * give an even choice: the face budget could not hold more detail, and Poisson's time goes with the points.
- */
+/* The points to reconstruct from, in unit coordinates, with their normals.
+ * Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
+ * and Poisson's time goes with the points. */
 static npg_status take_points(making *m)
 {
     const npg_frame *frame = m->frame;
@@ -238,11 +239,10 @@ static npg_status trim(making *m)
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
     NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
     if (!trim_unseen && share > LOST_TOLERATED)
-        npg_worker_warn(
-            m->worker, false, m->frame->number,
-            "%.1f %% of the reconstructed surface is farther than %g diagonals from every point and "
-            "was trimmed off",
-            100 * share, m->state->trim);
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
+                        "and was trimmed off",
+                        100 * share, m->state->trim);
     return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
 }
 
@@ -334,11 +334,10 @@ static void judge_invented(making *m)
     npg_worker_facts(m->worker)->unseen_share = m->invented;
     note(m, "invented_share", m->invented);
     if (100 * m->invented > m->state->invented_max)
-        npg_worker_warn(
-            m->worker, true, m->frame->number,
-            "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, and it "
-            "was kept (the bar is %g %%; --unseen trim leaves it out)",
-            100 * m->invented, m->state->invented_max);
+        npg_worker_warn(m->worker, true, m->frame->number,
+                        "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, "
+                        "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
+                        100 * m->invented, m->state->invented_max);
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt

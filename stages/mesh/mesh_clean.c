@@ -181,8 +181,8 @@ npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_
     return status;
 }
 
-/* What meshoptimizer takes while it works, roughly: it has no way to refuse politely, so ask for it before.
- */
+/* What meshoptimizer takes while it works, roughly: it has no way to refuse politely,
+ * so ask for it before. */
 static ptrdiff_t decimation_bytes(const npg_mesh *mesh)
 {
     return (ptrdiff_t)(mesh->vert_count * 120 + mesh->face_count * 60);

@@ -212,8 +212,8 @@ static npg_status find_border(uint32_t *next, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-/* The closed loop along the border from a vertex, its length; 0 if it is longer than HOLE_MAX or comes back
- * elsewhere. */
+/* The closed loop along the border from a vertex, its length; 0 if it is longer than HOLE_MAX
+ * or comes back elsewhere. */
 static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
 {
     size_t count = 0;
@@ -226,8 +226,8 @@ static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
     return count >= 3 ? count : 0;
 }
 
-/* Holes of a few edges get a vertex in their middle (three edges: just the face).  Larger ones are openings.
- */
+/* Holes of a few edges get a vertex in their middle (three edges: just the face).
+ * Larger ones are openings. */
 static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
 {
     npg_mesh *mesh = *slot, *out = NULL;
@@ -465,8 +465,9 @@ npg_status npg_mesh_require_manifold(const npg_mesh *mesh, const char *name)
         /* A directed edge used once at most means: two faces at most, and they agree on the outside. */
         else if (i && same_ends(&sides[i - 1], &sides[i]))
             status = npg_error(NPG_BAD_INPUT,
-                               "%s is not a manifold: faces %u and %u both use the edge from vertex %u to "
-                               "vertex %u in this direction",
+                               "%s is not a manifold: "
+                               "faces %u and %u both use the edge from vertex %u to vertex %u "
+                               "in this direction",
                                name, sides[i - 1].corner / 3, face, sides[i].from, sides[i].to);
     }
     npg_release(&sides);

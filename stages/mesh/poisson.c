@@ -31,8 +31,8 @@ static npg_status check_finite(const float *points, const float *normals, size_t
     return NPG_OK;
 }
 
-/* Normals of a closed surface, or of one seen from one side, span space; those of a plane are all parallel.
- */
+/* Normals of a closed surface, or of one seen from one side, span space;
+ * those of a plane are all parallel. */
 static npg_status check_spread(const float *normals, size_t n)
 {
     double parallel = 0;

@@ -1,5 +1,5 @@
-/* Poisson: a closed surface from oriented points, by PCL's screened Poisson reconstruction in a child
- * process.
+/* Poisson: a closed surface from oriented points, by PCL's screened Poisson reconstruction
+ * in a child process.
  *
  * PCL's code gives an empty mesh without an error for some inputs, garbage without an error for badly
  * oriented normals, and may crash or exit: so the input is checked before, the process has limits, and the
@@ -13,13 +13,13 @@
 #include "pipeline/options.h"
 
 typedef struct npg_poisson_settings {
-    int depth;           /* of the octree, 10                                         */
-    double point_weight; /* of the screening term, 10                                 */
-    int rounds_max;      /* npg_resurface(): drafts at most; 0: 4                     */
-    npg_apart_way apart; /* npg_resurface_apart(): how                                */
+    int depth;           /* of the octree, 10                     */
+    double point_weight; /* of the screening term, 10             */
+    int rounds_max;      /* npg_resurface(): drafts at most; 0: 4 */
+    npg_apart_way apart; /* npg_resurface_apart(): how            */
     double time_limit_s;
-    size_t memory_limit; /* bytes of address space of the child; 0: none              */
-    const char *program; /* NULL: neupig-poisson                                      */
+    size_t memory_limit; /* bytes of address space of the child; 0: none */
+    const char *program; /* NULL: neupig-poisson                         */
     bool (*should_stop)(void *user);
     void *user;
 } npg_poisson_settings;
@@ -38,8 +38,8 @@ npg_status npg_poisson(npg_mesh **mesh, const float *points, const float *normal
 /* The checks before, alone. */
 npg_status npg_poisson_check(const float *points, const float *normals, size_t point_count);
 
-/* Share of points whose normal points against most of those of its near neighbours on the same sheet, 0..1.
- */
+/* Share of points whose normal points against most of those of its near neighbours on
+ * the same sheet, 0..1. */
 npg_status npg_normals_disagreement(double *share, const float *points, const float *normals,
                                     size_t point_count);
 

@@ -1,8 +1,8 @@
 /* Resurface: Poisson again and again, until points and surface agree on which side is out.
  *
  * Where a patch of normals is on the wrong side, the surface that Poisson draws through it faces the other
- * way at many of its points: those take the surface's side and the next surface is better. Based on: F. Hou
- * et al., Iterative Poisson Surface Reconstruction (iPSR) for Unoriented Points, 2022. We turn normals only,
+ * way at many of its points: those take the surface's side and the next surface is better.  Based on: F. Hou
+ * et al., Iterative Poisson Surface Reconstruction (iPSR) for Unoriented Points, 2022.  We turn normals only,
  * begin from oriented ones, and keep what fits the points best. */
 #ifndef NPG_RESURFACE_H
 #define NPG_RESURFACE_H

@@ -9,16 +9,16 @@
 #include "mesh/loop_fill.h"
 #include "mesh/mesh_clean.h"
 
-#define LONGER        2.0 /* times its length: an edge that speaks against its face     */
-#define FAR_SPACINGS  1.0 /* mean distance of a face's corners from the points          */
-#define EXPLAINED     0.5 /* spacings from points to surface, in a frame that is heard  */
-#define LEAN_LONGER   1.4 /* the same, for faces that go with those beside them          */
+#define LONGER        2.0 /* times its length: an edge that speaks against its face    */
+#define FAR_SPACINGS  1.0 /* mean distance of a face's corners from the points         */
+#define EXPLAINED     0.5 /* spacings from points to surface, in a frame that is heard */
+#define LEAN_LONGER   1.4 /* the same, for faces that go with those beside them        */
 #define LEAN_SPACINGS 0.6
-#define FRAMES_LEAST  3   /* that speak against a face                                  */
-#define SEEDS_LEAST   2   /* faces of a patch that are spoken against                   */
+#define FRAMES_LEAST  3   /* that speak against a face                                             */
+#define SEEDS_LEAST   2   /* faces of a patch that are spoken against                              */
 #define BORDER_NEAR   0.7 /* times the faces' distance from the points, for the border around them */
-#define SAVED_LEAST   0.7 /* the new faces' area, at most, of the patch in its worst pose */
-#define LOOPS_LEAST   2   /* of its border: a tube between two parts; a cap or a crease is left */
+#define SAVED_LEAST   0.7 /* the new faces' area, at most, of the patch in its worst pose          */
+#define LOOPS_LEAST   2   /* of its border: a tube between two parts; a cap or a crease is left    */
 #define TIDY_ROUNDS   10
 #define ISLAND_MOST   0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
 #define PATCH_MOST    0.2  /* of the faces: more is no weld but a surface that fits nowhere */
@@ -29,10 +29,10 @@ static const npg_tracker_settings weld_tracking = {
 typedef struct hearing {
     const npg_weld_settings *settings;
     const npg_mesh *mesh;
-    uint8_t *against; /* F: frames that speak against a face                 */
-    uint8_t *leaning; /* F: frames that do so or nearly                      */
-    double *dist_sum; /* V: over the heard frames                            */
-    float *poses;     /* frames x V x 3: the mesh in the heard frames        */
+    uint8_t *against; /* F: frames that speak against a face          */
+    uint8_t *leaning; /* F: frames that do so or nearly               */
+    double *dist_sum; /* V: over the heard frames                     */
+    float *poses;     /* frames x V x 3: the mesh in the heard frames */
     size_t frames, room;
     float *dist_sq; /* V */
     uint32_t *near; /* V */
@@ -112,10 +112,10 @@ static void close_hearing(hearing *h)
 #define NO_PATCH UINT32_MAX
 
 typedef struct patches {
-    uint8_t *is_in;    /* F: the faces spoken against and those around them    */
-    uint8_t *is_near;  /* V: scratch                                           */
-    uint32_t *of_vert; /* V: patch of a vertex of such faces, NO_PATCH         */
-    uint32_t *of_face; /* F                                                    */
+    uint8_t *is_in;    /* F: the faces spoken against and those around them */
+    uint8_t *is_near;  /* V: scratch                                        */
+    uint32_t *of_vert; /* V: patch of a vertex of such faces, NO_PATCH      */
+    uint32_t *of_face; /* F                                                 */
     size_t count;
 } patches;
 
@@ -192,8 +192,8 @@ done:
     return status;
 }
 
-/* Where a border passes a vertex twice, take in all faces around it.  Returns how many such vertices there
- * were. */
+/* Where a border passes a vertex twice, take in all faces around it.  Returns how many such
+ * vertices there were. */
 static size_t take_pinches(patches *p, const npg_mesh *mesh, const uint32_t *twin)
 {
     size_t pinches = 0;
@@ -259,7 +259,7 @@ static double worst_pose(const float **pose, const hearing *h, const patches *p,
 }
 
 /* next[v] = the vertex after v on the patch's border, in the direction of the patch's own faces; all of them
- * once. False where the border is no set of simple loops. */
+ * once.  False where the border is no set of simple loops. */
 static bool link_border(uint32_t *next, size_t *border_count, const npg_mesh *mesh, const patches *p,
                         uint32_t patch, const uint32_t *twin)
 {
@@ -384,11 +384,11 @@ static npg_status rebuild(npg_mesh **out, const cutting *c, size_t cut_count)
 /* Whether the mesh is no worse than before: no edge that is wrong, no new border, in as many pieces. */
 static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *after)
 {
-    npg_manifold old, new;
+    npg_manifold was, now;
     const npg_mesh *both[2] = {before, after};
     size_t pieces[2];
-    NPG_TRY(npg_mesh_manifold(&old, before));
-    NPG_TRY(npg_mesh_manifold(&new, after));
+    NPG_TRY(npg_mesh_manifold(&was, before));
+    NPG_TRY(npg_mesh_manifold(&now, after));
     for (int i = 0; i < 2; i++) {
         uint32_t *component;
         NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, both[i]->vert_count, sizeof *component));
@@ -397,9 +397,9 @@ static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *
         npg_release(&component);
         NPG_TRY(status);
     }
-    *yes = new.crowded_edges <= old.crowded_edges &&new.misoriented_edges <=
-           old.misoriented_edges &&new.border_edges <= old.border_edges &&new.degenerate_faces <=
-           old.degenerate_faces &&pieces[1] <= pieces[0];
+    *yes = now.crowded_edges <= was.crowded_edges && now.misoriented_edges <= was.misoriented_edges &&
+           now.border_edges <= was.border_edges && now.degenerate_faces <= was.degenerate_faces &&
+           pieces[1] <= pieces[0];
     return NPG_OK;
 }
 

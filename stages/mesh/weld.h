@@ -8,8 +8,7 @@
  * patches with two border loops or more, which takes a handle from the mesh: a crease that was closed too far
  * can't be told from a part that was followed badly, so it stays (apart.h and choose.h see to those).  The
  * result is closed and oriented where the mesh was; a cut that can't be closed so, that would save little
- * area or that would leave the mesh in pieces, is not made.
- */
+ * area or that would leave the mesh in pieces, is not made. */
 #ifndef NPG_WELD_H
 #define NPG_WELD_H
 

@@ -1,5 +1,5 @@
-/* Carry: few well-spread vertices of the reference that are optimised, and how they carry the rest of the
- * surface.
+/* Carry: few well-spread vertices of the reference that are optimised, and how they carry
+ * the rest of the surface.
  *
  *     x(v) = y(v) + sum_i b_i(v) (x_i - y_i)
  *
@@ -18,13 +18,13 @@ typedef struct npg_carrier {
 } npg_carrier;
 
 typedef struct npg_carry {
-    npg_thin *surface;             /* W vertices: the surface that points are matched with        */
-    npg_thin *samples;             /* S: vertices of that surface                                 */
-    uint32_t *vertex;              /* S: which vertex of the reference each sample is             */
-    npg_carrier *carriers;         /* V */
-    npg_carrier *surface_carriers; /* W */
-    npg_surface *rest;             /* of the samples, at rest */
-    size_t vert_count;             /* V */
+    npg_thin *surface;             /* W vertices: the surface that points are matched with */
+    npg_thin *samples;             /* S: vertices of that surface                          */
+    uint32_t *vertex;              /* S: which vertex of the reference each sample is      */
+    npg_carrier *carriers;         /* V                                                    */
+    npg_carrier *surface_carriers; /* W                                                    */
+    npg_surface *rest;             /* of the samples, at rest                              */
+    size_t vert_count;             /* V                                                    */
 } npg_carry;
 
 /* About sample_target samples (0, or more than there are: all vertices of the surface, which has about

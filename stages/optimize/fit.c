@@ -1,6 +1,5 @@
-/* Fit: grids, decoder and motion put together; one epoch is a walk over all frames, in batches from the key
- * outward.
- */
+/* Fit: grids, decoder and motion put together; one epoch is a walk over all frames,
+ * in batches from the key outward. */
 #include "optimize/fit.h"
 
 #include <math.h>
@@ -151,8 +150,8 @@ static npg_status open_grid_adam(npg_fit *fit)
     return status;
 }
 
-/* Features that differ from place to place from the start; with a head of zero the motion still begins at
- * rest. */
+/* Features that differ from place to place from the start; with a head of zero the motion
+ * still begins at rest. */
 static npg_status draw_features(npg_fit *fit)
 {
     float *values;
@@ -194,8 +193,8 @@ static npg_mlp_shape shape_of(const npg_fit_settings *s)
                            (float)s->slope};
 }
 
-/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all begins as the identity.
- */
+/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all
+ * begins as the identity. */
 static npg_status draw_params(npg_fit *fit)
 {
     npg_mlp_shape s = shape_of(&fit->settings);

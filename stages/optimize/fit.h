@@ -1,5 +1,5 @@
-/* Fit: the joint optimisation of one window (paper, sections on latent grids to objectives), on the OpenCL
- * device.
+/* Fit: the joint optimisation of one window (paper, sections on latent grids to objectives),
+ * on the OpenCL device.
  *
  * A fit keeps grids, decoder and optimiser from window to window; a window brings its frames.  Everything is
  * in unit coordinates.  Not for several threads at a time. */
@@ -12,31 +12,31 @@
 #include "pipeline/mesh.h"
 
 typedef enum npg_confidence {
-    NPG_CONFIDENCE_CUMULATIVE, /* product of omega from the key outward (paper)  */
-    NPG_CONFIDENCE_SINGLE,     /* omega of the frame alone                       */
-    NPG_CONFIDENCE_DELTA,      /* omega = 0.5                                    */
-    NPG_CONFIDENCE_CONSTANT    /* omega = 1                                      */
+    NPG_CONFIDENCE_CUMULATIVE, /* product of omega from the key outward (paper) */
+    NPG_CONFIDENCE_SINGLE,     /* omega of the frame alone                      */
+    NPG_CONFIDENCE_DELTA,      /* omega = 0.5                                   */
+    NPG_CONFIDENCE_CONSTANT    /* omega = 1                                     */
 } npg_confidence;
 
 typedef enum npg_catch_up {
-    NPG_CATCH_UP_ROOT,        /* delta = 1 - sqrt(e) (paper)   */
-    NPG_CATCH_UP_CONSTANT,    /* delta = 1                     */
-    NPG_CATCH_UP_LINEAR,      /* delta = 1 - e                 */
-    NPG_CATCH_UP_EXPONENTIAL, /* delta = exp(-5 e)             */
-    NPG_CATCH_UP_INTERPOLATED /* w = (1 - e) omega + e         */
+    NPG_CATCH_UP_ROOT,        /* delta = 1 - sqrt(e) (paper) */
+    NPG_CATCH_UP_CONSTANT,    /* delta = 1                   */
+    NPG_CATCH_UP_LINEAR,      /* delta = 1 - e               */
+    NPG_CATCH_UP_EXPONENTIAL, /* delta = exp(-5 e)           */
+    NPG_CATCH_UP_INTERPOLATED /* w = (1 - e) omega + e       */
 } npg_catch_up;
 
 /* M of the Sobolev steps (I + lambda M)^-1; D counts a grid node's neighbours, A joins them. */
 typedef enum npg_smoothing {
-    NPG_SMOOTHING_GRAPH,    /* D - A                                    */
-    NPG_SMOOTHING_SCREENED, /* 6 I + D - A: inside a grid 2 D - A        */
+    NPG_SMOOTHING_GRAPH,    /* D - A                                             */
+    NPG_SMOOTHING_SCREENED, /* 6 I + D - A: inside a grid 2 D - A                */
     NPG_SMOOTHING_DOUBLED   /* 2 D - A: the published code's, at the border, too */
 } npg_smoothing;
 
 typedef enum npg_encoding { NPG_ENCODING_GRID, NPG_ENCODING_SINGLE, NPG_ENCODING_HASH } npg_encoding;
 
-/* Which of the states that a run by Chamfer distance goes through is its result; runs by pulls end with the
- * last. */
+/* Which of the states that a run by Chamfer distance goes through is its result;
+ * runs by pulls end with the last. */
 typedef enum npg_deliver {
     NPG_DELIVER_LEAST, /* the one with the least loss, the confidence left aside */
     NPG_DELIVER_LAST   /* the one after the last step                            */
@@ -62,10 +62,10 @@ void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *option
 /* One frame of a window.  All frames of a window have points (and follow by Chamfer distance), or all have
  * bases (and follow by pulls). */
 typedef struct npg_fit_frame {
-    int64_t index;       /* place in time; |index - key| orders the confidence               */
-    double time;         /* what the time code is a function of, 0..1 over the window        */
-    const float *points; /* N x 3, unit, finite; a loan during npg_fit_begin                 */
-    size_t count;        /* N; 0: no points, the frame follows from the others               */
+    int64_t index;       /* place in time; |index - key| orders the confidence        */
+    double time;         /* what the time code is a function of, 0..1 over the window */
+    const float *points; /* N x 3, unit, finite; a loan during npg_fit_begin          */
+    size_t count;        /* N; 0: no points, the frame follows from the others        */
     const float *base; /* V x 3: positions that the decoder moves, or NULL: the reference; a loan likewise */
 } npg_fit_frame;
 
@@ -90,8 +90,8 @@ void npg_fit_close(npg_fit **fit);
  * as the key when it is not among them). */
 npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key);
 
-/* Correspondences of all frames, in the order of npg_fit_begin: frame i has pulls[start[i]] .. pulls[start[i
- * + 1]]. Their vertices are changed to the fit's own order. */
+/* Correspondences of all frames, in the order of npg_fit_begin: frame i has
+ * pulls[start[i]] .. pulls[start[i + 1]].  Their vertices are changed to the fit's own order. */
 npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start);
 
 /* Epochs first .. end - 1 of settings.epochs; afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED

@@ -15,14 +15,14 @@ typedef struct npg_fit_knowns {
 
 /* {0} is none yet. */
 typedef struct npg_fit_least {
-    npg_fit_step step;    /* what the state's epoch measured before its own step       */
-    double loss;          /* of that step, without confidence; only with rows          */
-    float *rows, *params; /* copies, owned; NULL: none yet                             */
-    double *code;         /* of the time code's parameters, owned                      */
+    npg_fit_step step;    /* what the state's epoch measured before its own step */
+    double loss;          /* of that step, without confidence; only with rows    */
+    float *rows, *params; /* copies, owned; NULL: none yet                       */
+    double *code;         /* of the time code's parameters, owned                */
 } npg_fit_least;
 
-/* Chamfer distance and weighted isometry without the confidence of frames, which changes from epoch to epoch.
- */
+/* Chamfer distance and weighted isometry without the confidence of frames, which changes
+ * from epoch to epoch. */
 double npg_fit_plain_loss(const npg_fit_step *step, double isometry_weight);
 
 /* Copy the state when its loss is less than the least so far. */

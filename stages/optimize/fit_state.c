@@ -28,8 +28,8 @@ static bool is_of_grid(const npg_level *level, int channel)
     return level->kind != NPG_LEVEL_HASHED && channel >= level->channel_first && channel < level->channel_end;
 }
 
-/* Whether the table holds more than its dense grids: hashed levels, or values in channels that a level does
- * not fill. */
+/* Whether the table holds more than its dense grids: hashed levels, or values in channels that
+ * a level does not fill. */
 static bool has_rest(const npg_levels *levels, const float *rows)
 {
     for (int l = 0; l < levels->count; l++)

@@ -4,8 +4,8 @@
 
 #include "optimize/fit.h"
 
-/* State of one epoch; frames are asked for from the key outward, so that each product is ready when needed.
- */
+/* State of one epoch; frames are asked for from the key outward, so that each product
+ * is ready when needed. */
 typedef struct npg_weights {
     int confidence, catch_up;
     double progress; /* e / e_max */

@@ -9,15 +9,15 @@
 typedef struct npg_matcher npg_matcher;
 
 typedef struct npg_match_settings {
-    int64_t points; /* most points of a frame that pull                                       */
-    double along;   /* share of distances along the surface, 0..1                             */
-    double reverse; /* weight of surface -> points against points -> surface                  */
-    double total;   /* sum of the weights of a frame's points                                 */
-    double tie;     /* weight of keeping solved positions, for a whole frame                  */
+    int64_t points; /* most points of a frame that pull                      */
+    double along;   /* share of distances along the surface, 0..1            */
+    double reverse; /* weight of surface -> points against points -> surface */
+    double total;   /* sum of the weights of a frame's points                */
+    double tie;     /* weight of keeping solved positions, for a whole frame */
 } npg_match_settings;
 
-/* carry is a loan that outlives the matcher.  A matcher works in its caller's thread; several may share a
- * carry. */
+/* carry is a loan that outlives the matcher.  A matcher works in its caller's thread;
+ * several may share a carry. */
 npg_status npg_matcher_open(npg_matcher **matcher, const npg_carry *carry,
                             const npg_match_settings *settings);
 void npg_matcher_close(npg_matcher **matcher);
@@ -27,7 +27,7 @@ size_t npg_matcher_most(const npg_matcher *matcher);
 
 /* Pulls of a frame whose surface (carry.h) is now at vert_unit (W x 3) with the samples at `samples` (S x 3).
  * Points: N x 3 unit, normals N x 3 or NULL.  Distances count less the more they exceed three times the
- * frame's median (Geman and McClure). Appends to pulls and *count. */
+ * frame's median (Geman and McClure).  Appends to pulls and *count. */
 npg_status npg_match_points(npg_matcher *matcher, npg_pull *pulls, size_t *count, const float *vert_unit,
                             const float *samples, const float *points, const float *normals,
                             size_t point_count);

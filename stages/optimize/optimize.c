@@ -1,5 +1,5 @@
-/* optimize: slides windows over time and finds the deformation of the reference in every frame (paper,
- * method).
+/* optimize: slides windows over time and finds the deformation of the reference in every
+ * frame (paper, method).
  *
  * Holds the frames of one window, fits them jointly on the OpenCL device, writes vertices into each frame and
  * passes on what no later window needs. */
@@ -29,81 +29,91 @@ typedef struct state {
 
 /* ---- options ---- */
 
-#define AT(field)     offsetof(state, window_settings.fit.field)
-#define MATCH(field)  offsetof(state, window_settings.match.field)
-#define INT_OPTION    NPG_OPTION_INT
-#define REAL_OPTION   NPG_OPTION_REAL
-#define CHOICE_OPTION NPG_OPTION_CHOICE
+#define WINDOW(member) offsetof(state, window_settings.member)
+#define FIT(member)    WINDOW(fit.member)
+#define MATCH(member)  WINDOW(match.member)
 
+/* clang-format off */
 static const npg_option options[] = {
-    {"epochs", "steps of each window's joint fit", INT_OPTION, AT(epochs), "10", 0, 1e6, NULL, "N"},
-    {"rotation", "how the decoder's output becomes a rotation", CHOICE_OPTION, AT(rotation), "quaternion", 0,
-     0, "quaternion|cayley|exponential", NULL},
-    {"time-code", "what the decoder is told about time", CHOICE_OPTION, AT(time_code), "fourier", 0, 0,
-     "fourier|polynomial|gaussian|learned", NULL},
-    {"time-frequencies", "frequencies of the time code; it has twice as many values", INT_OPTION,
-     AT(frequencies), "4", 1, 16, NULL, "M"},
-    {"encoding", "features: a hierarchy of grids, its finest grid alone, or a hash table", CHOICE_OPTION,
-     AT(encoding), "grid", 0, 0, "grid|single|hash", NULL},
-    {"grid-levels", "levels of the position grid", INT_OPTION, AT(grid_levels), "8", 1, 16, NULL, "L"},
-    {"grid-base", "nodes per axis of the coarsest level", INT_OPTION, AT(grid_base), "2", 2, 64, NULL, "N"},
-    {"grid-step", "nodes per axis that each level adds", INT_OPTION, AT(grid_step), "3", 0, 16, NULL, "N"},
-    {"grid-rate", "learning rate of the coarsest level", REAL_OPTION, AT(grid_rate), "0.005", 0, 10, NULL,
-     NULL},
-    {"grid-rate-growth", "its growth per level", REAL_OPTION, AT(grid_rate_growth), "2.5", 0.1, 10, NULL,
-     NULL},
-    {"lambda", "smoothing of the coarsest level, 0 for none", REAL_OPTION, AT(lambda), "0.4", 0, 1e4, NULL,
-     NULL},
-    {"lambda-growth", "its growth per level", REAL_OPTION, AT(lambda_growth), "1.5", 0.1, 10, NULL, NULL},
-    {"smoothing",
-     "matrix of the smoothing: I + lambda (D - A), the same with 6 lambda more on the diagonal, or I + "
-     "lambda "
-     "(2 D - A)",
-     CHOICE_OPTION, AT(smoothing), "screened", 0, 0, "graph|screened|doubled", NULL},
-    {"normal-grid", "features by normal direction beside those by position", NPG_OPTION_FLAG, AT(normal_grid),
-     "yes", 0, 0, NULL, NULL},
-    {"normal-nodes", "nodes per axis of the normal grid", INT_OPTION, AT(normal_nodes), "4", 2, 32, NULL,
-     "N"},
-    {"width-1", "units of the first hidden layer", INT_OPTION, AT(width_1), "512", 32, 4096, NULL, "N"},
-    {"width-2", "units of the second hidden layer", INT_OPTION, AT(width_2), "512", 32, 4096, NULL, "N"},
-    {"mlp-rate", "learning rate of the decoder", REAL_OPTION, AT(mlp_rate), "0.001", 0, 1, NULL, NULL},
-    {"slope", "slope of the leaky rectifier below 0", REAL_OPTION, AT(slope), "0.01", 0, 1, NULL, NULL},
-    {"isometry", "weight of the change of edge lengths", REAL_OPTION, AT(isometry), "5", 0, 1e6, NULL, NULL},
-    {"welsch", "width of the robust weight on squared unit distances, 0 for none", REAL_OPTION, AT(alpha),
-     "0.3", 0, 1e3, NULL, NULL},
-    {"confidence", "weight of a frame by how well it and those nearer the key fit", CHOICE_OPTION,
-     AT(confidence), "constant", 0, 0, "cumulative|single|delta|constant", NULL},
-    {"catch-up", "how the confidence opens with the epochs", CHOICE_OPTION, AT(catch_up), "root", 0, 0,
-     "root|constant|linear|exponential|interpolated", NULL},
-    {"feature-start", "grid features begin spread over +- this; 0 as in the paper", REAL_OPTION,
-     AT(feature_start), "3", 0, 1e3, NULL, NULL},
-    {"rate-end", "learning rates at the last epoch as a share; they fall by half a cosine", REAL_OPTION,
-     AT(rate_end), "0.1", 0, 1, NULL, NULL},
-    {"deliver",
-     "result of a joint fit by Chamfer distance: of all the states between its steps the one with the least "
-     "loss, or the last",
-     CHOICE_OPTION, AT(deliver), "least", 0, 0, "least|last", NULL},
-    {"aligned-rate",
-     "share of the learning rates where frames come aligned: the fit then starts beside its goal, and full "
-     "steps would first lead away from it",
-     REAL_OPTION, offsetof(state, window_settings.aligned_rate), "0.1", 0, 100, NULL, NULL},
-    {"samples", "vertices of aligned frames that are fitted and carry the others, 0: all", INT_OPTION,
-     offsetof(state, window_settings.samples), "1500", 0, 1e6, NULL, "N"},
-    {"rounds", "times in a window's fit that aligned frames are matched with their points", INT_OPTION,
-     offsetof(state, window_settings.rounds), "2", 1, 1000, NULL, "N"},
-    {"match-points", "most points of an aligned frame that pull at the surface", INT_OPTION, MATCH(points),
-     "5000", 10, 1e7, NULL, "N"},
-    {"match-along", "share of distances along the surface, 0 to 1", REAL_OPTION, MATCH(along), "0.02", 0, 1,
-     NULL, NULL},
-    {"match-reverse", "weight of surface to points against points to surface", REAL_OPTION, MATCH(reverse),
-     "0.5", 0, 100, NULL, NULL},
-    {"match-total", "weight of all points of an aligned frame", REAL_OPTION, MATCH(total), "5000", 1, 1e9,
-     NULL, NULL},
-    {"match-tie", "weight of staying where the window before has put a frame, against its points",
-     REAL_OPTION, MATCH(tie), "1", 0, 1e6, NULL, NULL},
-    {"fit-batch", "frames whose hidden layer is kept at a time", INT_OPTION, AT(batch), "4", 1, 64, NULL,
-     "N"},
+    /* type        name                place                  default       least  most  shown as or words */
+    NPG_ROW_INT   ("epochs",           FIT(epochs),           "10",         0,     1e6,  "N",
+        "steps of each window's joint fit"),
+    NPG_ROW_CHOICE("rotation",         FIT(rotation),         "quaternion", "quaternion|cayley|exponential",
+        "how the decoder's output becomes a rotation"),
+    NPG_ROW_CHOICE("time-code",        FIT(time_code),        "fourier",
+        "fourier|polynomial|gaussian|learned",
+        "what the decoder is told about time"),
+    NPG_ROW_INT   ("time-frequencies", FIT(frequencies),      "4",          1,     16,   "M",
+        "frequencies of the time code; it has twice as many values"),
+    NPG_ROW_CHOICE("encoding",         FIT(encoding),         "grid",       "grid|single|hash",
+        "features: a hierarchy of grids, its finest grid alone, or a hash table"),
+    NPG_ROW_INT   ("grid-levels",      FIT(grid_levels),      "8",          1,     16,   "L",
+        "levels of the position grid"),
+    NPG_ROW_INT   ("grid-base",        FIT(grid_base),        "2",          2,     64,   "N",
+        "nodes per axis of the coarsest level"),
+    NPG_ROW_INT   ("grid-step",        FIT(grid_step),        "3",          0,     16,   "N",
+        "nodes per axis that each level adds"),
+    NPG_ROW_REAL  ("grid-rate",        FIT(grid_rate),        "0.005",      0,     10,   NULL,
+        "learning rate of the coarsest level"),
+    NPG_ROW_REAL  ("grid-rate-growth", FIT(grid_rate_growth), "2.5",        0.1,   10,   NULL,
+        "its growth per level"),
+    NPG_ROW_REAL  ("lambda",           FIT(lambda),           "0.4",        0,     1e4,  NULL,
+        "smoothing of the coarsest level, 0 for none"),
+    NPG_ROW_REAL  ("lambda-growth",    FIT(lambda_growth),    "1.5",        0.1,   10,   NULL,
+        "its growth per level"),
+    NPG_ROW_CHOICE("smoothing",        FIT(smoothing),        "screened",   "graph|screened|doubled",
+        "matrix of the smoothing: I + lambda (D - A), the same with 6 lambda more on the diagonal, "
+        "or I + lambda (2 D - A)"),
+    NPG_ROW_FLAG  ("normal-grid",      FIT(normal_grid),      "yes",
+        "features by normal direction beside those by position"),
+    NPG_ROW_INT   ("normal-nodes",     FIT(normal_nodes),     "4",          2,     32,   "N",
+        "nodes per axis of the normal grid"),
+    NPG_ROW_INT   ("width-1",          FIT(width_1),          "512",        32,    4096, "N",
+        "units of the first hidden layer"),
+    NPG_ROW_INT   ("width-2",          FIT(width_2),          "512",        32,    4096, "N",
+        "units of the second hidden layer"),
+    NPG_ROW_REAL  ("mlp-rate",         FIT(mlp_rate),         "0.001",      0,     1,    NULL,
+        "learning rate of the decoder"),
+    NPG_ROW_REAL  ("slope",            FIT(slope),            "0.01",       0,     1,    NULL,
+        "slope of the leaky rectifier below 0"),
+    NPG_ROW_REAL  ("isometry",         FIT(isometry),         "5",          0,     1e6,  NULL,
+        "weight of the change of edge lengths"),
+    NPG_ROW_REAL  ("welsch",           FIT(alpha),            "0.3",        0,     1e3,  NULL,
+        "width of the robust weight on squared unit distances, 0 for none"),
+    NPG_ROW_CHOICE("confidence",       FIT(confidence),       "constant",
+        "cumulative|single|delta|constant",
+        "weight of a frame by how well it and those nearer the key fit"),
+    NPG_ROW_CHOICE("catch-up",         FIT(catch_up),         "root",
+        "root|constant|linear|exponential|interpolated",
+        "how the confidence opens with the epochs"),
+    NPG_ROW_REAL  ("feature-start",    FIT(feature_start),    "3",          0,     1e3,  NULL,
+        "grid features begin spread over +- this; 0 as in the paper"),
+    NPG_ROW_REAL  ("rate-end",         FIT(rate_end),         "0.1",        0,     1,    NULL,
+        "learning rates at the last epoch as a share; they fall by half a cosine"),
+    NPG_ROW_CHOICE("deliver",          FIT(deliver),          "least",      "least|last",
+        "result of a joint fit by Chamfer distance: "
+        "of all the states between its steps the one with the least loss, or the last"),
+    NPG_ROW_REAL  ("aligned-rate",     WINDOW(aligned_rate),  "0.1",        0,     100,  NULL,
+        "share of the learning rates where frames come aligned: "
+        "the fit then starts beside its goal, and full steps would first lead away from it"),
+    NPG_ROW_INT   ("samples",          WINDOW(samples),       "1500",       0,     1e6,  "N",
+        "vertices of aligned frames that are fitted and carry the others, 0: all"),
+    NPG_ROW_INT   ("rounds",           WINDOW(rounds),        "2",          1,     1000, "N",
+        "times in a window's fit that aligned frames are matched with their points"),
+    NPG_ROW_INT   ("match-points",     MATCH(points),         "5000",       10,    1e7,  "N",
+        "most points of an aligned frame that pull at the surface"),
+    NPG_ROW_REAL  ("match-along",      MATCH(along),          "0.02",       0,     1,    NULL,
+        "share of distances along the surface, 0 to 1"),
+    NPG_ROW_REAL  ("match-reverse",    MATCH(reverse),        "0.5",        0,     100,  NULL,
+        "weight of surface to points against points to surface"),
+    NPG_ROW_REAL  ("match-total",      MATCH(total),          "5000",       1,     1e9,  NULL,
+        "weight of all points of an aligned frame"),
+    NPG_ROW_REAL  ("match-tie",        MATCH(tie),            "1",          0,     1e6,  NULL,
+        "weight of staying where the window before has put a frame, against its points"),
+    NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
+        "frames whose hidden layer is kept at a time"),
     {0}};
+/* clang-format on */
 
 void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
 {

@@ -20,8 +20,8 @@
 #include "optimize/window.h"
 
 typedef struct npg_record_facts {                        /* no padding: the same bytes every time */
-    int64_t first, last, new_first, new_last, direction; /* as npg_window                   */
-    npg_plan time_plan;                                  /* what npg_window_time() needs    */
+    int64_t first, last, new_first, new_last, direction; /* as npg_window                         */
+    npg_plan time_plan;                                  /* what npg_window_time() needs          */
     int64_t is_aligned, vert_count, sample_count;
     int64_t rotation, time_kind, frequencies, width_1, width_2;
     uint64_t seed; /* of the time code */

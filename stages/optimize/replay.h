@@ -1,7 +1,8 @@
 /* Replay: the deformation of a finished run at any time, from the records of its windows alone (record.h).
  *
- *     x(t) = the windows around t, one after the other in the order they were solved: x + share_w(t) (x_w(t)
- * - x) x_w(t) = y(t), carried by the samples that w's decoder moves at t       (y: the coarse alignment)
+ *     x(t)   = x + share_w(t) (x_w(t) - x) for the windows w around t, one after the other in the order they
+ *              were solved
+ *     x_w(t) = y(t), carried by the samples that w's decoder moves at t       (y: the coarse alignment)
  *
  * At a frame that is what the run has written, but for rounding.  Between frames the decoder is asked for
  * that very time - it is a function of it - and y is the cubic through the alignments of the frames around

@@ -10,8 +10,8 @@
 
 struct npg_time_code {
     npg_time_kind kind;
-    size_t size;         /* 2 M                                            */
-    double *frequencies; /* gaussian: M, owned                              */
+    size_t size;         /* 2 M                                                                 */
+    double *frequencies; /* gaussian: M, owned                                                  */
     double *params;      /* learned: w1, b1 (HIDDEN each), w2 (HIDDEN x size), b2 (size); owned */
     double *first, *second, *gradient;
     size_t param_count;

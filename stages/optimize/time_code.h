@@ -1,5 +1,5 @@
-/* Time code: what the decoder is told about time (paper: "Fourier Time Encoding" and the table on time
- * functions). */
+/* Time code: what the decoder is told about time (paper: "Fourier Time Encoding" and the table
+ * on time functions). */
 #ifndef NPG_TIME_CODE_H
 #define NPG_TIME_CODE_H
 
@@ -9,10 +9,10 @@
 #include "pipeline/status.h"
 
 typedef enum npg_time_kind {
-    NPG_TIME_FOURIER,    /* sin(pi 2^j t), j = 0 .. M - 1, then cos                              */
-    NPG_TIME_POLYNOMIAL, /* t^j, j = 1 .. 2 M                                                    */
-    NPG_TIME_GAUSSIAN,   /* sin(2 pi b_j t), then cos, b_j drawn from a normal distribution      */
-    NPG_TIME_LEARNED     /* a two-layer network of t, trained along                              */
+    NPG_TIME_FOURIER,    /* sin(pi 2^j t), j = 0 .. M - 1, then cos                         */
+    NPG_TIME_POLYNOMIAL, /* t^j, j = 1 .. 2 M                                               */
+    NPG_TIME_GAUSSIAN,   /* sin(2 pi b_j t), then cos, b_j drawn from a normal distribution */
+    NPG_TIME_LEARNED     /* a two-layer network of t, trained along                         */
 } npg_time_kind;
 
 typedef struct npg_time_code npg_time_code;

@@ -11,8 +11,8 @@ extern "C" {
 
 /* What the grids belong to, for the metadata. */
 typedef struct npg_vdb_place {
-    double world_centre[3]; /* world position of the grids' 0                    */
-    double unit_per_world;  /* scale                                         */
+    double world_centre[3]; /* world position of the grids' 0 */
+    double unit_per_world;  /* scale                          */
     int64_t frame_first, frame_last, window;
 } npg_vdb_place;
 

@@ -19,12 +19,12 @@ struct npg_window_solver {
     float *surfaces;   /* per matcher W x 3 */
     npg_figure figure; /* of the reference  */
     /* of the window at work, owned */
-    float *points;       /* all frames' points in units   */
-    size_t *point_start; /* count + 1                     */
-    float *bases, *now;  /* count x S x 3                 */
+    float *points;       /* all frames' points in units     */
+    size_t *point_start; /* count + 1                       */
+    float *bases, *now;  /* count x S x 3                   */
     float *fit_bases;    /* the bases in figure coordinates */
-    npg_figure *figures; /* of the frames                 */
-    float *dense;        /* V x 3                         */
+    npg_figure *figures; /* of the frames                   */
+    float *dense;        /* V x 3                           */
     npg_pull *pulls;
     size_t *pull_start;
     npg_fit_frame *frames;

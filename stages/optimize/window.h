@@ -14,8 +14,8 @@
 typedef struct npg_window_settings {
     npg_fit_settings fit;
     npg_match_settings match;
-    int64_t samples;     /* 0: all vertices             */
-    int64_t rounds;      /* times the matches are made  */
+    int64_t samples;     /* 0: all vertices                                             */
+    int64_t rounds;      /* times the matches are made                                  */
     double aligned_rate; /* share of the fit's learning rates where frames come aligned */
 } npg_window_settings;
 
@@ -61,9 +61,9 @@ size_t npg_window_sample_count(const npg_window_solver *solver);
 /* The samples that carry the surface; NULL where every vertex is decoded.  A loan. */
 const npg_carry *npg_window_carry(const npg_window_solver *solver);
 
-/* What the time code is a function of: the absolute frame with a fixed period, the length of the first
- * window, so that frames which two windows share mean the same to both.  Moments between frames have times,
- * too. */
+/* What the time code is a function of: the absolute frame with a fixed period,
+ * the length of the first window, so that frames which two windows share mean the same to both.
+ * Moments between frames have times, too. */
 double npg_window_time(const npg_plan *plan, double index);
 
 /* How much a window says of a frame, or of a moment between two, against what the windows before it have

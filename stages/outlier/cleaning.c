@@ -7,10 +7,10 @@
 #include "outlier/outliers.h"
 #include "pipeline/frame_box.h"
 
-#define POINTS_MIN      16
-#define FLAT            1e-5 /* thickness over length below which a cloud is a plane */
-#define ISOLATED_ROUNDS 8
-#define CAP_ROUNDS      16
+#define POINTS_MIN      16   /* fewer are no surface; set by trial                       */
+#define FLAT            1e-5 /* thickness over length below which a cloud is a plane     */
+#define ISOLATED_ROUNDS 8    /* of the filter, each on what the one before has left      */
+#define CAP_ROUNDS      16   /* of looking for a side; set by trial, as the rounds above */
 
 npg_status npg_clean_finite(npg_frame *frame)
 {
@@ -52,6 +52,7 @@ static void cell_of(int64_t cell[3], const grid *g, const float *p)
     }
 }
 
+/* Multiplies and shifts as in MurmurHash3's last step; any hash that spreads neighbouring cells will do. */
 static uint64_t hash_of(const int64_t cell[3])
 {
     uint64_t h = 0x9e3779b97f4a7c15u;
@@ -63,7 +64,7 @@ static uint64_t hash_of(const int64_t cell[3])
 }
 
 /* True when point i is the first of its cell. */
-static bool enter(grid *g, uint32_t i)
+static bool is_first_of_cell(grid *g, uint32_t i)
 {
     int64_t mine[3], theirs[3];
     cell_of(mine, g, g->points + 3 * (size_t)i);
@@ -77,8 +78,8 @@ static bool enter(grid *g, uint32_t i)
     }
 }
 
-/* keep[i] (may be NULL) = point i is the first of its cell; *count of those.  Stops early beyond count_max.
- */
+/* keep[i] (may be NULL) = point i is the first of its cell; *count of those.
+ * Stops early beyond count_max. */
 static npg_status first_of_cells(uint8_t *keep, size_t *count, const npg_frame *frame, double side,
                                  size_t count_max)
 {
@@ -88,13 +89,13 @@ static npg_status first_of_cells(uint8_t *keep, size_t *count, const npg_frame *
     size_t most = n < count_max ? n : count_max + 1;
     npg_bounds_add_points(&bounds, frame->pos_local, n);
     memcpy(g.lo, bounds.lo, sizeof g.lo);
-    while (size < 2 * most) size *= 2;
+    while (size < 2 * most) size *= 2; /* at most half full, so that a free place is near */
     *count = 0;
     NPG_TRY(npg_alloc_array(&g.table, NPG_FOR_FRAMES, size, sizeof *g.table));
     memset(g.table, 0xff, size * sizeof *g.table);
     g.mask = size - 1;
     for (size_t i = 0; i < n && *count <= count_max; i++) {
-        bool is_first = enter(&g, (uint32_t)i);
+        bool is_first = is_first_of_cell(&g, (uint32_t)i);
         if (keep) keep[i] = is_first;
         *count += is_first;
     }
@@ -126,8 +127,9 @@ npg_status npg_clean_voxels(npg_frame *frame, double side)
     return keep_first_of_cells(frame, &frame->cleaning.thinned, side);
 }
 
-/* Cells of a surface go with the inverse square of their side: each round uses that to come nearer, and
- * halves the interval between a side with too many cells and one with few enough when that is known. */
+/* The number of cells that a surface takes goes with the inverse square of their side: each round uses that
+ * to come nearer, aiming at 80 % of the most, and takes the geometric mean of a side with too many cells and
+ * one with few enough where the estimate leaves that interval. */
 npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
 {
     npg_bounds bounds = npg_bounds_empty();
@@ -135,34 +137,34 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     *side = 0;
     if (!point_max || frame->point_count <= point_max) return NPG_OK;
     npg_bounds_add_points(&bounds, frame->pos_local, frame->point_count);
-    double try = npg_bounds_diagonal(&bounds) / sqrt(2.0 * (double)point_max);
+    /* A guess to begin with: a surface as large as a square whose diagonal is that of the box. */
+    double cell_side = npg_bounds_diagonal(&bounds) / sqrt(2.0 * (double)point_max);
     for (int round = 0; round < CAP_ROUNDS; round++) {
         size_t count;
-        NPG_TRY(first_of_cells(NULL, &count, frame, try, point_max));
+        NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
         if (count <= point_max) {
-            enough = try;
+            enough = cell_side;
             if (2 * count > point_max) break;
         } else {
-            too_small = try;
+            too_small = cell_side;
         }
-        double guess = count > point_max ? 1.5 *
-        try : try
-            *sqrt((double)(count + 1) / (0.8 * (double)point_max));
+        double guess = count > point_max ? 1.5 * cell_side
+                                         : cell_side * sqrt((double)(count + 1) / (0.8 * (double)point_max));
         bool between = guess > too_small && (!(enough > 0) || guess < enough);
-        try = between ? guess : sqrt(too_small * enough);
+        cell_side = between ? guess : sqrt(too_small * enough);
     }
     while (!(enough > 0)) { /* ends: one cell holds all */
         size_t count;
-        try *= 2;
-        NPG_TRY(first_of_cells(NULL, &count, frame, try, point_max));
-        if (count <= point_max) enough = try;
+        cell_side *= 2;
+        NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
+        if (count <= point_max) enough = cell_side;
     }
     *side = enough;
     return npg_clean_voxels(frame, enough);
 }
 
-/* Of the points that are left drop those whose keep is 0, and say so in keep_all, which is about all points.
- */
+/* Drop those of the points left whose keep is 0, and mark them in keep_all, which has an entry for every
+ * point of the frame. */
 static size_t compact(float *left, uint8_t *keep_all, size_t count, const uint8_t *keep)
 {
     size_t at = 0, kept = 0;
@@ -195,7 +197,10 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, i
 
 /* ---- is it a body? ---- */
 
-/* Determinant and traces of the points' covariance tell how many of its three extents are not zero. */
+/* How many of the three extents are not zero, from the points' covariance without its eigenvalues (squared
+ * extents): the trace is their sum, the sum of the 2 x 2 minors that of their products in pairs, the
+ * determinant the product of all three.  With trace 1 the minors are about the second largest, and the
+ * determinant over the minors is about the smallest. */
 npg_status npg_clean_check(const npg_frame *frame)
 {
     double mean[3] = {0}, m[6] = {0}, n = (double)frame->point_count;
@@ -211,7 +216,7 @@ npg_status npg_clean_check(const npg_frame *frame)
         for (int k = 0; k < 6; k++) m[k] += products[k] / n;
     }
     double trace = m[0] + m[1] + m[2], far_sq = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2];
-    if (!(trace > 1e-24 * far_sq)) /* the mean itself is rounded */
+    if (!(trace > 1e-24 * far_sq)) /* less is rounding of the mean: doubles keep 1e-16 of it */
         return npg_error(NPG_BAD_INPUT, "all %zu points are in one place", frame->point_count);
     for (int k = 0; k < 6; k++) m[k] /= trace;
     double minors = m[0] * m[1] + m[0] * m[2] + m[1] * m[2] - m[3] * m[3] - m[4] * m[4] - m[5] * m[5];

@@ -10,7 +10,7 @@
 #include "pipeline/memory.h"
 
 #define BATCH         4096 /* queries at a time: bounds the memory for neighbours */
-#define JACOBI_ROUNDS 12
+#define JACOBI_ROUNDS 12   /* sweeps, more than a 3 x 3 matrix needs */
 
 /* ---- smallest eigenvector of a symmetric 3 x 3 matrix ---- */
 
@@ -90,9 +90,10 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
     }
 }
 
-#define VIEW_CELLS_MAX 512 /* per side of the picture */
+/* All set by trial. */
+#define VIEW_CELLS_MAX 512 /* per side of the picture                                                */
 #define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
-#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half */
+#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half    */
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
@@ -117,8 +118,9 @@ static void scale_to_unit(double a[3])
     for (int i = 0; i < 3; i++) a[i] /= length;
 }
 
-/* False when the sensor is inside the box or so near that the picture would be wider than 120 degrees. */
-static bool aim(view *v, const npg_bounds *bounds, const double sensor[3], size_t point_count)
+/* False when the sensor is inside the ball around the box or so near that the picture would be wider than
+ * 120 degrees: asin(1 / 1.15) is 60. */
+static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], size_t point_count)
 {
     double middle[3], radius = npg_bounds_diagonal(bounds) / 2;
     for (int a = 0; a < 3; a++) {
@@ -136,7 +138,7 @@ static bool aim(view *v, const npg_bounds *bounds, const double sensor[3], size_
     scale_to_unit(v->right);
     cross(v->up, v->forward, v->right);
     v->half_width = radius / sqrt(distance * distance - radius * radius);
-    v->cells = (size_t)sqrt((double)point_count / 4);
+    v->cells = (size_t)sqrt((double)point_count / 4); /* four points a cell, if they filled the picture */
     if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
     v->cell_width = 2 * v->half_width * distance / (double)v->cells;
     return v->cells >= 4;
@@ -167,7 +169,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, co
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, points, n);
     *yes = false;
-    if (!aim(&v, &bounds, sensor, n)) return NPG_OK;
+    if (!aim_view(&v, &bounds, sensor, n)) return NPG_OK;
     double depth, hidden_depth = HIDDEN_CELLS * v.cell_width;
     NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));
     for (size_t i = 0; i < v.cells * v.cells; i++) nearest[i] = INFINITY;

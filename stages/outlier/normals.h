@@ -22,7 +22,7 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
 
 /* Give normals without sides their sides: a spanning tree over neighbours, surest agreement first, then whole
  * patches and single points by the winding number, then the sign of the whole.  Outward for closed bodies, to
- * the convex side for open ones.  *score tells how well the sides fit together, to compare results by. */
+ * the convex side for open ones.  *score says how well the sides fit together, to compare results by. */
 npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count);
 
 /* Estimate and orient with several numbers of neighbours and keep the result of the best score: few follow

@@ -1,10 +1,10 @@
 /* Orient: which side of a surface is out, decided for all points of a npg_sided_cloud together.
  *
- * Neighbours say how their sides go together: reflected at the plane halfway between two points, a normal
- * comes to lie on its neighbour's where the surface curves like a circle, and the two sides of a thin sheet
- * come to agree as opposite.  The winding number says which side is out: the solid angle that the whole
- * oriented npg_sided_cloud covers, seen from a point on it, is positive where the point's surroundings face
- * out.
+ * Neighbours say how their sides go together: reflected at the plane halfway between two points,
+ * a normal comes to lie on its neighbour's where the surface curves like a circle, and the two sides
+ * of a thin sheet come to agree as opposite.  The winding number says which side is out: the solid angle
+ * that the whole oriented npg_sided_cloud covers, seen from a point on it, is positive where the point's
+ * surroundings face out.
  *
  * Based on: H. Hoppe et al., Surface Reconstruction from Unorganized Points, 1992 (spanning tree); A.
  * Jacobson et al., Robust Inside-Outside Segmentation Using Generalized Winding Numbers, 2013. */
@@ -17,14 +17,14 @@
 #include "outlier/sides.h"
 #include "pipeline/memory.h"
 
-#define NEIGHBOURS     NPG_SIDE_NEIGHBOURS
-#define CORE_MAX       8000 /* points that are oriented together: pairs of them are looked at */
-#define POINT_ROUNDS   30
-#define MEND_ROUNDS    6
-#define DOUBT_ROUNDS   4
-#define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given */
-#define MISFIT_WEIGHT  4.0
-#define WINDING_WEIGHT 0.6 /* of the winding number beside the neighbours' vote, for single points */
+#define NEIGHBOURS NPG_SIDE_NEIGHBOURS
+/* All set by trial. */
+#define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
+#define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
+#define MEND_ROUNDS    6    /* of those, each with the winding number computed anew                */
+#define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
+#define MISFIT_WEIGHT  4.0  /* of the winding number's misfit beside the neighbours' agreement     */
+#define WINDING_WEIGHT 0.6  /* of the winding number beside the neighbours' vote, of single points */
 
 /* ---- neighbours ---- */
 
@@ -44,12 +44,13 @@ static npg_status find_neighbours(npg_sided_cloud *c)
     NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, c->index, dist_sq, c->points, c->count, NEIGHBOURS, 0));
     for (size_t i = 0; i < c->count; i++) {
         size_t last = c->count < NEIGHBOURS ? c->count - 1 : NEIGHBOURS - 1;
+        /* The disc that reaches to the last neighbour is the surface of that many points. */
         c->area[i] = 3.14159265f * dist_sq[NEIGHBOURS * i + last] / (float)last;
         mean += (double)c->area[i] / (double)c->count;
     }
     /* Far outliers have a large disc around them: no point may outweigh many. */
     for (size_t i = 0; i < c->count; i++) c->area[i] = fminf(c->area[i], 3 * (float)mean);
-    c->soft_sq = 0.5f * (float)mean;
+    c->soft_sq = 0.5f * (float)mean; /* 1 / d^2 grows without bound for near points; set by trial */
 done:
     npg_kdtree_close(&tree);
     npg_release(&dist_sq);
@@ -100,7 +101,7 @@ static npg_status face_out(npg_sided_cloud *c)
 {
     NPG_TRY(npg_sided_winding(c));
     if (total_winding(c) >= 0) return NPG_OK;
-    for (size_t i = 0; i < c->count; i++) turn(c, i);
+    for (size_t i = 0; i < c->count; i++) turn_normal(c, i);
     for (size_t i = 0; i < c->count; i++) c->winding[i] = -c->winding[i];
     return NPG_OK;
 }
@@ -116,7 +117,7 @@ static double vote(const npg_sided_cloud *c, uint32_t i)
         sum += a * fabs(a);
         weight += fabs(a);
     }
-    double winding = 2 * (double)c->winding[i];
+    double winding = 2 * (double)c->winding[i]; /* 1 on a surface that faces out */
     return (weight > 0 ? sum / weight : 0) + WINDING_WEIGHT * fmax(-1, fmin(1, winding));
 }
 
@@ -126,10 +127,10 @@ static size_t turn_points(npg_sided_cloud *c)
     size_t all = 0;
     for (int round = 0; round < POINT_ROUNDS; round++) {
         size_t turned = 0;
-        double bar = round < 3 ? -0.5 : round < 6 ? -0.25 : 0; /* the clear cases first */
+        double bar = round < 3 ? -0.5 : round < 6 ? -0.25 : 0; /* the clear cases first; set by trial */
         for (uint32_t i = 0; i < c->count; i++)
             if (vote(c, i) < bar) {
-                turn(c, i);
+                turn_normal(c, i);
                 turned++;
             }
         all += turned;
@@ -151,7 +152,8 @@ static npg_status settle_points(npg_sided_cloud *c)
 /* Sides from directions alone. */
 static npg_status orient_from_nothing(npg_sided_cloud *c)
 {
-    static const float sure[] = {0.3f, 0.6f, 0.8f, 0.92f}; /* large patches first, then their parts */
+    /* Of the agreement that holds a patch together: large patches first, then their parts; set by trial. */
+    static const float sure[] = {0.3f, 0.6f, 0.8f, 0.92f};
     uint32_t *patch_of;
     NPG_TRY(npg_alloc_array(&patch_of, NPG_FOR_FRAMES, c->count, sizeof *patch_of));
     npg_status status = make_links(c);
@@ -168,7 +170,8 @@ static npg_status orient_from_nothing(npg_sided_cloud *c)
 
 /* ---- given sides ---- */
 
-/* Keep given sides unless a whole patch, or then a single point, is clearly on the wrong one. */
+/* Keep given sides unless a whole patch, or then a single point, is clearly on the wrong one: points whose
+ * side comes out differently when it is found from nothing are in doubt, and are turned in patches. */
 static npg_status orient_from_given(npg_sided_cloud *c)
 {
     float *given = NULL;
@@ -202,7 +205,7 @@ static npg_status score_of(double *score, npg_sided_cloud *c)
     double lost = 0, area = 0, votes = 0;
     NPG_TRY(npg_sided_winding(c));
     for (uint32_t i = 0; i < c->count; i++) {
-        lost += (double)c->area[i] * misfit(c->winding[i]);
+        lost += (double)c->area[i] * winding_misfit(c->winding[i]);
         area += (double)c->area[i];
         votes += vote(c, i);
     }
@@ -221,7 +224,7 @@ static npg_status orient_core(npg_sided_cloud *c, bool from_given, double *score
 
 /* ---- large clouds: a core is oriented, the rest follows ---- */
 
-/* Evenly spread by index: clouds come in scan or random order, both spread over the surface. */
+/* Evenly spread by index: clouds come in scan or random order, and either is spread over the surface. */
 static void take_core(float *points, float *normals, uint32_t *from, size_t core_count,
                       const float *all_points, const float *all_normals, size_t n)
 {
@@ -253,6 +256,7 @@ static npg_status follow_core(float *all_normals, const float *all_points, size_
             for (size_t k = 0; k < NEAR; k++) {
                 const float *o = normals + 3 * (size_t)index[NEAR * i + k];
                 float along = m[0] * o[0] + m[1] * o[1] + m[2] * o[2];
+                /* Near points and clear agreement count more; 1e-20: a core point is at distance 0 itself. */
                 sum += along * fabsf(along) / (dist_sq[NEAR * i + k] + 1e-20f);
             }
             for (size_t a = 0; a < 3 && sum < 0; a++) m[a] = -m[a];
@@ -271,7 +275,7 @@ static npg_status orient(float *normals, double *score, const float *points, siz
     uint32_t *from = NULL;
     npg_status status;
     npg_sided_cloud whole = {.count = n, .points = points, .normals = normals};
-    if (n < 4) return NPG_OK;
+    if (n < 4) return NPG_OK; /* no closed surface has fewer */
     if (n <= CORE_MAX) return orient_core(&whole, from_given, score);
     NPG_TRY_OR(done, status, npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
     NPG_TRY_OR(done, status, npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
@@ -295,7 +299,7 @@ npg_status npg_normals_orient(float *normals, double *score, const float *points
 
 npg_status npg_normals_make(float *normals, const float *points, size_t n)
 {
-    static const int neighbours[] = {10, 12, 16, 24};
+    static const int neighbours[] = {10, 12, 16, 24}; /* set by trial: see normals.h for what they trade */
     float *trial;
     double best = -INFINITY;
     npg_status status = NPG_OK;

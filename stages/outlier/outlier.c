@@ -32,31 +32,32 @@ typedef struct outlier_state {
     double normals_s;
 } outlier_state;
 
-#define OFFSET(member) offsetof(outlier_state, member)
+#define AT(member) offsetof(outlier_state, member)
 
+/* clang-format off */
 static const npg_option outlier_options[] = {
-    {"outliers", "Drop isolated points (PCL's statistical filter, repeated until it finds no more)",
-     NPG_OPTION_FLAG, OFFSET(drop_isolated), "yes", 0, 0, NULL, NULL},
-    {"outlier-neighbours", "Neighbours whose mean distance tells whether a point is isolated", NPG_OPTION_INT,
-     OFFSET(neighbours), "12", 2, 200, NULL, NULL},
-    {"outlier-ratio", "Standard deviations above the mean at which a point is isolated", NPG_OPTION_REAL,
-     OFFSET(ratio), "5", 0.5, 100, NULL, NULL},
-    {"voxel", "Keep one point per cube of this side, in the capture's unit; 0: all", NPG_OPTION_REAL,
-     OFFSET(voxel), "0", 0, 1e12, NULL, "LENGTH"},
-    {"points-max", "Thin frames with more points than this, with a warning", NPG_OPTION_INT,
-     OFFSET(point_max), "250000", 1000, 4e9, NULL, NULL},
-    {"normals", "Use given normals (checked and mended) or estimate them; auto: given where there are any",
-     NPG_OPTION_CHOICE, OFFSET(normals), "auto", 0, 0, "auto|estimate|given", NULL},
-    {"normals-for", "Make and mend normals for the keyframe alone or for all frames", NPG_OPTION_CHOICE,
-     OFFSET(normals_for), "key", 0, 0, "key|all", NULL},
-    {"normal-neighbours", "Points a normal is estimated from, 4 or more; 0: several numbers are tried",
-     NPG_OPTION_INT, OFFSET(normal_neighbours), "0", 0, 200, NULL, NULL},
-    {"sensor",
-     "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; none: "
-     "the "
-     "body is closed; auto: the origin, if the points look like one view from it",
-     NPG_OPTION_TEXT, OFFSET(sensor_text), "auto", 0, 0, NULL, "X,Y,Z"},
+    /* type        name                  place                  default   least  most  shown as or words */
+    NPG_ROW_FLAG  ("outliers",           AT(drop_isolated),     "yes",
+        "Drop isolated points (PCL's statistical filter, repeated until it finds no more)"),
+    NPG_ROW_INT   ("outlier-neighbours", AT(neighbours),        "12",     2,     200,  NULL,
+        "Neighbours whose mean distance tells whether a point is isolated"),
+    NPG_ROW_REAL  ("outlier-ratio",      AT(ratio),             "5",      0.5,   100,  NULL,
+        "Standard deviations above the mean at which a point is isolated"),
+    NPG_ROW_REAL  ("voxel",              AT(voxel),             "0",      0,     1e12, "LENGTH",
+        "Keep one point per cube of this side, in the capture's unit; 0: all"),
+    NPG_ROW_INT   ("points-max",         AT(point_max),         "250000", 1000,  4e9,  NULL,
+        "Thin frames with more points than this, with a warning"),
+    NPG_ROW_CHOICE("normals",            AT(normals),           "auto",   "auto|estimate|given",
+        "Use given normals (checked and mended) or estimate them; auto: given where there are any"),
+    NPG_ROW_CHOICE("normals-for",        AT(normals_for),       "key",    "key|all",
+        "Make and mend normals for the keyframe alone or for all frames"),
+    NPG_ROW_INT   ("normal-neighbours",  AT(normal_neighbours), "0",      0,     200,  NULL,
+        "Points a normal is estimated from, 4 or more; 0: several numbers are tried"),
+    NPG_ROW_TEXT  ("sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
+        "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; "
+        "none: the body is closed; auto: the origin, if the points look like one view from it"),
     {0}};
+/* clang-format on */
 
 /* ---- set-up ---- */
 
@@ -80,7 +81,7 @@ static npg_status parse_sensor(outlier_state *s)
     return NPG_OK;
 }
 
-#define REMEMBERED_MAX ((size_t)4 << 20) /* bytes of what the statistical filter found */
+#define KEPT_RESULTS_MAX ((size_t)4 << 20) /* bytes of what the statistical filter found; set by trial */
 
 static void release_isolated(void *thing)
 {
@@ -92,7 +93,7 @@ static npg_status open_isolated(npg_worker *worker)
 {
     npg_isolated *isolated;
     if (npg_worker_kept(worker)) return NPG_OK;
-    NPG_TRY(npg_isolated_open(&isolated, npg_worker_facts(worker)->is_live ? 0 : REMEMBERED_MAX));
+    NPG_TRY(npg_isolated_open(&isolated, npg_worker_facts(worker)->is_live ? 0 : KEPT_RESULTS_MAX));
     npg_worker_keep(worker, isolated, release_isolated);
     return NPG_OK;
 }
@@ -107,7 +108,7 @@ static npg_status outlier_init(npg_worker *worker)
     return parse_sensor(npg_worker_state(worker));
 }
 
-/* What a pass says again and again is said once: in the first pass that sees the frames. */
+/* Every pass cleans the frames again; only the first one reports what it did to them. */
 static bool is_first_pass(npg_worker *worker)
 {
     return npg_worker_pass(worker) == NPG_PASS_MEASURE || npg_worker_facts(worker)->is_live;
@@ -115,7 +116,7 @@ static bool is_first_pass(npg_worker *worker)
 
 /* ---- points ---- */
 
-static npg_status clean(npg_worker *worker, npg_frame *frame)
+static npg_status clean_points(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     size_t read = frame->point_count;
@@ -140,7 +141,7 @@ static void repair_directions(float *normals, size_t *bad, const float *estimate
     *bad = 0;
     for (size_t i = 0; i < n; i++) {
         float *d = normals + 3 * i, length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        bool good = isfinite(length) && length > 1e-6f;
+        bool good = isfinite(length) && length > 1e-6f; /* readers give 0 where there is none */
         for (size_t a = 0; a < 3; a++) d[a] = good ? d[a] / length : estimate[3 * i + a];
         *bad += !good;
     }
@@ -162,7 +163,7 @@ static npg_status find_sensor(npg_worker *worker, const npg_frame *frame, double
 
 static int neighbours_of(const outlier_state *s)
 {
-    return s->normal_neighbours ? (int)s->normal_neighbours : 16;
+    return s->normal_neighbours ? (int)s->normal_neighbours : 16; /* as npg_normals_make() tries, too */
 }
 
 static npg_status make_normals(npg_worker *worker, npg_frame *frame)
@@ -206,7 +207,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     return npg_normals_mend(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n);
 }
 
-static npg_status do_normals(npg_worker *worker, npg_frame *frame)
+static npg_status make_or_mend_normals(npg_worker *worker, npg_frame *frame)
 {
     outlier_state *s = npg_worker_state(worker);
     double since = npg_clock_s();
@@ -222,7 +223,7 @@ static npg_status do_normals(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* A live run chooses its keyframe only after this stage, so there every frame may be the one. */
+/* A live run chooses its keyframe after this stage, so there every frame may be the one. */
 static bool needs_normals(npg_worker *worker, const npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -240,7 +241,7 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
 
 /* ---- the stage ---- */
 
-static void count(outlier_state *s, const npg_cleaning *c)
+static void add_counts(outlier_state *s, const npg_cleaning *c)
 {
     npg_cleaning *sum = &s->sum;
     sum->read += c->read;
@@ -261,7 +262,7 @@ static npg_status name_frame(npg_status status, const npg_frame *frame)
 }
 
 /* A frame that can't be used is skipped under --keep-going, else it ends the run. */
-static npg_status refuse(npg_worker *worker, npg_frame *frame, npg_status status)
+static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status status)
 {
     outlier_state *s = npg_worker_state(worker);
     if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return name_frame(status, frame);
@@ -278,18 +279,18 @@ static npg_status refuse(npg_worker *worker, npg_frame *frame, npg_status status
 
 static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
 {
-    npg_status status = frame->is_skipped ? NPG_OK : clean(worker, frame);
-    return status ? refuse(worker, frame, status) : NPG_OK;
+    npg_status status = frame->is_skipped ? NPG_OK : clean_points(worker, frame);
+    return status ? skip_or_fail(worker, frame, status) : NPG_OK;
 }
 
-static npg_status finish_frame(npg_worker *worker, npg_frame *frame)
+static npg_status check_frame_and_normals(npg_worker *worker, npg_frame *frame)
 {
     if (frame->is_skipped) return NPG_OK;
     npg_status status = npg_clean_check(frame);
-    if (!status && needs_normals(worker, frame)) status = do_normals(worker, frame);
-    if (status) return refuse(worker, frame, status);
+    if (!status && needs_normals(worker, frame)) status = make_or_mend_normals(worker, frame);
+    if (status) return skip_or_fail(worker, frame, status);
     frame->fields |= NPG_FIELD_CLEAN;
-    count(npg_worker_state(worker), &frame->cleaning);
+    add_counts(npg_worker_state(worker), &frame->cleaning);
     return NPG_OK;
 }
 
@@ -314,7 +315,7 @@ static npg_status outlier_process(npg_worker *worker, npg_chunk **chunk)
     NPG_TRY(drop_isolated(worker, *chunk));
     for (size_t i = 0; i < frame_count; i++) {
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
-        NPG_TRY(finish_frame(worker, npg_chunk_frame(*chunk, i)));
+        NPG_TRY(check_frame_and_normals(worker, npg_chunk_frame(*chunk, i)));
     }
     return NPG_OK;
 }
@@ -352,7 +353,7 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 120 * thinned * threads + REMEMBERED_MAX;
+    return 17 * points + 120 * thinned * threads + KEPT_RESULTS_MAX; /* bytes per point, rounded up */
 }
 
 const npg_stage npg_stage_outlier = {.name = "outlier",

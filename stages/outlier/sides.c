@@ -1,5 +1,4 @@
-/* Sides: spanning tree, patches and winding number of a npg_sided_cloud whose normals look for their sides.
- */
+/* Sides: spanning tree, patches and winding number of a npg_sided_cloud. */
 #include "outlier/sides.h"
 
 #include <string.h>
@@ -8,8 +7,9 @@
 #include "pipeline/parallel.h"
 
 #define NEIGHBOURS    NPG_SIDE_NEIGHBOURS
-#define PATCH_ROUNDS  4
-#define BORDER_WEIGHT 0.1 /* of a patch's border beside its winding number */
+#define PATCH_ROUNDS  4           /* turning one patch changes what is best for the others; set by trial */
+#define BORDER_WEIGHT 0.1         /* of a patch's border beside its winding number; set by trial         */
+#define FULL_ANGLE    12.5663706f /* 4 pi: the winding number is a solid angle in units of it            */
 
 /* ---- winding number ---- */
 
@@ -18,7 +18,7 @@
 /* Points and their normals times area, each coordinate by itself, filled up with points without area. */
 typedef struct panel {
     float *x, *y, *z, *nx, *ny, *nz; /* in one allocation, x owns it */
-    size_t padded;                   /* a multiple of LANES         */
+    size_t padded;                   /* a multiple of LANES          */
 } panel;
 
 static npg_status open_panel(panel *p, size_t count_max)
@@ -72,7 +72,7 @@ npg_status npg_sided_winding(npg_sided_cloud *c)
     NPG_TRY(open_panel(&all, c->count));
     fill_panel(&all, c, NULL, c->count);
     for (size_t i = 0; i < c->count; i++)
-        c->winding[i] = sum_panel(&all, c->points + 3 * i, c->soft_sq) / 12.5663706f;
+        c->winding[i] = sum_panel(&all, c->points + 3 * i, c->soft_sq) / FULL_ANGLE;
     npg_release(&all.x);
     return NPG_OK;
 }
@@ -92,8 +92,8 @@ static uint32_t root_of(const forest *f, uint32_t i, uint8_t *is_turned)
     return i;
 }
 
-/* The older (lower) root stays, so the result has one form; paths are shortened by hanging i under its root.
- */
+/* The older (lower) root stays, so the result has one form; paths are shortened
+ * by hanging i under its root. */
 static void join(forest *f, const npg_link *l)
 {
     uint8_t side_a, side_b;
@@ -134,7 +134,7 @@ npg_status npg_sided_grow_tree(npg_sided_cloud *c)
     for (size_t i = 0; i < c->link_count && !status; i++) join(&f, &c->links[i]);
     for (uint32_t k = 0; k < c->count && !status; k++) {
         root_of(&f, k, &turned);
-        if (turned) turn(c, k);
+        if (turned) turn_normal(c, k);
     }
     close_forest(&f);
     return status;
@@ -198,22 +198,23 @@ done:
     return status;
 }
 
-/* p->change = what turning patch k adds to the winding number everywhere.  Returns the change of the misfit,
- * summed over all points by area, per area of the patch. */
-static double try_patch(const npg_sided_cloud *c, patches *p, size_t k)
+/* p->change = what turning patch k over adds to the winding number everywhere.  Returns the change of the
+ * misfit, summed over all points by area, per area of the patch. */
+static double misfit_change(const npg_sided_cloud *c, patches *p, size_t k)
 {
     double sum = 0, area = 0;
     fill_panel(&p->panel, c, p->members + p->first[k], p->first[k + 1] - p->first[k]);
     for (size_t i = 0; i < c->count; i++) {
-        p->change[i] = -2 * sum_panel(&p->panel, c->points + 3 * i, c->soft_sq) / 12.5663706f;
-        sum += (double)c->area[i] * (misfit(c->winding[i] + p->change[i]) - misfit(c->winding[i]));
+        p->change[i] = -2 * sum_panel(&p->panel, c->points + 3 * i, c->soft_sq) / FULL_ANGLE;
+        sum += (double)c->area[i] *
+               (winding_misfit(c->winding[i] + p->change[i]) - winding_misfit(c->winding[i]));
     }
     for (size_t m = p->first[k]; m < p->first[k + 1]; m++) area += (double)c->area[p->members[m]];
     return sum / area;
 }
 
 /* How well patch k agrees with its surroundings, -1..1. */
-static double border_of(const npg_sided_cloud *c, const patches *p, size_t k, const uint32_t *patch_of)
+static double border_agreement(const npg_sided_cloud *c, const patches *p, size_t k, const uint32_t *patch_of)
 {
     double sum = 0, weight = 0;
     for (size_t m = p->first[k]; m < p->first[k + 1]; m++)
@@ -236,11 +237,11 @@ npg_status npg_sided_turn_patches(npg_sided_cloud *c, const uint32_t *patch_of, 
     for (int round = 0; round < PATCH_ROUNDS && turned && !status; round++) {
         turned = 0;
         for (size_t k = 0; k < p.count; k++) {
-            if (2 * (p.first[k + 1] - p.first[k]) > c->count)
-                continue; /* the whole's sign is decided apart */
-            double border = border_of(c, &p, k, patch_of), gain = -try_patch(c, &p, k);
+            /* More than half of the points: that is the sign of the whole, which face_out() decides. */
+            if (2 * (p.first[k + 1] - p.first[k]) > c->count) continue;
+            double border = border_agreement(c, &p, k, patch_of), gain = -misfit_change(c, &p, k);
             if (gain - BORDER_WEIGHT * border <= bar) continue;
-            for (size_t m = p.first[k]; m < p.first[k + 1]; m++) turn(c, p.members[m]);
+            for (size_t m = p.first[k]; m < p.first[k + 1]; m++) turn_normal(c, p.members[m]);
             for (size_t i = 0; i < c->count; i++) c->winding[i] += p.change[i];
             turned++;
         }

@@ -1,5 +1,5 @@
 /* Sides: what orient.c (the order of the steps) and sides.c (tree, patches, winding number) share: a
- * npg_sided_cloud whose normals have directions and look for their sides. */
+ * npg_sided_cloud whose normals have a direction each, and are to be turned to the side that is out. */
 #ifndef NPG_SIDES_H
 #define NPG_SIDES_H
 
@@ -8,7 +8,7 @@
 
 #include "pipeline/status.h"
 
-#define NPG_SIDE_NEIGHBOURS 12
+#define NPG_SIDE_NEIGHBOURS 12 /* of a point, itself among them; set by trial */
 
 typedef struct npg_link { /* two neighbours and how well their sides agree, -1..1 */
     uint32_t a, b;
@@ -26,7 +26,8 @@ typedef struct npg_sided_cloud { /* the points that are oriented together */
     size_t link_count;
 } npg_sided_cloud;
 
-/* n_a . (n_b reflected at the plane between the two points) */
+/* n_a . (n_b reflected at the plane halfway between the two points): 1 where the two lie on a circle and face
+ * the same way, -1 where one of them is turned over. */
 static inline float agreement(const npg_sided_cloud *c, uint32_t a, uint32_t b)
 {
     const float *p = c->points + 3 * (size_t)a, *q = c->points + 3 * (size_t)b;
@@ -39,14 +40,14 @@ static inline float agreement(const npg_sided_cloud *c, uint32_t a, uint32_t b)
     return mn - 2 * me * ne / length_sq;
 }
 
-static inline void turn(npg_sided_cloud *c, size_t i)
+static inline void turn_normal(npg_sided_cloud *c, size_t i)
 {
     for (size_t a = 0; a < 3; a++) c->normals[3 * i + a] = -c->normals[3 * i + a];
 }
 
-/* How far the winding number at a point is from that of a surface that faces out; spikes count no more
- * than 2. */
-static inline double misfit(float winding)
+/* How far the winding number at a point is from that of a surface that faces out;
+ * spikes count no more than 2. */
+static inline double winding_misfit(float winding)
 {
     double off = fmax(-2, fmin(2, (double)winding - 0.5));
     return off * off;

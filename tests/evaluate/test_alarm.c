@@ -205,8 +205,8 @@ static void frames_without_figures_are_passed_over(void **state)
 
 enum { SIDE = 20, VERTS = (SIDE + 1) * (SIDE + 1), EXTRA = 40 };
 
-/* A sheet of 1 x 1 in cells of 1 / SIDE, a point on every vertex; without a border each side goes on at the
- * other. */
+/* A sheet of 1 x 1 in cells of 1 / SIDE, a point on every vertex; without a border each side
+ * goes on at the other. */
 typedef struct sheet {
     npg_mesh *mesh;
     float points[3 * (VERTS + EXTRA)], vert_dist_sq[VERTS], vert_unit[3 * VERTS];

@@ -147,8 +147,8 @@ static void a_flattened_face_is_stretched_not_flipped(void **state)
 enum { FRAMES = 3, POINTS = 2000 };
 
 typedef struct scene {
-    double gap[FRAMES];   /* points lie this far outside the unit sphere              */
-    double share[FRAMES]; /* of the sphere from the north pole down that has points   */
+    double gap[FRAMES];   /* points lie this far outside the unit sphere            */
+    double share[FRAMES]; /* of the sphere from the north pole down that has points */
     double vert_scale[FRAMES];
     bool skipped[FRAMES], broken[FRAMES];
     /* seen */

@@ -1,5 +1,5 @@
-/* Forms: choosing them, what they refuse, what is in their files, and what stays when the disk or memory
- * ends. */
+/* Forms: choosing them, what they refuse, what is in their files, and what stays when
+ * the disk or memory ends. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -602,8 +602,8 @@ static void memory_does_not_grow_with_frames(void **state)
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
         bool is_glb = !strcmp(lists[i], "glb");
         size_t few = counted_for(lists[i], 12), many = counted_for(lists[i], 48);
-        /* a line of text for each pose of the file that is written, and what the text's buffer has to spare
-         */
+        /* a line of text for each pose of the file that is written, and what the text's
+         * buffer has to spare */
         size_t allowed = is_glb ? (48 - 12) * 1024 : 600;
         if (many > few + allowed) fail_msg("%s: %zu bytes for 12 frames, %zu for 48", lists[i], few, many);
         if (!is_glb) continue;

@@ -152,8 +152,8 @@ static void add_strip(npg_mesh *mesh, size_t first, float height, bool is_up)
         }
 }
 
-/* The strip rolled up around the line x = 0, z = 2: x becomes the arc, z the distance from the arc inwards.
- */
+/* The strip rolled up around the line x = 0, z = 2: x becomes the arc, z the distance
+ * from the arc inwards. */
 static void roll(double out[3], double x, double y, double z)
 {
     out[0] = (2 - z) * sin(x / 2);

@@ -1,5 +1,5 @@
-/* Metrics and random numbers: samples are uniform, figures are those worked out by hand, memory failures
- * clean. */
+/* Metrics and random numbers: samples are uniform, figures are those worked out by hand,
+ * memory failures clean. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -115,12 +115,12 @@ static const struct bad_file {
      "neither f4 nor f8"},
     {"a.npy", BYTES(NPY("\x36", "{'descr': [('x','<f4')], 'fortran_order': False, 'shape': (1,3)}")),
      "no plain type"},
+    /* the header ends within the type, its last byte is that of the memory */
     {"a.npy",
      BYTES(
          NPY("\x3f",
              "                                                   'descr': '>f") "4', 'fortran_order': True"),
-     "type (descr) is neither f4 nor f8"}, /* the header ends within the type, its last byte is that of the
-                                              memory */
+     "type (descr) is neither f4 nor f8"},
     {"a.npy", BYTES(NPY("\x36", "{'descr': '<f4', 'fortran_order': Maybe, 'shape': (1,3)}")),
      "fortran_order is not True or False"},
     {"a.npy", BYTES(NPY("\x36", "{'descr': '<f4', 'fortran_order': False, 'shape': (3,) }")), "not (N, 3)"},

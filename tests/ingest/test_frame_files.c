@@ -1,5 +1,5 @@
-/* Frame files: which files are the frames, in what order, with which numbers and gaps; what --frames chooses.
- */
+/* Frame files: which files are the frames, in what order, with which numbers and gaps;
+ * what --frames chooses. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -372,9 +372,8 @@ static void no_points_is_no_failure(void **state)
 {
     (void)state;
     static const char *const files[][2] = {
-        {"0.ply",
-         "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float "
-         "z\nend_header\n"},
+        {"0.ply", "ply\nformat ascii 1.0\nelement vertex 0\n"
+                  "property float x\nproperty float y\nproperty float z\nend_header\n"},
         {"0.xyz", "# nothing\n"},
         {"0.obj", "# nothing\n"},
         {"0.pts", "0\n"},

@@ -33,8 +33,8 @@ static void ops_agree_with_their_twins(void **state)
     check_all(device, sizes, 5);
 }
 
-/* The parameters of other devices compute right on this one: work-groups of many items, other vectors and
- * tiles. */
+/* The parameters of other devices compute right on this one: work-groups of many items,
+ * other vectors and tiles. */
 static void ops_agree_with_the_parameters_of_other_devices(void **state)
 {
     const char *const sets[] = {"wide", "narrow", "gpu"};

@@ -61,8 +61,8 @@ static void sides_from_nothing(void **state)
         if (which == 3) shape_box(points, truth, N, cube, &r);
         if (which == 4) shape_limbs(points, truth, N, &r);
         assert_int_equal(npg_normals_make(normals, points, N), NPG_OK);
-        /* a plate's rim is thinner than the neighbourhoods: its directions, and so its sides, are ambiguous
-         */
+        /* a plate's rim is thinner than the neighbourhoods: its directions, and so its
+         * sides, are ambiguous */
         assert_true(wrong_sides() < (which == 2 ? N / 25 : which == 4 ? N / 100 : N / 200));
     }
 }

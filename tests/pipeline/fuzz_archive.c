@@ -1,6 +1,6 @@
-/* Fuzz target of the states on disk, for libFuzzer: the bytes as they are, and with their checksum made
- * right, so that damage reaches what is behind the checksum.  Then every part of a state that is taken from
- * it. */
+/* Fuzz target of the states on disk, for libFuzzer: the bytes as they are,
+ * and with their checksum made right, so that damage reaches what is behind the checksum.
+ * Then every part of a state that is taken from it. */
 #include <string.h>
 #include <xxhash.h>
 

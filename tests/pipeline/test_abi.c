@@ -1,6 +1,6 @@
-/* The public interface as a program of another age sees it: layouts that must stay, structs that are longer
- * or shorter than ours, NULL and closed handles in every function (tests/abi.bats sees that none is left
- * out). */
+/* The public interface as a program of another age sees it: layouts that must stay,
+ * structs that are longer or shorter than ours, NULL and closed handles in every function
+ * (tests/abi.bats sees that none is left out). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,8 +27,8 @@ typedef struct layout {
 #type "." #member, offsetof(type, member), was                                                       \
     }
 
-/* Of version 0.1 on a machine with 64-bit pointers.  A new member goes to the end: then only the size grows.
- */
+/* Of version 0.1 on a machine with 64-bit pointers.  A new member goes to the end:
+ * then only the size grows. */
 static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_allocator, alloc, 16),
                                  AT(npg_allocator, release, 24),

@@ -24,17 +24,30 @@ typedef struct first_state {
     const char *text;
 } first_state;
 
-#define OFFSET(member) offsetof(first_state, member)
+#define AT(member) offsetof(first_state, member)
 
+/* clang-format off */
 static const npg_option first_table[] = {
-    {"test-flag", "A flag", NPG_OPTION_FLAG, OFFSET(flag), "no", 0, 0, NULL, NULL},
-    {"test-whole", "A number", NPG_OPTION_INT, OFFSET(whole), "5", -10, 1e15, NULL, NULL},
-    {"test-real", "A number", NPG_OPTION_REAL, OFFSET(real), "0.25", 0, 1, NULL, NULL},
-    {"test-choice", "A word", NPG_OPTION_CHOICE, OFFSET(choice), "two", 0, 0, "one|two|three", NULL},
-    {"test-text", "A text", NPG_OPTION_TEXT, OFFSET(text), "", 0, 0, NULL, NULL},
+    /* type        name           place       default  least  most  shown as or words */
+    NPG_ROW_FLAG  ("test-flag",   AT(flag),   "no",
+        "A flag"),
+    NPG_ROW_INT   ("test-whole",  AT(whole),  "5",     -10,   1e15, NULL,
+        "A number"),
+    NPG_ROW_REAL  ("test-real",   AT(real),   "0.25",  0,     1,    NULL,
+        "A number"),
+    NPG_ROW_CHOICE("test-choice", AT(choice), "two",   "one|two|three",
+        "A word"),
+    NPG_ROW_TEXT  ("test-text",   AT(text),   "",      NULL,
+        "A text"),
     {0}};
+/* clang-format on */
+/* clang-format off */
 static const npg_option last_table[] = {
-    {"test-last", "Behind a stage without options", NPG_OPTION_INT, 0, "1", 0, 9, NULL, NULL}, {0}};
+    /* type     name         place  default  least  most  shown as */
+    NPG_ROW_INT("test-last", 0,     "1",     0,     9,    NULL,
+        "Behind a stage without options"),
+    {0}};
+/* clang-format on */
 
 static const npg_stage first = {.name = "first", .options = first_table};
 static const npg_stage second = {.name = "second"};
@@ -135,7 +148,7 @@ static void bad_values_are_refused_and_change_nothing(void **state)
 static void a_table_outside_the_chain_gets_defaults(void **state)
 {
     (void)state;
-    const npg_option foreign[] = {{"foreign", "", NPG_OPTION_INT, 0, "42", 0, 99, NULL, NULL}, {0}};
+    const npg_option foreign[] = {NPG_ROW_INT("foreign", 0, "42", 0, 99, NULL, ""), {0}};
     npg_options *options = open_options();
     int64_t value = 0;
     npg_options_fill(options, foreign, &value);

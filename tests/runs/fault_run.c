@@ -62,15 +62,15 @@ static npg_status run(const char *input, const char *output, char **pairs, int p
     return status;
 }
 
-/* Whether what is under a final name in OUT is byte for byte that of the whole run; with all of it, or not.
- */
+/* Whether what is under a final name in OUT is byte for byte that of the whole run;
+ * with all of it, or not. */
 static int results_are_whole(const char *output, const char *whole, int is_all)
 {
     setenv("OUT", output, 1);
     setenv("WHOLE", whole, 1);
     if (is_all)
-        return system("diff -r \"$OUT/meshes\" \"$WHOLE/meshes\" && cmp \"$OUT/frames.jsonl\" "
-                      "\"$WHOLE/frames.jsonl\"") == 0;
+        return system("diff -r \"$OUT/meshes\" \"$WHOLE/meshes\" && "
+                      "cmp \"$OUT/frames.jsonl\" \"$WHOLE/frames.jsonl\"") == 0;
     return system(
                "cd \"$OUT\" 2>/dev/null || exit 0; for file in reference.ply frames.jsonl meshes/*.ply; do "
                "[ ! -e \"$file\" ] || cmp \"$file\" \"$WHOLE/$file\" || exit 1; done") == 0;

@@ -1,10 +1,13 @@
 /* Fault shim: makes a system fail under the command, by LD_PRELOAD.
  *
- *     NPG_FAULT=KIND:N[+]     the N-th write below NPG_FAULT_UNDER (N-th and all later ones with +) does
- * KIND: ENOSPC, EIO, SHORT (half of the bytes), EINTR; SYNC: the N-th fsync has EIO; RENAME: the N-th rename
- * has EIO NPG_FAULT_UNDER=DIR     absolute; only files in this folder count NPG_FAULT_MARK=FILE     appears
- * once the fault has happened NPG_FAULT_CLOCK=SECONDS the calendar clock jumps by this much to and fro with
- * every look at it NPG_FAULT_KERNEL=A=>B   in the OpenCL sources that are built, A is B */
+ *     NPG_FAULT=KIND:N[+]      the N-th write below NPG_FAULT_UNDER (N-th and all later ones with +) does
+ *                              KIND: ENOSPC, EIO, SHORT (half of the bytes), EINTR;
+ *                              SYNC: the N-th fsync has EIO; RENAME: the N-th rename has EIO
+ *     NPG_FAULT_UNDER=DIR      absolute; only files in this folder count
+ *     NPG_FAULT_MARK=FILE      appears once the fault has happened
+ *     NPG_FAULT_CLOCK=SECONDS  the calendar clock jumps by this much to and fro with every look at it
+ *     NPG_FAULT_KERNEL=A=>B    in the OpenCL sources that are built, A is B
+ */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>

@@ -5,14 +5,17 @@
 
 #include "pipeline/stage.h"
 
+/* clang-format off */
 static const npg_option fuzz_options[] = {
-    {"whole", "", NPG_OPTION_INT, 0, "1", -5, 1e6, NULL, NULL},
-    {"real", "", NPG_OPTION_REAL, 0, "0.5", -1e9, 1e9, NULL, NULL},
-    {"flag", "", NPG_OPTION_FLAG, 0, "no", 0, 0, NULL, NULL},
-    {"choice", "", NPG_OPTION_CHOICE, 0, "one", 0, 0, "one|two|three", NULL},
-    {"text", "", NPG_OPTION_TEXT, 0, "", 0, 0, NULL, NULL},
-    {"truth", "", NPG_OPTION_TEXT, 0, "", 0, 0, NULL, NULL},
+    /* type        name         place    default  least  most  shown as or words */
+    NPG_ROW_INT   ("whole",     0,       "1",     -5,    1e6,  NULL, ""),
+    NPG_ROW_REAL  ("real",      0,       "0.5",   -1e9,  1e9,  NULL, ""),
+    NPG_ROW_FLAG  ("flag",      0,       "no", ""),
+    NPG_ROW_CHOICE("choice",    0,       "one",   "one|two|three", ""),
+    NPG_ROW_TEXT  ("text",      0,       "",      NULL, ""),
+    NPG_ROW_TEXT  ("truth",     0,       "",      NULL, ""),
     {0}};
+/* clang-format on */
 
 static const npg_stage fuzz_stage = {.name = "fuzz", .options = fuzz_options};
 const npg_stage *const npg_chain[] = {&fuzz_stage, NULL};

@@ -1,5 +1,5 @@
-/* A device that the tests of a program share: open_device and close_device are their group's set-up and
- * teardown. */
+/* A device that the tests of a program share: open_device and close_device are their group's
+ * set-up and teardown. */
 #ifndef NPG_TEST_GROUP_DEVICE_H
 #define NPG_TEST_GROUP_DEVICE_H
 

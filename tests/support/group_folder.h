@@ -1,5 +1,5 @@
-/* A folder that the tests of a program share: open_folder and close_folder are their group's set-up and
- * teardown. */
+/* A folder that the tests of a program share: open_folder and close_folder are their group's
+ * set-up and teardown. */
 #ifndef NPG_TEST_GROUP_FOLDER_H
 #define NPG_TEST_GROUP_FOLDER_H
 

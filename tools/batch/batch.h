@@ -9,11 +9,11 @@
 
 /* How a capture ended, as OUT/<name>/verdict.json says it. */
 typedef struct npg_verdict {
-    bool is_known;     /* false: it has not been run to an end yet           */
-    char word[16];     /* done, partial, stopped, time, memory, bad input... */
+    bool is_known;     /* false: it has not been run to an end yet                               */
+    char word[16];     /* done, partial, stopped, time, memory, bad input...                     */
     int exit_code;     /* of the run; 75 for time, 6 for memory, 128 + n when killed by signal n */
-    char message[600]; /* why, "" when done                                 */
-    double seconds;    /* of the last start that did anything                */
+    char message[600]; /* why, "" when done                                                      */
+    double seconds;    /* of the last start that did anything                                    */
     size_t peak_bytes;
     bool was_done; /* this start found it done; not part of the file */
 } npg_verdict;
@@ -22,12 +22,12 @@ typedef struct npg_verdict {
 enum { NPG_BATCH_SEGMENTS_UNSAID, NPG_BATCH_SEGMENTS_ONE, NPG_BATCH_SEGMENTS_AUTO };
 
 typedef struct npg_capture {
-    char *name;            /* of its folder in the output; owned                      */
-    char *input, *output;  /* absolute paths; owned                                   */
-    npg_options *options;  /* of its run, input and output among them; owned          */
-    char *refusal;         /* why it is not even started, NULL: it is; owned          */
-    double max_time_s;     /* 0: no limit                                             */
-    int segments;          /* NPG_BATCH_SEGMENTS_..                                   */
+    char *name;            /* of its folder in the output; owned                           */
+    char *input, *output;  /* absolute paths; owned                                        */
+    npg_options *options;  /* of its run, input and output among them; owned               */
+    char *refusal;         /* why it is not even started, NULL: it is; owned               */
+    double max_time_s;     /* 0: no limit                                                  */
+    int segments;          /* NPG_BATCH_SEGMENTS_..                                        */
     bool of_mesh_vertices; /* its points are the vertices of meshes: nothing else is there */
     npg_verdict verdict;
 } npg_capture;
@@ -64,8 +64,8 @@ npg_status npg_batch_read_folder(npg_batch *batch, const npg_batch_given *given)
 npg_status npg_batch_add(npg_batch *batch, npg_capture **capture, const char *name);
 
 /* Set input, output and what the command line gives; the last step.  What leads out of the capture's folder
- * is left alone: the capture then has a refusal.  text: as the manifest or the listing has
- * it; a path that is not absolute is taken from `folder`. */
+ * is left alone: the capture then has a refusal.  text: as the manifest or the listing has it; a path that is
+ * not absolute is taken from `folder`. */
 npg_status npg_batch_finish(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
                             const npg_batch_given *given);
 

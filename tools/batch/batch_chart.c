@@ -69,8 +69,8 @@ static void draw_bar(npg_file *page, const chart *c)
     double bar = c->figures->bar;
     if (!isfinite(bar) || bar > c->top) return;
     npg_file_print(page,
-                   "<line class=\"bar\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"><title>bar: %.3g "
-                   "%%</title></line>\n",
+                   "<line class=\"bar\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\">"
+                   "<title>bar: %.3g %%</title></line>\n",
                    LEFT, WIDTH - RIGHT, y_of(c, bar), y_of(c, bar), bar);
 }
 
@@ -84,8 +84,8 @@ static void draw_cuts(npg_file *page, const chart *c)
         while (next < f->count && f->frames[next].number < first) next++;
         double x = x_of(c, next) - (x_of(c, 1) - x_of(c, 0)) / 2;
         npg_file_print(page,
-                       "<line class=\"cut\" x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\"><title>another "
-                       "reference from frame %lld</title></line>\n",
+                       "<line class=\"cut\" x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\">"
+                       "<title>another reference from frame %lld</title></line>\n",
                        x, x, TOP, HEIGHT - BOTTOM, first);
     }
 }
@@ -131,11 +131,11 @@ void npg_page_chart(npg_file *page, const npg_capture_figures *figures)
 {
     const chart c = {figures, upper_edge(figures)};
     if (!figures->count) return;
-    npg_file_print(
-        page,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
-        "role=\"img\"><title>error of every frame</title>\n",
-        WIDTH, HEIGHT, WIDTH, HEIGHT);
+    npg_file_print(page,
+                   "<svg xmlns=\"http://www.w3.org/2000/svg\" "
+                   "viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" role=\"img\">"
+                   "<title>error of every frame</title>\n",
+                   WIDTH, HEIGHT, WIDTH, HEIGHT);
     draw_axes(page, &c);
     draw_bar(page, &c);
     draw_cuts(page, &c);

@@ -131,8 +131,8 @@ static npg_status list_captures(npg_listing *names, const npg_batch *batch)
     return status;
 }
 
-/* The name of its folder in the output: without what can't be one (npg_batch_add()), and not that of
- * another. */
+/* The name of its folder in the output: without what can't be one (npg_batch_add()),
+ * and not that of another. */
 static void name_of(char *out, size_t size, const npg_batch *batch, const char *name)
 {
     enum { LONGEST = 190 };

@@ -28,7 +28,7 @@
 typedef struct manifest {
     npg_batch *batch;
     const npg_batch_given *given;
-    char *folder;     /* of the file; owned                        */
+    char *folder;     /* of the file; owned                          */
     npg_capture base; /* what "defaults" says; its options are owned */
 } manifest;
 
@@ -183,8 +183,8 @@ static npg_status check_top(json_t *root)
         bool known = !strcmp(key, "output") || !strcmp(key, "defaults") || !strcmp(key, "captures");
         if (!known)
             return npg_error(NPG_USAGE,
-                             "%s: a manifest has \"output\", \"defaults\" and \"captures\"; what "
-                             "holds for all captures stands in \"defaults\"",
+                             "%s: a manifest has \"output\", \"defaults\" and \"captures\"; "
+                             "what holds for all captures stands in \"defaults\"",
                              key);
     }
     if (defaults && !json_is_object(defaults)) return npg_error(NPG_USAGE, "defaults: not a JSON object");

@@ -12,13 +12,13 @@
 #include "tools/progress.h"
 
 static const char head[] =
-    "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\">\n<head>\n<meta "
-    "charset=\"utf-8\"/>\n"
+    "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\">\n"
+    "<head>\n<meta charset=\"utf-8\"/>\n"
     "<title>neupig batch</title>\n<style>\n"
     "body { font: 15px/1.45 sans-serif; color: #222; max-width: 66em; margin: 2em auto; padding: 0 1em; }\n"
     "table { border-collapse: collapse; width: 100%; }\n"
-    "th, td { text-align: left; padding: .25em .8em .25em 0; border-bottom: 1px solid #ddd; vertical-align: "
-    "top; }\n"
+    "th, td { text-align: left; padding: .25em .8em .25em 0; border-bottom: 1px solid #ddd; "
+    "vertical-align: top; }\n"
     "td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }\n"
     ".done { color: #1a7f37; } .partial { color: #9a6700; } .bad { color: #b42318; } .open { color: #777; }\n"
     "section { border-top: 2px solid #ddd; margin-top: 2em; }\n"
@@ -123,15 +123,16 @@ static void write_table(npg_file *page, const npg_batch *batch, const npg_captur
 {
     bool with_segments = npg_batch_has_segments(batch);
     npg_file_print(page,
-                   "<table>\n<tr><th>capture</th><th>verdict</th><th class=\"number\">good frames</th>%s"
+                   "<table>\n<tr><th>capture</th><th>verdict</th>"
+                   "<th class=\"number\">good frames</th>%s"
                    "<th class=\"number\">error, %%</th><th class=\"number\">worst</th>"
                    "<th class=\"number\">time</th><th class=\"number\">memory</th></tr>\n",
                    with_segments ? "<th>segments</th>" : "");
     for (size_t i = 0; i < batch->count; i++)
         write_row(page, &batch->captures[i], i, &figures[i], with_segments);
     npg_file_print(page,
-                   "</table>\n<p>The error is the median distance of a frame's points to the surface, in per "
-                   "cent of the capture's diagonal%s.</p>\n",
+                   "</table>\n<p>The error is the median distance of a frame's points to the surface, "
+                   "in per cent of the capture's diagonal%s.</p>\n",
                    with_segments ? ", or of the segment's where it has several" : "");
 }
 

@@ -5,8 +5,8 @@
 #include "pipeline/file.h"
 #include "tools/batch/batch_figures.h"
 
-/* Write OUT/batch.html.  figures: one for each capture.  A picture that can't be drawn is replaced by the
- * reason. */
+/* Write OUT/batch.html.  figures: one for each capture.  A picture that can't be drawn
+ * is replaced by the reason. */
 npg_status npg_batch_page_write(const npg_batch *batch, const npg_capture_figures *figures);
 
 /* ---- its parts ---- */

@@ -1,5 +1,5 @@
-/* Segments of a capture that was run with segments = auto: what OUT/<name>/segments.json tells (segments.h).
- */
+/* Segments of a capture that was run with segments = auto: what OUT/<name>/segments.json
+ * tells (segments.h). */
 #ifndef NPG_BATCH_SEGMENTS_H
 #define NPG_BATCH_SEGMENTS_H
 

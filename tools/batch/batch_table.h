@@ -6,9 +6,9 @@
 
 #include "tools/batch/batch.h"
 
-/* Write OUT/batch.json and OUT/batch.html with every capture of the batch, also those that other processes
- * do, as far as they are now, and print the table to `out` unless it is NULL.  Processes of one batch take
- * turns. */
+/* Write OUT/batch.json and OUT/batch.html with every capture of the batch, also those that
+ * other processes do, as far as they are now, and print the table to `out` unless it is NULL.
+ * Processes of one batch take turns. */
 npg_status npg_batch_report(npg_batch *batch, FILE *out);
 
 #endif

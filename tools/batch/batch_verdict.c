@@ -50,8 +50,8 @@ static void tell_topology(npg_verdict *v, const npg_capture *capture)
         const json_t *alarm = json_object_get(told, directions[d]);
         if (json_is_object(alarm))
             snprintf(v->message, sizeof v->message,
-                     "from frame %lld %s the reference no longer explains the points; \"segments\": "
-                     "\"auto\" takes another there",
+                     "from frame %lld %s the reference no longer explains the points; "
+                     "\"segments\": \"auto\" takes another there",
                      (long long)json_integer_value(json_object_get(alarm, "from_frame")), d ? "back" : "on");
     }
     json_decref(report);

@@ -29,9 +29,9 @@ void npg_verdict_read(npg_verdict *verdict, const npg_capture *capture);
 npg_status npg_verdict_write(const npg_capture *capture);
 npg_status npg_verdict_remove(const npg_capture *capture);
 
-/* Exit code of a batch: 75 when it was stopped before its end, 1 when a capture has failed or is not done, 7
- * when one is done with frames skipped or below the quality bar, else 0.  Captures of this process, or of
- * all. */
+/* Exit code of a batch: 75 when it was stopped before its end, 1 when a capture has failed
+ * or is not done, 7 when one is done with frames skipped or below the quality bar, else 0.
+ * Captures of this process, or of all. */
 int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped);
 
 /* An object of name, input, output and what verdict.json says. */

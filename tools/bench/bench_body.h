@@ -5,8 +5,8 @@
 #include "optimize/fit.h"
 
 typedef struct npg_bench_body {
-    npg_mesh *mesh;        /* a closed ellipsoid with normals, owned       */
-    npg_fit_frame *frames; /* T of them, with points; owned                */
+    npg_mesh *mesh;        /* a closed ellipsoid with normals, owned */
+    npg_fit_frame *frames; /* T of them, with points; owned          */
     size_t frame_count, point_count;
 } npg_bench_body;
 

@@ -23,8 +23,8 @@ bool npg_bench_wants(const char *only, const char *name);
 npg_status npg_bench_kernels(npg_meter *meter, const npg_bench_body *body, const char *only,
                              npg_bench_take *take, void *user);
 
-/* The same for what makes dense surfaces: of so many vertices, carried by samples and decoded by the network.
- */
+/* The same for what makes dense surfaces: of so many vertices, carried by samples
+ * and decoded by the network. */
 npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, npg_bench_take *take,
                            void *user);
 

@@ -16,8 +16,8 @@ typedef struct npg_spread {
 } npg_spread;
 
 typedef struct npg_timing {
-    double wall_s;                 /* median of one call                                           */
-    npg_spread busy_s;             /* of one call: processor seconds / units, or wall on a GPU     */
+    double wall_s;                 /* median of one call                                       */
+    npg_spread busy_s;             /* of one call: processor seconds / units, or wall on a GPU */
     npg_spread in_flops, in_bytes; /* multiply-add operations, and bytes, that the slices beside it
                                       would have done in the busy time of one call                 */
 } npg_timing;
@@ -28,8 +28,8 @@ typedef struct npg_meter {
     npg_buffer a, b;
     size_t repeat, groups, local;
     int rounds, vectors;
-    double round_flops, vector_bytes; /* of all items together                   */
-    double flops_per_s, bytes_per_s;  /* the best slices so far                  */
+    double round_flops, vector_bytes; /* of all items together  */
+    double flops_per_s, bytes_per_s;  /* the best slices so far */
 } npg_meter;
 
 npg_status npg_meter_open(npg_meter *meter, npg_device *device, size_t repeat);

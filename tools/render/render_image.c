@@ -89,8 +89,8 @@ static void shading_normal(double normal[3], const npg_scene *scene, const npg_r
     for (int k = 0; k < 3 && length > 0; k++) normal[k] /= length;
 }
 
-/* A light from the upper left behind the eye and a weaker one from the eye; insides of surfaces are reddish.
- */
+/* A light from the upper left behind the eye and a weaker one from the eye;
+ * insides of surfaces are reddish. */
 static void shade(float out[3], const npg_scene *scene, const npg_eye *eye, const npg_ray_hit *hit)
 {
     static const float inside[3] = {0.75f, 0.35f, 0.30f};

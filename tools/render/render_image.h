@@ -6,7 +6,7 @@
 
 typedef struct npg_eye {
     double position[3];
-    double axes[9];          /* rows of unit length: to the right, up, ahead     */
+    double axes[9];          /* rows of unit length: to the right, up, ahead      */
     double slope_x, slope_y; /* half the picture's width and height at distance 1 */
 } npg_eye;
 
@@ -15,8 +15,8 @@ typedef struct npg_image {
     uint8_t *pixels; /* height x width x 3, RGB, owned */
 } npg_image;
 
-/* Turn the eye: azimuth in degrees (0: along -z from the front, 90: from +x) and elevation; up: 1 for y, 2
- * for z. */
+/* Turn the eye: azimuth in degrees (0: along -z from the front, 90: from +x) and elevation;
+ * up: 1 for y, 2 for z. */
 void npg_eye_turn(npg_eye *eye, double azimuth, double elevation, int up);
 
 /* Place a turned eye so that all of `reach` (along its axes) is in the picture; *aspect is width / height of

@@ -8,11 +8,11 @@
 enum { NPG_COLOUR_PLAIN, NPG_COLOUR_VERTEX, NPG_COLOUR_NORMAL, NPG_COLOUR_IDENTITY }; /* words of --colour */
 
 typedef struct npg_scene {
-    npg_mesh *mesh; /* what rays meet, with vertex normals; owned                                    */
-    float *colours; /* V x 3, 0..1, owned                                                            */
+    npg_mesh *mesh; /* what rays meet, with vertex normals; owned */
+    float *colours; /* V x 3, 0..1, owned                         */
     float
         *ball_middle; /* clouds: the middle of each ball, owned; ball b has faces 8 b .. 8 b + 7; else NULL */
-    size_t shown, total; /* clouds: points drawn and points there                                        */
+    size_t shown, total; /* clouds: points drawn and points there */
 } npg_scene;
 
 /* Whether a file holds faces: a PLY that declares some, an OBJ with an f line. */

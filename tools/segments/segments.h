@@ -1,11 +1,10 @@
-/* Segments: a capture whose topology changes, as several runs with a reference each (neupig run --segments
- * auto).
+/* Segments: a capture whose topology changes, as several runs with a reference each
+ * (neupig run --segments auto).
  *
- * The first run is that of the whole capture, in OUT itself.  Where its alarm goes off (stages/alarm.h) it
+ * The first run is that of the whole capture, in OUT itself.  Where its alarm goes off (evaluate/alarm.h) it
  * ends; the frames on the keyframe's side are solved anew with the same keyframe, the others become a segment
  * with a keyframe of its own, and so on until every segment explains its frames.  The newer segment also
- * solves the
- * --overlap frames before the cut that its neighbour explains ("shared" in its frames.jsonl).
+ * solves the --overlap frames before the cut that its neighbour explains ("shared" in its frames.jsonl).
  *
  *     OUT/segment_<number>/       a job like any other; the number is that of its first own frame
  *     OUT/links/<b>_on_<a>.csv    each vertex of segment b on the surface of segment a, in a frame of both
@@ -30,9 +29,9 @@ enum { NPG_SEGMENTS_ONE, NPG_SEGMENTS_AUTO }; /* the words of --segments */
 /* The whole work.  NPG_USAGE for live sources, and where OUT holds the segments of something else. */
 npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter);
 
-/* Before neupig append or apply (the verb) takes a folder for that of one run.  NPG_USAGE: it holds several
- * segments (the message names them), or is one of several and `is_alone` (frames that came later belong to
- * all). */
+/* Before neupig append or apply (the verb) takes a folder for that of one run.
+ * NPG_USAGE: it holds several segments (the message names them), or is one of several and `is_alone`
+ * (frames that came later belong to all). */
 npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone);
 
 /* After neupig append has gone on with OUT: a list of one segment that is not of all frames any more goes. */
@@ -44,12 +43,12 @@ npg_status npg_segments_make_way(const npg_options *options);
 /* ---- between the files of segments ---- */
 
 typedef struct npg_segment {
-    int64_t first, last;               /* its own frames, places in the selection, both inclusive  */
-    int64_t shared_first, shared_last; /* frames before and after them that it solves as well      */
-    int64_t keyframe;                  /* number of the frame that must be the keyframe, -1: any   */
-    char folder[40];                   /* in OUT; "." for OUT itself                               */
-    bool is_partial;                   /* done with frames skipped, unexplained or below the bar   */
-    json_t *alarm;                     /* what cut it off from its neighbour, or NULL; owned       */
+    int64_t first, last;               /* its own frames, places in the selection, both inclusive */
+    int64_t shared_first, shared_last; /* frames before and after them that it solves as well     */
+    int64_t keyframe;                  /* number of the frame that must be the keyframe, -1: any  */
+    char folder[40];                   /* in OUT; "." for OUT itself                              */
+    bool is_partial;                   /* done with frames skipped, unexplained or below the bar  */
+    json_t *alarm;                     /* what cut it off from its neighbour, or NULL; owned      */
 } npg_segment;
 
 typedef struct npg_segments {
@@ -92,8 +91,8 @@ npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment)
 /* The overlaps with their links, written to OUT/links; *overlaps is a new reference. */
 npg_status npg_segments_link(json_t **overlaps, const npg_segments *s);
 
-/* OUT/segments.json in place of the partial one, and with several segments OUT/done.json.  overlaps: a loan.
- */
+/* OUT/segments.json in place of the partial one, and with several segments OUT/done.json.
+ * overlaps: a loan. */
 npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool is_partial);
 
 #endif

@@ -139,8 +139,8 @@ static npg_status link_pair(json_t *links, bool *is_linked, const npg_segments *
     return status;
 }
 
-/* The frames of an overlap, the nearest to the cut last; the links are made in the last one that both have.
- */
+/* The frames of an overlap, the nearest to the cut last; the links are made in the last
+ * one that both have. */
 static npg_status link_overlap(json_t *overlaps, const npg_segments *s, const npg_segment *a,
                                const npg_segment *b)
 {

@@ -100,8 +100,8 @@ static npg_status load(npg_segments *s, const char *name)
     for (size_t i = 0; i < json_array_size(list) && !status; i++) status = take(s, json_array_get(list, i));
     if (!status && s->count && !is_of_these(s, told))
         status = npg_error(NPG_USAGE,
-                           "%s holds segments of other frames; give --restart to discard what is there, or "
-                           "choose another output folder",
+                           "%s holds segments of other frames; "
+                           "give --restart to discard what is there, or choose another output folder",
                            s->output);
     if (!status && s->count && !strcmp(name, WHOLE))
         s->overlaps = json_incref(json_object_get(told, "overlaps"));
@@ -215,20 +215,20 @@ npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alo
     if (json_array_size(list) > 1 && !is_alone) {
         spell(text, sizeof text, list, folder);
         status = npg_error(NPG_USAGE,
-                           "%s holds a capture in %zu segments with a reference each; neupig %s takes one of "
-                           "them: %s",
+                           "%s holds a capture in %zu segments with a reference each; "
+                           "neupig %s takes one of them: %s",
                            folder, json_array_size(list), verb, text);
     } else if (json_array_size(list) > 1) {
-        status =
-            npg_error(NPG_USAGE,
-                      "%s holds a capture in %zu segments, and neupig %s goes on with one reference: run "
-                      "the frames that came later into a folder of their own (neupig run INPUT -o "
-                      "NEW --segments auto --frames FIRST:), or all of them anew (--restart)",
-                      folder, json_array_size(list), verb);
+        status = npg_error(NPG_USAGE,
+                           "%s holds a capture in %zu segments, and neupig %s goes on with one reference: "
+                           "run the frames that came later into a folder of their own "
+                           "(neupig run INPUT -o NEW --segments auto --frames FIRST:), "
+                           "or all of them anew (--restart)",
+                           folder, json_array_size(list), verb);
     } else if (is_alone && is_part(folder)) {
         status = npg_error(NPG_USAGE,
-                           "%s is one segment of a capture; neupig %s would part it from the others: run the "
-                           "frames that came later into a folder of their own",
+                           "%s is one segment of a capture; neupig %s would part it from the others: "
+                           "run the frames that came later into a folder of their own",
                            folder, verb);
     }
     json_decref(told);

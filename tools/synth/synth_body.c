@@ -15,7 +15,7 @@ struct npg_body {
     float *weights; /* V x NPG_BONES, rows sum to 1; walking figures only */
     bool is_welded; /* the surface at rest lies in the pose `weld`        */
     npg_rigid weld[NPG_BONES];
-    size_t bar_verts; /* the ball's come after them                   */
+    size_t bar_verts; /* the ball's come after them */
 };
 
 /* ---- skin of the walker ---- */
@@ -117,8 +117,8 @@ static void pose_bar(const npg_body *body, float *vert_pos, double phase)
         double y = (double)p[1], turn = twist * y, angle = curvature * y;
         double x = cos(turn) * (double)p[0] + sin(turn) * (double)p[2];
         double z = -sin(turn) * (double)p[0] + cos(turn) * (double)p[2];
-        /* The middle line is an arc of that curvature through the origin; (1 - cos a) / k without dividing by
-         * 0. */
+        /* The middle line is an arc of that curvature through the origin;
+         * (1 - cos a) / k without dividing by 0. */
         double half = 0.5 * angle, ratio = fabs(half) < 1e-9 ? 1 : sin(half) / half;
         double line_x = y * ratio * sin(half), line_y = y * ratio * cos(half);
         vert_pos[3 * v] = (float)(line_x + x * cos(angle));

@@ -5,8 +5,8 @@
 #include "pipeline/mesh.h"
 
 /* The words of --body.  HANDS: a walker whose right hand has grown into its hip and leaves it at the change.
- * TWO: the bar, beside which a ball appears at the change.  GONE: the bar with a ball that disappears there.
- */
+ * TWO: the bar, beside which a ball appears at the change.  GONE: the bar with a ball
+ * that disappears there. */
 enum { NPG_BODY_WALKER, NPG_BODY_BAR, NPG_BODY_HANDS, NPG_BODY_TWO, NPG_BODY_GONE, NPG_BODIES };
 
 typedef struct npg_body npg_body;
@@ -24,9 +24,9 @@ const npg_mesh *npg_body_rest(const npg_body *body);
 
 /* A moment of the motion. */
 typedef struct npg_moment {
-    double phase;  /* cycles, starting at rest's neighbourhood             */
-    double travel; /* metres that a walking figure goes forward per cycle  */
-    double since;  /* frames since the change; only for a changed body     */
+    double phase;  /* cycles, starting at rest's neighbourhood            */
+    double travel; /* metres that a walking figure goes forward per cycle */
+    double since;  /* frames since the change; only for a changed body    */
 } npg_moment;
 
 /* The positions of its V vertices (V x 3) at a moment. */

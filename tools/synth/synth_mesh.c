@@ -6,17 +6,17 @@
 #include "geometry/mesh_tools.h"
 #include "tools/synth/synth_body.h"
 
-/* Each cube is cut into six tetrahedra around its diagonal, so that neighbours share their faces' cuts and
- * the result is closed and manifold by construction.  Corner c of a cube is at (c & 1, c >> 1 & 1, c >> 2).
- */
+/* Each cube is cut into six tetrahedra around its diagonal, so that neighbours
+ * share their faces' cuts and the result is closed and manifold by construction.
+ * Corner c of a cube is at (c & 1, c >> 1 & 1, c >> 2). */
 static const int tetrahedra[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
                                      {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
 
 typedef struct field {
     size_t size[3]; /* nodes along each axis */
     double lo[3], cell;
-    double *value;      /* at every node; never 0                                             */
-    uint32_t (*cut)[7]; /* the vertex on the edge from a node in each of 7 directions, + 1     */
+    double *value;      /* at every node; never 0                                          */
+    uint32_t (*cut)[7]; /* the vertex on the edge from a node in each of 7 directions, + 1 */
     float *vert_pos;
     uint32_t *faces;
     size_t vert_count, vert_room, face_count, face_room;
@@ -105,8 +105,8 @@ static npg_status march_tetrahedron(field *f, const size_t corner[4])
     if (in == 2) {
         for (int e = 0; e < 4; e++)
             NPG_TRY(cut_edge(f, corner[inside[e == 1 || e == 2]], corner[outside[e >= 2]], &v[e]));
-        /* v: (i0,o0) (i1,o0) (i1,o1) (i0,o1), a quad; its sense follows the parity of the order of corners.
-         */
+        /* v: (i0,o0) (i1,o0) (i1,o1) (i0,o1), a quad; its sense follows the parity
+         * of the order of corners. */
         bool odd = (inside[0] + inside[1]) % 2 == 0;
         NPG_TRY(odd ? add_face(f, v[0], v[1], v[2]) : add_face(f, v[0], v[2], v[1]));
         return odd ? add_face(f, v[0], v[2], v[3]) : add_face(f, v[0], v[3], v[2]);
@@ -203,8 +203,8 @@ static npg_status check_closed(const npg_mesh *mesh)
     if (facts.border_edges || facts.crowded_edges || facts.misoriented_edges || facts.degenerate_faces ||
         components != 1 || npg_mesh_volume(mesh) <= 0)
         return npg_error(NPG_FAILED,
-                         "the body's surface is not one closed manifold (%zu border, %zu crowded, %zu turned "
-                         "edges, %zu faces without area, %zu parts); try a smaller --cell",
+                         "the body's surface is not one closed manifold (%zu border, %zu crowded, "
+                         "%zu turned edges, %zu faces without area, %zu parts); try a smaller --cell",
                          facts.border_edges, facts.crowded_edges, facts.misoriented_edges,
                          facts.degenerate_faces, components);
     return NPG_OK;

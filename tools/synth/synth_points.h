@@ -5,16 +5,16 @@
 #include "pipeline/mesh.h"
 
 typedef struct npg_scan {
-    int64_t point_count; /* N per frame                                                                 */
-    bool vary;           /* N / 2 .. N instead, drawn for each frame                                    */
+    int64_t point_count; /* N per frame                              */
+    bool vary;           /* N / 2 .. N instead, drawn for each frame */
     double noise; /* Gaussian, deviation in % of the diagonal; along the ray with cameras, else each axis */
-    double outliers; /* % of the points replaced by uniform ones in 1.2 x the frame's box            */
-    int64_t holes;   /* balls of 6 % of the diagonal cut out of every frame                         */
-    int64_t cameras; /* 0: the whole surface; else a ring of that many depth cameras                */
-    int64_t width;   /* of a camera's picture, pixels; height is the same                           */
+    double outliers; /* % of the points replaced by uniform ones in 1.2 x the frame's box */
+    int64_t holes;   /* balls of 6 % of the diagonal cut out of every frame               */
+    int64_t cameras; /* 0: the whole surface; else a ring of that many depth cameras      */
+    int64_t width;   /* of a camera's picture, pixels; height is the same                 */
     uint64_t seed;
-    double diagonal;  /* of the first frame's box      */
-    double centre[3]; /* what the cameras look at      */
+    double diagonal;  /* of the first frame's box */
+    double centre[3]; /* what the cameras look at */
 } npg_scan;
 
 typedef struct npg_scanned {
@@ -24,8 +24,8 @@ typedef struct npg_scanned {
 
 void npg_scanned_close(npg_scanned *points);
 
-/* The points of one frame of a moving surface.  points is emptied first.  NPG_BAD_INPUT when no camera sees
- * it. */
+/* The points of one frame of a moving surface.  points is emptied first.
+ * NPG_BAD_INPUT when no camera sees it. */
 npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame);
 
 /* ---- between the files of a capture ---- */

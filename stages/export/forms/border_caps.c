@@ -45,7 +45,8 @@ static size_t next_edge(const border *edges, const uint8_t *is_used, size_t coun
     return low < count && edges[low].from == from ? low : count;
 }
 
-static size_t fill(uint32_t *caps, const border *edges, uint8_t *is_used, size_t count)
+/* A fan around the first vertex of every loop. */
+static size_t fill_loops(uint32_t *caps, const border *edges, uint8_t *is_used, size_t count)
 {
     size_t made = 0;
     for (size_t start = 0; start < count; start++) {
@@ -77,7 +78,7 @@ npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, const uint32_t *f
         qsort(edges, count, sizeof *edges, by_from);
         status = npg_alloc_array(&is_used, NPG_FOR_FILES, count, 1);
         if (!status) status = npg_alloc_array(caps, NPG_FOR_FILES, count, 3 * sizeof **caps);
-        if (!status) *cap_count = fill(*caps, edges, is_used, count);
+        if (!status) *cap_count = fill_loops(*caps, edges, is_used, count);
     }
     npg_release(&edges);
     npg_release(&is_used);

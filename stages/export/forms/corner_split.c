@@ -6,7 +6,7 @@
 /* The copies of one vertex are a list: the vertex itself, then next[] until UINT32_MAX. */
 typedef struct splitting {
     npg_corner_split *split;
-    uint32_t *next;   /* one per copy  */
+    uint32_t *next;   /* one per copy                                */
     uint8_t *is_used; /* one per vertex: it has a texture coordinate */
 } splitting;
 

@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-#define FLOAT_STEPS 16777216 /* float rounds by at most 1 / this of the largest coordinate */
-#define KEPT_SHARE  1e-6     /* of the box: what positions may lose                        */
+#define FLOAT_STEPS 16777216 /* 2^24: float rounds by at most 1 / this of the largest coordinate */
+#define KEPT_SHARE  1e-6     /* of the box: what positions may lose, a micrometre in a metre */
 
 extern const npg_form npg_form_obj, npg_form_pc2, npg_form_mdd, npg_form_glb, npg_form_usda, npg_form_npz,
     npg_form_vdb;
@@ -12,15 +12,15 @@ extern const npg_form npg_form_obj, npg_form_pc2, npg_form_mdd, npg_form_glb, np
 const npg_form *const npg_forms[] = {&npg_form_obj,  /* beside PLY                           */
                                      &npg_form_pc2,  /* 3ds Max, Blender, Marvelous Designer */
                                      &npg_form_mdd,  /* LightWave, Blender, three.js         */
-                                     &npg_form_glb,  /* the web, Blender, Unreal */
-                                     &npg_form_usda, /* USD tools, Unreal */
+                                     &npg_form_glb,  /* the web, Blender, Unreal             */
+                                     &npg_form_usda, /* USD tools, Unreal                    */
                                      &npg_form_npz,  /* NumPy                                */
-                                     &npg_form_vdb,  /* Houdini, Blender */
+                                     &npg_form_vdb,  /* Houdini, Blender                     */
                                      NULL};
 
 /* ---- choosing ---- */
 
-static int find(const char *name, size_t length)
+static int find_form(const char *name, size_t length)
 {
     for (int i = 0; npg_forms[i]; i++)
         if (strlen(npg_forms[i]->name) == length && !strncmp(npg_forms[i]->name, name, length)) return i;
@@ -41,11 +41,11 @@ static npg_status refuse_name(const char *name, size_t length)
 npg_status npg_forms_choose(npg_form_choice *choice, const char *list, bool is_obj)
 {
     bool has_ply = false;
-    int obj = find("obj", 3);
+    int obj = find_form("obj", 3);
     *choice = (npg_form_choice){.is_obj = is_obj};
     for (const char *name = list; *name;) {
         size_t length = strcspn(name, ",");
-        int form = find(name, length);
+        int form = find_form(name, length);
         bool is_ply = length == 3 && !strncmp(name, "ply", 3);
         if (form < 0 && !is_ply) return refuse_name(name, length);
         has_ply = has_ply || is_ply;
@@ -92,9 +92,10 @@ static npg_status check_floats(const npg_form *form, const npg_form_facts *facts
 {
     if (facts->largest / FLOAT_STEPS <= KEPT_SHARE * facts->diagonal) return NPG_OK;
     return npg_error(NPG_USAGE,
-                     "%s can't hold the capture: its numbers have 24 bits, and coordinates up to %g in a box "
-                     "of diagonal %g would lose more than a millionth of it; set centre to write them around "
-                     "0",
+                     "%s can't hold the capture: its numbers have 24 bits, "
+                     "and coordinates up to %g in a box of diagonal %g "
+                     "would lose more than a millionth of it; "
+                     "set centre to write them around 0",
                      form->name, facts->largest, facts->diagonal);
 }
 

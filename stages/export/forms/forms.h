@@ -1,16 +1,18 @@
 /* Forms: what other programs read, made of a run's meshes in one pass over the frames.
  *
- *     OUT/motion.pc2, motion.mdd   point caches for OUT/reference.obj, same order of the vertices
- *     OUT/motion.glb               glTF with morph targets; longer captures motion_000.glb, motion_001.glb
- * ... OUT/motion.usda              points as time samples OUT/motion.npz               arrays for NumPy
- *     OUT/obj/<prefix>_0000.obj    a second sequence, where the first one is PLY
- *     OUT/volumes/<prefix>_0000.vdb  level set of every frame;  OUT/latents/window_000000.vdb
- *     OUT/exports.jsonl            one line per file of these, with size and checksum
+ *     OUT/motion.pc2, motion.mdd     point caches for OUT/reference.obj, same order of the vertices
+ *     OUT/motion.glb                 glTF with morph targets; motion_000.glb and so on when it is long
+ *     OUT/motion.usda                points as time samples
+ *     OUT/motion.npz                 arrays for NumPy
+ *     OUT/obj/<prefix>_0000.obj      a second sequence, where the first one is PLY
+ *     OUT/volumes/<prefix>_0000.vdb  level set of every frame
+ *     OUT/latents/window_000000.vdb  latent grids of every window
+ *     OUT/exports.jsonl              one line per file of these, with size and checksum
  *
- * The mesh sequence is written while frames are solved, which is not the order of time, and is what a run
- * that was broken off goes on from.  The other forms are made from those files when all are there: one pass
- * in the order of time writes all of them.  So no form needs a state of its own to be resumed, a broken-off
- * pass is simply made again, and the bytes do not depend on how often that happened.  One file per form
+ * The mesh sequence is written while frames are solved, which is not the order of time, and is what a
+ * resumed run continues.  The other forms are made from those files when all are there: one pass in the
+ * order of time writes all of them.  So no form needs a state of its own to be resumed, a broken-off pass is
+ * simply made again, and the bytes do not depend on how often that happened.  One file per form
  * (write_<form>.c), one row per form in forms.c.
  *
  * Threads: one pass belongs to one thread. */
@@ -27,44 +29,44 @@ typedef struct npg_form_log npg_form_log;
 
 /* What a writer may know before the first pose.  Everything is as written: after axes, scale and centre. */
 typedef struct npg_form_facts {
-    const char *output;              /* OUT                                                       */
-    const char *prefix;              /* of files that are numbered                                */
-    int width;                       /* digits of their number at least                           */
-    size_t vert_count;               /* V                                                         */
-    size_t face_count;               /* F                                                         */
-    const uint32_t *faces;           /* F x 3, counter-clockwise from outside                     */
-    const float *rest;               /* V x 3: the reference                                      */
-    const uint8_t *colours;          /* V x 4 RGBA, sRGB as scanners write it, or NULL            */
-    const float *uvs;                /* V x 2 or NULL                                             */
-    const float *corner_uvs;         /* F x 3 x 2 or NULL: where vertices have more than one      */
-    const char *like;                /* OBJ file whose lines an OBJ keeps, or NULL                */
-    bool turns_faces;                /* and its faces are to be turned over                       */
-    bool has_normals;                /* poses have normals                                        */
-    int64_t pose_count;              /* T, meshes there are; -1: not known yet                    */
+    const char *output;              /* OUT                                                  */
+    const char *prefix;              /* of files that are numbered                           */
+    int width;                       /* digits of their number at least                      */
+    size_t vert_count;               /* V                                                    */
+    size_t face_count;               /* F                                                    */
+    const uint32_t *faces;           /* F x 3, counter-clockwise from outside                */
+    const float *rest;               /* V x 3: the reference                                 */
+    const uint8_t *colours;          /* V x 4 RGBA, sRGB as scanners write it, or NULL       */
+    const float *uvs;                /* V x 2 or NULL                                        */
+    const float *corner_uvs;         /* F x 3 x 2 or NULL: where vertices have more than one */
+    const char *like;                /* OBJ file whose lines an OBJ keeps, or NULL           */
+    bool turns_faces;                /* and its faces are to be turned over                  */
+    bool has_normals;                /* poses have normals                                   */
+    int64_t pose_count;              /* T, meshes there are; -1: not known yet               */
     int64_t first_index, last_index; /* of the poses                                         */
     double fps;
     double metres_per_unit;
-    bool is_z_up;                          /* else y                                                    */
-    double largest, diagonal;              /* coordinate, and of the box; 0: not known yet              */
-    double longest;                        /* side of the box                                           */
-    double voxel_share;                    /* a level set's voxel, in longest sides                     */
-    bool has_grids;                        /* OUT/job holds the latent grids of this run's windows      */
+    bool is_z_up;                          /* else y                                                      */
+    double largest, diagonal;              /* coordinate, and of the box; 0: not known yet                */
+    double longest;                        /* side of the box                                             */
+    double voxel_share;                    /* a level set's voxel, in longest sides                       */
+    bool has_grids;                        /* OUT/job holds the latent grids of this run's windows        */
     const struct npg_placement *placement; /* the capture's coordinates to these; NULL: they are the same */
-    npg_form_log *log;                     /* where files are noted                                     */
+    npg_form_log *log;                     /* where files are noted                                       */
 } npg_form_facts;
 
 typedef struct npg_pose {
-    int64_t index, number; /* of the frame                  */
-    const float *pos;      /* V x 3                         */
-    const float *normals;  /* V x 3 or NULL (has_normals)   */
+    int64_t index, number; /* of the frame                */
+    const float *pos;      /* V x 3                       */
+    const float *normals;  /* V x 3 or NULL (has_normals) */
 } npg_pose;
 
-/* A form.  state is zeroed before open; close is called after open in any case and removes what is not
- * finished. */
+/* A form.  state is zeroed before open; close is called after open in any case and removes
+ * what is not finished. */
 typedef struct npg_form {
     const char *name, *help;
-    bool is_float;  /* keeps positions as float: far from 0 that is too coarse                     */
-    bool is_steady; /* has no times of its own: a frame without a mesh repeats the one before it   */
+    bool is_float;       /* keeps positions as float: far from 0 that is too coarse                   */
+    bool has_fixed_rate; /* has no times of its own: a frame without a mesh repeats the one before it */
     size_t state_size;
     /* NPG_USAGE when the form can't hold such a capture (vert_count at most, pose_count -1 where unknown).
      * May be NULL. */
@@ -109,7 +111,7 @@ uint64_t npg_forms_bytes(const npg_form_choice *choice, const npg_form_facts *fa
 typedef struct npg_form_watch {
     bool (*should_stop)(void *user);
     void *user;
-    int64_t repeated; /* out: frames without a mesh that steady forms filled */
+    int64_t repeated; /* out: frames without a mesh that forms of a fixed rate filled */
 } npg_form_watch;
 
 /* Remove all that forms of earlier runs left in OUT. */

@@ -59,7 +59,7 @@ static bool is_numbered(const char *name)
     const char *dot = strrchr(name, '.'), *digits = dot;
     while (digits > name && isdigit((unsigned char)digits[-1])) digits--;
     if (dot - digits < 4) return false;
-    if (digits - name > 1 && digits[-1] == '-') digits--;
+    if (digits - name > 1 && digits[-1] == '-') digits--; /* numbers may be negative */
     return digits - name > 1 && digits[-1] == '_';
 }
 
@@ -71,6 +71,7 @@ static npg_status clear_folder(const char *folder, bool (*is_ours)(const char *n
     for (struct dirent *entry; !status && (entry = readdir(listing));) {
         char name[NAME_MAX + 1], *path;
         size_t length = strlen(entry->d_name);
+        /* What a killed run left half-written (pipeline/file.h): ".<name>.part". */
         bool is_part = entry->d_name[0] == '.' && length > 6 && !strcmp(entry->d_name + length - 5, ".part");
         snprintf(name, sizeof name, "%.*s", (int)(is_part ? length - 6 : length), entry->d_name + is_part);
         if (!is_ours(name)) continue;
@@ -155,11 +156,11 @@ static npg_status each_line(const npg_form_facts *facts, npg_visit_line *visit, 
     return status;
 }
 
-static npg_status give(forms_pass *p, int64_t index, int64_t number, bool steady_only)
+static npg_status pass_pose(forms_pass *p, int64_t index, int64_t number, bool fixed_rate_only)
 {
     const npg_pose pose = {index, number, p->mesh->vert_pos, p->mesh->vert_normals};
     for (int i = 0; npg_forms[i]; i++)
-        if (p->states[i] && (!steady_only || npg_forms[i]->is_steady))
+        if (p->states[i] && (!fixed_rate_only || npg_forms[i]->has_fixed_rate))
             NPG_TRY(npg_forms[i]->pose(p->states[i], &pose));
     return NPG_OK;
 }
@@ -184,14 +185,14 @@ static npg_status read_pose(forms_pass *p, const char *file)
     return status;
 }
 
-static bool has_steady(const npg_form_choice *choice)
+static bool any_fixed_rate(const npg_form_choice *choice)
 {
     for (int i = 0; npg_forms[i]; i++)
-        if (choice->is_chosen[i] && npg_forms[i]->is_steady) return true;
+        if (choice->is_chosen[i] && npg_forms[i]->has_fixed_rate) return true;
     return false;
 }
 
-static npg_status take_line(void *user, const json_t *frame, const char *line, size_t size)
+static npg_status write_line_poses(void *user, const json_t *frame, const char *line, size_t size)
 {
     forms_pass *p = user;
     const char *file = json_string_value(json_object_get(frame, "file"));
@@ -199,13 +200,14 @@ static npg_status take_line(void *user, const json_t *frame, const char *line, s
     (void)line, (void)size;
     if (p->watch->should_stop && p->watch->should_stop(p->watch->user)) return NPG_STOPPED;
     if (!file) return NPG_OK;
-    for (int64_t i = p->index + 1; p->mesh && has_steady(p->choice) && i < index; i++) {
-        NPG_TRY(give(p, i, i, true));
+    /* Frames without a mesh since the last one: forms of a fixed rate repeat the mesh before them. */
+    for (int64_t i = p->index + 1; p->mesh && any_fixed_rate(p->choice) && i < index; i++) {
+        NPG_TRY(pass_pose(p, i, i, true));
         p->watch->repeated++;
     }
     NPG_TRY(read_pose(p, file));
     p->index = index;
-    return give(p, index, json_integer_value(json_object_get(frame, "number")), false);
+    return pass_pose(p, index, json_integer_value(json_object_get(frame, "number")), false);
 }
 
 /* ---- the pass ---- */
@@ -248,7 +250,7 @@ static npg_status write_forms(forms_pass *p)
     NPG_TRY(npg_forms_check(p->choice, facts));
     NPG_TRY(open_log(p));
     NPG_TRY(open_writers(p));
-    NPG_TRY(each_line(facts, take_line, p));
+    NPG_TRY(each_line(facts, write_line_poses, p));
     return finish_writers(p);
 }
 

@@ -8,6 +8,7 @@
 
 #include "ingest/formats/number.h"
 
+/* Constants of OpenGL that glTF 2.0 uses. */
 enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
 enum { UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126 };
 
@@ -79,7 +80,7 @@ static void add_node(builder *b)
     const npg_form_facts *facts = b->layout->facts;
     add(b, "\"nodes\":[{\"name\":\"capture\",\"mesh\":0");
     if (facts->is_z_up) {
-        add(b, ",\"rotation\":[");
+        add(b, ",\"rotation\":["); /* x, y, z, w: a quarter turn about x, z up becomes y up */
         add_number(b, -sqrt(0.5));
         add(b, ",0,0,");
         add_number(b, sqrt(0.5));
@@ -100,24 +101,25 @@ static void add_head(builder *b)
 {
     const npg_glb_layout *layout = b->layout;
     add(b,
-        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"neupig "
-        "%s\",\"extras\":{\"segment\":%lld,\"segments\":"
-        "%lld,\"first_frame\":%lld,\"frames\":%zu,\"fps\":",
+        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"neupig %s\","
+        "\"extras\":{\"segment\":%lld,\"segments\":%lld,"
+        "\"first_frame\":%lld,\"frames\":%zu,\"fps\":",
         npg_version(), (long long)layout->segment, (long long)layout->segments,
         (long long)layout->first_index, layout->pose_count);
     add_number(b, layout->facts->fps);
     add(b, "}},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],");
     add_node(b);
-    add(b, "\"materials\":[{\"name\":\"surface\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,"
-           "\"roughnessFactor\":0.9},\"doubleSided\":true}],");
+    add(b, "\"materials\":[{\"name\":\"surface\","
+           "\"pbrMetallicRoughness\":{\"metallicFactor\":0,\"roughnessFactor\":0.9},"
+           "\"doubleSided\":true}],");
 }
 
 static void add_mesh(builder *b)
 {
     const npg_form_facts *facts = b->layout->facts;
     int next = 2; /* accessors: indices 0, positions 1, then what there is */
-    add(b, "\"meshes\":[{\"name\":\"surface\",\"primitives\":[{\"indices\":0,\"material\":0,\"attributes\":{"
-           "\"POSITION\":1");
+    add(b, "\"meshes\":[{\"name\":\"surface\",\"primitives\":["
+           "{\"indices\":0,\"material\":0,\"attributes\":{\"POSITION\":1");
     if (facts->has_normals) add(b, ",\"NORMAL\":%d", next++);
     if (facts->colours) add(b, ",\"COLOR_0\":%d", next++);
     if (b->layout->has_uvs) add(b, ",\"TEXCOORD_0\":%d", next++);
@@ -132,9 +134,9 @@ static void add_mesh(builder *b)
     add(b, "%s}],", b->layout->pose_count > 1 ? "]" : ""); /* weights at rest: VTK crashes without */
     if (b->layout->pose_count > 1)
         add(b,
-            "\"animations\":[{\"name\":\"motion\",\"samplers\":[{\"input\":%d,\"output\":%d,"
-            "\"interpolation\":\"LINEAR\"}],\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,\"path\":"
-            "\"weights\"}}]}],",
+            "\"animations\":[{\"name\":\"motion\","
+            "\"samplers\":[{\"input\":%d,\"output\":%d,\"interpolation\":\"LINEAR\"}],"
+            "\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"weights\"}}]}],",
             next, next + 1);
 }
 

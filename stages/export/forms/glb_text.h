@@ -16,13 +16,13 @@ typedef struct npg_glb_range { /* of an accessor */
  *     per further pose: position deltas G float3, normal deltas | times T float | weights T (T - 1) float */
 typedef struct npg_glb_layout {
     const npg_form_facts *facts;
-    size_t vert_count;         /* G                                   */
-    size_t pose_count;         /* T of this mesh, NPG_GLB_POSES most  */
-    int64_t first_index;       /* of its frames                       */
-    int64_t segment, segments; /* which of how many files             */
+    size_t vert_count;         /* G                                  */
+    size_t pose_count;         /* T of this mesh, NPG_GLB_POSES most */
+    int64_t first_index;       /* of its frames                      */
+    int64_t segment, segments; /* which of how many files            */
     bool has_uvs;
-    npg_glb_range base, delta[NPG_GLB_POSES]; /* delta[0] is not used   */
-    float times[NPG_GLB_POSES];               /* seconds from the first pose         */
+    npg_glb_range base, delta[NPG_GLB_POSES]; /* delta[0] is not used        */
+    float times[NPG_GLB_POSES];               /* seconds from the first pose */
 } npg_glb_layout;
 
 /* Offsets in the binary part. */

@@ -8,7 +8,7 @@
 #include "kernels/path_spectrum.h"
 #include "pipeline/memory.h"
 
-#define SWEEPS 30
+#define SWEEPS 30 /* of Jacobi's rotations, more than a matrix of 30 channels needs */
 
 /* ---- the solve ---- */
 
@@ -37,6 +37,7 @@ npg_status npg_features_solve(double *values, int nodes, int channels, double sc
     NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FILES, n + 2, n * sizeof *basis));
     double *line = basis + n * n, *eigen = line + n;
     npg_status status = npg_path_spectrum(basis, eigen, nodes, degree);
+    /* Into the basis that makes the matrix diagonal, a division, and back, as in kernels/sobolev.cl. */
     for (int back = 0; back < 2 && !status; back++) {
         for (size_t axis = 0, step = c; axis < 3; axis++, step *= n)
             turn_axis(values, line, basis, nodes, step, n * n * c, back);

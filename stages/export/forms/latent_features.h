@@ -14,10 +14,10 @@ extern "C" {
 npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double degree,
                               double lambda);
 
-/* The first principal component of `count` rows of C values: out[i] = direction . (row_i - mean), where
- * direction (C, unit length, its largest entry positive) is the eigenvector of the covariance's largest
- * eigenvalue; *share is that eigenvalue's part of the whole variance, 0 where rows do not differ. NPG_MEMORY.
- */
+/* The first principal component of `count` rows of C values: out[i] = direction . (row_i - mean),
+ * where direction (C, unit length, its largest entry positive) is the eigenvector of the covariance's
+ * largest eigenvalue; *share is that eigenvalue's part of the whole variance, 0 where rows do not
+ * differ.  NPG_MEMORY. */
 npg_status npg_features_component(double *out, double *direction, double *share, const double *values,
                                   size_t count, int channels);
 

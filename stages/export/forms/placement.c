@@ -19,6 +19,7 @@ npg_status npg_placement_parse(npg_placement *map, const char *axes)
         map->from[a] = *c++ - 'x';
     }
     if (*c) return npg_error(NPG_USAGE, "option axes: \"%s\" goes on after the third axis", axes);
+    /* A cyclic order of the axes keeps the handedness, a swap of two changes it, and so does each sign. */
     bool is_cyclic = map->from[1] == (map->from[0] + 1) % 3;
     map->is_mirror = is_cyclic != (map->sign[0] * map->sign[1] * map->sign[2] > 0);
     return NPG_OK;

@@ -42,19 +42,19 @@ template <class Body> void each_node(const level &l, Body body)
 }
 
 // One value between a grid and the row of a node.
-void take(double *to, const openvdb::Vec3s &from)
+void to_doubles(double *to, const openvdb::Vec3s &from)
 {
     for (int c = 0; c < 3; c++) to[c] = double(from[c]);
 }
-void take(double *to, float from)
+void to_doubles(double *to, float from)
 {
     *to = double(from);
 }
-void give(openvdb::Vec3s &to, const double *from)
+void from_doubles(openvdb::Vec3s &to, const double *from)
 {
     to = openvdb::Vec3s(float(from[0]), float(from[1]), float(from[2]));
 }
-void give(float &to, const double *from)
+void from_doubles(float &to, const double *from)
 {
     to = float(*from);
 }
@@ -63,7 +63,7 @@ template <class Grid> void read_values(level &l, Grid &grid, size_t channel)
 {
     auto accessor = grid.getConstAccessor();
     each_node(l, [&](const openvdb::Coord &node, size_t at) {
-        take(&l.values[at + channel], accessor.getValue(node));
+        to_doubles(&l.values[at + channel], accessor.getValue(node));
     });
 }
 
@@ -72,7 +72,7 @@ template <class Grid> void write_values(const level &l, Grid &grid, size_t chann
     auto accessor = grid.getAccessor();
     each_node(l, [&](const openvdb::Coord &node, size_t at) {
         typename Grid::ValueType value;
-        give(value, &l.values[at + channel]);
+        from_doubles(value, &l.values[at + channel]);
         accessor.setValueOn(node, value);
     });
 }
@@ -101,7 +101,7 @@ npg_status sort_into_levels(std::map<int, level> &levels, const openvdb::GridPtr
         l.lambda = grid->metaValue<double>("npg_lambda");
         l.screen = grid->metaValue<double>("npg_screen");
         l.degree = grid->metaValue<double>("npg_degree");
-        if (l.nodes < 1 || l.nodes > 4096)
+        if (l.nodes < 1 || l.nodes > 4096) // damage: the fit's grids have at most some hundred nodes per axis
             return npg_error(NPG_BAD_INPUT, "%s: the grid %s has %d nodes", path, grid->getName().c_str(),
                              l.nodes);
         l.grids[grid->metaValue<int32_t>("npg_channel_first")] = grid;
@@ -189,7 +189,7 @@ npg_status npg_vdb_save_latents(const char *path, npg_vdb_span *span, const char
         for (auto &[at, l] : levels) {
             for (auto &[first, grid] : l.grids) grid = in.readGrid(grid->getName());
             NPG_TRY(make_features(out, l, placement));
-            l = level(); // the room is for the next one
+            l = level(); // one level in memory at a time
         }
         out.close();
         return NPG_OK;

@@ -12,6 +12,8 @@ extern "C" {
 namespace
 {
 
+constexpr float HALF_WIDTH = 3; // of the narrow band, in voxels: OpenVDB's own default
+
 openvdb::FloatGrid::Ptr make_grid(const npg_vdb_surface &s)
 {
     std::vector<openvdb::Vec3s> points(s.vert_count);
@@ -19,7 +21,7 @@ openvdb::FloatGrid::Ptr make_grid(const npg_vdb_surface &s)
     for (size_t i = 0; i < s.vert_count; i++) points[i] = openvdb::Vec3s(s.points + 3 * i);
     for (size_t f = 0; f < s.face_count; f++) triangles[f] = openvdb::Vec3I(s.faces + 3 * f);
     auto transform = openvdb::math::Transform::createLinearTransform(s.voxel);
-    auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, points, triangles, 3.0f);
+    auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, points, triangles, HALF_WIDTH);
     grid->setName("surface");
     return grid;
 }
@@ -41,8 +43,8 @@ npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *s)
         auto grid = make_grid(*s);
         if (!has_inside(*grid))
             return npg_error(NPG_FAILED,
-                             "OpenVDB: frame %lld: nothing is inside the surface; voxels of %g are too large "
-                             "for it",
+                             "OpenVDB: frame %lld: nothing is inside the surface; "
+                             "voxels of %g are too large for it",
                              (long long)s->number, s->voxel);
         openvdb::MetaMap about;
         about.insertMeta("npg_version", openvdb::StringMetadata(npg_version()));

@@ -18,14 +18,15 @@
 #include "ingest/formats/bytes.h"
 #include "pipeline/file.h"
 
-#define BYTES_MOST (UINT64_C(0xffffffff) - (1 << 20)) /* of a file's binary part */
+/* Of a file's binary part: lengths have 32 bits, and a MiB is left for the JSON. */
+#define BYTES_MOST (UINT64_C(0xffffffff) - (1 << 20))
 
 typedef struct glb_state {
     const npg_form_facts *facts;
     npg_corner_split split;
-    size_t poses_most;      /* in one file                      */
-    int64_t done, segments; /* poses so far; files in all       */
-    size_t at;              /* poses in the file under way      */
+    size_t poses_most;      /* in one file                 */
+    int64_t done, segments; /* poses so far; files in all  */
+    size_t at;              /* poses in the file under way */
     npg_glb_layout layout;
     char name[32];
     npg_file *file;
@@ -51,13 +52,14 @@ static size_t poses_for(const npg_form_facts *facts, size_t vert_count)
     return poses;
 }
 
-static npg_status check(const npg_form_facts *facts)
+static npg_status check_glb(const npg_form_facts *facts)
 {
     if (poses_for(facts, facts->vert_count) > 1 || facts->pose_count == 1) return NPG_OK;
     return npg_error(NPG_USAGE, "glb can't hold the capture: two frames of %zu vertices take more than 4 GiB",
                      facts->vert_count);
 }
 
+/* A frame is a row per vertex, and about 1500 bytes of JSON. */
 static uint64_t bytes(const npg_form_facts *facts)
 {
     return facts->pose_count < 1 ? 0 : (uint64_t)facts->pose_count * (12 * facts->vert_count + 1500);
@@ -152,7 +154,7 @@ static void put_heads(glb_state *s, unsigned char heads[20])
 {
     uint64_t binary = npg_glb_places_of(&s->layout).end;
     memcpy(heads, "glTF", 4);
-    npg_put_little(heads + 4, 2, 4);
+    npg_put_little(heads + 4, 2, 4); /* version */
     npg_put_little(heads + 8, 12 + 8 + s->text_length + 8 + binary, 4);
     npg_put_little(heads + 12, s->text_length, 4);
     memcpy(heads + 16, "JSON", 4);
@@ -161,7 +163,7 @@ static void put_heads(glb_state *s, unsigned char heads[20])
 static npg_status begin_file(glb_state *s, const npg_pose *pose)
 {
     const npg_form_facts *facts = s->facts;
-    unsigned char heads[20], binary_head[8] = "....BIN";
+    unsigned char heads[20], binary_head[8] = "....BIN"; /* its length comes first */
     int64_t left = facts->pose_count - s->done;
     char *path, *text;
     s->layout = (npg_glb_layout){.facts = facts,
@@ -236,7 +238,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     return s->at == s->layout.pose_count ? end_file(s) : NPG_OK;
 }
 
-static npg_status finish(void *state)
+static npg_status finish_glb(void *state)
 {
     const glb_state *s = state;
     return s->at ? npg_error(NPG_FAILED, "glb: %zu frames are missing", s->layout.pose_count - s->at)
@@ -256,9 +258,9 @@ const npg_form npg_form_glb = {.name = "glb",
                                .help = "glTF with morph targets",
                                .is_float = true,
                                .state_size = sizeof(glb_state),
-                               .check = check,
+                               .check = check_glb,
                                .bytes = bytes,
                                .open = open_glb,
                                .pose = write_pose,
-                               .finish = finish,
+                               .finish = finish_glb,
                                .close = close_glb};

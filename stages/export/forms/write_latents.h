@@ -4,7 +4,7 @@
 
 #include "export/forms/forms.h"
 
-/* OUT/latents/window_000000.vdb of every OUT/job/window_000000.vdb there is (shims/vdb_latents.h says what is
+/* OUT/latents/window_000000.vdb of every OUT/job/window_000000.vdb there is (vdb_latents.h says what is
  * in them); nothing without facts->has_grids.  NPG_DISK, NPG_BAD_INPUT. */
 npg_status npg_latents_write(const npg_form_facts *facts);
 

@@ -18,7 +18,7 @@ static npg_status write_header(npg_file *file, const npg_form_facts *facts)
     return NPG_OK;
 }
 
-static npg_status check(const npg_form_facts *facts)
+static npg_status check_mdd(const npg_form_facts *facts)
 {
     return npg_cache_check("mdd", facts);
 }
@@ -37,9 +37,9 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 const npg_form npg_form_mdd = {.name = "mdd",
                                .help = "MDD point cache with reference.obj",
                                .is_float = true,
-                               .is_steady = true,
+                               .has_fixed_rate = true,
                                .state_size = sizeof(npg_cache),
-                               .check = check,
+                               .check = check_mdd,
                                .bytes = npg_cache_bytes,
                                .open = open_mdd,
                                .pose = write_pose,

@@ -1,13 +1,18 @@
 /* NPZ writer: arrays for numpy.load("motion.npz").
  *
- *     vertices      (T, V, 3) float32    as written, T frames that have a mesh
- *     faces         (F, 3) int32
- *     reference     (V, 3) float32       the surface at the keyframe
- *     rotation      (T, 3, 3) float64    with translation the rigid motion that takes the reference closest
- * to translation   (T, 3) float64       the frame: vertices[t] is about reference @ rotation[t].T +
- * translation[t] index, number (T,) int64           place in time, number of the input's file time (T,)
- * float64         seconds, index / fps fps, metres_per_unit () float64, up () one letter colours       (V, 4)
- * uint8, uvs (V, 2) float32, corner_uvs (F, 3, 2) float32  where the reference has them
+ *     vertices          (T, V, 3) float32    as written, T frames that have a mesh
+ *     faces             (F, 3) int32
+ *     reference         (V, 3) float32       the surface at the keyframe
+ *     rotation          (T, 3, 3) float64    the rigid motion that takes the reference closest to the frame:
+ *     translation       (T, 3) float64       vertices[t] is about reference @ rotation[t].T + translation[t]
+ *     index, number     (T,) int64           place in time, number of the input's file
+ *     time              (T,) float64         seconds, index / fps
+ *     fps               () float64
+ *     metres_per_unit   () float64
+ *     up                () one letter
+ *     colours           (V, 4) uint8         where the reference has them
+ *     uvs               (V, 2) float32       where the reference has them
+ *     corner_uvs        (F, 3, 2) float32    where the reference has them
  */
 #include <stdio.h>
 
@@ -110,6 +115,7 @@ static npg_status put_header(npz_state *s, int which)
         snprintf(shape + used, sizeof shape - used, "%s%lld%s", i ? " " : "", (long long)a.shape[i],
                  i + 1 < a.rank || a.rank == 1 ? "," : "");
     }
+    /* Format: numpy.lib.format, version 1.0. */
     int length = snprintf(text + 10, sizeof text - 10,
                           "{'descr': '%s', 'fortran_order': False, 'shape': (%s), }", a.type, shape);
     memcpy(text, "\x93NUMPY\x01\x00", 8);
@@ -119,6 +125,7 @@ static npg_status put_header(npz_state *s, int which)
     return npg_zip_put(&s->zip, (size_t)s->at[which], text, HEADER);
 }
 
+/* The next values of an array, little-endian on any machine. */
 static npg_status put(npz_state *s, int which, const void *words, size_t word_size, size_t count)
 {
     unsigned char block[4096];
@@ -160,7 +167,7 @@ static npg_status put_fixed(npz_state *s)
 
 /* ---- the form ---- */
 
-static npg_status check(const npg_form_facts *facts)
+static npg_status check_npz(const npg_form_facts *facts)
 {
     if (facts->vert_count <= INT32_MAX) return NPG_OK;
     return npg_error(NPG_USAGE,
@@ -203,7 +210,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     return put(s, VERTICES, pose->pos, 4, 3 * facts->vert_count);
 }
 
-static npg_status finish(void *state)
+static npg_status finish_npz(void *state)
 {
     npz_state *s = state;
     NPG_TRY(npg_zip_commit(&s->zip));
@@ -220,9 +227,9 @@ const npg_form npg_form_npz = {.name = "npz",
                                .help = "NumPy arrays with each frame's rigid motion",
                                .is_float = true,
                                .state_size = sizeof(npz_state),
-                               .check = check,
+                               .check = check_npz,
                                .bytes = bytes,
                                .open = open_npz,
                                .pose = write_pose,
-                               .finish = finish,
+                               .finish = finish_npz,
                                .close = close_npz};

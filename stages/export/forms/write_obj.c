@@ -14,8 +14,8 @@ int npg_obj_decimals_for(const npg_mesh_view *mesh)
     for (size_t i = 3; i < 3 * mesh->vert_count; i++)
         extent = fmax(extent, fabs(mesh->vert_world[i] - mesh->vert_world[i % 3]));
     if (!(extent > 0) || !isfinite(extent)) return 9;
-    int decimals = (int)ceil(7 - log10(extent));
-    return decimals < 1 ? 1 : decimals > 30 ? 30 : decimals;
+    int decimals = (int)ceil(7 - log10(extent));             /* as many as a float can tell apart */
+    return decimals < 1 ? 1 : decimals > 30 ? 30 : decimals; /* lines have room for 30 */
 }
 
 void npg_obj_add_numbers(char *line, size_t size, int decimals, const double *values, int count)

@@ -62,8 +62,8 @@ static bool is_gap(char c)
     return c == ' ' || c == '\t' || c == '\r';
 }
 
-/* The corners after the first one, from the last on: the face looks the other way and is cut into the same
- * triangles. */
+/* The corners after the first one, from the last on: the face looks the other way and is cut
+ * into the same triangles. */
 static void copy_backwards(const copying *c, const char *at, const char *end)
 {
     while (at < end) {

@@ -33,7 +33,7 @@ npg_status npg_write_obj_pose(const char *path, const npg_form_facts *facts, con
 
 static uint64_t bytes(const npg_form_facts *facts)
 {
-    uint64_t per_vert = facts->has_normals ? 100 : 70; /* with its two faces */
+    uint64_t per_vert = facts->has_normals ? 100 : 70; /* with its two faces, about */
     return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * facts->vert_count * per_vert;
 }
 
@@ -60,7 +60,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     return status ? status : npg_form_made(s->facts->log, "obj", file, pose->index, 1);
 }
 
-static npg_status finish(void *state)
+static npg_status finish_sequence(void *state)
 {
     (void)state;
     return NPG_OK;
@@ -77,5 +77,5 @@ const npg_form npg_form_obj = {.name = "obj",
                                .bytes = bytes,
                                .open = open_sequence,
                                .pose = write_pose,
-                               .finish = finish,
+                               .finish = finish_sequence,
                                .close = close_sequence};

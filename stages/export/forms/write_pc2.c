@@ -1,7 +1,7 @@
 /* PC2 writer: a point cache, little-endian, for the mesh OUT/reference.obj.
  *
- *     "POINTCACHE2\0", int32 version 1, int32 points, float32 first sample's frame, float32 frames per
- * sample, int32 samples; then samples x points x 3 float32
+ *     "POINTCACHE2\0", int32 version 1, int32 points, float32 first sample's frame,
+ *     float32 frames per sample, int32 samples; then samples x points x 3 float32
  *
  * The form has neither times nor units: sample k is frame first + k. */
 #include "export/forms/point_cache.h"
@@ -17,7 +17,7 @@ static npg_status write_header(npg_file *file, const npg_form_facts *facts)
     return npg_file_write(file, header, sizeof header);
 }
 
-static npg_status check(const npg_form_facts *facts)
+static npg_status check_pc2(const npg_form_facts *facts)
 {
     return npg_cache_check("pc2", facts);
 }
@@ -36,9 +36,9 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 const npg_form npg_form_pc2 = {.name = "pc2",
                                .help = "PC2 point cache with reference.obj",
                                .is_float = true,
-                               .is_steady = true,
+                               .has_fixed_rate = true,
                                .state_size = sizeof(npg_cache),
-                               .check = check,
+                               .check = check_pc2,
                                .bytes = npg_cache_bytes,
                                .open = open_pc2,
                                .pose = write_pose,

@@ -32,8 +32,8 @@ static void write_header(npg_file *file, const npg_mesh_view *mesh, const char *
     if (mesh->vert_normals) npg_file_print(file, "property float nx\nproperty float ny\nproperty float nz\n");
     if (mesh->vert_uvs) npg_file_print(file, "property float s\nproperty float t\n");
     if (mesh->vert_colours)
-        npg_file_print(file, "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                             "property uchar alpha\n");
+        npg_file_print(file, "property uchar red\nproperty uchar green\n"
+                             "property uchar blue\nproperty uchar alpha\n");
     if (mesh->face_count)
         npg_file_print(file, "element face %zu\nproperty list uchar int vertex_indices\n", mesh->face_count);
     npg_file_print(file, "end_header\n");

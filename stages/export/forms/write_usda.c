@@ -2,8 +2,8 @@
  *
  *     /capture          Xform, the default prim
  *     /capture/surface  Mesh: points.timeSamples and extent.timeSamples with the frame's index as the time
- * code, faces once, no subdivision, primvars:displayColor and primvars:st where the reference has colours and
- * UVs
+ *                       code, faces once, no subdivision, primvars:displayColor and primvars:st where the
+ *                       reference has colours and UVs
  *
  * timeCodesPerSecond is the rate of the capture, metersPerUnit and upAxis as the options say.  Floats have
  * nine digits and so come back as they were.  Samples of the extent stand before those of the points, each
@@ -114,12 +114,13 @@ static void print_extent(usda_state *s)
 
 /* ---- the form ---- */
 
+/* Three numbers of about ten characters a vertex, with what parts them. */
 static uint64_t bytes(const npg_form_facts *facts)
 {
     return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * (facts->vert_count * 36 + EXTENT_SIZE);
 }
 
-static npg_status check(const npg_form_facts *facts)
+static npg_status check_usda(const npg_form_facts *facts)
 {
     if (facts->vert_count <= INT32_MAX) return NPG_OK;
     return npg_error(NPG_USAGE,
@@ -174,7 +175,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     return npg_file_print(s->file, ",\n");
 }
 
-static npg_status finish(void *state)
+static npg_status finish_usda(void *state)
 {
     usda_state *s = state;
     npg_file_print(s->file, "        }\n    }\n}\n");
@@ -191,9 +192,9 @@ const npg_form npg_form_usda = {.name = "usda",
                                 .help = "USD as text, points as time samples",
                                 .is_float = true,
                                 .state_size = sizeof(usda_state),
-                                .check = check,
+                                .check = check_usda,
                                 .bytes = bytes,
                                 .open = open_usda,
                                 .pose = write_pose,
-                                .finish = finish,
+                                .finish = finish_usda,
                                 .close = close_usda};

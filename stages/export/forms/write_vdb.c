@@ -82,7 +82,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     return status ? status : npg_form_made(facts->log, "vdb", file, pose->index, 1);
 }
 
-static npg_status finish(void *state)
+static npg_status finish_vdb(void *state)
 {
     return npg_latents_write(((vdb_state *)state)->facts);
 }
@@ -98,5 +98,5 @@ const npg_form npg_form_vdb = {.name = "vdb",
                                .bytes = bytes,
                                .open = open_vdb,
                                .pose = write_pose,
-                               .finish = finish,
+                               .finish = finish_vdb,
                                .close = close_vdb};

@@ -4,8 +4,8 @@
 
 #include "pipeline/mesh.h"
 
-/* What to write: V world positions with the rest of a mesh (its own vert_pos is not used).  normals may be
- * NULL. */
+/* What to write: V world positions with the rest of a mesh (its own vert_pos is not used).
+ * normals may be NULL. */
 typedef struct npg_mesh_view {
     size_t vert_count, face_count;
     const double *vert_world;    /* V x 3 */

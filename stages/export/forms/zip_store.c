@@ -6,7 +6,15 @@
 
 #include "ingest/formats/bytes.h"
 
-#define FIXED_TIME 0x00210000 /* 1980-01-01 00:00, the first one there is: the same bytes every day */
+/* Records and numbers of PKWARE's APPNOTE.TXT, version 6.3. */
+#define FIXED_TIME     0x00210000 /* 1980-01-01 00:00, the first one there is: the same bytes every day */
+#define LOCAL_HEADER   0x04034b50
+#define ENTRY          0x02014b50
+#define END_64         0x06064b50
+#define END_64_LOCATOR 0x07064b50
+#define END            0x06054b50
+#define VERSION        20 /* that readers need */
+#define VERSION_64     45
 
 /* ---- checksum ---- */
 
@@ -41,7 +49,7 @@ static size_t put_number(const npg_zip *zip, unsigned char *out, uint64_t value)
 /* What the header before a member and its entry in the directory have in common: version to sizes. */
 static size_t put_common(const npg_zip *zip, unsigned char *out, const npg_zip_member *member, bool is_large)
 {
-    size_t n = npg_put_little(out, is_large ? 45 : 20, 2);
+    size_t n = npg_put_little(out, is_large ? VERSION_64 : VERSION, 2);
     n += npg_put_little(out + n, 0x0800, 2); /* names are UTF-8 */
     n += npg_put_little(out + n, 0, 2);      /* stored */
     n += npg_put_little(out + n, FIXED_TIME, 4);
@@ -52,7 +60,7 @@ static size_t put_common(const npg_zip *zip, unsigned char *out, const npg_zip_m
 
 static size_t put_header(const npg_zip *zip, unsigned char *out, const npg_zip_member *member)
 {
-    size_t length = strlen(member->name), n = npg_put_little(out, 0x04034b50, 4);
+    size_t length = strlen(member->name), n = npg_put_little(out, LOCAL_HEADER, 4);
     bool is_large = member->size >= zip->large;
     n += put_common(zip, out + n, member, is_large);
     n += npg_put_little(out + n, length, 2);
@@ -70,8 +78,8 @@ static size_t put_entry(const npg_zip *zip, unsigned char *out, const npg_zip_me
 {
     bool has_size = member->size >= zip->large, has_place = member->header_at >= zip->large;
     size_t length = strlen(member->name), extra = (has_size ? 16u : 0) + (has_place ? 8u : 0);
-    size_t n = npg_put_little(out, 0x02014b50, 4);
-    n += npg_put_little(out + n, 45, 2);
+    size_t n = npg_put_little(out, ENTRY, 4);
+    n += npg_put_little(out + n, VERSION_64, 2);
     n += put_common(zip, out + n, member, extra != 0);
     n += npg_put_little(out + n, length, 2);
     n += npg_put_little(out + n, extra ? extra + 4 : 0, 2);
@@ -94,21 +102,21 @@ static void write_end(const npg_zip *zip, uint64_t directory_at, uint64_t direct
     uint64_t end_at = npg_file_size(zip->file);
     size_t n = 0;
     if (directory_at >= zip->large) {
-        n += npg_put_little(out + n, 0x06064b50, 4);
+        n += npg_put_little(out + n, END_64, 4);
         n += npg_put_little(out + n, 44, 8);
-        n += npg_put_little(out + n, 45, 2);
-        n += npg_put_little(out + n, 45, 2);
+        n += npg_put_little(out + n, VERSION_64, 2);
+        n += npg_put_little(out + n, VERSION_64, 2);
         n += npg_put_little(out + n, 0, 8);
         n += npg_put_little(out + n, zip->count, 8);
         n += npg_put_little(out + n, zip->count, 8);
         n += npg_put_little(out + n, directory_size, 8);
         n += npg_put_little(out + n, directory_at, 8);
-        n += npg_put_little(out + n, 0x07064b50, 4);
+        n += npg_put_little(out + n, END_64_LOCATOR, 4);
         n += npg_put_little(out + n, 0, 4);
         n += npg_put_little(out + n, end_at, 8);
         n += npg_put_little(out + n, 1, 4);
     }
-    n += npg_put_little(out + n, 0x06054b50, 4);
+    n += npg_put_little(out + n, END, 4);
     n += npg_put_little(out + n, 0, 4);
     n += npg_put_little(out + n, zip->count, 2);
     n += npg_put_little(out + n, zip->count, 2);
@@ -155,7 +163,7 @@ npg_status npg_zip_put(npg_zip *zip, size_t at, const void *data, size_t size)
                                 : npg_file_patch(zip->file, place, data, size);
 }
 
-static npg_status finish(npg_zip *zip)
+static npg_status write_directory(npg_zip *zip)
 {
     unsigned char record[160];
     for (size_t i = 0; i < zip->count; i++) {
@@ -172,7 +180,7 @@ static npg_status finish(npg_zip *zip)
 
 npg_status npg_zip_commit(npg_zip *zip)
 {
-    npg_status status = finish(zip);
+    npg_status status = write_directory(zip);
     if (!status) return npg_file_commit(&zip->file);
     npg_zip_discard(zip);
     return status;

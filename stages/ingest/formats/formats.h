@@ -25,7 +25,7 @@ npg_status npg_npy_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
 /* The header is checked here, the data is read by PCL from source->name. */
 npg_status npg_pcd_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin);
 
-/* The format a name's ending stands for ("ply", "xyz", ...), NULL for none; the file is not looked at. */
+/* The format a name's ending stands for ("ply", "xyz", ...), NULL for none; the file is not read. */
 const char *npg_format_by_ending(const char *path);
 
 #endif

@@ -34,7 +34,7 @@ npg_status npg_builder_polygon(npg_mesh_builder *b, const uint32_t *corners, siz
     return NPG_OK;
 }
 
-static npg_status check(const npg_mesh_builder *b, const char *name)
+static npg_status check_faces(const npg_mesh_builder *b, const char *name)
 {
     if (!b->vert_count) return npg_error(NPG_BAD_INPUT, "%s: the mesh has no vertices", name);
     if (!b->face_count && !b->may_be_points)
@@ -49,7 +49,7 @@ static npg_status check(const npg_mesh_builder *b, const char *name)
 npg_status npg_builder_finish(npg_mesh **out, npg_mesh_builder *b, const char *name)
 {
     npg_mesh *mesh;
-    NPG_TRY(check(b, name));
+    NPG_TRY(check_faces(b, name));
     NPG_TRY(npg_mesh_open(&mesh, 0, 0));
     mesh->vert_count = b->vert_count;
     mesh->face_count = b->face_count;

@@ -26,8 +26,8 @@ size_t npg_builder_vertex(npg_mesh_builder *builder, const double world[3]);
 /* A polygon as a fan around its first corner; takes room itself.  NPG_MEMORY. */
 npg_status npg_builder_polygon(npg_mesh_builder *builder, const uint32_t *corners, size_t corner_count);
 
-/* The mesh; takes over the builder's arrays.  NPG_BAD_INPUT (beginning with `name`) without faces (unless
- * may_be_points) or when a face uses a vertex that is not there. */
+/* The mesh, which then owns the builder's arrays.  NPG_BAD_INPUT (beginning with `name`) without faces
+ * (unless may_be_points) or when a face uses a vertex that is not there. */
 npg_status npg_builder_finish(npg_mesh **mesh, npg_mesh_builder *builder, const char *name);
 void npg_builder_clear(npg_mesh_builder *builder);
 

@@ -11,9 +11,9 @@
 #include <string.h>
 #include <strings.h>
 
-#define DIGITS_MAX 19  /* what fits an uint64_t */
+#define DIGITS_MAX 19  /* what fits an uint64_t                            */
 #define POWER_MAX  27  /* 10^27 is exact in a 64-bit mantissa: 5^27 < 2^63 */
-#define TOKEN_MAX  800 /* longer than any double needs */
+#define TOKEN_MAX  800 /* longer than any double needs: 767 digits         */
 
 static const long double power_of_ten[POWER_MAX + 1] = {
     1e0L,  1e1L,  1e2L,  1e3L,  1e4L,  1e5L,  1e6L,  1e7L,  1e8L,  1e9L,  1e10L, 1e11L, 1e12L, 1e13L,
@@ -42,13 +42,23 @@ static double by_library(const char *text)
 /* Words for numbers that are not finite. */
 static const char *parse_word(const char *text, const char *end, bool negative, double *value)
 {
+    /* clang-format off */
     static const struct {
         const char *word;
         double value;
-    } words[] = {{"nan", (double)NAN},      {"infinity", (double)INFINITY}, {"inf", (double)INFINITY},
-                 {"nan(ind)", (double)NAN}, {"nan(snan)", (double)NAN},     {"1.#ind", (double)NAN},
-                 {"1.#qnan", (double)NAN},  {"1.#inf", (double)INFINITY},   {"1.#inf00", (double)INFINITY},
-                 {"1.#qnan0", (double)NAN}, {"1.#ind00", (double)NAN}};
+    } words[] = {
+        {"nan",       (double)NAN},
+        {"inf",       (double)INFINITY},
+        {"infinity",  (double)INFINITY},
+        {"nan(ind)",  (double)NAN}, /* Windows libraries of today */
+        {"nan(snan)", (double)NAN},
+        {"1.#qnan",   (double)NAN}, /* older ones, padded to the digits asked for */
+        {"1.#qnan0",  (double)NAN},
+        {"1.#ind",    (double)NAN},
+        {"1.#ind00",  (double)NAN},
+        {"1.#inf",    (double)INFINITY},
+        {"1.#inf00",  (double)INFINITY}};
+    /* clang-format on */
     size_t length = 0;
     while (!ends(text + length, end)) length++;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
@@ -77,7 +87,7 @@ static const char *parse_exponent(const char *text, const char *end, int *expone
     int value = 0;
     if (text < end && (*text == '+' || *text == '-')) negative = *text++ == '-';
     for (; text < end && *text >= '0' && *text <= '9'; text++, any = true)
-        if (value < 100000) value = value * 10 + (*text - '0');
+        if (value < 100000) value = value * 10 + (*text - '0'); /* beyond that it is 0 or infinity anyway */
     *exponent = negative ? -value : value;
     return any ? text : NULL;
 }
@@ -93,7 +103,7 @@ const char *npg_number_parse(const char *token, const char *end, double *value)
         unsigned digit = (unsigned)*text - '0';
         if (digit <= 9) {
             digits++;
-            significant += significant > 0 || digit > 0;
+            significant += significant > 0 || digit > 0; /* leading zeros are not */
             if (significant <= DIGITS_MAX) mantissa = mantissa * 10 + digit;
             scale -= after_point;
         } else if (*text == '.' && !after_point) {
@@ -110,6 +120,7 @@ const char *npg_number_parse(const char *token, const char *end, double *value)
     scale += exponent;
     if (significant > DIGITS_MAX || scale > POWER_MAX || scale < -POWER_MAX)
         return parse_long(token, text, value);
+    /* Both factors are exact in the 64-bit mantissa of x86: one rounding here, one to double. */
     long double result = (long double)mantissa;
     result = scale < 0 ? result / power_of_ten[-scale] : result * power_of_ten[scale];
     *value = negative ? -(double)result : (double)result;
@@ -121,6 +132,7 @@ const char *npg_number_parse(const char *token, const char *end, double *value)
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
 size_t npg_number_print(char *out, size_t size, const char *format, double value)
 {
+    /* snprintf() writes the decimal point of the program's locale. */
     const char *sign = localeconv()->decimal_point;
     int length = snprintf(out, size, format, value);
     char *at = *sign && strcmp(sign, ".") != 0 ? strstr(out, sign) : NULL;

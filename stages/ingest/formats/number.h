@@ -12,8 +12,8 @@
  * can't tell apart (off by at most one last place); beyond that the C library decides. */
 const char *npg_number_parse(const char *text, const char *end, double *value);
 
-/* A number as printf writes it with this format (one double), with a decimal point in every locale; returns
- * the length. */
+/* A number as printf writes it with this format (one double), with a decimal point in every locale;
+ * returns the length. */
 size_t npg_number_print(char *out, size_t size, const char *format, double value);
 
 /* The first byte at or after text that is neither space, tab nor carriage return. */

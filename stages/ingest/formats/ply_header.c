@@ -4,19 +4,26 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Far above any header of real files (set by trial), so that damaged ones are refused and cost nothing. */
 #define HEADER_LINE_MAX  1023
 #define HEADER_LINES_MAX 10000
-#define WORDS_MAX        6
+#define WORDS_MAX        6 /* "property list <type> <type> <name>" has 5 */
 
+/* Each type has its name of the first PLY files and one that says its size. */
+/* clang-format off */
 static const struct {
     const char *name;
     npg_ply_type type;
-} type_names[] = {{"float", NPG_PLY_FLOAT},    {"float32", NPG_PLY_FLOAT}, {"double", NPG_PLY_DOUBLE},
-                  {"float64", NPG_PLY_DOUBLE}, {"uchar", NPG_PLY_UINT8},   {"uint8", NPG_PLY_UINT8},
-                  {"char", NPG_PLY_INT8},      {"int8", NPG_PLY_INT8},     {"ushort", NPG_PLY_UINT16},
-                  {"uint16", NPG_PLY_UINT16},  {"short", NPG_PLY_INT16},   {"int16", NPG_PLY_INT16},
-                  {"uint", NPG_PLY_UINT32},    {"uint32", NPG_PLY_UINT32}, {"int", NPG_PLY_INT32},
-                  {"int32", NPG_PLY_INT32}};
+} type_names[] = {
+    {"char",   NPG_PLY_INT8},   {"int8",    NPG_PLY_INT8},
+    {"uchar",  NPG_PLY_UINT8},  {"uint8",   NPG_PLY_UINT8},
+    {"short",  NPG_PLY_INT16},  {"int16",   NPG_PLY_INT16},
+    {"ushort", NPG_PLY_UINT16}, {"uint16",  NPG_PLY_UINT16},
+    {"int",    NPG_PLY_INT32},  {"int32",   NPG_PLY_INT32},
+    {"uint",   NPG_PLY_UINT32}, {"uint32",  NPG_PLY_UINT32},
+    {"float",  NPG_PLY_FLOAT},  {"float32", NPG_PLY_FLOAT},
+    {"double", NPG_PLY_DOUBLE}, {"float64", NPG_PLY_DOUBLE}};
+/* clang-format on */
 
 size_t npg_ply_type_size(npg_ply_type type)
 {
@@ -57,7 +64,7 @@ typedef struct header_line {
     size_t word_count;      /* may be larger than WORDS_MAX */
 } header_line;
 
-static void split(header_line *line)
+static void split_words(header_line *line)
 {
     char *rest = NULL;
     line->word_count = 0;
@@ -78,7 +85,7 @@ static npg_status next_line(header_line *line, npg_source *source)
     if (memchr(text, 0, length)) return npg_source_bad_line(source, "zero byte in the header");
     memcpy(line->text, text, length);
     line->text[length] = 0;
-    split(line);
+    split_words(line);
     return NPG_OK;
 }
 
@@ -100,7 +107,7 @@ static npg_status read_magic(npg_source *source)
 
 /* ---- the three kinds of line that matter ---- */
 
-static npg_status take_format(npg_ply_header *header, const header_line *line, const npg_source *source)
+static npg_status parse_format(npg_ply_header *header, const header_line *line, const npg_source *source)
 {
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
     if (line->word_count != 3) return npg_source_bad_line(source, "\"format\" needs a name and a version");
@@ -114,17 +121,18 @@ static npg_status take_format(npg_ply_header *header, const header_line *line, c
     return npg_source_bad_line(source, "unknown format \"%.40s\"", line->words[1]);
 }
 
-static npg_status take_count(uint64_t *count, const char *text, const npg_source *source)
+static npg_status parse_count(uint64_t *count, const char *text, const npg_source *source)
 {
     if (*text == '-') return npg_source_bad_line(source, "negative count %.40s", text);
     size_t digits = strspn(text, "0123456789");
     if (!digits || text[digits]) return npg_source_bad_line(source, "\"%.40s\" is not a count", text);
-    if (digits > 15) return npg_source_bad_line(source, "impossible count %.40s", text);
+    if (digits > 15) /* so that counts times row sizes stay below 2^64 */
+        return npg_source_bad_line(source, "impossible count %.40s", text);
     *count = strtoull(text, NULL, 10);
     return NPG_OK;
 }
 
-static npg_status take_name(char *out, const char *name, const npg_source *source)
+static npg_status copy_name(char *out, const char *name, const npg_source *source)
 {
     if (strlen(name) >= NPG_PLY_NAME)
         return npg_source_bad_line(source, "name of %zu bytes: \"%.40s...\"", strlen(name), name);
@@ -132,7 +140,7 @@ static npg_status take_name(char *out, const char *name, const npg_source *sourc
     return NPG_OK;
 }
 
-static npg_status take_element(npg_ply_header *header, const header_line *line, const npg_source *source)
+static npg_status parse_element(npg_ply_header *header, const header_line *line, const npg_source *source)
 {
     if (line->word_count != 3) return npg_source_bad_line(source, "\"element\" needs a name and a count");
     if (header->element_count == NPG_PLY_ELEMENTS)
@@ -141,13 +149,13 @@ static npg_status take_element(npg_ply_header *header, const header_line *line, 
         if (!strcmp(header->elements[i].name, line->words[1]))
             return npg_source_bad_line(source, "second element \"%.40s\"", line->words[1]);
     npg_ply_element *element = &header->elements[header->element_count];
-    NPG_TRY(take_name(element->name, line->words[1], source));
-    NPG_TRY(take_count(&element->count, line->words[2], source));
+    NPG_TRY(copy_name(element->name, line->words[1], source));
+    NPG_TRY(parse_count(&element->count, line->words[2], source));
     header->element_count++;
     return NPG_OK;
 }
 
-static npg_status take_type(npg_ply_type *type, const char *name, const npg_source *source)
+static npg_status parse_type(npg_ply_type *type, const char *name, const npg_source *source)
 {
     for (size_t i = 0; i < sizeof type_names / sizeof *type_names; i++)
         if (!strcmp(type_names[i].name, name)) {
@@ -157,7 +165,7 @@ static npg_status take_type(npg_ply_type *type, const char *name, const npg_sour
     return npg_source_bad_line(source, "unknown type \"%.40s\"", name);
 }
 
-static npg_status take_property(npg_ply_header *header, const header_line *line, const npg_source *source)
+static npg_status parse_property(npg_ply_header *header, const header_line *line, const npg_source *source)
 {
     if (!header->element_count) return npg_source_bad_line(source, "a property before the first element");
     npg_ply_element *element = &header->elements[header->element_count - 1];
@@ -172,9 +180,9 @@ static npg_status take_property(npg_ply_header *header, const header_line *line,
     for (size_t i = 0; i < element->property_count; i++)
         if (!strcmp(element->properties[i].name, name))
             return npg_source_bad_line(source, "second property \"%.40s\"", name);
-    NPG_TRY(take_name(property->name, name, source));
-    NPG_TRY(take_type(&property->type, line->words[line->word_count - 2], source));
-    if (is_list) NPG_TRY(take_type(&property->count_type, line->words[2], source));
+    NPG_TRY(copy_name(property->name, name, source));
+    NPG_TRY(parse_type(&property->type, line->words[line->word_count - 2], source));
+    if (is_list) NPG_TRY(parse_type(&property->count_type, line->words[2], source));
     if (is_list && property->count_type >= NPG_PLY_FLOAT)
         return npg_source_bad_line(source, "the length of list \"%s\" is not a whole number", name);
     property->is_list = is_list;
@@ -187,7 +195,8 @@ static npg_status take_property(npg_ply_header *header, const header_line *line,
 
 /* ---- the whole ---- */
 
-/* A count that the rest of the file can't hold is a lie; found here it costs no memory. */
+/* A count that the rest of the file can't hold is wrong; found here it costs no memory.  The shortest row of
+ * text has a digit and a separator for each value. */
 static npg_status check_counts(const npg_ply_header *header, const npg_source *source)
 {
     uint64_t left = npg_source_left(source), need = 0;
@@ -217,12 +226,12 @@ static npg_status read_lines(npg_ply_header *header, npg_source *source)
             return NPG_OK;
         }
         if (!strcmp(word, "format")) {
-            NPG_TRY(take_format(header, &line, source));
+            NPG_TRY(parse_format(header, &line, source));
             has_format = true;
         } else if (!strcmp(word, "element")) {
-            NPG_TRY(take_element(header, &line, source));
+            NPG_TRY(parse_element(header, &line, source));
         } else if (!strcmp(word, "property")) {
-            NPG_TRY(take_property(header, &line, source));
+            NPG_TRY(parse_property(header, &line, source));
         } else {
             return npg_source_bad_line(source, "unknown word \"%.40s\" in the header", word);
         }

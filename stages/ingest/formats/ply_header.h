@@ -23,7 +23,7 @@ typedef struct npg_ply_property {
     char name[NPG_PLY_NAME];
     npg_ply_type type; /* of the value, or of a list's items */
     bool is_list;
-    npg_ply_type count_type; /* lists only                                       */
+    npg_ply_type count_type; /* lists only                                        */
     size_t offset;           /* in the row; meaningful where no list is before it */
 } npg_ply_property;
 

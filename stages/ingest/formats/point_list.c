@@ -6,8 +6,8 @@
 
 /* A number beyond this is damage, not a place: as origin it would swallow every other point. */
 #define ORIGIN_MAX 1e15
-#define SAMPLES    1001 /* of a cloud, for its median                                                    */
-#define AWAY_MAX   16   /* spreads between origin and median; float then still keeps 1e-6 of the spread */
+#define SAMPLES    1001 /* of a cloud, for its median                                                     */
+#define AWAY_MAX   16   /* spreads between origin and median: float, of 24 bits, keeps 1e-6 of the spread */
 
 npg_status npg_points_reserve(npg_point_list *list, size_t more)
 {
@@ -39,15 +39,15 @@ static int by_value(const void *left, const void *right)
 bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point_count)
 {
     double values[SAMPLES], median[3] = {0}, spread = 0, away = 0;
-    size_t step = point_count / SAMPLES + 1;
+    size_t step = point_count / SAMPLES + 1; /* at most SAMPLES points, evenly over the file */
     for (size_t a = 0; a < 3; a++) {
         size_t count = 0;
         for (size_t i = 0; i < point_count; i += step)
             if (isfinite(pos_local[3 * i + a])) values[count++] = (double)pos_local[3 * i + a];
-        if (count < 8) return false;
+        if (count < 8) return false; /* too few for deciles; any origin will do */
         qsort(values, count, sizeof *values, by_value);
         median[a] = values[count / 2];
-        spread = fmax(spread, values[count * 9 / 10] - values[count / 10]);
+        spread = fmax(spread, values[count * 9 / 10] - values[count / 10]); /* outliers aside */
         away = fmax(away, fabs(median[a]));
     }
     if (!origin->known || away <= AWAY_MAX * spread) return false;
@@ -58,7 +58,7 @@ bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point
 void npg_unit_normal(float out[3], const double normal[3])
 {
     double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-    bool usable = length > 1e-12 && isfinite(length);
+    bool usable = length > 1e-12 && isfinite(length); /* shorter ones have no direction */
     for (int a = 0; a < 3; a++) out[a] = usable ? (float)(normal[a] / length) : 0;
 }
 

@@ -7,8 +7,8 @@
 #include "ingest/formats/ply_header.h"
 #include "ingest/formats/point_list.h"
 
-#define HEADER_MAX  65536
-#define BLOCK_BYTES ((size_t)64 << 10)
+#define HEADER_MAX  65536 /* what version 1 can say; later versions only lift that for field lists */
+#define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 
 typedef struct array {
     npg_ply_type type; /* NPG_PLY_FLOAT or NPG_PLY_DOUBLE */
@@ -18,7 +18,7 @@ typedef struct array {
     size_t columns;
 } array;
 
-static npg_status bad(const npg_source *source, const char *cause)
+static npg_status refuse_header(const npg_source *source, const char *cause)
 {
     return npg_error(NPG_BAD_INPUT, "%s: NPY header: %s", source->name, cause);
 }
@@ -34,46 +34,47 @@ static const char *value_of(const char *header, const char *key)
     return at + 1 + strspn(at + 1, " ");
 }
 
-static npg_status take_type(array *a, const char *text, const npg_source *source)
+static npg_status parse_type(array *a, const char *text, const npg_source *source)
 {
-    if (!text || (*text != '\'' && *text != '"')) return bad(source, "no plain type (descr)");
+    if (!text || (*text != '\'' && *text != '"')) return refuse_header(source, "no plain type (descr)");
     char name[4] = {0};
     snprintf(name, sizeof name, "%.3s", text + 1);
     bool is_whole = strlen(name) == 3; /* else the header ends within it, and there is no text[4] */
     if (!is_whole || !strchr("<>=", name[0]) || (text[4] != '\'' && text[4] != '"'))
-        return bad(source, "type (descr) is neither f4 nor f8");
+        return refuse_header(source, "type (descr) is neither f4 nor f8");
     a->order = name[0] == '>' ? NPG_PLY_BIG : NPG_PLY_LITTLE;
     a->type = name[2] == '8' ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT;
     if (name[1] == 'f' && (name[2] == '4' || name[2] == '8')) return NPG_OK;
-    return bad(source, "type (descr) is neither f4 nor f8");
+    return refuse_header(source, "type (descr) is neither f4 nor f8");
 }
 
-static npg_status take_order(array *a, const char *text, const npg_source *source)
+static npg_status parse_order(array *a, const char *text, const npg_source *source)
 {
-    if (!text) return bad(source, "no fortran_order");
+    if (!text) return refuse_header(source, "no fortran_order");
     a->is_fortran = !strncmp(text, "True", 4);
-    return a->is_fortran || !strncmp(text, "False", 5) ? NPG_OK
-                                                       : bad(source, "fortran_order is not True or False");
+    return a->is_fortran || !strncmp(text, "False", 5)
+               ? NPG_OK
+               : refuse_header(source, "fortran_order is not True or False");
 }
 
-static npg_status take_shape(array *a, const char *text, const npg_source *source)
+static npg_status parse_shape(array *a, const char *text, const npg_source *source)
 {
     uint64_t sizes[2];
-    if (!text || *text++ != '(') return bad(source, "no shape");
+    if (!text || *text++ != '(') return refuse_header(source, "no shape");
     for (int i = 0; i < 2; i++) {
         text += strspn(text, " ");
         size_t digits = strspn(text, "0123456789");
-        if (*text == '-') return bad(source, "negative size in the shape");
-        if (!digits || digits > 15) return bad(source, "the shape is not (N, 3) or (N, 6)");
+        if (*text == '-') return refuse_header(source, "negative size in the shape");
+        if (!digits || digits > 15) return refuse_header(source, "the shape is not (N, 3) or (N, 6)");
         sizes[i] = strtoull(text, NULL, 10);
-        text += digits + (text[digits] == 'L');
+        text += digits + (text[digits] == 'L'); /* Python 2 wrote whole numbers as 5000L */
         text += strspn(text, " ");
-        if (i == 0 && *text++ != ',') return bad(source, "the shape is not (N, 3) or (N, 6)");
+        if (i == 0 && *text++ != ',') return refuse_header(source, "the shape is not (N, 3) or (N, 6)");
     }
     text += *text == ',';
     text += strspn(text, " ");
     if (*text != ')' || (sizes[1] != 3 && sizes[1] != 6))
-        return bad(source, "the shape is not (N, 3) or (N, 6)");
+        return refuse_header(source, "the shape is not (N, 3) or (N, 6)");
     a->rows = sizes[0];
     a->columns = (size_t)sizes[1];
     return NPG_OK;
@@ -106,9 +107,9 @@ static npg_status read_header(array *a, npg_source *source)
 {
     char *text = NULL;
     NPG_TRY(read_header_text(&text, source));
-    npg_status status = take_type(a, value_of(text, "descr"), source);
-    if (!status) status = take_order(a, value_of(text, "fortran_order"), source);
-    if (!status) status = take_shape(a, value_of(text, "shape"), source);
+    npg_status status = parse_type(a, value_of(text, "descr"), source);
+    if (!status) status = parse_order(a, value_of(text, "fortran_order"), source);
+    if (!status) status = parse_shape(a, value_of(text, "shape"), source);
     npg_release(&text);
     if (status) return status;
     uint64_t size = a->rows * a->columns * npg_ply_type_size(a->type), left = npg_source_left(source);

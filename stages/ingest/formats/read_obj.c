@@ -8,7 +8,7 @@
 #include "ingest/formats/number.h"
 #include "ingest/formats/point_list.h"
 
-#define CORNERS_MAX 1024
+#define CORNERS_MAX 1024 /* of a polygon; larger ones are damage (set by trial) */
 
 enum { POSITION, UV, NORMAL, KINDS };
 
@@ -35,7 +35,7 @@ static const char *const ignored_words[] = {
 /* ---- words of a line ---- */
 
 /* The line's keyword; *at moves behind it. */
-static size_t take_word(const char **word, const char **at, const char *end)
+static size_t next_word(const char **word, const char **at, const char *end)
 {
     *word = *at;
     while (*at < end && **at != ' ' && **at != '\t') ++*at;
@@ -60,11 +60,12 @@ static int kind_of(const char *word, size_t length)
 static size_t count_words(const char *at, const char *end)
 {
     size_t count = 0;
-    for (const char *word; at < end; count++) take_word(&word, &at, end);
+    for (const char *word; at < end; count++) next_word(&word, &at, end);
     return count;
 }
 
-/* How much of everything there is, so that arrays are made once and indices can be checked on their line. */
+/* How much of everything there is, so that arrays are allocated once, and so that faces may use vertices of
+ * later lines and an index that is wrong is still reported with its own line. */
 static npg_status count_lines(reader *r)
 {
     const char *at, *word;
@@ -73,7 +74,7 @@ static npg_status count_lines(reader *r)
     while (!(status = npg_source_line(r->source, &at, &length))) {
         const char *end = at + length;
         at = npg_skip_blanks(at, end);
-        length = take_word(&word, &at, end);
+        length = next_word(&word, &at, end);
         int kind = kind_of(word, length);
         if (kind < KINDS) r->total[kind]++;
         if (r->wants_faces && is_word(word, length, "f")) {
@@ -114,6 +115,7 @@ static npg_status add_position(reader *r, const char *at, const char *end)
     double values[8];
     int count;
     NPG_TRY(parse_values(r, values, 3, 8, &count, at, end));
+    /* x y z [w] r g b, an extension of the format; the first vertex settles whether it is used. */
     if (b->vert_count == 0) b->has_colours = r->wants_faces && count >= 6;
     if (b->vert_count == b->pos_capacity || !b->vert_count)
         NPG_TRY(npg_builder_reserve(b, b->vert_count < r->total[POSITION] ? r->total[POSITION] : 1,
@@ -152,7 +154,7 @@ static npg_status add_uv(reader *r, const char *at, const char *end)
 /* ---- f ---- */
 
 /* One index of a corner: 1-based, or negative from the last one read.  *index becomes 0-based. */
-static npg_status take_index(reader *r, uint32_t *index, int kind, const char **at, const char *end)
+static npg_status parse_index(reader *r, uint32_t *index, int kind, const char **at, const char *end)
 {
     static const char *const names[] = {"vertex", "texture coordinate", "normal"};
     size_t so_far[] = {r->builder.vert_count, r->uv_count, r->normal_count};
@@ -160,7 +162,7 @@ static npg_status take_index(reader *r, uint32_t *index, int kind, const char **
     bool negative = *at < end && **at == '-';
     const char *first = *at += negative;
     int64_t value = 0;
-    while (*at < end && **at >= '0' && **at <= '9' && value < (int64_t)1 << 40)
+    while (*at < end && **at >= '0' && **at <= '9' && value < (int64_t)1 << 40) /* no overflow */
         value = value * 10 + (*(*at)++ - '0');
     int shown = end - first > 20 ? 20 : (int)(end - first);
     if (*at == first) return npg_source_bad_line(r->source, "\"%.*s\" is not an index", shown, first);
@@ -183,11 +185,11 @@ static npg_status link_vertex(reader *r, int kind, uint32_t vertex, uint32_t to)
 }
 
 /* *uv: 1 + the vt it names, 0: none. */
-static npg_status take_corner(reader *r, uint32_t *vertex, uint32_t *uv, const char **at, const char *end)
+static npg_status parse_corner(reader *r, uint32_t *vertex, uint32_t *uv, const char **at, const char *end)
 {
     uint32_t other;
     *uv = 0;
-    NPG_TRY(take_index(r, vertex, POSITION, at, end));
+    NPG_TRY(parse_index(r, vertex, POSITION, at, end));
     for (int kind = UV; kind <= NORMAL && *at < end && **at == '/'; kind++) {
         ++*at;
         if (*at < end && **at == '/' && kind == UV) continue;
@@ -199,7 +201,7 @@ static npg_status take_corner(reader *r, uint32_t *vertex, uint32_t *uv, const c
             if (*at == before) break;
             continue;
         }
-        NPG_TRY(take_index(r, &other, kind, at, end));
+        NPG_TRY(parse_index(r, &other, kind, at, end));
         NPG_TRY(link_vertex(r, kind, *vertex, other));
         if (kind == UV) *uv = other + 1;
     }
@@ -210,7 +212,7 @@ static npg_status take_corner(reader *r, uint32_t *vertex, uint32_t *uv, const c
 }
 
 /* The corners' texture coordinates, cut into the triangles of the fan that the builder makes next. */
-static npg_status note_corners(reader *r, const uint32_t *uvs, size_t count)
+static npg_status keep_corner_uvs(reader *r, const uint32_t *uvs, size_t count)
 {
     size_t first = r->builder.face_count, faces = first + count - 2;
     size_t need = r->triangles > faces ? r->triangles : faces;
@@ -228,27 +230,28 @@ static npg_status add_face(reader *r, const char *at, const char *end)
     uint32_t corners[CORNERS_MAX], uvs[CORNERS_MAX];
     size_t count = 0;
     for (; at < end && count < CORNERS_MAX; count++)
-        NPG_TRY(take_corner(r, &corners[count], &uvs[count], &at, end));
+        NPG_TRY(parse_corner(r, &corners[count], &uvs[count], &at, end));
     if (at < end) return npg_source_bad_line(r->source, "a face of more than %d corners", CORNERS_MAX);
     if (count < 3) return npg_source_bad_line(r->source, "a face of %zu corners", count);
     if (!r->wants_faces) return NPG_OK;
-    NPG_TRY(note_corners(r, uvs, count));
+    NPG_TRY(keep_corner_uvs(r, uvs, count));
     return npg_builder_polygon(&r->builder, corners, count);
 }
 
 /* ---- the whole ---- */
 
-static npg_status take_line(reader *r, const char *at, const char *end)
+static npg_status parse_line(reader *r, const char *at, const char *end)
 {
     const char *word;
     at = npg_skip_blanks(at, end);
     if (at == end || *at == '#') return NPG_OK;
-    size_t length = take_word(&word, &at, end);
+    size_t length = next_word(&word, &at, end);
     switch (kind_of(word, length)) {
     case POSITION: return add_position(r, at, end);
     case NORMAL: return add_normal(r, at, end);
     case UV: return add_uv(r, at, end);
     }
+    /* "fo" is the face of older versions of the format. */
     if (is_word(word, length, "f") || is_word(word, length, "fo")) return add_face(r, at, end);
     for (size_t i = 0; i < sizeof ignored_words / sizeof *ignored_words; i++)
         if (is_word(word, length, ignored_words[i])) return NPG_OK;
@@ -262,7 +265,8 @@ static npg_status read_lines(reader *r)
     npg_status status;
     NPG_TRY(npg_source_find_line_end(r->source));
     if (r->source->is_seekable) NPG_TRY(count_lines(r));
-    while (!(status = npg_source_line(r->source, &text, &length))) NPG_TRY(take_line(r, text, text + length));
+    while (!(status = npg_source_line(r->source, &text, &length)))
+        NPG_TRY(parse_line(r, text, text + length));
     return status == NPG_END ? NPG_OK : status;
 }
 
@@ -289,7 +293,7 @@ static npg_status gather_corners(reader *r)
 }
 
 /* Without faces the i-th vn belongs to the i-th v when there are as many. */
-static npg_status attach(reader *r)
+static npg_status set_vertex_data(reader *r)
 {
     npg_mesh_builder *b = &r->builder;
     if (r->link[UV]) NPG_TRY(gather(&b->vert_uvs, r, UV, r->uvs, 2));
@@ -302,7 +306,7 @@ static npg_status attach(reader *r)
     return NPG_OK;
 }
 
-static void clear(reader *r)
+static void clear_reader(reader *r)
 {
     npg_builder_clear(&r->builder);
     npg_release(&r->normals);
@@ -316,14 +320,14 @@ npg_status npg_obj_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
 {
     reader r = {.source = source, .builder = {.origin = origin}};
     npg_status status = read_lines(&r);
-    if (!status) status = attach(&r);
+    if (!status) status = set_vertex_data(&r);
     if (!status) {
         frame->pos_local = r.builder.vert_pos;
         frame->normals = r.builder.vert_normals;
         frame->point_count = r.builder.vert_count;
         r.builder.vert_pos = r.builder.vert_normals = NULL;
     }
-    clear(&r);
+    clear_reader(&r);
     return status;
 }
 
@@ -332,8 +336,8 @@ npg_status npg_obj_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *or
     reader r = {
         .source = source, .wants_faces = true, .builder = {.origin = origin, .may_be_points = may_be_points}};
     npg_status status = read_lines(&r);
-    if (!status) status = attach(&r);
+    if (!status) status = set_vertex_data(&r);
     if (!status) status = npg_builder_finish(mesh, &r.builder, source->name);
-    clear(&r);
+    clear_reader(&r);
     return status;
 }

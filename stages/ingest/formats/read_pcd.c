@@ -8,6 +8,7 @@
 #include "ingest/formats/pcd.h"
 #include "ingest/formats/point_list.h"
 
+/* Above any header of real files (set by trial): damaged ones are refused and cost nothing. */
 enum { FIELDS_MAX = 128, LINE_MAX_BYTES = 8191, WORDS_MAX = FIELDS_MAX + 1 };
 
 typedef struct pcd_header {
@@ -50,7 +51,7 @@ static npg_status next_line(header_line *line, npg_source *source)
     return NPG_OK;
 }
 
-static npg_status take_whole(uint64_t *value, const char *text, const npg_source *source)
+static npg_status parse_count(uint64_t *value, const char *text, const npg_source *source)
 {
     size_t digits = strspn(text, "0123456789");
     if (!digits || text[digits] || digits > 15)
@@ -59,7 +60,7 @@ static npg_status take_whole(uint64_t *value, const char *text, const npg_source
     return NPG_OK;
 }
 
-static npg_status take_names(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_names(pcd_header *h, const header_line *line, const npg_source *source)
 {
     if (h->field_count) return npg_source_bad_line(source, "second line FIELDS");
     for (size_t i = 1; i < line->word_count; i++) {
@@ -77,7 +78,7 @@ static npg_status expect_fields(const pcd_header *h, const header_line *line, co
                                line->word_count - 1, h->field_count);
 }
 
-static npg_status take_sizes(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_sizes(pcd_header *h, const header_line *line, const npg_source *source)
 {
     NPG_TRY(expect_fields(h, line, source));
     for (size_t i = 0; i < h->field_count; i++) {
@@ -90,7 +91,7 @@ static npg_status take_sizes(pcd_header *h, const header_line *line, const npg_s
     return NPG_OK;
 }
 
-static npg_status take_types(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_types(pcd_header *h, const header_line *line, const npg_source *source)
 {
     NPG_TRY(expect_fields(h, line, source));
     for (size_t i = 0; i < h->field_count; i++) {
@@ -103,13 +104,13 @@ static npg_status take_types(pcd_header *h, const header_line *line, const npg_s
     return NPG_OK;
 }
 
-static npg_status take_counts(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_field_counts(pcd_header *h, const header_line *line, const npg_source *source)
 {
     NPG_TRY(expect_fields(h, line, source));
     for (size_t i = 0; i < h->field_count; i++) {
         uint64_t count = 0;
-        NPG_TRY(take_whole(&count, line->words[i + 1], source));
-        if (count < 1 || count > 65536)
+        NPG_TRY(parse_count(&count, line->words[i + 1], source));
+        if (count < 1 || count > 65536) /* more is damage (set by trial) */
             return npg_source_bad_line(source, "field \"%s\" has count %llu", h->names[i],
                                        (unsigned long long)count);
         h->counts[i] = (size_t)count;
@@ -118,24 +119,24 @@ static npg_status take_counts(pcd_header *h, const header_line *line, const npg_
     return NPG_OK;
 }
 
-static npg_status take_size(uint64_t *value, bool *has, const header_line *line, const npg_source *source)
+static npg_status parse_size(uint64_t *value, bool *has, const header_line *line, const npg_source *source)
 {
     if (line->word_count != 2) return npg_source_bad_line(source, "%s needs one number", line->words[0]);
     *has = true;
-    return take_whole(value, line->words[1], source);
+    return parse_count(value, line->words[1], source);
 }
 
-static npg_status take_line(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_line(pcd_header *h, const header_line *line, const npg_source *source)
 {
     const char *word = line->words[0];
     if (!strcmp(word, "VERSION") || !strcmp(word, "VIEWPOINT")) return NPG_OK;
-    if (!strcmp(word, "FIELDS") || !strcmp(word, "COLUMNS")) return take_names(h, line, source);
-    if (!strcmp(word, "SIZE")) return take_sizes(h, line, source);
-    if (!strcmp(word, "TYPE")) return take_types(h, line, source);
-    if (!strcmp(word, "COUNT")) return take_counts(h, line, source);
-    if (!strcmp(word, "WIDTH")) return take_size(&h->width, &h->has_width, line, source);
-    if (!strcmp(word, "HEIGHT")) return take_size(&h->height, &h->has_height, line, source);
-    if (!strcmp(word, "POINTS")) return take_size(&h->points, &h->has_points, line, source);
+    if (!strcmp(word, "FIELDS") || !strcmp(word, "COLUMNS")) return parse_names(h, line, source);
+    if (!strcmp(word, "SIZE")) return parse_sizes(h, line, source);
+    if (!strcmp(word, "TYPE")) return parse_types(h, line, source);
+    if (!strcmp(word, "COUNT")) return parse_field_counts(h, line, source);
+    if (!strcmp(word, "WIDTH")) return parse_size(&h->width, &h->has_width, line, source);
+    if (!strcmp(word, "HEIGHT")) return parse_size(&h->height, &h->has_height, line, source);
+    if (!strcmp(word, "POINTS")) return parse_size(&h->points, &h->has_points, line, source);
     if (strcmp(word, "DATA") != 0) return npg_source_bad_line(source, "unknown word \"%.30s\"", word);
     if (line->word_count != 2) return npg_source_bad_line(source, "DATA needs one word");
     snprintf(h->data, sizeof h->data, "%s", line->words[1]);
@@ -200,7 +201,7 @@ static npg_status read_header(pcd_header *h, npg_source *source)
     for (int i = 0; !status && !h->data[0]; i++) {
         if (i == 1000) status = npg_source_bad_line(source, "no line DATA in the first 1000 lines");
         if (!status) status = next_line(line, source);
-        if (!status && line->words[0][0] != '#') status = take_line(h, line, source);
+        if (!status && line->words[0][0] != '#') status = parse_line(h, line, source);
     }
     if (!status) status = check_header(h, source);
     npg_release(&line);
@@ -209,7 +210,7 @@ static npg_status read_header(pcd_header *h, npg_source *source)
 
 /* ---- the body, before PCL sees it ---- */
 
-static npg_status claims(const pcd_header *h, const npg_source *source, uint64_t need)
+static npg_status refuse_claim(const pcd_header *h, const npg_source *source, uint64_t need)
 {
     return npg_source_bad_byte(source, "the header claims %llu points (%llu bytes), but %llu bytes follow",
                                (unsigned long long)h->points, (unsigned long long)need,
@@ -254,8 +255,8 @@ static npg_status check_compressed(const pcd_header *h, npg_source *source, uint
     if (available < sizeof sizes) return npg_source_bad_byte(source, "the file ends before the data");
     memcpy(sizes, npg_source_data(source), sizeof sizes);
     npg_source_take(source, sizeof sizes);
-    if (sizes[1] != need) return claims(h, source, need);
-    /* No three bytes of this compression stand for more than 264. */
+    if (sizes[1] != need) return refuse_claim(h, source, need);
+    /* LZF: no three bytes stand for more than 264. */
     if (sizes[0] > npg_source_left(source) || need / 264 > sizes[0])
         return npg_source_bad_byte(source, "%u compressed bytes can't be in the %llu that follow", sizes[0],
                                    (unsigned long long)npg_source_left(source));
@@ -270,24 +271,26 @@ static npg_status check_body(const pcd_header *h, npg_source *source)
         row += h->sizes[i] * h->counts[i];
         values += h->counts[i];
     }
-    if (h->points > (uint64_t)1 << 36) return claims(h, source, UINT64_MAX);
+    /* So that points times bytes of a row can't overflow. */
+    if (h->points > (uint64_t)1 << 36) return refuse_claim(h, source, UINT64_MAX);
     if (!strcmp(h->data, "ascii")) return check_rows(h, source, values);
     uint64_t need = h->points * row;
-    if (!strcmp(h->data, "binary")) return need == npg_source_left(source) ? NPG_OK : claims(h, source, need);
+    if (!strcmp(h->data, "binary"))
+        return need == npg_source_left(source) ? NPG_OK : refuse_claim(h, source, need);
     if (!strcmp(h->data, "binary_compressed")) return check_compressed(h, source, need);
     return npg_source_bad_line(source, "unknown DATA \"%s\"", h->data);
 }
 
 /* ---- the whole ---- */
 
-static npg_status begin(void *user, size_t point_count, bool has_normals)
+static npg_status begin_points(void *user, size_t point_count, bool has_normals)
 {
     npg_point_list *points = user;
     points->has_normals = has_normals;
     return npg_points_reserve(points, point_count);
 }
 
-static void add(void *user, const double world[3], const double normal[3])
+static void add_point(void *user, const double world[3], const double normal[3])
 {
     npg_points_add(user, world, normal);
 }
@@ -304,6 +307,6 @@ npg_status npg_pcd_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     size_t count = (size_t)header->points;
     npg_release(&header);
     if (status || !count) return status;
-    npg_pcd_sink sink = {&points, begin, add};
+    npg_pcd_sink sink = {&points, begin_points, add_point};
     return npg_pcd_load(source->name, count, &sink);
 }

@@ -8,8 +8,8 @@
 #include "ingest/formats/ply_header.h"
 #include "ingest/formats/point_list.h"
 
-#define BLOCK_BYTES ((size_t)64 << 10)
-#define CORNERS_MAX 1024 /* of a polygon; larger ones are damage */
+#define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
+#define CORNERS_MAX 1024               /* of a polygon; larger ones are damage (set by trial) */
 
 /* What a vertex property can mean. */
 enum { X, Y, Z, NX, NY, NZ, RED, GREEN, BLUE, ALPHA, U, V, SLOTS };
@@ -48,7 +48,7 @@ typedef struct reader {
     npg_source *source;
     npg_ply_header *header;
     const npg_ply_element *vertex, *face; /* into header; face is NULL when a cloud is read */
-    int slot_of[NPG_PLY_PROPERTIES];      /* of each vertex property, -1: of no interest     */
+    int slot_of[NPG_PLY_PROPERTIES];      /* of each vertex property, -1: of no interest    */
     const npg_ply_property *in_slot[SLOTS];
     npg_point_list points;     /* where vertices go when a cloud is read */
     npg_mesh_builder *builder; /* or when a mesh is read; NULL else      */
@@ -77,7 +77,7 @@ static void assign_slots(reader *r)
     }
 }
 
-static npg_status bind_vertices(reader *r)
+static npg_status find_vertex_element(reader *r)
 {
     const char *name = r->source->name;
     r->vertex = find_element(r->header, "vertex");
@@ -106,8 +106,8 @@ static bool has_slots(const reader *r, int first, int last)
 static uint8_t colour_byte(const reader *r, int slot, double value)
 {
     npg_ply_type type = r->in_slot[slot]->type;
-    if (type >= NPG_PLY_FLOAT) value *= 255;
-    if (type == NPG_PLY_UINT16) value /= 257;
+    if (type >= NPG_PLY_FLOAT) value *= 255;  /* 0 .. 1 */
+    if (type == NPG_PLY_UINT16) value /= 257; /* 65535 / 255 */
     return value >= 255 ? 255 : value > 0 ? (uint8_t)(value + 0.5) : 0;
 }
 
@@ -132,7 +132,7 @@ static npg_status reserve_vertices(reader *r, size_t count)
     return r->builder ? npg_builder_reserve(r->builder, count, 0) : npg_points_reserve(&r->points, count);
 }
 
-/* All at once where the file's size vouches for the count, else block by block. */
+/* All at once where the count has been checked against the file's size, else block by block. */
 static npg_status reserve_known(reader *r)
 {
     if (npg_source_left(r->source) == UINT64_MAX) return NPG_OK;
@@ -151,6 +151,7 @@ static void decode_rows(reader *r, const unsigned char *rows, size_t count)
 {
     npg_ply_format format = r->header->format;
     int used[SLOTS], used_count = 0;
+    /* Of a cloud only positions and normals are of interest, the first slots. */
     for (int slot = 0; slot < (r->builder ? SLOTS : NZ + 1); slot++)
         if (r->in_slot[slot]) used[used_count++] = slot;
     double slots[SLOTS] = {0};
@@ -358,6 +359,7 @@ static npg_status parse_face_property(reader *r, uint64_t row, const npg_ply_pro
     uint32_t corners[CORNERS_MAX];
     bool is_corners = is_corner_list(property);
     if (property->is_list) NPG_TRY(parse_value(r, at, end, &length));
+    /* NaN, negative, or no length that a line of text could have. */
     if (!(length >= 0 && length <= 1e9)) return npg_source_bad_line(r->source, "a list of length %g", length);
     if (is_corners) NPG_TRY(check_corner_count(r, row, (uint64_t)length));
     for (size_t i = 0; i < (size_t)length; i++) {
@@ -412,7 +414,7 @@ npg_status npg_ply_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     reader r = {.source = source, .points = {.frame = frame, .origin = origin}};
     NPG_TRY(npg_alloc(&r.header, NPG_FOR_FILES, sizeof *r.header));
     npg_status status = npg_ply_header_read(r.header, source);
-    if (!status) status = bind_vertices(&r);
+    if (!status) status = find_vertex_element(&r);
     r.points.has_normals = has_slots(&r, NX, NZ);
     if (!status) status = read_body(&r);
     npg_release(&r.header);
@@ -425,7 +427,7 @@ npg_status npg_ply_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *or
     reader r = {.source = source, .builder = &builder};
     NPG_TRY(npg_alloc(&r.header, NPG_FOR_FILES, sizeof *r.header));
     npg_status status = npg_ply_header_read(r.header, source);
-    if (!status) status = bind_vertices(&r);
+    if (!status) status = find_vertex_element(&r);
     if (!status) status = find_corner_list(&r);
     builder.has_normals = has_slots(&r, NX, NZ);
     builder.has_colours = has_slots(&r, RED, BLUE);

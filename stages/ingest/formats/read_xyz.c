@@ -1,5 +1,5 @@
-/* XYZ reader: one point per line, columns by blanks, commas or semicolons; normals where columns 4 to 6 are.
- */
+/* XYZ reader: one point per line, columns by blanks, commas or semicolons;
+ * normals where columns 4 to 6 are. */
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -9,8 +9,8 @@
 #include "ingest/formats/point_list.h"
 
 #define COLUMNS_MAX    6
-#define UNIT_TOLERANCE 0.02
-#define UNIT_SHARE     0.9 /* of the rows: below it columns 4 to 6 are something else, colours perhaps */
+#define UNIT_TOLERANCE 0.02 /* of a normal's length from 1; set by trial, as the next                   */
+#define UNIT_SHARE     0.9  /* of the rows: below it columns 4 to 6 are something else, colours perhaps */
 
 typedef struct reader {
     npg_source *source;
@@ -18,7 +18,7 @@ typedef struct reader {
     bool wants_normals;
     int columns;                    /* of the first row, at most COLUMNS_MAX; 0 before it */
     uint64_t claimed_count;         /* .pts: its first line; UINT64_MAX without           */
-    uint64_t unit_rows, blank_rows; /* rows whose normal has unit length, or none at all */
+    uint64_t unit_rows, blank_rows; /* rows whose normal has unit length, or none at all  */
 } reader;
 
 static bool is_comment(const char *at, const char *end)
@@ -41,7 +41,7 @@ static npg_status count_rows(npg_source *source, size_t *rows)
     *rows = 0;
     while (!(status = npg_source_line(source, &text, &length))) {
         const char *at = npg_skip_blanks(text, text + length);
-        *rows += length - (size_t)(at - text) >= 5 && starts_number(*at);
+        *rows += length - (size_t)(at - text) >= 5 && starts_number(*at); /* "0 0 0" has 5 bytes */
     }
     if (status != NPG_END) return status;
     return npg_source_rewind(source);
@@ -114,13 +114,14 @@ static npg_status add_row(reader *r, const double *values, int columns, size_t r
     return NPG_OK;
 }
 
-static npg_status take_line(reader *r, const char *at, const char *end, size_t rows)
+static npg_status parse_line(reader *r, const char *at, const char *end, size_t rows)
 {
     double values[COLUMNS_MAX] = {0};
     int columns;
     if (is_comment(at, end)) return NPG_OK;
     if (!r->columns && r->claimed_count == UINT64_MAX && is_title(at, end)) return NPG_OK;
     NPG_TRY(parse_row(r, values, &columns, at, end));
+    /* .pts files begin with the number of their points. */
     bool is_count = columns == 1 && !r->columns && r->claimed_count == UINT64_MAX && values[0] >= 0 &&
                     values[0] < 1e15 && values[0] == floor(values[0]);
     if (!is_count) return add_row(r, values, columns, rows);
@@ -135,18 +136,20 @@ static npg_status read_rows(reader *r, size_t rows)
     npg_status status;
     while (!(status = npg_source_line(r->source, &text, &length))) {
         const char *end = text + length;
+        /* The byte order mark that Windows editors put in front of UTF-8. */
         if (r->source->line == 1 && length >= 3 && !memcmp(text, "\xef\xbb\xbf", 3)) text += 3;
-        NPG_TRY(take_line(r, npg_skip_blanks(text, end), end, rows));
+        NPG_TRY(parse_line(r, npg_skip_blanks(text, end), end, rows));
     }
     return status == NPG_END ? NPG_OK : status;
 }
 
-static npg_status conclude(reader *r)
+static npg_status check_count_and_normals(reader *r)
 {
     npg_frame *frame = r->points.frame;
     if (r->claimed_count != UINT64_MAX && r->claimed_count != frame->point_count)
         return npg_error(NPG_BAD_INPUT, "%s: line 1: claims %llu points, but %zu follow", r->source->name,
                          (unsigned long long)r->claimed_count, frame->point_count);
+    /* Points without a normal, which scanners write as 0 0 0 or nan, don't count. */
     double directed = (double)(frame->point_count - r->blank_rows);
     bool are_normals = r->unit_rows && (double)r->unit_rows >= UNIT_SHARE * directed;
     if (frame->normals && !r->wants_normals && !are_normals) npg_release(&frame->normals);
@@ -163,5 +166,5 @@ npg_status npg_xyz_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     NPG_TRY(npg_source_find_line_end(source));
     if (source->is_seekable) NPG_TRY(count_rows(source, &rows));
     NPG_TRY(read_rows(&r, rows));
-    return conclude(&r);
+    return check_count_and_normals(&r);
 }

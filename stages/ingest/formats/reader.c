@@ -20,16 +20,23 @@ static npg_status read_xyzn(npg_frame *frame, npg_source *source, npg_origin *or
     return npg_xyz_read_cloud(frame, source, origin, true);
 }
 
+enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
+
+/* clang-format off */
 static const struct format {
     const char *ending, *name;
     cloud_reader read;
     bool needs_whole; /* nothing but blanks may follow */
-} formats[] = {{".ply", "ply", npg_ply_read_cloud, true}, {".obj", "obj", npg_obj_read_cloud, false},
-               {".npy", "npy", npg_npy_read_cloud, true}, {".xyz", "xyz", read_xyz, false},
-               {".xyzn", "xyz", read_xyzn, false},        {".txt", "xyz", read_xyz, false},
-               {".pts", "xyz", read_xyz, false},          {".pcd", "pcd", npg_pcd_read_cloud, false}};
-
-enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
+} formats[FORMATS] = {
+    [PLY]  = {".ply",  "ply", npg_ply_read_cloud, true},
+    [OBJ]  = {".obj",  "obj", npg_obj_read_cloud, false},
+    [NPY]  = {".npy",  "npy", npg_npy_read_cloud, true},
+    [XYZ]  = {".xyz",  "xyz", read_xyz,           false},
+    [XYZN] = {".xyzn", "xyz", read_xyzn,          false},
+    [TXT]  = {".txt",  "xyz", read_xyz,           false},
+    [PTS]  = {".pts",  "xyz", read_xyz,           false},
+    [PCD]  = {".pcd",  "pcd", npg_pcd_read_cloud, false}};
+/* clang-format on */
 
 static const struct format *by_ending(const char *path)
 {
@@ -46,7 +53,7 @@ static bool looks_like_numbers(const char *text, size_t length)
         if (!text[i] || !strchr("0123456789+-.eE,; \t\r\n", text[i])) return false;
         digits += text[i] >= '0' && text[i] <= '9';
     }
-    return digits >= 3;
+    return digits >= 3; /* a point has at least three */
 }
 
 /* From the first bytes of a file. */
@@ -61,7 +68,8 @@ static const struct format *by_content(const unsigned char *data, size_t size)
     return end && looks_like_numbers(text, (size_t)(end - text)) ? &formats[XYZ] : NULL;
 }
 
-/* The ending decides; a file with another ending, or a PLY, NPY or PCD under a foreign name, shows itself. */
+/* The ending decides; of a file with another ending, or of a PLY, NPY or PCD under a foreign name, its first
+ * bytes do. */
 static npg_status find_format(const struct format **out, npg_source *source)
 {
     size_t available;
@@ -117,9 +125,9 @@ static npg_status read_points(npg_frame *frame, const char *path, npg_origin *or
     return status;
 }
 
-/* The first file settles the origin.  Where its first point turns out to lie far off (many sensors write
- * 0 0 0 for a pixel they could not see), float has lost the detail of all others: read again around the
- * median. */
+/* The first file settles the origin.  Where its first point turns out to lie far off
+ * (many sensors write 0 0 0 for a pixel they could not see), float has lost the detail of all others:
+ * read again around the median. */
 static npg_status read_first(npg_frame *frame, const char *path, npg_origin *origin)
 {
     struct stat info;

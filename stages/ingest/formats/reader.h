@@ -15,9 +15,9 @@
 #include "pipeline/frame_box.h"
 #include "pipeline/mesh.h"
 
-/* Read a cloud into frame->pos_local, normals (where the file has them), point_count, cleaning.read, path and
- * fields; the frame is empty before, and after a failure.  A file without points is NPG_OK with point_count
- * 0. */
+/* Read a cloud into frame->pos_local, normals (where the file has them), point_count,
+ * cleaning.read, path and fields; the frame is empty before, and after a failure.
+ * A file without points is NPG_OK with point_count 0. */
 npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin);
 
 /* Read a triangle mesh from PLY or OBJ; polygons are split into fans, normals, colours and UVs per vertex are
@@ -39,8 +39,8 @@ npg_status npg_stream_open(npg_stream **stream, int fd, const char *name);
 npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *origin);
 void npg_stream_close(npg_stream **stream);
 
-/* stopping(user) is asked about four times a second while nothing comes; true makes next return NPG_STOPPED.
- */
+/* stopping(user) is asked about four times a second while nothing comes;
+ * true makes next return NPG_STOPPED. */
 void npg_stream_set_stop(npg_stream *stream, bool (*stopping)(void *user), void *user);
 
 /* The format that npg_read_cloud would use for a path ("ply", "obj", "xyz", "npy", "pcd"), NULL for none. */

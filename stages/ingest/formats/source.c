@@ -12,10 +12,10 @@
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 
-#define WINDOW_SIZE  ((size_t)256 << 10)
-#define STOP_POLL_MS 250
+#define WINDOW_SIZE  ((size_t)256 << 10) /* set by trial */
+#define STOP_POLL_MS 250                 /* a stop is noticed within that; formats/source.h says so */
 
-static npg_status unreadable(const char *name, int cause)
+static npg_status refuse_unreadable(const char *name, int cause)
 {
     return npg_error(cause == ENOMEM ? NPG_MEMORY : NPG_BAD_INPUT, "%s: can't be read: %s", name,
                      strerror(cause));
@@ -26,12 +26,13 @@ npg_status npg_source_open_fd(npg_source **out, int fd, const char *name)
     npg_source *source;
     struct stat info;
     *out = NULL;
-    if (fstat(fd, &info)) return unreadable(name, errno);
-    if (S_ISDIR(info.st_mode)) return unreadable(name, EISDIR);
+    if (fstat(fd, &info)) return refuse_unreadable(name, errno);
+    if (S_ISDIR(info.st_mode)) return refuse_unreadable(name, EISDIR);
     NPG_TRY(npg_alloc(&source, NPG_FOR_FILES, sizeof *source));
     npg_status status = npg_copy_text(&source->name, name);
-    /* A small file needs no more than its own size, so that many small frames stay cheap. */
+    /* A file that was opened elsewhere may stand behind its beginning: its size then says nothing. */
     bool is_file = S_ISREG(info.st_mode) && lseek(fd, 0, SEEK_CUR) == 0;
+    /* A small file needs no more than its own size, so that many small frames stay cheap. */
     size_t window = WINDOW_SIZE;
     if (is_file && info.st_size < (off_t)WINDOW_SIZE) window = (size_t)info.st_size + 1;
     if (!status) status = npg_grow(&source->window, &source->capacity, window, 1, NPG_FOR_FILES);
@@ -74,14 +75,14 @@ void npg_source_close(npg_source **slot)
 npg_status npg_source_rewind(npg_source *source)
 {
     NPG_REQUIRE(source->is_seekable);
-    if (lseek(source->fd, 0, SEEK_SET) < 0) return unreadable(source->name, errno);
+    if (lseek(source->fd, 0, SEEK_SET) < 0) return refuse_unreadable(source->name, errno);
     source->begin = source->end = 0;
     source->byte = source->line = 0;
     source->at_end = false;
     return NPG_OK;
 }
 
-/* A read from a pipe may last for ever; look whether the run wants to stop meanwhile. */
+/* A read from a pipe may last for ever: ask meanwhile whether the run is to stop. */
 static npg_status wait_for_bytes(npg_source *source)
 {
     struct pollfd wanted = {source->fd, POLLIN, 0};
@@ -99,7 +100,7 @@ static npg_status read_some(npg_source *source)
         NPG_TRY(wait_for_bytes(source));
         ssize_t got = read(source->fd, source->window + source->end, source->capacity - source->end);
         if (got < 0 && errno == EINTR) continue;
-        if (got < 0) return unreadable(source->name, errno);
+        if (got < 0) return refuse_unreadable(source->name, errno);
         source->at_end = got == 0;
         source->end += (size_t)got;
         return NPG_OK;
@@ -144,6 +145,7 @@ uint64_t npg_source_left(const npg_source *source)
 
 npg_status npg_source_read(npg_source *source, unsigned char **out, size_t size, size_t *got)
 {
+    /* Where the size of the source is known all is allocated at once, else as the bytes come in. */
     size_t capacity = 0, first = npg_source_left(source) == UINT64_MAX ? WINDOW_SIZE : size;
     npg_status status = NPG_OK;
     *out = NULL;
@@ -184,7 +186,7 @@ npg_status npg_source_line(npg_source *source, const char **text, size_t *length
     *text = (const char *)npg_source_data(source);
     size_t taken = end ? (size_t)(end - npg_source_data(source)) + 1 : available;
     *length = end ? taken - 1 : taken;
-    while (*length && (*text)[*length - 1] == '\r') --*length;
+    while (*length && (*text)[*length - 1] == '\r') --*length; /* line ends of Windows */
     npg_source_take(source, taken);
     source->line++;
     return NPG_OK;
@@ -200,8 +202,8 @@ npg_status npg_source_find_line_end(npg_source *source)
     return NPG_OK;
 }
 
-static npg_status bad(const npg_source *source, const char *unit, uint64_t place, const char *format,
-                      va_list arguments)
+static npg_status refuse_at(const npg_source *source, const char *unit, uint64_t place, const char *format,
+                            va_list arguments)
 {
     char text[512];
     vsnprintf(text, sizeof text, format, arguments);
@@ -212,7 +214,7 @@ npg_status npg_source_bad_line(const npg_source *source, const char *format, ...
 {
     va_list arguments;
     va_start(arguments, format);
-    npg_status status = bad(source, "line", source->line, format, arguments);
+    npg_status status = refuse_at(source, "line", source->line, format, arguments);
     va_end(arguments);
     return status;
 }
@@ -221,7 +223,7 @@ npg_status npg_source_bad_byte(const npg_source *source, const char *format, ...
 {
     va_list arguments;
     va_start(arguments, format);
-    npg_status status = bad(source, "byte", source->byte, format, arguments);
+    npg_status status = refuse_at(source, "byte", source->byte, format, arguments);
     va_end(arguments);
     return status;
 }

@@ -21,8 +21,8 @@ typedef struct npg_source {
     uint64_t line;         /* number of the line npg_source_line() gave last, 1 for the first */
     unsigned char *window; /* owned */
     size_t capacity, begin, end;
-    bool (*stopping)(
-        void *user); /* asked about four times a second while a stream has nothing; may be NULL */
+    /* asked about four times a second while a stream has nothing; may be NULL */
+    bool (*stopping)(void *user);
     void *user;
 } npg_source;
 

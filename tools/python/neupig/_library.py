@@ -1,6 +1,6 @@
 """The shared library: where it is, its functions, and how a failure becomes an exception.
 
-Follows pipeline/neupig.h; tests/python.bats compares the struct sizes and names of both.
+Follows pipeline/neupig.h; tests/delivery/python.bats compares the struct sizes and names of both.
 """
 
 from __future__ import annotations
