@@ -50,7 +50,7 @@ static npg_status check_finite(const float *values, size_t count, const char *wh
     return NPG_OK;
 }
 
-static npg_status take_back(npg_worker *worker, npg_frame *frame)
+static npg_status apply_changes(npg_worker *worker, npg_frame *frame)
 {
     custom_state *s = npg_worker_state(worker);
     bool is_clean = custom_of(worker)->fields & NPG_FIELD_CLEAN;
@@ -85,7 +85,7 @@ static npg_status do_frame(npg_worker *worker, npg_frame *frame)
     if (frame->vert_unit) show_vertices(&view, npg_worker_facts(worker), frame);
     npg_error_restore(NPG_OK, "");
     NPG_TRY(result_of(custom->given.frame(custom->given.user, &view)));
-    return take_back(worker, frame);
+    return apply_changes(worker, frame);
 }
 
 /* ---- the stage ---- */

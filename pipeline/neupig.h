@@ -54,7 +54,7 @@ extern "C" {
 typedef enum npg_status {
     NPG_OK = 0,
     NPG_END = 1,        /* no more: the stream ended                                           */
-    NPG_STOPPED = 2,    /* npg_run_stop() was called; what is on disk can be gone on from      */
+    NPG_STOPPED = 2,    /* npg_run_stop() was called; run it again to resume                   */
     NPG_PARTIAL = 3,    /* done, but frames were skipped, unexplained or below the quality bar */
     NPG_CHANGED = 4,    /* ended where the topology changed (option alarm = split)             */
     NPG_FAILED = -1,    /* an environment or library failed in a way of no class below         */
@@ -68,7 +68,7 @@ typedef enum npg_status {
 } npg_status;
 
 /* The exit code of the command for a status: 0 done, 1 failed, 2 usage, 3 bad input, 4 device, 5 disk, 6
- * memory, 7 finished with frames skipped or below the quality bar, 75 stopped, run again to go on. */
+ * memory, 7 finished with frames skipped or below the quality bar, 75 stopped, run again to resume. */
 NPG_API int npg_status_exit_code(npg_status status);
 
 /* A word for a status, for logs and reports.  Never NULL. */
@@ -136,7 +136,7 @@ NPG_API npg_status npg_options_set(npg_options *options, const char *name, const
 NPG_API npg_status npg_options_load(npg_options *options, const char *path);
 
 /* The options that the job in the folder was begun with, its input and its output:
- * with append = yes a run then goes on with frames that came since, without it with what is left.
+ * with append = yes a run then adds the frames that came since, without it it finishes those that are left.
  * NPG_USAGE when the folder holds no job. */
 NPG_API npg_status npg_options_load_job(npg_options *options, const char *folder);
 
@@ -148,7 +148,7 @@ NPG_API const char *npg_options_get(const npg_options *options, const char *name
  * The texts stay for good. */
 NPG_API npg_status npg_options_describe(size_t i, npg_option_info *info);
 
-/* ---- a stage of one's own ---- */
+/* ---- custom stages ---- */
 
 /* A frame on its way through the chain.  All pointers are loans until the callback returns.  Points, normals
  * and vertices may be changed in place, never their number; coordinates are kept small for floats:
@@ -189,12 +189,12 @@ typedef struct npg_custom_stage {
  *
  * Every run calls the callback from one thread at a time, a thread of the stage's own, so it works beside the
  * other stages; it must not call functions of the same run but npg_run_stop().  After ingest and outlier it
- * sees each frame up to four times (the capture is measured, scored, looked at and solved) and must do the
+ * sees each frame up to four times (to measure, to score, to choose the keyframe, to solve) and must do the
  * same each time, or the result is undefined; after the others once.  Frames do not come in time order but as
  * they are solved, outwards from the keyframe.  Points after outlier and vertices must stay finite, and a
  * frame that has been cleaned must keep a point (NPG_USAGE, NPG_BAD_INPUT).
  *
- * A run that goes on where an earlier one was needs the same stages (by name and place).
+ * A run that resumes an earlier one needs the same stages (by name and place).
  * NPG_USAGE: a name that is taken, a place that is not there, too many stages. */
 NPG_API npg_status npg_options_add_stage(npg_options *options, const npg_custom_stage *stage);
 
@@ -206,8 +206,8 @@ typedef struct npg_log_record {
     size_t struct_size;
     npg_log_level level;
     double time_s;       /* seconds since the run was opened             */
-    const char *stage;   /* the stage that speaks                        */
-    int64_t frame;       /* number of the frame it speaks of, -1 if none */
+    const char *stage;   /* the stage it comes from                      */
+    int64_t frame;       /* number of the frame it is about, -1 if none  */
     const char *message; /* one line, no newline at its end              */
 } npg_log_record;
 
@@ -215,7 +215,7 @@ typedef struct npg_progress {
     size_t struct_size;
     const char *stage;           /* the stage that decides how far the run is      */
     double share;                /* 0..1 of the whole run                          */
-    double elapsed_s, left_s;    /* left_s < 0 while it can't be told              */
+    double elapsed_s, left_s;    /* left_s < 0 while it is not known               */
     int64_t frames_done, frames; /* written so far, in all (-1: not known yet)     */
     int64_t step, steps;         /* epochs of the window at work                   */
     int64_t window, windows;     /* the window at work, and how many there will be */
@@ -278,7 +278,7 @@ NPG_API npg_status npg_run_wait(npg_run *run);
 /* Ask the run to stop soon.  Safe in a signal handler and from any thread. */
 NPG_API void npg_run_stop(npg_run *run);
 
-/* Stop the run if it is going on, wait for its threads, free everything. */
+/* Stop the run if it is at work, wait for its threads, free everything. */
 NPG_API void npg_run_close(npg_run **run);
 
 /* ---- nearest surface point ---- */

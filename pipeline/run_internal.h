@@ -49,7 +49,7 @@ struct npg_run {
     char failure_text[1024], failure_stage[32];
     bool is_partial;
     int64_t warning_count;
-    npg_progress progress;     /* the first word of it: what is left is told from the pace since */
+    npg_progress progress;     /* the first one: the time left follows from the pace since */
     json_t *report, *warnings; /* owned */
     json_t *closed_reports;    /* of stages: before the solving pass, or as they were closed; owned */
     npg_published published[NPG_FACTS_MAX];

@@ -9,9 +9,10 @@
 #include "align/tracker.h"
 #include "job/job.h"
 
-#define LOST       1.5 /* times the usual Chamfer distance, at which a frame is tried again */
-#define HOPE       3   /* lost frames in a row that are all tried again                     */
-#define LAST_HOPES 4   /* after them every so many                                          */
+/* Set by trial on captures with fast motion. */
+#define LOST               1.5 /* times the usual Chamfer distance, from which a frame counts as lost */
+#define RETRIED_IN_ROW     3   /* lost frames in a row that are all tried again                       */
+#define RETRIED_AFTERWARDS 4   /* of those behind them every so many                                  */
 
 /* The two last poses on one side of the key. */
 typedef struct side {
@@ -177,11 +178,18 @@ static bool is_lost(const state *s, const npg_tracked *tracked)
     return s->sum.frames && tracked->chamfer > LOST * s->sum.chamfer_sum / (double)s->sum.frames;
 }
 
-/* Where the usual way lost the surface: with more patience, from where the motion should have led and from
- * where the surface was.  The pose that explains the frame best stays. */
-static npg_status try_again(npg_worker *worker, npg_tracked *best, side *at, const npg_frame *frame)
+/* Where the usual fit lost the surface: with more effort, from where the motion should have led and from where the
+ * surface was.  The pose that explains the frame best stays. */
+static npg_status fit_with_effort(npg_worker *worker, npg_tracked *best, side *at, const npg_frame *frame)
 {
-    static const npg_tracker_effort patience[] = {{40, 100, 0.2, 10}, {80, 100, 0.4, 10}};
+    /* The usual fit has up to --align-steps steps, begins ten times as stiff as it ends, and is 0.08 wide.  A lost
+     * frame has moved farther than that: more steps, a stiffer beginning that moves the body as a whole, and twice,
+     * then four times the width.  What is lost must not slide away along the surface, hence ten times `along`.
+     * Figures: why_these_defaults.md, lost frames. */
+    static const npg_tracker_effort efforts[] = {
+        {.steps = 40, .stiffness = 100, .width_unit = 0.2, .along = 10},
+        {.steps = 80, .stiffness = 100, .width_unit = 0.4, .along = 10},
+    };
     state *s = npg_worker_state(worker);
     const double *starts[] = {at->before, s->start};
     s->sum.tried_again++;
@@ -189,7 +197,7 @@ static npg_status try_again(npg_worker *worker, npg_tracked *best, side *at, con
         npg_tracked tracked;
         if (i % 2 == 0 && !at->has_before) continue; /* both starts are the same */
         memcpy(s->trial, starts[i % 2], pose_bytes(s));
-        NPG_TRY(fit_pose(worker, &tracked, s->trial, frame, &patience[i / 2]));
+        NPG_TRY(fit_pose(worker, &tracked, s->trial, frame, &efforts[i / 2]));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
         if (tracked.chamfer >= best->chamfer) continue;
         *best = tracked;
@@ -198,17 +206,17 @@ static npg_status try_again(npg_worker *worker, npg_tracked *best, side *at, con
     return NPG_OK;
 }
 
-/* A capture that the reference does not explain at all is not worth the patience in every frame. */
-static npg_status find_again(npg_worker *worker, npg_tracked *tracked, side *at, const npg_frame *frame)
+/* A capture that the reference does not explain at all must not cost every frame five fits. */
+static npg_status retry_lost(npg_worker *worker, npg_tracked *tracked, side *at, const npg_frame *frame)
 {
     const state *s = npg_worker_state(worker);
-    if (is_lost(s, tracked) && (at->lost_in_row < HOPE || at->lost_in_row % LAST_HOPES == 0))
-        NPG_TRY(try_again(worker, tracked, at, frame));
+    bool is_retried = at->lost_in_row < RETRIED_IN_ROW || at->lost_in_row % RETRIED_AFTERWARDS == 0;
+    if (is_lost(s, tracked) && is_retried) NPG_TRY(fit_with_effort(worker, tracked, at, frame));
     at->lost_in_row = is_lost(s, tracked) ? at->lost_in_row + 1 : 0;
     return NPG_OK;
 }
 
-static void count(state *s, const npg_tracked *tracked, const npg_frame *frame)
+static void add_to_report(state *s, const npg_tracked *tracked, const npg_frame *frame)
 {
     s->sum.frames++;
     s->sum.dist_sum += tracked->point_dist_mean;
@@ -227,8 +235,8 @@ static npg_status fit_side(npg_worker *worker, side *at, const npg_frame *frame)
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, s->points, frame->pos_local, frame->point_count);
     memcpy(s->start, at->now, pose_bytes(s));
     NPG_TRY(fit_pose(worker, &tracked, at->now, frame, NULL));
-    NPG_TRY(find_again(worker, &tracked, at, frame));
-    count(s, &tracked, frame);
+    NPG_TRY(retry_lost(worker, &tracked, at, frame));
+    add_to_report(s, &tracked, frame);
     return NPG_OK;
 }
 

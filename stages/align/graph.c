@@ -153,7 +153,8 @@ static void turn_to_weights(npg_graph *graph, const float *beyond)
     for (size_t v = 0; v < graph->vert_count; v++) {
         float *w = graph->vert_weight + v * NPG_GRAPH_BIND, sum = 0;
         for (int i = 0; i < NPG_GRAPH_BIND; i++) {
-            float share = 1 - w[i] / (beyond[v] * 1.001f);
+            float share = 1 - w[i] / (beyond[v] *
+                                      1.001f); /* a hair beyond: a vertex as far from all nodes keeps some */
             bool is_bound = graph->vert_node[v * NPG_GRAPH_BIND + (size_t)i] != UINT32_MAX;
             w[i] = is_bound ? share * share : 0;
             sum += w[i];
@@ -228,6 +229,7 @@ npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_tar
     NPG_REQUIRE(mesh && mesh->vert_count && node_target);
     NPG_TRY(npg_alloc(&graph, NPG_FOR_MESH, sizeof *graph));
     graph->vert_count = mesh->vert_count;
+    /* 0.7: set by trial, so that the greedy choice of nodes one radius apart ends near node_target of them. */
     graph->radius = sqrt(npg_mesh_area(mesh) / (0.7 * (double)node_target));
     size_t bound = mesh->vert_count * NPG_GRAPH_BIND;
     npg_status status = npg_alloc_array(&graph->vert_node, NPG_FOR_MESH, bound, sizeof(uint32_t));

@@ -21,6 +21,14 @@
 #define TURN_MAX    0.6   /* of a node in one step, radians                                   */
 #define MOVE_MAX    0.15  /* units                                                            */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
+/* Set by trial, like those above. */
+#define FACING_AWAY                                                                                          \
+    -0.2             /* cosine of two normals below which a pair is of two sides of a part, not of one     */
+#define SCHEDULE 1.5 /* stiffness and width are final after 2/3 of the steps: the last third settles there */
+#define NOISE_WIDTH                                                                                          \
+    2.5 /* mean distances of points that the robust weight is wide at least                   */
+#define SETTLED     0.01 /* of the graph's radius: a step that moves no node farther ends the fit */
+#define PAIR_WIDTHS 3.0  /* samples farther than so many widths from every point have no pair: a hole */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
 #define LENT_TERMS 0.18
@@ -247,7 +255,7 @@ static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_
         double facing = 0;
         for (size_t c = 0; c < 3 && with_normals; c++)
             facing += p.normal[c] * (double)t->target_normals[3 * i + c];
-        if (facing < -0.2) continue;
+        if (facing < FACING_AWAY) continue;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
         add_pull(t, part, &p, pose, share, width);
@@ -271,7 +279,8 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
             p.target[c] = (double)points[3 * (size_t)t->near[s] + c];
             if (normals) facing += p.normal[c] * (double)normals[3 * (size_t)t->near[s] + c];
         }
-        if (facing < -0.2 || (double)t->near_sq[s] > 9 * width * width) continue;
+        if (facing < FACING_AWAY || (double)t->near_sq[s] > PAIR_WIDTHS * PAIR_WIDTHS * width * width)
+            continue;
         memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
         memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
         add_pull(t, TO_POINTS, &p, pose, share, width);
@@ -431,13 +440,13 @@ static npg_status gather(step *s)
 static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_effort *effort)
 {
     int last = effort->steps - 1;
-    double progress = last ? fmin(1, 1.5 * tracked->steps / last) : 1;
+    double progress = last ? fmin(1, SCHEDULE * tracked->steps / last) : 1;
     double noise = tracked->point_dist_mean / (NOISE_UNIT * s->t->size);
     s->is_first = !tracked->steps;
     s->is_settling = progress >= 1;
     s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
     s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
-    s->width = fmax(s->width, 2.5 * tracked->point_dist_mean);
+    s->width = fmax(s->width, NOISE_WIDTH * tracked->point_dist_mean);
 }
 
 static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
@@ -471,7 +480,7 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     while (tracked->steps < effort->steps && !status) {
         set_schedule(&s, tracked, effort);
         status = do_step(&s, tracked, pose);
-        if (s.is_settling && tracked->change < 0.01 * t->graph->radius) break;
+        if (s.is_settling && tracked->change < SETTLED * t->graph->radius) break;
     }
     npg_kdtree_close(&tree);
     return status;

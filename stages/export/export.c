@@ -1,5 +1,5 @@
 /* Export: writes every frame's mesh with the same faces, in the capture's own units and axes, and what the
- * run has to say about it. */
+ * run reports about it. */
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -195,7 +195,7 @@ static npg_form_facts form_facts(const npg_worker *worker)
 }
 
 /* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.
- * 0 where it can't be told. */
+ * 0 where it is not known. */
 static uint64_t bytes_of_meshes(const npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);
@@ -209,7 +209,7 @@ static uint64_t bytes_of_meshes(const npg_worker *worker)
            npg_forms_bytes(&state->choice, &of_forms);
 }
 
-/* What a form can't hold is said before the fit starts; of a live source as soon as its box is known. */
+/* What a form can't hold is refused before the fit starts; of a live source as soon as its box is known. */
 static npg_status check_forms(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
@@ -399,7 +399,7 @@ static npg_status write_forms(npg_worker *worker)
     return status;
 }
 
-static npg_status finish(npg_worker *worker)
+static npg_status close_frames(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
@@ -487,7 +487,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 static npg_status flush(npg_worker *worker)
 {
     if (!output_of(worker)[0]) return NPG_OK;
-    return npg_worker_pass(worker) == NPG_PASS_SOLVE ? finish(worker) : check_numbers(worker);
+    return npg_worker_pass(worker) == NPG_PASS_SOLVE ? close_frames(worker) : check_numbers(worker);
 }
 
 static void uninit(npg_worker *worker)
@@ -533,9 +533,9 @@ static const npg_option options[] = {
     NPG_ROW_REAL  ("fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
         "Frames per second of the capture, for the report and formats that carry time"),
     NPG_ROW_CHOICE("up",           AT(up),           "y",     "y|z",
-        "Axis that points up in the written coordinates, for forms that can say it"),
+        "Axis that points up in the written coordinates, for forms that record it"),
     NPG_ROW_CHOICE("unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
-        "Unit of the written coordinates, for forms that can say it"),
+        "Unit of the written coordinates, for forms that record it"),
     NPG_ROW_FLAG  ("centre",       AT(is_centred),   "no",
         "Write coordinates relative to the middle of the capture's box, which done.json then names: "
         "for captures far from 0"),

@@ -57,7 +57,7 @@ const char *npg_job_grids_path(const npg_job *job);
  * stay.  Any thread. */
 npg_status npg_job_write(npg_job *job, bool keeps_grids);
 
-/* The job goes on with frames that came since: write job.json with them. */
+/* The job is extended by frames that came since: write job.json with them. */
 npg_status npg_job_extend(npg_job *job);
 
 /* Open the state that later frames start from in place of the newest one. */

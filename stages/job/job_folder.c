@@ -102,7 +102,7 @@ static npg_status remove_motions(npg_job *job)
     return status;
 }
 
-/* Keep the two newest and the one that later frames go on from; grids that are to be exported stay, too. */
+/* Keep the two newest and the one that later frames start from; grids that are to be exported stay, too. */
 static npg_status remove_old(npg_job *job, const char *name, int64_t serial)
 {
     bool stays = serial == job->serial || serial == job->serial - 1 || serial == job->forward_serial;
@@ -240,7 +240,7 @@ static npg_status note_serial(npg_job *job, const char *name, int64_t serial)
     return NPG_OK;
 }
 
-/* The newest state that is whole.  What is damaged is said and passed over: the work since is done again. */
+/* The newest state that is whole.  A damaged one is warned of and passed over: the work since is done again. */
 static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_log)
 {
     NPG_TRY(each_state(job, note_serial));
@@ -251,7 +251,7 @@ static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_log)
         if (status && serial == 0)
             npg_worker_warn(worker, false, -1, "%s; the job starts over", npg_error_text());
         else if (status)
-            npg_worker_warn(worker, false, -1, "%s; the job goes on from the window before",
+            npg_worker_warn(worker, false, -1, "%s; the job resumes from the window before",
                             npg_error_text());
         else
             job->serial = serial;
@@ -280,7 +280,7 @@ const char *npg_job_grids_path(const npg_job *job)
 npg_status npg_job_open_forward(npg_job *job)
 {
     if (job->forward_serial < 0)
-        return npg_error(NPG_USAGE, "%s: there is no state that later frames can go on from", job->folder);
+        return npg_error(NPG_USAGE, "%s: there is no state that later frames can start from", job->folder);
     return open_state(job, job->forward_serial, false);
 }
 
@@ -308,18 +308,18 @@ static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *w
     if (added && is_done && !append)
         return npg_error(NPG_USAGE,
                          "%s is done, but the input has %lld frames more than then: "
-                         "neupig append %s goes on with them, --restart starts over",
+                         "neupig append %s adds them, --restart starts over",
                          job->output, (long long)added, job->output);
     if (added && !is_done)
         npg_worker_warn(worker, false, -1,
                         "%lld frames came since the job was begun; "
-                        "neupig append goes on with them when it is done",
+                        "neupig append adds them when it is done",
                         (long long)added);
     if (job->archive) NPG_TRY(npg_archive_get(job->archive, "planned", &planned, sizeof planned));
     bool is_longer = job->archive && planned < (int64_t)json_array_size(json_object_get(job->then, "frames"));
     if ((added && is_done) || (is_longer && !is_done)) *start = NPG_JOB_APPEND;
     if (*start == NPG_JOB_APPEND && !job->archive)
-        return npg_error(NPG_USAGE, "%s: there is no state left to go on from; --restart starts over",
+        return npg_error(NPG_USAGE, "%s: there is no state left to resume from; --restart starts over",
                          job->folder);
     return NPG_OK;
 }

@@ -35,7 +35,7 @@ static json_t *describe_options(const npg_options *options)
     return values;
 }
 
-/* The stages that a program added, "name after place" each; their code can't be told from other code. */
+/* The stages that a program added, "name after place" each; their code can't be compared. */
 static json_t *describe_custom_stages(const npg_options *options)
 {
     json_t *list = json_array();
@@ -70,7 +70,7 @@ static npg_status describe_frames(json_t *frames, const npg_frame_files *list)
         json_array_append_new(frames, entry);
         if (!list->slots[i].path) continue;
         npg_status status = describe_file(entry, list->slots[i].path);
-        /* what can't be read is for ingest to refuse or skip; here it only has to be told from what can */
+        /* what can't be read is for ingest to refuse or skip; here it only must not pass for one that can */
         if (status && status != NPG_BAD_INPUT) return status;
     }
     return NPG_OK;

@@ -65,19 +65,19 @@ static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight 
     return status;
 }
 
-/* ---- how it fares ---- */
+/* ---- how it results ---- */
 
-typedef struct faring {
+typedef struct result_sums {
     const npg_mesh *mesh;
     const npg_poisson_settings *settings; /* for the wish to stop */
     double point_dist, vert_dist, stretched;
     size_t frames;
     float *dist; /* V, owned */
-} faring;
+} result_sums;
 
 static npg_status see(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
 {
-    faring *f = user;
+    result_sums *f = user;
     double area = 0, stretched = 0, dist = 0;
     if (f->settings->should_stop && f->settings->should_stop(f->settings->user))
         return npg_error(NPG_STOPPED, "stopped while the keyframe was chosen");
@@ -97,18 +97,18 @@ static npg_status see(void *user, const npg_sight *sight, const float *vert_unit
 }
 
 /* Follow the candidate's draft through the other frames. */
-static npg_status follow(npg_fare *fare, const npg_sights *sights, size_t at, npg_mesh *draft,
+static npg_status follow(npg_draft_result *result, const npg_sights *sights, size_t at, npg_mesh *draft,
                          const npg_poisson_settings *settings)
 {
-    faring f = {.mesh = draft, .settings = settings};
+    result_sums f = {.mesh = draft, .settings = settings};
     npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, draft->vert_count, sizeof *f.dist);
     if (!status) status = npg_sights_follow(sights, at, draft, &draft_tracking, see, &f);
     npg_release(&f.dist);
     NPG_TRY(status);
-    fare->is_followed = true;
-    fare->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
-    fare->vert_dist_unit = f.vert_dist / fmax(1, (double)f.frames);
-    fare->stretched_share = f.stretched / fmax(1, (double)f.frames);
+    result->is_followed = true;
+    result->point_dist_unit = f.point_dist / fmax(1, (double)f.frames);
+    result->vert_dist_unit = f.vert_dist / fmax(1, (double)f.frames);
+    result->stretched_share = f.stretched / fmax(1, (double)f.frames);
     return NPG_OK;
 }
 
@@ -121,7 +121,7 @@ static bool is_fatal(npg_status status)
 /* ---- the choice ---- */
 
 typedef struct candidate {
-    npg_fare *fare;
+    npg_draft_result *result;
     size_t at;       /* in the sights */
     npg_mesh *draft; /* NULL where none was needed or could be made; owned */
 } candidate;
@@ -135,28 +135,28 @@ typedef struct choosing {
 
 /* Whether parts are further apart in a candidate than in another: what the choice is for.
  * Distances alone say little. */
-static bool is_less_touching(const npg_fare *a, const npg_fare *b)
+static bool is_less_touching(const npg_draft_result *a, const npg_draft_result *b)
 {
     return a->contact < LESS_CONTACT * b->contact;
 }
 
-static bool is_more_apart(const npg_fare *a, const npg_fare *b)
+static bool is_more_apart(const npg_draft_result *a, const npg_draft_result *b)
 {
     return a->handles < b->handles || is_less_touching(a, b);
 }
 
-static npg_status list_candidates(choosing *c, npg_fare *fares, int64_t best_scored)
+static npg_status list_candidates(choosing *c, npg_draft_result *results, int64_t best_scored)
 {
     for (size_t i = 0; i < c->sights->count && c->count < NPG_CHOICE_MAX; i++) {
         const npg_sight *sight = &c->sights->list[i];
         if (!sight->is_candidate || !sight->normals) continue;
-        npg_fare *fare = &fares[c->count];
-        *fare = (npg_fare){.index = sight->index, .number = sight->number};
-        NPG_TRY(npg_cloud_contact(&fare->contact, sight->points, sight->normals, sight->point_count));
-        c->list[c->count++] = (candidate){.fare = fare, .at = i};
+        npg_draft_result *result = &results[c->count];
+        *result = (npg_draft_result){.index = sight->index, .number = sight->number};
+        NPG_TRY(npg_cloud_contact(&result->contact, sight->points, sight->normals, sight->point_count));
+        c->list[c->count++] = (candidate){.result = result, .at = i};
     }
     c->scored = 0;
-    while (c->scored < c->count && c->list[c->scored].fare->index != best_scored) c->scored++;
+    while (c->scored < c->count && c->list[c->scored].result->index != best_scored) c->scored++;
     return NPG_OK;
 }
 
@@ -170,21 +170,21 @@ typedef struct together {
 
 static npg_status draft_one(choosing *c, candidate *one)
 {
-    return make_draft(&one->draft, &one->fare->handles, &c->sights->list[one->at], c->settings);
+    return make_draft(&one->draft, &one->result->handles, &c->sights->list[one->at], c->settings);
 }
 
 static npg_status follow_one(choosing *c, candidate *one)
 {
-    return follow(one->fare, c->sights, one->at, one->draft, c->settings);
+    return follow(one->result, c->sights, one->at, one->draft, c->settings);
 }
 
 static npg_status act_for_one(void *user, size_t part)
 {
     const together *t = user;
     npg_status status = t->act(t->c, t->list[part]);
-    return is_fatal(status)
-               ? npg_error_prefix(status, "frame %lld as a keyframe", (long long)t->list[part]->fare->number)
-               : NPG_OK;
+    return is_fatal(status) ? npg_error_prefix(status, "frame %lld as a keyframe",
+                                               (long long)t->list[part]->result->number)
+                            : NPG_OK;
 }
 
 static npg_status act_for_all(together *t)
@@ -200,14 +200,15 @@ static npg_status make_drafts(choosing *c)
     together first = {.c = c, .act = draft_one, .list = {scored}, .count = scored != NULL};
     together others = {.c = c, .act = draft_one};
     NPG_TRY(act_for_all(&first));
-    bool has_draft = scored && scored->draft, may_lose_handles = has_draft && scored->fare->handles > 0;
+    bool has_draft = scored && scored->draft, may_lose_handles = has_draft && scored->result->handles > 0;
     for (size_t i = 0; i < c->count; i++) {
-        bool is_wanted = !has_draft || may_lose_handles || is_less_touching(c->list[i].fare, scored->fare);
+        bool is_wanted =
+            !has_draft || may_lose_handles || is_less_touching(c->list[i].result, scored->result);
         if (i != c->scored && is_wanted) others.list[others.count++] = &c->list[i];
     }
     NPG_TRY(act_for_all(&others));
     for (size_t i = 0; i < others.count; i++)
-        if (has_draft && others.list[i]->draft && !is_more_apart(others.list[i]->fare, scored->fare))
+        if (has_draft && others.list[i]->draft && !is_more_apart(others.list[i]->result, scored->result))
             npg_mesh_unref(&others.list[i]->draft);
     return NPG_OK;
 }
@@ -222,46 +223,46 @@ static npg_status compare(choosing *c)
     return is_alone ? NPG_OK : act_for_all(&running);
 }
 
-static void add_up(npg_fare *fares, size_t count, int64_t frame_count)
+static void add_up(npg_draft_result *results, size_t count, int64_t frame_count)
 {
     int64_t fewest = INT64_MAX;
     for (size_t i = 0; i < count; i++)
-        if (fares[i].is_followed && fares[i].handles < fewest) fewest = fares[i].handles;
+        if (results[i].is_followed && results[i].handles < fewest) fewest = results[i].handles;
     for (size_t i = 0; i < count; i++) {
-        double off = (double)fares[i].index / (double)frame_count - 0.5;
-        if (!fares[i].is_followed) continue;
-        fares[i].cost = (fares[i].point_dist_unit + fares[i].vert_dist_unit +
-                         STRETCH_COST * fares[i].stretched_share + CONTACT_COST * fares[i].contact) *
-                        (1 + HANDLE_COST * (double)(fares[i].handles - fewest)) *
-                        (1 + MIDDLE_COST * off * off);
+        double off = (double)results[i].index / (double)frame_count - 0.5;
+        if (!results[i].is_followed) continue;
+        results[i].cost = (results[i].point_dist_unit + results[i].vert_dist_unit +
+                           STRETCH_COST * results[i].stretched_share + CONTACT_COST * results[i].contact) *
+                          (1 + HANDLE_COST * (double)(results[i].handles - fewest)) *
+                          (1 + MIDDLE_COST * off * off);
     }
 }
 
 /* The best-scored frame, unless another costs clearly less (and has its parts more apart, or it would not
  * have been followed). */
-static size_t cheapest(const npg_fare *fares, size_t count, size_t scored)
+static size_t cheapest(const npg_draft_result *results, size_t count, size_t scored)
 {
-    bool has_scored = scored < count && fares[scored].is_followed;
+    bool has_scored = scored < count && results[scored].is_followed;
     size_t best = scored < count ? scored : 0;
     for (size_t i = 0; i < count; i++) {
-        if (!fares[i].is_followed || i == best) continue;
-        double bar = fares[best].is_followed ? fares[best].cost : (double)INFINITY;
-        if (has_scored) bar = fmin(bar, CLEARLY_LESS * fares[scored].cost);
-        if (fares[i].cost < bar) best = i;
+        if (!results[i].is_followed || i == best) continue;
+        double bar = results[best].is_followed ? results[best].cost : (double)INFINITY;
+        if (has_scored) bar = fmin(bar, CLEARLY_LESS * results[scored].cost);
+        if (results[i].cost < bar) best = i;
     }
     return best;
 }
 
-npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
+npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best, const npg_sights *sights,
                       int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings)
 {
     choosing c = {.sights = sights, .settings = settings};
-    npg_status status = list_candidates(&c, fares, best_scored);
+    npg_status status = list_candidates(&c, results, best_scored);
     if (!status) status = make_drafts(&c);
     if (!status) status = compare(&c);
     for (size_t i = 0; i < c.count; i++) npg_mesh_unref(&c.list[i].draft);
     *count = c.count;
-    add_up(fares, c.count, frame_count);
-    *best = cheapest(fares, c.count, c.scored);
+    add_up(results, c.count, frame_count);
+    *best = cheapest(results, c.count, c.scored);
     return status;
 }

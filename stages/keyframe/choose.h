@@ -22,7 +22,7 @@
 #include "align/sights.h"
 #include "mesh/poisson.h"
 
-typedef struct npg_fare {
+typedef struct npg_draft_result {
     int64_t index, number;
     bool is_followed;       /* false: not in the running, or no surface could be made; the distances are 0 */
     double point_dist_unit; /* points -> surface, mean over the other frames                               */
@@ -31,12 +31,12 @@ typedef struct npg_fare {
     double contact;         /* share of its own points                                                     */
     int64_t handles;        /* of the closed draft; 0 where none was made                                  */
     double cost;            /* 0 when not followed                                                         */
-} npg_fare;
+} npg_draft_result;
 
-/* frame_count: of the capture.  fares: room for as many as there are candidates; *count gets how many, *best
- * which is chosen (its place in fares).  best_scored: index of the frame to stay with.  NPG_MEMORY,
+/* frame_count: of the capture.  results: room for as many as there are candidates; *count gets how many, *best
+ * which is chosen (its place in results).  best_scored: index of the frame to stay with.  NPG_MEMORY,
  * NPG_STOPPED. */
-npg_status npg_choose(npg_fare *fares, size_t *count, size_t *best, const npg_sights *sights,
+npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best, const npg_sights *sights,
                       int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings);
 
 #endif

@@ -20,16 +20,17 @@ npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, np
     return NPG_OK;
 }
 
-static void report_candidates(npg_worker *worker, const npg_fare *fares, size_t count, double seconds)
+static void report_candidates(npg_worker *worker, const npg_draft_result *results, size_t count,
+                              double seconds)
 {
     json_t *list = json_array();
     for (size_t i = 0; i < count; i++)
         json_array_append_new(
-            list,
-            json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)fares[i].number, "followed",
-                      fares[i].is_followed, "point_dist_unit", fares[i].point_dist_unit, "vert_dist_unit",
-                      fares[i].vert_dist_unit, "stretched_share", fares[i].stretched_share, "contact",
-                      fares[i].contact, "handles", (json_int_t)fares[i].handles, "cost", fares[i].cost));
+            list, json_pack("{sI sb sf sf sf sf sI sf}", "number", (json_int_t)results[i].number, "followed",
+                            results[i].is_followed, "point_dist_unit", results[i].point_dist_unit,
+                            "vert_dist_unit", results[i].vert_dist_unit, "stretched_share",
+                            results[i].stretched_share, "contact", results[i].contact, "handles",
+                            (json_int_t)results[i].handles, "cost", results[i].cost));
     json_object_set_new(npg_worker_report(worker), "candidates", list);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }
@@ -39,32 +40,32 @@ static bool should_stop(void *worker)
     return npg_worker_stopping(worker);
 }
 
-static npg_status compare(npg_worker *worker, npg_fare *fare, const npg_sights *sights)
+static npg_status compare(npg_worker *worker, npg_draft_result *result, const npg_sights *sights)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_poisson_settings settings = npg_poisson_settings_of(npg_worker_options(worker));
-    npg_fare fares[NPG_CHOICE_MAX];
+    npg_draft_result results[NPG_CHOICE_MAX];
     size_t count, best;
     double since = npg_clock_s();
     settings.should_stop = should_stop;
     settings.user = worker;
-    NPG_TRY(npg_choose(fares, &count, &best, sights, facts->plan.key, facts->frame_count, &settings));
+    NPG_TRY(npg_choose(results, &count, &best, sights, facts->plan.key, facts->frame_count, &settings));
     if (!count) return NPG_OK;
-    *fare = fares[best];
-    report_candidates(worker, fares, count, npg_clock_s() - since);
-    npg_worker_log(worker, NPG_LOG_INFO, fare->number,
+    *result = results[best];
+    report_candidates(worker, results, count, npg_clock_s() - since);
+    npg_worker_log(worker, NPG_LOG_INFO, result->number,
                    "is the keyframe, of %zu candidates (%.2f %% of its points in contact)", count,
-                   100 * fare->contact);
+                   100 * result->contact);
     return NPG_OK;
 }
 
-npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_fare *fare)
+npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_draft_result *result)
 {
     const npg_choice *choice = &npg_worker_facts(worker)->choice;
     npg_sights *sights = pass->sights;
-    *fare = (npg_fare){.index = -1};
+    *result = (npg_draft_result){.index = -1};
     if (!sights) return NPG_OK;
-    if (choice->candidate_count > 1) NPG_TRY(compare(worker, fare, sights));
+    if (choice->candidate_count > 1) NPG_TRY(compare(worker, result, sights));
     if (!choice->cut_welds) return NPG_OK;
     pass->sights = NULL; /* the run's, from here on */
     return npg_worker_publish(worker, &npg_fact_sights, sights);

@@ -6,7 +6,7 @@
  * surface, near the middle in time.
  *
  * Not in the paper: the score hardly tells frames apart, so the frame it finds is only the first of several
- * candidates (shortlist.h), of which the choosing pass takes the one whose surface fares best (choose.h).  A
+ * candidates (shortlist.h), of which the choosing pass takes the one whose surface results best (choose.h).  A
  * mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to (likeness.h). */
 #include <math.h>
 #include <string.h>
@@ -157,7 +157,7 @@ static bool has_candidates(const npg_worker *worker)
     return state->choice == CHOICE_APART && state->number == NO_NUMBER && !*own_mesh(worker);
 }
 
-/* A mesh of one's own has the pose of a frame: the nearest one is the keyframe. */
+/* The user's own mesh has the pose of a frame: the nearest one is the keyframe. */
 static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
@@ -269,14 +269,14 @@ static npg_status close_choosing(npg_worker *worker)
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
     json_t *report = npg_worker_report(worker), *by_score = json_object_get(report, "key");
-    npg_fare fare;
-    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &fare));
-    if (fare.index < 0 || fare.index == facts->plan.key) return NPG_OK;
+    npg_draft_result result;
+    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &result));
+    if (result.index < 0 || result.index == facts->plan.key) return NPG_OK;
     json_object_set(report, "key_by_score", by_score);
-    facts->plan.key = fare.index;
+    facts->plan.key = result.index;
     json_object_set_new(report, "key",
-                        json_pack("{sI sI sf}", "index", (json_int_t)fare.index, "number",
-                                  (json_int_t)fare.number, "cost", fare.cost));
+                        json_pack("{sI sI sf}", "index", (json_int_t)result.index, "number",
+                                  (json_int_t)result.number, "cost", result.cost));
     report_windows(worker); /* they lie around the keyframe */
     return NPG_OK;
 }
@@ -456,10 +456,10 @@ static const npg_option options[] = {
     /* type        name               place           default  least  most  shown as or words */
     NPG_ROW_INT   ("keyframe",        AT(number),     "-1",    -1,    1e15, NULL,
         "Number of the frame whose surface is the reference, as in the file names; "
-        "-1: by score, or, with a reference of one's own, the frame that it is nearest to"),
+        "-1: by score, or, with --reference, the frame that it is nearest to"),
     NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
         "Take the frame with the best score (paper), "
-        "or the one of several good frames whose surface fares best in the others, "
+        "or the one of several good frames whose surface results best in the others, "
         "so that limbs which touch in one frame are not joined for the whole capture "
         "(apart; not for live runs)"),
     NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",

@@ -3,7 +3,7 @@
  *     d = mean_p |p - nearest vertex| + mean_v |v - nearest point|
  *
  * over at most about LOOKED_AT points p of the frame and as many vertices v.  The frame with the smallest d
- * is the one whose pose the mesh has: it is the keyframe that a reference of one's own should have. */
+ * is the one whose pose the mesh has: it is the keyframe that a run with the user's own mesh should have. */
 #ifndef NPG_LIKENESS_H
 #define NPG_LIKENESS_H
 

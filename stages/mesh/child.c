@@ -155,7 +155,7 @@ static npg_status receive_some(child *c)
     return NPG_OK;
 }
 
-/* Keeps the end of what is said. */
+/* Keeps the end of what the child prints. */
 static void hear_some(child *c)
 {
     char text[256], *kept = c->result->words;
@@ -168,7 +168,7 @@ static void hear_some(child *c)
     }
 }
 
-static npg_status talk(child *c)
+static npg_status exchange(child *c)
 {
     double end_s = npg_clock_s() + c->job->time_limit_s;
     while (c->out >= 0 || c->words >= 0) {
@@ -207,7 +207,7 @@ static npg_status judge(const child *c, int how)
 }
 
 /* A host that ignores SIGCHLD gets no exit status: then the answer's own end mark must do. */
-static npg_status finish(child *c, npg_status status)
+static npg_status reap(child *c, npg_status status)
 {
     int how = 0;
     pid_t pid;
@@ -229,7 +229,7 @@ npg_status npg_child_run(npg_child_result *result, const npg_child_job *job)
     NPG_TRY(find_program(path, job->program));
     npg_status status = start(&c, path);
     if (!status) {
-        status = finish(&c, talk(&c));
+        status = reap(&c, exchange(&c));
     } else {
         close_end(&c.in);
         close_end(&c.out);

@@ -18,11 +18,11 @@ typedef struct npg_hand {
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until
  * all frames passed on before are on disk, so that what is solved is never lost.  Held frames that no window
- * has solved yet are read again by a run that goes on.  NPG_DISK, NPG_ABORTED. */
+ * has solved yet are read again by a resumed run.  NPG_DISK, NPG_ABORTED. */
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit);
 
 /* Restore what the optimize stage had in hand; with appended frames only those which the first new window
- * shares.  The plan of facts tells which. */
+ * shares.  facts.plan has which. */
 npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand);
 
 #endif

@@ -486,7 +486,7 @@ static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
 }
 
 /* What the present state measures; with is_learning the gradients for a step, too. */
-static npg_status look(npg_fit *fit, npg_fit_step *step, bool is_learning)
+static npg_status measure_epoch(npg_fit *fit, npg_fit_step *step, bool is_learning)
 {
     npg_weights weights;
     double progress = (double)step->epoch / (double)step->epochs;
@@ -537,7 +537,7 @@ static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_
 {
     for (; step->epoch < end; step->epoch++) {
         fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
-        NPG_TRY(look(fit, step, true));
+        NPG_TRY(measure_epoch(fit, step, true));
         NPG_TRY(offer(fit, least, step));
         NPG_TRY(end_epoch(fit));
         if (watch) NPG_TRY(watch(user, step));
@@ -545,11 +545,11 @@ static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_
     return NPG_OK;
 }
 
-/* The last step's outcome is looked at as well; then the fit goes back to the state with the least loss. */
-static npg_status go_back(npg_fit *fit, npg_fit_least *least, npg_fit_step *step)
+/* The last step's outcome is measured as well; then the fit returns to the state with the least loss. */
+static npg_status return_to_least(npg_fit *fit, npg_fit_least *least, npg_fit_step *step)
 {
     npg_fit_knowns now = knowns_of(fit);
-    NPG_TRY(look(fit, step, false));
+    NPG_TRY(measure_epoch(fit, step, false));
     NPG_TRY(offer(fit, least, step));
     fit->result = least->step;
     return npg_fit_least_restore(least, &now);
@@ -562,7 +562,7 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
     bool is_kept = fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled && end > first;
     fit->result.epochs = 0;
     npg_status status = run_epochs(fit, &step, end, is_kept ? &least : NULL, watch, user);
-    if (!status && is_kept) status = go_back(fit, &least, &step);
+    if (!status && is_kept) status = return_to_least(fit, &least, &step);
     npg_fit_least_clear(&least);
     if (status) return status;
     NPG_TRY(npg_buffer_read(&fit->mlp.params, 0, fit->params,
