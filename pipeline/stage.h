@@ -50,25 +50,25 @@ typedef struct npg_facts {
     int64_t number_min, number_max; /* of all frames          */
     npg_bounds bounds_local;        /* of all usable points   */
     npg_frame_box box;
-    npg_plan plan;                       /* its key is the one by score until the choosing pass has ended */
-    int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture */
-    npg_choice choice;                   /* what the choosing pass should look at                        */
+    npg_plan plan;                       /* its key is the one by score until the choosing pass has ended   */
+    int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture                  */
+    npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
     /* mesh */
-    npg_mesh *reference; /* unit coordinates, with normals; owned by the run              */
-    double unseen_share; /* share of the reference's area that no point of its frame saw  */
+    npg_mesh *reference; /* unit coordinates, with normals; owned by the run             */
+    double unseen_share; /* share of the reference's area that no point of its frame saw */
     /* evaluate, at the end of the solving pass; forward and backward from the keyframe */
-    bool has_changed[2];   /* the reference does not explain the capture any more ...               */
-    int64_t changed_at[2]; /* ... from the frame of this index on                                   */
+    bool has_changed[2];   /* the reference does not explain the capture any more ... */
+    int64_t changed_at[2]; /* ... from the frame of this index on                     */
     /* the service job, before the first pass */
-    bool is_resumed;      /* all facts above are known; only the solving pass is walked              */
-    int64_t resumed_read; /* frames of the plan that need not be read again                          */
+    bool is_resumed;      /* all facts above are known; only the solving pass is walked */
+    int64_t resumed_read; /* frames of the plan that need not be read again             */
 } npg_facts;
 
 typedef struct npg_worker npg_worker;
 
-/* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it, and it
- * is written once in a run. */
+/* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it,
+ * and it is written once in a run. */
 typedef struct npg_fact_kind {
     const char *name, *owner;
     void (*release)(void *value); /* when the run closes */
@@ -81,8 +81,8 @@ typedef struct npg_stage {
     unsigned passes;           /* NPG_PASS_* it takes part in                         */
     uint32_t needs, gives;     /* NPG_FIELD_*, in the solving pass                    */
 
-    /* False: under these options the stage is left out of all passes.  The state has the options, nothing else
-     * is known yet.  NULL: it always takes part. */
+    /* False: under these options the stage is left out of all passes.  The state has the options,
+     * nothing else is known yet.  NULL: it always takes part. */
     bool (*takes_part)(const npg_worker *worker);
     /* Take what the pass needs.  Called on the stage's own thread.  May be NULL. */
     npg_status (*init)(npg_worker *worker);
@@ -99,8 +99,9 @@ typedef struct npg_stage {
     /* Of the stage that gives NPG_FIELD_REFERENCE: how many vertices it will have at most.  Read from options
      * and facts alone, from any thread. */
     size_t (*verts_at_most)(const npg_worker *worker);
-    /* Add to a state on disk what this stage must find there when the run is resumed.  Called from the thread
-     * that writes the state, while this stage has seen the frames that are written and no other.  May be NULL. */
+    /* Add to a state on disk what this stage must find there when the run is resumed.
+     * Called from the thread that writes the state, while this stage has seen the frames that are written
+     * and no other.  May be NULL. */
     npg_status (*save)(const npg_worker *worker, npg_archive_writer *out);
     /* After all stages ended well: the last word (files that must come last).  May be NULL. */
     npg_status (*conclude)(npg_worker *worker);
@@ -111,8 +112,8 @@ typedef struct npg_service {
     const char *name, *help;
     const npg_option *options; /* may be NULL */
     size_t state_size;         /* zeroed, filled from the options, then given to begin */
-    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run ends
-     * well at once; with facts.is_resumed only the solving pass is walked. */
+    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run
+     * ends well at once; with facts.is_resumed only the solving pass is walked. */
     npg_status (*begin)(npg_worker *worker);
 } npg_service;
 

@@ -6,14 +6,14 @@ extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, 
 extern const npg_service npg_service_job;
 
 const npg_stage *const npg_chain[] = {
-    &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points           */
-    &npg_stage_outlier,  /* drops what is no surface, makes or mends normals               */
-    &npg_stage_keyframe, /* box, keyframe, plan of the windows                             */
-    &npg_stage_mesh,     /* the reference surface of the keyframe                          */
-    &npg_stage_align,    /* the reference brought coarsely into each frame                 */
-    &npg_stage_optimize, /* its deformation in every frame                                 */
-    &npg_stage_evaluate, /* figures and a verdict per frame                                */
-    &npg_stage_export,   /* meshes, report, done.json                                      */
+    &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points */
+    &npg_stage_outlier,  /* drops what is no surface, makes or mends normals     */
+    &npg_stage_keyframe, /* box, keyframe, plan of the windows                   */
+    &npg_stage_mesh,     /* the reference surface of the keyframe                */
+    &npg_stage_align,    /* the reference brought coarsely into each frame       */
+    &npg_stage_optimize, /* its deformation in every frame                       */
+    &npg_stage_evaluate, /* figures and a verdict per frame                      */
+    &npg_stage_export,   /* meshes, report, done.json                            */
     NULL};
 
 const npg_service *const npg_services[] = {

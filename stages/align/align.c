@@ -78,8 +78,8 @@ static size_t pose_bytes(const state *s)
     return npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
 }
 
-/* The last frame that a window waits for takes it along: it comes to the stage that writes the state just when the
- * window can be solved. */
+/* The last frame that a window waits for takes it along: it comes to the stage that writes the state just
+ * when the window can be solved. */
 static npg_status attach_state(const state *s, npg_frame *frame)
 {
     size_t bytes = pose_bytes(s), at = 0, size = 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum;

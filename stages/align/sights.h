@@ -30,7 +30,8 @@ typedef struct npg_sights {
 /* Copy a cleaned frame's points, evenly thinned.  Skipped frames are left out.  NPG_MEMORY. */
 npg_status npg_sights_add(npg_sights *sights, const npg_frame *frame, const npg_frame_box *box,
                           bool is_candidate);
-/* What stage keyframe saw in the choosing pass, for the stage that cuts welds; not there where nothing is cut. */
+/* What stage keyframe saw in the choosing pass, for the stage that cuts welds;
+ * not there where nothing is cut. */
 extern const npg_fact_kind npg_fact_sights;
 
 npg_status npg_sights_open(npg_sights **sights);

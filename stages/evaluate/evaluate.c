@@ -17,7 +17,7 @@
 #include "pipeline/order.h"
 #include "pipeline/stage.h"
 
-#define WARNINGS_MAX 10 /* frames below the bar that get a warning of their own */
+#define WARNINGS_MAX 10 /* frames below the bar that get a warning of their own; set by trial */
 
 typedef struct aggregate {
     double sum, worst;
@@ -26,23 +26,26 @@ typedef struct aggregate {
 } aggregate;
 
 /* The figures that the report sums up. */
+/* clang-format off */
 static const struct {
     const char *name;
     size_t offset;
     bool is_small_bad;
-} summed[] = {{"point_dist_median", offsetof(npg_figures, point_dist_median), false},
-              {"point_dist_mean", offsetof(npg_figures, point_dist_mean), false},
-              {"point_dist_p95", offsetof(npg_figures, point_dist_p95), false},
-              {"vertex_dist_mean", offsetof(npg_figures, vertex_dist_mean), false},
-              {"coverage", offsetof(npg_figures, coverage), true},
-              {"flipped_share", offsetof(npg_figures, flipped_share), false},
-              {"stretched_share", offsetof(npg_figures, stretched_share), false},
-              {"edge_change", offsetof(npg_figures, edge_change), false},
-              {"chamfer", offsetof(npg_figures, chamfer), false},
-              {"truth_cd", offsetof(npg_figures, truth_cd), false},
-              {"truth_nc", offsetof(npg_figures, truth_nc), true},
-              {"truth_f", offsetof(npg_figures, truth_f), true},
-              {"truth_corr", offsetof(npg_figures, truth_corr), false}};
+} summed[] = {
+    {"point_dist_median", offsetof(npg_figures, point_dist_median), false},
+    {"point_dist_mean",   offsetof(npg_figures, point_dist_mean),   false},
+    {"point_dist_p95",    offsetof(npg_figures, point_dist_p95),    false},
+    {"vertex_dist_mean",  offsetof(npg_figures, vertex_dist_mean),  false},
+    {"coverage",          offsetof(npg_figures, coverage),          true},
+    {"flipped_share",     offsetof(npg_figures, flipped_share),     false},
+    {"stretched_share",   offsetof(npg_figures, stretched_share),   false},
+    {"edge_change",       offsetof(npg_figures, edge_change),       false},
+    {"chamfer",           offsetof(npg_figures, chamfer),           false},
+    {"truth_cd",          offsetof(npg_figures, truth_cd),          false},
+    {"truth_nc",          offsetof(npg_figures, truth_nc),          true},
+    {"truth_f",           offsetof(npg_figures, truth_f),           true},
+    {"truth_corr",        offsetof(npg_figures, truth_corr),        false}};
+/* clang-format on */
 enum { SUMMED = sizeof summed / sizeof *summed };
 
 typedef struct evaluate_state {
@@ -59,8 +62,8 @@ typedef struct evaluate_state {
     npg_topology *topology;
     npg_truth *truth;
     bool is_tied; /* the truth, in a frame */
-    float *
-        tied_vert_unit; /* V x 3, owned: the surface in that frame, or in that of the run that is resumed; NULL before */
+    /* V x 3, owned: the surface in that frame, or in that of the run that is resumed; NULL before */
+    float *tied_vert_unit;
     size_t tied_count;
     int64_t tied_number;
     float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
@@ -77,8 +80,8 @@ typedef struct evaluate_state {
 /* ---- points -> surface ---- */
 
 /* Every step-th point, so that no more than the limit are asked for. */
-static npg_status take_points(evaluate_state *state, const npg_frame_box *box, const npg_frame *frame,
-                              size_t *taken)
+static npg_status sample_points(evaluate_state *state, const npg_frame_box *box, const npg_frame *frame,
+                                size_t *taken)
 {
     size_t limit = state->point_limit ? (size_t)state->point_limit : SIZE_MAX;
     size_t step = frame->point_count > limit ? (frame->point_count + limit - 1) / limit : 1;
@@ -137,7 +140,7 @@ static npg_status measure_points(evaluate_state *state, npg_figures *figures, si
  * points on the surface where they are sparser than that. */
 static double cover_radius(const evaluate_state *state, double area, size_t point_count, double per_unit)
 {
-    double spacing = sqrt(area / (double)point_count);
+    double spacing = sqrt(area / (double)point_count); /* the side of a point's share of the surface */
     return fmax(state->cover_dist / 100 / per_unit, 2 * spacing);
 }
 
@@ -231,7 +234,7 @@ static npg_figures no_figures(void)
 }
 
 /* Correspondence is tied in the first frame that is compared; a resumed run ties it in the same one. */
-static npg_status tie(npg_worker *worker, npg_frame *frame)
+static npg_status keep_tied_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     size_t size = frame->vert_count * 3 * sizeof(float);
@@ -249,7 +252,7 @@ static npg_status compare_truth(npg_worker *worker, npg_frame *frame)
     const npg_facts *facts = npg_worker_facts(worker);
     uint64_t seed = (uint64_t)npg_worker_settings(worker)->seed;
     bool is_restored = state->tied_vert_unit && !state->is_tied;
-    NPG_TRY(tie(worker, frame));
+    NPG_TRY(keep_tied_frame(worker, frame));
     if (is_restored) {
         npg_frame first = {.number = state->tied_number,
                            .vert_count = state->tied_count,
@@ -296,13 +299,13 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     NPG_TRY(check_vertices(frame, facts->reference));
     npg_shape_measure(state->shape, figures, frame->vert_unit);
     if (state->truth) NPG_TRY(compare_truth(worker, frame));
-    if (!frame->is_skipped) NPG_TRY(take_points(state, &facts->box, frame, &point_count));
+    if (!frame->is_skipped) NPG_TRY(sample_points(state, &facts->box, frame, &point_count));
     if (!point_count) return NPG_OK;
     npg_thin_gather(state->thin, state->vert_unit, frame->vert_unit);
     NPG_TRY(npg_surface_move(state->surface, state->vert_unit));
     NPG_TRY(measure_points(state, figures, point_count, per_unit, &points_sq));
     NPG_TRY(measure_vertices(state, figures, facts, point_count, per_unit, &vertices_sq));
-    figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5;
+    figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5; /* in the unit of the paper's tables */
     return NPG_OK;
 }
 
@@ -316,7 +319,7 @@ static const char *fault_of(const evaluate_state *state, const npg_figures *f, d
     *bound = state->residual_max;
     if (!(*value <= *bound)) return "median distance of the points to the surface, in % of the diagonal,";
     *value = 100 * f->coverage;
-    *bound = state->coverage_min * (1 - unseen_share);
+    *bound = state->coverage_min * (1 - unseen_share); /* of what the keyframe saw */
     if (!(*value >= *bound)) return "share of the surface with points near it, in %,";
     *value = 100 * f->flipped_share;
     *bound = state->flipped_max;
@@ -351,7 +354,7 @@ static npg_status note_bad(evaluate_state *state, int64_t number)
     return NPG_OK;
 }
 
-static npg_status judge(npg_worker *worker, npg_frame *frame)
+static npg_status judge_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     double value, bound;
@@ -395,7 +398,7 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
     json_object_set_new(report, "bad", bad);
-    /* a run that goes on has not warned of all of them itself */
+    /* A resumed run has not warned itself of those that it restored. */
     if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))
         npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
                         state->bad_count);
@@ -406,7 +409,7 @@ static npg_status flush(npg_worker *worker)
 
 /* ---- the alarm ---- */
 
-static npg_status watch(npg_worker *worker, const npg_frame *frame)
+static npg_status watch_topology(npg_worker *worker, const npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     if (!state->topology)
@@ -416,7 +419,7 @@ static npg_status watch(npg_worker *worker, const npg_frame *frame)
 
 /* ---- what an earlier run of the same job has measured ---- */
 
-static npg_status take_line(void *user, const json_t *line, const char *text, size_t size)
+static npg_status restore_line(void *user, const json_t *line, const char *text, size_t size)
 {
     npg_worker *worker = user;
     evaluate_state *state = npg_worker_state(worker);
@@ -439,7 +442,7 @@ static npg_status take_line(void *user, const json_t *line, const char *text, si
     state->skipped_count += is_skipped;
     if (!is_good && !is_skipped) NPG_TRY(note_bad(state, frame.number));
     npg_frame_line_misfits(&frame.figures, json_object_get(line, "misfits"));
-    return watch(worker, &frame);
+    return watch_topology(worker, &frame);
 }
 
 static npg_status restore(npg_worker *worker)
@@ -448,7 +451,7 @@ static npg_status restore(npg_worker *worker)
     int64_t count, bytes;
     NPG_TRY(restore_tied(npg_worker_state(worker), npg_job_archive(job)));
     npg_job_exported(job, &count, &bytes);
-    return npg_frame_log_each(npg_worker_settings(worker)->output, bytes, take_line, worker);
+    return npg_frame_log_each(npg_worker_settings(worker)->output, bytes, restore_line, worker);
 }
 
 /* ---- the stage ---- */
@@ -472,8 +475,8 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
         state->skipped_count += frame->is_skipped && !frame->is_shared;
         if (has_mesh) NPG_TRY(measure_frame(worker, frame));
-        NPG_TRY(judge(worker, frame));
-        NPG_TRY(watch(worker, frame));
+        NPG_TRY(judge_frame(worker, frame));
+        NPG_TRY(watch_topology(worker, frame));
     }
     return NPG_OK;
 }
@@ -507,8 +510,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     if (limit && points > limit) points = limit;
     *chunks_held = 1;
     return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
-           points * 120 + /* misfits: were all points far, with their links */
-           720 * npg_worker_verts_at_most(worker);
+           points * 120 +                          /* misfits: were all points far, with their links */
+           720 * npg_worker_verts_at_most(worker); /* bytes per vertex, rounded up */
 }
 
 #define AT(member) offsetof(evaluate_state, member)

@@ -30,8 +30,8 @@ static npg_status write_file_entry(npg_file *file, const char *output, const cha
     return status;
 }
 
-/* Sizes and checksums of the meshes or of the other forms' files, from the lines of the list that has them.
- */
+/* Sizes and checksums of the meshes or of the other forms' files, from the lines
+ * of the list that has them. */
 static npg_status write_entries(npg_file *file, const char *output, const char *list_name, bool *is_first)
 {
     char *path, *line = NULL;

@@ -25,8 +25,8 @@ typedef struct npg_capture {
     uint64_t reads; /* files parsed so far */
 } npg_capture;
 
-/* The files that the options of a run (input, frames, missing, confine) name as its frames; nothing is read.  As
- * npg_frame_files_open() and, with confine, npg_frame_files_confine(). */
+/* The files that the options of a run (input, frames, missing, confine) name as its frames; nothing is read.
+ * As npg_frame_files_open() and, with confine, npg_frame_files_confine(). */
 npg_status npg_capture_list(npg_frame_files **list, const npg_options *options);
 
 /* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open. */

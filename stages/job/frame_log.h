@@ -42,8 +42,8 @@ npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts);
 /* Called with each line's object, and its bytes with their newline. */
 typedef npg_status npg_visit_line(void *user, const json_t *frame, const char *line, size_t size);
 
-/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where they are no
- * such lines. */
+/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where
+ * they are no such lines. */
 npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_visit_line *visit, void *user);
 
 /* The same of any file of such lines, from its beginning. */

@@ -1,4 +1,5 @@
-/* job: the service that, before anything else, finds out whether an earlier run of the same job can be resumed. */
+/* job: the service that, before anything else, finds out whether an earlier run of the same
+ * job can be resumed. */
 #include "job/job.h"
 
 #include <errno.h>

@@ -1,22 +1,26 @@
-/* Job: what OUT/job/ holds so that a run which was stopped, killed or broken off is resumed by itself.  A service
- * of the run, not a stage: no frame passes through it.
+/* Job: what OUT/job/ holds so that a run which was stopped, killed or broken off is resumed by itself.
+ * A service of the run, not a stage: no frame passes through it.
  *
- *     OUT/job/lock                 empty; the run at work holds a lock (flock) on it, which ends with its process
- *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their sizes,
- *                                  times and checksums
- *     OUT/job/window_000012.npg    state after the 12th solved window: an archive (pipeline/archive.h) with the facts
- *                                  of the capture, the reference mesh in unit coordinates, what stages need to be
- *                                  resumed, the optimiser, and the frames that the next windows share
+ *     OUT/job/lock                 empty; the run at work holds a lock (flock) on it, which ends with its
+ *                                  process
+ *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
+ *                                  sizes, times and checksums
+ *     OUT/job/window_000012.npg    state after the 12th solved window: an archive (pipeline/archive.h) with
+ *                                  the facts of the capture, the reference mesh in unit coordinates, what
+ *                                  stages need to be resumed, the optimiser, and the frames that the next
+ *                                  windows share
  *     OUT/job/window_000012.vdb    the latent grids of the same moment (optimize/vdb_grids.h)
- *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those of all
- *                                  windows stay, for neupig apply
+ *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those
+ *                                  of all windows stay, for neupig apply
  *
- * The two newest windows stay, and the one that later frames start from (neupig append); where grids are to be
- * exported, those of all.  Each file appears whole or not at all; the archive names the checksum of its grids and of
- * the frame log, so that a damaged one is noticed and the one before it used.  No file says that a run is at work.
+ * The two newest windows stay, and the one that later frames start from (neupig append);
+ * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the
+ * checksum of its grids and of the frame log, so that a damaged one is noticed and the one before it used.
+ * No file says that a run is at work.
  *
- * Threads: a run's npg_job belongs to the service until the passes begin.  From then on stage optimize writes states,
- * stage export says how many frames are on disk; functions marked so may be called from any thread. */
+ * Threads: a run's npg_job belongs to the service until the passes begin.
+ * From then on stage optimize writes states, stage export says how many frames are on disk;
+ * functions marked so may be called from any thread. */
 #ifndef NPG_JOB_H
 #define NPG_JOB_H
 
@@ -25,8 +29,8 @@
 
 typedef struct npg_job npg_job;
 
-/* The job of the worker's run; NULL where nothing is kept on disk (live, pulled from, or no output).  Written by
- * the service job before the first pass. */
+/* The job of the worker's run; NULL where nothing is kept on disk (live, pulled from, or no output).
+ * Written by the service job before the first pass. */
 npg_job *npg_job_of(const npg_worker *worker);
 
 /* ---- the job as a whole (job_folder.c) ---- */
@@ -34,13 +38,13 @@ npg_job *npg_job_of(const npg_worker *worker);
 /* What a run finds of an earlier one. */
 typedef enum npg_job_start {
     NPG_JOB_FRESH,  /* nothing that it could be resumed from      */
-    NPG_JOB_RESUME, /* it continues where the earlier one was      */
-    NPG_JOB_APPEND, /* the earlier one is done, frames came since  */
-    NPG_JOB_DONE    /* nothing is left to do                       */
+    NPG_JOB_RESUME, /* it continues where the earlier one was     */
+    NPG_JOB_APPEND, /* the earlier one is done, frames came since */
+    NPG_JOB_DONE    /* nothing is left to do                      */
 } npg_job_start;
 
-/* Open OUT/job, lock it and compare.  NPG_USAGE: another run is at work there, or the inputs, options or the version
- * are others than those that what is there was made of; the text says which. */
+/* Open OUT/job, lock it and compare.  NPG_USAGE: another run is at work there, or the inputs,
+ * options or the version are others than those that what is there was made of; the text says which. */
 npg_status npg_job_open(npg_job **job, npg_job_start *start, npg_worker *worker, bool restart, bool append);
 void npg_job_close(npg_job **job);
 
@@ -53,8 +57,8 @@ const npg_archive *npg_job_archive(const npg_job *job);
 /* Its latent grids. */
 const char *npg_job_grids_path(const npg_job *job);
 
-/* From now on the job is of this run: forget older states and write job.json.  keeps_grids: those of all windows
- * stay.  Any thread. */
+/* From now on the job is of this run: forget older states and write job.json.  keeps_grids:
+ * those of all windows stay.  Any thread. */
 npg_status npg_job_write(npg_job *job, bool keeps_grids);
 
 /* The job is extended by frames that came since: write job.json with them. */
@@ -79,17 +83,17 @@ npg_status npg_job_wait_exported(npg_job *job, int64_t count, int64_t *log_bytes
 
 /* Where a run is when a state is written. */
 typedef struct npg_job_moment {
-    int64_t emitted;     /* frames that have been passed on to evaluate and export     */
-    int64_t read;        /* frames of the plan that need not be read again             */
-    bool is_forward_end; /* later frames start from this state (neupig append)         */
+    int64_t emitted;     /* frames that have been passed on to evaluate and export */
+    int64_t read;        /* frames of the plan that need not be read again         */
+    bool is_forward_end; /* later frames start from this state (neupig append)     */
 } npg_job_moment;
 
 /* Adds to the state what the stage that writes it knows; grids_path is where its latent grids go. */
 typedef npg_status npg_job_write_state(void *user, npg_archive_writer *out, const char *grids_path);
 
-/* Write the next state: waits until the frames passed on are on disk, so that what is solved is never lost, then
- * facts, reports, reference, what stages save (npg_stage.save), and what write() adds.  The file appears whole or not
- * at all.  NPG_DISK, NPG_ABORTED. */
+/* Write the next state: waits until the frames passed on are on disk, so that what is solved is never lost,
+ * then facts, reports, reference, what stages save (npg_stage.save), and what write() adds.
+ * The file appears whole or not at all.  NPG_DISK, NPG_ABORTED. */
 npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                               void *user);
 
@@ -116,8 +120,8 @@ int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 /* A new JSON object.  */
 npg_status npg_job_describe(json_t **description, const npg_options *options);
 
-/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.  NPG_USAGE
- * says what differs first. */
+/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.
+ * NPG_USAGE says what differs first. */
 npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now);
 
 #endif

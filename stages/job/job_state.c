@@ -49,7 +49,8 @@ static npg_status put_all(npg_archive_writer *out, npg_worker *worker, const npg
     NPG_TRY(npg_archive_put(out, "forward", &forward, sizeof forward));
     NPG_TRY(npg_archive_put(out, "read", &moment->read, sizeof moment->read));
     NPG_TRY(put_facts(out, worker));
-    /* the stages behind have no frame in hand: those passed on before are on disk (put_log), no other followed */
+    /* the stages behind have no frame in hand: those passed on before are on disk
+     * (put_log), no other followed */
     return npg_worker_save_stages(worker, out);
 }
 

@@ -1,4 +1,4 @@
-/* Choosing pass: reads the frames of facts.choice, and takes the one of its candidates whose surface results best in the
+/* Choosing pass: reads the frames of facts.choice, and takes the one of its candidates whose surface fits best in the
  * others (choose.h) for the keyframe. */
 #ifndef NPG_CHOOSE_PASS_H
 #define NPG_CHOOSE_PASS_H

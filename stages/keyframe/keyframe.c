@@ -130,17 +130,17 @@ static bool is_better(const candidate *a, const candidate *b)
     return a->score > b->score || (a->score == b->score && a->index < b->index);
 }
 
-static void offer(keyframe_state *state, candidate new)
+static void offer(keyframe_state *state, candidate scored)
 {
     size_t at = state->best_count;
     if (at < SHOWN_SCORES)
         state->best_count++;
-    else if (is_better(&new, &state->best[at - 1]))
+    else if (is_better(&scored, &state->best[at - 1]))
         at--;
     else
         return;
-    for (; at > 0 && is_better(&new, &state->best[at - 1]); at--) state->best[at] = state->best[at - 1];
-    state->best[at] = new;
+    for (; at > 0 && is_better(&scored, &state->best[at - 1]); at--) state->best[at] = state->best[at - 1];
+    state->best[at] = scored;
 }
 
 /* Path of the user's own mesh; "" where the reference is to be made. */
@@ -188,12 +188,12 @@ static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg
     if (frame->is_skipped) return NPG_OK;
     size_t cell_count = mark_cells(state->cells, &facts->box, frame, true);
     mark_cells(state->cells, &facts->box, frame, false);
-    candidate new = {frame->index, frame->number, cell_count,
-                     score_of(cell_count, frame->index, frame_count)};
-    if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &new, frame));
-    if (cell_count) offer(state, new);
+    candidate scored = {frame->index, frame->number, cell_count,
+                        score_of(cell_count, frame->index, frame_count)};
+    if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &scored, frame));
+    if (cell_count) offer(state, scored);
     if (is_named && cell_count && !state->is_chosen) {
-        state->chosen = new;
+        state->chosen = scored;
         state->is_chosen = true;
     }
     if (facts->is_live || !has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count))

@@ -16,11 +16,11 @@ bool npg_shortlist_wants(int64_t index, int64_t frame_count)
 
 npg_status npg_shortlist_add(npg_shortlist *shortlist, const npg_frame *frame, size_t cell_count)
 {
-    npg_nearby *new = &shortlist->list[shortlist->count];
+    npg_nearby *added = &shortlist->list[shortlist->count];
     NPG_REQUIRE(shortlist->count < sizeof shortlist->list / sizeof *shortlist->list);
-    *new = (npg_nearby){.index = frame->index, .cell_count = cell_count};
+    *added = (npg_nearby){.index = frame->index, .cell_count = cell_count};
     if (frame->normals && (frame->fields & NPG_FIELD_CLEAN))
-        NPG_TRY(npg_cloud_contact(&new->contact, frame->pos_local, frame->normals, frame->point_count));
+        NPG_TRY(npg_cloud_contact(&added->contact, frame->pos_local, frame->normals, frame->point_count));
     shortlist->count++;
     return NPG_OK;
 }

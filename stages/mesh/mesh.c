@@ -478,8 +478,8 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
     return NPG_OK;
 }
 
-/* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point, and 80 bytes a
- * face with its share of vertices, normals and the links that mending needs. */
+/* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point,
+ * and 80 bytes a face with its share of vertices, normals and the links that mending needs. */
 #define RAW_FACES_PER_POINT 16
 #define BYTES_PER_RAW_FACE  80
 

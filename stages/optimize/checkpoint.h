@@ -1,4 +1,5 @@
-/* Checkpoint: what stage optimize adds to the state of a run after a solved window, and takes back (job/job.h). */
+/* Checkpoint: what stage optimize adds to the state of a run after a solved window,
+ * and takes back (job/job.h). */
 #ifndef NPG_CHECKPOINT_H
 #define NPG_CHECKPOINT_H
 
