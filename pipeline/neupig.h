@@ -205,10 +205,10 @@ typedef enum npg_log_level { NPG_LOG_ERROR, NPG_LOG_WARNING, NPG_LOG_INFO, NPG_L
 typedef struct npg_log_record {
     size_t struct_size;
     npg_log_level level;
-    double time_s;       /* seconds since the run was opened             */
-    const char *stage;   /* the stage it comes from                      */
-    int64_t frame;       /* number of the frame it is about, -1 if none  */
-    const char *message; /* one line, no newline at its end              */
+    double time_s;       /* seconds since the run was opened            */
+    const char *stage;   /* the stage it comes from                     */
+    int64_t frame;       /* number of the frame it is about, -1 if none */
+    const char *message; /* one line, no newline at its end             */
 } npg_log_record;
 
 typedef struct npg_progress {

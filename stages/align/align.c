@@ -178,14 +178,14 @@ static bool is_lost(const state *s, const npg_tracked *tracked)
     return s->sum.frames && tracked->chamfer > LOST * s->sum.chamfer_sum / (double)s->sum.frames;
 }
 
-/* Where the usual fit lost the surface: with more effort, from where the motion should have led and from where the
- * surface was.  The pose that explains the frame best stays. */
+/* Where the usual fit lost the surface: with more effort, from where the motion should have led
+ * and from where the surface was.  The pose that explains the frame best stays. */
 static npg_status fit_with_effort(npg_worker *worker, npg_tracked *best, side *at, const npg_frame *frame)
 {
-    /* The usual fit has up to --align-steps steps, begins ten times as stiff as it ends, and is 0.08 wide.  A lost
-     * frame has moved farther than that: more steps, a stiffer beginning that moves the body as a whole, and twice,
-     * then four times the width.  What is lost must not slide away along the surface, hence ten times `along`.
-     * Figures: why_these_defaults.md, lost frames. */
+    /* The usual fit has up to --align-steps steps, begins ten times as stiff as it ends, and is 0.08 wide.
+     * A lost frame has moved farther than that: more steps, a stiffer beginning that moves the body
+     * as a whole, and twice, then four times the width.  What is lost must not slide away along the surface,
+     * hence ten times `along`. Figures: why_these_defaults.md, lost frames. */
     static const npg_tracker_effort efforts[] = {
         {.steps = 40, .stiffness = 100, .width_unit = 0.2, .along = 10},
         {.steps = 80, .stiffness = 100, .width_unit = 0.4, .along = 10},

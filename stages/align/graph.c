@@ -229,7 +229,7 @@ npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_tar
     NPG_REQUIRE(mesh && mesh->vert_count && node_target);
     NPG_TRY(npg_alloc(&graph, NPG_FOR_MESH, sizeof *graph));
     graph->vert_count = mesh->vert_count;
-    /* 0.7: set by trial, so that the greedy choice of nodes one radius apart ends near node_target of them. */
+    /* 0.7: set by trial, so that the greedy choice of nodes a radius apart ends near node_target of them. */
     graph->radius = sqrt(npg_mesh_area(mesh) / (0.7 * (double)node_target));
     size_t bound = mesh->vert_count * NPG_GRAPH_BIND;
     npg_status status = npg_alloc_array(&graph->vert_node, NPG_FOR_MESH, bound, sizeof(uint32_t));

@@ -22,13 +22,11 @@
 #define MOVE_MAX    0.15  /* units                                                            */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Set by trial, like those above. */
-#define FACING_AWAY                                                                                          \
-    -0.2             /* cosine of two normals below which a pair is of two sides of a part, not of one     */
-#define SCHEDULE 1.5 /* stiffness and width are final after 2/3 of the steps: the last third settles there */
-#define NOISE_WIDTH                                                                                          \
-    2.5 /* mean distances of points that the robust weight is wide at least                   */
-#define SETTLED     0.01 /* of the graph's radius: a step that moves no node farther ends the fit */
-#define PAIR_WIDTHS 3.0  /* samples farther than so many widths from every point have no pair: a hole */
+#define FACING_AWAY (-0.2) /* cosine of two normals below which a pair is of two sides of a part */
+#define SCHEDULE    1.5    /* stiffness and width are final after 2/3 of the steps; the last third settles */
+#define NOISE_WIDTH 2.5    /* mean distances of points that the robust weight is wide at least */
+#define SETTLED     0.01   /* of the graph's radius: a step that moves no node farther ends the fit */
+#define PAIR_WIDTHS 3.0    /* samples farther than so many widths from every point have no pair: a hole */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
 #define LENT_TERMS 0.18

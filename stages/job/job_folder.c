@@ -240,7 +240,8 @@ static npg_status note_serial(npg_job *job, const char *name, int64_t serial)
     return NPG_OK;
 }
 
-/* The newest state that is whole.  A damaged one is warned of and passed over: the work since is done again. */
+/* The newest state that is whole.  A damaged one is passed over with a warning: the work since is done
+ * again. */
 static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_log)
 {
     NPG_TRY(each_state(job, note_serial));

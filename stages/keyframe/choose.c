@@ -65,7 +65,7 @@ static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight 
     return status;
 }
 
-/* ---- how it results ---- */
+/* ---- how a draft fits the other frames ---- */
 
 typedef struct result_sums {
     const npg_mesh *mesh;

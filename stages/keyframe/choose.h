@@ -33,9 +33,9 @@ typedef struct npg_draft_result {
     double cost;            /* 0 when not followed                                                         */
 } npg_draft_result;
 
-/* frame_count: of the capture.  results: room for as many as there are candidates; *count gets how many, *best
- * which is chosen (its place in results).  best_scored: index of the frame to stay with.  NPG_MEMORY,
- * NPG_STOPPED. */
+/* frame_count: of the capture.  results: room for as many as there are candidates; *count gets how
+ * many, *best which is chosen (its place in results).  best_scored: index of the frame to stay with.
+ * NPG_MEMORY, NPG_STOPPED. */
 npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best, const npg_sights *sights,
                       int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings);
 

@@ -6,8 +6,9 @@
  * surface, near the middle in time.
  *
  * Not in the paper: the score hardly tells frames apart, so the frame it finds is only the first of several
- * candidates (shortlist.h), of which the choosing pass takes the one whose surface results best (choose.h).  A
- * mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to (likeness.h). */
+ * candidates (shortlist.h), of which the choosing pass takes the one whose surface fits best (choose.h).
+ * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
+ * (likeness.h). */
 #include <math.h>
 #include <string.h>
 
@@ -459,7 +460,7 @@ static const npg_option options[] = {
         "-1: by score, or, with --reference, the frame that it is nearest to"),
     NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
         "Take the frame with the best score (paper), "
-        "or the one of several good frames whose surface results best in the others, "
+        "or the one of several good frames whose surface fares best in the others, "
         "so that limbs which touch in one frame are not joined for the whole capture "
         "(apart; not for live runs)"),
     NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",

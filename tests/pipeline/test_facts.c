@@ -1,4 +1,4 @@
-/* What stages share through the run: facts of their own kinds, waits that a stop ends, stages that sit out. */
+/* What stages share through the run: facts of their own kinds, waits that a stop ends, stages left out. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
