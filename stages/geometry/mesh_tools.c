@@ -6,18 +6,7 @@
 #include <string.h>
 
 #include "geometry/sets.h"
-
-static void face_cross(double out[3], const float *vert_pos, const uint32_t face[3])
-{
-    const float *a = vert_pos + 3 * (size_t)face[0], *b = vert_pos + 3 * (size_t)face[1],
-                *c = vert_pos + 3 * (size_t)face[2];
-    double u[3], v[3];
-    for (int i = 0; i < 3; i++) {
-        u[i] = (double)b[i] - (double)a[i];
-        v[i] = (double)c[i] - (double)a[i];
-    }
-    for (int i = 0; i < 3; i++) out[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
-}
+#include "geometry/vec3.h"
 
 void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
                              size_t face_count)
@@ -25,20 +14,16 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
     memset(normals, 0, vert_count * 3 * sizeof *normals);
     for (size_t f = 0; f < face_count; f++) {
         double n[3];
-        face_cross(n, vert_pos, faces + 3 * f);
+        npg_face_cross(n, vert_pos, faces + 3 * f);
         for (int k = 0; k < 3; k++)
             for (int a = 0; a < 3; a++)
                 normals[3 * (size_t)faces[3 * f + (size_t)k] + (size_t)a] += (float)n[a];
     }
     for (size_t i = 0; i < vert_count; i++) {
         float *n = normals + 3 * i;
-        float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        if (length > 0) {
-            for (int a = 0; a < 3; a++) n[a] /= length;
-        } else {
-            n[0] = n[1] = 0;
-            n[2] = 1;
-        }
+        if (npg_vec3_make_unitf(n)) continue;
+        n[0] = n[1] = 0;
+        n[2] = 1;
     }
 }
 
@@ -124,8 +109,8 @@ npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, 
 double npg_face_area(const float *vert_pos, const uint32_t face[3])
 {
     double n[3];
-    face_cross(n, vert_pos, face);
-    return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    npg_face_cross(n, vert_pos, face);
+    return 0.5 * npg_vec3_length(n);
 }
 
 double npg_mesh_area(const npg_mesh *mesh)
@@ -141,7 +126,7 @@ double npg_mesh_volume(const npg_mesh *mesh)
     for (size_t f = 0; f < mesh->face_count; f++) {
         double n[3];
         const float *a = mesh->vert_pos + 3 * (size_t)mesh->faces[3 * f];
-        face_cross(n, mesh->vert_pos, mesh->faces + 3 * f);
+        npg_face_cross(n, mesh->vert_pos, mesh->faces + 3 * f);
         sum += n[0] * (double)a[0] + n[1] * (double)a[1] + n[2] * (double)a[2];
     }
     return sum / 6; /* tetrahedra from the origin to every face: a . (b x c) / 6 = a . face_cross / 6 */

@@ -8,6 +8,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/vec3.h"
 #include "mesh/contact.h"
 
 #define NEIGHBOURS    48 /* in which a facing point is looked for */
@@ -23,11 +24,6 @@ typedef struct manner {
 } manner;
 
 static const manner manners[] = {[NPG_APART_TIGHT] = {1.2, true, 2}, [NPG_APART_LOOSE] = {1.5, false, 0}};
-
-static float dot(const float *a, const float *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* ---- gaps ---- */
 
@@ -53,7 +49,7 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
         for (size_t k = 0; k < SMOOTH_OVER; k++) {
             size_t j = near[NEIGHBOURS * i + k];
             if (j >= n) break;
-            if (dot(normals + 3 * i, normals + 3 * j) < 0.3f) continue;
+            if (npg_vec3_dotf(normals + 3 * i, normals + 3 * j) < 0.3f) continue;
             sum += push[j];
             weight += 1;
         }
@@ -139,7 +135,7 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
 {
     float scale = 0;
     for (size_t k = 0; k < BACK_AMONG && near[k] < apart->count && to->count < BACK_OVER; k++) {
-        bool is_across = dot(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0;
+        bool is_across = npg_vec3_dotf(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0;
         if (is_across && manners[apart->way].is_one_sided) continue;
         if (!to->count) scale = dist_sq[k] + 1e-12f;
         to->weight[to->count] = scale / (dist_sq[k] + scale);
@@ -189,7 +185,7 @@ static void move(const way_back *w, const float *rows, float sign)
     for (size_t i = 0; i < w->mesh->vert_count; i++) {
         float way[3], went[3];
         mean_around(went, &w->of[i], w->apart->shift);
-        if (dot(went, went) <= 0) continue;
+        if (npg_vec3_dotf(went, went) <= 0) continue;
         mean_around(way, &w->of[i], rows);
         for (size_t a = 0; a < 3; a++) w->mesh->vert_pos[3 * i + a] += sign * way[a];
     }

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "pipeline/memory.h"
 
@@ -108,13 +109,11 @@ static void span_plane(double x[3], double y[3], const float n[3])
 {
     int least = fabsf(n[0]) < fabsf(n[1]) ? 0 : 1;
     if (fabsf(n[2]) < fabsf(n[least])) least = 2;
-    double axis[3] = {least == 0, least == 1, least == 2}, length = 0;
-    for (int i = 0; i < 3; i++)
-        x[i] = axis[(i + 1) % 3] * (double)n[(i + 2) % 3] - axis[(i + 2) % 3] * (double)n[(i + 1) % 3];
-    for (int i = 0; i < 3; i++) length += x[i] * x[i];
-    for (int i = 0; i < 3; i++) x[i] /= sqrt(length);
-    for (int i = 0; i < 3; i++)
-        y[i] = (double)n[(i + 1) % 3] * x[(i + 2) % 3] - (double)n[(i + 2) % 3] * x[(i + 1) % 3];
+    const double axis[3] = {least == 0, least == 1, least == 2};
+    const double across[3] = {(double)n[0], (double)n[1], (double)n[2]};
+    npg_vec3_cross(x, axis, across);
+    npg_vec3_make_unit(x);
+    npg_vec3_cross(y, across, x);
 }
 
 /* The quadric's height and slope at the point itself, from the neighbours of its side. */
@@ -127,7 +126,7 @@ static void fit(float *out_point, float *out_normal, size_t i, const float *poin
     span_plane(x, y, n);
     for (size_t j = 0; j < k && r > 0; j++) {
         const float *q = points + 3 * (size_t)index[j], *o = normals + 3 * (size_t)index[j];
-        if (n[0] * o[0] + n[1] * o[1] + n[2] * o[2] < SIDE_COS) continue;
+        if (npg_vec3_dotf(n, o) < SIDE_COS) continue;
         double u = 0, v = 0, h = 0, weight = exp(-2 * (double)dist_sq[j] / (r * r));
         for (int a = 0; a < 3; a++) {
             double d = ((double)q[a] - (double)p[a]) / r;

@@ -5,6 +5,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/sets.h"
+#include "geometry/vec3.h"
 #include "mesh/mesh_clean.h"
 
 #define SMOOTH_ROUNDS 12
@@ -277,14 +278,12 @@ end:
 static double face_normal(double n[3], const npg_mesh *mesh, size_t f)
 {
     const uint32_t *face = mesh->faces + 3 * f;
+    const float *first = mesh->vert_pos + 3 * (size_t)face[0];
     double u[3], v[3];
-    for (size_t i = 0; i < 3; i++) {
-        double a = (double)mesh->vert_pos[3 * (size_t)face[0] + i];
-        u[i] = (double)mesh->vert_pos[3 * (size_t)face[1] + i] - a;
-        v[i] = (double)mesh->vert_pos[3 * (size_t)face[2] + i] - a;
-    }
-    for (int i = 0; i < 3; i++) n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
-    double area2 = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    npg_vec3_between(u, first, mesh->vert_pos + 3 * (size_t)face[1]);
+    npg_vec3_between(v, first, mesh->vert_pos + 3 * (size_t)face[2]);
+    npg_vec3_cross(n, u, v);
+    double area2 = npg_vec3_length(n);
     double edges = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     return edges > 0 ? area2 / edges : 0; /* shape: 0 without area, 0.43 for an equilateral one */
 }
@@ -304,15 +303,12 @@ static void sum_at_vertices(double *sum, const npg_mesh *mesh)
 /* The face's normal against what the other faces around its corners say. */
 static bool is_turned(const double *sum, const npg_mesh *mesh, size_t f)
 {
-    double n[3], others[3] = {0}, dot = 0, nn = 0, oo = 0;
+    double n[3], others[3] = {0};
     if (face_normal(n, mesh, f) < 1e-6) return true;
-    for (size_t a = 0; a < 3; a++) {
+    for (size_t a = 0; a < 3; a++)
         for (size_t k = 0; k < 3; k++) others[a] += sum[3 * (size_t)mesh->faces[3 * f + k] + a] - n[a];
-        dot += n[a] * others[a];
-        nn += n[a] * n[a];
-        oo += others[a] * others[a];
-    }
-    return dot < FLIPPED_COS * sqrt(nn * oo);
+    double nn = npg_vec3_dot(n, n), oo = npg_vec3_dot(others, others);
+    return npg_vec3_dot(n, others) < FLIPPED_COS * sqrt(nn * oo);
 }
 
 static size_t find_flipped(uint8_t *is_flipped, double *sum, const npg_mesh *mesh)
@@ -368,7 +364,7 @@ static void collapse_flipped(npg_mesh *mesh, const uint8_t *is_flipped)
             const float *p = mesh->vert_pos + 3 * (size_t)face[k],
                         *q = mesh->vert_pos + 3 * (size_t)face[(k + 1) % 3];
             float d[3] = {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
-            float length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            float length_sq = npg_vec3_dotf(d, d);
             if (length_sq < least) {
                 least = length_sq;
                 at = k;

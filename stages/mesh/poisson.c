@@ -6,6 +6,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/vec3.h"
 #include "mesh/child.h"
 #include "mesh/poisson_wire.h"
 #include "pipeline/frame_box.h"
@@ -23,7 +24,7 @@ static npg_status check_finite(const float *points, const float *normals, size_t
     for (size_t i = 0; i < n; i++) {
         const float *p = points + 3 * i, *d = normals + 3 * i;
         if (!isfinite(p[0] + p[1] + p[2])) return npg_error(NPG_BAD_INPUT, "point %zu is not finite", i);
-        float length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        float length_sq = npg_vec3_dotf(d, d);
         if (!(fabsf(length_sq - 1) < 0.01f))
             return npg_error(NPG_BAD_INPUT, "the normal of point %zu has length %g instead of 1", i,
                              sqrt((double)length_sq));
@@ -73,8 +74,7 @@ npg_status npg_normals_disagreement(double *share, const float *points, const fl
         for (size_t k = 0; k < NEIGHBOURS; k++) {
             uint32_t j = index[NEIGHBOURS * i + k];
             if (j == UINT32_MAX || j == i) continue;
-            const float *a = normals + 3 * i, *b = normals + 3 * (size_t)j;
-            double cosine = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+            double cosine = (double)npg_vec3_dotf(normals + 3 * i, normals + 3 * (size_t)j);
             vote += cosine * fabs(cosine);
         }
         against += vote < 0;

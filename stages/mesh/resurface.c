@@ -7,6 +7,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/vec3.h"
 #include "mesh/apart.h"
 
 #define ROUNDS_MAX  4
@@ -22,7 +23,7 @@ static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const flo
     float sum = 0;
     for (size_t k = 0; k < 3; k++) {
         const float *v = mesh->vert_normals + 3 * (size_t)mesh->faces[3 * (size_t)hit->face + k];
-        sum += hit->weights[k] * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2]);
+        sum += hit->weights[k] * npg_vec3_dotf(v, n);
     }
     return sum;
 }

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "outlier/sides.h"
 #include "pipeline/memory.h"
@@ -254,8 +255,7 @@ static npg_status follow_core(float *all_normals, const float *all_points, size_
         for (size_t i = 0; i < count; i++) {
             float *m = all_normals + 3 * (first + i), sum = 0;
             for (size_t k = 0; k < NEAR; k++) {
-                const float *o = normals + 3 * (size_t)index[NEAR * i + k];
-                float along = m[0] * o[0] + m[1] * o[1] + m[2] * o[2];
+                float along = npg_vec3_dotf(m, normals + 3 * (size_t)index[NEAR * i + k]);
                 /* Near points and clear agreement count more; 1e-20: a core point is at distance 0 itself. */
                 sum += along * fabsf(along) / (dist_sq[NEAR * i + k] + 1e-20f);
             }
