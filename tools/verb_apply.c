@@ -11,9 +11,8 @@
 
 #include "export/export.h"
 #include "export/forms/writer.h"
-#include "geometry/attach.h"
-#include "geometry/mesh_tools.h"
-#include "ingest/formats/reader.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "job/file_facts.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"

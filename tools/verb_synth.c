@@ -4,8 +4,7 @@
 #include <string.h>
 
 #include "export/forms/writer.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"
 #include "tools/cli.h"

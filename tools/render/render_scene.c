@@ -9,8 +9,8 @@
 #include <strings.h>
 #include <unistd.h>
 
-#include "geometry/mesh_tools.h"
-#include "ingest/formats/reader.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "pipeline/file.h"
 
 enum { BALLS_MAX = 200000 };

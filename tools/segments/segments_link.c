@@ -7,8 +7,8 @@
 #include <sys/stat.h>
 
 #include "export/export.h"
-#include "geometry/mesh_tools.h"
-#include "ingest/formats/reader.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "job/file_facts.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
