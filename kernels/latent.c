@@ -21,7 +21,8 @@ static void fill_channels(npg_samples *samples, const npg_levels *levels)
     for (int l = 0; l < levels->count; l++) {
         const npg_level *level = &levels->level[l];
         for (size_t i = 0; i < level->row_count; i++)
-            samples->channels[level->first_row + i] = level->channel_first | level->channel_end << 8;
+            samples->channels[level->first_row + i] =
+                NPG_CHANNEL_RANGE(level->channel_first, level->channel_end);
     }
 }
 

@@ -5,10 +5,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "kernels/layout.h"
 #include "pipeline/memory.h"
 
-#define NPG_LATENT_CHANNELS 32
-#define NPG_LEVELS_MAX      32
+#define NPG_LEVELS_MAX 32
 
 typedef enum npg_level_kind {
     NPG_LEVEL_POSITION, /* dense grid over [-1, 1]^3, sampled at positions */
