@@ -67,22 +67,18 @@ static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, co
 npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels)
 {
     tables t = {0};
-    npg_status status;
     size_t bytes = levels->row_count * NPG_LATENT_CHANNELS * sizeof(float);
     fill_tables(&t, levels);
     *sobolev = (npg_sobolev){.level_count = levels->count, .line_count = t.lines};
-    NPG_TRY_OR(failed, status, npg_program_open(&sobolev->program, device, "sobolev", ""));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level));
-    NPG_TRY_OR(failed, status,
-               npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal));
-    NPG_TRY_OR(failed, status, upload_transforms(sobolev, device, levels, &t));
-    NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->a, device, bytes));
-    NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->b, device, bytes));
-    return NPG_OK;
-failed:
-    npg_sobolev_close(sobolev);
+    npg_status status = npg_program_open(&sobolev->program, device, "sobolev", "");
+    if (!status) status = npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level);
+    if (!status) status = npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first);
+    if (!status) status = npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda);
+    if (!status) status = npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal);
+    if (!status) status = upload_transforms(sobolev, device, levels, &t);
+    if (!status) status = npg_buffer_open(&sobolev->a, device, bytes);
+    if (!status) status = npg_buffer_open(&sobolev->b, device, bytes);
+    if (status) npg_sobolev_close(sobolev);
     return status;
 }
 

@@ -87,6 +87,14 @@ static void lay_out_rows(npg_block_system *s)
         }
 }
 
+static void fill_rows(npg_block_system *s, const uint32_t (*pairs)[2])
+{
+    memcpy(s->pairs, pairs, s->pair_count * sizeof *pairs);
+    for (size_t e = 0; e < s->pair_count; e++) s->first[pairs[e][0] + 1]++;
+    for (size_t a = 0; a < s->n; a++) s->first[a + 1] += s->first[a];
+    lay_out_rows(s);
+}
+
 npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pairs)[2], size_t pair_count)
 {
     npg_block_system *s;
@@ -95,16 +103,10 @@ npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pai
     s->n = n;
     s->pair_count = pair_count;
     npg_status status = open_arrays(s);
-    if (status) {
-        npg_block_close(&s);
-        return status;
-    }
-    memcpy(s->pairs, pairs, pair_count * sizeof *pairs);
-    for (size_t e = 0; e < pair_count; e++) s->first[pairs[e][0] + 1]++;
-    for (size_t a = 0; a < n; a++) s->first[a + 1] += s->first[a];
-    lay_out_rows(s);
+    if (!status) fill_rows(s, pairs);
+    if (status) npg_block_close(&s);
     *out = s;
-    return NPG_OK;
+    return status;
 }
 
 /* ---- gathering ---- */

@@ -27,6 +27,21 @@ static size_t find_face(const double *cumulated, size_t face_count, double area)
     return low;
 }
 
+/* One sample of a face, uniform over it: the root makes up for its growing width
+ * (Osada et al., Shape Distributions, 2002). */
+static void sample_face(float pos[3], float normal_out[3], const npg_mesh *mesh, size_t f, npg_random *random)
+{
+    double r = sqrt(npg_random_real(random)), t = npg_random_real(random), normal[3];
+    const uint32_t *face = mesh->faces + 3 * f;
+    const float *a = mesh->vert_pos + 3 * (size_t)face[0], *b = mesh->vert_pos + 3 * (size_t)face[1],
+                *c = mesh->vert_pos + 3 * (size_t)face[2];
+    npg_face_normal(normal, mesh->vert_pos, face);
+    for (int k = 0; k < 3; k++) {
+        pos[k] = (float)((1 - r) * (double)a[k] + r * (1 - t) * (double)b[k] + r * t * (double)c[k]);
+        normal_out[k] = (float)normal[k];
+    }
+}
+
 npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const npg_mesh *mesh,
                            size_t sample_count, uint64_t seed, uint64_t frame, uint64_t purpose)
 {
@@ -34,28 +49,17 @@ npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const 
     NPG_TRY(npg_alloc_array(&cumulated, NPG_FOR_QUERY, mesh->face_count, sizeof *cumulated));
     for (size_t f = 0; f < mesh->face_count; f++)
         cumulated[f] = total += npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * f);
-    if (!(total > 0) || !isfinite(total)) {
-        npg_release(&cumulated);
-        return npg_error(NPG_BAD_INPUT, "the mesh has no area, or a vertex that is not finite");
-    }
+    npg_status status = NPG_OK;
+    if (!(total > 0) || !isfinite(total))
+        status = npg_error(NPG_BAD_INPUT, "the mesh has no area, or a vertex that is not finite");
     npg_random random = npg_random_stream(seed, frame, purpose);
-    for (size_t s = 0; s < sample_count; s++) {
+    for (size_t s = 0; s < sample_count && !status; s++) {
         size_t f = find_face(cumulated, mesh->face_count, npg_random_real(&random) * total);
-        /* Uniform in the triangle: the root makes up for its growing width (Osada et al., 2002). */
-        double r = sqrt(npg_random_real(&random)), t = npg_random_real(&random);
-        const uint32_t *face = mesh->faces + 3 * f;
-        const float *a = mesh->vert_pos + 3 * face[0], *b = mesh->vert_pos + 3 * face[1],
-                    *c = mesh->vert_pos + 3 * face[2];
-        npg_face_normal(normal, mesh->vert_pos, face);
-        for (int k = 0; k < 3; k++) {
-            pos[3 * s + k] =
-                (float)((1 - r) * (double)a[k] + r * (1 - t) * (double)b[k] + r * t * (double)c[k]);
-            normals[3 * s + k] = (float)normal[k];
-        }
+        sample_face(pos + 3 * s, normals + 3 * s, mesh, f, &random);
         if (face_of) face_of[s] = (uint32_t)f;
     }
     npg_release(&cumulated);
-    return NPG_OK;
+    return status;
 }
 
 /* One side of a comparison. */

@@ -58,17 +58,10 @@ static npg_status check_extent(const float *points, size_t n)
     return NPG_OK;
 }
 
-npg_status npg_normals_disagreement(double *share, const float *points, const float *normals, size_t n)
+/* How many normals point against those around them. */
+static size_t count_against(const float *normals, const uint32_t *index, size_t n)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL;
-    npg_status status;
     size_t against = 0;
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *dist_sq));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points, n, NEIGHBOURS, 0));
     for (size_t i = 0; i < n; i++) {
         double vote = 0;
         for (size_t k = 0; k < NEIGHBOURS; k++) {
@@ -79,8 +72,19 @@ npg_status npg_normals_disagreement(double *share, const float *points, const fl
         }
         against += vote < 0;
     }
-    *share = (double)against / (double)n;
-done:
+    return against;
+}
+
+npg_status npg_normals_disagreement(double *share, const float *points, const float *normals, size_t n)
+{
+    npg_kdtree *tree = NULL;
+    uint32_t *index = NULL;
+    float *dist_sq = NULL;
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *dist_sq);
+    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, points, n, NEIGHBOURS, 0);
+    if (!status) *share = (double)count_against(normals, index, n) / (double)n;
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);

@@ -54,20 +54,18 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t n, i
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
     float *dist_sq = NULL, *around = NULL;
-    npg_status status;
     size_t k = (size_t)neighbours;
     NPG_REQUIRE(neighbours >= 3);
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq));
-    NPG_TRY_OR(done, status, npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around));
-    for (size_t first = 0; first < n; first += BATCH) {
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq);
+    if (!status) status = npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around);
+    for (size_t first = 0; first < n && !status; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
-        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0));
-        for (size_t i = 0; i < count; i++)
+        status = npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0);
+        for (size_t i = 0; i < count && !status; i++)
             normal_from(normals + 3 * (first + i), around, points, index + k * i, k);
     }
-done:
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);

@@ -182,12 +182,12 @@ npg_status npg_image_encode(const npg_image *image, void *out, size_t *size)
     if (!png_image_write_to_memory(&png, NULL, &room, 0, image->pixels, 0, NULL))
         return npg_error(NPG_FAILED, "libpng: %s", png.message);
     NPG_TRY(npg_alloc(bytes, NPG_FOR_FILES, room));
-    if (!png_image_write_to_memory(&png, *bytes, &room, 0, image->pixels, 0, NULL)) {
-        npg_release(bytes);
-        return npg_error(NPG_FAILED, "libpng: %s", png.message);
-    }
+    npg_status status = NPG_OK;
+    if (!png_image_write_to_memory(&png, *bytes, &room, 0, image->pixels, 0, NULL))
+        status = npg_error(NPG_FAILED, "libpng: %s", png.message);
+    if (status) npg_release(bytes);
     *size = room;
-    return NPG_OK;
+    return status;
 }
 
 npg_status npg_image_write(const npg_image *image, const char *path)
