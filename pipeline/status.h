@@ -57,13 +57,6 @@ npg_status npg_error_restore(npg_status status, const char *text);
         if (try_status_ != NPG_OK) return try_status_;                                                       \
     } while (0)
 
-/* Leave for the label with what a call returned in status, unless it was NPG_OK. */
-#define NPG_TRY_OR(label, status, call)                                                                      \
-    do {                                                                                                     \
-        (status) = (call);                                                                                   \
-        if ((status) != NPG_OK) goto label;                                                                  \
-    } while (0)
-
 #ifdef __cplusplus
 }
 #endif

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "export/forms/writer.h"
+#include "export/export.h"
 #include "geometry/geometry.h"
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"

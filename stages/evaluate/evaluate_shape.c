@@ -1,7 +1,7 @@
 /* Shape: flipped and stretched faces and the change of edges of a deformed mesh against its reference. */
 #include <math.h>
 
-#include "evaluate/evaluate.h"
+#include "evaluate/evaluate_shape.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
 
