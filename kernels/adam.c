@@ -5,7 +5,6 @@
 
 npg_status npg_adam_open(npg_adam *adam, npg_device *device, const float *rates, size_t row, size_t count)
 {
-    npg_status status;
     size_t rate_count = (count + row - 1) / row;
     *adam = (npg_adam){.count = count,
                        .row = row,
@@ -14,13 +13,11 @@ npg_status npg_adam_open(npg_adam *adam, npg_device *device, const float *rates,
                        .epsilon = 1e-8,
                        .scale = 1,
                        .span = (size_t)npg_device_tuning(device)->span};
-    NPG_TRY_OR(failed, status, npg_program_open(&adam->program, device, "adam", ""));
-    NPG_TRY_OR(failed, status, npg_buffer_open(&adam->first, device, count * sizeof(float)));
-    NPG_TRY_OR(failed, status, npg_buffer_open(&adam->second, device, count * sizeof(float)));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&adam->rate, device, rates, rate_count * sizeof(float)));
-    return NPG_OK;
-failed:
-    npg_adam_close(adam);
+    npg_status status = npg_program_open(&adam->program, device, "adam", "");
+    if (!status) status = npg_buffer_open(&adam->first, device, count * sizeof(float));
+    if (!status) status = npg_buffer_open(&adam->second, device, count * sizeof(float));
+    if (!status) status = npg_buffer_from(&adam->rate, device, rates, rate_count * sizeof(float));
+    if (status) npg_adam_close(adam);
     return status;
 }
 

@@ -6,14 +6,12 @@
  * has LOCAL work-items; each owns every LOCAL-th block of 16 vertices, walks both lists in order and adds what pulls at
  * its own: no atomics, equal input gives equal bits. */
 
-#define SLOT 8
-
 inline float weight_of(float dist_sq, float falloff)
 {
     return exp(-dist_sq * dist_sq * falloff);
 }
 
-/* cd: [frames].  g: dL/dx per frame like x, overwritten.  x: moving vertices ([rows / 16][3][16] per frame);
+/* cd: [frames].  g: dL/dx per frame like x, overwritten.  x: moving vertices (blocks, per frame);
  * points: targets; to_points / to_verts: nearest indices; forward / reverse: the slots (op nearest) of the searches
  * vertex -> point and point -> vertex.  falloff = 1 / (2 alpha^2), 0 for plain squared distances.
  * Global size: one group of LOCAL items per frame, frames first ... */
@@ -25,39 +23,42 @@ chamfer_frame(global float *cd, global float *g, global const float *x, global c
     local float sums[LOCAL];
     size_t frame = first + get_group_id(0);
     if (frame >= (size_t)(first + count)) return;
-    global const int *f = forward + frame * SLOT, *r = reverse + frame * SLOT;
-    global float *grad = g + (size_t)f[1] * 48;
-    x += (size_t)f[1] * 48;
-    points += (size_t)f[3] * 48;
+    global const int *f = forward + frame * NPG_SLOT, *r = reverse + frame * NPG_SLOT;
+    global float *grad = g + (size_t)f[NPG_SLOT_QUERY_BLOCK] * NPG_POINT_BLOCK;
+    int real = f[NPG_SLOT_QUERIES], point_count = r[NPG_SLOT_QUERIES];
+    x += (size_t)f[NPG_SLOT_QUERY_BLOCK] * NPG_POINT_BLOCK;
+    points += (size_t)f[NPG_SLOT_POINT_BLOCK] * NPG_POINT_BLOCK;
+    to_points += f[NPG_SLOT_RESULT];
+    to_verts += r[NPG_SLOT_RESULT];
     float sum_v = 0.0f, sum_p = 0.0f;
-    for (int block = ITEM; block < rows / 16; block += LOCAL) {
+    for (int block = ITEM; block < rows / NPG_LANES; block += LOCAL) {
         float part = 0.0f;
-        for (int lane = 0; lane < 16; lane++) {
-            int v = block * 16 + lane, p = v < f[0] ? to_points[f[5] + v] : 0;
-            size_t at = (size_t)block * 48 + lane, to = (size_t)(p / 16) * 48 + p % 16;
-            float3 d = (float3)(x[at] - points[to], x[at + 16] - points[to + 16], x[at + 32] - points[to + 32]);
+        for (int lane = 0; lane < NPG_LANES; lane++) {
+            int v = block * NPG_LANES + lane, p = v < real ? to_points[v] : 0;
+            size_t at = (size_t)block * NPG_POINT_BLOCK + lane, to = NPG_POINT_AT(p);
+            float3 d = POINT(x, at) - POINT(points, to);
             float dist_sq = d.x * d.x + d.y * d.y + d.z * d.z;
-            float w = v < f[0] ? weight_of(dist_sq, falloff) : 0.0f;
-            part += v < f[0] ? w * dist_sq : 0.0f;
+            float w = v < real ? weight_of(dist_sq, falloff) : 0.0f;
+            part += v < real ? w * dist_sq : 0.0f;
             grad[at] = 2.0f * w * d.x;
-            grad[at + 16] = 2.0f * w * d.y;
-            grad[at + 32] = 2.0f * w * d.z;
+            grad[at + NPG_LANES] = 2.0f * w * d.y;
+            grad[at + 2 * NPG_LANES] = 2.0f * w * d.z;
         }
         sum_v += part;
     }
-    for (int start = 0; start < r[0]; start += 16) {
+    for (int start = 0; start < point_count; start += NPG_LANES) {
         float part = 0.0f;
-        for (int p = start; p < min(start + 16, r[0]); p++) {
-            int v = to_verts[r[5] + p];
-            if (v / 16 % LOCAL != ITEM) continue;
-            size_t at = (size_t)(v / 16) * 48 + v % 16, to = (size_t)(p / 16) * 48 + p % 16;
-            float3 d = (float3)(x[at] - points[to], x[at + 16] - points[to + 16], x[at + 32] - points[to + 32]);
+        for (int p = start; p < min(start + NPG_LANES, point_count); p++) {
+            int v = to_verts[p];
+            if (v / NPG_LANES % LOCAL != ITEM) continue; /* another item's vertex */
+            size_t at = NPG_POINT_AT(v), to = NPG_POINT_AT(p);
+            float3 d = POINT(x, at) - POINT(points, to);
             float dist_sq = d.x * d.x + d.y * d.y + d.z * d.z;
             float w = weight_of(dist_sq, falloff);
             part += w * dist_sq;
             grad[at] += 2.0f * w * d.x;
-            grad[at + 16] += 2.0f * w * d.y;
-            grad[at + 32] += 2.0f * w * d.z;
+            grad[at + NPG_LANES] += 2.0f * w * d.y;
+            grad[at + 2 * NPG_LANES] += 2.0f * w * d.z;
         }
         sum_p += part;
     }

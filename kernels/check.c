@@ -6,18 +6,13 @@
 npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random)
 {
     NPG_TRY(npg_alloc_array(values, NPG_FOR_RUN, n, sizeof **values));
-    if (wide) {
-        npg_status status = npg_alloc_array(wide, NPG_FOR_RUN, n, sizeof **wide);
-        if (status) {
-            npg_release(values);
-            return status;
-        }
-    }
-    for (size_t i = 0; i < n; i++) {
+    npg_status status = wide ? npg_alloc_array(wide, NPG_FOR_RUN, n, sizeof **wide) : NPG_OK;
+    for (size_t i = 0; i < n && !status; i++) {
         (*values)[i] = (float)(scale * (2 * npg_random_real(random) - 1));
         if (wide) (*wide)[i] = (double)(*values)[i];
     }
-    return NPG_OK;
+    if (status) npg_release(values);
+    return status;
 }
 
 void npg_check_compare(double *error, const float *got, const double *want, size_t n)

@@ -10,7 +10,7 @@ static void fill_row(npg_samples *samples, const npg_levels *levels, size_t row,
 {
     for (int l = 0; l < levels->count; l++) {
         const npg_level *level = &levels->level[l];
-        size_t at = row * samples->per_row + 8 * (size_t)l;
+        size_t at = row * samples->per_row + NPG_CELL_NODES * (size_t)l;
         npg_level_sample(level, level->kind == NPG_LEVEL_NORMAL ? normal : position, samples->index + at,
                          samples->weight + at);
     }
@@ -21,7 +21,8 @@ static void fill_channels(npg_samples *samples, const npg_levels *levels)
     for (int l = 0; l < levels->count; l++) {
         const npg_level *level = &levels->level[l];
         for (size_t i = 0; i < level->row_count; i++)
-            samples->channels[level->first_row + i] = level->channel_first | level->channel_end << 8;
+            samples->channels[level->first_row + i] =
+                NPG_CHANNEL_RANGE(level->channel_first, level->channel_end);
     }
 }
 
@@ -40,31 +41,31 @@ static void transpose(npg_samples *samples, size_t real)
     samples->start[0] = 0;
 }
 
+static npg_status alloc_samples(npg_samples *samples, size_t real)
+{
+    size_t entries = samples->rows * samples->per_row, back = real * samples->per_row;
+    NPG_TRY(npg_alloc_array(&samples->index, NPG_FOR_FIT, entries, sizeof(int32_t)));
+    NPG_TRY(npg_alloc_array(&samples->weight, NPG_FOR_FIT, entries, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&samples->start, NPG_FOR_FIT, samples->node_count + 2, sizeof(int32_t)));
+    NPG_TRY(npg_alloc_array(&samples->vertex, NPG_FOR_FIT, back, sizeof(int32_t)));
+    NPG_TRY(npg_alloc_array(&samples->channels, NPG_FOR_FIT, samples->node_count, sizeof(int32_t)));
+    return npg_alloc_array(&samples->weight_back, NPG_FOR_FIT, back, sizeof(float));
+}
+
 npg_status npg_samples_open(npg_samples *samples, const npg_levels *levels, const float *positions,
                             const float *normals, size_t real, size_t rows)
 {
     NPG_REQUIRE(real && real <= rows && rows < INT32_MAX / 256);
-    size_t per_row = 8 * (size_t)levels->count, nodes = levels->row_count;
-    npg_status status;
-    *samples = (npg_samples){.rows = rows, .node_count = nodes, .per_row = per_row};
-    NPG_TRY_OR(failed, status,
-               npg_alloc_array(&samples->index, NPG_FOR_FIT, rows * per_row, sizeof(int32_t)));
-    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->weight, NPG_FOR_FIT, rows * per_row, sizeof(float)));
-    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->start, NPG_FOR_FIT, nodes + 2, sizeof(int32_t)));
-    NPG_TRY_OR(failed, status,
-               npg_alloc_array(&samples->vertex, NPG_FOR_FIT, real * per_row, sizeof(int32_t)));
-    NPG_TRY_OR(failed, status, npg_alloc_array(&samples->channels, NPG_FOR_FIT, nodes, sizeof(int32_t)));
-    NPG_TRY_OR(failed, status,
-               npg_alloc_array(&samples->weight_back, NPG_FOR_FIT, real * per_row, sizeof(float)));
-    for (size_t row = 0; row < rows; row++) {
+    *samples = (npg_samples){
+        .rows = rows, .node_count = levels->row_count, .per_row = NPG_CELL_NODES * (size_t)levels->count};
+    npg_status status = alloc_samples(samples, real);
+    for (size_t row = 0; row < rows && !status; row++) {
         size_t from = row < real ? row : real - 1;
         fill_row(samples, levels, row, positions + 3 * from, normals + 3 * from);
     }
-    fill_channels(samples, levels);
-    transpose(samples, real);
-    return NPG_OK;
-failed:
-    npg_samples_close(samples);
+    if (!status) fill_channels(samples, levels);
+    if (!status) transpose(samples, real);
+    if (status) npg_samples_close(samples);
     return status;
 }
 
@@ -82,19 +83,16 @@ void npg_samples_close(npg_samples *samples)
 
 npg_status npg_latent_open(npg_latent *latent, npg_device *device, const npg_samples *s)
 {
-    npg_status status;
     size_t entries = s->rows * s->per_row, back = (size_t)s->start[s->node_count];
     *latent = (npg_latent){.rows = s->rows, .node_count = s->node_count, .per_row = s->per_row};
-    NPG_TRY_OR(failed, status, npg_program_open(&latent->program, device, "latent", ""));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->index, device, s->index, entries * 4));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->weight, device, s->weight, entries * 4));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->start, device, s->start, (s->node_count + 1) * 4));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->vertex, device, s->vertex, back * 4));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->weight_back, device, s->weight_back, back * 4));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&latent->channels, device, s->channels, s->node_count * 4));
-    return NPG_OK;
-failed:
-    npg_latent_close(latent);
+    npg_status status = npg_program_open(&latent->program, device, "latent", "");
+    if (!status) status = npg_buffer_from(&latent->index, device, s->index, entries * 4);
+    if (!status) status = npg_buffer_from(&latent->weight, device, s->weight, entries * 4);
+    if (!status) status = npg_buffer_from(&latent->start, device, s->start, (s->node_count + 1) * 4);
+    if (!status) status = npg_buffer_from(&latent->vertex, device, s->vertex, back * 4);
+    if (!status) status = npg_buffer_from(&latent->weight_back, device, s->weight_back, back * 4);
+    if (!status) status = npg_buffer_from(&latent->channels, device, s->channels, s->node_count * 4);
+    if (status) npg_latent_close(latent);
     return status;
 }
 

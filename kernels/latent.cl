@@ -2,7 +2,7 @@
  *
  * The vertices and normals never move, so trilinear weights are a constant sparse matrix: K entries per vertex
  * forward, its transpose as row lists backward; no atomics, equal input gives equal bits.  The mean over levels
- * is part of the weights.  Every node has CZ = 32 channels of which its level uses a part (channel ranges). */
+ * is part of the weights.  Every node has 32 channels, two vectors a and b of 16, of which its level uses a part (channel ranges). */
 
 /* z: [rows][32]; index, weight: [rows][K]; nodes: [node_count][32].  Global size: (rows). */
 kernel void latent_sample(global float *z, global const float *nodes, global const int *index,
@@ -32,7 +32,7 @@ kernel void latent_tanh_back(global float *dz, global const float *z, int rows)
 }
 
 /* dnodes[n] = sum over the vertices that sample n of weight dz, in the channels [lo, hi) that the node uses.
- * start: [node_count + 1]; vertex, weight: [entries]; channels: [node_count] lo | hi << 8.
+ * start: [node_count + 1]; vertex, weight: [entries]; channels: [node_count] ranges.
  * Global size: (node_count). */
 kernel void latent_back(global float *dnodes, global const float *dz, global const int *start,
                         global const int *vertex, global const float *weight, global const int *channels,
@@ -47,7 +47,7 @@ kernel void latent_back(global float *dnodes, global const float *dz, global con
         a = fma(w, vload16(2 * vertex[k], dz), a);
         b = fma(w, vload16(2 * vertex[k] + 1, dz), b);
     }
-    int lo = channels[n] & 255, hi = channels[n] >> 8;
+    int lo = NPG_CHANNEL_FIRST(channels[n]), hi = NPG_CHANNEL_END(channels[n]);
     vstore16(select((float16)(0.0f), a, lane >= lo && lane < hi), 2 * n, dnodes);
     vstore16(select((float16)(0.0f), b, lane + 16 >= lo && lane + 16 < hi), 2 * n + 1, dnodes);
 }

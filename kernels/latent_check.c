@@ -35,7 +35,7 @@ static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
 {
     npg_random random = npg_random_stream(seed, 10, (uint64_t)size);
     d->real = size == 1 ? 5 : (size_t)size * 397 + 3;
-    d->rows = (d->real + 15) / 16 * 16;
+    d->rows = NPG_PADDED(d->real);
     make_levels(&d->levels, size, 1, 1);
     size_t nodes = d->levels.row_count * CHANNELS, z = d->rows * CHANNELS;
     NPG_TRY(npg_check_values(&d->positions, NULL, d->real * 3, 1.05, &random)); /* some outside the cube */
@@ -113,7 +113,8 @@ npg_status npg_slope_latent(uint64_t seed, double *error)
         npg_latent_back_ref(d.dnodes, d.dz_wide, d.z, &d.samples);
         /* channels that a level does not use have no gradient by definition: look at those it uses */
         for (size_t n = 0; n < d.samples.node_count; n += 7) {
-            size_t lo = (size_t)d.samples.channels[n] & 255, end = (size_t)d.samples.channels[n] >> 8;
+            size_t lo = (size_t)NPG_CHANNEL_FIRST(d.samples.channels[n]),
+                   end = (size_t)NPG_CHANNEL_END(d.samples.channels[n]);
             size_t at = n * CHANNELS + lo;
             npg_check_slope(error, d.nodes_wide + at, d.dnodes + at, end - lo, 3, 1e-5, latent_value, &d);
         }

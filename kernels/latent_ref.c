@@ -21,7 +21,8 @@ void npg_latent_back_ref(double *dnodes, const double *dz, const double *z, cons
     memset(dnodes, 0, samples->node_count * NPG_LATENT_CHANNELS * sizeof *dnodes);
     for (size_t n = 0; n < samples->node_count; n++)
         for (int32_t k = samples->start[n]; k < samples->start[n + 1]; k++)
-            for (int c = samples->channels[n] & 255; c < samples->channels[n] >> 8; c++) {
+            for (int c = NPG_CHANNEL_FIRST(samples->channels[n]); c < NPG_CHANNEL_END(samples->channels[n]);
+                 c++) {
                 size_t at = (size_t)samples->vertex[k] * NPG_LATENT_CHANNELS + (size_t)c;
                 dnodes[n * NPG_LATENT_CHANNELS + (size_t)c] +=
                     (double)samples->weight_back[k] * dz[at] * (1 - z[at] * z[at]);

@@ -32,7 +32,8 @@ static size_t row_of(const npg_level *level, const uint32_t at[3])
     return level->first_row + (at[0] * n + at[1]) * n + at[2];
 }
 
-void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[8], float weights[8])
+void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[NPG_CELL_NODES],
+                      float weights[NPG_CELL_NODES])
 {
     uint32_t cell[3];
     float part[3];
@@ -42,7 +43,7 @@ void npg_level_sample(const npg_level *level, const float point[3], int32_t rows
         cell[axis] = (uint32_t)fminf(floorf(at), last - 1);
         part[axis] = at - (float)cell[axis];
     }
-    for (int corner = 0; corner < 8; corner++) {
+    for (int corner = 0; corner < NPG_CELL_NODES; corner++) {
         uint32_t at[3];
         float weight = (float)level->share;
         for (int axis = 0; axis < 3; axis++) {

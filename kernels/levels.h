@@ -5,10 +5,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "kernels/layout.h"
 #include "pipeline/memory.h"
 
-#define NPG_LATENT_CHANNELS 32
-#define NPG_LEVELS_MAX      32
+#define NPG_LEVELS_MAX 32
+#define NPG_CELL_NODES 8 /* corners of a grid cell: the nodes that a point is sampled from */
 
 typedef enum npg_level_kind {
     NPG_LEVEL_POSITION, /* dense grid over [-1, 1]^3, sampled at positions */
@@ -41,6 +42,7 @@ void npg_levels_add(npg_levels *levels, npg_level level, size_t table_rows);
 /* The eight nodes around a point (clamped to [-1, 1]^3) of a level and their trilinear weights:
  * rows of the whole table.  Nodes lie at the corners of the cube ("align corners");
  * node (i, j, k) is row (i n + j) n + k. */
-void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[8], float weights[8]);
+void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[NPG_CELL_NODES],
+                      float weights[NPG_CELL_NODES]);
 
 #endif

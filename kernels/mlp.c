@@ -3,8 +3,6 @@
 
 #include <stdio.h>
 
-#include "kernels/levels.h"
-
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 
 size_t npg_mlp_at_w3(const npg_mlp_shape *s)
@@ -13,7 +11,7 @@ size_t npg_mlp_at_w3(const npg_mlp_shape *s)
 }
 size_t npg_mlp_at_b2(const npg_mlp_shape *s)
 {
-    return npg_mlp_at_w3(s) + s->w2 * 16;
+    return npg_mlp_at_w3(s) + s->w2 * NPG_MLP_W3_ROW;
 }
 size_t npg_mlp_at_b3(const npg_mlp_shape *s)
 {
@@ -21,7 +19,7 @@ size_t npg_mlp_at_b3(const npg_mlp_shape *s)
 }
 size_t npg_mlp_at_w1z(const npg_mlp_shape *s)
 {
-    return npg_mlp_at_b3(s) + 16;
+    return npg_mlp_at_b3(s) + NPG_MLP_W3_ROW;
 }
 size_t npg_mlp_at_w1t(const npg_mlp_shape *s)
 {
@@ -38,7 +36,7 @@ size_t npg_mlp_param_count(const npg_mlp_shape *s)
 
 size_t npg_mlp_packed(size_t rows, size_t row, size_t column)
 {
-    return column / 32 * 32 * rows + row * 32 + column % 32;
+    return column / NPG_PANEL * NPG_PANEL * rows + row * NPG_PANEL + column % NPG_PANEL;
 }
 
 static npg_status open_buffers(npg_mlp *m, npg_device *d)
@@ -62,7 +60,7 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     NPG_TRY(npg_buffer_open(&m->dp, d, m->rows * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->dc, d, m->groups * m->frames * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->sums, d, m->groups * npg_mlp_at_w1t(s) * f));
-    return npg_buffer_open(&m->transposed, d, (s->w1 * s->w2 + s->w1 * CHANNELS + 7 * s->w2) * f);
+    return npg_buffer_open(&m->transposed, d, (s->w1 * s->w2 + s->w1 * CHANNELS + NPG_MLP_USED * s->w2) * f);
 }
 
 size_t npg_mlp_rows(const npg_device *device, size_t vertices)
@@ -77,8 +75,9 @@ npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *s
     char constants[128];
     const npg_tuning *tuning = npg_device_tuning(device);
     const size_t block = (size_t)tuning->mlp_rows;
-    NPG_REQUIRE(rows && rows % block == 0 && frames && shape->w1 % 32 == 0 && shape->w2 % 32 == 0);
-    NPG_REQUIRE(shape->w1 >= 32 && shape->w2 >= 32);
+    NPG_REQUIRE(rows && rows % block == 0 && frames && shape->w1 % NPG_PANEL == 0 &&
+                shape->w2 % NPG_PANEL == 0);
+    NPG_REQUIRE(shape->w1 >= NPG_PANEL && shape->w2 >= NPG_PANEL);
     *mlp = (npg_mlp){.shape = *shape, .rows = rows, .blocks = rows / block, .frames = frames, .batch = batch};
     mlp->local = (size_t)tuning->mlp_local;
     mlp->span = (size_t)tuning->span;
@@ -115,8 +114,8 @@ npg_status npg_mlp_begin(npg_mlp *m)
     NPG_TRY(npg_buffer_zero(&m->sums));
     NPG_TRY(npg_buffer_zero(&m->dc));
     NPG_TRY(npg_buffer_zero(&m->dp));
-    return NPG_LAUNCH(m->program, "mlp_transpose", wide / 32, wide / 32, NPG_BUF(&m->transposed),
-                      NPG_BUF(&m->params));
+    return NPG_LAUNCH(m->program, "mlp_transpose", wide / NPG_PANEL, wide / NPG_PANEL,
+                      NPG_BUF(&m->transposed), NPG_BUF(&m->params));
 }
 
 npg_status npg_mlp_forward(npg_mlp *m, size_t first, size_t count)

@@ -28,7 +28,7 @@
 #define FOR_COLUMNS(c, C) for (int c = ITEM * TW; c < (C); c += LOCAL * TW)
 
 /* Where column c of a block, or of weights with K rows, begins. */
-#define COLUMN(rows, c) ((size_t)((c) / 32) * 32 * (rows) + (c) % 32)
+#define COLUMN(rows, c) ((size_t)((c) / NPG_PANEL) * NPG_PANEL * (rows) + (c) % NPG_PANEL)
 
 #define BLOCK(C) ((size_t)ROWS * (C))
 #define WMAX     (W1 > W2 ? W1 : W2)
@@ -37,24 +37,24 @@
  * in the first two. */
 #define AT_W2  0
 #define AT_W3  (AT_W2 + (size_t)W1 * W2)
-#define AT_B2  (AT_W3 + (size_t)W2 * 16)
+#define AT_B2  (AT_W3 + (size_t)W2 * NPG_MLP_W3_ROW)
 #define AT_B3  (AT_B2 + W2)
-#define AT_W1Z (AT_B3 + 16)
+#define AT_W1Z (AT_B3 + NPG_MLP_W3_ROW)
 #define AT_END (AT_W1Z + (size_t)CZ * W1)
 
 #define UNROLL _Pragma("unroll")
 
 /* acc (MR x TW) += rows r0.. of a block a (K columns, panels) x the columns of packed weights that begin at b. */
 #define TILE_ADD(acc, a, b, K, r0)                                                                                   \
-    for (int kp_ = 0; kp_ < (K); kp_ += 32) {                                                                        \
-        global const float *a_ = (a) + ((size_t)kp_ * ROWS + (size_t)(r0) * 32);                                     \
-        global const float *b_ = (b) + (size_t)kp_ * 32;                                                             \
-        for (int k_ = 0; k_ < 32; k_++) {                                                                            \
+    for (int kp_ = 0; kp_ < (K); kp_ += NPG_PANEL) {                                                                 \
+        global const float *a_ = (a) + ((size_t)kp_ * ROWS + (size_t)(r0) * NPG_PANEL);                              \
+        global const float *b_ = (b) + (size_t)kp_ * NPG_PANEL;                                                      \
+        for (int k_ = 0; k_ < NPG_PANEL; k_++) {                                                                     \
             REAL w_[NV];                                                                                             \
-            UNROLL for (int j_ = 0; j_ < NV; j_++) w_[j_] = LOAD(j_, b_ + 32 * k_);                                  \
+            UNROLL for (int j_ = 0; j_ < NV; j_++) w_[j_] = LOAD(j_, b_ + NPG_PANEL * k_);                           \
             UNROLL for (int i_ = 0; i_ < MR; i_++)                                                                   \
             {                                                                                                        \
-                REAL s_ = (REAL)(a_[32 * i_ + k_]);                                                                  \
+                REAL s_ = (REAL)(a_[NPG_PANEL * i_ + k_]);                                                           \
                 UNROLL for (int j_ = 0; j_ < NV; j_++) acc[i_][j_] = fma(s_, w_[j_], acc[i_][j_]);                   \
             }                                                                                                        \
         }                                                                                                            \
@@ -63,25 +63,25 @@
 /* sums (K x TW columns, packed) += a^T b over the ROWS rows of a block a (K columns) and the columns b. */
 #define TILE_GRAD(sums, a, b, K)                                                                                     \
     for (int k0_ = 0; k0_ < (K); k0_ += GR) {                                                                        \
-        global const float *a_ = (a) + (size_t)(k0_ / 32) * 32 * ROWS + k0_ % 32;                                    \
-        global float *s_ = (sums) + (size_t)k0_ * 32;                                                                \
+        global const float *a_ = (a) + (size_t)(k0_ / NPG_PANEL) * NPG_PANEL * ROWS + k0_ % NPG_PANEL;               \
+        global float *s_ = (sums) + (size_t)k0_ * NPG_PANEL;                                                         \
         REAL g_[GR][NV];                                                                                             \
         UNROLL for (int i_ = 0; i_ < GR; i_++)                                                                       \
         {                                                                                                            \
-            UNROLL for (int j_ = 0; j_ < NV; j_++) g_[i_][j_] = LOAD(j_, s_ + 32 * i_);                              \
+            UNROLL for (int j_ = 0; j_ < NV; j_++) g_[i_][j_] = LOAD(j_, s_ + NPG_PANEL * i_);                       \
         }                                                                                                            \
         for (int r_ = 0; r_ < ROWS; r_++) {                                                                          \
             REAL w_[NV];                                                                                             \
-            UNROLL for (int j_ = 0; j_ < NV; j_++) w_[j_] = LOAD(j_, (b) + 32 * r_);                                 \
+            UNROLL for (int j_ = 0; j_ < NV; j_++) w_[j_] = LOAD(j_, (b) + NPG_PANEL * r_);                          \
             UNROLL for (int i_ = 0; i_ < GR; i_++)                                                                   \
             {                                                                                                        \
-                REAL v_ = (REAL)(a_[32 * r_ + i_]);                                                                  \
+                REAL v_ = (REAL)(a_[NPG_PANEL * r_ + i_]);                                                           \
                 UNROLL for (int j_ = 0; j_ < NV; j_++) g_[i_][j_] = fma(v_, w_[j_], g_[i_][j_]);                     \
             }                                                                                                        \
         }                                                                                                            \
         UNROLL for (int i_ = 0; i_ < GR; i_++)                                                                       \
         {                                                                                                            \
-            UNROLL for (int j_ = 0; j_ < NV; j_++) STORE(g_[i_][j_], j_, s_ + 32 * i_);                              \
+            UNROLL for (int j_ = 0; j_ < NV; j_++) STORE(g_[i_][j_], j_, s_ + NPG_PANEL * i_);                       \
         }                                                                                                            \
     }
 
@@ -107,7 +107,8 @@ inline void first_layer(global float *h1, global const float *p, global const fl
         global float *to = h1 + COLUMN(ROWS, col);
         for (int r = 0; r < ROWS; r++)
         {
-            UNROLL for (int j = 0; j < NV; j++) STORE(leaky(LOAD(j, from + 32 * r) + c_[j]), j, to + 32 * r);
+            int at = NPG_PANEL * r;
+            UNROLL for (int j = 0; j < NV; j++) STORE(leaky(LOAD(j, from + at) + c_[j]), j, to + at);
         }
     }
 }
@@ -123,10 +124,10 @@ inline void first_layer(global float *h1, global const float *p, global const fl
                 UNROLL for (int j = 0; j < NV; j++) acc[i][j] = (REAL)(0.0f);                                        \
             }                                                                                                        \
             TILE_ADD(acc, a, (w) + COLUMN(K, col), K, r0)                                                            \
-            global float *to = (out) + COLUMN(ROWS, col) + 32 * r0;                                                  \
+            global float *to = (out) + COLUMN(ROWS, col) + NPG_PANEL * r0;                                           \
             UNROLL for (int i = 0; i < MR; i++)                                                                      \
             {                                                                                                        \
-                UNROLL for (int j = 0; j < NV; j++) STORE(acc[i][j], j, to + 32 * i);                                \
+                UNROLL for (int j = 0; j < NV; j++) STORE(acc[i][j], j, to + NPG_PANEL * i);                         \
             }                                                                                                        \
         }                                                                                                            \
     }
@@ -152,10 +153,10 @@ inline void second_layer(global float *h2, global const float *h1, global const 
                 UNROLL for (int j = 0; j < NV; j++) acc[i][j] = LOAD(j, b2 + col);
             }
             TILE_ADD(acc, h1, w2 + COLUMN(W1, col), W1, r0)
-            global float *to = h2 + COLUMN(ROWS, col) + 32 * r0;
+            global float *to = h2 + COLUMN(ROWS, col) + NPG_PANEL * r0;
             UNROLL for (int i = 0; i < MR; i++)
             {
-                UNROLL for (int j = 0; j < NV; j++) STORE(leaky(acc[i][j]), j, to + 32 * i);
+                UNROLL for (int j = 0; j < NV; j++) STORE(leaky(acc[i][j]), j, to + NPG_PANEL * i);
             }
         }
     }
@@ -167,11 +168,11 @@ inline void head_layer(global float *out, global const float *h2, global const f
     for (int r0 = ITEM * HR; r0 < ROWS; r0 += LOCAL * HR) {
         float8 acc[HR];
         UNROLL for (int i = 0; i < HR; i++) acc[i] = vload8(0, b3);
-        for (int panel = 0; panel < W2; panel += 32) {
-            global const float *a = h2 + (size_t)panel * ROWS + 32 * r0;
-            for (int k = 0; k < 32; k++) {
+        for (int panel = 0; panel < W2; panel += NPG_PANEL) {
+            global const float *a = h2 + (size_t)panel * ROWS + NPG_PANEL * r0;
+            for (int k = 0; k < NPG_PANEL; k++) {
                 float8 w = vload8(2 * (panel + k), w3);
-                UNROLL for (int i = 0; i < HR; i++) acc[i] = fma((float8)(a[32 * i + k]), w, acc[i]);
+                UNROLL for (int i = 0; i < HR; i++) acc[i] = fma((float8)(a[NPG_PANEL * i + k]), w, acc[i]);
             }
         }
         UNROLL for (int i = 0; i < HR; i++) vstore8(acc[i], r0 + i, out);
@@ -194,7 +195,8 @@ GROUP_KERNEL mlp_forward(global float *out, global float *h2, global const float
         SYNC
         second_layer(mine, h1, params + AT_W2, params + AT_B2);
         SYNC
-        head_layer(out + ((first_frame + frame) * blocks + block) * ROWS * 8, mine, params + AT_W3, params + AT_B3);
+        size_t first_row = ((first_frame + frame) * blocks + block) * ROWS;
+        head_layer(out + first_row * NPG_MLP_OUT, mine, params + AT_W3, params + AT_B3);
     }
 }
 
@@ -204,18 +206,18 @@ inline void head_back(global float *d2, global float *db2, global const float *d
 {
     FOR_COLUMNS(col, W2)
     {
-        REAL w[7][NV], sum[NV];
+        REAL w[NPG_MLP_USED][NV], sum[NV];
         UNROLL for (int j = 0; j < NV; j++) sum[j] = LOAD(j, db2 + col);
-        UNROLL for (int o = 0; o < 7; o++)
+        UNROLL for (int o = 0; o < NPG_MLP_USED; o++)
         {
             UNROLL for (int j = 0; j < NV; j++) w[o][j] = LOAD(j, w3t + o * W2 + col);
         }
         for (int r = 0; r < ROWS; r++) {
-            size_t at = COLUMN(ROWS, col) + 32 * r;
+            size_t at = COLUMN(ROWS, col) + NPG_PANEL * r;
             UNROLL for (int j = 0; j < NV; j++)
             {
                 REAL a = 0.0f;
-                UNROLL for (int o = 0; o < 7; o++) a = fma((REAL)(dout[8 * r + o]), w[o][j], a);
+                UNROLL for (int o = 0; o < NPG_MLP_USED; o++) a = fma((REAL)(dout[NPG_MLP_OUT * r + o]), w[o][j], a);
                 a = leaky_back(a, LOAD(j, h2 + at));
                 STORE(a, j, d2 + at);
                 sum[j] += a;
@@ -234,17 +236,17 @@ inline void head_grad(global float *dw3, global float *db3, global const float *
         vstore8(sum, 0, db3);
     }
     for (int k0 = ITEM * VW; k0 < W2; k0 += LOCAL * VW) {
-        REAL g[7];
+        REAL g[NPG_MLP_USED];
         global const float *a = h2 + COLUMN(ROWS, k0);
-        UNROLL for (int o = 0; o < 7; o++) g[o] = 0.0f;
+        UNROLL for (int o = 0; o < NPG_MLP_USED; o++) g[o] = 0.0f;
         for (int r = 0; r < ROWS; r++) {
-            REAL v = LOAD(0, a + 32 * r);
-            UNROLL for (int o = 0; o < 7; o++) g[o] = fma((REAL)(dout[8 * r + o]), v, g[o]);
+            REAL v = LOAD(0, a + NPG_PANEL * r);
+            UNROLL for (int o = 0; o < NPG_MLP_USED; o++) g[o] = fma((REAL)(dout[NPG_MLP_OUT * r + o]), v, g[o]);
         }
-        float lanes[7][VW];
-        UNROLL for (int o = 0; o < 7; o++) STORE(g[o], 0, lanes[o]);
+        float lanes[NPG_MLP_USED][VW];
+        UNROLL for (int o = 0; o < NPG_MLP_USED; o++) STORE(g[o], 0, lanes[o]);
         for (int k = 0; k < VW; k++)
-            for (int o = 0; o < 7; o++) dw3[(k0 + k) * 16 + o] += lanes[o][k];
+            for (int o = 0; o < NPG_MLP_USED; o++) dw3[(k0 + k) * NPG_MLP_W3_ROW + o] += lanes[o][k];
     }
 }
 
@@ -258,7 +260,7 @@ inline void second_back(global float *dp, global float *dc, global const float *
         UNROLL for (int j = 0; j < NV; j++) sum[j] = LOAD(j, dc + col);
         for (int r0 = 0; r0 < ROWS; r0 += MR) {
             REAL acc[MR][NV];
-            size_t at = COLUMN(ROWS, col) + 32 * r0;
+            size_t at = COLUMN(ROWS, col) + NPG_PANEL * r0;
             UNROLL for (int i = 0; i < MR; i++)
             {
                 UNROLL for (int j = 0; j < NV; j++) acc[i][j] = (REAL)(0.0f);
@@ -268,9 +270,9 @@ inline void second_back(global float *dp, global float *dc, global const float *
             {
                 UNROLL for (int j = 0; j < NV; j++)
                 {
-                    REAL d = leaky_back(acc[i][j], LOAD(j, h1 + at + 32 * i));
+                    REAL d = leaky_back(acc[i][j], LOAD(j, h1 + at + NPG_PANEL * i));
                     sum[j] += d;
-                    STORE(d + LOAD(j, dp + at + 32 * i), j, dp + at + 32 * i);
+                    STORE(d + LOAD(j, dp + at + NPG_PANEL * i), j, dp + at + NPG_PANEL * i);
                 }
             }
         }
@@ -293,7 +295,7 @@ GROUP_KERNEL mlp_backward(global float *dp, global float *sums, global float *dc
     for (int block = group; block < blocks; block += get_num_groups(0))
         for (int frame = 0; frame < frames; frame++) {
             size_t item = (size_t)frame * blocks + block;
-            global const float *d = dout + ((size_t)(first_frame + frame) * blocks + block) * ROWS * 8;
+            global const float *d = dout + ((size_t)(first_frame + frame) * blocks + block) * ROWS * NPG_MLP_OUT;
             global const float *y = h2 + item * BLOCK(W2);
             first_layer(h1, p + block * BLOCK(W1), c + (first_frame + frame) * W1);
             head_back(d2, sum + AT_B2, d, y, transposed + (size_t)W1 * (W2 + CZ));
@@ -340,19 +342,20 @@ kernel void mlp_reduce(global float *grad, global const float *sums, int groups)
 /* to (packed, C x K) = transpose of from (packed, K x C); both multiples of 32. */
 inline void transpose_panel(global float *to, global const float *from, int K, int C, size_t kp, size_t cp)
 {
-    for (int k = 0; k < 32; k++)
-        for (int c = 0; c < 32; c++) to[kp * C + (cp + c) * 32 + k] = from[cp * K + (kp + k) * 32 + c];
+    for (int k = 0; k < NPG_PANEL; k++)
+        for (int c = 0; c < NPG_PANEL; c++)
+            to[kp * C + (cp + c) * NPG_PANEL + k] = from[cp * K + (kp + k) * NPG_PANEL + c];
 }
 
 /* The transposes that the backward pass multiplies with, in the order w2t (packed W2 x W1), w1zt (packed W1 x CZ),
  * w3t (7 x W2).  Global size: (WMAX / 32, WMAX / 32). */
 kernel void mlp_transpose(global float *transposed, global const float *params)
 {
-    size_t kp = get_global_id(0) * 32, cp = get_global_id(1) * 32;
+    size_t kp = get_global_id(0) * NPG_PANEL, cp = get_global_id(1) * NPG_PANEL;
     if (kp < W1 && cp < W2) transpose_panel(transposed, params + AT_W2, W1, W2, kp, cp);
     if (kp < CZ && cp < W1) transpose_panel(transposed + (size_t)W1 * W2, params + AT_W1Z, CZ, W1, kp, cp);
     if (kp != 0 || cp >= W2) return;
     global float *w3t = transposed + (size_t)W1 * (W2 + CZ);
-    for (size_t k = cp; k < cp + 32; k++)
-        for (int o = 0; o < 7; o++) w3t[o * W2 + k] = params[AT_W3 + k * 16 + o];
+    for (size_t k = cp; k < cp + NPG_PANEL; k++)
+        for (int o = 0; o < NPG_MLP_USED; o++) w3t[o * W2 + k] = params[AT_W3 + k * NPG_MLP_W3_ROW + o];
 }

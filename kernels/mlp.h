@@ -7,9 +7,8 @@
 #ifndef NPG_MLP_H
 #define NPG_MLP_H
 
+#include "kernels/layout.h"
 #include "kernels/runtime/device.h"
-
-#define NPG_MLP_OUT 8 /* floats of output per vertex, 7 used */
 
 typedef struct npg_mlp_shape {
     size_t w1, w2;    /* widths of the hidden layers, multiples of 32 */

@@ -29,8 +29,9 @@ static npg_status open_mlp_data(mlp_data *d, size_t block, int size, uint64_t se
     NPG_TRY(npg_check_values(&d->code, &d->code_wide, d->frames * d->shape.code_size, 1, &random));
     NPG_TRY(npg_check_values(&d->dout, &d->dout_wide, samples * NPG_MLP_OUT, 1, &random));
     for (size_t k = 0; k < d->shape.w2; k++)
-        for (size_t o = 7; o < 16; o++) d->params[npg_mlp_at_w3(&d->shape) + k * 16 + o] = 0;
-    for (size_t o = 7; o < 16; o++) d->params[npg_mlp_at_b3(&d->shape) + o] = 0;
+        for (size_t o = NPG_MLP_USED; o < NPG_MLP_W3_ROW; o++)
+            d->params[npg_mlp_at_w3(&d->shape) + k * NPG_MLP_W3_ROW + o] = 0;
+    for (size_t o = NPG_MLP_USED; o < NPG_MLP_W3_ROW; o++) d->params[npg_mlp_at_b3(&d->shape) + o] = 0;
     for (size_t i = 7; i < samples * NPG_MLP_OUT; i += NPG_MLP_OUT) d->dout[i] = 0;
     NPG_TRY(npg_alloc_array(&d->out, NPG_FOR_RUN, samples * NPG_MLP_OUT, sizeof(double)));
     NPG_TRY(npg_alloc_array(&d->grad, NPG_FOR_RUN, n, sizeof(double)));

@@ -1,5 +1,4 @@
 /* mlp: the plain twins of mlp.cl and time.cl, in double, written as the paper writes the network. */
-#include "kernels/levels.h"
 #include "kernels/mlp.h"
 
 #define CHANNELS  NPG_LATENT_CHANNELS
@@ -36,9 +35,9 @@ void npg_mlp_forward_ref(double *out, const double *z, const double *code, const
     double h1[WIDTH_MAX], h2[WIDTH_MAX];
     const double *w3 = params + npg_mlp_at_w3(s), *b3 = params + npg_mlp_at_b3(s);
     hidden(h1, h2, z, code, params, s);
-    for (size_t o = 0; o < 7; o++) {
+    for (size_t o = 0; o < NPG_MLP_USED; o++) {
         out[o] = b3[o];
-        for (size_t k = 0; k < s->w2; k++) out[o] += h2[k] * w3[k * 16 + o];
+        for (size_t k = 0; k < s->w2; k++) out[o] += h2[k] * w3[k * NPG_MLP_W3_ROW + o];
     }
 }
 
@@ -49,14 +48,14 @@ static void head_back(double *d2, double *grad, const double *dout, const double
     const double *w3 = params + npg_mlp_at_w3(s);
     for (size_t k = 0; k < s->w2; k++) {
         double d = 0;
-        for (size_t o = 0; o < 7; o++) {
-            d += dout[o] * w3[k * 16 + o];
-            grad[npg_mlp_at_w3(s) + k * 16 + o] += dout[o] * h2[k];
+        for (size_t o = 0; o < NPG_MLP_USED; o++) {
+            d += dout[o] * w3[k * NPG_MLP_W3_ROW + o];
+            grad[npg_mlp_at_w3(s) + k * NPG_MLP_W3_ROW + o] += dout[o] * h2[k];
         }
         d2[k] = h2[k] > 0 ? d : (double)s->slope * d;
         grad[npg_mlp_at_b2(s) + k] += d2[k];
     }
-    for (size_t o = 0; o < 7; o++) grad[npg_mlp_at_b3(s) + o] += dout[o];
+    for (size_t o = 0; o < NPG_MLP_USED; o++) grad[npg_mlp_at_b3(s) + o] += dout[o];
 }
 
 static void second_back(double *d1, double *grad, const double *d2, const double *h1, const double *params,

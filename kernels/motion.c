@@ -6,13 +6,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+_Static_assert(sizeof(npg_pull) == NPG_PULL_FLOATS * sizeof(float), "as pull.cl reads it");
+
 /* ---- layout ---- */
 
 void npg_pack16(float *out, const float *points, size_t count, size_t padded)
 {
     for (size_t i = 0; i < padded; i++) {
         const float *from = points + 3 * (i < count ? i : count - 1);
-        for (size_t axis = 0; axis < 3; axis++) out[i / 16 * 48 + axis * 16 + i % 16] = from[axis];
+        for (size_t axis = 0; axis < 3; axis++) out[NPG_POINT_AT(i) + axis * NPG_LANES] = from[axis];
     }
 }
 
@@ -20,14 +22,14 @@ void npg_unpack16(float *points, const float *packed, size_t count)
 {
     for (size_t i = 0; i < count; i++)
         for (size_t axis = 0; axis < 3; axis++)
-            points[3 * i + axis] = packed[i / 16 * 48 + axis * 16 + i % 16];
+            points[3 * i + axis] = packed[NPG_POINT_AT(i) + axis * NPG_LANES];
 }
 
 size_t npg_tree_blocks(size_t count)
 {
-    size_t total = 0, children = (count + 15) / 16;
+    size_t total = 0, children = NPG_BLOCKS(count);
     do {
-        children = (children + 15) / 16;
+        children = NPG_BLOCKS(children);
         total += children;
     } while (children > 1);
     return total;
@@ -154,15 +156,19 @@ static void fill_slots(int32_t *forward, int32_t *reverse, const npg_motion *m, 
                        const totals *before)
 {
     const size_t vert_boxes = npg_tree_blocks(m->real);
-    const int32_t f[NPG_SLOT] = {(int32_t)m->real,       (int32_t)(t * m->rows / 16),
-                                 (int32_t)count,         (int32_t)before->leaves,
-                                 (int32_t)before->boxes, (int32_t)(t * m->rows)};
-    const int32_t r[NPG_SLOT] = {(int32_t)count,
-                                 (int32_t)before->leaves,
-                                 (int32_t)m->real,
-                                 (int32_t)(t * m->rows / 16),
-                                 (int32_t)(t * vert_boxes),
-                                 (int32_t)before->points};
+    const size_t vert_blocks = NPG_BLOCKS(m->rows);
+    const int32_t f[NPG_SLOT] = {[NPG_SLOT_QUERIES] = (int32_t)m->real,
+                                 [NPG_SLOT_QUERY_BLOCK] = (int32_t)(t * vert_blocks),
+                                 [NPG_SLOT_POINTS] = (int32_t)count,
+                                 [NPG_SLOT_POINT_BLOCK] = (int32_t)before->leaves,
+                                 [NPG_SLOT_BOX_BLOCK] = (int32_t)before->boxes,
+                                 [NPG_SLOT_RESULT] = (int32_t)(t * m->rows)};
+    const int32_t r[NPG_SLOT] = {[NPG_SLOT_QUERIES] = (int32_t)count,
+                                 [NPG_SLOT_QUERY_BLOCK] = (int32_t)before->leaves,
+                                 [NPG_SLOT_POINTS] = (int32_t)m->real,
+                                 [NPG_SLOT_POINT_BLOCK] = (int32_t)(t * vert_blocks),
+                                 [NPG_SLOT_BOX_BLOCK] = (int32_t)(t * vert_boxes),
+                                 [NPG_SLOT_RESULT] = (int32_t)before->points};
     memcpy(forward + t * NPG_SLOT, f, sizeof f);
     memcpy(reverse + t * NPG_SLOT, r, sizeof r);
 }
@@ -171,13 +177,13 @@ static npg_status upload_points(npg_motion *m, npg_device *device, const npg_tar
 {
     float *packed;
     size_t at = 0;
-    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, leaves * 48, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, leaves * NPG_POINT_BLOCK, sizeof(float)));
     for (size_t t = 0; t < m->frames; t++) {
-        size_t padded = (targets[t].count + 15) / 16 * 16;
+        size_t padded = NPG_PADDED(targets[t].count);
         npg_pack16(packed + at, targets[t].points, targets[t].count, padded);
         at += padded * 3;
     }
-    npg_status status = npg_buffer_from(&m->points, device, packed, leaves * 48 * sizeof(float));
+    npg_status status = npg_buffer_from(&m->points, device, packed, leaves * NPG_POINT_BLOCK * sizeof(float));
     npg_release(&packed);
     return status;
 }
@@ -190,7 +196,7 @@ static npg_status upload_targets(npg_motion *m, npg_device *device, const npg_ta
     NPG_TRY(npg_alloc(&slots, NPG_FOR_FIT, 2 * bytes));
     for (size_t t = 0; t < m->frames; t++) {
         fill_slots(slots, slots + m->frames * NPG_SLOT, m, t, targets[t].count, &sum);
-        sum.leaves += (targets[t].count + 15) / 16;
+        sum.leaves += NPG_BLOCKS(targets[t].count);
         sum.boxes += npg_tree_blocks(targets[t].count);
         sum.points += targets[t].count;
         if (targets[t].count > m->most_points) m->most_points = targets[t].count;
@@ -200,7 +206,7 @@ static npg_status upload_targets(npg_motion *m, npg_device *device, const npg_ta
                             : npg_error(NPG_USAGE, "%zu points in one window are too many", sum.points);
     if (!status) status = npg_buffer_from(&m->forward, device, slots, bytes);
     if (!status) status = npg_buffer_from(&m->reverse, device, slots + m->frames * NPG_SLOT, bytes);
-    if (!status) status = npg_buffer_open(&m->point_boxes, device, sum.boxes * 96 * sizeof(float));
+    if (!status) status = npg_buffer_open(&m->point_boxes, device, sum.boxes * NPG_BOX_BLOCK * sizeof(float));
     if (!status) status = npg_buffer_open(&m->to_verts, device, sum.points * sizeof(int32_t));
     npg_release(&slots);
     return status;
@@ -211,10 +217,11 @@ static npg_status open_moving(npg_motion *m, npg_device *device)
     const size_t f = sizeof(float), all = m->frames * m->rows;
     NPG_TRY(npg_buffer_open(&m->x, device, all * 3 * f));
     NPG_TRY(npg_buffer_open(&m->g, device, all * 3 * f));
-    NPG_TRY(npg_buffer_open(&m->vert_boxes, device, m->frames * npg_tree_blocks(m->real) * 96 * f));
+    NPG_TRY(
+        npg_buffer_open(&m->vert_boxes, device, m->frames * npg_tree_blocks(m->real) * NPG_BOX_BLOCK * f));
     NPG_TRY(npg_buffer_open(&m->to_points, device, all * sizeof(int32_t)));
     NPG_TRY(npg_buffer_open(&m->cd, device, m->frames * f));
-    NPG_TRY(npg_buffer_open(&m->part, device, all / 16 * f));
+    NPG_TRY(npg_buffer_open(&m->part, device, all / NPG_LANES * f));
     return npg_buffer_open(&m->gain, device, m->frames * f);
 }
 
@@ -229,7 +236,7 @@ npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotat
                            size_t real, size_t rows, const uint32_t (*edges)[2], size_t edge_count,
                            const npg_target *targets, size_t frames)
 {
-    NPG_REQUIRE(real && real <= rows && rows % 16 == 0);
+    NPG_REQUIRE(real && real <= rows && rows % NPG_LANES == 0);
     *m = (npg_motion){.rows = rows,
                       .real = real,
                       .frames = frames,
@@ -321,10 +328,10 @@ npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buff
                            double iso_gain, size_t first, size_t count)
 {
     NPG_TRY(npg_buffer_write(&m->gain, first * sizeof *gains, gains, count * sizeof *gains));
-    NPG_TRY(NPG_LAUNCH(m->isometry, "isometry_back", m->rows / 16, count, NPG_BUF(&m->g), NPG_BUF(&m->part),
-                       NPG_BUF(&m->x), NPG_BUF(&m->start), NPG_BUF(&m->neighbour), NPG_BUF(&m->edge_rest),
-                       NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows), NPG_INT(first),
-                       NPG_INT(count)));
+    NPG_TRY(NPG_LAUNCH(m->isometry, "isometry_back", m->rows / NPG_LANES, count, NPG_BUF(&m->g),
+                       NPG_BUF(&m->part), NPG_BUF(&m->x), NPG_BUF(&m->start), NPG_BUF(&m->neighbour),
+                       NPG_BUF(&m->edge_rest), NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows),
+                       NPG_INT(first), NPG_INT(count)));
     return NPG_LAUNCH(m->transform, "transform_back", m->rows, count, NPG_BUF(dout), NPG_BUF(&m->g),
                       NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->rest_stride), NPG_INT(m->rows),
                       NPG_INT(first), NPG_INT(count), NPG_INT(m->real));

@@ -1,12 +1,10 @@
 /* motion: what happens to vertices once the decoder has spoken: transform, nearest, chamfer, pull, isometry;
- * one .cl and one _ref.c for each.  Positions on the device are in blocks of 16: [rows / 16][3][16] per
- * frame, see npg_pack16. */
+ * one .cl and one _ref.c for each.  Positions on the device are in blocks of 16 (layout.h). */
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H
 
+#include "kernels/layout.h"
 #include "kernels/runtime/device.h"
-
-#define NPG_SLOT 8 /* ints that describe one search of one frame, see nearest.cl */
 
 typedef enum npg_rotation {
     NPG_ROTATION_QUATERNION,
@@ -14,8 +12,7 @@ typedef enum npg_rotation {
     NPG_ROTATION_EXPONENTIAL
 } npg_rotation;
 
-/* count x 3 -> [blocks of 16][3][16], padded to `padded` points (a multiple of 16) by repeating
- * the last; and back. */
+/* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last; and back. */
 void npg_pack16(float *out, const float *points, size_t count, size_t padded);
 void npg_unpack16(float *points, const float *packed, size_t count);
 
@@ -23,7 +20,7 @@ void npg_unpack16(float *points, const float *packed, size_t count);
  * Points are finite. */
 npg_status npg_morton_order(uint32_t *order, const float *points, size_t count);
 
-/* Box blocks (of 96 floats) of the tree over `count` points. */
+/* Box blocks of the tree over `count` points. */
 size_t npg_tree_blocks(size_t count);
 
 /* A known correspondence: the surface point sum share x_vertex + constant, the target already taken off. */
@@ -84,7 +81,7 @@ npg_status npg_motion_apply(npg_motion *motion, const npg_buffer *out, size_t fi
 npg_status npg_motion_chamfer(npg_motion *motion, double alpha, size_t first, size_t count);
 
 /* g = gain[frame] g + iso_gain d(isometry)/dx; then dout from g.  gains: one per frame from `first` on.
- * part [frames][rows / 16] gets the sums of edge changes over half-edges. */
+ * part [frames][blocks of the rows] gets the sums of edge changes over half-edges. */
 npg_status npg_motion_back(npg_motion *motion, const npg_buffer *dout, const npg_buffer *out,
                            const float *gains, double iso_gain, size_t first, size_t count);
 

@@ -49,7 +49,7 @@ static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
 {
     npg_random random = npg_random_stream(seed, 14, (uint64_t)size);
     d->real = size == 1 ? 4 : (size_t)(size * size) * 53 + 1;
-    d->rows = (d->real + 15) / 16 * 16;
+    d->rows = NPG_PADDED(d->real);
     d->edge_count = 2 * d->real - 3;
     NPG_TRY(npg_check_values(&d->rest, &d->rest_wide, d->real * 3, 0.9, &random));
     NPG_TRY(sort_points(d->rest, d->rest_wide, d->real));
@@ -463,7 +463,7 @@ static npg_status compare_isometry(npg_device *device, motion_data *d, npg_motio
     npg_buffer dout = {0};
     double want[FRAMES] = {0};
     float *part;
-    size_t blocks = d->rows / 16;
+    size_t blocks = d->rows / NPG_LANES;
     NPG_TRY(compare_chamfer(device, d, motion, out, error));
     for (size_t t = 0; t < FRAMES; t++) {
         double *g = d->g + t * d->real * 3;

@@ -1,24 +1,15 @@
 /* nearest: the closest of a set of points, for many queries in many frames.
  *
- * A tree holds the points in Morton order in leaves of 16 ([leaf][3][16]); a box block holds the boxes of 16 children
- * ([block][6][16]: low x, y, z, high x, y, z); the level above has a box for each of those, up to one block.  Tests
- * run on 16 boxes or points at once.  Points that move keep their order and leaves: refitting the boxes is enough.
+ * A tree holds the points in Morton order in leaves of 16; a box block holds the boxes of 16 children; the level above
+ * has a box for each of those, up to one block.  Tests run on 16 boxes or points at once.  Points that move keep their order and leaves: refitting the boxes is enough.
  * A search starts from a known candidate (the answer of the last epoch, or of the neighbouring query), so that it
  * mostly has to confirm it.  Ties go to the candidate, then to the lower index.
  *
- * slots: [frames][8] = {query count, first query leaf, point count, first leaf, first box block, first result,
- * 0, 0}.  Padding of the last leaf repeats the last point. */
+ * Layouts of points, boxes and slots: layout.h; a leaf is a block of points. */
 
-#define SLOT 8
-#define FAR  1e18f
+#define FAR 1e18f /* an empty box begins and ends there; its square is still finite */
 
 /* Build constants from the tuning of the device: QUERIES, LOCAL. */
-
-/* Box blocks of the level over `count` children. */
-inline int blocks_over(int count)
-{
-    return (count + 15) / 16;
-}
 
 inline float lowest(float16 v)
 {
@@ -38,25 +29,26 @@ GROUP_KERNEL
 nearest_refit(global float *boxes, global const float *points, global const int *slots, int first, int count)
 {
     if (get_group_id(0) >= (size_t)count) return;
-    global const int *slot = slots + (first + get_group_id(0)) * SLOT;
-    int children = (slot[2] + 15) / 16;
-    global const float *from = points + (size_t)slot[3] * 48;
-    global float *to = boxes + (size_t)slot[4] * 96;
+    global const int *slot = slots + (first + get_group_id(0)) * NPG_SLOT;
+    int children = NPG_BLOCKS(slot[NPG_SLOT_POINTS]);
+    global const float *from = points + (size_t)slot[NPG_SLOT_POINT_BLOCK] * NPG_POINT_BLOCK;
+    global float *to = boxes + (size_t)slot[NPG_SLOT_BOX_BLOCK] * NPG_BOX_BLOCK;
     for (int level = 0;; level++) {
-        int blocks = blocks_over(children), size = level ? 96 : 48;
-        for (int i = ITEM; i < blocks * 16; i += LOCAL) {
-            global float *box = to + (size_t)(i / 16) * 96 + i % 16;
+        int blocks = NPG_BLOCKS(children), size = level ? NPG_BOX_BLOCK : NPG_POINT_BLOCK;
+        for (int i = ITEM; i < blocks * NPG_LANES; i += LOCAL) {
+            global float *box = to + (size_t)(i / NPG_LANES) * NPG_BOX_BLOCK + i % NPG_LANES;
             for (int axis = 0; axis < 3; axis++) {
-                global const float *child = from + (size_t)i * size + 16 * axis;
+                global const float *low = from + (size_t)i * size + NPG_LANES * axis;
+                global const float *high = level ? low + 3 * NPG_LANES : low;
                 bool real = i < children;
-                box[16 * axis] = real ? lowest(vload16(0, child)) : FAR;
-                box[16 * (axis + 3)] = real ? highest(vload16(0, level ? child + 48 : child)) : -FAR;
+                box[NPG_LANES * axis] = real ? lowest(vload16(0, low)) : FAR;
+                box[NPG_LANES * (axis + 3)] = real ? highest(vload16(0, high)) : -FAR;
             }
         }
         if (blocks == 1) return;
         SYNC
         from = to;
-        to += (size_t)blocks * 96;
+        to += (size_t)blocks * NPG_BOX_BLOCK;
         children = blocks;
     }
 }
@@ -102,17 +94,19 @@ inline found search_leaf(global const float *leaf, int first, float3 q, found be
 inline found search(global const float *points, global const float *boxes, const int *starts, int levels, float3 q,
                     found best)
 {
+    /* A node pops and pushes at most 16 children: 15 more wait for each level of boxes but the lowest.  The host lets
+     * no window have more than 2^25 points (npg_motion_open): 2^21 leaves, so 6 levels of boxes, 76 entries. */
     int stack_node[96], stack_level[96], top = 1;
     stack_node[0] = 0;
     stack_level[0] = levels - 1;
     while (top) {
         int level = stack_level[--top], node = stack_node[top];
-        int bits = bits_of(boxes_nearer(boxes + (size_t)(starts[level] + node) * 96, q, best.dist_sq));
+        int bits = bits_of(boxes_nearer(boxes + (size_t)(starts[level] + node) * NPG_BOX_BLOCK, q, best.dist_sq));
         while (bits) {
-            int child = node * 16 + 31 - clz(bits & -bits);
+            int child = node * NPG_LANES + 31 - clz(bits & -bits); /* the lowest bit that is set */
             bits &= bits - 1;
             if (level == 0) {
-                best = search_leaf(points + (size_t)child * 48, child * 16, q, best);
+                best = search_leaf(points + (size_t)child * NPG_POINT_BLOCK, child * NPG_LANES, q, best);
             } else {
                 stack_node[top] = child;
                 stack_level[top++] = level - 1;
@@ -124,8 +118,7 @@ inline found search(global const float *points, global const float *boxes, const
 
 inline found candidate(global const float *points, int index, float3 q)
 {
-    global const float *leaf = points + (size_t)(index / 16) * 48 + index % 16;
-    float3 d = (float3)(leaf[0], leaf[16], leaf[32]) - q;
+    float3 d = POINT(points, NPG_POINT_AT(index)) - q;
     return (found){index, d.x * d.x + d.y * d.y + d.z * d.z};
 }
 
@@ -136,29 +129,31 @@ kernel void nearest_find(global int *index, global const float *queries, global 
                          int count)
 {
     if (get_global_id(1) >= (size_t)count) return;
-    global const int *slot = slots + (first_frame + get_global_id(1)) * SLOT;
-    int first = get_global_id(0) * QUERIES, last = min(first + QUERIES, slot[0]), starts[8], levels = 0;
-    for (int children = (slot[2] + 15) / 16, start = 0;; levels++) {
+    global const int *slot = slots + (first_frame + get_global_id(1)) * NPG_SLOT;
+    int first = get_global_id(0) * QUERIES, last = min(first + QUERIES, slot[NPG_SLOT_QUERIES]);
+    int starts[8], levels = 0; /* 6 levels at most, see search() */
+    for (int children = NPG_BLOCKS(slot[NPG_SLOT_POINTS]), start = 0;; levels++) {
         starts[levels] = start;
-        children = blocks_over(children);
+        children = NPG_BLOCKS(children);
         start += children;
         if (children == 1) break;
     }
     levels++;
-    points += (size_t)slot[3] * 48;
-    boxes += (size_t)slot[4] * 96;
-    int before = -1;
+    points += (size_t)slot[NPG_SLOT_POINT_BLOCK] * NPG_POINT_BLOCK;
+    boxes += (size_t)slot[NPG_SLOT_BOX_BLOCK] * NPG_BOX_BLOCK;
+    queries += (size_t)slot[NPG_SLOT_QUERY_BLOCK] * NPG_POINT_BLOCK;
+    index += slot[NPG_SLOT_RESULT];
+    int before = -1; /* the answer to the query before: Morton neighbours have near answers */
     for (int i = first; i < last; i++) {
-        global const float *block = queries + (size_t)(slot[1] + i / 16) * 48 + i % 16;
-        float3 q = (float3)(block[0], block[16], block[32]);
-        found best = candidate(points, index[slot[5] + i], q);
+        float3 q = POINT(queries, NPG_POINT_AT(i));
+        found best = candidate(points, index[i], q);
         if (before >= 0) {
             found other = candidate(points, before, q);
             if (other.dist_sq < best.dist_sq) best = other;
         }
         best = search(points, boxes, starts, levels, q, best);
         /* repeated points of the last leaf stand for the last one */
-        before = min(best.index, slot[2] - 1);
-        index[slot[5] + i] = before;
+        before = min(best.index, slot[NPG_SLOT_POINTS] - 1);
+        index[i] = before;
     }
 }

@@ -4,7 +4,7 @@
 #include "kernels/path_spectrum.h"
 
 typedef struct tables {
-    int32_t level[NPG_LEVELS_MAX][4];
+    int32_t level[NPG_LEVELS_MAX][NPG_GRID];
     int32_t eigen_first[NPG_LEVELS_MAX];
     float lambda[NPG_LEVELS_MAX], diagonal[NPG_LEVELS_MAX];
     size_t matrix_size, eigen_size, lines;
@@ -20,10 +20,10 @@ static void fill_tables(tables *t, const npg_levels *levels)
     for (int l = 0; l < levels->count; l++) {
         const npg_level *level = &levels->level[l];
         size_t n = is_smoothed(level) ? (size_t)level->nodes : 0;
-        t->level[l][0] = (int32_t)n;
-        t->level[l][1] = (int32_t)level->first_row;
-        t->level[l][2] = (int32_t)t->lines;
-        t->level[l][3] = (int32_t)t->matrix_size;
+        t->level[l][NPG_GRID_NODES] = (int32_t)n;
+        t->level[l][NPG_GRID_ROW] = (int32_t)level->first_row;
+        t->level[l][NPG_GRID_LINE] = (int32_t)t->lines;
+        t->level[l][NPG_GRID_MATRIX] = (int32_t)t->matrix_size;
         t->eigen_first[l] = (int32_t)t->eigen_size;
         t->lambda[l] = (float)level->lambda;
         t->diagonal[l] = (float)level->screen;
@@ -52,9 +52,9 @@ static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, co
     npg_status status = npg_alloc_array(&matrices, NPG_FOR_FIT, t->matrix_size + 1, sizeof(float));
     if (!status) status = npg_alloc_array(&eigen, NPG_FOR_FIT, t->eigen_size + 1, sizeof(float));
     for (int l = 0; !status && l < sobolev->level_count; l++)
-        if (t->level[l][0])
-            status = fill_transform(matrices + t->level[l][3], eigen + t->eigen_first[l], &levels->level[l],
-                                    (size_t)t->level[l][0]);
+        if (t->level[l][NPG_GRID_NODES])
+            status = fill_transform(matrices + t->level[l][NPG_GRID_MATRIX], eigen + t->eigen_first[l],
+                                    &levels->level[l], (size_t)t->level[l][NPG_GRID_NODES]);
     if (!status)
         status = npg_buffer_from(&sobolev->matrices, device, matrices, (t->matrix_size + 1) * sizeof(float));
     if (!status)
@@ -67,22 +67,18 @@ static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, co
 npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels)
 {
     tables t = {0};
-    npg_status status;
     size_t bytes = levels->row_count * NPG_LATENT_CHANNELS * sizeof(float);
     fill_tables(&t, levels);
     *sobolev = (npg_sobolev){.level_count = levels->count, .line_count = t.lines};
-    NPG_TRY_OR(failed, status, npg_program_open(&sobolev->program, device, "sobolev", ""));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level));
-    NPG_TRY_OR(failed, status,
-               npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda));
-    NPG_TRY_OR(failed, status, npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal));
-    NPG_TRY_OR(failed, status, upload_transforms(sobolev, device, levels, &t));
-    NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->a, device, bytes));
-    NPG_TRY_OR(failed, status, npg_buffer_open(&sobolev->b, device, bytes));
-    return NPG_OK;
-failed:
-    npg_sobolev_close(sobolev);
+    npg_status status = npg_program_open(&sobolev->program, device, "sobolev", "");
+    if (!status) status = npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level);
+    if (!status) status = npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first);
+    if (!status) status = npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda);
+    if (!status) status = npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal);
+    if (!status) status = upload_transforms(sobolev, device, levels, &t);
+    if (!status) status = npg_buffer_open(&sobolev->a, device, bytes);
+    if (!status) status = npg_buffer_open(&sobolev->b, device, bytes);
+    if (status) npg_sobolev_close(sobolev);
     return status;
 }
 

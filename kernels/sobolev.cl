@@ -5,7 +5,7 @@
  * is C on each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper:
  * section on the objectives, "Preconditioning"; the published code iterates conjugate gradients instead.
  *
- * levels: [L][4] = {n, first node, first line, offset of its matrix}; the node (i, j, k) of a level is row
+ * levels: [L][NPG_GRID] (layout.h); the node (i, j, k) of a level is row
  * first + (i n + j) n + k with 32 channels.  A line is one of the n^2 rows of nodes along the axis of the pass.
  * Levels with n = 0 (no smoothing) are copied: they have `count` lines of one node, count in the matrix field. */
 
@@ -16,9 +16,10 @@ typedef struct line_of {
 inline line_of find_line(global const int *levels, int L, int line, int axis)
 {
     int l = 0;
-    while (l + 1 < L && line >= levels[4 * (l + 1) + 2]) l++;
-    int n = levels[4 * l], first = levels[4 * l + 1];
-    line -= levels[4 * l + 2];
+    while (l + 1 < L && line >= levels[NPG_GRID * (l + 1) + NPG_GRID_LINE]) l++;
+    levels += NPG_GRID * l;
+    int n = levels[NPG_GRID_NODES], first = levels[NPG_GRID_ROW];
+    line -= levels[NPG_GRID_LINE];
     if (n == 0) return (line_of){0, first + line, 0, l, line};
     int a = line / n, b = line % n;
     int start = axis == 0 ? a * n + b : axis == 1 ? a * n * n + b : (a * n + b) * n;
@@ -40,7 +41,7 @@ kernel void sobolev_pass(global float *out, global const float *in, global const
         vstore16(vload16(2 * at.first + 1, in), 2 * at.first + 1, out);
         return;
     }
-    global const float *m = matrices + levels[4 * at.level + 3], *e = eigen + eigen_first[at.level];
+    global const float *m = matrices + levels[NPG_GRID * at.level + NPG_GRID_MATRIX], *e = eigen + eigen_first[at.level];
     float e_line = e[at.line / at.n] + e[at.line % at.n];
     for (int i = 0; i < at.n; i++) {
         float16 a = 0.0f, b = 0.0f;

@@ -1,15 +1,14 @@
 /* transform: x = R(q) v + tanh(0.1 d) for every vertex of every frame (paper: "Transformation Mapping").
  *
- * out: [frames][rows][8] = four rotation values, three of translation, one unused.  Positions are in blocks of 16:
- * [rows / 16][3][16], frame after frame.  All kernels of the step work on the frames first .. first + count - 1.
+ * out: [frames][rows][8] = four rotation values, three of translation, one unused.  Positions are in blocks (layout.h),
+ * frame after frame.  All kernels of the step work on the frames first .. first + count - 1.
  *
  *     ROTATION 0    offset quaternion (1 + o0, o1, o2, o3), normalised
  *     ROTATION 1    Cayley: the quaternion (1, o1, o2, o3), normalised
  *     ROTATION 2    exponential map of the rotation vector (o1, o2, o3)
  */
 
-#define AT(block, axis, lane) (((size_t)(block)*3 + (axis)) * 16 + (lane))
-#define REACH                 0.1f
+#define REACH 0.1f
 
 typedef struct turn {
     float s;     /* scalar part of the unit quaternion */
@@ -46,17 +45,17 @@ kernel void transform_apply(global float *x, global const float *out, global con
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
-    size_t block = i / 16, lane = i % 16;
+    size_t at = NPG_POINT_AT(i);
     rest += frame * stride;
     float8 o = vload8(frame * rows + i, out);
     turn q = turn_of(o);
-    float3 v = (float3)(rest[AT(block, 0, lane)], rest[AT(block, 1, lane)], rest[AT(block, 2, lane)]);
+    float3 v = POINT(rest, at);
     float3 uv = cross(q.u, v);
     float3 y = v + 2.0f * (q.s * uv + cross(q.u, uv)) + tanh(REACH * o.s456);
     global float *to = x + frame * rows * 3;
-    to[AT(block, 0, lane)] = y.x;
-    to[AT(block, 1, lane)] = y.y;
-    to[AT(block, 2, lane)] = y.z;
+    to[at] = y.x;
+    to[at + NPG_LANES] = y.y;
+    to[at + 2 * NPG_LANES] = y.z;
 }
 
 /* dout from g = dL/dx; rows from `real` on are padding and get 0.  Global size: (rows, count). */
@@ -65,14 +64,14 @@ kernel void transform_back(global float *dout, global const float *g, global con
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
-    size_t block = i / 16, lane = i % 16;
+    size_t at = NPG_POINT_AT(i);
     global const float *from = g + frame * rows * 3;
     rest += frame * stride;
     float8 o = vload8(frame * rows + i, out), d = 0.0f;
     if (i < (size_t)real) {
         turn q = turn_of(o);
-        float3 v = (float3)(rest[AT(block, 0, lane)], rest[AT(block, 1, lane)], rest[AT(block, 2, lane)]);
-        float3 f = (float3)(from[AT(block, 0, lane)], from[AT(block, 1, lane)], from[AT(block, 2, lane)]);
+        float3 v = POINT(rest, at);
+        float3 f = POINT(from, at);
         float ds = 2.0f * dot(f, cross(q.u, v));
         float3 du = 2.0f * (q.s * cross(v, f) + f * dot(q.u, v) + v * dot(f, q.u) - 2.0f * q.u * dot(f, v));
 #if ROTATION == 2

@@ -49,14 +49,13 @@ npg_status npg_archive_create(npg_archive_writer **out, const char *path)
     writer->hash = XXH3_createState();
     npg_status status = writer->hash ? NPG_OK : npg_error(NPG_MEMORY, "no memory for a checksum");
     if (!status) status = npg_file_open(&writer->file, path);
-    if (status) {
-        close_writer(&writer);
-        return status;
+    if (!status) {
+        XXH3_64bits_reset(writer->hash);
+        append(writer, magic, sizeof magic);
     }
-    XXH3_64bits_reset(writer->hash);
-    append(writer, magic, sizeof magic);
+    if (status) close_writer(&writer);
     *out = writer;
-    return NPG_OK;
+    return status;
 }
 
 npg_status npg_archive_put(npg_archive_writer *writer, const char *name, const void *data, size_t size)

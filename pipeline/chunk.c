@@ -16,15 +16,12 @@ npg_status npg_chunk_open(npg_chunk **out, size_t capacity)
     npg_chunk *chunk;
     NPG_REQUIRE(capacity >= 1);
     NPG_TRY(npg_alloc(&chunk, NPG_FOR_RUN, sizeof *chunk));
-    npg_status status = npg_alloc_array(&chunk->frames, NPG_FOR_RUN, capacity, sizeof *chunk->frames);
-    if (status) {
-        npg_release(&chunk);
-        return status;
-    }
     chunk->capacity = capacity;
     atomic_init(&chunk->references, 1);
+    npg_status status = npg_alloc_array(&chunk->frames, NPG_FOR_RUN, capacity, sizeof *chunk->frames);
+    if (status) npg_chunk_unref(&chunk);
     *out = chunk;
-    return NPG_OK;
+    return status;
 }
 
 npg_chunk *npg_chunk_ref(npg_chunk *chunk)
@@ -85,19 +82,16 @@ static npg_status copy_rows(float **out, const float *rows, size_t count)
 
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
 {
-    npg_status status = NPG_OK;
     *out = *frame;
     out->path = NULL;
     out->pos_local = out->normals = out->vert_unit = NULL;
     out->align_state = NULL; /* belongs to one frame on its way, not to copies */
     out->align_state_size = 0;
-    if (frame->path) NPG_TRY_OR(fail, status, npg_copy_text(&out->path, frame->path));
-    NPG_TRY_OR(fail, status, copy_rows(&out->pos_local, frame->pos_local, frame->point_count));
-    NPG_TRY_OR(fail, status, copy_rows(&out->normals, frame->normals, frame->point_count));
-    NPG_TRY_OR(fail, status, copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count));
-    return NPG_OK;
-fail:
-    npg_frame_clear(out);
+    npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
+    if (!status) status = copy_rows(&out->pos_local, frame->pos_local, frame->point_count);
+    if (!status) status = copy_rows(&out->normals, frame->normals, frame->point_count);
+    if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count);
+    if (status) npg_frame_clear(out);
     return status;
 }
 

@@ -61,25 +61,24 @@ static void free_file(npg_file **slot)
     npg_release(slot);
 }
 
+static npg_status fill_file(npg_file *file, const char *path)
+{
+    NPG_TRY(npg_copy_text(&file->path, path));
+    NPG_TRY(hide(&file->hidden_path, path));
+    NPG_TRY(folder_of(&file->folder, path));
+    NPG_TRY(npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
+    file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    return file->fd < 0 ? npg_error_errno(NPG_DISK, "can't write %s", path) : NPG_OK;
+}
+
 npg_status npg_file_open(npg_file **out, const char *path)
 {
     npg_file *file;
-    npg_status status;
     *out = NULL;
     NPG_TRY(npg_alloc(&file, NPG_FOR_FILES, sizeof *file));
-    NPG_TRY_OR(fail, status, npg_copy_text(&file->path, path));
-    NPG_TRY_OR(fail, status, hide(&file->hidden_path, path));
-    NPG_TRY_OR(fail, status, folder_of(&file->folder, path));
-    NPG_TRY_OR(fail, status, npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
-    file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (file->fd < 0) {
-        status = npg_error_errno(NPG_DISK, "can't write %s", path);
-        goto fail;
-    }
+    npg_status status = fill_file(file, path);
+    if (status) free_file(&file);
     *out = file;
-    return NPG_OK;
-fail:
-    free_file(&file);
     return status;
 }
 
@@ -175,13 +174,9 @@ npg_status npg_file_commit(npg_file **slot)
     int closed = close(file->fd);
     file->fd = -1;
     if (!file->status && closed) keep_failure(file, "close");
-    if (file->status) {
-        npg_status status = npg_error_restore(file->status, file->cause);
-        npg_file_discard(slot);
-        return status;
-    }
-    if (rename(file->hidden_path, file->path)) keep_failure(file, "rename to");
-    npg_status status = file->status ? file->status : sync_folder(file);
+    if (!file->status && rename(file->hidden_path, file->path)) keep_failure(file, "rename to");
+    /* Where the folder can't be synced the file stands under its name already: the failure is reported all the same. */
+    npg_status status = file->status ? npg_error_restore(file->status, file->cause) : sync_folder(file);
     if (file->status) unlink(file->hidden_path);
     free_file(slot);
     return status;

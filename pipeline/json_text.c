@@ -1,11 +1,12 @@
-/* JSON: values from data that it can't hold as it is, and files. */
+/* JSON: values from data that it can't hold as it is, and the files that the program writes. */
+#include "pipeline/json_file.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "pipeline/file.h"
-#include "pipeline/json_file.h"
-#include "pipeline/stage.h"
+#include "pipeline/memory.h"
 
 /* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
 static size_t sequence_length(const unsigned char *text)

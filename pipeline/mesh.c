@@ -6,19 +6,15 @@
 npg_status npg_mesh_open(npg_mesh **out, size_t vert_count, size_t face_count)
 {
     npg_mesh *mesh;
-    npg_status status;
     NPG_TRY(npg_alloc(&mesh, NPG_FOR_MESH, sizeof *mesh));
     mesh->references = 1;
     mesh->vert_count = vert_count;
     mesh->face_count = face_count;
-    NPG_TRY_OR(fail, status,
-               npg_alloc_array(&mesh->vert_pos, NPG_FOR_MESH, vert_count, 3 * sizeof *mesh->vert_pos));
-    NPG_TRY_OR(fail, status,
-               npg_alloc_array(&mesh->faces, NPG_FOR_MESH, face_count, 3 * sizeof *mesh->faces));
+    npg_status status =
+        npg_alloc_array(&mesh->vert_pos, NPG_FOR_MESH, vert_count, 3 * sizeof *mesh->vert_pos);
+    if (!status) status = npg_alloc_array(&mesh->faces, NPG_FOR_MESH, face_count, 3 * sizeof *mesh->faces);
+    if (status) npg_mesh_unref(&mesh);
     *out = mesh;
-    return NPG_OK;
-fail:
-    npg_mesh_unref(&mesh);
     return status;
 }
 
@@ -53,19 +49,16 @@ static npg_status copy_bytes(void *out, const void *from, size_t count, size_t s
 npg_status npg_mesh_copy(npg_mesh **out, const npg_mesh *mesh)
 {
     npg_mesh *copy;
-    npg_status status;
     size_t v = mesh->vert_count;
     NPG_TRY(npg_mesh_open(&copy, v, mesh->face_count));
     memcpy(copy->vert_pos, mesh->vert_pos, v * 3 * sizeof(float));
     memcpy(copy->faces, mesh->faces, mesh->face_count * 3 * sizeof(uint32_t));
-    NPG_TRY_OR(fail, status, copy_bytes(&copy->vert_normals, mesh->vert_normals, v, 3 * sizeof(float)));
-    NPG_TRY_OR(fail, status, copy_bytes(&copy->vert_colours, mesh->vert_colours, v, 4));
-    NPG_TRY_OR(fail, status, copy_bytes(&copy->vert_uvs, mesh->vert_uvs, v, 2 * sizeof(float)));
-    NPG_TRY_OR(fail, status,
-               copy_bytes(&copy->corner_uvs, mesh->corner_uvs, mesh->face_count, 6 * sizeof(float)));
+    npg_status status = copy_bytes(&copy->vert_normals, mesh->vert_normals, v, 3 * sizeof(float));
+    if (!status) status = copy_bytes(&copy->vert_colours, mesh->vert_colours, v, 4);
+    if (!status) status = copy_bytes(&copy->vert_uvs, mesh->vert_uvs, v, 2 * sizeof(float));
+    if (!status)
+        status = copy_bytes(&copy->corner_uvs, mesh->corner_uvs, mesh->face_count, 6 * sizeof(float));
+    if (status) npg_mesh_unref(&copy);
     *out = copy;
-    return NPG_OK;
-fail:
-    npg_mesh_unref(&copy);
     return status;
 }

@@ -23,17 +23,14 @@ npg_status npg_ring_open(npg_ring **out, size_t capacity)
     npg_ring *ring;
     NPG_REQUIRE(capacity >= 1);
     NPG_TRY(npg_alloc(&ring, NPG_FOR_RUN, sizeof *ring));
-    npg_status status = npg_alloc_array(&ring->slots, NPG_FOR_RUN, capacity, sizeof *ring->slots);
-    if (status) {
-        npg_release(&ring);
-        return status;
-    }
     ring->capacity = capacity;
     pthread_mutex_init(&ring->lock, NULL);
     pthread_cond_init(&ring->changed_full, NULL);
     pthread_cond_init(&ring->changed_empty, NULL);
+    npg_status status = npg_alloc_array(&ring->slots, NPG_FOR_RUN, capacity, sizeof *ring->slots);
+    if (status) npg_ring_close(&ring);
     *out = ring;
-    return NPG_OK;
+    return status;
 }
 
 static void drop_all(npg_ring *ring)

@@ -11,6 +11,7 @@
 #include "pipeline/archive.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
+#include "pipeline/json_file.h"
 #include "pipeline/latch.h"
 #include "pipeline/mesh.h"
 #include "pipeline/options.h"
@@ -193,13 +194,6 @@ void npg_worker_restore_reports(npg_worker *worker, const json_t *saved);
 
 /* Let every stage add to a state on disk what it needs to be resumed (npg_stage.save). */
 npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out);
-
-/* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never
- * lost.  NULL gives null. */
-json_t *npg_json_text(const char *text);
-
-/* A JSON number, or null for one that is not finite. */
-json_t *npg_json_real(double value);
 
 /* Log and report the bound on memory.  The run itself does so before the solving pass of files; in a live one
  * the stage that makes the plan does, as soon as it is made.  Asks all stages' memory(), which then read

@@ -28,18 +28,33 @@ npg_status npg_error_restore(npg_status status, const char *text);
         if (!(condition)) return npg_error(NPG_USAGE, "%s: needs %s", __func__, #condition);                 \
     } while (0)
 
+/* Cleaning up after a failure: one way everywhere, without goto.
+ *
+ *   - A function that holds nothing returns at once: NPG_TRY(call).
+ *   - A function that holds something frees it in one place, at its end, whether things went well or not.  What
+ *     it frees begins as NULL (closers take that), calls are chained, and work between calls that can fail
+ *     becomes a function of its own, which holds nothing:
+ *
+ *         npg_status status = npg_alloc_array(&index, NPG_FOR_MESH, count, sizeof *index);
+ *         if (!status) status = npg_kdtree_open(&tree, points, count);
+ *         if (!status) status = measure(index, tree);
+ *         npg_kdtree_close(&tree);
+ *         npg_release(&index);
+ *         return status;
+ *
+ *   - A function that hands out what it opens gives it up before it returns a failure:
+ *
+ *         if (status) npg_thing_close(&thing);
+ *         *out = thing;
+ *         return status;
+ *
+ *   - What only one call needs (a path) is freed right after it, then NPG_TRY(status). */
+
 /* Return what a call returned, unless it was NPG_OK. */
 #define NPG_TRY(call)                                                                                        \
     do {                                                                                                     \
         npg_status try_status_ = (call);                                                                     \
         if (try_status_ != NPG_OK) return try_status_;                                                       \
-    } while (0)
-
-/* Leave for the label with what a call returned in status, unless it was NPG_OK. */
-#define NPG_TRY_OR(label, status, call)                                                                      \
-    do {                                                                                                     \
-        (status) = (call);                                                                                   \
-        if ((status) != NPG_OK) goto label;                                                                  \
     } while (0)
 
 #ifdef __cplusplus

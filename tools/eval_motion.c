@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 void npg_eval_motion_close(npg_eval_motion *motion)
 {
@@ -26,13 +26,6 @@ static npg_status begin(npg_eval_motion *motion, npg_mesh *mesh)
     for (int i = 0; i < 2; i++)
         NPG_TRY(npg_alloc_array(&motion->before[i], NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
     return npg_mesh_edges(&motion->edges, &motion->edge_count, mesh->faces, mesh->face_count);
-}
-
-static double distance(const float *a, const float *b)
-{
-    double sum = 0;
-    for (int k = 0; k < 3; k++) sum += ((double)a[k] - (double)b[k]) * ((double)a[k] - (double)b[k]);
-    return sqrt(sum);
 }
 
 static double jitter_of(const npg_eval_motion *motion, const float *after)
@@ -56,7 +49,8 @@ static double edge_change_of(const npg_eval_motion *motion, const float *pos)
     double sum = 0;
     for (size_t e = 0; e < motion->edge_count; e++) {
         size_t a = 3 * (size_t)motion->edges[e][0], b = 3 * (size_t)motion->edges[e][1];
-        sum += fabs(distance(pos + a, pos + b) / fmax(distance(rest + a, rest + b), 1e-30) - 1);
+        sum += fabs(npg_vec3_distance(pos + a, pos + b) / fmax(npg_vec3_distance(rest + a, rest + b), 1e-30) -
+                    1);
     }
     return sum / (double)motion->edge_count;
 }

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "optimize/replay.h"
+#include "optimize/optimize.h"
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"
 

@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "ingest/frame_select.h"
+#include "ingest/ingest.h"
 
 typedef struct npg_listing {
     char **paths; /* count of them, owned */

@@ -10,7 +10,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "pipeline/stage.h"
+#include "pipeline/json_file.h"
 #include "tools/log_file.h"
 
 void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose)

@@ -10,13 +10,12 @@
 #include <unistd.h>
 
 #include "export/export.h"
-#include "export/forms/writer.h"
-#include "geometry/attach.h"
-#include "geometry/mesh_tools.h"
-#include "ingest/formats/reader.h"
-#include "job/file_facts.h"
-#include "job/frame_log.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "pipeline/file.h"
+#include "pipeline/file_facts.h"
+#include "pipeline/json_file.h"
+#include "pipeline/json_lines.h"
 #include "tools/cli.h"
 #include "tools/job_motion.h"
 #include "tools/listing.h"
@@ -150,11 +149,11 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     return NPG_OK;
 }
 
-static npg_status each_line(const applying *a, npg_visit_line *visit, void *user)
+static npg_status each_line(const applying *a, npg_json_line_visit *visit, void *user)
 {
     char path[PATH_SIZE];
     NPG_TRY(path_of(path, a->job, "frames.jsonl"));
-    return npg_frame_lines_each(path, (int64_t)npg_file_bytes(path), visit, user);
+    return npg_json_lines_each(path, (int64_t)npg_file_bytes(path), visit, user);
 }
 
 /* The saved windows, where frames between frames or lost ones need them. */

@@ -6,10 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "optimize/optimize.h"
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
 #include "tools/bench/bench_compare.h"
-#include "tools/bench/bench_kernels.h"
+#include "tools/bench/bench_rows.h"
 #include "tools/cli.h"
 
 typedef struct settings {
@@ -80,62 +81,40 @@ static npg_status take_row(void *user, const npg_bench_row *row)
     bench *b = user;
     bool by_bytes;
     double share = npg_bench_share(row, &by_bytes), busy_s = row->timing.busy_s.median;
-    json_t *json = json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:s, s:f}", "flops", row->flops, "bytes",
-                             row->bytes, "wall_s", row->timing.wall_s, "gflops", row->flops / busy_s / 1e9,
-                             "gbytes", row->bytes / busy_s / 1e9, "share_of_multiply_add_peak",
-                             row->flops / row->timing.in_flops.median, "bound_by",
-                             by_bytes ? "memory" : "multiply-add", "share_of_bound", share);
+    json_t *json = json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:s, s:f}", "flops", row->work.flops, "bytes",
+                             row->work.bytes, "wall_s", row->timing.wall_s, "gflops",
+                             row->work.flops / busy_s / 1e9, "gbytes", row->work.bytes / busy_s / 1e9,
+                             "share_of_multiply_add_peak", row->work.flops / row->timing.in_flops.median,
+                             "bound_by", by_bytes ? "memory" : "multiply-add", "share_of_bound", share);
     json_object_set_new(json, "busy_s", json_of_spread(row->timing.busy_s));
     json_object_set_new(json, "relative",
                         json_of_spread(by_bytes ? row->timing.in_bytes : row->timing.in_flops));
-    if (row->vertex_frames > 0)
-        json_object_set_new(json, "vertex_frames_per_busy_second",
-                            json_real(row->vertex_frames / busy_s / (row->on_host ? units_of(b) : 1)));
-    json_object_set_new(b->kernels, row->name, json);
+    if (row->work.vertex_frames > 0)
+        json_object_set_new(
+            json, "vertex_frames_per_busy_second",
+            json_real(row->work.vertex_frames / busy_s / (row->work.on_host ? units_of(b) : 1)));
+    json_object_set_new(b->kernels, row->work.name, json);
     return NPG_OK;
 }
 
 /* ---- the fit ---- */
 
-/* The method's own settings, from the tables. */
-static npg_status fit_settings(npg_fit_settings *out, int64_t count)
-{
-    npg_options *options;
-    NPG_TRY(npg_options_open(&options));
-    npg_fit_settings_fill(out, options);
-    out->epochs = count;
-    npg_options_close(&options);
-    return NPG_OK;
-}
-
 typedef struct epochs {
     double last_wall_s, last_cpu_s, *wall_s, *cpu_s;
 } epochs;
 
-static npg_status watch(void *user, const npg_fit_step *step)
+/* An npg_epoch_visit. */
+static npg_status time_epoch(void *user, int64_t epoch)
 {
     epochs *e = user;
     double wall_s = npg_clock_s(), cpu_s = npg_clock_process_s();
-    e->wall_s[step->epoch] = wall_s - e->last_wall_s;
-    e->cpu_s[step->epoch] = cpu_s - e->last_cpu_s;
+    if (epoch >= 0) {
+        e->wall_s[epoch] = wall_s - e->last_wall_s;
+        e->cpu_s[epoch] = cpu_s - e->last_cpu_s;
+    }
     e->last_wall_s = wall_s;
     e->last_cpu_s = cpu_s;
     return NPG_OK;
-}
-
-static npg_status run_epochs(bench *b, epochs *e)
-{
-    npg_fit_settings fit_with;
-    npg_fit *fit = NULL;
-    NPG_TRY(fit_settings(&fit_with, b->s.epochs));
-    npg_status status = npg_fit_open(&fit, b->device, &fit_with, b->body.mesh, 1);
-    if (!status)
-        status = npg_fit_begin(fit, b->body.frames, b->body.frame_count, (int64_t)b->body.frame_count / 2);
-    e->last_wall_s = npg_clock_s();
-    e->last_cpu_s = npg_clock_process_s();
-    if (!status) status = npg_fit_run(fit, 0, b->s.epochs, watch, e);
-    npg_fit_close(&fit);
-    return status;
 }
 
 static npg_status bench_fit(bench *b, json_t *root)
@@ -145,7 +124,9 @@ static npg_status bench_fit(bench *b, json_t *root)
     if (!npg_bench_wants(b->s.only, "fit")) return NPG_OK;
     npg_status status = npg_alloc_array(&e.wall_s, NPG_FOR_RUN, 2 * n, sizeof *e.wall_s);
     e.cpu_s = e.wall_s + n;
-    if (!status) status = run_epochs(b, &e);
+    if (!status)
+        status = npg_fit_once(b->device, b->body.mesh, (const float *const *)b->body.points,
+                              b->body.point_count, b->body.frame_count, b->s.epochs, time_epoch, &e);
     if (!status) {
         double wall_s = npg_spread_of(e.wall_s, n).median, frames = (double)b->body.frame_count;
         json_object_set_new(

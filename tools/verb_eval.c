@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/metrics.h"
-#include "ingest/formats/reader.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "tools/cli.h"
 #include "tools/eval_motion.h"
 #include "tools/listing.h"

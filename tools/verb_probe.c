@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "pipeline/clock.h"
 #include "tools/cli.h"
 #include "tools/probe/probe_capture.h"

@@ -3,9 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "export/forms/writer.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
+#include "export/export.h"
+#include "geometry/geometry.h"
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"
 #include "tools/cli.h"

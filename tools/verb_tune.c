@@ -4,8 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "kernels/kernels.h"
-#include "tools/bench/bench_kernels.h"
+#include "tools/bench/bench_rows.h"
 #include "tools/cli.h"
 
 #define GAIN 0.03 /* a set takes the place of the present one when it is faster by this share */
@@ -101,7 +100,7 @@ static npg_status add_row(void *user, const npg_bench_row *row)
 {
     tune *t = user;
     t->cost += row->timing.in_flops.median;
-    t->flops += row->flops;
+    t->flops += row->work.flops;
     return NPG_OK;
 }
 

@@ -185,27 +185,25 @@ npg_status npg_device_open(npg_device **out, const char *spec)
     return npg_device_open_tuned(out, spec, "auto");
 }
 
+static npg_status fill_device(npg_device *device, const char *spec, const char *tuning)
+{
+    cl_int code;
+    NPG_TRY(npg_kernel_cache_enter());
+    device->is_in_cache = true;
+    NPG_TRY(choose_device(device, spec));
+    NPG_TRY(choose_tuning(device, tuning));
+    device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
+    NPG_TRY(npg_cl_status(code, "clCreateContext"));
+    device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
+    return npg_cl_status(code, "clCreateCommandQueue");
+}
+
 npg_status npg_device_open_tuned(npg_device **out, const char *spec, const char *tuning)
 {
     npg_device *device;
-    cl_int code = 0;
     *out = NULL;
-    NPG_TRY(npg_kernel_cache_enter());
-    npg_status status = npg_alloc(&device, NPG_FOR_DEVICE, sizeof *device);
-    if (status) {
-        npg_kernel_cache_leave();
-        return status;
-    }
-    status = choose_device(device, spec && strcmp(spec, "auto") != 0 ? spec : "");
-    if (!status) status = choose_tuning(device, tuning);
-    if (!status) {
-        device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
-        status = npg_cl_status(code, "clCreateContext");
-    }
-    if (!status) {
-        device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
-        status = npg_cl_status(code, "clCreateCommandQueue");
-    }
+    NPG_TRY(npg_alloc(&device, NPG_FOR_DEVICE, sizeof *device));
+    npg_status status = fill_device(device, spec && strcmp(spec, "auto") != 0 ? spec : "", tuning);
     if (status) npg_device_close(&device);
     *out = device;
     return status;
@@ -219,8 +217,8 @@ void npg_device_close(npg_device **slot)
     npg_programs_close(device);
     if (device->queue) clReleaseCommandQueue(device->queue);
     if (device->context) clReleaseContext(device->context);
+    if (device->is_in_cache) npg_kernel_cache_leave();
     npg_release(slot);
-    npg_kernel_cache_leave();
 }
 
 const npg_device_info *npg_device_facts(const npg_device *device)

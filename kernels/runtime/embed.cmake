@@ -1,5 +1,5 @@
-# Writes the kernel sources SOURCES, each behind the text of HEAD, into OUT as C arrays, so that the library needs no files at
-# run time.
+# Writes the kernel sources SOURCES, each behind the texts of HEADS, into OUT as C arrays, so that the library needs no
+# files at run time.
 function(bytes_of out file)
   file(READ ${file} hex HEX)
   string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
@@ -8,7 +8,11 @@ endfunction()
 
 set(text "/* generated from the .cl files of kernels */\n#include \"kernels/runtime/kernel_sources.h\"\n\n")
 set(table "")
-bytes_of(head ${HEAD})
+set(head "")
+foreach(part ${HEADS})
+  bytes_of(bytes ${part})
+  string(APPEND head "${bytes}")
+endforeach()
 string(HEX "#line 1\n" line)
 string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," line "${line}")
 foreach(source ${SOURCES})

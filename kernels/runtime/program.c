@@ -204,11 +204,11 @@ npg_status npg_program_open(npg_program **out, npg_device *device, const char *n
     npg_status status = build_program(program, source->text);
     if (status) {
         release(program);
-        return status;
+    } else {
+        program->next = device->programs;
+        *out = device->programs = program;
     }
-    program->next = device->programs;
-    *out = device->programs = program;
-    return NPG_OK;
+    return status;
 }
 
 void npg_program_close(npg_program **slot)

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/vec3.h"
 #include "pipeline/parallel.h"
 
 #define LANES 8           /* of a column */
@@ -86,6 +87,14 @@ static void lay_out_rows(npg_block_system *s)
         }
 }
 
+static void fill_rows(npg_block_system *s, const uint32_t (*pairs)[2])
+{
+    memcpy(s->pairs, pairs, s->pair_count * sizeof *pairs);
+    for (size_t e = 0; e < s->pair_count; e++) s->first[pairs[e][0] + 1]++;
+    for (size_t a = 0; a < s->n; a++) s->first[a + 1] += s->first[a];
+    lay_out_rows(s);
+}
+
 npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pairs)[2], size_t pair_count)
 {
     npg_block_system *s;
@@ -94,16 +103,10 @@ npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pai
     s->n = n;
     s->pair_count = pair_count;
     npg_status status = open_arrays(s);
-    if (status) {
-        npg_block_close(&s);
-        return status;
-    }
-    memcpy(s->pairs, pairs, pair_count * sizeof *pairs);
-    for (size_t e = 0; e < pair_count; e++) s->first[pairs[e][0] + 1]++;
-    for (size_t a = 0; a < n; a++) s->first[a + 1] += s->first[a];
-    lay_out_rows(s);
+    if (!status) fill_rows(s, pairs);
+    if (status) npg_block_close(&s);
     *out = s;
-    return NPG_OK;
+    return status;
 }
 
 /* ---- gathering ---- */
@@ -130,14 +133,6 @@ static size_t pair_of(const npg_block_system *s, uint32_t a, uint32_t b)
     return lo < s->first[a + 1] && s->pairs[lo][1] == b ? lo : s->pair_count;
 }
 
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int i = 0; i < 3; i++) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        out[i] = a[j] * b[k] - a[k] * b[j];
-    }
-}
-
 /* block += scale u v^T. */
 NPG_WIDE static void add_outer(double *restrict block, double scale, const double *restrict u,
                                const double *restrict v)
@@ -153,7 +148,7 @@ NPG_WIDE static void add_outer(double *restrict block, double scale, const doubl
  */
 static void add_arms(double *block, double scale, const double a[3], const double b[3])
 {
-    double along = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    double along = npg_vec3_dot(a, b);
     for (int i = 0; i < 3; i++) {
         int j = (i + 1) % 3, k = (i + 2) % 3;
         for (int c = 0; c < 3; c++) block[6 * i + c] -= scale * b[i] * a[c];
@@ -174,8 +169,8 @@ void npg_block_add(npg_block_system *s, size_t which, const npg_block_term *t)
     for (int c = 0; c < 3; c++) pull[c] = t->across * level * t->normal[c] + t->along * t->right[c];
     for (size_t k = 0; k < t->count; k++) {
         double turned[3], *right = p->right + 6 * (size_t)t->nodes[k];
-        cross(turned, t->arms[k], pull);
-        cross(lever[k], t->arms[k], t->normal);
+        npg_vec3_cross(turned, t->arms[k], pull);
+        npg_vec3_cross(lever[k], t->arms[k], t->normal);
         memcpy(lever[k] + 3, t->normal, sizeof t->normal);
         for (int c = 0; c < 3; c++) {
             right[c] += t->shares[k] * turned[c];

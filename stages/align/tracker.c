@@ -9,6 +9,7 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
 #include "geometry/thin.h"
+#include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 
@@ -308,7 +309,7 @@ static void add_edges(npg_tracker *t, const double *pose, double stiffness)
 /* rotation = exp(omega) rotation (Rodrigues). */
 static void turn(double rotation[9], const double omega[3])
 {
-    double angle = sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]), m[9], out[9];
+    double angle = npg_vec3_length(omega), m[9], out[9];
     double s = angle > 1e-9 ? sin(angle) / angle : 1,
            c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
     const double x[9] = {0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0};
@@ -332,8 +333,7 @@ static double share_of_step(const npg_tracker *t)
     for (size_t k = 0; k < t->graph->node_count; k++)
         for (size_t half = 0; half < 2; half++) {
             const double *d = t->step + 6 * k + 3 * half;
-            largest =
-                fmax(largest, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (half ? MOVE_MAX : TURN_MAX));
+            largest = fmax(largest, npg_vec3_length(d) / (half ? MOVE_MAX : TURN_MAX));
         }
     return largest > 1 ? 1 / largest : 1;
 }
@@ -490,16 +490,12 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
  * products would else triple their rounding errors with every frame. */
 static void straighten(double m[9])
 {
-    double along = 0, size = 0;
-    for (int i = 0; i < 3; i++) size += m[i] * m[i];
-    for (int i = 0; i < 3; i++) m[i] /= sqrt(size);
-    for (int i = 0; i < 3; i++) along += m[i] * m[3 + i];
-    for (int i = 0; i < 3; i++) m[3 + i] -= along * m[i];
-    size = m[3] * m[3] + m[4] * m[4] + m[5] * m[5];
-    for (int i = 3; i < 6; i++) m[i] /= sqrt(size);
-    m[6] = m[1] * m[5] - m[2] * m[4];
-    m[7] = m[2] * m[3] - m[0] * m[5];
-    m[8] = m[0] * m[4] - m[1] * m[3];
+    double *first = m, *second = m + 3, *third = m + 6;
+    npg_vec3_make_unit(first);
+    double along = npg_vec3_dot(first, second);
+    for (int i = 0; i < 3; i++) second[i] -= along * first[i];
+    npg_vec3_make_unit(second);
+    npg_vec3_cross(third, first, second);
 }
 
 void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)

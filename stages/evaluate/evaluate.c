@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/evaluate.h"
+#include "evaluate/evaluate_shape.h"
+#include "evaluate/evaluate_truth.h"
 #include "evaluate/misfit.h"
 #include "evaluate/topology.h"
 #include "geometry/kdtree.h"

@@ -1,8 +1,9 @@
 /* Shape: flipped and stretched faces and the change of edges of a deformed mesh against its reference. */
 #include <math.h>
 
-#include "evaluate/evaluate.h"
+#include "evaluate/evaluate_shape.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/vec3.h"
 
 /* A face is with its neighbourhood above this cosine and against it below minus that; between, as across a
  * crease, it counts as neither.  Set by trial. */
@@ -18,28 +19,6 @@ struct npg_shape {
     double *normals;   /* F x 3 scratch; owned */
     double *vert_sums; /* V x 3 scratch; owned */
 };
-
-static void subtract(double out[3], const float *a, const float *b)
-{
-    for (int i = 0; i < 3; i++) out[i] = (double)a[i] - (double)b[i];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/* Unit normal (0 for a face without area); the result is the area. */
-static double face_normal(double normal[3], const float *vert_pos, const uint32_t *face)
-{
-    double u[3], v[3];
-    subtract(u, vert_pos + 3 * (size_t)face[1], vert_pos + 3 * (size_t)face[0]);
-    subtract(v, vert_pos + 3 * (size_t)face[2], vert_pos + 3 * (size_t)face[0]);
-    for (int i = 0; i < 3; i++) normal[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
-    double length = sqrt(dot(normal, normal));
-    for (int i = 0; i < 3; i++) normal[i] = length > 0 ? normal[i] / length : 0;
-    return length / 2;
-}
 
 /* Sums of the faces' normals around each vertex, weighted by reference area. */
 static void sum_normals(const npg_shape *shape)
@@ -64,8 +43,8 @@ static double cosine_of(const npg_shape *shape, size_t f)
         sum[a] = -3 * shape->areas[f] * normal[a]; /* the face itself is in the sum of each of its corners */
         for (int k = 0; k < 3; k++) sum[a] += shape->vert_sums[3 * (size_t)face[k] + (size_t)a];
     }
-    double length = sqrt(dot(sum, sum));
-    return length > 1e-9 * shape->areas[f] ? dot(sum, normal) / length : 0;
+    double length = npg_vec3_length(sum);
+    return length > 1e-9 * shape->areas[f] ? npg_vec3_dot(sum, normal) / length : 0;
 }
 
 static npg_status measure_reference(npg_shape *shape)
@@ -78,7 +57,7 @@ static npg_status measure_reference(npg_shape *shape)
     NPG_TRY(npg_alloc_array(&shape->normals, NPG_FOR_MESH, f, 3 * sizeof *shape->normals));
     NPG_TRY(npg_alloc_array(&shape->vert_sums, NPG_FOR_MESH, v, 3 * sizeof *shape->vert_sums));
     for (size_t i = 0; i < f; i++)
-        shape->areas[i] = face_normal(shape->normals + 3 * i, mesh->vert_pos, mesh->faces + 3 * i);
+        shape->areas[i] = npg_face_normal(shape->normals + 3 * i, mesh->vert_pos, mesh->faces + 3 * i);
     sum_normals(shape);
     for (size_t i = 0; i < f; i++) shape->cosines[i] = cosine_of(shape, i);
     return NPG_OK;
@@ -109,9 +88,7 @@ void npg_shape_close(npg_shape **slot)
 
 static double length_of(const float *vert_pos, const uint32_t edge[2])
 {
-    double d[3];
-    subtract(d, vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
-    return sqrt(dot(d, d));
+    return npg_vec3_distance(vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
 }
 
 static double edge_change(const npg_shape *shape, const float *vert_unit)
@@ -132,7 +109,7 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
     const npg_mesh *mesh = shape->reference;
     size_t flipped = 0, stretched = 0;
     for (size_t f = 0; f < mesh->face_count; f++) {
-        double area = face_normal(shape->normals + 3 * f, vert_unit, mesh->faces + 3 * f);
+        double area = npg_face_normal(shape->normals + 3 * f, vert_unit, mesh->faces + 3 * f);
         stretched += area > STRETCH * shape->areas[f] || STRETCH * area < shape->areas[f];
     }
     sum_normals(shape);
@@ -150,7 +127,7 @@ double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count,
     double sum = 0, normal[3];
     for (size_t i = 0; i < vert_count; i++) areas[i] = 0;
     for (size_t f = 0; f < face_count; f++) {
-        double area = face_normal(normal, vert_pos, faces + 3 * f);
+        double area = npg_face_normal(normal, vert_pos, faces + 3 * f);
         for (size_t k = 0; k < 3; k++) areas[faces[3 * f + k]] += area / 3;
         sum += area;
     }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/evaluate.h"
+#include "evaluate/evaluate_truth.h"
 #include "geometry/metrics.h"
 #include "ingest/formats/reader.h"
 #include "pipeline/file.h"

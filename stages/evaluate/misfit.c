@@ -6,6 +6,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/sets.h"
+#include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 
 /* Set by trial.  misfit.h says how they are used. */
@@ -47,12 +48,7 @@ struct npg_misfit_finder {
 
 static double length_of(const float *vert_pos, const uint32_t edge[2])
 {
-    double sum = 0;
-    for (size_t a = 0; a < 3; a++) {
-        double d = (double)vert_pos[3 * (size_t)edge[0] + a] - (double)vert_pos[3 * (size_t)edge[1] + a];
-        sum += d * d;
-    }
-    return sqrt(sum);
+    return npg_vec3_distance(vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
 }
 
 static npg_status measure_reference(npg_misfit_finder *f)

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "export/export.h"
+#include "export/export_folder.h"
 #include "export/forms/forms.h"
 #include "export/forms/placement.h"
 #include "export/forms/writer.h"

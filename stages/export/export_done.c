@@ -5,10 +5,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "export/export.h"
-#include "job/file_facts.h"
+#include "export/export_folder.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
+#include "pipeline/file_facts.h"
 
 static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)
 {

@@ -9,7 +9,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-#include "export/export.h"
+#include "export/export_folder.h"
 #include "export/forms/forms.h"
 #include "pipeline/file.h"
 #include "pipeline/order.h"

@@ -6,6 +6,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/vec3.h"
 
 struct npg_attachment {
     npg_mesh *rest;      /* reference held               */
@@ -16,25 +17,6 @@ struct npg_attachment {
     float *rest_normals; /* V x 3                        */
     float *now_normals;  /* V x 3: of the pose under way */
 };
-
-/* ---- small vectors ---- */
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
-
-static bool make_unit(double v[3])
-{
-    double length = sqrt(dot(v, v));
-    for (int i = 0; i < 3 && length > 0; i++) v[i] /= length;
-    return length > 0;
-}
 
 /* sum w_k rows[face_k] */
 static void interpolate(double out[3], const float *rows, const uint32_t *face, const float weights[3])
@@ -60,7 +42,7 @@ static void face_corners(local_frame *frame, const float *vert_pos, const uint32
     for (int k = 0; k < 3; k++) {
         double d[3];
         for (size_t a = 0; a < 3; a++) d[a] = (double)vert_pos[3 * face[k] + a] - middle[a];
-        for (int i = 0; i < 2; i++) frame->corners[k][i] = dot(d, frame->axes[i]);
+        for (int i = 0; i < 2; i++) frame->corners[k][i] = npg_vec3_dot(d, frame->axes[i]);
     }
 }
 
@@ -70,15 +52,15 @@ static void set_frame(local_frame *frame, const float *vert_pos, const float *ve
 {
     double *normal = frame->axes[2], side[3] = {0};
     interpolate(normal, vert_normals, face, weights);
-    if (!make_unit(normal))
+    if (!npg_vec3_make_unit(normal))
         for (size_t a = 0; a < 3; a++) normal[a] = (double)vert_normals[3 * face[0] + a];
     int least = 0; /* the axis that the normal is farthest from: their cross product is not short */
     for (int a = 1; a < 3; a++)
         if (fabs(normal[a]) < fabs(normal[least])) least = a;
     side[least] = 1;
-    cross(frame->axes[0], side, normal);
-    make_unit(frame->axes[0]);
-    cross(frame->axes[1], normal, frame->axes[0]);
+    npg_vec3_cross(frame->axes[0], side, normal);
+    npg_vec3_make_unit(frame->axes[0]);
+    npg_vec3_cross(frame->axes[1], normal, frame->axes[0]);
     face_corners(frame, vert_pos, face);
 }
 
@@ -115,12 +97,9 @@ static double rotated(const double turn[3][3], int a, const float v[3])
 static bool looks_along(const npg_mesh *rest, uint32_t face_number, const float *normal)
 {
     const uint32_t *face = rest->faces + 3 * face_number;
-    double e[2][3], out[3], n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]};
-    for (int k = 0; k < 2; k++)
-        for (size_t a = 0; a < 3; a++)
-            e[k][a] = (double)rest->vert_pos[3 * face[k + 1] + a] - (double)rest->vert_pos[3 * face[0] + a];
-    cross(out, e[0], e[1]);
-    return dot(out, n) >= 0;
+    double out[3], n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]};
+    npg_face_cross(out, rest->vert_pos, face);
+    return npg_vec3_dot(out, n) >= 0;
 }
 
 /* Two rays from every such point, along its normal and against it; the nearer face

@@ -4,21 +4,17 @@
 #include <stdbool.h>
 
 #include "geometry/query.h"
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+#include "geometry/vec3.h"
 
 /* Squared distance from the origin to the segment a..b; *t is where on it. */
 static double segment(double *t, const double a[3], const double b[3])
 {
     double ab[3], at[3];
-    for (int i = 0; i < 3; i++) ab[i] = b[i] - a[i];
-    double length_sq = dot(ab, ab), along = -dot(a, ab);
+    npg_vec3_sub(ab, b, a);
+    double length_sq = npg_vec3_dot(ab, ab), along = -npg_vec3_dot(a, ab);
     *t = along <= 0 ? 0 : along >= length_sq ? 1 : along / length_sq;
     for (int i = 0; i < 3; i++) at[i] = a[i] + *t * ab[i];
-    return dot(at, at);
+    return npg_vec3_dot(at, at);
 }
 
 /* The best of the edges k -> k + 1 that are wanted. */
@@ -43,19 +39,18 @@ static double edges(double weights[3], double corner[3][3], const bool is_wanted
 static double triangle(double weights[3], double corner[3][3])
 {
     double u[3], v[3], n[3];
-    for (int i = 0; i < 3; i++) {
-        u[i] = corner[1][i] - corner[0][i];
-        v[i] = corner[2][i] - corner[0][i];
-    }
-    for (int i = 0; i < 3; i++) n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
-    double n_sq = dot(n, n), uu = dot(u, u), vv = dot(v, v), uv = dot(u, v);
+    npg_vec3_sub(u, corner[1], corner[0]);
+    npg_vec3_sub(v, corner[2], corner[0]);
+    npg_vec3_cross(n, u, v);
+    double n_sq = npg_vec3_dot(n, n), uu = npg_vec3_dot(u, u), vv = npg_vec3_dot(v, v),
+           uv = npg_vec3_dot(u, v);
     /* Sides within 1e-12 of parallel: doubles don't give a plane. */
     if (!(n_sq > 1e-24 * uu * vv)) return edges(weights, corner, (const bool[3]){true, true, true});
-    double du = -dot(corner[0], u), dv = -dot(corner[0], v);
+    double du = -npg_vec3_dot(corner[0], u), dv = -npg_vec3_dot(corner[0], v);
     double b = (vv * du - uv * dv) / n_sq, c = (uu * dv - uv * du) / n_sq;
     const bool is_beyond[3] = {c < 0, 1 < b + c, b < 0}; /* the edges 0-1, 1-2, 2-0 */
     if (is_beyond[0] || is_beyond[1] || is_beyond[2]) return edges(weights, corner, is_beyond);
-    double height = dot(n, corner[0]);
+    double height = npg_vec3_dot(n, corner[0]);
     weights[0] = 1 - b - c;
     weights[1] = b;
     weights[2] = c;

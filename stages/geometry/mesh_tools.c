@@ -6,18 +6,7 @@
 #include <string.h>
 
 #include "geometry/sets.h"
-
-static void face_cross(double out[3], const float *vert_pos, const uint32_t face[3])
-{
-    const float *a = vert_pos + 3 * (size_t)face[0], *b = vert_pos + 3 * (size_t)face[1],
-                *c = vert_pos + 3 * (size_t)face[2];
-    double u[3], v[3];
-    for (int i = 0; i < 3; i++) {
-        u[i] = (double)b[i] - (double)a[i];
-        v[i] = (double)c[i] - (double)a[i];
-    }
-    for (int i = 0; i < 3; i++) out[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
-}
+#include "geometry/vec3.h"
 
 void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
                              size_t face_count)
@@ -25,20 +14,16 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
     memset(normals, 0, vert_count * 3 * sizeof *normals);
     for (size_t f = 0; f < face_count; f++) {
         double n[3];
-        face_cross(n, vert_pos, faces + 3 * f);
+        npg_face_cross(n, vert_pos, faces + 3 * f);
         for (int k = 0; k < 3; k++)
             for (int a = 0; a < 3; a++)
                 normals[3 * (size_t)faces[3 * f + (size_t)k] + (size_t)a] += (float)n[a];
     }
     for (size_t i = 0; i < vert_count; i++) {
         float *n = normals + 3 * i;
-        float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        if (length > 0) {
-            for (int a = 0; a < 3; a++) n[a] /= length;
-        } else {
-            n[0] = n[1] = 0;
-            n[2] = 1;
-        }
+        if (npg_vec3_make_unitf(n)) continue;
+        n[0] = n[1] = 0;
+        n[2] = 1;
     }
 }
 
@@ -124,8 +109,8 @@ npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, 
 double npg_face_area(const float *vert_pos, const uint32_t face[3])
 {
     double n[3];
-    face_cross(n, vert_pos, face);
-    return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    npg_face_cross(n, vert_pos, face);
+    return 0.5 * npg_vec3_length(n);
 }
 
 double npg_mesh_area(const npg_mesh *mesh)
@@ -141,7 +126,7 @@ double npg_mesh_volume(const npg_mesh *mesh)
     for (size_t f = 0; f < mesh->face_count; f++) {
         double n[3];
         const float *a = mesh->vert_pos + 3 * (size_t)mesh->faces[3 * f];
-        face_cross(n, mesh->vert_pos, mesh->faces + 3 * f);
+        npg_face_cross(n, mesh->vert_pos, mesh->faces + 3 * f);
         sum += n[0] * (double)a[0] + n[1] * (double)a[1] + n[2] * (double)a[2];
     }
     return sum / 6; /* tetrahedra from the origin to every face: a . (b x c) / 6 = a . face_cross / 6 */
@@ -179,30 +164,36 @@ npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh)
     return status;
 }
 
+/* How many of n vertices are in the list; seen: room for n. */
+static size_t count_distinct(const uint32_t *list, size_t count, uint32_t *seen, size_t n)
+{
+    size_t distinct = 0;
+    memset(seen, 0, n * sizeof *seen);
+    for (size_t i = 0; i < count; i++) {
+        distinct += seen[list[i]] == 0;
+        seen[list[i]] = 1;
+    }
+    return distinct;
+}
+
 /* Border loops: components of the border's edges, each taken as a face with two equal corners. */
 static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
 {
     uint32_t *twin = NULL, *flat = NULL, *component = NULL;
-    size_t count = 0, pieces, border_verts = 0, n = mesh->vert_count;
-    npg_status status;
+    size_t count = 0, pieces, n = mesh->vert_count;
     *loops = 0;
-    NPG_TRY_OR(done, status, npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
-    NPG_TRY_OR(done, status, npg_alloc_array(&flat, NPG_FOR_MESH, 3 * mesh->face_count, 3 * sizeof *flat));
-    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, n, sizeof *component));
-    NPG_TRY_OR(done, status, npg_mesh_twins(twin, mesh->faces, mesh->face_count));
-    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+    npg_status status = npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin);
+    if (!status) status = npg_alloc_array(&flat, NPG_FOR_MESH, 3 * mesh->face_count, 3 * sizeof *flat);
+    if (!status) status = npg_alloc_array(&component, NPG_FOR_MESH, n, sizeof *component);
+    if (!status) status = npg_mesh_twins(twin, mesh->faces, mesh->face_count);
+    for (size_t i = 0; i < 3 * mesh->face_count && !status; i++) {
         if (twin[i] != UINT32_MAX) continue;
         flat[3 * count] = flat[3 * count + 1] = mesh->faces[i];
         flat[3 * count++ + 2] = mesh->faces[i - i % 3 + (i + 1) % 3];
     }
-    NPG_TRY_OR(done, status, npg_mesh_components(component, &pieces, n, flat, count));
-    memset(component, 0, n * sizeof *component);
-    for (size_t i = 0; i < 3 * count; i++) {
-        border_verts += component[flat[i]] == 0;
-        component[flat[i]] = 1;
-    }
-    *loops = pieces + border_verts - n; /* every vertex off the border is a component of its own */
-done:
+    if (!status) status = npg_mesh_components(component, &pieces, n, flat, count);
+    /* every vertex off the border is a component of its own */
+    if (!status) *loops = pieces + count_distinct(flat, 3 * count, component, n) - n;
     npg_release(&twin);
     npg_release(&flat);
     npg_release(&component);
@@ -250,33 +241,37 @@ static void number_kept(uint32_t *number, size_t *vert_count, size_t *face_count
         if (number[i] != UINT32_MAX) number[i] = (uint32_t)(*vert_count)++;
 }
 
+/* Room in `out` for the vertex data that `mesh` has beside positions. */
+static npg_status alloc_vertex_data(npg_mesh *out, const npg_mesh *mesh)
+{
+    size_t v = out->vert_count;
+    if (mesh->vert_normals) NPG_TRY(npg_alloc_array(&out->vert_normals, NPG_FOR_MESH, v, 3 * sizeof(float)));
+    if (mesh->vert_colours) NPG_TRY(npg_alloc_array(&out->vert_colours, NPG_FOR_MESH, v, 4));
+    if (mesh->vert_uvs) NPG_TRY(npg_alloc_array(&out->vert_uvs, NPG_FOR_MESH, v, 2 * sizeof(float)));
+    return NPG_OK;
+}
+
+static void copy_kept(npg_mesh *out, const npg_mesh *mesh, const uint32_t *number, const uint8_t *keep_face)
+{
+    for (size_t i = 0; i < mesh->vert_count; i++)
+        if (number[i] != UINT32_MAX) copy_vertex(out, number[i], mesh, i);
+    for (size_t f = 0, to = 0; f < mesh->face_count; f++)
+        for (int k = 0; k < 3 && keep_face[f]; k++) out->faces[to++] = number[mesh->faces[3 * f + (size_t)k]];
+}
+
 npg_status npg_mesh_keep_faces(npg_mesh **slot, const uint8_t *keep_face)
 {
     npg_mesh *mesh = *slot, *out = NULL;
     uint32_t *number;
     size_t vert_count, face_count;
-    npg_status status;
     NPG_TRY(npg_alloc_array(&number, NPG_FOR_MESH, mesh->vert_count, sizeof *number));
     number_kept(number, &vert_count, &face_count, mesh, keep_face);
-    NPG_TRY_OR(done, status, npg_mesh_open(&out, vert_count, face_count));
-    if (mesh->vert_normals)
-        NPG_TRY_OR(done, status,
-                   npg_alloc_array(&out->vert_normals, NPG_FOR_MESH, vert_count, 3 * sizeof(float)));
-    if (mesh->vert_colours)
-        NPG_TRY_OR(done, status, npg_alloc_array(&out->vert_colours, NPG_FOR_MESH, vert_count, 4));
-    if (mesh->vert_uvs)
-        NPG_TRY_OR(done, status,
-                   npg_alloc_array(&out->vert_uvs, NPG_FOR_MESH, vert_count, 2 * sizeof(float)));
-    for (size_t i = 0; i < mesh->vert_count; i++)
-        if (number[i] != UINT32_MAX) copy_vertex(out, number[i], mesh, i);
-    for (size_t f = 0, to = 0; f < mesh->face_count; f++)
-        for (int k = 0; k < 3 && keep_face[f]; k++) out->faces[to++] = number[mesh->faces[3 * f + (size_t)k]];
-    npg_mesh_unref(slot);
-    *slot = out;
-    out = NULL;
-done:
-    npg_mesh_unref(&out);
+    npg_status status = npg_mesh_open(&out, vert_count, face_count);
+    if (!status) status = alloc_vertex_data(out, mesh);
+    if (!status) copy_kept(out, mesh, number, keep_face);
     npg_release(&number);
+    npg_mesh_unref(status ? &out : slot);
+    if (!status) *slot = out;
     return status;
 }
 

@@ -5,25 +5,13 @@
 #include <math.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/random.h"
 
 enum { SIDE_PREDICTED, SIDE_TRUTH }; /* keys of the random streams */
 
 /* ---- samples ---- */
-
-static double face_normal(double normal[3], const npg_mesh *mesh, const uint32_t face[3])
-{
-    double u[3], v[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = (double)mesh->vert_pos[3 * face[1] + k] - (double)mesh->vert_pos[3 * face[0] + k];
-        v[k] = (double)mesh->vert_pos[3 * face[2] + k] - (double)mesh->vert_pos[3 * face[0] + k];
-    }
-    double cross[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-    double length = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
-    for (int k = 0; k < 3; k++) normal[k] = length > 0 ? cross[k] / length : 0;
-    return 0.5 * length;
-}
 
 /* The first face whose cumulated area is above `area`. */
 static size_t find_face(const double *cumulated, size_t face_count, double area)
@@ -39,35 +27,39 @@ static size_t find_face(const double *cumulated, size_t face_count, double area)
     return low;
 }
 
+/* One sample of a face, uniform over it: the root makes up for its growing width
+ * (Osada et al., Shape Distributions, 2002). */
+static void sample_face(float pos[3], float normal_out[3], const npg_mesh *mesh, size_t f, npg_random *random)
+{
+    double r = sqrt(npg_random_real(random)), t = npg_random_real(random), normal[3];
+    const uint32_t *face = mesh->faces + 3 * f;
+    const float *a = mesh->vert_pos + 3 * (size_t)face[0], *b = mesh->vert_pos + 3 * (size_t)face[1],
+                *c = mesh->vert_pos + 3 * (size_t)face[2];
+    npg_face_normal(normal, mesh->vert_pos, face);
+    for (int k = 0; k < 3; k++) {
+        pos[k] = (float)((1 - r) * (double)a[k] + r * (1 - t) * (double)b[k] + r * t * (double)c[k]);
+        normal_out[k] = (float)normal[k];
+    }
+}
+
 npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const npg_mesh *mesh,
                            size_t sample_count, uint64_t seed, uint64_t frame, uint64_t purpose)
 {
     double *cumulated, total = 0, normal[3];
     NPG_TRY(npg_alloc_array(&cumulated, NPG_FOR_QUERY, mesh->face_count, sizeof *cumulated));
     for (size_t f = 0; f < mesh->face_count; f++)
-        cumulated[f] = total += face_normal(normal, mesh, mesh->faces + 3 * f);
-    if (!(total > 0) || !isfinite(total)) {
-        npg_release(&cumulated);
-        return npg_error(NPG_BAD_INPUT, "the mesh has no area, or a vertex that is not finite");
-    }
+        cumulated[f] = total += npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * f);
+    npg_status status = NPG_OK;
+    if (!(total > 0) || !isfinite(total))
+        status = npg_error(NPG_BAD_INPUT, "the mesh has no area, or a vertex that is not finite");
     npg_random random = npg_random_stream(seed, frame, purpose);
-    for (size_t s = 0; s < sample_count; s++) {
+    for (size_t s = 0; s < sample_count && !status; s++) {
         size_t f = find_face(cumulated, mesh->face_count, npg_random_real(&random) * total);
-        /* Uniform in the triangle: the root makes up for its growing width (Osada et al., 2002). */
-        double r = sqrt(npg_random_real(&random)), t = npg_random_real(&random);
-        const uint32_t *face = mesh->faces + 3 * f;
-        const float *a = mesh->vert_pos + 3 * face[0], *b = mesh->vert_pos + 3 * face[1],
-                    *c = mesh->vert_pos + 3 * face[2];
-        face_normal(normal, mesh, face);
-        for (int k = 0; k < 3; k++) {
-            pos[3 * s + k] =
-                (float)((1 - r) * (double)a[k] + r * (1 - t) * (double)b[k] + r * t * (double)c[k]);
-            normals[3 * s + k] = (float)normal[k];
-        }
+        sample_face(pos + 3 * s, normals + 3 * s, mesh, f, &random);
         if (face_of) face_of[s] = (uint32_t)f;
     }
     npg_release(&cumulated);
-    return NPG_OK;
+    return status;
 }
 
 /* One side of a comparison. */
@@ -194,15 +186,8 @@ double npg_metrics_drift(const npg_mesh *predicted, const npg_mesh *truth, const
                          double diagonal)
 {
     double sum = 0;
-    for (size_t v = 0; v < predicted->vert_count; v++) {
-        double dist_sq = 0;
-        for (int k = 0; k < 3; k++) {
-            double d =
-                (double)predicted->vert_pos[3 * v + k] - (double)truth->vert_pos[3 * (size_t)truth_of[v] + k];
-            dist_sq += d * d;
-        }
-        sum += sqrt(dist_sq);
-    }
+    for (size_t v = 0; v < predicted->vert_count; v++)
+        sum += npg_vec3_distance(predicted->vert_pos + 3 * v, truth->vert_pos + 3 * (size_t)truth_of[v]);
     return sum / (double)predicted->vert_count / diagonal;
 }
 

@@ -18,20 +18,17 @@ npg_status npg_capture_open(npg_capture **out, const char *input, const char *se
                             bool keep_going, size_t cache_limit)
 {
     npg_capture *c;
-    npg_status status;
     *out = NULL;
     NPG_TRY(npg_alloc(&c, NPG_FOR_FILES, sizeof *c));
     c->missing = missing;
     c->keep_going = keep_going;
     c->cache_limit = cache_limit;
-    NPG_TRY_OR(fail, status, npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE));
-    NPG_TRY_OR(fail, status, refuse_gaps(c, input));
-    NPG_TRY_OR(fail, status, npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count));
-    NPG_TRY_OR(fail, status, npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached));
+    npg_status status = npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE);
+    if (!status) status = refuse_gaps(c, input);
+    if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
+    if (!status) status = npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached);
+    if (status) npg_capture_close(&c);
     *out = c;
-    return NPG_OK;
-fail:
-    npg_capture_close(&c);
     return status;
 }
 

@@ -72,16 +72,13 @@ npg_status npg_follow_open(npg_follow **out, const npg_follow_settings *settings
     follow->settings = *settings;
     follow->watch = -1;
     npg_status status = split_place(follow, settings->where);
-    if (status) {
-        npg_follow_close(&follow);
-        return status;
-    }
     /* Where inotify is not to be had, the scans alone find what changes. */
-    follow->watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (!status) follow->watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
     if (follow->watch >= 0)
         inotify_add_watch(follow->watch, follow->folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE);
+    if (status) npg_follow_close(&follow);
     *out = follow;
-    return NPG_OK;
+    return status;
 }
 
 static void clear_files(file *files, size_t count)

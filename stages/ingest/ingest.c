@@ -6,7 +6,7 @@
 #include "ingest/capture.h"
 #include "ingest/follow.h"
 #include "ingest/formats/reader.h"
-#include "ingest/ingest.h"
+#include "pipeline/stage.h"
 
 /* Frames of one gap in a live source.  Each becomes a frame of the run, so a number that is damaged or a time
  * stamp must not make millions; set far above what a capture loses. */
@@ -429,6 +429,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     return capture ? capture->cache_bytes : 0;
 }
 
+extern const npg_stage npg_stage_ingest;
 const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .help = "reads the frames",
                                     .options = ingest_options,

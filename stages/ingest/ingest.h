@@ -1,9 +1,9 @@
-/* Ingest stage. */
+/* Door of the ingest room: what tools use of it. */
 #ifndef NPG_INGEST_H
 #define NPG_INGEST_H
 
-#include "pipeline/stage.h"
-
-extern const npg_stage npg_stage_ingest;
+#include "ingest/formats/reader.h" /* one cloud or mesh from a file or a stream                   */
+#include "ingest/frame_files.h"    /* which files of an input are frames, and the text of --frames */
+#include "ingest/frame_names.h"    /* names in natural order                                      */
 
 #endif

@@ -62,12 +62,10 @@ static npg_status read_one(npg_stream *stream, npg_frame *frame, npg_origin *ori
 npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *origin)
 {
     npg_status status = read_one(stream, frame, origin);
+    if (status == NPG_BAD_INPUT) npg_error_prefix(status, "frame %lld", (long long)stream->frames);
     if (!status) status = npg_copy_text(&frame->path, stream->source->name);
-    if (status) {
-        npg_frame_clear(frame);
-        return status == NPG_BAD_INPUT ? npg_error_prefix(status, "frame %lld", (long long)stream->frames)
-                                       : status;
-    }
+    if (status) npg_frame_clear(frame);
+    if (status) return status;
     frame->cleaning.read = frame->point_count;
     frame->fields = NPG_FIELD_POINTS;
     frame->number = frame->index = stream->frames++;

@@ -9,8 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "job/file_facts.h"
 #include "pipeline/file.h"
+#include "pipeline/file_facts.h"
 
 typedef struct line_place { /* a frame's line in the partial list */
     int64_t index;
@@ -117,20 +117,14 @@ static json_t *json_of_frame(const npg_frame *frame, const char *file)
 static npg_status open_list(npg_frame_log **out, const char *output, int flags)
 {
     npg_frame_log *list;
-    npg_status status;
     NPG_TRY(npg_alloc(&list, NPG_FOR_FILES, sizeof *list));
     list->fd = -1;
-    NPG_TRY_OR(fail, status, npg_copy_text(&list->output, output));
-    NPG_TRY_OR(fail, status, npg_join_path(&list->partial_path, output, NPG_FRAME_LOG_NAME));
-    list->fd = open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
-    if (list->fd < 0) {
-        status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
-        goto fail;
-    }
+    npg_status status = npg_copy_text(&list->output, output);
+    if (!status) status = npg_join_path(&list->partial_path, output, NPG_FRAME_LOG_NAME);
+    if (!status) list->fd = open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
+    if (!status && list->fd < 0) status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
+    if (status) npg_frame_log_close(&list);
     *out = list;
-    return NPG_OK;
-fail:
-    npg_frame_log_close(&list);
     return status;
 }
 
@@ -199,7 +193,7 @@ npg_status npg_frame_log_resume(npg_frame_log **out, const char *output, int64_t
     resuming r = {0};
     NPG_TRY(open_list(out, output, 0));
     r.list = *out;
-    npg_status status = npg_frame_lines_each(r.list->partial_path, bytes, take_line, &r);
+    npg_status status = npg_json_lines_each(r.list->partial_path, bytes, take_line, &r);
     if (!status && ftruncate(r.list->fd, (off_t)bytes))
         status = npg_error_errno(NPG_DISK, "can't shorten %s", r.list->partial_path);
     if (status) npg_frame_log_close(out);

@@ -9,6 +9,7 @@
 #ifndef NPG_FRAME_LOG_H
 #define NPG_FRAME_LOG_H
 
+#include "pipeline/json_lines.h"
 #include "pipeline/stage.h"
 
 #define NPG_FRAME_LOG_NAME "frames.partial.jsonl"
@@ -39,15 +40,9 @@ npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts);
 
 /* ---- the log of an earlier run ---- */
 
-/* Called with each line's object, and its bytes with their newline. */
-typedef npg_status npg_visit_line(void *user, const json_t *frame, const char *line, size_t size);
-
-/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where
- * they are no such lines. */
-npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_visit_line *visit, void *user);
-
-/* The same of any file of such lines, from its beginning. */
-npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line *visit, void *user);
+/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where they are no
+ * such lines. */
+npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user);
 
 /* The misfits of a line, exactly as they were; NaN where it has none. */
 void npg_frame_line_misfits(npg_figures *figures, const json_t *misfits);

@@ -3,47 +3,16 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "pipeline/file.h"
 
-npg_status npg_frame_lines_each(const char *path, int64_t bytes, npg_visit_line *visit, void *user)
-{
-    char *line = NULL;
-    size_t capacity = 0;
-    npg_status status = NPG_OK;
-    int fd;
-    NPG_TRY(npg_file_open_plain(&fd, path, NPG_DISK));
-    FILE *list = fdopen(fd, "r");
-    if (!list) {
-        status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-        close(fd);
-        return status;
-    }
-    for (int64_t at = 0; at < bytes && !status;) {
-        ssize_t size = getline(&line, &capacity, list);
-        json_t *frame = size > 0 ? json_loadb(line, (size_t)size, 0, NULL) : NULL;
-        if (!json_is_object(frame) || at + size > bytes)
-            status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written (byte %lld)", path,
-                               (long long)at);
-        if (!status) status = visit(user, frame, line, (size_t)size);
-        at += size;
-        json_decref(frame);
-    }
-    fclose(list);
-    free(line);
-    return status;
-}
-
-npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_visit_line *visit, void *user)
+npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user)
 {
     char *path;
     NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
-    npg_status status = npg_frame_lines_each(path, bytes, visit, user);
+    npg_status status = npg_json_lines_each(path, bytes, visit, user);
     npg_release(&path);
     return status;
 }
@@ -97,7 +66,7 @@ static npg_status shorten(const char *from, const char *to, int64_t below, int64
     shortened list = {.below = below};
     if (stat(from, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", from);
     NPG_TRY(npg_file_open(&list.file, to));
-    npg_status status = npg_frame_lines_each(from, (int64_t)info.st_size, keep_line, &list);
+    npg_status status = npg_json_lines_each(from, (int64_t)info.st_size, keep_line, &list);
     if (!status)
         status = npg_file_commit(&list.file);
     else

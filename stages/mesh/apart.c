@@ -8,6 +8,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/vec3.h"
 #include "mesh/contact.h"
 
 #define NEIGHBOURS    48 /* in which a facing point is looked for */
@@ -23,11 +24,6 @@ typedef struct manner {
 } manner;
 
 static const manner manners[] = {[NPG_APART_TIGHT] = {1.2, true, 2}, [NPG_APART_LOOSE] = {1.5, false, 0}};
-
-static float dot(const float *a, const float *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* ---- gaps ---- */
 
@@ -53,7 +49,7 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
         for (size_t k = 0; k < SMOOTH_OVER; k++) {
             size_t j = near[NEIGHBOURS * i + k];
             if (j >= n) break;
-            if (dot(normals + 3 * i, normals + 3 * j) < 0.3f) continue;
+            if (npg_vec3_dotf(normals + 3 * i, normals + 3 * j) < 0.3f) continue;
             sum += push[j];
             weight += 1;
         }
@@ -66,22 +62,20 @@ static npg_status measure_pushes(float *push, const npg_apart *apart)
     npg_kdtree *tree = NULL;
     float *dist_sq = NULL, *smoothed = NULL;
     uint32_t *near = NULL;
-    npg_status status;
     const float *points = apart->points, *normals = apart->normals;
     size_t n = apart->count;
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&near, NPG_FOR_MESH, n, NEIGHBOURS * sizeof(uint32_t)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&smoothed, NPG_FOR_MESH, n, sizeof(float)));
-    NPG_TRY_OR(done, status, npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, near, dist_sq, points, n, NEIGHBOURS, 0));
-    for (size_t i = 0; i < n; i++)
+    npg_status status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof(float));
+    if (!status) status = npg_alloc_array(&near, NPG_FOR_MESH, n, NEIGHBOURS * sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&smoothed, NPG_FOR_MESH, n, sizeof(float));
+    if (!status) status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, points, n, NEIGHBOURS, 0);
+    for (size_t i = 0; i < n && !status; i++)
         push[i] = push_of(i, near + NEIGHBOURS * i, dist_sq + NEIGHBOURS * i, points, normals, n,
                           manners[apart->way].wide * apart->spacing);
-    for (int round = 0; round < SMOOTH_ROUNDS; round++) {
+    for (int round = 0; round < SMOOTH_ROUNDS && !status; round++) {
         smooth(smoothed, push, near, normals, n);
         memcpy(push, smoothed, n * sizeof(float));
     }
-done:
     npg_kdtree_close(&tree);
     npg_release(&dist_sq);
     npg_release(&near);
@@ -93,19 +87,17 @@ npg_status npg_apart_open(npg_apart *apart, const float *points, const float *no
                           double spacing, npg_apart_way way)
 {
     float *push = NULL;
-    npg_status status;
     NPG_REQUIRE(n && spacing > 0 && way != NPG_APART_NOT);
     *apart = (npg_apart){.points = points, .normals = normals, .count = n, .spacing = spacing, .way = way};
-    NPG_TRY_OR(done, status, npg_alloc_array(&apart->shift, NPG_FOR_MESH, n, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&apart->shifted, NPG_FOR_MESH, n, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&push, NPG_FOR_MESH, n, sizeof(float)));
-    NPG_TRY_OR(done, status, measure_pushes(push, apart));
-    for (size_t i = 0; i < n; i++) apart->moved += push[i] > 0;
-    for (size_t i = 0; i < 3 * n; i++) {
+    npg_status status = npg_alloc_array(&apart->shift, NPG_FOR_MESH, n, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&apart->shifted, NPG_FOR_MESH, n, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&push, NPG_FOR_MESH, n, sizeof(float));
+    if (!status) status = measure_pushes(push, apart);
+    for (size_t i = 0; i < n && !status; i++) apart->moved += push[i] > 0;
+    for (size_t i = 0; i < 3 * n && !status; i++) {
         apart->shift[i] = -push[i / 3] * normals[i];
         apart->shifted[i] = points[i] + apart->shift[i];
     }
-done:
     npg_release(&push);
     if (status) npg_apart_close(apart);
     return status;
@@ -139,7 +131,7 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
 {
     float scale = 0;
     for (size_t k = 0; k < BACK_AMONG && near[k] < apart->count && to->count < BACK_OVER; k++) {
-        bool is_across = dot(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0;
+        bool is_across = npg_vec3_dotf(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0;
         if (is_across && manners[apart->way].is_one_sided) continue;
         if (!to->count) scale = dist_sq[k] + 1e-12f;
         to->weight[to->count] = scale / (dist_sq[k] + scale);
@@ -152,18 +144,16 @@ static npg_status find_around(way_back *w)
     npg_kdtree *tree = NULL;
     float *dist_sq = NULL, *normals = NULL;
     uint32_t *near = NULL;
-    npg_status status;
     const npg_mesh *m = w->mesh;
     size_t v = m->vert_count;
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_MESH, v, BACK_AMONG * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&near, NPG_FOR_MESH, v, BACK_AMONG * sizeof(uint32_t)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&normals, NPG_FOR_MESH, v, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_kdtree_open(&tree, w->apart->shifted, w->apart->count));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, near, dist_sq, m->vert_pos, v, BACK_AMONG, 0));
-    npg_mesh_vertex_normals(normals, m->vert_pos, v, m->faces, m->face_count);
-    for (size_t i = 0; i < v; i++)
+    npg_status status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, v, BACK_AMONG * sizeof(float));
+    if (!status) status = npg_alloc_array(&near, NPG_FOR_MESH, v, BACK_AMONG * sizeof(uint32_t));
+    if (!status) status = npg_alloc_array(&normals, NPG_FOR_MESH, v, 3 * sizeof(float));
+    if (!status) status = npg_kdtree_open(&tree, w->apart->shifted, w->apart->count);
+    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, m->vert_pos, v, BACK_AMONG, 0);
+    if (!status) npg_mesh_vertex_normals(normals, m->vert_pos, v, m->faces, m->face_count);
+    for (size_t i = 0; i < v && !status; i++)
         choose_around(&w->of[i], normals + 3 * i, near + BACK_AMONG * i, dist_sq + BACK_AMONG * i, w->apart);
-done:
     npg_kdtree_close(&tree);
     npg_release(&dist_sq);
     npg_release(&near);
@@ -189,7 +179,7 @@ static void move(const way_back *w, const float *rows, float sign)
     for (size_t i = 0; i < w->mesh->vert_count; i++) {
         float way[3], went[3];
         mean_around(went, &w->of[i], w->apart->shift);
-        if (dot(went, went) <= 0) continue;
+        if (npg_vec3_dotf(went, went) <= 0) continue;
         mean_around(way, &w->of[i], rows);
         for (size_t a = 0; a < 3; a++) w->mesh->vert_pos[3 * i + a] += sign * way[a];
     }
@@ -225,18 +215,16 @@ npg_status npg_apart_bring_back(const npg_apart *apart, npg_mesh *mesh)
 {
     way_back w = {.apart = apart, .mesh = mesh};
     size_t n = apart->count;
-    npg_status status;
     if (!apart->moved) return NPG_OK;
-    NPG_TRY_OR(done, status, npg_alloc_array(&w.of, NPG_FOR_MESH, mesh->vert_count, sizeof *w.of));
-    NPG_TRY_OR(done, status, npg_alloc_array(&w.hits, NPG_FOR_MESH, n, sizeof *w.hits));
-    NPG_TRY_OR(done, status, npg_alloc_array(&w.gaps, NPG_FOR_MESH, n, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, find_around(&w));
-    move(&w, apart->shift, -1);
-    for (int round = 0; round < manners[apart->way].rounds; round++) {
-        NPG_TRY_OR(done, status, measure_gaps(&w));
-        move(&w, w.gaps, 1);
+    npg_status status = npg_alloc_array(&w.of, NPG_FOR_MESH, mesh->vert_count, sizeof *w.of);
+    if (!status) status = npg_alloc_array(&w.hits, NPG_FOR_MESH, n, sizeof *w.hits);
+    if (!status) status = npg_alloc_array(&w.gaps, NPG_FOR_MESH, n, 3 * sizeof(float));
+    if (!status) status = find_around(&w);
+    if (!status) move(&w, apart->shift, -1);
+    for (int round = 0; round < manners[apart->way].rounds && !status; round++) {
+        status = measure_gaps(&w);
+        if (!status) move(&w, w.gaps, 1);
     }
-done:
     npg_release(&w.of);
     npg_release(&w.hits);
     npg_release(&w.gaps);

@@ -31,23 +31,10 @@ static void thin(float *out, const float *in, size_t kept, size_t count)
     for (size_t i = 0; i < kept; i++) memcpy(out + 3 * i, in + 3 * (i * count / kept), 3 * sizeof(float));
 }
 
-npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count)
+/* How many points face one of their neighbours. */
+static size_t count_facing(const float *p, const float *n, const uint32_t *near, size_t count)
 {
-    npg_kdtree *tree = NULL;
-    float *p = NULL, *n = NULL, *dist_sq = NULL;
-    uint32_t *near = NULL;
-    npg_status status;
-    size_t count = point_count < POINTS_MOST ? point_count : POINTS_MOST, facing = 0;
-    *share = 0;
-    NPG_REQUIRE(count);
-    NPG_TRY_OR(done, status, npg_alloc_array(&p, NPG_FOR_QUERY, count, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&n, NPG_FOR_QUERY, count, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&near, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(uint32_t)));
-    thin(p, points, count, point_count);
-    thin(n, normals, count, point_count);
-    NPG_TRY_OR(done, status, npg_kdtree_open(&tree, p, count));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, near, dist_sq, p, count, NEIGHBOURS, 0));
+    size_t facing = 0;
     for (size_t i = 0; i < count; i++) {
         size_t k = 0;
         while (k < NEIGHBOURS) {
@@ -57,8 +44,26 @@ npg_status npg_cloud_contact(double *share, const float *points, const float *no
         }
         facing += k < NEIGHBOURS;
     }
-    *share = (double)facing / (double)count;
-done:
+    return facing;
+}
+
+npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count)
+{
+    npg_kdtree *tree = NULL;
+    float *p = NULL, *n = NULL, *dist_sq = NULL;
+    uint32_t *near = NULL;
+    size_t count = point_count < POINTS_MOST ? point_count : POINTS_MOST;
+    *share = 0;
+    NPG_REQUIRE(count);
+    npg_status status = npg_alloc_array(&p, NPG_FOR_QUERY, count, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&n, NPG_FOR_QUERY, count, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(float));
+    if (!status) status = npg_alloc_array(&near, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(uint32_t));
+    if (!status) thin(p, points, count, point_count);
+    if (!status) thin(n, normals, count, point_count);
+    if (!status) status = npg_kdtree_open(&tree, p, count);
+    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, p, count, NEIGHBOURS, 0);
+    if (!status) *share = (double)count_facing(p, n, near, count) / (double)count;
     npg_kdtree_close(&tree);
     npg_release(&p);
     npg_release(&n);

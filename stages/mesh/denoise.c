@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "pipeline/memory.h"
 
@@ -45,32 +46,43 @@ static int by_value(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-npg_status npg_cloud_noise(double *sigma, const float *points, size_t n)
+/* Residuals of the planes through few and through many neighbours, at `asked` points spread over the cloud. */
+static npg_status measure_residuals(double *near, double *wide, size_t asked, const npg_kdtree *tree,
+                                    const float *points, size_t n)
 {
-    npg_kdtree *tree = NULL;
     uint32_t index[WIDE];
     float dist_sq[WIDE];
-    double *near = NULL, *wide = NULL;
-    npg_status status;
-    size_t asked = n < ASKED_MAX ? n : ASKED_MAX;
-    *sigma = 0;
-    if (n < WIDE) return NPG_OK;
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&near, NPG_FOR_FRAMES, asked, sizeof *near));
-    NPG_TRY_OR(done, status, npg_alloc_array(&wide, NPG_FOR_FRAMES, asked, sizeof *wide));
     for (size_t i = 0; i < asked; i++) {
         const float *p = points + 3 * (n * i / asked);
-        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, p, 1, WIDE, 1));
+        NPG_TRY(npg_kdtree_nearest(tree, index, dist_sq, p, 1, WIDE, 1));
         near[i] = plane_residual(points, index, NEAR);
         wide[i] = plane_residual(points, index, WIDE);
     }
-    qsort(near, asked, sizeof *near, by_value);
-    qsort(wide, asked, sizeof *wide, by_value);
-    /* residual = sigma^2 + c k^2, at two k */
+    return NPG_OK;
+}
+
+/* residual = sigma^2 + c k^2 for k neighbours: the medians at two k give sigma.  Sorts both lists. */
+static double noise_of(double *near, double *wide, size_t count)
+{
+    qsort(near, count, sizeof *near, by_value);
+    qsort(wide, count, sizeof *wide, by_value);
     double ratio = (double)(WIDE * WIDE) / (NEAR * NEAR);
-    double noise = (ratio * near[asked / 2] - wide[asked / 2]) / (ratio - 1);
-    *sigma = noise > 0 ? sqrt(noise) : 0;
-done:
+    double noise = (ratio * near[count / 2] - wide[count / 2]) / (ratio - 1);
+    return noise > 0 ? sqrt(noise) : 0;
+}
+
+npg_status npg_cloud_noise(double *sigma, const float *points, size_t n)
+{
+    npg_kdtree *tree = NULL;
+    double *near = NULL, *wide = NULL;
+    size_t asked = n < ASKED_MAX ? n : ASKED_MAX;
+    *sigma = 0;
+    if (n < WIDE) return NPG_OK;
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&near, NPG_FOR_FRAMES, asked, sizeof *near);
+    if (!status) status = npg_alloc_array(&wide, NPG_FOR_FRAMES, asked, sizeof *wide);
+    if (!status) status = measure_residuals(near, wide, asked, tree, points, n);
+    if (!status) *sigma = noise_of(near, wide, asked);
     npg_kdtree_close(&tree);
     npg_release(&near);
     npg_release(&wide);
@@ -108,13 +120,11 @@ static void span_plane(double x[3], double y[3], const float n[3])
 {
     int least = fabsf(n[0]) < fabsf(n[1]) ? 0 : 1;
     if (fabsf(n[2]) < fabsf(n[least])) least = 2;
-    double axis[3] = {least == 0, least == 1, least == 2}, length = 0;
-    for (int i = 0; i < 3; i++)
-        x[i] = axis[(i + 1) % 3] * (double)n[(i + 2) % 3] - axis[(i + 2) % 3] * (double)n[(i + 1) % 3];
-    for (int i = 0; i < 3; i++) length += x[i] * x[i];
-    for (int i = 0; i < 3; i++) x[i] /= sqrt(length);
-    for (int i = 0; i < 3; i++)
-        y[i] = (double)n[(i + 1) % 3] * x[(i + 2) % 3] - (double)n[(i + 2) % 3] * x[(i + 1) % 3];
+    const double axis[3] = {least == 0, least == 1, least == 2};
+    const double across[3] = {(double)n[0], (double)n[1], (double)n[2]};
+    npg_vec3_cross(x, axis, across);
+    npg_vec3_make_unit(x);
+    npg_vec3_cross(y, across, x);
 }
 
 /* The quadric's height and slope at the point itself, from the neighbours of its side. */
@@ -127,7 +137,7 @@ static void fit(float *out_point, float *out_normal, size_t i, const float *poin
     span_plane(x, y, n);
     for (size_t j = 0; j < k && r > 0; j++) {
         const float *q = points + 3 * (size_t)index[j], *o = normals + 3 * (size_t)index[j];
-        if (n[0] * o[0] + n[1] * o[1] + n[2] * o[2] < SIDE_COS) continue;
+        if (npg_vec3_dotf(n, o) < SIDE_COS) continue;
         double u = 0, v = 0, h = 0, weight = exp(-2 * (double)dist_sq[j] / (r * r));
         for (int a = 0; a < 3; a++) {
             double d = ((double)q[a] - (double)p[a]) / r;
@@ -157,23 +167,21 @@ npg_status npg_cloud_smooth(float *points, float *normals, size_t n, int neighbo
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
     float *dist_sq = NULL, *new_points = NULL, *new_normals = NULL;
-    npg_status status;
     size_t k = (size_t)neighbours < n ? (size_t)neighbours : n;
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq));
-    NPG_TRY_OR(done, status, npg_alloc_array(&new_points, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&new_normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
-    for (size_t first = 0; first < n; first += BATCH) {
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq);
+    if (!status) status = npg_alloc_array(&new_points, NPG_FOR_FRAMES, n, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&new_normals, NPG_FOR_FRAMES, n, 3 * sizeof(float));
+    for (size_t first = 0; first < n && !status; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
-        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0));
-        for (size_t i = 0; i < count; i++)
+        status = npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0);
+        for (size_t i = 0; i < count && !status; i++)
             fit(new_points + 3 * (first + i), new_normals + 3 * (first + i), first + i, points, normals,
                 index + k * i, dist_sq + k * i, k);
     }
-    memcpy(points, new_points, n * 3 * sizeof *points);
-    memcpy(normals, new_normals, n * 3 * sizeof *normals);
-done:
+    if (!status) memcpy(points, new_points, n * 3 * sizeof *points);
+    if (!status) memcpy(normals, new_normals, n * 3 * sizeof *normals);
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);

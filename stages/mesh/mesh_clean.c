@@ -10,18 +10,17 @@
 #include "geometry/mesh_tools.h"
 
 #define SPACING_NEIGHBOUR 8
+#define SPACING_ASKED     20000 /* points at most that are asked for their neighbours */
 
 npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
                            size_t point_count)
 {
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
-    npg_status status;
-    NPG_TRY(npg_kdtree_open(&tree, points, point_count));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_MESH, query_count, sizeof *index));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist, queries, query_count, 1, 0));
-    for (size_t i = 0; i < query_count; i++) dist[i] = sqrtf(dist[i]);
-done:
+    npg_status status = npg_kdtree_open(&tree, points, point_count);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, query_count, sizeof *index);
+    if (!status) status = npg_kdtree_nearest(tree, index, dist, queries, query_count, 1, 0);
+    for (size_t i = 0; i < query_count && !status; i++) dist[i] = sqrtf(dist[i]);
     npg_kdtree_close(&tree);
     npg_release(&index);
     return status;
@@ -38,24 +37,28 @@ static int by_value(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
+/* Of the distances to k neighbours each the farthest; and of these the median.  Overwrites the list. */
+static float median_farthest(float *dist_sq, size_t count, size_t k)
+{
+    for (size_t i = 0; i < count; i++) dist_sq[i] = dist_sq[k * i + k - 1];
+    qsort(dist_sq, count, sizeof *dist_sq, by_value);
+    return dist_sq[count / 2];
+}
+
 npg_status npg_cloud_spacing(double *spacing, const float *points, size_t n)
 {
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
     float *dist_sq = NULL, *queries = NULL;
-    npg_status status;
-    size_t k = SPACING_NEIGHBOUR + 1, asked = n < 20000 ? n : 20000;
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&queries, NPG_FOR_MESH, asked, 3 * sizeof *queries));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_MESH, asked, k * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_MESH, asked, k * sizeof *dist_sq));
-    for (size_t i = 0; i < asked; i++)
+    size_t k = SPACING_NEIGHBOUR + 1, asked = n < SPACING_ASKED ? n : SPACING_ASKED;
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&queries, NPG_FOR_MESH, asked, 3 * sizeof *queries);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, asked, k * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, asked, k * sizeof *dist_sq);
+    for (size_t i = 0; i < asked && !status; i++)
         memcpy(queries + 3 * i, points + 3 * (n * i / asked), 3 * sizeof *queries);
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, queries, asked, k, 0));
-    for (size_t i = 0; i < asked; i++) dist_sq[i] = dist_sq[k * i + k - 1];
-    qsort(dist_sq, asked, sizeof *dist_sq, by_value);
-    *spacing = sqrt((double)dist_sq[asked / 2]);
-done:
+    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, queries, asked, k, 0);
+    if (!status) *spacing = sqrt((double)median_farthest(dist_sq, asked, k));
     npg_kdtree_close(&tree);
     npg_release(&queries);
     npg_release(&index);
@@ -81,17 +84,15 @@ npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, si
 {
     float *dist = NULL;
     uint8_t *keep_face = NULL;
-    npg_status status;
     size_t face_count = (*mesh)->face_count;
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist, NPG_FOR_MESH, (*mesh)->vert_count, sizeof *dist));
-    NPG_TRY_OR(done, status, npg_alloc(&keep_face, NPG_FOR_MESH, face_count));
-    NPG_TRY_OR(done, status, npg_mesh_point_dist(dist, *mesh, points, point_count));
-    for (size_t f = 0; f < face_count; f++) {
+    npg_status status = npg_alloc_array(&dist, NPG_FOR_MESH, (*mesh)->vert_count, sizeof *dist);
+    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
+    if (!status) status = npg_mesh_point_dist(dist, *mesh, points, point_count);
+    for (size_t f = 0; f < face_count && !status; f++) {
         const uint32_t *face = (*mesh)->faces + 3 * f;
         keep_face[f] = (double)fmaxf(dist[face[0]], fmaxf(dist[face[1]], dist[face[2]])) <= dist_max;
     }
-    status = keep(mesh, share, keep_face);
-done:
+    if (!status) status = keep(mesh, share, keep_face);
     npg_release(&dist);
     npg_release(&keep_face);
     return status;
@@ -121,48 +122,54 @@ static npg_status find_near(uint8_t *is_near, const npg_mesh *mesh, const uint32
 {
     float *main_pos = NULL, *dist = NULL;
     size_t main_count = 0;
-    npg_status status;
-    NPG_TRY_OR(done, status,
-               npg_alloc_array(&main_pos, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *main_pos));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist));
-    for (size_t i = 0; i < mesh->vert_count; i++)
+    npg_status status = npg_alloc_array(&main_pos, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *main_pos);
+    if (!status) status = npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist);
+    for (size_t i = 0; i < mesh->vert_count && !status; i++)
         if (component_of[i] == largest)
             memcpy(main_pos + 3 * main_count++, mesh->vert_pos + 3 * i, 3 * sizeof *main_pos);
-    NPG_TRY_OR(done, status, npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, main_pos, main_count));
-    for (size_t i = 0; i < mesh->vert_count; i++)
+    if (!status) status = npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, main_pos, main_count);
+    for (size_t i = 0; i < mesh->vert_count && !status; i++)
         if ((double)dist[i] <= dist_max && area[component_of[i]] >= area_min) is_near[component_of[i]] = 1;
-done:
     npg_release(&main_pos);
     npg_release(&dist);
     return status;
 }
 
-static npg_status keep_pieces(npg_mesh **mesh, npg_pieces *pieces, const uint32_t *component_of,
-                              double share_min, double dist_max)
+/* is_kept of each component: the largest, and what is near it. */
+static npg_status choose_pieces(uint8_t *is_kept, double *area, const npg_mesh *mesh, size_t count,
+                                const uint32_t *component_of, double share_min, double dist_max)
 {
-    double *area = NULL, total = 0;
-    uint8_t *keep_face = NULL, *is_kept = NULL;
-    size_t largest = 0, face_count = (*mesh)->face_count;
-    npg_status status;
-    NPG_TRY_OR(done, status, npg_alloc_array(&area, NPG_FOR_MESH, pieces->found, sizeof *area));
-    NPG_TRY_OR(done, status, npg_alloc(&is_kept, NPG_FOR_MESH, pieces->found));
-    NPG_TRY_OR(done, status, npg_alloc(&keep_face, NPG_FOR_MESH, face_count));
-    for (size_t f = 0; f < face_count; f++) {
-        const uint32_t *face = (*mesh)->faces + 3 * f;
-        area[component_of[face[0]]] += npg_face_area((*mesh)->vert_pos, face);
+    double total = 0;
+    size_t largest = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *face = mesh->faces + 3 * f;
+        area[component_of[face[0]]] += npg_face_area(mesh->vert_pos, face);
     }
-    for (size_t i = 0; i < pieces->found; i++) {
+    for (size_t i = 0; i < count; i++) {
         total += area[i];
         if (area[i] > area[largest]) largest = i;
     }
-    if (dist_max > 0 && pieces->found > 1)
-        NPG_TRY_OR(done, status,
-                   find_near(is_kept, *mesh, component_of, area, largest, share_min * total, dist_max));
+    if (dist_max > 0 && count > 1)
+        NPG_TRY(find_near(is_kept, mesh, component_of, area, largest, share_min * total, dist_max));
     is_kept[largest] = 1;
-    for (size_t i = 0; i < pieces->found; i++) pieces->kept += is_kept[i];
-    for (size_t f = 0; f < face_count; f++) keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];
-    status = keep(mesh, &pieces->lost_share, keep_face);
-done:
+    return NPG_OK;
+}
+
+static npg_status keep_pieces(npg_mesh **mesh, npg_pieces *pieces, const uint32_t *component_of,
+                              double share_min, double dist_max)
+{
+    double *area = NULL;
+    uint8_t *keep_face = NULL, *is_kept = NULL;
+    size_t face_count = (*mesh)->face_count;
+    npg_status status = npg_alloc_array(&area, NPG_FOR_MESH, pieces->found, sizeof *area);
+    if (!status) status = npg_alloc(&is_kept, NPG_FOR_MESH, pieces->found);
+    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
+    if (!status)
+        status = choose_pieces(is_kept, area, *mesh, pieces->found, component_of, share_min, dist_max);
+    for (size_t i = 0; i < pieces->found && !status; i++) pieces->kept += is_kept[i];
+    for (size_t f = 0; f < face_count && !status; f++)
+        keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];
+    if (!status) status = keep(mesh, &pieces->lost_share, keep_face);
     npg_release(&area);
     npg_release(&is_kept);
     npg_release(&keep_face);
@@ -188,28 +195,31 @@ static ptrdiff_t decimation_bytes(const npg_mesh *mesh)
     return (ptrdiff_t)(mesh->vert_count * 120 + mesh->face_count * 60);
 }
 
+static npg_status simplify(uint32_t *indices, size_t *count, const npg_mesh *mesh, size_t face_max)
+{
+    ptrdiff_t bytes = decimation_bytes(mesh);
+    NPG_TRY(npg_memory_count(NPG_FOR_MESH, bytes));
+    *count = meshopt_simplify(indices, mesh->faces, 3 * mesh->face_count, mesh->vert_pos, mesh->vert_count,
+                              3 * sizeof(float), 3 * face_max, 1.0f, 0, NULL);
+    return npg_memory_count(NPG_FOR_MESH, -bytes);
+}
+
 npg_status npg_mesh_decimate(npg_mesh **mesh, size_t face_max)
 {
-    uint32_t *indices;
-    size_t old_count = (*mesh)->face_count;
+    uint32_t *indices = NULL;
+    uint8_t *keep_face = NULL;
+    size_t old_count = (*mesh)->face_count, count = 0;
     if (old_count <= face_max) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&indices, NPG_FOR_MESH, old_count, 3 * sizeof *indices));
-    ptrdiff_t bytes = decimation_bytes(*mesh);
-    npg_status status = npg_memory_count(NPG_FOR_MESH, bytes);
+    npg_status status = npg_alloc_array(&indices, NPG_FOR_MESH, old_count, 3 * sizeof *indices);
+    if (!status) status = simplify(indices, &count, *mesh, face_max);
+    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, old_count);
     if (!status) {
-        size_t count = meshopt_simplify(indices, (*mesh)->faces, 3 * old_count, (*mesh)->vert_pos,
-                                        (*mesh)->vert_count, 3 * sizeof(float), 3 * face_max, 1.0f, 0, NULL);
-        npg_memory_count(NPG_FOR_MESH, -bytes);
-        uint8_t *keep_face;
-        status = npg_alloc(&keep_face, NPG_FOR_MESH, old_count);
-        if (!status) {
-            memcpy((*mesh)->faces, indices, count * sizeof *indices);
-            memset(keep_face, 1, count / 3);
-            (*mesh)->face_count = count / 3;
-            status = npg_mesh_keep_faces(mesh, keep_face);
-            npg_release(&keep_face);
-        }
+        memcpy((*mesh)->faces, indices, count * sizeof *indices);
+        memset(keep_face, 1, count / 3);
+        (*mesh)->face_count = count / 3;
+        status = npg_mesh_keep_faces(mesh, keep_face); /* drops the vertices that no face uses any more */
     }
     npg_release(&indices);
+    npg_release(&keep_face);
     return status;
 }

@@ -5,6 +5,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/sets.h"
+#include "geometry/vec3.h"
 #include "mesh/mesh_clean.h"
 
 #define SMOOTH_ROUNDS 12
@@ -61,16 +62,12 @@ static void keep_one_of(const face_key *keys, size_t count, uint8_t *keep_face, 
     done->duplicate += count - (balance != 0);
 }
 
-static npg_status drop_faces(npg_mesh **mesh, npg_mending *done)
+/* Degenerate faces, and all but one (or all, where they cancel out) of those with the same corners go. */
+static void choose_faces(uint8_t *keep_face, face_key *keys, const npg_mesh *mesh, npg_mending *done)
 {
-    face_key *keys = NULL;
-    uint8_t *keep_face = NULL;
-    npg_status status;
-    size_t count = (*mesh)->face_count, before = done->degenerate + done->duplicate;
-    NPG_TRY_OR(end, status, npg_alloc_array(&keys, NPG_FOR_MESH, count, sizeof *keys));
-    NPG_TRY_OR(end, status, npg_alloc(&keep_face, NPG_FOR_MESH, count));
+    size_t count = mesh->face_count;
     for (size_t f = 0; f < count; f++) {
-        keys[f] = key_of((*mesh)->faces + 3 * f, (uint32_t)f);
+        keys[f] = key_of(mesh->faces + 3 * f, (uint32_t)f);
         keep_face[f] = keys[f].sorted[0] != keys[f].sorted[1] && keys[f].sorted[1] != keys[f].sorted[2];
         done->degenerate += !keep_face[f];
     }
@@ -79,8 +76,17 @@ static npg_status drop_faces(npg_mesh **mesh, npg_mending *done)
         for (next = i + 1; next < count && same_face(&keys[i], &keys[next]);) next++;
         if (next - i > 1 && keep_face[keys[i].face]) keep_one_of(keys + i, next - i, keep_face, done);
     }
-    if (done->degenerate + done->duplicate > before) status = npg_mesh_keep_faces(mesh, keep_face);
-end:
+}
+
+static npg_status drop_faces(npg_mesh **mesh, npg_mending *done)
+{
+    face_key *keys = NULL;
+    uint8_t *keep_face = NULL;
+    size_t count = (*mesh)->face_count, before = done->degenerate + done->duplicate;
+    npg_status status = npg_alloc_array(&keys, NPG_FOR_MESH, count, sizeof *keys);
+    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, count);
+    if (!status) choose_faces(keep_face, keys, *mesh, done);
+    if (!status && done->degenerate + done->duplicate > before) status = npg_mesh_keep_faces(mesh, keep_face);
     npg_release(&keys);
     npg_release(&keep_face);
     return status;
@@ -158,17 +164,10 @@ static npg_status join_corners(uint32_t *parent, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-/* The corners of each fan become one vertex; the first fan of a vertex keeps it, others get a copy. */
-static npg_status split(npg_mesh **slot, npg_mending *done)
+/* number[c] of each fan's root corner c: the vertex that the fan is now; returns how many are new. */
+static size_t number_fans(uint32_t *number, uint32_t *first, uint32_t *parent, const npg_mesh *mesh)
 {
-    npg_mesh *mesh = *slot, *out = NULL;
-    uint32_t *parent = NULL, *number = NULL, *first = NULL;
     size_t corners = 3 * mesh->face_count, extra = 0;
-    npg_status status;
-    NPG_TRY_OR(end, status, npg_alloc_array(&parent, NPG_FOR_MESH, corners, sizeof *parent));
-    NPG_TRY_OR(end, status, npg_alloc_array(&number, NPG_FOR_MESH, corners, sizeof *number));
-    NPG_TRY_OR(end, status, npg_alloc_array(&first, NPG_FOR_MESH, mesh->vert_count, sizeof *first));
-    NPG_TRY_OR(end, status, join_corners(parent, mesh));
     memset(first, 0xff, mesh->vert_count * sizeof *first);
     for (uint32_t c = 0; c < corners; c++) {
         uint32_t root = npg_set_root(parent, c), v = mesh->faces[c];
@@ -176,18 +175,37 @@ static npg_status split(npg_mesh **slot, npg_mending *done)
         number[c] = first[v] == UINT32_MAX ? v : (uint32_t)(mesh->vert_count + extra++);
         if (first[v] == UINT32_MAX) first[v] = c;
     }
-    if (!extra) goto end;
-    NPG_TRY_OR(end, status, npg_mesh_open(&out, mesh->vert_count + extra, mesh->face_count));
+    return extra;
+}
+
+static npg_status copy_fans(npg_mesh **slot, const uint32_t *number, uint32_t *parent, size_t extra)
+{
+    npg_mesh *mesh = *slot, *out;
+    NPG_TRY(npg_mesh_open(&out, mesh->vert_count + extra, mesh->face_count));
     memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
-    for (uint32_t c = 0; c < corners; c++) {
+    for (uint32_t c = 0; c < 3 * mesh->face_count; c++) {
         out->faces[c] = number[npg_set_root(parent, c)];
         memcpy(out->vert_pos + 3 * (size_t)out->faces[c], mesh->vert_pos + 3 * (size_t)mesh->faces[c],
                3 * sizeof(float));
     }
-    done->split_vertices += extra;
     npg_mesh_unref(slot);
     *slot = out;
-end:
+    return NPG_OK;
+}
+
+/* The corners of each fan become one vertex; the first fan of a vertex keeps it, others get a copy. */
+static npg_status split(npg_mesh **slot, npg_mending *done)
+{
+    const npg_mesh *mesh = *slot;
+    uint32_t *parent = NULL, *number = NULL, *first = NULL;
+    size_t corners = 3 * mesh->face_count, extra = 0;
+    npg_status status = npg_alloc_array(&parent, NPG_FOR_MESH, corners, sizeof *parent);
+    if (!status) status = npg_alloc_array(&number, NPG_FOR_MESH, corners, sizeof *number);
+    if (!status) status = npg_alloc_array(&first, NPG_FOR_MESH, mesh->vert_count, sizeof *first);
+    if (!status) status = join_corners(parent, mesh);
+    if (!status) extra = number_fans(number, first, parent, mesh);
+    if (!status && extra) status = copy_fans(slot, number, parent, extra);
+    if (!status) done->split_vertices += extra;
     npg_release(&parent);
     npg_release(&number);
     npg_release(&first);
@@ -226,20 +244,12 @@ static size_t follow(uint32_t *loop, const uint32_t *next, uint32_t from)
     return count >= 3 ? count : 0;
 }
 
-/* Holes of a few edges get a vertex in their middle (three edges: just the face).
- * Larger ones are openings. */
-static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
+/* Fill the holes of a border of edge_count edges: a vertex and a face for each edge are enough room. */
+static npg_status add_holes(npg_mesh **slot, uint32_t *next, size_t edge_count, npg_mending *done)
 {
-    npg_mesh *mesh = *slot, *out = NULL;
-    uint32_t *next = NULL, loop[HOLE_MAX];
-    npg_status status;
-    size_t hole_count = 0, edge_count = 0;
-    NPG_TRY_OR(end, status, npg_alloc_array(&next, NPG_FOR_MESH, mesh->vert_count, sizeof *next));
-    NPG_TRY_OR(end, status, find_border(next, mesh));
-    for (uint32_t v = 0; v < mesh->vert_count; v++) edge_count += next[v] != UINT32_MAX;
-    if (!edge_count) goto end;
-    NPG_TRY_OR(end, status,
-               npg_mesh_open(&out, mesh->vert_count + edge_count, mesh->face_count + edge_count));
+    npg_mesh *mesh = *slot, *out;
+    uint32_t loop[HOLE_MAX];
+    NPG_TRY(npg_mesh_open(&out, mesh->vert_count + edge_count, mesh->face_count + edge_count));
     memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
     memcpy(out->faces, mesh->faces, mesh->face_count * 3 * sizeof(uint32_t));
     size_t vert_count = mesh->vert_count, face_count = mesh->face_count;
@@ -247,7 +257,7 @@ static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
         size_t count = next[v] == UINT32_MAX ? 0 : follow(loop, next, v);
         if (!count) continue;
         for (size_t k = 0; k < count; k++) next[loop[k]] = UINT32_MAX;
-        hole_count++;
+        done->holes++;
         if (count == 3) {
             memcpy(out->faces + 3 * face_count++, loop, 3 * sizeof *loop);
             continue;
@@ -262,12 +272,21 @@ static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
     }
     out->vert_count = vert_count;
     out->face_count = face_count;
-    done->holes += hole_count;
     npg_mesh_unref(slot);
     *slot = out;
-    out = NULL;
-end:
-    npg_mesh_unref(&out);
+    return NPG_OK;
+}
+
+/* Holes of a few edges get a vertex in their middle (three edges: just the face).
+ * Larger ones are openings. */
+static npg_status fill_holes(npg_mesh **slot, npg_mending *done)
+{
+    uint32_t *next;
+    size_t vert_count = (*slot)->vert_count, edge_count = 0;
+    NPG_TRY(npg_alloc_array(&next, NPG_FOR_MESH, vert_count, sizeof *next));
+    npg_status status = find_border(next, *slot);
+    for (size_t v = 0; v < vert_count && !status; v++) edge_count += next[v] != UINT32_MAX;
+    if (!status && edge_count) status = add_holes(slot, next, edge_count, done);
     npg_release(&next);
     return status;
 }
@@ -277,14 +296,12 @@ end:
 static double face_normal(double n[3], const npg_mesh *mesh, size_t f)
 {
     const uint32_t *face = mesh->faces + 3 * f;
+    const float *first = mesh->vert_pos + 3 * (size_t)face[0];
     double u[3], v[3];
-    for (size_t i = 0; i < 3; i++) {
-        double a = (double)mesh->vert_pos[3 * (size_t)face[0] + i];
-        u[i] = (double)mesh->vert_pos[3 * (size_t)face[1] + i] - a;
-        v[i] = (double)mesh->vert_pos[3 * (size_t)face[2] + i] - a;
-    }
-    for (int i = 0; i < 3; i++) n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
-    double area2 = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    npg_vec3_between(u, first, mesh->vert_pos + 3 * (size_t)face[1]);
+    npg_vec3_between(v, first, mesh->vert_pos + 3 * (size_t)face[2]);
+    npg_vec3_cross(n, u, v);
+    double area2 = npg_vec3_length(n);
     double edges = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     return edges > 0 ? area2 / edges : 0; /* shape: 0 without area, 0.43 for an equilateral one */
 }
@@ -304,15 +321,12 @@ static void sum_at_vertices(double *sum, const npg_mesh *mesh)
 /* The face's normal against what the other faces around its corners say. */
 static bool is_turned(const double *sum, const npg_mesh *mesh, size_t f)
 {
-    double n[3], others[3] = {0}, dot = 0, nn = 0, oo = 0;
+    double n[3], others[3] = {0};
     if (face_normal(n, mesh, f) < 1e-6) return true;
-    for (size_t a = 0; a < 3; a++) {
+    for (size_t a = 0; a < 3; a++)
         for (size_t k = 0; k < 3; k++) others[a] += sum[3 * (size_t)mesh->faces[3 * f + k] + a] - n[a];
-        dot += n[a] * others[a];
-        nn += n[a] * n[a];
-        oo += others[a] * others[a];
-    }
-    return dot < FLIPPED_COS * sqrt(nn * oo);
+    double nn = npg_vec3_dot(n, n), oo = npg_vec3_dot(others, others);
+    return npg_vec3_dot(n, others) < FLIPPED_COS * sqrt(nn * oo);
 }
 
 static size_t find_flipped(uint8_t *is_flipped, double *sum, const npg_mesh *mesh)
@@ -368,7 +382,7 @@ static void collapse_flipped(npg_mesh *mesh, const uint8_t *is_flipped)
             const float *p = mesh->vert_pos + 3 * (size_t)face[k],
                         *q = mesh->vert_pos + 3 * (size_t)face[(k + 1) % 3];
             float d[3] = {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
-            float length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            float length_sq = npg_vec3_dotf(d, d);
             if (length_sq < least) {
                 least = length_sq;
                 at = k;
@@ -391,18 +405,17 @@ static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
     double *sum = NULL;
     uint8_t *is_flipped = NULL;
     uint32_t *weight = NULL;
-    npg_status status;
-    NPG_TRY_OR(end, status, npg_alloc_array(&sum, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *sum));
-    NPG_TRY_OR(end, status, npg_alloc_array(&weight, NPG_FOR_MESH, mesh->vert_count, sizeof *weight));
-    NPG_TRY_OR(end, status, npg_alloc(&is_flipped, NPG_FOR_MESH, mesh->face_count));
-    *left = find_flipped(is_flipped, sum, mesh);
+    *left = 0;
+    npg_status status = npg_alloc_array(&sum, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *sum);
+    if (!status) status = npg_alloc_array(&weight, NPG_FOR_MESH, mesh->vert_count, sizeof *weight);
+    if (!status) status = npg_alloc(&is_flipped, NPG_FOR_MESH, mesh->face_count);
+    if (!status) *left = find_flipped(is_flipped, sum, mesh);
     done->flipped += *left;
     for (int round = 0; round < SMOOTH_ROUNDS && *left; round++) {
         smooth_round(mesh, is_flipped, sum, weight);
         *left = find_flipped(is_flipped, sum, mesh);
     }
     if (*left) collapse_flipped(mesh, is_flipped);
-end:
     npg_release(&sum);
     npg_release(&weight);
     npg_release(&is_flipped);

@@ -6,6 +6,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/vec3.h"
 #include "mesh/child.h"
 #include "mesh/poisson_wire.h"
 #include "pipeline/frame_box.h"
@@ -23,7 +24,7 @@ static npg_status check_finite(const float *points, const float *normals, size_t
     for (size_t i = 0; i < n; i++) {
         const float *p = points + 3 * i, *d = normals + 3 * i;
         if (!isfinite(p[0] + p[1] + p[2])) return npg_error(NPG_BAD_INPUT, "point %zu is not finite", i);
-        float length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        float length_sq = npg_vec3_dotf(d, d);
         if (!(fabsf(length_sq - 1) < 0.01f))
             return npg_error(NPG_BAD_INPUT, "the normal of point %zu has length %g instead of 1", i,
                              sqrt((double)length_sq));
@@ -57,30 +58,33 @@ static npg_status check_extent(const float *points, size_t n)
     return NPG_OK;
 }
 
-npg_status npg_normals_disagreement(double *share, const float *points, const float *normals, size_t n)
+/* How many normals point against those around them. */
+static size_t count_against(const float *normals, const uint32_t *index, size_t n)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL;
-    npg_status status;
     size_t against = 0;
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *dist_sq));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points, n, NEIGHBOURS, 0));
     for (size_t i = 0; i < n; i++) {
         double vote = 0;
         for (size_t k = 0; k < NEIGHBOURS; k++) {
             uint32_t j = index[NEIGHBOURS * i + k];
             if (j == UINT32_MAX || j == i) continue;
-            const float *a = normals + 3 * i, *b = normals + 3 * (size_t)j;
-            double cosine = (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+            double cosine = (double)npg_vec3_dotf(normals + 3 * i, normals + 3 * (size_t)j);
             vote += cosine * fabs(cosine);
         }
         against += vote < 0;
     }
-    *share = (double)against / (double)n;
-done:
+    return against;
+}
+
+npg_status npg_normals_disagreement(double *share, const float *points, const float *normals, size_t n)
+{
+    npg_kdtree *tree = NULL;
+    uint32_t *index = NULL;
+    float *dist_sq = NULL;
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *dist_sq);
+    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, points, n, NEIGHBOURS, 0);
+    if (!status) *share = (double)count_against(normals, index, n) / (double)n;
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);

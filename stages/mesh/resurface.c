@@ -7,6 +7,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/vec3.h"
 #include "mesh/apart.h"
 
 #define ROUNDS_MAX  4
@@ -22,7 +23,7 @@ static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const flo
     float sum = 0;
     for (size_t k = 0; k < 3; k++) {
         const float *v = mesh->vert_normals + 3 * (size_t)mesh->faces[3 * (size_t)hit->face + k];
-        sum += hit->weights[k] * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2]);
+        sum += hit->weights[k] * npg_vec3_dotf(v, n);
     }
     return sum;
 }
@@ -32,18 +33,16 @@ static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh
 {
     npg_surface *surface = NULL;
     npg_surface_hit *hits = NULL;
-    npg_status status;
     *turned = 0;
-    NPG_TRY_OR(done, status, npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits));
-    NPG_TRY_OR(done, status,
-               npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
-    NPG_TRY_OR(done, status, npg_surface_closest_near(surface, hits, points, n, NULL, NULL, 0));
-    for (size_t i = 0; i < n; i++) {
+    npg_status status = npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits);
+    if (!status)
+        status = npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
+    if (!status) status = npg_surface_closest_near(surface, hits, points, n, NULL, NULL, 0);
+    for (size_t i = 0; i < n && !status; i++) {
         if (side_at(mesh, &hits[i], normals + 3 * i) >= CLEARLY) continue;
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
         ++*turned;
     }
-done:
     npg_surface_close(&surface);
     npg_release(&hits);
     return status;

@@ -139,17 +139,22 @@ static void widen(patches *p, const npg_mesh *mesh)
     }
 }
 
-/* Number the patches: faces that are in and connected by vertices. */
-static npg_status number_patches(patches *p, const npg_mesh *mesh)
+/* Copy the faces that are in (or those that are not), and number their components: F x 3 and V.  Returns how
+ * many faces those are in *count. */
+static npg_status join_faces(uint32_t *some, uint32_t *component, size_t *count, const patches *p,
+                             const npg_mesh *mesh, bool are_in)
 {
-    uint32_t *some = NULL, *component = NULL;
-    size_t count = 0, components, v = mesh->vert_count;
-    npg_status status;
-    NPG_TRY_OR(done, status, npg_alloc_array(&some, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *some));
-    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, v, sizeof *component));
+    size_t components;
+    *count = 0;
     for (size_t f = 0; f < mesh->face_count; f++)
-        if (p->is_in[f]) memcpy(some + 3 * count++, mesh->faces + 3 * f, 3 * sizeof *some);
-    NPG_TRY_OR(done, status, npg_mesh_components(component, &components, v, some, count));
+        if (p->is_in[f] == are_in) memcpy(some + 3 * (*count)++, mesh->faces + 3 * f, 3 * sizeof *some);
+    return npg_mesh_components(component, &components, mesh->vert_count, some, *count);
+}
+
+static void set_patches(patches *p, const npg_mesh *mesh, const uint32_t *some, size_t count,
+                        uint32_t *component)
+{
+    size_t v = mesh->vert_count;
     for (size_t i = 0; i < v; i++) p->of_vert[i] = NO_PATCH;
     for (size_t i = 0; i < 3 * count; i++) p->of_vert[some[i]] = component[some[i]];
     /* components count lone vertices, too: number those of faces from 0 on */
@@ -162,7 +167,17 @@ static npg_status number_patches(patches *p, const npg_mesh *mesh)
     }
     for (size_t f = 0; f < mesh->face_count; f++)
         p->of_face[f] = p->is_in[f] ? p->of_vert[mesh->faces[3 * f]] : NO_PATCH;
-done:
+}
+
+/* Number the patches: faces that are in and connected by vertices. */
+static npg_status number_patches(patches *p, const npg_mesh *mesh)
+{
+    uint32_t *some = NULL, *component = NULL;
+    size_t count;
+    npg_status status = npg_alloc_array(&some, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *some);
+    if (!status) status = npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component);
+    if (!status) status = join_faces(some, component, &count, p, mesh, true);
+    if (!status) set_patches(p, mesh, some, count, component);
     npg_release(&some);
     npg_release(&component);
     return status;
@@ -172,20 +187,16 @@ done:
 static npg_status take_islands(patches *p, const npg_mesh *mesh)
 {
     uint32_t *rest = NULL, *component = NULL;
-    size_t *size = NULL, count = 0, components;
-    npg_status status;
-    NPG_TRY_OR(done, status, npg_alloc_array(&rest, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *rest));
-    NPG_TRY_OR(done, status, npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
-    NPG_TRY_OR(done, status, npg_alloc_array(&size, NPG_FOR_MESH, mesh->vert_count, sizeof *size));
-    for (size_t f = 0; f < mesh->face_count; f++)
-        if (!p->is_in[f]) memcpy(rest + 3 * count++, mesh->faces + 3 * f, 3 * sizeof *rest);
-    NPG_TRY_OR(done, status, npg_mesh_components(component, &components, mesh->vert_count, rest, count));
-    for (size_t f = 0; f < count; f++) size[component[rest[3 * f]]]++;
-    for (size_t f = 0; f < mesh->face_count; f++)
+    size_t *size = NULL, count = 0;
+    npg_status status = npg_alloc_array(&rest, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *rest);
+    if (!status) status = npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component);
+    if (!status) status = npg_alloc_array(&size, NPG_FOR_MESH, mesh->vert_count, sizeof *size);
+    if (!status) status = join_faces(rest, component, &count, p, mesh, false);
+    for (size_t f = 0; f < count && !status; f++) size[component[rest[3 * f]]]++;
+    for (size_t f = 0; f < mesh->face_count && !status; f++)
         if (!p->is_in[f] &&
             (double)size[component[mesh->faces[3 * f]]] < ISLAND_MOST * (double)mesh->face_count)
             p->is_in[f] = 1;
-done:
     npg_release(&rest);
     npg_release(&component);
     npg_release(&size);

@@ -465,7 +465,7 @@ static npg_status end_epoch(npg_fit *fit)
 
 static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
 {
-    size_t blocks = fit->rows / 16, solved = 0, all = fit->frame_count * blocks;
+    size_t blocks = fit->rows / NPG_LANES, solved = 0, all = fit->frame_count * blocks;
     float *part;
     double sum = 0, weighted = 0;
     NPG_TRY(npg_alloc_array(&part, NPG_FOR_FIT, all, sizeof(float)));
@@ -582,7 +582,7 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
     NPG_TRY(npg_buffer_read(&fit->motion.x, fit->rank[i] * bytes, fit->packed, bytes));
     for (size_t row = 0; row < fit->real; row++)
         for (size_t axis = 0; axis < 3; axis++) {
-            float at = fit->packed[row / 16 * 48 + axis * 16 + row % 16];
+            float at = fit->packed[NPG_POINT_AT(row) + axis * NPG_LANES];
             if (!isfinite(at)) return npg_error(NPG_DIVERGED, "a vertex of frame %zu is not finite", i);
             vert_unit[3 * fit->order[row] + axis] = at;
         }

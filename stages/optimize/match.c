@@ -8,6 +8,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/vec3.h"
 
 #define OPPOSITE -0.2 /* cosine below which a point's normal speaks against the surface's */
 
@@ -89,17 +90,6 @@ static void face_point(float out[3], const float *vert_pos, const uint32_t *face
                  weights[2] * vert_pos[3 * (size_t)face[2] + i];
 }
 
-static float dot3(const float *a, const float *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void unit3(float v[3])
-{
-    float size = sqrtf(dot3(v, v));
-    for (int i = 0; i < 3 && size > 0; i++) v[i] /= size;
-}
-
 static float robust_weight(double dist_sq, double width)
 {
     double share = 1 / (1 + dist_sq / (width * width));
@@ -115,7 +105,7 @@ static void pull_target(npg_matcher *m, npg_pull *pull, size_t i, const float *v
     face_point(at, vert_unit, face, hit->weights);
     *pull = (npg_pull){.weight = weight, .along = (float)m->settings.along};
     face_point(pull->normal, m->vert_normals, face, hit->weights);
-    unit3(pull->normal);
+    npg_vec3_make_unitf(pull->normal);
     for (int c = 0; c < 3; c++) {
         pull->vertex[c] = m->carriers[i].sample[c];
         pull->share[c] = m->carriers[i].share[c];
@@ -134,7 +124,8 @@ static void match_targets(npg_matcher *m, npg_pull *pulls, size_t *count, const 
     for (size_t i = 0; i < m->target_count; i++) {
         float weight = (float)share * robust_weight((double)m->hits[i].dist_sq, width);
         pull_target(m, &pulls[*count], i, vert_unit, samples, weight);
-        if (with_normals && dot3(pulls[*count].normal, m->normals + 3 * i) < (float)OPPOSITE) continue;
+        if (with_normals && npg_vec3_dotf(pulls[*count].normal, m->normals + 3 * i) < (float)OPPOSITE)
+            continue;
         ++*count;
     }
 }
@@ -156,7 +147,8 @@ static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, 
         const float *to = points + 3 * (size_t)m->near[s];
         npg_pull pull = {.vertex = {(int32_t)s, (int32_t)s, (int32_t)s}, .share = {1, 0, 0}};
         memcpy(pull.normal, m->vert_normals + 3 * (size_t)m->carry->samples->vertex[s], sizeof pull.normal);
-        if (normals && dot3(pull.normal, normals + 3 * (size_t)m->near[s]) < (float)OPPOSITE) continue;
+        if (normals && npg_vec3_dotf(pull.normal, normals + 3 * (size_t)m->near[s]) < (float)OPPOSITE)
+            continue;
         pull.weight = (float)share * robust_weight((double)m->near_sq[s], width);
         pull.along = (float)m->settings.along;
         for (size_t k = 0; k < 3; k++) pull.constant[k] = -to[k];

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/vec3.h"
 #include "kernels/jacobi.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
@@ -53,20 +54,18 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t n, i
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
     float *dist_sq = NULL, *around = NULL;
-    npg_status status;
     size_t k = (size_t)neighbours;
     NPG_REQUIRE(neighbours >= 3);
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq));
-    NPG_TRY_OR(done, status, npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around));
-    for (size_t first = 0; first < n; first += BATCH) {
+    npg_status status = npg_kdtree_open(&tree, points, n);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq);
+    if (!status) status = npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around);
+    for (size_t first = 0; first < n && !status; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
-        NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0));
-        for (size_t i = 0; i < count; i++)
+        status = npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0);
+        for (size_t i = 0; i < count && !status; i++)
             normal_from(normals + 3 * (first + i), around, points, index + k * i, k);
     }
-done:
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);
@@ -102,22 +101,6 @@ typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double cell_width; /* at the cloud's middle */
 } view;
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
-
-static void scale_to_unit(double a[3])
-{
-    double length = sqrt(dot(a, a));
-    for (int i = 0; i < 3; i++) a[i] /= length;
-}
-
 /* False when the sensor is inside the ball around the box or so near that the picture would be wider than
  * 120 degrees: asin(1 / 1.15) is 60. */
 static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], size_t point_count)
@@ -128,15 +111,15 @@ static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], 
         v->forward[a] = middle[a] - sensor[a];
         v->sensor[a] = sensor[a];
     }
-    double distance = sqrt(dot(v->forward, v->forward));
+    double distance = npg_vec3_length(v->forward);
     if (!(distance > 1.15 * radius)) return false;
     int least = fabs(v->forward[0]) < fabs(v->forward[1]) ? 0 : 1;
     if (fabs(v->forward[2]) < fabs(v->forward[least])) least = 2;
     double axis[3] = {least == 0, least == 1, least == 2};
-    scale_to_unit(v->forward);
-    cross(v->right, axis, v->forward);
-    scale_to_unit(v->right);
-    cross(v->up, v->forward, v->right);
+    npg_vec3_make_unit(v->forward);
+    npg_vec3_cross(v->right, axis, v->forward);
+    npg_vec3_make_unit(v->right);
+    npg_vec3_cross(v->up, v->forward, v->right);
     v->half_width = radius / sqrt(distance * distance - radius * radius);
     v->cells = (size_t)sqrt((double)point_count / 4); /* four points a cell, if they filled the picture */
     if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
@@ -149,9 +132,9 @@ static size_t project(double *depth, const view *v, const float *p)
 {
     double d[3], at[2];
     for (int a = 0; a < 3; a++) d[a] = (double)p[a] - v->sensor[a];
-    *depth = dot(d, v->forward);
-    at[0] = dot(d, v->right) / *depth;
-    at[1] = dot(d, v->up) / *depth;
+    *depth = npg_vec3_dot(d, v->forward);
+    at[0] = npg_vec3_dot(d, v->right) / *depth;
+    at[1] = npg_vec3_dot(d, v->up) / *depth;
     size_t cell = 0;
     for (int i = 0; i < 2; i++) {
         double x = (at[i] / v->half_width + 1) / 2 * (double)v->cells;

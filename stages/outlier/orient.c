@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "outlier/sides.h"
 #include "pipeline/memory.h"
@@ -20,6 +21,7 @@
 #define NEIGHBOURS NPG_SIDE_NEIGHBOURS
 /* All set by trial. */
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
+#define FOLLOWED       5    /* core points that each other point asks for its side                 */
 #define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
 #define MEND_ROUNDS    6    /* of those, each with the winding number computed anew                */
 #define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
@@ -28,20 +30,10 @@
 
 /* ---- neighbours ---- */
 
-static npg_status find_neighbours(npg_sided_cloud *c)
+/* The area that each point stands for, and the softening of the winding number that goes with it. */
+static void set_areas(npg_sided_cloud *c, const float *dist_sq)
 {
-    npg_kdtree *tree = NULL;
-    float *dist_sq = NULL;
-    npg_status status;
     double mean = 0;
-    NPG_TRY(npg_kdtree_open(&tree, c->points, c->count));
-    NPG_TRY_OR(done, status,
-               npg_alloc_array(&c->index, NPG_FOR_FRAMES, c->count, NEIGHBOURS * sizeof *c->index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&c->area, NPG_FOR_FRAMES, c->count, sizeof *c->area));
-    NPG_TRY_OR(done, status, npg_alloc_array(&c->winding, NPG_FOR_FRAMES, c->count, sizeof *c->winding));
-    NPG_TRY_OR(done, status,
-               npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, c->count, NEIGHBOURS * sizeof *dist_sq));
-    NPG_TRY_OR(done, status, npg_kdtree_nearest(tree, c->index, dist_sq, c->points, c->count, NEIGHBOURS, 0));
     for (size_t i = 0; i < c->count; i++) {
         size_t last = c->count < NEIGHBOURS ? c->count - 1 : NEIGHBOURS - 1;
         /* The disc that reaches to the last neighbour is the surface of that many points. */
@@ -51,7 +43,20 @@ static npg_status find_neighbours(npg_sided_cloud *c)
     /* Far outliers have a large disc around them: no point may outweigh many. */
     for (size_t i = 0; i < c->count; i++) c->area[i] = fminf(c->area[i], 3 * (float)mean);
     c->soft_sq = 0.5f * (float)mean; /* 1 / d^2 grows without bound for near points; set by trial */
-done:
+}
+
+static npg_status find_neighbours(npg_sided_cloud *c)
+{
+    npg_kdtree *tree = NULL;
+    float *dist_sq = NULL;
+    size_t n = c->count;
+    npg_status status = npg_kdtree_open(&tree, c->points, n);
+    if (!status) status = npg_alloc_array(&c->index, NPG_FOR_FRAMES, n, NEIGHBOURS * sizeof *c->index);
+    if (!status) status = npg_alloc_array(&c->area, NPG_FOR_FRAMES, n, sizeof *c->area);
+    if (!status) status = npg_alloc_array(&c->winding, NPG_FOR_FRAMES, n, sizeof *c->winding);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, n, NEIGHBOURS * sizeof *dist_sq);
+    if (!status) status = npg_kdtree_nearest(tree, c->index, dist_sq, c->points, n, NEIGHBOURS, 0);
+    if (!status) set_areas(c, dist_sq);
     npg_kdtree_close(&tree);
     npg_release(&dist_sq);
     return status;
@@ -170,6 +175,18 @@ static npg_status orient_from_nothing(npg_sided_cloud *c)
 
 /* ---- given sides ---- */
 
+/* Points whose given side is not the one they would get from nothing are in doubt; sides stay as given. */
+static npg_status find_doubts(uint8_t *in_doubt, float *given, npg_sided_cloud *c)
+{
+    size_t n = c->count;
+    memcpy(given, c->normals, n * 3 * sizeof *given);
+    NPG_TRY(orient_from_nothing(c));
+    for (size_t i = 0; i < n; i++)
+        in_doubt[i] = memcmp(given + 3 * i, c->normals + 3 * i, 3 * sizeof *given) != 0;
+    memcpy(c->normals, given, n * 3 * sizeof *given);
+    return NPG_OK;
+}
+
 /* Keep given sides unless a whole patch, or then a single point, is clearly on the wrong one: points whose
  * side comes out differently when it is found from nothing are in doubt, and are turned in patches. */
 static npg_status orient_from_given(npg_sided_cloud *c)
@@ -177,21 +194,15 @@ static npg_status orient_from_given(npg_sided_cloud *c)
     float *given = NULL;
     uint8_t *in_doubt = NULL;
     uint32_t *patch_of = NULL;
-    npg_status status;
     size_t n = c->count;
-    NPG_TRY(face_out(c));
-    NPG_TRY_OR(done, status, npg_alloc_array(&given, NPG_FOR_FRAMES, n, 3 * sizeof *given));
-    NPG_TRY_OR(done, status, npg_alloc_array(&patch_of, NPG_FOR_FRAMES, n, sizeof *patch_of));
-    NPG_TRY_OR(done, status, npg_alloc(&in_doubt, NPG_FOR_FRAMES, n));
-    memcpy(given, c->normals, n * 3 * sizeof *given);
-    NPG_TRY_OR(done, status, orient_from_nothing(c));
-    for (size_t i = 0; i < n; i++)
-        in_doubt[i] = memcmp(given + 3 * i, c->normals + 3 * i, 3 * sizeof *given) != 0;
-    memcpy(c->normals, given, n * 3 * sizeof *given);
-    NPG_TRY_OR(done, status, npg_sided_patches(patch_of, c, in_doubt, 0.5f));
-    NPG_TRY_OR(done, status, npg_sided_turn_patches(c, patch_of, GIVEN_TRUST));
-    status = settle_points(c);
-done:
+    npg_status status = face_out(c);
+    if (!status) status = npg_alloc_array(&given, NPG_FOR_FRAMES, n, 3 * sizeof *given);
+    if (!status) status = npg_alloc_array(&patch_of, NPG_FOR_FRAMES, n, sizeof *patch_of);
+    if (!status) status = npg_alloc(&in_doubt, NPG_FOR_FRAMES, n);
+    if (!status) status = find_doubts(in_doubt, given, c);
+    if (!status) status = npg_sided_patches(patch_of, c, in_doubt, 0.5f);
+    if (!status) status = npg_sided_turn_patches(c, patch_of, GIVEN_TRUST);
+    if (!status) status = settle_points(c);
     npg_release(&given);
     npg_release(&in_doubt);
     npg_release(&patch_of);
@@ -235,34 +246,37 @@ static void take_core(float *points, float *normals, uint32_t *from, size_t core
     }
 }
 
+/* Turn a normal to the side that the core points around it agree on. */
+static void follow_neighbours(float *normal, const float *core_normals, const uint32_t *index,
+                              const float *dist_sq)
+{
+    float sum = 0;
+    for (size_t k = 0; k < FOLLOWED; k++) {
+        float along = npg_vec3_dotf(normal, core_normals + 3 * (size_t)index[k]);
+        /* Near points and clear agreement count more; 1e-20: a core point is at distance 0 itself. */
+        sum += along * fabsf(along) / (dist_sq[k] + 1e-20f);
+    }
+    for (size_t a = 0; a < 3 && sum < 0; a++) normal[a] = -normal[a];
+}
+
 /* Every other point takes the side its nearest core points agree on. */
 static npg_status follow_core(float *all_normals, const float *all_points, size_t n, const float *points,
                               const float *normals, size_t core_count)
 {
-    enum { NEAR = 5, BATCH = 4096 };
+    enum { BATCH = 4096 };
     npg_kdtree *tree = NULL;
     uint32_t *index = NULL;
     float *dist_sq = NULL;
-    npg_status status;
-    NPG_TRY(npg_kdtree_open(&tree, points, core_count));
-    NPG_TRY_OR(done, status, npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, NEAR * sizeof *index));
-    NPG_TRY_OR(done, status, npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, NEAR * sizeof *dist_sq));
-    for (size_t first = 0; first < n; first += BATCH) {
+    npg_status status = npg_kdtree_open(&tree, points, core_count);
+    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, FOLLOWED * sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, FOLLOWED * sizeof *dist_sq);
+    for (size_t first = 0; first < n && !status; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
-        NPG_TRY_OR(done, status,
-                   npg_kdtree_nearest(tree, index, dist_sq, all_points + 3 * first, count, NEAR, 0));
-        for (size_t i = 0; i < count; i++) {
-            float *m = all_normals + 3 * (first + i), sum = 0;
-            for (size_t k = 0; k < NEAR; k++) {
-                const float *o = normals + 3 * (size_t)index[NEAR * i + k];
-                float along = m[0] * o[0] + m[1] * o[1] + m[2] * o[2];
-                /* Near points and clear agreement count more; 1e-20: a core point is at distance 0 itself. */
-                sum += along * fabsf(along) / (dist_sq[NEAR * i + k] + 1e-20f);
-            }
-            for (size_t a = 0; a < 3 && sum < 0; a++) m[a] = -m[a];
-        }
+        status = npg_kdtree_nearest(tree, index, dist_sq, all_points + 3 * first, count, FOLLOWED, 0);
+        for (size_t i = 0; i < count && !status; i++)
+            follow_neighbours(all_normals + 3 * (first + i), normals, index + FOLLOWED * i,
+                              dist_sq + FOLLOWED * i);
     }
-done:
     npg_kdtree_close(&tree);
     npg_release(&index);
     npg_release(&dist_sq);
@@ -273,18 +287,16 @@ static npg_status orient(float *normals, double *score, const float *points, siz
 {
     float *core_points = NULL, *core_normals = NULL;
     uint32_t *from = NULL;
-    npg_status status;
     npg_sided_cloud whole = {.count = n, .points = points, .normals = normals};
     if (n < 4) return NPG_OK; /* no closed surface has fewer */
     if (n <= CORE_MAX) return orient_core(&whole, from_given, score);
-    NPG_TRY_OR(done, status, npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float)));
-    NPG_TRY_OR(done, status, npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from));
-    take_core(core_points, core_normals, from, CORE_MAX, points, normals, n);
+    npg_status status = npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from);
+    if (!status) take_core(core_points, core_normals, from, CORE_MAX, points, normals, n);
     npg_sided_cloud core = {.count = CORE_MAX, .points = core_points, .normals = core_normals};
-    NPG_TRY_OR(done, status, orient_core(&core, from_given, score));
-    status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
-done:
+    if (!status) status = orient_core(&core, from_given, score);
+    if (!status) status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
     npg_release(&core_points);
     npg_release(&core_normals);
     npg_release(&from);

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/vec3.h"
 #include "outlier/cleaning.h"
 #include "outlier/isolated.h"
 #include "outlier/normals.h"
@@ -140,7 +141,7 @@ static void repair_directions(float *normals, size_t *bad, const float *estimate
 {
     *bad = 0;
     for (size_t i = 0; i < n; i++) {
-        float *d = normals + 3 * i, length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        float *d = normals + 3 * i, length = npg_vec3_lengthf(d);
         bool good = isfinite(length) && length > 1e-6f; /* readers give 0 where there is none */
         for (size_t a = 0; a < 3; a++) d[a] = good ? d[a] / length : estimate[3 * i + a];
         *bad += !good;

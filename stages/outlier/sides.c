@@ -175,16 +175,9 @@ static void close_patches(patches *p)
     npg_release(&p->panel.x);
 }
 
-/* From the lowest member of each point's patch; points with UINT32_MAX belong to none. */
-static npg_status open_patches(patches *p, const uint32_t *patch_of, size_t n)
+/* Sort the points by patch (counting sort); number: room for n. */
+static void fill_patches(patches *p, uint32_t *number, const uint32_t *patch_of, size_t n)
 {
-    uint32_t *number = NULL;
-    npg_status status;
-    NPG_TRY_OR(done, status, npg_alloc_array(&p->members, NPG_FOR_FRAMES, n, sizeof *p->members));
-    NPG_TRY_OR(done, status, npg_alloc_array(&p->first, NPG_FOR_FRAMES, n + 2, sizeof *p->first));
-    NPG_TRY_OR(done, status, npg_alloc_array(&p->change, NPG_FOR_FRAMES, n, sizeof *p->change));
-    NPG_TRY_OR(done, status, open_panel(&p->panel, n));
-    NPG_TRY_OR(done, status, npg_alloc_array(&number, NPG_FOR_FRAMES, n, sizeof *number));
     for (size_t i = 0; i < n; i++)
         if (patch_of[i] == i) number[i] = (uint32_t)p->count++;
     for (size_t i = 0; i < n; i++)
@@ -192,7 +185,18 @@ static npg_status open_patches(patches *p, const uint32_t *patch_of, size_t n)
     for (size_t k = 2; k < p->count + 2; k++) p->first[k] += p->first[k - 1];
     for (size_t i = 0; i < n; i++)
         if (patch_of[i] != UINT32_MAX) p->members[p->first[number[patch_of[i]] + 1]++] = (uint32_t)i;
-done:
+}
+
+/* From the lowest member of each point's patch; points with UINT32_MAX belong to none. */
+static npg_status open_patches(patches *p, const uint32_t *patch_of, size_t n)
+{
+    uint32_t *number = NULL;
+    npg_status status = npg_alloc_array(&p->members, NPG_FOR_FRAMES, n, sizeof *p->members);
+    if (!status) status = npg_alloc_array(&p->first, NPG_FOR_FRAMES, n + 2, sizeof *p->first);
+    if (!status) status = npg_alloc_array(&p->change, NPG_FOR_FRAMES, n, sizeof *p->change);
+    if (!status) status = open_panel(&p->panel, n);
+    if (!status) status = npg_alloc_array(&number, NPG_FOR_FRAMES, n, sizeof *number);
+    if (!status) fill_patches(p, number, patch_of, n);
     npg_release(&number);
     if (status) close_patches(p);
     return status;

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "geometry/vec3.h"
 #include "pipeline/status.h"
 
 #define NPG_SIDE_NEIGHBOURS 12 /* of a point, itself among them; set by trial */
@@ -33,10 +34,9 @@ static inline float agreement(const npg_sided_cloud *c, uint32_t a, uint32_t b)
     const float *p = c->points + 3 * (size_t)a, *q = c->points + 3 * (size_t)b;
     const float *m = c->normals + 3 * (size_t)a, *n = c->normals + 3 * (size_t)b;
     float e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-    float length_sq = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-    float mn = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
+    float length_sq = npg_vec3_dotf(e, e), mn = npg_vec3_dotf(m, n);
     if (!(length_sq > 0)) return mn;
-    float me = m[0] * e[0] + m[1] * e[1] + m[2] * e[2], ne = n[0] * e[0] + n[1] * e[1] + n[2] * e[2];
+    float me = npg_vec3_dotf(m, e), ne = npg_vec3_dotf(n, e);
     return mn - 2 * me * ne / length_sq;
 }
 

@@ -9,7 +9,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "evaluate/evaluate.h"
+#include "evaluate/evaluate_shape.h"
+#include "evaluate/evaluate_truth.h"
 #include "export/forms/writer.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"

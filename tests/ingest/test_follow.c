@@ -8,9 +8,10 @@
 #include <cmocka.h>
 
 #include "ingest/follow.h"
-#include "ingest/ingest.h"
 #include "tests/support/temp_folder.h"
 #include "tests/support/test_chain.h"
+
+extern const npg_stage npg_stage_ingest;
 
 static temp_folder folder;
 static char capture[300]; /* the folder that the running test follows */

@@ -8,9 +8,10 @@
 #include <fcntl.h>
 
 #include "ingest/capture.h"
-#include "ingest/ingest.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"
+
+extern const npg_stage npg_stage_ingest;
 
 /* ---- a stage that writes down what it sees, and plans ---- */
 

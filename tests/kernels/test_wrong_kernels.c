@@ -48,7 +48,7 @@ static const struct change {
     {"transform", "half_sinc(t) * du + ", "half_sinc(t) * du - ", "transform, exponential"},
     {"nearest", "if (low < best.dist_sq)", "if (2.0f * low < best.dist_sq)", "nearest"},
     {"chamfer", "sum_v + sum_p", "sum_v - sum_p", "chamfer"},
-    {"pull", "g[a2 + 16 * axis] += p[6] * d", "g[a2 + 16 * axis] -= p[6] * d", "pull"},
+    {"pull", "g[a2 + NPG_LANES * axis] += p[6] * d", "g[a2 + NPG_LANES * axis] -= p[6] * d", "pull"},
     {"isometry", "sum += fabs(change)", "sum += change", "isometry"},
 };
 

@@ -12,12 +12,11 @@
 #include <stdatomic.h>
 #include <time.h>
 
-#include "ingest/ingest.h"
 #include "pipeline/live_plan.h"
 #include "pipeline/run_internal.h"
 #include "tests/support/test_chain.h"
 
-extern const npg_stage npg_stage_keyframe;
+extern const npg_stage npg_stage_ingest, npg_stage_keyframe;
 
 enum { LOOK_AHEAD = 20, WINDOW = 8, OVERLAP = 3, FRAMES = 150, POINTS = 12 };
 

@@ -7,8 +7,8 @@
 #include <sys/statvfs.h>
 
 #include "pipeline/file.h"
+#include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/stage.h"
 #include "tools/probe/probe_capture.h"
 #include "tools/progress.h"
 

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "ingest/frame_names.h"
+#include "ingest/ingest.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 #include "tools/batch/batch.h"

@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/stage.h"
 #include "tools/batch/batch_segments.h"
 #include "tools/batch/batch_verdict.h"
 #include "tools/progress.h"

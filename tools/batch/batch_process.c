@@ -16,8 +16,8 @@
 
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
+#include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/stage.h"
 #include "tools/log_file.h"
 #include "tools/run_job.h"
 

@@ -12,8 +12,8 @@
 #include <unistd.h>
 
 #include "pipeline/clock.h"
+#include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/stage.h"
 #include "tools/batch/batch_process.h"
 
 #define TICK_MS        200

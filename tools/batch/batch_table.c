@@ -10,7 +10,6 @@
 
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/stage.h"
 #include "tools/batch/batch_page.h"
 #include "tools/batch/batch_segments.h"
 #include "tools/batch/batch_verdict.h"

@@ -11,7 +11,6 @@
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/stage.h"
 #include "tools/batch/batch_segments.h"
 
 #define FILE_NAME "verdict.json"

@@ -3,15 +3,16 @@
 
 #include <math.h>
 
+#include "geometry/geometry.h"
+
 static const double axes[3] = {0.3, 0.4, 0.9};
 
 static void place(double out[3], double normal[3], double polar, double around)
 {
-    double unit[3] = {sin(polar) * cos(around), sin(polar) * sin(around), cos(polar)}, size = 0;
+    double unit[3] = {sin(polar) * cos(around), sin(polar) * sin(around), cos(polar)};
     for (int i = 0; i < 3; i++) out[i] = axes[i] * unit[i];
     for (int i = 0; i < 3; i++) normal[i] = unit[i] / axes[i];
-    for (int i = 0; i < 3; i++) size += normal[i] * normal[i];
-    for (int i = 0; i < 3; i++) normal[i] /= sqrt(size);
+    npg_vec3_make_unit(normal);
 }
 
 /* Rings of `side` vertices from pole to pole, the poles left open by half a ring. */
@@ -46,19 +47,16 @@ static void pose(float out[3], const double rest[3], double bend)
     out[2] = (float)(rest[2] - sin(angle) * rest[0]);
 }
 
-static npg_status make_frame(npg_fit_frame *frame, size_t point_count, size_t t, size_t frame_count)
+/* The points of frame t, on a spiral that is even over the sphere and begins elsewhere in each frame. */
+static npg_status make_points(float **out, size_t point_count, size_t t, size_t frame_count)
 {
-    float *points;
     double bend = frame_count > 1 ? (double)t / (double)(frame_count - 1) - 0.5 : 0;
-    NPG_TRY(npg_alloc_array(&points, NPG_FOR_FRAMES, point_count, 3 * sizeof(float)));
-    for (size_t i = 0; i < point_count;
-         i++) { /* a spiral: even over the sphere, another start in each frame */
+    NPG_TRY(npg_alloc_array(out, NPG_FOR_FRAMES, point_count, 3 * sizeof(float)));
+    for (size_t i = 0; i < point_count; i++) {
         double at[3], normal[3], share = ((double)i + 0.5) / (double)point_count;
         place(at, normal, acos(1 - 2 * share), M_PI * (1 + sqrt(5)) * ((double)i + (double)t));
-        pose(points + 3 * i, at, bend);
+        pose(*out + 3 * i, at, bend);
     }
-    *frame = (npg_fit_frame){(int64_t)t, frame_count > 1 ? (double)t / (double)(frame_count - 1) : 0, points,
-                             point_count, NULL};
     return NPG_OK;
 }
 
@@ -67,18 +65,17 @@ npg_status npg_bench_body_open(npg_bench_body *body, size_t vert_count, size_t p
 {
     size_t side = (size_t)ceil(sqrt((double)vert_count));
     *body = (npg_bench_body){.frame_count = frame_count, .point_count = point_count};
-    npg_status status = npg_alloc_array(&body->frames, NPG_FOR_FRAMES, frame_count, sizeof *body->frames);
+    npg_status status = npg_alloc_array(&body->points, NPG_FOR_FRAMES, frame_count, sizeof *body->points);
     if (!status) status = make_mesh(&body->mesh, side < 4 ? 4 : side);
     for (size_t t = 0; t < frame_count && !status; t++)
-        status = make_frame(&body->frames[t], point_count, t, frame_count);
+        status = make_points(&body->points[t], point_count, t, frame_count);
     if (status) npg_bench_body_close(body);
     return status;
 }
 
 void npg_bench_body_close(npg_bench_body *body)
 {
-    for (size_t t = 0; body->frames && t < body->frame_count; t++)
-        npg_release((void *)&body->frames[t].points);
-    npg_release(&body->frames);
+    for (size_t t = 0; body->points && t < body->frame_count; t++) npg_release(&body->points[t]);
+    npg_release(&body->points);
     npg_mesh_unref(&body->mesh);
 }

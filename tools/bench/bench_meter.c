@@ -32,13 +32,13 @@ static clocks now(void)
 }
 
 /* Busy and wall seconds of `calls` calls. */
-static npg_status run(double *busy_s, double *wall_s, const npg_meter *m, npg_work *work, void *user,
+static npg_status run(double *busy_s, double *wall_s, const npg_meter *m, npg_call *call, void *user,
                       size_t calls)
 {
     const npg_device_info *info = npg_device_facts(m->device);
     clocks start = now();
     npg_status status = NPG_OK;
-    for (size_t i = 0; i < calls && !status; i++) status = work(user);
+    for (size_t i = 0; i < calls && !status; i++) status = call(user);
     if (!status) status = npg_device_finish(m->device);
     clocks end = now();
     *wall_s = end.wall_s - start.wall_s;
@@ -116,12 +116,12 @@ static npg_status slices(double *flops, double *bytes, npg_meter *m)
 
 /* ---- pairs ---- */
 
-static npg_status take_pairs(double *figures[4], npg_meter *m, npg_work *work, void *user, size_t calls)
+static npg_status take_pairs(double *figures[4], npg_meter *m, npg_call *call, void *user, size_t calls)
 {
     for (size_t i = 0; i < m->repeat; i++) {
         double flops, bytes, busy_s, wall_s;
         NPG_TRY(slices(&flops, &bytes, m));
-        NPG_TRY(run(&busy_s, &wall_s, m, work, user, calls));
+        NPG_TRY(run(&busy_s, &wall_s, m, call, user, calls));
         figures[0][i] = wall_s / (double)calls;
         figures[1][i] = busy_s / (double)calls;
         figures[2][i] = flops * figures[1][i];
@@ -130,17 +130,17 @@ static npg_status take_pairs(double *figures[4], npg_meter *m, npg_work *work, v
     return NPG_OK;
 }
 
-npg_status npg_meter_time(npg_timing *timing, npg_meter *m, npg_work *work, void *user)
+npg_status npg_meter_time(npg_timing *timing, npg_meter *m, npg_call *call, void *user)
 {
     double *all, busy_s, wall_s;
     size_t n = m->repeat;
-    NPG_TRY(run(&busy_s, &wall_s, m, work, user, 1)); /* the first may build */
-    NPG_TRY(run(&busy_s, &wall_s, m, work, user, 1));
+    NPG_TRY(run(&busy_s, &wall_s, m, call, user, 1)); /* the first may build */
+    NPG_TRY(run(&busy_s, &wall_s, m, call, user, 1));
     size_t calls = busy_s < SLICE_S ? (size_t)(SLICE_S / busy_s) + 1 : 1;
     if (calls > 10000) calls = 10000;
     NPG_TRY(npg_alloc_array(&all, NPG_FOR_RUN, 4 * n, sizeof *all));
     double *figures[4] = {all, all + n, all + 2 * n, all + 3 * n};
-    npg_status status = take_pairs(figures, m, work, user, calls);
+    npg_status status = take_pairs(figures, m, call, user, calls);
     if (!status)
         *timing = (npg_timing){npg_spread_of(figures[0], n).median, npg_spread_of(figures[1], n),
                                npg_spread_of(figures[2], n), npg_spread_of(figures[3], n)};

@@ -6,9 +6,10 @@
 #ifndef NPG_BENCH_METER_H
 #define NPG_BENCH_METER_H
 
-#include "kernels/runtime/device.h"
+#include "kernels/kernels.h"
 
-typedef npg_status npg_work(void *user);
+/* What is timed: one call of npg_work (pipeline/work.h). */
+typedef npg_status npg_call(void *user);
 
 /* Lower quartile, median and upper quartile of the repetitions. */
 typedef struct npg_spread {
@@ -39,6 +40,6 @@ void npg_meter_close(npg_meter *meter);
 npg_spread npg_spread_of(double *values, size_t count);
 
 /* Short work is called several times for one figure; one call goes before and does not count. */
-npg_status npg_meter_time(npg_timing *timing, npg_meter *meter, npg_work *work, void *user);
+npg_status npg_meter_time(npg_timing *timing, npg_meter *meter, npg_call *call, void *user);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "pipeline/run_settings.h"
 #include "tools/listing.h"
 

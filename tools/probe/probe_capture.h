@@ -2,7 +2,7 @@
 #ifndef NPG_PROBE_CAPTURE_H
 #define NPG_PROBE_CAPTURE_H
 
-#include "ingest/frame_files.h"
+#include "ingest/ingest.h"
 #include "tools/probe/probe_facts.h"
 
 /* Count a frame that was read with `status`, and clear it.  Bad data is noted and looked past; any other

@@ -5,22 +5,12 @@
 #include <png.h>
 #include <string.h>
 
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 #include "pipeline/file.h"
 
 #define RADIANS (3.14159265358979323846 / 180)
 
 static const float background[3] = {0.97f, 0.97f, 0.98f};
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int k = 0; k < 3; k++) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-}
 
 /* ---- camera ---- */
 
@@ -36,10 +26,9 @@ void npg_eye_turn(npg_eye *eye, double azimuth, double elevation, int up)
         world_up[2] = 1;
     }
     for (int k = 0; k < 3; k++) ahead[k] = -back[k];
-    cross(right, ahead, world_up);
-    double length = sqrt(dot(right, right));
-    for (int k = 0; k < 3; k++) right[k] /= length;
-    cross(above, right, ahead);
+    npg_vec3_cross(right, ahead, world_up);
+    npg_vec3_make_unit(right);
+    npg_vec3_cross(above, right, ahead);
 }
 
 void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *reach)
@@ -85,7 +74,7 @@ static void shading_normal(double normal[3], const npg_scene *scene, const npg_r
             normal[k] +=
                 (double)hit->weights[c] * (double)mesh->vert_normals[3 * (size_t)face[c] + (size_t)k];
     }
-    double length = sqrt(dot(normal, normal));
+    double length = sqrt(npg_vec3_dot(normal, normal));
     for (int k = 0; k < 3 && length > 0; k++) normal[k] /= length;
 }
 
@@ -97,12 +86,12 @@ static void shade(float out[3], const npg_scene *scene, const npg_eye *eye, cons
     double normal[3], light[3];
     bool is_back = hit->is_back && !scene->ball_middle;
     shading_normal(normal, scene, hit);
-    if (dot(normal, eye->axes + 6) > 0)
+    if (npg_vec3_dot(normal, eye->axes + 6) > 0)
         for (int k = 0; k < 3; k++) normal[k] = -normal[k];
     for (int k = 0; k < 3; k++)
         light[k] = -0.55 * eye->axes[k] + 0.65 * eye->axes[3 + k] - 0.55 * eye->axes[6 + k];
-    double key = fmax(dot(normal, light) / sqrt(dot(light, light)), 0),
-           head = fabs(dot(normal, eye->axes + 6));
+    double key = fmax(npg_vec3_dot(normal, light) / sqrt(npg_vec3_dot(light, light)), 0),
+           head = fabs(npg_vec3_dot(normal, eye->axes + 6));
     double amount = 0.16 + 0.62 * key + 0.26 * head;
     const uint32_t *face = scene->mesh->faces + 3 * (size_t)hit->face;
     for (size_t k = 0; k < 3; k++) {
@@ -193,12 +182,12 @@ npg_status npg_image_encode(const npg_image *image, void *out, size_t *size)
     if (!png_image_write_to_memory(&png, NULL, &room, 0, image->pixels, 0, NULL))
         return npg_error(NPG_FAILED, "libpng: %s", png.message);
     NPG_TRY(npg_alloc(bytes, NPG_FOR_FILES, room));
-    if (!png_image_write_to_memory(&png, *bytes, &room, 0, image->pixels, 0, NULL)) {
-        npg_release(bytes);
-        return npg_error(NPG_FAILED, "libpng: %s", png.message);
-    }
+    npg_status status = NPG_OK;
+    if (!png_image_write_to_memory(&png, *bytes, &room, 0, image->pixels, 0, NULL))
+        status = npg_error(NPG_FAILED, "libpng: %s", png.message);
+    if (status) npg_release(bytes);
     *size = room;
-    return NPG_OK;
+    return status;
 }
 
 npg_status npg_image_write(const npg_image *image, const char *path)

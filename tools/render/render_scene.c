@@ -9,8 +9,8 @@
 #include <strings.h>
 #include <unistd.h>
 
-#include "geometry/mesh_tools.h"
-#include "ingest/formats/reader.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "pipeline/file.h"
 
 enum { BALLS_MAX = 200000 };
@@ -73,12 +73,12 @@ static npg_status read_any(npg_mesh **mesh, bool *faces, const char *path, npg_o
     NPG_TRY(npg_file_has_faces(faces, path));
     if (!*faces) return read_cloud(mesh, path, origin);
     NPG_TRY(npg_read_mesh(mesh, path, origin));
-    for (size_t v = 0; v < (*mesh)->vert_count; v++)
-        if (!is_finite((*mesh)->vert_pos + 3 * v)) {
-            npg_mesh_unref(mesh);
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, v);
-        }
-    return NPG_OK;
+    npg_status status = NPG_OK;
+    for (size_t v = 0; v < (*mesh)->vert_count && !status; v++)
+        if (!is_finite((*mesh)->vert_pos + 3 * v))
+            status = npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, v);
+    if (status) npg_mesh_unref(mesh);
+    return status;
 }
 
 npg_status npg_scene_measure(npg_bounds *reach, const char *path, npg_origin *origin, const double axes[9])

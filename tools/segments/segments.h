@@ -18,7 +18,7 @@
 
 #include <jansson.h>
 
-#include "ingest/frame_files.h"
+#include "ingest/ingest.h"
 #include "pipeline/memory.h"
 #include "pipeline/options.h"
 #include "tools/progress.h"

@@ -7,12 +7,12 @@
 #include <sys/stat.h>
 
 #include "export/export.h"
-#include "geometry/mesh_tools.h"
-#include "ingest/formats/reader.h"
-#include "job/file_facts.h"
-#include "job/frame_log.h"
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
 #include "pipeline/file.h"
+#include "pipeline/file_facts.h"
 #include "pipeline/frame_box.h"
+#include "pipeline/json_lines.h"
 #include "tools/segments/segments.h"
 
 #define NEAR 0.01 /* of the diagonal */
@@ -45,7 +45,7 @@ static npg_status read_frame(npg_mesh **mesh, const npg_segments *s, const npg_s
     wanted w = {.number = number, .folder = folder};
     npg_status status = npg_join_path(&list, folder, "frames.jsonl");
     if (!status && stat(list, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", list);
-    if (!status) status = npg_frame_lines_each(list, (int64_t)info.st_size, look_at_line, &w);
+    if (!status) status = npg_json_lines_each(list, (int64_t)info.st_size, look_at_line, &w);
     if (!status && w.path) status = npg_read_mesh(mesh, w.path, origin);
     npg_release(&w.path);
     npg_release(&list);

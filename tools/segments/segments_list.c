@@ -8,12 +8,10 @@
 #include <unistd.h>
 
 #include "export/export.h"
-#include "job/file_facts.h"
-#include "job/frame_log.h"
 #include "pipeline/file.h"
+#include "pipeline/file_facts.h"
 #include "pipeline/folder.h"
 #include "pipeline/json_file.h"
-#include "pipeline/stage.h"
 #include "tools/listing.h"
 #include "tools/segments/segments.h"
 

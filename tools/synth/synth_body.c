@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 #define PI 3.14159265358979323846
 
@@ -134,7 +134,7 @@ static const double ball_radius = 0.22;
 static double ball_distance(const double p[3], const void *user)
 {
     (void)user;
-    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - ball_radius;
+    return npg_vec3_length(p) - ball_radius;
 }
 
 /* It rolls along in front of the bar, out of reach of its bending. */

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/geometry.h"
 #include "pipeline/random.h"
 #include "tools/synth/synth_points.h"
 
@@ -19,27 +20,20 @@ typedef struct picture {
     uint32_t *face; /* the face seen */
 } picture;
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* The i-th of a ring at half the diagonal's height above the middle, turned to the middle. */
 static camera camera_of_ring(const npg_scan *capture, int64_t i)
 {
     const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
     double angle = 2 * PI * (double)i / (double)capture->cameras;
     camera c = {.width = capture->width, .focal = 0.95 * (double)capture->width};
-    double ahead[3] = {-sin(angle), -lift, -cos(angle)}, length = sqrt(dot(ahead, ahead));
+    double ahead[3] = {-sin(angle), -lift, -cos(angle)}, length = npg_vec3_length(ahead);
     for (int k = 0; k < 3; k++) {
         c.ahead[k] = ahead[k] / length;
         c.eye[k] = capture->centre[k] - distance * c.ahead[k];
     }
     c.right[0] = -cos(angle);
     c.right[2] = sin(angle);
-    c.up[0] = c.right[1] * c.ahead[2] - c.right[2] * c.ahead[1];
-    c.up[1] = c.right[2] * c.ahead[0] - c.right[0] * c.ahead[2];
-    c.up[2] = c.right[0] * c.ahead[1] - c.right[1] * c.ahead[0];
+    npg_vec3_cross(c.up, c.right, c.ahead);
     return c;
 }
 
@@ -47,9 +41,9 @@ static camera camera_of_ring(const npg_scan *capture, int64_t i)
 static void project(double out[3], const camera *c, const float *p)
 {
     double from_eye[3] = {(double)p[0] - c->eye[0], (double)p[1] - c->eye[1], (double)p[2] - c->eye[2]};
-    out[2] = dot(from_eye, c->ahead);
-    out[0] = 0.5 * (double)c->width + c->focal * dot(from_eye, c->right) / out[2];
-    out[1] = 0.5 * (double)c->width + c->focal * dot(from_eye, c->up) / out[2];
+    out[2] = npg_vec3_dot(from_eye, c->ahead);
+    out[0] = 0.5 * (double)c->width + c->focal * npg_vec3_dot(from_eye, c->right) / out[2];
+    out[1] = 0.5 * (double)c->width + c->focal * npg_vec3_dot(from_eye, c->up) / out[2];
 }
 
 static double cross_2d(const double a[3], const double b[3], double x, double y)
@@ -84,21 +78,6 @@ static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint3
         }
 }
 
-static void face_normal(double normal[3], const npg_mesh *mesh, uint32_t f)
-{
-    const uint32_t *face = mesh->faces + 3 * (size_t)f;
-    double u[3], w[3];
-    for (size_t k = 0; k < 3; k++) {
-        u[k] =
-            (double)mesh->vert_pos[3 * (size_t)face[1] + k] - (double)mesh->vert_pos[3 * (size_t)face[0] + k];
-        w[k] =
-            (double)mesh->vert_pos[3 * (size_t)face[2] + k] - (double)mesh->vert_pos[3 * (size_t)face[0] + k];
-    }
-    double cross[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-    double length = fmax(sqrt(dot(cross, cross)), 1e-30);
-    for (int k = 0; k < 3; k++) normal[k] = cross[k] / length;
-}
-
 /* The surface point behind every pixel that sees a front side, with noise along its ray. */
 static npg_status take_points(npg_scanned *points, const picture *seen, const camera *c, const npg_mesh *mesh,
                               double noise, npg_random *random)
@@ -111,7 +90,7 @@ static npg_status take_points(npg_scanned *points, const picture *seen, const ca
         double y = ((double)(at / c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
         for (int k = 0; k < 3; k++)
             pos[k] = c->eye[k] + depth * (c->ahead[k] + x * c->right[k] + y * c->up[k]);
-        face_normal(normal, mesh, seen->face[at]);
+        npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * (size_t)seen->face[at]);
         double facing = 0;
         for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
         if (facing > 0) NPG_TRY(npg_scanned_add(points, pos, normal));

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "tools/synth/synth_body.h"
 
 /* Each cube is cut into six tetrahedra around its diagonal, so that neighbours

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/random.h"
 

@@ -11,9 +11,10 @@
 
 #include "export/forms/forms.h"
 #include "ingest/formats/reader.h"
-#include "job/file_facts.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
+#include "pipeline/file_facts.h"
+#include "pipeline/json_lines.h"
 
 struct npg_form_log {
     const char *output;
@@ -144,14 +145,14 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     return NPG_OK;
 }
 
-static npg_status each_line(const npg_form_facts *facts, npg_visit_line *visit, void *user)
+static npg_status each_line(const npg_form_facts *facts, npg_json_line_visit *visit, void *user)
 {
     struct stat info;
     char *path;
     NPG_TRY(npg_join_path(&path, facts->output, "frames.jsonl"));
     npg_status status = NPG_OK;
     if (stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-    if (!status) status = npg_frame_lines_each(path, (int64_t)info.st_size, visit, user);
+    if (!status) status = npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
     npg_release(&path);
     return status;
 }

@@ -1,7 +1,7 @@
 /* OBJ sequence beside a PLY one: OUT/obj/<prefix>_0000.obj. */
 #include <stdio.h>
 
-#include "export/export.h"
+#include "export/export_folder.h"
 #include "export/forms/forms.h"
 #include "export/forms/write_obj.h"
 #include "pipeline/file.h"

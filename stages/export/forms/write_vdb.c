@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "export/export.h"
+#include "export/export_folder.h"
 #include "export/forms/border_caps.h"
 #include "export/forms/forms.h"
 #include "export/forms/vdb_surface.h"

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "geometry/vec3.h"
+
 /* A number beyond this is damage, not a place: as origin it would swallow every other point. */
 #define ORIGIN_MAX 1e15
 #define SAMPLES    1001 /* of a cloud, for its median                                                     */
@@ -57,7 +59,7 @@ bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point
 
 void npg_unit_normal(float out[3], const double normal[3])
 {
-    double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    double length = npg_vec3_length(normal);
     bool usable = length > 1e-12 && isfinite(length); /* shorter ones have no direction */
     for (int a = 0; a < 3; a++) out[a] = usable ? (float)(normal[a] / length) : 0;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "geometry/vec3.h"
 #include "ingest/formats/formats.h"
 #include "ingest/formats/number.h"
 #include "ingest/formats/point_list.h"
@@ -77,8 +78,7 @@ static npg_status parse_row(reader *r, double values[COLUMNS_MAX], int *columns,
 
 static bool is_unit(const double *normal)
 {
-    double sq = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
-    return fabs(sqrt(sq) - 1) < UNIT_TOLERANCE;
+    return fabs(npg_vec3_length(normal) - 1) < UNIT_TOLERANCE;
 }
 
 static bool is_blank(const double *normal)

@@ -36,16 +36,13 @@ npg_status npg_source_open_fd(npg_source **out, int fd, const char *name)
     size_t window = WINDOW_SIZE;
     if (is_file && info.st_size < (off_t)WINDOW_SIZE) window = (size_t)info.st_size + 1;
     if (!status) status = npg_grow(&source->window, &source->capacity, window, 1, NPG_FOR_FILES);
-    if (status) {
-        npg_source_close(&source);
-        return status;
-    }
     source->fd = fd;
     source->is_seekable = is_file;
     source->size = is_file ? (uint64_t)info.st_size : UINT64_MAX;
     source->line_end = '\n';
+    if (status) npg_source_close(&source);
     *out = source;
-    return NPG_OK;
+    return status;
 }
 
 npg_status npg_source_open_file(npg_source **out, const char *path)

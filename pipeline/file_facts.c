@@ -1,5 +1,5 @@
 /* File facts: sizes and checksums. */
-#include "job/file_facts.h"
+#include "pipeline/file_facts.h"
 
 #include <errno.h>
 #include <stdio.h>

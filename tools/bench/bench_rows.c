@@ -1,0 +1,80 @@
+/* Bench rows: the rooms' work, timed and handed over. */
+#include "tools/bench/bench_rows.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/align.h"
+#include "geometry/geometry.h"
+#include "optimize/optimize.h"
+
+typedef struct bench {
+    npg_meter *meter;
+    const char *only;
+    npg_bench_visit *visit;
+    void *user;
+} bench;
+
+double npg_bench_share(const npg_bench_row *row, bool *by_bytes)
+{
+    double flops = row->work.flops / row->timing.in_flops.median;
+    double bytes = row->work.bytes / row->timing.in_bytes.median;
+    *by_bytes = bytes > flops;
+    return fmax(flops, bytes);
+}
+
+bool npg_bench_wants(const char *only, const char *name)
+{
+    for (const char *word = only; *word; word += strspn(word, ",")) {
+        size_t length = strcspn(word, ",");
+        if (!strncmp(name, word, length)) return true;
+        word += length;
+    }
+    return !*only;
+}
+
+/* An npg_work_visit. */
+static npg_status time_row(void *user, const npg_work *work)
+{
+    bench *b = user;
+    npg_bench_row row = {.work = *work};
+    if (!npg_bench_wants(b->only, work->name)) return NPG_OK;
+    NPG_TRY(
+        npg_error_prefix(npg_meter_time(&row.timing, b->meter, work->call, work->user), "%s", work->name));
+    return b->visit(b->user, &row);
+}
+
+npg_status npg_bench_kernels(npg_meter *meter, const npg_bench_body *body, const char *only,
+                             npg_bench_visit *visit, void *user)
+{
+    bench b = {meter, only, visit, user};
+    const npg_mesh *mesh = body->mesh;
+    uint32_t(*edges)[2];
+    size_t edge_count;
+    NPG_TRY(npg_mesh_edges(&edges, &edge_count, mesh->faces, mesh->face_count));
+    npg_workload load = {.vert_pos = mesh->vert_pos,
+                         .vert_normals = mesh->vert_normals,
+                         .vert_count = mesh->vert_count,
+                         .edges = (const uint32_t(*)[2])edges,
+                         .edge_count = edge_count,
+                         .points = (const float *const *)body->points,
+                         .frame_count = body->frame_count,
+                         .point_count = body->point_count};
+    npg_status status = npg_kernels_work(meter->device, &load, time_row, &b);
+    npg_release(&edges);
+    return status;
+}
+
+npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, npg_bench_visit *visit,
+                           void *user)
+{
+    bench b = {meter, only, visit, user};
+    npg_bench_body body;
+    NPG_TRY(npg_bench_body_open(&body, vertices, 1, 1));
+    npg_status status = npg_align_work(body.mesh, time_row, &b);
+    if (!status) status = npg_carry_work(body.mesh, time_row, &b);
+    if (!status)
+        status = npg_decoder_work(meter->device, body.mesh->vert_pos, body.mesh->vert_count, time_row, &b);
+    npg_bench_body_close(&body);
+    return status;
+}
