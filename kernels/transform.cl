@@ -40,8 +40,8 @@ inline turn turn_of(float8 o)
 
 /* x: [frames] x positions; rest: the positions to transform, `stride` floats
  * from frame to frame (0: the reference in all).  Global size: (rows, count). */
-kernel void transform_apply(global float *x, global const float *out, global const float *rest, int stride, int rows, int first,
-                            int count)
+kernel void transform_apply(global float *x, global const float *out, global const float *rest, int stride, int rows,
+                            int first, int count)
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
