@@ -8,9 +8,9 @@ npg_status npg_adam_open(npg_adam *adam, npg_device *device, const float *rates,
     size_t rate_count = (count + row - 1) / row;
     *adam = (npg_adam){.count = count,
                        .row = row,
-                       .beta1 = 0.9,
-                       .beta2 = 0.999,
-                       .epsilon = 1e-8,
+                       .beta1 = NPG_ADAM_BETA1,
+                       .beta2 = NPG_ADAM_BETA2,
+                       .epsilon = NPG_ADAM_EPSILON,
                        .scale = 1,
                        .span = (size_t)npg_device_tuning(device)->span};
     npg_status status = npg_program_open(&adam->program, device, "adam", "");
@@ -32,6 +32,7 @@ void npg_adam_close(npg_adam *adam)
 npg_status npg_adam_step(npg_adam *adam, const npg_buffer *parameters, const npg_buffer *gradient)
 {
     double step = (double)++adam->step;
+    /* The bias corrections, once on the host instead of for every parameter. */
     double c1 = adam->scale / (1 - pow(adam->beta1, step)), c2 = 1 / sqrt(1 - pow(adam->beta2, step));
     return NPG_LAUNCH(adam->program, "adam_step", (adam->count + adam->span - 1) / adam->span, 1,
                       NPG_BUF(parameters), NPG_BUF(&adam->first), NPG_BUF(&adam->second), NPG_BUF(gradient),

@@ -4,6 +4,11 @@
 
 #include "kernels/runtime/device.h"
 
+/* The decay of both moments, and what keeps the division finite: the values that Kingma and Ba recommend. */
+#define NPG_ADAM_BETA1   0.9
+#define NPG_ADAM_BETA2   0.999
+#define NPG_ADAM_EPSILON 1e-8
+
 /* State for one list of parameters. */
 typedef struct npg_adam {
     npg_program *program;

@@ -6,7 +6,7 @@
 void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
                        const float *rates, size_t row, size_t count, int64_t step)
 {
-    const double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8;
+    const double beta1 = NPG_ADAM_BETA1, beta2 = NPG_ADAM_BETA2, epsilon = NPG_ADAM_EPSILON;
     for (size_t i = 0; i < count; i++) {
         first[i] = beta1 * first[i] + (1 - beta1) * gradient[i];
         second[i] = beta2 * second[i] + (1 - beta2) * gradient[i] * gradient[i];

@@ -15,6 +15,7 @@ npg_status npg_check_values(float **values, double **wide, size_t n, double scal
     return status;
 }
 
+/* 1e-30 here and below: what is all zero is compared as it is, not divided by 0. */
 void npg_check_compare(double *error, const float *got, const double *want, size_t n)
 {
     double largest = 1e-30, worst = 0;

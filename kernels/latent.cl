@@ -1,8 +1,9 @@
 /* latent: grid features sampled at the reference vertices, z(v) = tanh(sum_k weight[v][k] node[index[v][k]]).
  *
  * The vertices and normals never move, so trilinear weights are a constant sparse matrix: K entries per vertex
- * forward, its transpose as row lists backward; no atomics, equal input gives equal bits.  The mean over levels
- * is part of the weights.  Every node has 32 channels, two vectors a and b of 16, of which its level uses a part (channel ranges). */
+ * forward, its transpose as row lists backward; no atomics, equal input gives equal bits.  The mean over levels is
+ * part of the weights.  Every node has 32 channels, two vectors a and b of 16, of which its level uses a part
+ * (channel ranges). */
 
 /* z: [rows][32]; index, weight: [rows][K]; nodes: [node_count][32].  Global size: (rows). */
 kernel void latent_sample(global float *z, global const float *nodes, global const int *index,

@@ -111,7 +111,7 @@ npg_status npg_slope_latent(uint64_t seed, double *error)
     if (!status) {
         latent_value(&d);
         npg_latent_back_ref(d.dnodes, d.dz_wide, d.z, &d.samples);
-        /* channels that a level does not use have no gradient by definition: look at those it uses */
+        /* channels that a level does not use have no gradient by definition: check those it uses */
         for (size_t n = 0; n < d.samples.node_count; n += 7) {
             size_t lo = (size_t)NPG_CHANNEL_FIRST(d.samples.channels[n]),
                    end = (size_t)NPG_CHANNEL_END(d.samples.channels[n]);

@@ -1,16 +1,17 @@
 /* Layout: how data lies in device buffers, for kernels (.cl) and host code (.c) alike.
  *
- * Read by both: the C files include it, and the build puts its text before the text of every kernel (CMakeLists.txt),
- * so it holds nothing but numbers and formulas.  Changing a number alone is not enough where the kernels' code has it
- * in its types, as float16 for NPG_LANES. */
+ * Read by both: the C files include it, and the build puts its text before the text of every kernel
+ * (CMakeLists.txt), so it holds nothing but numbers and formulas.  Changing a number alone is not enough
+ * where the kernels' code has it in its types, as float16 for NPG_LANES. */
 #ifndef NPG_LAYOUT_H
 #define NPG_LAYOUT_H
 
 /* ---- points and boxes ---- */
 
-/* Points and vertices lie in blocks of 16, coordinate by coordinate: [block][3][16].  16 floats are the widest
- * vector of OpenCL and of AVX-512, so one instruction does the same for 16 neighbours, and a block is three whole
- * cache lines.  The last block is padded with repeats of the last point; a search that finds one of them has found that point. */
+/* Points and vertices lie in blocks of 16, coordinate by coordinate: [block][3][16].  16 floats are the
+ * widest vector of OpenCL and of AVX-512, so one instruction does the same for 16 neighbours, and a block
+ * is three whole cache lines.  The last block is padded with repeats of the last point; a search that
+ * finds one of them has found that point. */
 #define NPG_LANES       16
 #define NPG_POINT_BLOCK (3 * NPG_LANES) /* floats of a block of points: 48 */
 
@@ -57,12 +58,12 @@
 
 /* ---- the decoder (mlp) ---- */
 
-/* Matrices lie in panels of 32 columns, [panel][row][32], so that the operands of the inner products are contiguous:
- * two vectors of 16 are what the widest register tile takes from a row. */
+/* Matrices lie in panels of 32 columns, [panel][row][32], so that the operands of the inner products are
+ * contiguous: two vectors of 16 are what the widest register tile takes from a row. */
 #define NPG_PANEL 32
 
-/* Floats of the decoder's output for a vertex: 8, so one vector, of which four of rotation and three of translation
- * are used.  The rows of its last weights W3 have 16 columns, zero from the eighth on. */
+/* Floats of the decoder's output for a vertex: 8, so one vector, of which four of rotation and three of
+ * translation are used.  The rows of its last weights W3 have 16 columns, zero from the eighth on. */
 #define NPG_MLP_OUT    8
 #define NPG_MLP_USED   7
 #define NPG_MLP_W3_ROW 16

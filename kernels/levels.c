@@ -40,9 +40,10 @@ void npg_level_sample(const npg_level *level, const float point[3], int32_t rows
     for (int axis = 0; axis < 3; axis++) {
         float last = (float)(level->nodes - 1);
         float at = fminf(fmaxf((point[axis] + 1) * 0.5f * last, 0), last);
-        cell[axis] = (uint32_t)fminf(floorf(at), last - 1);
+        cell[axis] = (uint32_t)fminf(floorf(at), last - 1); /* the upper border belongs to the last cell */
         part[axis] = at - (float)cell[axis];
     }
+    /* Corner bits: x, y, z from the highest, so that rows of the table are met in order. */
     for (int corner = 0; corner < NPG_CELL_NODES; corner++) {
         uint32_t at[3];
         float weight = (float)level->share;

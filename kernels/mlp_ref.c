@@ -2,7 +2,7 @@
 #include "kernels/mlp.h"
 
 #define CHANNELS  NPG_LATENT_CHANNELS
-#define WIDTH_MAX 4096
+#define WIDTH_MAX 4096 /* of a hidden layer: the most that options width-1 and width-2 take */
 
 static double leaky(double x, double slope)
 {

@@ -48,7 +48,7 @@ static int by_key(const void *a, const void *b)
 }
 
 /* Spread the low 21 bits to every third bit. */
-static uint64_t spread(uint64_t v)
+static uint64_t spread_bits(uint64_t v)
 {
     v &= 0x1fffff;
     v = (v | v << 32) & 0x1f00000000ffffULL;
@@ -65,11 +65,11 @@ npg_status npg_morton_order(uint32_t *order, const float *points, size_t count)
     NPG_TRY(npg_alloc_array(&keys, NPG_FOR_FIT, count, sizeof *keys));
     for (size_t i = 0; i < 3 * count; i++) lo[i % 3] = fminf(lo[i % 3], points[i]);
     for (size_t i = 0; i < 3 * count; i++) extent = fmaxf(extent, points[i] - lo[i % 3]);
-    float scale = extent > 0 ? 2097151.0f / extent : 0;
+    float scale = extent > 0 ? 2097151.0f /* 2^21 - 1, the last cell of an axis */ / extent : 0;
     for (size_t i = 0; i < count; i++) {
         keys[i].index = (uint32_t)i;
         for (size_t axis = 0; axis < 3; axis++)
-            keys[i].key |= spread((uint64_t)((points[3 * i + axis] - lo[axis]) * scale)) << axis;
+            keys[i].key |= spread_bits((uint64_t)((points[3 * i + axis] - lo[axis]) * scale)) << axis;
     }
     qsort(keys, count, sizeof *keys, by_key);
     for (size_t i = 0; i < count; i++) order[i] = keys[i].index;

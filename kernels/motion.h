@@ -1,4 +1,4 @@
-/* motion: what happens to vertices once the decoder has spoken: transform, nearest, chamfer, pull, isometry;
+/* motion: what follows the decoder: transform, nearest, chamfer, pull, isometry;
  * one .cl and one _ref.c for each.  Positions on the device are in blocks of 16 (layout.h). */
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H

@@ -1,9 +1,10 @@
 /* nearest: the closest of a set of points, for many queries in many frames.
  *
- * A tree holds the points in Morton order in leaves of 16; a box block holds the boxes of 16 children; the level above
- * has a box for each of those, up to one block.  Tests run on 16 boxes or points at once.  Points that move keep their order and leaves: refitting the boxes is enough.
- * A search starts from a known candidate (the answer of the last epoch, or of the neighbouring query), so that it
- * mostly has to confirm it.  Ties go to the candidate, then to the lower index.
+ * A tree holds the points in Morton order in leaves of 16; a box block holds the boxes of 16 children; the level
+ * above has a box for each of those, up to one block.  Tests run on 16 boxes or points at once.  Points that move
+ * keep their order and leaves: refitting the boxes is enough.  A search starts from a known candidate (the answer of
+ * the last epoch, or of the neighbouring query), so that it mostly has to confirm it.  Ties go to the candidate,
+ * then to the lower index.
  *
  * Layouts of points, boxes and slots: layout.h; a leaf is a block of points. */
 

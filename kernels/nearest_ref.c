@@ -1,4 +1,4 @@
-/* nearest: the plain twin of nearest.cl, in double: look at every point. */
+/* nearest: the plain twin of nearest.cl, in double: compares with every point. */
 #include "kernels/motion.h"
 
 size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *points, size_t count)

@@ -8,10 +8,10 @@
  * together (align/tracker.h). */
 
 /* pulls: [..][16] floats = v0 v1 v2 (as int bits) w | b0 b1 b2 a | q x y z 0 | n x y z 0, those of frame f from
- * start[f] to start[f + 1].  x, g: blocks, frame after frame; g is overwritten.  loss: [frames].  A frame has
- * LOCAL work-items (build constant, from the tuning of the device); each owns every LOCAL-th block of 16 vertices, walks
- * the list in order and adds what pulls at its own: equal input gives equal bits.
- * Global size: one group of LOCAL items per frame, frames first ... */
+ * start[f] to start[f + 1].  x, g: blocks, frame after frame; g is overwritten.  loss: [frames].  A frame has LOCAL
+ * work-items (build constant, from the tuning of the device); each owns every LOCAL-th block of 16 vertices, walks
+ * the list in order and adds what pulls at its own: equal input gives equal bits.  Global size: one group of LOCAL
+ * items per frame, frames first ... */
 #define IS_MINE(v) ((v) / NPG_LANES % LOCAL == ITEM)
 
 GROUP_KERNEL

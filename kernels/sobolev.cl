@@ -41,7 +41,8 @@ kernel void sobolev_pass(global float *out, global const float *in, global const
         vstore16(vload16(2 * at.first + 1, in), 2 * at.first + 1, out);
         return;
     }
-    global const float *m = matrices + levels[NPG_GRID * at.level + NPG_GRID_MATRIX], *e = eigen + eigen_first[at.level];
+    global const float *m = matrices + levels[NPG_GRID * at.level + NPG_GRID_MATRIX];
+    global const float *e = eigen + eigen_first[at.level];
     float e_line = e[at.line / at.n] + e[at.line % at.n];
     for (int i = 0; i < at.n; i++) {
         float16 a = 0.0f, b = 0.0f;

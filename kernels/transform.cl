@@ -8,7 +8,7 @@
  *     ROTATION 2    exponential map of the rotation vector (o1, o2, o3)
  */
 
-#define REACH 0.1f
+#define REACH 0.1f /* farthest translation along an axis, in units (paper) */
 
 typedef struct turn {
     float s;     /* scalar part of the unit quaternion */
@@ -16,7 +16,8 @@ typedef struct turn {
     float scale; /* 1 / norm before normalising        */
 } turn;
 
-/* half_sinc(t) = sin(t / 2) / t and its derivative over t, divided by t. */
+/* half_sinc(t) = sin(t / 2) / t and its derivative over t, divided by t.  For small t the differences of nearly equal
+ * numbers keep too few digits; the first terms of the series are then exact to those of a float. */
 inline float half_sinc(float t)
 {
     return t > 1e-3f ? sin(0.5f * t) / t : 0.5f - t * t / 48.0f;
@@ -40,8 +41,8 @@ inline turn turn_of(float8 o)
 
 /* x: [frames] x positions; rest: the positions to transform, `stride` floats
  * from frame to frame (0: the reference in all).  Global size: (rows, count). */
-kernel void transform_apply(global float *x, global const float *out, global const float *rest, int stride, int rows, int first,
-                            int count)
+kernel void transform_apply(global float *x, global const float *out, global const float *rest, int stride, int rows,
+                            int first, int count)
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;

@@ -3,7 +3,7 @@
 
 #include "kernels/motion.h"
 
-#define REACH 0.1
+#define REACH 0.1 /* as in transform.cl */
 
 /* The unit quaternion (s, x, y, z) of the decoder's first four values. */
 static void quaternion_of(double q[4], const double out[7], npg_rotation rotation)

@@ -198,7 +198,8 @@ static npg_status open_moves(moves *m, npg_device *device, const npg_workload *l
                            rows, load->edges, load->edge_count, targets, m->count);
 }
 
-/* As above; nearest neighbours are not counted in operations, how many the search takes depends on the data. */
+/* As above; nearest neighbours are not counted in operations, how many the search takes depends on the
+ * data. */
 static npg_status visit_moves(const visitor *to, moves *m, const npg_workload *load, size_t rows)
 {
     const double T = (double)m->count, V = (double)rows, N = (double)load->point_count;

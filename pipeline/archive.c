@@ -17,6 +17,7 @@ typedef struct block_head {
     uint64_t size;
 } block_head;
 
+/* Blocks begin at multiples of 8, so that what is found can be read as int64_t or double in place. */
 static size_t padded(uint64_t size)
 {
     return (size_t)((size + 7) / 8 * 8);
@@ -109,9 +110,9 @@ static npg_status read_all(int fd, unsigned char *bytes, size_t size, const char
     return NPG_OK;
 }
 
-static npg_status check(const npg_archive *a, const char *path)
+static npg_status verify(const npg_archive *a, const char *path)
 {
-    const size_t tail = sizeof(block_head) + sizeof(uint64_t);
+    const size_t tail = sizeof(block_head) + sizeof(uint64_t); /* the last block, with the checksum */
     uint64_t hash;
     if (a->size < sizeof magic + tail || memcmp(a->bytes, magic, sizeof magic) != 0)
         return npg_error(NPG_BAD_INPUT, "%s is damaged: it does not begin as an archive", path);
@@ -137,7 +138,7 @@ npg_status npg_archive_open(npg_archive **out, const char *path)
     if (!status) status = npg_alloc(&a->bytes, NPG_FOR_FILES, a->size);
     if (!status) status = read_all(fd, a->bytes, a->size, path);
     if (fd >= 0) close(fd);
-    if (!status) status = check(a, path);
+    if (!status) status = verify(a, path);
     if (status) npg_archive_close(&a);
     *out = a;
     return status;

@@ -27,7 +27,7 @@ npg_status npg_archive_put(npg_archive_writer *writer, const char *name, const v
 /* Closes the writer in any case. */
 npg_status npg_archive_commit(npg_archive_writer **writer);
 
-/* Give up: nothing remains.  NULL is fine. */
+/* Close without a result: nothing remains on disk.  NULL is fine. */
 void npg_archive_discard(npg_archive_writer **writer);
 
 /* ---- reading ---- */

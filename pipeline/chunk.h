@@ -64,10 +64,8 @@ typedef struct npg_frame {
     size_t vert_count; /* V                                                         */
     float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates */
     npg_figures figures;
-    /* owned; on the last frame that a window waits for: what stage align needs to be resumed after it; NULL
-     * on all others */
-    void *align_state;
-    size_t align_state_size; /* bytes */
+    void *align_state;       /* owned; on the last frame that a window waits for: what resumes stage align */
+    size_t align_state_size; /* after it; NULL on all others                                               */
 } npg_frame;
 
 typedef struct npg_chunk npg_chunk;

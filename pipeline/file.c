@@ -12,7 +12,7 @@
 
 #include "pipeline/memory.h"
 
-#define BUFFER_SIZE (256 << 10)
+#define BUFFER_SIZE (256 << 10) /* bytes gathered before a write: few system calls for many small pieces */
 
 struct npg_file {
     int fd;
@@ -43,7 +43,8 @@ static npg_status folder_of(char **out, const char *path)
     return NPG_OK;
 }
 
-static npg_status hide(char **out, const char *path)
+/* "<folder>/.<name>.part", where the file is written until it is whole. */
+static npg_status make_hidden_path(char **out, const char *path)
 {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
     size_t folder = (size_t)(name - path), size = strlen(path) + 8;
@@ -64,7 +65,7 @@ static void free_file(npg_file **slot)
 static npg_status fill_file(npg_file *file, const char *path)
 {
     NPG_TRY(npg_copy_text(&file->path, path));
-    NPG_TRY(hide(&file->hidden_path, path));
+    NPG_TRY(make_hidden_path(&file->hidden_path, path));
     NPG_TRY(folder_of(&file->folder, path));
     NPG_TRY(npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
     file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
@@ -96,7 +97,7 @@ static npg_status write_through(npg_file *file, const unsigned char *data, size_
     while (size) {
         ssize_t written = write(file->fd, data, size);
         if (written < 0 && errno == EINTR) continue;
-        if (written == 0) errno = ENOSPC;
+        if (written == 0) errno = ENOSPC; /* nothing was written, and no cause was given */
         if (written <= 0) return keep_failure(file, "write");
         data += written;
         size -= (size_t)written;
@@ -160,7 +161,7 @@ static npg_status sync_folder(npg_file *file)
 {
     int fd = open(file->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return keep_failure(file, "sync the folder of");
-    int failed = fsync(fd) && errno != EINVAL;
+    int failed = fsync(fd) && errno != EINVAL; /* EINVAL: some file systems have nothing to sync there */
     if (failed) keep_failure(file, "sync the folder of");
     close(fd);
     return failed ? file->status : NPG_OK;
@@ -175,7 +176,8 @@ npg_status npg_file_commit(npg_file **slot)
     file->fd = -1;
     if (!file->status && closed) keep_failure(file, "close");
     if (!file->status && rename(file->hidden_path, file->path)) keep_failure(file, "rename to");
-    /* Where the folder can't be synced the file stands under its name already: the failure is reported all the same. */
+    /* Where the folder can't be synced the file stands under its name already: the failure is reported all
+     * the same. */
     npg_status status = file->status ? npg_error_restore(file->status, file->cause) : sync_folder(file);
     if (file->status) unlink(file->hidden_path);
     free_file(slot);
@@ -193,6 +195,8 @@ void npg_file_discard(npg_file **slot)
 
 /* ---- reading ---- */
 
+/* O_NONBLOCK: opening a pipe without a writer would wait for one; O_NOCTTY: a terminal must not become
+ * ours. */
 npg_status npg_file_open_plain(int *out, const char *path, npg_status failure)
 {
     struct stat info;

@@ -22,14 +22,14 @@ npg_status npg_file_print(npg_file *file, const char *format, ...) NPG_PRINTF(2,
 /* Bytes written so far. */
 uint64_t npg_file_size(const npg_file *file);
 
-/* Write over bytes that were written before, where a header tells of what comes after it.  Failures as with
- * npg_file_write(). */
+/* Write over bytes that were written before, where a header states sizes of what follows it.  Failures as
+ * with npg_file_write(). */
 npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size);
 
 /* Make the file appear under its name; closes it in any case. */
 npg_status npg_file_commit(npg_file **file);
 
-/* Give up: nothing remains.  NULL is fine. */
+/* Close without a result: the hidden file is removed.  NULL is fine. */
 void npg_file_discard(npg_file **file);
 
 /* Open a plain file for reading; *fd is the caller's, -1 on failure.  Never waits:
@@ -46,7 +46,7 @@ bool npg_path_is_inside(const char *path, const char *folder);
 /* NPG_BAD_INPUT, by name, for one that is not inside: what option confine is for. */
 npg_status npg_path_confine(const char *path, const char *folder);
 
-/* NPG_USAGE where a link stands in the place of a folder. */
+/* NPG_USAGE where a symbolic link stands in the place of a folder (option confine). */
 npg_status npg_folder_is_own(const char *folder);
 
 /* Make a folder and its parents. */

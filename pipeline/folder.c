@@ -11,6 +11,8 @@
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 
+enum { WALK_FDS = 16 }; /* folders that nftw() keeps open at a time */
+
 /* The number between prefix and extension; false for any other name. */
 static bool number_in(const char *name, const char *prefix, const char *extension, int64_t *number)
 {
@@ -46,7 +48,8 @@ npg_status npg_folder_numbers(int64_t **numbers, size_t *count, const char *fold
     return status;
 }
 
-static _Thread_local npg_status removed; /* NPG_OK, or the first failure */
+/* nftw() hands no pointer through: what a removal came to.  NPG_OK, or the first failure. */
+static _Thread_local npg_status removed;
 
 static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
 {
@@ -59,7 +62,7 @@ static int remove_entry(const char *path, const struct stat *info, int kind, str
 npg_status npg_folder_remove(const char *path)
 {
     removed = NPG_OK;
-    if (nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS) && errno != ENOENT && !removed)
+    if (nftw(path, remove_entry, WALK_FDS, FTW_DEPTH | FTW_PHYS) && errno != ENOENT && !removed)
         removed = npg_error_errno(NPG_DISK, "can't remove %s", path);
     return removed;
 }

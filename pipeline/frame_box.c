@@ -62,6 +62,7 @@ npg_status npg_frame_box_set(npg_frame_box *box, const npg_origin *origin, const
         box->origin[a] = origin->world[a];
         box->centre[a] = bounds->lo[a] + side / 2;
     }
+    /* Below, the scale would be larger than a float can hold (3e38). */
     if (!(longest > 1e-30)) return npg_error(NPG_BAD_INPUT, "all points of all frames are in one place");
     box->scale = NPG_UNIT_EXTENT / (longest / 2);
     box->diagonal = npg_bounds_diagonal(bounds);

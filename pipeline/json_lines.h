@@ -8,11 +8,12 @@
 
 #include "pipeline/status.h"
 
-/* Given each line in turn: its object, a loan, and its bytes with their newline.  A failure ends the visit. */
+/* Given each line in turn: its object, a loan, and its bytes with their newline.  A failure ends the
+ * visit. */
 typedef npg_status npg_json_line_visit(void *user, const json_t *object, const char *line, size_t size);
 
-/* The lines in the first `bytes` bytes of a file.  NPG_DISK when it can't be read, NPG_BAD_INPUT where these are no
- * whole lines with an object each. */
+/* The lines in the first `bytes` bytes of a file.  NPG_DISK when it can't be read, NPG_BAD_INPUT where
+ * these are no whole lines with an object each. */
 npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user);
 
 #endif

@@ -9,6 +9,8 @@
 #include "pipeline/memory.h"
 
 /* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
+/* Bounds as in RFC 3629: c0, c1 and e0 8x, f0 8x would be too long, ed ax a surrogate, f4 9x beyond
+ * 10ffff. */
 static size_t sequence_length(const unsigned char *text)
 {
     unsigned char c = text[0];

@@ -1,8 +1,8 @@
 /* Latch: a count that only grows, raised by one thread and waited for by others.
  *
  * Like a ring it has an end that both sides see: once aborted it stays so, and whoever waits is woken.
- * The run aborts the latches that its stages opened (npg_worker_open_latch) when it stops or fails,
- * so a wait needs neither a clock nor a look at the run.
+ * The run aborts the latches that its stages opened (npg_worker_open_latch) when it stops or fails, so a
+ * wait needs neither a clock nor a look at the run.
  *
  * Threads: all functions but close from any thread. */
 #ifndef NPG_LATCH_H

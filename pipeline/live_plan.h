@@ -7,7 +7,7 @@
  *   1 .. B            backward to frame 0; all their frames came before the plan was made
  *   B + 1, B + 2, ..  forward for as long as frames come; the first of them starts from window 0
  * so that a stage that solves window after window holds two windows of frames at most (the look-ahead and a
- * window where the source ends inside window 0), however long the source goes on.  A forward window begins
+ * window where the source ends inside window 0), however long the source lasts.  A forward window begins
  * `overlap` frames before its new ones even where the source ends inside it, so nothing older has to be kept;
  * that last window is then shorter.  The functions take both kinds of plans; an ordinary one gives what
  * pipeline/plan.h gives.

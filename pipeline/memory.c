@@ -8,7 +8,7 @@
 
 #include "pipeline/struct_size.h"
 
-#define ALIGN 64
+#define ALIGN 64 /* a cache line, and the widest vector (16 floats) */
 
 typedef struct head { /* sits in the 64 bytes before every block */
     size_t size;
@@ -143,7 +143,7 @@ npg_status npg_grow(void *array, size_t *capacity, size_t need, size_t size, npg
     if (need <= *capacity) return NPG_OK;
     size_t count = need > SIZE_MAX / 2 ? need : *capacity + *capacity / 2;
     if (count < need) count = need;
-    if (count < 16) count = 16;
+    if (count < 16) count = 16; /* the first few elements would else each move the array */
     NPG_TRY(npg_alloc_array(&bigger, purpose, count, size));
     if (*slot) memcpy(bigger, *slot, *capacity * size);
     npg_release(slot);

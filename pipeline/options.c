@@ -57,7 +57,7 @@ const npg_option *npg_option_at(size_t i, const char **stage)
     return option_at(npg_chain, i, stage);
 }
 
-static const npg_option *find(const npg_options *options, const char *name, size_t *at)
+static const npg_option *find_option(const npg_options *options, const char *name, size_t *at)
 {
     const npg_option *option;
     for (*at = 0; (option = option_at(options->chain, *at, NULL)); ++*at)
@@ -80,6 +80,7 @@ npg_status npg_options_describe(size_t i, npg_option_info *info)
 
 /* ---- values ---- */
 
+/* The place of a word among "a|b|c", -1 when it is none of them. */
 static int which_choice(const char *choices, const char *text)
 {
     size_t length = strlen(text);
@@ -92,6 +93,7 @@ static int which_choice(const char *choices, const char *text)
     return -1;
 }
 
+/* 1 for yes, 0 for no, -1 for neither. */
 static int which_flag(const char *text)
 {
     return which_choice("no|false|off|0", text) >= 0 ? 0 : which_choice("yes|true|on|1", text) >= 0 ? 1 : -1;
@@ -237,7 +239,7 @@ npg_status npg_options_set(npg_options *options, const char *name, const char *v
     size_t at;
     char *text;
     NPG_REQUIRE(options && name && value);
-    const npg_option *option = find(options, name, &at);
+    const npg_option *option = find_option(options, name, &at);
     if (!option) return npg_error(NPG_USAGE, "there is no option %s", name);
     NPG_TRY(npg_option_check(option, value));
     NPG_TRY(npg_copy_text(&text, value));
@@ -249,16 +251,16 @@ npg_status npg_options_set(npg_options *options, const char *name, const char *v
 bool npg_options_is_set(const npg_options *options, const char *name)
 {
     size_t at;
-    return find(options, name, &at) && options->texts[at];
+    return find_option(options, name, &at) && options->texts[at];
 }
 
 /* The preset by name; quality best is one as well, where no other is named. */
 static const char *chosen_preset(const npg_options *options)
 {
     size_t at, quality;
-    const npg_option *option = find(options, "preset", &at);
+    const npg_option *option = find_option(options, "preset", &at);
     if (options->texts[at]) return options->texts[at];
-    bool is_best = find(options, "quality", &quality) && options->texts[quality] &&
+    bool is_best = find_option(options, "quality", &quality) && options->texts[quality] &&
                    !strcmp(options->texts[quality], "best");
     return is_best ? "best" : option->default_text;
 }
@@ -285,7 +287,7 @@ static const char *text_of(const npg_options *options, const npg_option *option,
 const char *npg_options_get(const npg_options *options, const char *name)
 {
     size_t at;
-    const npg_option *option = options && name ? find(options, name, &at) : NULL;
+    const npg_option *option = options && name ? find_option(options, name, &at) : NULL;
     return option ? text_of(options, option, at) : NULL;
 }
 
@@ -305,7 +307,7 @@ void npg_options_fill(const npg_options *options, const npg_option *table, void 
 {
     for (const npg_option *option = table; option && option->name; option++) {
         size_t at;
-        bool is_known = find(options, option->name, &at) == option;
+        bool is_known = find_option(options, option->name, &at) == option;
         npg_option_store(option, is_known ? text_of(options, option, at) : option->default_text, state);
     }
 }
@@ -360,7 +362,7 @@ static npg_status set_all_from_json(npg_options *options, json_t *root, const ch
 
 npg_status npg_options_load(npg_options *options, const char *path)
 {
-    enum { LIMIT = 1 << 20 };
+    enum { LIMIT = 1 << 20 }; /* bytes; all options together take a few thousand */
     char *text;
     json_t *root;
     NPG_REQUIRE(options && path);

@@ -13,7 +13,7 @@ typedef struct helper {
     pthread_t thread;
     bool is_started;
     npg_status status;
-    char error[512]; /* error texts belong to threads */
+    char error[512]; /* its error text, which is per thread (npg_error_text) */
 } helper;
 
 static void *do_part(void *argument)
@@ -48,6 +48,7 @@ size_t npg_parallel_parts(size_t count, size_t least, size_t most)
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     size_t parts = cores < 1 ? 1 : (size_t)cores;
     if (most && parts > most) parts = most;
+    /* One part more than full ones: below `least` items there is one, from there on two. */
     if (parts > count / least + 1) parts = count / least + 1;
     return parts > NPG_PARALLEL_MAX ? NPG_PARALLEL_MAX : parts;
 }

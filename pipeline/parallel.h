@@ -6,7 +6,7 @@
 
 #include "pipeline/status.h"
 
-#define NPG_PARALLEL_MAX 64
+#define NPG_PARALLEL_MAX 64 /* parts; their state is on the stack of the caller */
 
 /* Code that gcc builds for several widths of x86 processor; which one runs is settled when the program is
  * loaded (the sanitizers' start-up code can't do that).  For small loops over plain arrays. */

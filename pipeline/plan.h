@@ -2,7 +2,7 @@
  *
  * Windows go outward from the one that holds the keyframe: window 0 is around it,
  * then all later windows forward in time, then all earlier ones backward.
- * A window shares `overlap` frames with the one it starts from.  Windows of appended frames go on forward,
+ * A window shares `overlap` frames with the one it starts from.  Windows of appended frames continue forward,
  * each with the last `overlap` frames before its new ones. */
 #ifndef NPG_PLAN_H
 #define NPG_PLAN_H
@@ -16,7 +16,7 @@ typedef struct npg_plan {
     int64_t key;         /* index of the keyframe                              */
     int64_t window;      /* frames per window; >= T: one joint window over all */
     int64_t overlap;     /* frames shared with the neighbour, < window         */
-    /* of a run that goes on with frames which came later; all 0 without */
+    /* of a run that is continued with frames which came later; all 0 without */
     int64_t appended_at; /* frames before this one are solved; the windows are those of the rest, forward */
     int64_t first_count; /* frame_count of the first plan: it decides where the window of the keyframe lies */
 } npg_plan;
@@ -40,7 +40,7 @@ int64_t npg_plan_read_count(const npg_plan *plan);
 /* How many of them are read before window i can be solved: it brings their last. */
 int64_t npg_plan_read_before(const npg_plan *plan, int64_t i);
 
-/* True for the window that holds the last frame in time: later frames go on from there. */
+/* True for the window that holds the last frame in time: later frames continue from there. */
 bool npg_plan_is_last_forward(const npg_plan *plan, int64_t i);
 
 int64_t npg_plan_window_count(const npg_plan *plan);

@@ -13,6 +13,7 @@ typedef struct npg_random {
     uint64_t state;
 } npg_random;
 
+/* The output function of SplitMix64 (David Stafford's mix 13). */
 static inline uint64_t npg_random_mix(uint64_t x)
 {
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -20,7 +21,8 @@ static inline uint64_t npg_random_mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
-/* The stream of a seed and two keys (a frame, a purpose). */
+/* The stream of a seed and two keys (a frame, a purpose).  Its odd factors are 2^64 / g and 2^64 / g^3, g
+ * = 1.2207 (x^4 = x + 1); they keep key_a = 1 apart from key_b = 1. */
 static inline npg_random npg_random_stream(uint64_t seed, uint64_t key_a, uint64_t key_b)
 {
     uint64_t state = npg_random_mix(seed + 0x9e3779b97f4a7c15u);
@@ -28,6 +30,7 @@ static inline npg_random npg_random_stream(uint64_t seed, uint64_t key_a, uint64
     return (npg_random){npg_random_mix(state ^ (key_b * 0x8cb92ba72f3d8dd7u + 2))};
 }
 
+/* The counter's step is 2^64 / golden ratio, as in SplitMix64. */
 static inline uint64_t npg_random_bits(npg_random *random)
 {
     random->state += 0x9e3779b97f4a7c15u;
@@ -40,13 +43,15 @@ static inline double npg_random_real(npg_random *random)
     return (double)(npg_random_bits(random) >> 11) * 0x1p-53;
 }
 
-/* Uniform in 0 .. count - 1; count >= 1.  The bias of 2^-64 x count is of no matter here. */
+/* Uniform in 0 .. count - 1; count >= 1.  The high half of a product (Lemire 2019, without its second
+ * draw): the bias of 2^-64 x count can't be seen in any sample drawn here. */
 static inline uint64_t npg_random_below(npg_random *random, uint64_t count)
 {
     return (uint64_t)(((unsigned __int128)npg_random_bits(random) * count) >> 64);
 }
 
-/* Gaussian with mean 0 and deviation 1 (Box and Muller; one of the pair). */
+/* Gaussian with mean 0 and deviation 1 (Box and Muller 1958; one of the pair).  u is in (0, 1], as its
+ * logarithm needs; v turns by 2 pi. */
 static inline double npg_random_gauss(npg_random *random)
 {
     double u = 1 - npg_random_real(random), v = npg_random_real(random);

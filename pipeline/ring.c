@@ -10,8 +10,8 @@ typedef enum ring_state { RING_OPEN, RING_ENDED, RING_ABORTED } ring_state;
 
 struct npg_ring {
     pthread_mutex_t lock;
-    pthread_cond_t changed_full,
-        changed_empty; /* the producer waits on the first, the consumer on the second */
+    pthread_cond_t changed_full;  /* the producer waits for room   */
+    pthread_cond_t changed_empty; /* the consumer waits for chunks */
     ring_state state;
     size_t capacity, count, first;
     double push_wait_s, pop_wait_s;
@@ -95,7 +95,8 @@ npg_status npg_ring_pop(npg_ring *ring, npg_chunk **chunk)
     return status;
 }
 
-static void leave_open(npg_ring *ring, ring_state state)
+/* From OPEN to one of the two ends; an abort also takes the place of an end. */
+static void set_end(npg_ring *ring, ring_state state)
 {
     pthread_mutex_lock(&ring->lock);
     if (state == RING_ABORTED || ring->state == RING_OPEN) ring->state = state;
@@ -107,11 +108,11 @@ static void leave_open(npg_ring *ring, ring_state state)
 
 void npg_ring_end(npg_ring *ring)
 {
-    leave_open(ring, RING_ENDED);
+    set_end(ring, RING_ENDED);
 }
 void npg_ring_abort(npg_ring *ring)
 {
-    leave_open(ring, RING_ABORTED);
+    set_end(ring, RING_ABORTED);
 }
 
 void npg_ring_waits(npg_ring *ring, double *push_wait_s, double *pop_wait_s)

@@ -31,9 +31,9 @@ npg_status npg_error_restore(npg_status status, const char *text);
 /* Cleaning up after a failure: one way everywhere, without goto.
  *
  *   - A function that holds nothing returns at once: NPG_TRY(call).
- *   - A function that holds something frees it in one place, at its end, whether things went well or not.  What
- *     it frees begins as NULL (closers take that), calls are chained, and work between calls that can fail
- *     becomes a function of its own, which holds nothing:
+ *   - A function that holds something frees it in one place, at its end, whether things went well or not.
+ *     What it frees begins as NULL (closers take that), calls are chained, and work between calls that
+ *     can fail becomes a function of its own, which holds nothing:
  *
  *         npg_status status = npg_alloc_array(&index, NPG_FOR_MESH, count, sizeof *index);
  *         if (!status) status = npg_kdtree_open(&tree, points, count);
@@ -42,7 +42,7 @@ npg_status npg_error_restore(npg_status status, const char *text);
  *         npg_release(&index);
  *         return status;
  *
- *   - A function that hands out what it opens gives it up before it returns a failure:
+ *   - A function that hands out what it opens closes it before it returns a failure:
  *
  *         if (status) npg_thing_close(&thing);
  *         *out = thing;

@@ -214,7 +214,7 @@ static npg_status tune_knob(tune *t, const one_number *knob)
 
 static npg_status keep(const tune *t)
 {
-    char path[4200];
+    char path[NPG_CACHE_PATH];
     if (*t->s.output)
         snprintf(path, sizeof path, "%s", t->s.output);
     else

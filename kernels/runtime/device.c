@@ -69,7 +69,7 @@ npg_status npg_device_describe(size_t i, npg_device_info *info)
     return status;
 }
 
-static bool has_part(const char *text, const char *part)
+static bool contains_ignoring_case(const char *text, const char *part)
 {
     size_t size = strlen(part);
     for (; *text; text++)
@@ -77,14 +77,14 @@ static bool has_part(const char *text, const char *part)
     return false;
 }
 
-static bool fits(const npg_device_info *info, size_t i, const char *spec)
+static bool matches_spec(const npg_device_info *info, size_t i, const char *spec)
 {
     char *end;
     unsigned long number = strtoul(spec, &end, 10);
     if (isdigit((unsigned char)*spec) && !*end) return number == i;
     if (!strcmp(spec, "cpu")) return info->is_cpu;
     if (!strcmp(spec, "gpu")) return !info->is_cpu;
-    return has_part(info->name, spec);
+    return contains_ignoring_case(info->name, spec);
 }
 
 static npg_status choose_device(npg_device *device, const char *spec)
@@ -97,7 +97,7 @@ static npg_status choose_device(npg_device *device, const char *spec)
         for (size_t i = 0; i < count; i++) {
             NPG_TRY(read_facts(&device->info, ids[i]));
             device->id = ids[i];
-            if (*spec ? fits(&device->info, i, spec) : any || device->info.is_cpu) return NPG_OK;
+            if (*spec ? matches_spec(&device->info, i, spec) : any || device->info.is_cpu) return NPG_OK;
             size_t used = strlen(list);
             snprintf(list + used, sizeof list - used, " %zu \"%s\"", i, device->info.name);
         }
@@ -106,12 +106,16 @@ static npg_status choose_device(npg_device *device, const char *spec)
 
 /* ---- tuning ---- */
 
+enum { WIDE, NARROW, GPU };
+
 static const struct {
     const char *name;
     const npg_tuning *tuning;
-} sets[] = {{"wide", &npg_tuning_wide}, {"narrow", &npg_tuning_narrow}, {"gpu", &npg_tuning_gpu}};
+} sets[] = {[WIDE] = {"wide", &npg_tuning_wide},
+            [NARROW] = {"narrow", &npg_tuning_narrow},
+            [GPU] = {"gpu", &npg_tuning_gpu}};
 
-static void take_set(npg_device *device, size_t i)
+static void use_named_set(npg_device *device, size_t i)
 {
     device->tuning = *sets[i].tuning;
     snprintf(device->tuning_source, sizeof device->tuning_source, "%s", sets[i].name);
@@ -129,10 +133,10 @@ npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *devi
 }
 
 /* The set of this kind of device, and over it what was tuned. */
-static void tune_by_kind(npg_device *device)
+static void choose_set_by_kind(npg_device *device)
 {
-    char path[4200];
-    take_set(device, !device->info.is_cpu ? 2 : device->info.vector >= 16 ? 0 : 1);
+    char path[NPG_CACHE_PATH];
+    use_named_set(device, !device->info.is_cpu ? GPU : device->info.vector >= 16 ? WIDE : NARROW);
     if (npg_device_tuning_path(path, sizeof path, device)) return;
     npg_status status = npg_tuning_load(&device->tuning, path, device->info.name);
     if (!status) snprintf(device->tuning_source, sizeof device->tuning_source, "%s", path);
@@ -147,11 +151,11 @@ static npg_status choose_tuning(npg_device *device, const char *tuning)
 {
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++)
         if (!strcmp(sets[i].name, tuning)) {
-            take_set(device, i);
+            use_named_set(device, i);
             return NPG_OK;
         }
     if (!*tuning || !strcmp(tuning, "auto")) {
-        tune_by_kind(device);
+        choose_set_by_kind(device);
         return NPG_OK;
     }
     npg_status status = npg_tuning_load(&device->tuning, tuning, device->info.name);
@@ -237,7 +241,7 @@ npg_status npg_device_finish(npg_device *device)
 npg_status npg_buffer_open(npg_buffer *buffer, npg_device *device, size_t size)
 {
     cl_int code;
-    if (!size) size = 64;
+    if (!size) size = 64; /* OpenCL refuses buffers of 0 bytes */
     *buffer = (npg_buffer){device, NULL, size};
     NPG_TRY(npg_memory_count(NPG_FOR_DEVICE, (ptrdiff_t)size));
     buffer->memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, size, NULL, &code);

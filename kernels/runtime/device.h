@@ -10,6 +10,9 @@
 #include "kernels/runtime/tuning.h"
 #include "pipeline/memory.h"
 
+/* Room for the path of a file in the kernel cache or of a tuning. */
+#define NPG_CACHE_PATH 4400
+
 typedef struct npg_device npg_device;
 typedef struct npg_program npg_program;
 
@@ -84,7 +87,7 @@ void npg_device_distrust(npg_device *device);
 /* One argument of a kernel. */
 typedef struct npg_argument {
     const npg_buffer *buffer; /* or NULL: a number */
-    int kind;                 /* 0 buffer, 1 int, 2 float */
+    enum { NPG_ARGUMENT_BUFFER, NPG_ARGUMENT_INT, NPG_ARGUMENT_FLOAT } kind;
     int32_t number;
     float real;
 } npg_argument;
@@ -92,17 +95,17 @@ typedef struct npg_argument {
 #define NPG_BUF(b)                                                                                           \
     (npg_argument)                                                                                           \
     {                                                                                                        \
-        .buffer = (b), .kind = 0                                                                             \
+        .buffer = (b), .kind = NPG_ARGUMENT_BUFFER                                                           \
     }
 #define NPG_INT(n)                                                                                           \
     (npg_argument)                                                                                           \
     {                                                                                                        \
-        .kind = 1, .number = (int32_t)(n)                                                                    \
+        .kind = NPG_ARGUMENT_INT, .number = (int32_t)(n)                                                     \
     }
 #define NPG_REAL(x)                                                                                          \
     (npg_argument)                                                                                           \
     {                                                                                                        \
-        .kind = 2, .real = (float)(x)                                                                        \
+        .kind = NPG_ARGUMENT_FLOAT, .real = (float)(x)                                                       \
     }
 
 /* Queue a kernel over x (by y) work-items.  local is the work-group's extent in x: 0 takes that

@@ -8,12 +8,12 @@
 #include "kernels/runtime/cl_error.h"
 #include "kernels/runtime/device.h"
 
-#define NPG_KERNELS_MAX 16
+#define NPG_KERNELS_MAX 16 /* of one program; mlp has the most, 6 */
 
 struct npg_device {
     npg_device_info info;
     npg_tuning tuning;
-    char tuning_source[4300]; /* "wide", "gpu", ... or a path */
+    char tuning_source[NPG_CACHE_PATH]; /* "wide", "gpu", ... or a path */
     cl_device_id id;
     cl_context context;
     cl_command_queue queue;

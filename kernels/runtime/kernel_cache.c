@@ -20,12 +20,12 @@
 
 #define PRIVATE_PREFIX "neupig-kernels-"
 #define PRIVATE_LOCK   "owner"
-#define PRIVATE_AGE_S  60
+#define PRIVATE_AGE_S  60 /* a younger folder may be of a process that has not locked it yet */
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int users, lock_fd = -1;
 static char shared_folder[4096];  /* of this version; "" when there can be none */
-static char private_folder[2048]; /* "" while the shared folder is ours */
+static char private_folder[2048]; /* "" while this process has the shared folder */
 
 static unsigned long long hash_of_sources(void)
 {
@@ -35,7 +35,7 @@ static unsigned long long hash_of_sources(void)
     return hash;
 }
 
-static void name_base(char *out, size_t size)
+static void find_base(char *out, size_t size)
 {
     const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
     if (cache && cache[0] == '/')
@@ -47,11 +47,11 @@ static void name_base(char *out, size_t size)
 }
 
 /* The folder of this version, and its lock unless another process has it.  A home that can't be written to is
- * no obstacle. */
-static void take_shared(void)
+ * no failure. */
+static void lock_shared_folder(void)
 {
     char base[2048], path[4200];
-    name_base(base, sizeof base);
+    find_base(base, sizeof base);
     snprintf(shared_folder, sizeof shared_folder, "%s/%s-%016llx", base, npg_version(), hash_of_sources());
     snprintf(path, sizeof path, "%s/lock", shared_folder);
     if (!npg_make_folder(shared_folder)) lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
@@ -71,7 +71,7 @@ static const char *private_parent(void)
     return temp && temp[0] == '/' ? temp : "/tmp";
 }
 
-/* The descriptor of the folder's lock, ours from now on; -1 if another process has it. */
+/* Lock a folder and return the lock's descriptor; -1 if another process has it. */
 static int lock_private(const char *folder, int flags)
 {
     char path[4200];
@@ -82,8 +82,7 @@ static int lock_private(const char *folder, int flags)
     return -1;
 }
 
-/* Whether the process that made the folder is gone without removing it (it was killed); a young one may not
- * have its lock yet. */
+/* Whether the process that made the folder is gone without removing it (it was killed): its lock is free. */
 static bool is_left_behind(const char *folder)
 {
     struct stat info;
@@ -107,7 +106,7 @@ static void remove_left_behind(void)
     if (parent) closedir(parent);
 }
 
-static npg_status make_private(void)
+static npg_status make_private_folder(void)
 {
     snprintf(private_folder, sizeof private_folder, "%s/" PRIVATE_PREFIX "XXXXXX", private_parent());
     bool is_made = mkdtemp(private_folder) != NULL;
@@ -122,10 +121,10 @@ static npg_status make_private(void)
 
 static npg_status choose_folder(void)
 {
-    take_shared();
+    lock_shared_folder();
     if (getenv("POCL_CACHE_DIR")) return NPG_OK;
     remove_left_behind();
-    if (lock_fd < 0) NPG_TRY(make_private());
+    if (lock_fd < 0) NPG_TRY(make_private_folder());
     setenv("POCL_CACHE_DIR", lock_fd < 0 ? private_folder : shared_folder, 1);
     return NPG_OK;
 }

@@ -1,5 +1,5 @@
 /* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
- * between versions, so each version of neupig has a folder of its own, used by the process that holds its
+ * between versions, so each version of neupig has its own folder, used by the process that holds its
  * lock; any other process works in a private folder that is removed at the end, or, if it was killed, by a
  * later one. */
 #ifndef NPG_KERNEL_CACHE_H
@@ -14,7 +14,7 @@
 npg_status npg_kernel_cache_enter(void);
 void npg_kernel_cache_leave(void);
 
-/* Path of a file of ours in this version's folder, whether it is there or not; false when there is no such
+/* Path of a file in this version's folder, whether it is there or not; false when there is no such
  * folder.  Only the process that holds the folder may write binaries there. */
 bool npg_kernel_cache_path(char *out, size_t size, const char *name);
 bool npg_kernel_cache_is_ours(void);

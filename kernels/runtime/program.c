@@ -14,7 +14,8 @@
 #include "kernels/runtime/kernel_sources.h"
 #include "pipeline/file.h"
 
-#define CONSTANTS_MAX 384
+#define CONSTANTS_MAX 384        /* letters of the build constants; half of them from the tuning */
+#define BINARY_MAX    (1u << 28) /* bytes; a larger file is none of ours */
 
 struct npg_program {
     npg_program *next;
@@ -30,7 +31,9 @@ struct npg_program {
 };
 
 #define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
-#define FLAGS        "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros "
+/* Multiply-adds may be fused; but numbers may be infinite or NaN (no -cl-fast-relaxed-math): a fit that
+ * diverges must show. */
+#define FLAGS "-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros "
 
 static const npg_kernel_source *source_of(const char *name)
 {
@@ -76,7 +79,7 @@ static unsigned char *read_binary(const char *path, uint64_t key, size_t *size)
     if (!file) return NULL;
     bool good = fread(&head, sizeof head, 1, file) == 1 &&
                 !memcmp(head.magic, binary_magic, sizeof head.magic) && head.key == key && head.size &&
-                head.size < 1u << 28 && !npg_alloc(&bytes, NPG_FOR_DEVICE, head.size);
+                head.size < BINARY_MAX && !npg_alloc(&bytes, NPG_FOR_DEVICE, head.size);
     good = good && fread(bytes, 1, head.size, file) == head.size && fgetc(file) == EOF &&
            XXH64(bytes, head.size, 0) == head.hash;
     fclose(file);
@@ -87,7 +90,7 @@ static unsigned char *read_binary(const char *path, uint64_t key, size_t *size)
 
 static bool create_from_binary(npg_program *program)
 {
-    char path[4400];
+    char path[NPG_CACHE_PATH];
     size_t size;
     cl_int code = 0, status = 0;
     if (!binary_path(path, sizeof path, program)) return false;
@@ -115,9 +118,9 @@ static npg_status write_binary(const char *path, uint64_t key, const unsigned ch
 }
 
 /* A cache that can't be written costs time, nothing else. */
-static void keep_binary(const npg_program *program)
+static void store_binary(const npg_program *program)
 {
-    char path[4400];
+    char path[NPG_CACHE_PATH];
     size_t size = 0;
     unsigned char *bytes;
     if (!npg_kernel_cache_is_ours() || !binary_path(path, sizeof path, program)) return;
@@ -133,7 +136,7 @@ static void keep_binary(const npg_program *program)
 
 static npg_status build_failure(const npg_program *program, cl_int code)
 {
-    char log[800] = "";
+    char log[800] = ""; /* as much as goes into an error text */
     size_t size = 0;
     clGetProgramBuildInfo(program->program, program->device->id, CL_PROGRAM_BUILD_LOG, 0, NULL, &size);
     if (size && size <= sizeof log)
@@ -170,7 +173,7 @@ static npg_status build_program(npg_program *program, const char *text)
     return code ? build_failure(program, code) : make_kernels(program);
 }
 
-static void release(npg_program *program)
+static void release_program(npg_program *program)
 {
     for (cl_uint i = 0; i < program->kernel_count; i++) clReleaseKernel(program->kernels[i]);
     if (program->program) clReleaseProgram(program->program);
@@ -203,7 +206,7 @@ npg_status npg_program_open(npg_program **out, npg_device *device, const char *n
     memcpy(program->constants, all, sizeof all);
     npg_status status = build_program(program, source->text);
     if (status) {
-        release(program);
+        release_program(program);
     } else {
         program->next = device->programs;
         *out = device->programs = program;
@@ -218,7 +221,7 @@ void npg_program_close(npg_program **slot)
 
 void npg_device_distrust(npg_device *device)
 {
-    char path[4400];
+    char path[NPG_CACHE_PATH];
     device->is_distrusted = true;
     if (!npg_kernel_cache_is_ours()) return;
     for (npg_program *program = device->programs; program; program = program->next)
@@ -230,8 +233,8 @@ void npg_programs_close(npg_device *device)
     while (device->programs) {
         npg_program *program = device->programs;
         device->programs = program->next;
-        if (program->is_from_text && !device->is_distrusted) keep_binary(program);
-        release(program);
+        if (program->is_from_text && !device->is_distrusted) store_binary(program);
+        release_program(program);
     }
 }
 
@@ -241,8 +244,10 @@ static cl_int set_argument(cl_kernel kernel, cl_uint i, const npg_argument *argu
 {
     cl_mem memory;
     switch (argument->kind) {
-    case 0: memory = argument->buffer->memory; return clSetKernelArg(kernel, i, sizeof memory, &memory);
-    case 1: return clSetKernelArg(kernel, i, sizeof argument->number, &argument->number);
+    case NPG_ARGUMENT_BUFFER:
+        memory = argument->buffer->memory;
+        return clSetKernelArg(kernel, i, sizeof memory, &memory);
+    case NPG_ARGUMENT_INT: return clSetKernelArg(kernel, i, sizeof argument->number, &argument->number);
     default: return clSetKernelArg(kernel, i, sizeof argument->real, &argument->real);
     }
 }

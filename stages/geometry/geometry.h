@@ -2,10 +2,10 @@
 #ifndef NPG_GEOMETRY_H
 #define NPG_GEOMETRY_H
 
-#include "geometry/attach.h" /* points tied to a surface that moves (neupig apply)                       */
-#include "geometry/mesh_tools.h" /* normals, edges, areas, components and checks of meshes (synth, render)   */
-#include "geometry/metrics.h" /* measures against a ground truth, and samples of a surface (eval, synth)  */
-#include "geometry/query.h"   /* rays (render)                                                            */
-#include "geometry/vec3.h"    /* dot and cross products, normals of faces                                 */
+#include "geometry/attach.h"     /* points tied to a surface that moves (apply)               */
+#include "geometry/mesh_tools.h" /* normals, edges, areas, components, checks (synth, render) */
+#include "geometry/metrics.h"    /* measures against a ground truth, samples (eval, synth)    */
+#include "geometry/query.h"      /* rays (render)                                             */
+#include "geometry/vec3.h"       /* dot and cross products, normals of faces                  */
 
 #endif

@@ -46,7 +46,8 @@ static int by_value(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* Residuals of the planes through few and through many neighbours, at `asked` points spread over the cloud. */
+/* Residuals of the planes through few and through many neighbours, at `asked` points spread over the
+ * cloud. */
 static npg_status measure_residuals(double *near, double *wide, size_t asked, const npg_kdtree *tree,
                                     const float *points, size_t n)
 {
