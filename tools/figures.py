@@ -36,7 +36,7 @@ CAPTURES = {
     "dancer175": ("dancer, 175 frames", None),
     "horse17": ("galloping horse, 17 frames", None),
     "noisy40": ("dancer, 40 frames, with noise, outliers and holes, without normals", None),
-    "room17": ("a real person before one depth camera, 17 frames, no truth", None),
+    "person17": ("a person's upper body before one depth camera, 17 frames, no truth", None),
     "walker24": ("walking figure, 24 frames, with noise and outliers, without normals",
                  "--frames 24 --points 5000 --noise 0.1 --outliers 0.5 --no-normals"),
     "walker96": ("walking figure, 96 frames", "--frames 96 --points 5000 --cycles 4"),
@@ -63,6 +63,10 @@ HEADS = {"CD": "CD", "worst_CD": "worst CD", "NC": "NC", "F": "F-0.5 %", "Corr":
 
 def fail(text):
     sys.exit(f"figures: {text}")
+
+
+def shown(key, value):
+    return "-" if value is None else FORMATS[key].format(value)
 
 
 # ---- the tables: what is in them decides what is measured ----
@@ -118,7 +122,7 @@ def main_table():
 TABLES = {
     "main": main_table(),
     "no truth": table_of_runs(("point_dist_median", "coverage", "cpu_s", "memory_mib"),
-                              row(CAPTURES["room17"][0], "room17", "",
+                              row(CAPTURES["person17"][0], "person17", "",
                                   ("point_dist_median", "coverage", "cpu_s", "memory_mib"))),
     "memory": table_of_runs(("Corr", "worst_Corr", "memory_mib", "cpu_s"),
                             row(CAPTURES["walker96"][0], "walker96", "", ("Corr", "worst_Corr", "memory_mib", "cpu_s")),
@@ -272,10 +276,6 @@ def measure_bench(arguments):
 
 
 # ---- the pages ----
-
-def shown(key, value):
-    return "-" if value is None else FORMATS[key].format(value)
-
 
 def alone(run):
     """Whether the run had the machine to itself: else its wall time says little."""

@@ -16,7 +16,7 @@
 #   <!-- test: COMMAND -->   a command that only the test needs, run at this place
 #
 # A command is right when it ends with 0, or with 7 (done, with frames below the bar: the captures here are tiny).  The
-# captures and meshes that pages speak of (my-capture/, captures/, scan.obj ...) are made when a command first names them.
+# captures and meshes that pages speak of (my-capture/, captures/, scan.obj, my-model.obj) are made when a command names them.
 # Blocks that are indented, or of no kind, are refused, so that no command line slips through.  Needs bash and awk alone.
 set -euo pipefail
 
@@ -102,16 +102,28 @@ list_page() { # PAGE
 synth() { # FOLDER OPTIONS...: points alone, as a capture from anywhere
     local folder=$1
     shift
-    neupig synth -o "$folder.synth" --cell 0.05 --points 1200 "$@" >/dev/null
+    neupig synth -o "$folder.synth" --cell 0.035 --points 1200 "$@" >/dev/null
     mkdir -p "$(dirname "$folder")"
     mv "$folder.synth/points" "$folder"
     [ ! -e "$folder.truth" ] && mv "$folder.synth/truth" "$folder.truth"
     rm -r "$folder.synth"
 }
 
+# A mesh of somebody's own that lies on the reference of out/: that of the keyframe, as OBJ.
+provide_mesh() {
+    local key
+    [ ! -e scan.obj ] || return 0
+    key=$(sed -n 's/^{"index":[0-9]*,"number":\([0-9]*\),.*"key":true,.*/\1/p' out/frames.jsonl)
+    neupig apply out --mesh out/reference.ply --format obj -o carried.obj >/dev/null
+    cp "carried.obj/frame_$(printf %04d "$key").obj" scan.obj
+    cp scan.obj my-model.obj
+    rm -r carried.obj
+}
+
 # Make what the command names and what is not there yet.
 provide() { # COMMAND
     case $1 in *my-capture*) [ -e my-capture ] || synth my-capture --frames 5 --cycles 0.3 --noise 0.1 ;; esac
+    case $1 in *scan.obj* | *my-model.obj*) provide_mesh ;; esac
     case $1 in
     *captures/* | *night.json* | *dancer* | *horse*)
         [ -e captures ] || {
