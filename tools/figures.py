@@ -245,7 +245,7 @@ def measure_all(arguments):
     while left:
         figures = read_file(arguments.file)  # anew: others may measure beside
         have = {key_of(run) for run in figures["runs"]}
-        for key in wanted(arguments.table):
+        for key in sorted(wanted(arguments.table), key=lambda run: "paper" in run[1]):  # what takes minutes, last
             if (only and key[0] not in only) or key in missing or (key in have and (not arguments.again or key in again)):
                 continue
             run = measure_run(arguments, *key)
