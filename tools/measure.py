@@ -87,7 +87,7 @@ def source(neupig):
     """Version of the command, and the last commit that changed its code."""
     version = subprocess.run([neupig, "version"], check=True, stdout=subprocess.PIPE, text=True).stdout.split()[1]
     tree = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    code = ["pipeline", "stages", "kernels", "tools/*.c", "CMakeLists.txt"]
+    code = [f"{folder}/*.[ch]*" for folder in ("pipeline", "stages", "kernels", "tools")]
     found = subprocess.run(["git", "-C", tree, "log", "-1", "--format=%h", "--"] + code, stdout=subprocess.PIPE,
                            stderr=subprocess.DEVNULL, text=True, check=False).stdout.strip()
     return {"version": version, "commit": found or "unknown", "date": datetime.date.today().isoformat()}

@@ -127,8 +127,8 @@ provide() { # COMMAND
     case $1 in
     *captures/* | *night.json* | *dancer* | *horse*)
         [ -e captures ] || {
-            synth captures/dancer --frames 4 --cycles 0.2
-            synth captures/horse --body bar --frames 4 --cycles 0.3
+            synth captures/dancer --body bar --frames 3 --cycles 0.2
+            synth captures/horse --body bar --frames 3 --cycles 0.3 --seed 1
             rm -r captures/*.truth
         }
         ;;
