@@ -53,7 +53,7 @@ int main(int argc, char **argv)
                NPG_DIVERGED, NPG_ABORTED);
         return 0;
     }
-    SIZE("OptionInfo", npg_option_info), SIZE("FrameView", npg_frame_view), SIZE("OwnStage", npg_custom_stage);
+    SIZE("OptionInfo", npg_option_info), SIZE("FrameView", npg_frame_view), SIZE("CustomStage", npg_custom_stage);
     SIZE("LogRecord", npg_log_record), SIZE("Progress", npg_progress), SIZE("Hooks", npg_hooks);
     SIZE("Cloud", npg_cloud), SIZE("Result", npg_result), SIZE("Hit", npg_surface_hit);
     return 0;

@@ -70,7 +70,7 @@ class FrameViewStruct(Structure):
 FrameFunction = CFUNCTYPE(c_int, c_void_p, POINTER(FrameViewStruct))
 
 
-class OwnStageStruct(Structure):
+class CustomStageStruct(Structure):
     _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("after", c_char_p), ("user", c_void_p),
                 ("frame", FrameFunction)]
 
@@ -125,7 +125,7 @@ _FUNCTIONS = {
     "npg_options_load": (c_int, [c_void_p, c_char_p]),
     "npg_options_load_job": (c_int, [c_void_p, c_char_p]),
     "npg_options_describe": (c_int, [c_size_t, POINTER(OptionInfoStruct)]),
-    "npg_options_add_stage": (c_int, [c_void_p, POINTER(OwnStageStruct)]),
+    "npg_options_add_stage": (c_int, [c_void_p, POINTER(CustomStageStruct)]),
     "npg_run_open": (c_int, [_SLOT, c_void_p, POINTER(HooksStruct)]),
     "npg_run_push": (c_int, [c_void_p, POINTER(CloudStruct)]),
     "npg_run_finish": (c_int, [c_void_p]),
