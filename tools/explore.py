@@ -7,7 +7,7 @@
     tools/plot_explore.py explored/results.jsonl -o accuracy.svg
 
 Every run of `neupig run` is measured with `neupig eval` and becomes one line of DIR/results.jsonl; a run that has its
-line is not made again, so the same command goes on where it was stopped.  Cost is the wall and processor seconds of the
+line is not made again, so the same command resumes where it was stopped.  Cost is the wall and processor seconds of the
 whole command, files in to files out.  Needs Python 3 alone.
 """
 import argparse
@@ -16,11 +16,11 @@ import json
 import os
 import shlex
 import shutil
-import subprocess
 import sys
-import time
 
-FIGURES = ("CD", "NC", "F", "Corr")
+import measure
+
+FIGURES = measure.FIGURES[:4]
 
 
 def fail(text):
@@ -30,8 +30,8 @@ def fail(text):
 def parse_arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", required=True, metavar="DIR", help="where results.jsonl and the runs go")
-    parser.add_argument("--capture", action="append", default=[], metavar="NAME=POINTS,TRUTH[,FRAMES]",
-                        help="a capture with its truth; FRAMES as of neupig run --frames")
+    parser.add_argument("--capture", action="append", default=[], metavar="NAME=POINTS[,TRUTH[,FRAMES]]",
+                        help="a capture, with its truth; FRAMES as of neupig run --frames")
     parser.add_argument("--synth", action="store_true", help="add a made walking figure with noise and outliers")
     parser.add_argument("--synth-frames", type=int, default=17, metavar="N")
     parser.add_argument("--synth-points", type=int, default=5000, metavar="N")
@@ -69,68 +69,21 @@ def grid(arguments):
 
 def captures(arguments):
     """[(name, points, truth, frames)]."""
-    found = []
-    for capture in arguments.capture:
-        name, equals, rest = capture.partition("=")
-        parts = rest.split(",")
-        if not equals or len(parts) not in (2, 3):
-            fail(f"--capture {capture}: wanted NAME=POINTS,TRUTH[,FRAMES]")
-        found.append((name, parts[0], parts[1], parts[2] if len(parts) == 3 else ""))
+    found = [measure.parse_capture(capture, fail) for capture in arguments.capture]
     if arguments.synth or not found:
-        found.append(make_synth(arguments))
+        name = f"walker-{arguments.synth_frames}x{arguments.synth_points}"
+        size = ("--frames", str(arguments.synth_frames), "--points", str(arguments.synth_points))
+        made = measure.synth(arguments.neupig, os.path.join(arguments.output, name), size + measure.SYNTH_LIKE_A_SCAN)
+        found.append((name, *made, ""))
     return found
 
 
-def make_synth(arguments):
-    name = f"walker-{arguments.synth_frames}x{arguments.synth_points}"
-    folder = os.path.join(arguments.output, name)
-    if not os.path.isdir(os.path.join(folder, "truth")):
-        subprocess.run([arguments.neupig, "synth", "-o", folder, "--frames", str(arguments.synth_frames), "--points",
-                        str(arguments.synth_points), "--noise", "0.2", "--outliers", "1"], check=True,
-                       stdout=subprocess.DEVNULL)
-    return name, os.path.join(folder, "points"), os.path.join(folder, "truth"), ""
-
-
-def timed(command, log):
-    """Exit code, wall seconds, processor seconds with those of child processes."""
-    start = time.monotonic()
-    with open(log, "ab") as out:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    return process.returncode, time.monotonic() - start, usage.ru_utime + usage.ru_stime
-
-
-def measure(arguments, capture, setting, folder):
-    """One line of results; the run's exit code 7 (below the bar) is a result too."""
+def measured(arguments, capture, setting, folder):
+    """One line of results."""
     name, points, truth, frames = capture
-    chosen = ["--frames", frames] if frames else []
-    shutil.rmtree(folder, ignore_errors=True)
-    code, wall_s, cpu_s = timed([arguments.neupig, "run", points, "-o", folder, "--quiet"] + chosen + setting[1],
-                                folder + ".log")
-    result = {"capture": name, "setting": setting[0], "options": setting[1], "frames": frames, "exit_code": code,
-              "wall_s": round(wall_s, 3), "cpu_s": round(cpu_s, 3)}
-    if code not in (0, 7):
-        return result
-    eval_of = subprocess.run([arguments.neupig, "eval", folder, truth, "--json"] + chosen, stdin=subprocess.DEVNULL,
-                             stdout=subprocess.PIPE, check=True)
-    figures = json.loads(eval_of.stdout)
-    result.update({key: figures.get(key) for key in FIGURES})
+    result = {"capture": name, "setting": setting[0], "options": setting[1], "frames": frames}
+    result.update(measure.measure(arguments.neupig, points, truth, frames, setting[1], folder))
     return result
-
-
-def read_results(path):
-    if not os.path.exists(path):
-        return []
-    results = []
-    with open(path, encoding="utf-8") as lines:
-        for number, line in enumerate(lines, 1):
-            try:
-                results.append(json.loads(line))
-            except json.JSONDecodeError as error:
-                if line.endswith("\n"):
-                    fail(f"{path}, line {number}: {error}")  # only the last line may be cut off, by a kill
-    return results
 
 
 def key_of(result):
@@ -151,7 +104,7 @@ def main():
     arguments = parse_arguments()
     os.makedirs(os.path.join(arguments.output, "runs"), exist_ok=True)
     path = os.path.join(arguments.output, "results.jsonl")
-    results = read_results(path)
+    results = measure.read_lines(path, fail)
     done = {key_of(result) for result in results}
     with open(path, "w", encoding="utf-8") as out:  # without a line that was cut off
         out.writelines(json.dumps(result) + "\n" for result in results)
@@ -161,7 +114,7 @@ def main():
             continue
         print(f"explore: {i}/{len(jobs)} {capture[0]}: {setting[0]}", file=sys.stderr, flush=True)
         folder = os.path.join(arguments.output, "runs", f"{capture[0]}-{i}")
-        result = measure(arguments, capture, setting, folder)
+        result = measured(arguments, capture, setting, folder)
         results.append(result)
         with open(path, "a", encoding="utf-8") as out:
             out.write(json.dumps(result) + "\n")

@@ -29,16 +29,12 @@ def parse_arguments():
     return parser.parse_args()
 
 
-def read_points(arguments):
+def points_of(results, x, y):
     """{capture: [(x, y, setting)]} in order of x."""
     captures = {}
-    with open(arguments.results, encoding="utf-8") as lines:
-        for line in lines:
-            r = json.loads(line)
-            if r.get(arguments.x) and r.get(arguments.y):
-                captures.setdefault(r["capture"], []).append((r[arguments.x], r[arguments.y], r["setting"]))
-    if not captures:
-        sys.exit(f"plot_explore: {arguments.results} has no result with {arguments.x} and {arguments.y}")
+    for r in results:
+        if r.get(x) and r.get(y):
+            captures.setdefault(r["capture"], []).append((r[x], r[y], r["setting"]))
     return {name: sorted(points) for name, points in sorted(captures.items())}
 
 
@@ -72,7 +68,7 @@ class Axis:
         return self.start + share * (self.end - self.start)
 
 
-def draw_axes(x, y, arguments):
+def draw_axes(x, y, labels):
     bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
     parts = [f'<path d="M{LEFT} {TOP}V{bottom}H{right}" fill="none" stroke="#333"/>']
     for value in ticks(x.low, x.high):
@@ -81,9 +77,9 @@ def draw_axes(x, y, arguments):
     for value in ticks(y.low, y.high):
         parts.append(f'<path d="M{LEFT} {y.at(value):.1f}H{right}" stroke="#e4e4e4"/>'
                      f'<text x="{LEFT - 6}" y="{y.at(value) + 4:.1f}" text-anchor="end">{value:g}</text>')
-    parts.append(f'<text x="{(LEFT + right) / 2}" y="{HEIGHT - 12}" text-anchor="middle">{LABELS[arguments.x]}</text>')
+    parts.append(f'<text x="{(LEFT + right) / 2}" y="{HEIGHT - 12}" text-anchor="middle">{labels[0]}</text>')
     parts.append(f'<text transform="translate(16 {(TOP + bottom) / 2}) rotate(-90)" text-anchor="middle">'
-                 f'{LABELS[arguments.y]}</text>')
+                 f'{labels[1]}</text>')
     return parts
 
 
@@ -102,20 +98,31 @@ def draw_capture(name, points, colour, place, x, y, larger):
     return parts
 
 
-def main():
-    arguments = parse_arguments()
-    captures = read_points(arguments)
+def draw(results, x_key, y_key, names=None):
+    """The picture as text; names are what captures are called in it."""
+    captures = points_of(results, x_key, y_key)
     every = [point for points in captures.values() for point in points]
+    if not every:
+        sys.exit(f"plot_explore: no result has {x_key} and {y_key}")
     x = Axis([p[0] for p in every], LEFT, WIDTH - RIGHT)
     y = Axis([p[1] for p in every], HEIGHT - BOTTOM, TOP)
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
              f'height="{HEIGHT}" font-family="sans-serif" font-size="12">',
              f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>']
-    parts += draw_axes(x, y, arguments)
+    parts += draw_axes(x, y, (LABELS[x_key], LABELS[y_key]))
     for i, (name, points) in enumerate(captures.items()):
-        parts += draw_capture(name, points, COLOURS[i % len(COLOURS)], i, x, y, arguments.y in LARGER_IS_BETTER)
+        parts += draw_capture((names or {}).get(name, name), points, COLOURS[i % len(COLOURS)], i, x, y,
+                              y_key in LARGER_IS_BETTER)
+    return "\n".join(parts + ["</svg>", ""])
+
+
+def main():
+    arguments = parse_arguments()
+    with open(arguments.results, encoding="utf-8") as lines:
+        results = [json.loads(line) for line in lines]
+    picture = draw(results, arguments.x, arguments.y)
     with open(arguments.output + ".part", "w", encoding="utf-8") as out:
-        out.write("\n".join(parts + ["</svg>", ""]))
+        out.write(picture)
     os.replace(arguments.output + ".part", arguments.output)
 
 

@@ -53,7 +53,7 @@ int main(int argc, char **argv)
                NPG_DIVERGED, NPG_ABORTED);
         return 0;
     }
-    SIZE("OptionInfo", npg_option_info), SIZE("FrameView", npg_frame_view), SIZE("OwnStage", npg_custom_stage);
+    SIZE("OptionInfo", npg_option_info), SIZE("FrameView", npg_frame_view), SIZE("CustomStage", npg_custom_stage);
     SIZE("LogRecord", npg_log_record), SIZE("Progress", npg_progress), SIZE("Hooks", npg_hooks);
     SIZE("Cloud", npg_cloud), SIZE("Result", npg_result), SIZE("Hit", npg_surface_hit);
     return 0;
@@ -66,10 +66,27 @@ EOF
     env/bin/python "$BATS_TEST_DIRNAME/test_python.py" work
 }
 
-@test "it says where it looked when there is no library" {
+@test "it says what to build and where it looked when there is no library" {
     NEUPIG_LIBRARY=/nowhere/libneupig.so run env/bin/python -c 'import neupig'
     [ "$status" -ne 0 ]
-    [[ "$output" == *"NEUPIG_LIBRARY"* ]]
+    [[ "$output" == *"cmake --build build --target neupig_shared"*"NEUPIG_LIBRARY"*"/nowhere/libneupig.so"* ]]
+}
+
+@test "installed from a tree it finds that tree's build, and names the tree while nothing is built there" {
+    mkdir -p tree/tools tree/pipeline elsewhere
+    cp -r source tree/tools/python
+    cp "$root/pipeline/neupig.h" tree/pipeline/
+    "$python" -m venv --system-site-packages tree-env
+    tree-env/bin/pip install --no-index --disable-pip-version-check tree/tools/python >tree.log 2>&1
+    unset NEUPIG_LIBRARY
+    cd elsewhere
+    run ../tree-env/bin/python -c 'import neupig'
+    [ "$status" -ne 0 ] || [ "$(ldconfig -p | grep -c libneupig)" -gt 0 ]
+    [ "$status" -eq 0 ] || [[ "$output" == *"/tree with: cmake --build build --target neupig_shared"* ]]
+    ln -s "$build" ../tree/build
+    run ../tree-env/bin/python -c 'import neupig; print(neupig.library_path)'
+    echo "$output"
+    [ "$output" = "$(realpath "$build/libneupig.so")" ]
 }
 
 @test "mypy finds nothing to say" {

@@ -51,8 +51,14 @@ def _write_wheel(folder: str, files: dict[str, bytes]) -> str:
     return WHEEL
 
 
+def _source_tree() -> dict[str, bytes]:
+    """Where the tree is whose build folder holds the library; nothing when this folder lies in none."""
+    tree = HERE.parent.parent
+    return {f"{NAME}/source_tree.txt": f"{tree}\n".encode()} if (tree / "pipeline" / "neupig.h").exists() else {}
+
+
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    return _write_wheel(wheel_directory, {f"{NAME}/{p.name}": p.read_bytes() for p in _sources()})
+    return _write_wheel(wheel_directory, {f"{NAME}/{p.name}": p.read_bytes() for p in _sources()} | _source_tree())
 
 
 def build_editable(wheel_directory, config_settings=None, metadata_directory=None):

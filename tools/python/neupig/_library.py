@@ -70,7 +70,7 @@ class FrameViewStruct(Structure):
 FrameFunction = CFUNCTYPE(c_int, c_void_p, POINTER(FrameViewStruct))
 
 
-class OwnStageStruct(Structure):
+class CustomStageStruct(Structure):
     _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("after", c_char_p), ("user", c_void_p),
                 ("frame", FrameFunction)]
 
@@ -125,7 +125,7 @@ _FUNCTIONS = {
     "npg_options_load": (c_int, [c_void_p, c_char_p]),
     "npg_options_load_job": (c_int, [c_void_p, c_char_p]),
     "npg_options_describe": (c_int, [c_size_t, POINTER(OptionInfoStruct)]),
-    "npg_options_add_stage": (c_int, [c_void_p, POINTER(OwnStageStruct)]),
+    "npg_options_add_stage": (c_int, [c_void_p, POINTER(CustomStageStruct)]),
     "npg_run_open": (c_int, [_SLOT, c_void_p, POINTER(HooksStruct)]),
     "npg_run_push": (c_int, [c_void_p, POINTER(CloudStruct)]),
     "npg_run_finish": (c_int, [c_void_p]),
@@ -141,14 +141,31 @@ _FUNCTIONS = {
 }
 
 
+def _tree() -> pathlib.Path | None:
+    """The source tree this module lies in, or was installed from (backend.py leaves its path beside the module)."""
+    here = pathlib.Path(__file__).resolve().parent
+    note = here / "source_tree.txt"
+    tree = pathlib.Path(note.read_text(encoding="utf-8").rstrip("\n")) if note.exists() else here.parents[2]
+    return tree if (tree / "pipeline" / "neupig.h").exists() else None
+
+
 def _candidates() -> list[str]:
-    """Where the library may be: as told, the build of this source tree, then where libraries are."""
+    """Where the library may be: as told, the build of the source tree, then where libraries are."""
     told = os.environ.get("NEUPIG_LIBRARY")
     if told:
         return [told]
-    built = pathlib.Path(__file__).resolve().parents[3] / "build" / "libneupig.so"
-    found = [str(built)] if built.exists() else []
-    return [*found, "libneupig.so.0", f"{sys.prefix}/lib/libneupig.so.0", "/usr/local/lib/libneupig.so.0"]
+    tree = _tree()
+    built = [str(tree / "build" / "libneupig.so.0")] if tree else []
+    return [*built, "libneupig.so.0", f"{sys.prefix}/lib/libneupig.so.0", "/usr/local/lib/libneupig.so.0"]
+
+
+def _not_found(tried: list[str]) -> str:
+    """What to do about it, and where was looked."""
+    tree = _tree()
+    build = (f"build it in {tree} with: cmake --build build --target neupig_shared" if tree
+             else "build it in the source tree with: cmake --build build --target neupig_shared")
+    return (f"the library libneupig.so.0 is not found; {build}, or set NEUPIG_LIBRARY to its path; looked for "
+            + "; ".join(tried))
 
 
 def _load() -> ctypes.CDLL:
@@ -158,10 +175,9 @@ def _load() -> ctypes.CDLL:
             library = ctypes.CDLL(path)
             break
         except OSError as failure:
-            tried.append(str(failure))
+            tried.append(f"{path} ({failure})")
     else:
-        raise ImportError("libneupig is not found; say where it is with NEUPIG_LIBRARY=/.../libneupig.so.0 ("
-                          + "; ".join(tried) + ")")
+        raise ImportError(_not_found(tried))
     for name, (result, arguments) in _FUNCTIONS.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments

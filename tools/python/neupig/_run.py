@@ -105,7 +105,7 @@ def _view(pointer: Any, count: int) -> npt.NDArray[np.float32]:
 
 
 class Stage(NamedTuple):
-    """A stage of one's own, after one of ingest, outlier, keyframe, mesh, align, optimize, evaluate, export.
+    """A custom stage, after one of ingest, outlier, keyframe, mesh, align, optimize, evaluate, export.
 
     ``frame`` is called on a thread of the run.  After ingest and outlier it sees every frame up to four times and must
     do the same each time.  An exception in it ends the run and is raised again by ``wait``.
@@ -181,7 +181,7 @@ class Run(Closing):
 
         function = native.FrameFunction(frame)
         self._callbacks.append(function)
-        given = native.OwnStageStruct(sizeof(native.OwnStageStruct), stage.name.encode(), stage.after.encode(), None,
+        given = native.CustomStageStruct(sizeof(native.CustomStageStruct), stage.name.encode(), stage.after.encode(), None,
                                       function)
         check(lib.npg_options_add_stage(options.handle, byref(given)))
 
@@ -200,7 +200,7 @@ class Run(Closing):
         return native.HooksStruct(sizeof(native.HooksStruct), None, *functions)
 
     def _check(self, status: int) -> Status:
-        """As check(), but what a stage of one's own raised is raised again."""
+        """As check(), but what a custom stage raised is raised again."""
         try:
             return check(status)
         except Error as error:
