@@ -62,8 +62,13 @@ npg_status npg_frame_box_set(npg_frame_box *box, const npg_origin *origin, const
         box->origin[a] = origin->world[a];
         box->centre[a] = bounds->lo[a] + side / 2;
     }
-    /* Below, the scale would be larger than a float can hold (3e38). */
-    if (!(longest > 1e-30)) return npg_error(NPG_BAD_INPUT, "all points of all frames are in one place");
+    if (!(longest > 0)) return npg_error(NPG_BAD_INPUT, "all points of all frames are in one place");
+    if (longest < NPG_SIDE_MIN || longest > NPG_SIDE_MAX)
+        return npg_error(
+            NPG_BAD_INPUT,
+            "the longest side of the box of all points is %g; it must be from %g to %g: the capture has "
+            "to be written in another unit",
+            longest, NPG_SIDE_MIN, NPG_SIDE_MAX);
     box->scale = NPG_UNIT_EXTENT / (longest / 2);
     box->diagonal = npg_bounds_diagonal(bounds);
     return NPG_OK;

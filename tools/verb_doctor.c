@@ -43,14 +43,14 @@ static json_t *json_of_device(size_t i, const npg_device_info *info)
                      (json_int_t)info->memory_bytes, "self_test", status ? npg_error_text() : "ok");
 }
 
-/* Empty when there is no driver at all. */
-static json_t *list_devices(void)
+/* Empty when there is no driver at all, or none that can be asked: a failure. */
+static npg_status list_devices(json_t *list)
 {
-    json_t *list = json_array();
     npg_device_info info;
-    for (size_t i = 0; npg_device_describe(i, &info) == NPG_OK; i++)
+    npg_status status;
+    for (size_t i = 0; !(status = npg_device_describe(i, &info)); i++)
         json_array_append_new(list, json_of_device(i, &info));
-    return list;
+    return status == NPG_END ? NPG_OK : status;
 }
 
 /* ---- libraries ---- */
@@ -133,7 +133,8 @@ int npg_verb_doctor(int argc, char **argv)
     npg_cli cli;
     npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
     if (status) return npg_cli_end(argv[0], status);
-    json_t *machine = describe_machine(), *libraries = list_libraries(), *devices = list_devices();
+    json_t *machine = describe_machine(), *libraries = list_libraries(), *devices = json_array();
+    status = list_devices(devices);
     if (s.json) {
         json_t *all =
             json_pack("{s:O,s:O,s:O}", "machine", machine, "libraries", libraries, "devices", devices);
@@ -144,7 +145,7 @@ int npg_verb_doctor(int argc, char **argv)
     } else {
         print_text(machine, libraries, devices);
     }
-    status = judge(devices);
+    if (!status) status = judge(devices);
     json_decref(machine);
     json_decref(libraries);
     json_decref(devices);

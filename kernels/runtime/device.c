@@ -10,6 +10,7 @@
 #include "kernels/runtime/cl_error.h"
 #include "kernels/runtime/device_internal.h"
 #include "kernels/runtime/kernel_cache.h"
+#include "kernels/runtime/probe.h"
 
 #define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
 
@@ -20,6 +21,7 @@ static npg_status all_devices(cl_device_id *ids, size_t capacity, size_t *count)
     cl_platform_id platforms[16];
     cl_uint platform_count = 0, found;
     *count = 0;
+    NPG_TRY(npg_probe_drivers());
     cl_int code = clGetPlatformIDs(16, platforms, &platform_count);
     if (code == -1001 || (!code && !platform_count))
         return npg_error(NPG_DEVICE,

@@ -69,6 +69,8 @@ static inline bool npg_vec3_make_unit(double v[3])
 static inline bool npg_vec3_make_unitf(float v[3])
 {
     float length = npg_vec3_lengthf(v);
+    /* the squares of so small ones leave the range of float: normals by area in a mesh of 1e-9 units */
+    if (length < 1e-18f) length = (float)npg_vec3_distance((const float[3]){0}, v);
     for (int i = 0; i < 3 && length > 0; i++) v[i] /= length;
     return length > 0;
 }

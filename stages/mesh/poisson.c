@@ -7,8 +7,8 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
-#include "mesh/child.h"
 #include "mesh/poisson_wire.h"
+#include "pipeline/child.h"
 #include "pipeline/frame_box.h"
 
 #define POINTS_MIN       16

@@ -6,6 +6,7 @@
 #include <string>
 
 extern "C" {
+#include "job/vdb_file.h"
 #include "optimize/vdb_grids.h"
 }
 #include "geometry/guard.hpp"
@@ -52,12 +53,23 @@ template <class Body> void each_node(const npg_level &level, Body body)
             for (int k = 0; k < level.nodes; k++) body(openvdb::Coord(i, j, k), row++);
 }
 
+double unit_step(const npg_level &level)
+{
+    return 2.0 / (level.nodes - 1);
+}
+
+// Whether a grid's voxels have to stay in the cube [-1, 1]^3, though they stand for places.
+bool stays_unit(const npg_level &level, const npg_vdb_place &place)
+{
+    return level.kind != NPG_LEVEL_NORMAL && unit_step(level) / place.unit_per_world < NPG_VDB_VOXEL_MIN;
+}
+
 openvdb::math::Transform::Ptr transform_of(const npg_level &level, const npg_vdb_place &place)
 {
-    bool is_normal = level.kind == NPG_LEVEL_NORMAL;
-    double scale = is_normal ? 1 : 1 / place.unit_per_world, step = 2.0 / (level.nodes - 1) * scale;
+    bool is_unit = level.kind == NPG_LEVEL_NORMAL || stays_unit(level, place);
+    double scale = is_unit ? 1 : 1 / place.unit_per_world, step = unit_step(level) * scale;
     openvdb::Vec3d first(-scale);
-    if (!is_normal) first += openvdb::Vec3d(place.world_centre);
+    if (!is_unit) first += openvdb::Vec3d(place.world_centre);
     auto transform = openvdb::math::Transform::createLinearTransform(step);
     transform->postTranslate(first);
     return transform;
@@ -68,6 +80,7 @@ void describe(openvdb::GridBase &grid, const npg_level &level, int at, int chann
 {
     grid.setName(name_of(level, at, channel));
     grid.setTransform(transform_of(level, place));
+    if (stays_unit(level, place)) grid.insertMeta("npg_space", openvdb::StringMetadata("unit"));
     grid.insertMeta("npg_level", openvdb::Int32Metadata(at));
     grid.insertMeta("npg_nodes", openvdb::Int32Metadata(level.nodes));
     grid.insertMeta("npg_lambda", openvdb::DoubleMetadata(level.lambda));

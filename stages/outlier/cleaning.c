@@ -2,6 +2,7 @@
 #include "outlier/cleaning.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "outlier/outliers.h"
@@ -197,6 +198,18 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, i
 
 /* ---- is it a body? ---- */
 
+static npg_status too_few(const npg_frame *frame)
+{
+    const npg_cleaning *c = &frame->cleaning;
+    char why[200] = "";
+    if (frame->point_count < c->read)
+        snprintf(why, sizeof why,
+                 " (%zu not finite or farther than %g from the first point, %zu duplicate, %zu isolated)",
+                 c->not_finite, (double)NPG_COORDINATE_MAX, c->duplicate, c->isolated);
+    return npg_error(NPG_BAD_INPUT, "%zu usable points of %zu, a surface takes %d%s", frame->point_count,
+                     c->read, POINTS_MIN, why);
+}
+
 /* How many of the three extents are not zero, from the points' covariance without its eigenvalues (squared
  * extents): the trace is their sum, the sum of the 2 x 2 minors that of their products in pairs, the
  * determinant the product of all three.  With trace 1 the minors are about the second largest, and the
@@ -204,9 +217,7 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, i
 npg_status npg_clean_check(const npg_frame *frame)
 {
     double mean[3] = {0}, m[6] = {0}, n = (double)frame->point_count;
-    if (frame->point_count < POINTS_MIN)
-        return npg_error(NPG_BAD_INPUT, "%zu usable points of %zu, a surface takes %d", frame->point_count,
-                         frame->cleaning.read, POINTS_MIN);
+    if (frame->point_count < POINTS_MIN) return too_few(frame);
     for (size_t i = 0; i < 3 * frame->point_count; i++) mean[i % 3] += (double)frame->pos_local[i] / n;
     for (size_t i = 0; i < frame->point_count; i++) {
         double d[3];

@@ -253,8 +253,9 @@ static void follow_neighbours(float *normal, const float *core_normals, const ui
     float sum = 0;
     for (size_t k = 0; k < FOLLOWED; k++) {
         float along = npg_vec3_dotf(normal, core_normals + 3 * (size_t)index[k]);
-        /* Near points and clear agreement count more; 1e-20: a core point is at distance 0 itself. */
-        sum += along * fabsf(along) / (dist_sq[k] + 1e-20f);
+        /* Near points and clear agreement count more; 1e-37: a core point is at distance 0 itself, and other
+         * distances are as small as the capture (NPG_SIDE_MIN). */
+        sum += along * fabsf(along) / (dist_sq[k] + 1e-37f);
     }
     for (size_t a = 0; a < 3 && sum < 0; a++) normal[a] = -normal[a];
 }

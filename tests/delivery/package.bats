@@ -18,7 +18,7 @@ setup() {
 }
 
 @test "it holds command, libraries, header, manual, completion and licence, all below /usr" {
-    for file in bin/neupig libexec/neupig/neupig-poisson include/neupig.h share/man/man1/neupig.1 \
+    for file in bin/neupig libexec/neupig/neupig-{devices,poisson} include/neupig.h share/man/man1/neupig.1 \
         share/bash-completion/completions/neupig share/zsh/vendor-completions/_neupig share/doc/neupig/copyright; do
         [ -s "root/usr/$file" ]
     done
@@ -38,7 +38,7 @@ setup() {
 @test "every library that its programs name belongs to a package it depends on" {
     dpkg-deb -f neupig_*.deb Depends | tr ',|' '\n\n' | awk '{ print $1 }' | sort -u >depends
     grep -qx pocl-opencl-icd depends
-    for file in root/usr/bin/neupig root/usr/libexec/neupig/neupig-poisson "$libdir/libneupig.so"; do
+    for file in root/usr/bin/neupig root/usr/libexec/neupig/neupig-{devices,poisson} "$libdir/libneupig.so"; do
         objdump -p "$file" | awk '$1 == "NEEDED" { print $2 }' >needed
         [ -s needed ]
         while read -r name; do

@@ -11,10 +11,10 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
-#include "mesh/child.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/poisson.h"
 #include "mesh/vdb.h"
+#include "pipeline/child.h"
 #include "pipeline/stage.h"
 #include "tests/support/shapes.h"
 #include "tests/support/temp_folder.h"

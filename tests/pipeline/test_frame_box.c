@@ -7,6 +7,7 @@
 #include <cmocka.h>
 
 #include <math.h>
+#include <string.h>
 
 #include "pipeline/frame_box.h"
 
@@ -70,10 +71,16 @@ static void boxes_that_can_not_be_are_refused(void **state)
     npg_origin origin = {.known = true};
     npg_frame_box box;
     npg_bounds empty = npg_bounds_empty(), point = {{1, 1, 1}, {1, 1, 1}},
-               infinite = {{0, 0, 0}, {1, 1, (double)INFINITY}};
+               infinite = {{0, 0, 0}, {1, 1, (double)INFINITY}}, tiny = {{0, 0, 0}, {0, NPG_SIDE_MIN / 2, 0}},
+               huge = {{0, 0, 0}, {0, 0, NPG_SIDE_MAX * 2}};
     assert_int_equal(npg_frame_box_set(&box, &origin, &empty), NPG_BAD_INPUT);
     assert_int_equal(npg_frame_box_set(&box, &origin, &point), NPG_BAD_INPUT);
     assert_int_equal(npg_frame_box_set(&box, &origin, &infinite), NPG_BAD_INPUT);
+    assert_non_null(strstr(npg_error_text(), "no frame has a usable point"));
+    assert_int_equal(npg_frame_box_set(&box, &origin, &tiny), NPG_BAD_INPUT);
+    assert_non_null(strstr(npg_error_text(), "another unit"));
+    assert_int_equal(npg_frame_box_set(&box, &origin, &huge), NPG_BAD_INPUT);
+    assert_non_null(strstr(npg_error_text(), "another unit"));
     assert_true(npg_bounds_diagonal(&empty) == 0);
 }
 

@@ -7,6 +7,7 @@
  *     NPG_FAULT_MARK=FILE      appears once the fault has happened
  *     NPG_FAULT_CLOCK=SECONDS  the calendar clock jumps by this much to and fro with every look at it
  *     NPG_FAULT_KERNEL=A=>B    in the OpenCL sources that are built, A is B
+ *     NPG_FAULT_DRIVER=WORDS   the OpenCL driver says these when it is first asked, and aborts
  */
 #include <dlfcn.h>
 #include <errno.h>
@@ -169,6 +170,19 @@ time_t time(time_t *out)
     clock_gettime(CLOCK_REALTIME, &now);
     if (out) *out = now.tv_sec;
     return now.tv_sec;
+}
+
+/* ---- the driver ---- */
+
+cl_int clGetPlatformIDs(cl_uint capacity, cl_platform_id *platforms, cl_uint *count)
+{
+    typedef cl_int get(cl_uint, cl_platform_id *, cl_uint *);
+    get *real = NULL;
+    const char *words = getenv("NPG_FAULT_DRIVER");
+    *(void **)&real = dlsym(RTLD_NEXT, "clGetPlatformIDs");
+    if (!words) return real(capacity, platforms, count);
+    fprintf(stderr, "%s\n", words);
+    abort();
 }
 
 /* ---- kernels ---- */

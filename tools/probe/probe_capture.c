@@ -51,6 +51,10 @@ void npg_probe_judge(npg_probe *probe)
 {
     size_t readable = probe->frames - probe->unreadable;
     npg_probe_spread counts = npg_probe_counts(probe);
+    npg_frame_box box;
+    bool has_points = probe->bounds.lo[0] <= probe->bounds.hi[0];
+    if (has_points && npg_frame_box_set(&box, &probe->origin, &probe->bounds))
+        npg_probe_attend(probe, "%s", npg_error_text());
     if (probe->not_finite)
         npg_probe_attend(probe, "%zu points have coordinates that are not finite", probe->not_finite);
     if (probe->zero_normals) npg_probe_attend(probe, "%zu normals have no direction", probe->zero_normals);

@@ -2,6 +2,7 @@
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 extern "C" {
 #include "export/forms/latent_features.h"
 #include "export/forms/vdb_latents.h"
+#include "job/vdb_file.h"
 }
 #include "geometry/guard.hpp"
 #include "job/vdb_writer.hpp"
@@ -110,18 +112,47 @@ npg_status sort_into_levels(std::map<int, level> &levels, const openvdb::GridPtr
     return NPG_OK;
 }
 
+using openvdb::Mat4d;
+
 // Row vectors times this matrix: written[a] = scale sign[a] (world - centre)[from[a]].
-void place(openvdb::GridBase &grid, const npg_placement *p)
+Mat4d world_to_written(const npg_placement *p)
 {
-    if (!p || grid.getName().rfind("position", 0) != 0) return;
-    openvdb::Mat4d matrix = openvdb::Mat4d::zero();
+    Mat4d matrix = Mat4d::zero();
     for (int a = 0; a < 3; a++) {
         matrix[p->from[a]][a] = p->scale * p->sign[a];
         matrix[3][a] = -p->scale * p->sign[a] * p->centre[p->from[a]];
     }
     matrix[3][3] = 1;
-    if (matrix == openvdb::Mat4d::identity()) return;
-    grid.transform().postMult(matrix);
+    return matrix;
+}
+
+Mat4d unit_to_world(const openvdb::MetaMap &about)
+{
+    Mat4d matrix = Mat4d::identity();
+    double scale = 1 / about.metaValue<double>("npg_unit_per_world");
+    matrix.setToScale(openvdb::Vec3d(scale));
+    matrix.setTranslation(about.metaValue<openvdb::Vec3d>("npg_world_centre"));
+    return matrix;
+}
+
+const char space_key[] = "npg_space";
+
+// Grids over places to written coordinates, or to the unit cube where OpenVDB can't hold their voxels there.
+void place(openvdb::GridBase &grid, const npg_placement *p, const openvdb::MetaMap &about)
+{
+    if (!p || grid.getName().rfind("position", 0) != 0) return;
+    bool is_unit = grid.getMetadata<openvdb::StringMetadata>(space_key) != nullptr;
+    Mat4d to_world = unit_to_world(about), matrix = world_to_written(p);
+    if (is_unit) matrix = to_world * matrix;
+    if (matrix == Mat4d::identity()) return;
+    double step = grid.voxelSize()[0] * std::cbrt(std::abs(matrix.getMat3().det()));
+    if (step >= NPG_VDB_VOXEL_MIN) {
+        grid.transform().postMult(matrix);
+        grid.removeMeta(space_key);
+    } else if (!is_unit) {
+        grid.transform().postMult(to_world.inverse());
+        grid.insertMeta(space_key, openvdb::StringMetadata("unit"));
+    }
 }
 
 npg_status make_component(FloatGrid::Ptr &out, const level &l)
@@ -135,6 +166,7 @@ npg_status make_component(FloatGrid::Ptr &out, const level &l)
     out = FloatGrid::create();
     out->setTransform(like.transform().copy());
     out->setName(like.getName().substr(0, like.getName().rfind("_c")) + "_pc1");
+    if (auto space = like[space_key]) out->insertMeta(space_key, *space);
     out->insertMeta("npg_share", openvdb::DoubleMetadata(share));
     out->insertMeta("npg_level", openvdb::Int32Metadata(like.metaValue<int32_t>("npg_level")));
     auto accessor = out->getAccessor();
@@ -144,7 +176,8 @@ npg_status make_component(FloatGrid::Ptr &out, const level &l)
     return NPG_OK;
 }
 
-npg_status make_features(npg::vdb_writer &file, level &l, const npg_placement *placement)
+npg_status make_features(npg::vdb_writer &file, level &l, const npg_placement *placement,
+                         const openvdb::MetaMap &about)
 {
     size_t n = size_t(l.nodes);
     FloatGrid::Ptr component;
@@ -156,7 +189,7 @@ npg_status make_features(npg::vdb_writer &file, level &l, const npg_placement *p
     each_grid(
         l, [&](Vec3SGrid &grid, size_t channel) { write_values(l, grid, channel); },
         [&](FloatGrid &grid, size_t channel) { write_values(l, grid, channel); });
-    for (auto &[first, grid] : l.grids) place(*grid, placement);
+    for (auto &[first, grid] : l.grids) place(*grid, placement, about);
     NPG_TRY(make_component(component, l));
     for (auto &[first, grid] : l.grids) file.add(grid);
     file.add(component);
@@ -188,7 +221,7 @@ npg_status npg_vdb_save_latents(const char *path, npg_vdb_span *span, const char
         npg::vdb_writer out(path, *in.getMetadata(), count_with_components(levels));
         for (auto &[at, l] : levels) {
             for (auto &[first, grid] : l.grids) grid = in.readGrid(grid->getName());
-            NPG_TRY(make_features(out, l, placement));
+            NPG_TRY(make_features(out, l, placement, *in.getMetadata()));
             l = level(); // one level in memory at a time
         }
         out.close();

@@ -29,6 +29,17 @@ static uint64_t bytes(const npg_form_facts *facts)
     return facts->pose_count < 0 ? 0 : (uint64_t)((double)facts->pose_count * cells * 12);
 }
 
+static npg_status check(const npg_form_facts *facts)
+{
+    double voxel = facts->voxel_share * facts->longest;
+    if (!(voxel > 0) || voxel >= NPG_VDB_VOXEL_MIN) return NPG_OK;
+    return npg_error(
+        NPG_USAGE,
+        "vdb can't hold the capture: OpenVDB has no voxels below %g, and here they would be %g (vdb-voxel "
+        "%g of the longest side, %g); write the meshes %.1g times as large or larger (scale)",
+        NPG_VDB_VOXEL_MIN, voxel, facts->voxel_share, facts->longest, 1.1 * NPG_VDB_VOXEL_MIN / voxel);
+}
+
 static npg_status close_openings(vdb_state *s)
 {
     const npg_form_facts *facts = s->facts;
@@ -95,6 +106,7 @@ static void close_vdb(void *state)
 const npg_form npg_form_vdb = {.name = "vdb",
                                .help = "OpenVDB level set per frame, latent grids per window",
                                .state_size = sizeof(vdb_state),
+                               .check = check,
                                .bytes = bytes,
                                .open = open_vdb,
                                .pose = write_pose,

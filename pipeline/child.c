@@ -1,5 +1,5 @@
 /* Child: run a helper program with bytes in, bytes out, a time limit and a way to stop it. */
-#include "mesh/child.h"
+#include "pipeline/child.h"
 
 #include <dlfcn.h>
 #include <errno.h>
