@@ -49,19 +49,19 @@ is_gone() { # within ten seconds
 
 @test "stopped or killed it leaves no root, no mount and no process behind" {
     needs_namespaces
-    fake_debootstrap 'mkdir -p "$root/usr"; mount -t tmpfs none "$root/usr"; echo "$root" >started; exec sleep 4321'
+    fake_debootstrap 'mkdir -p "$root/usr"; mount -t tmpfs none "$root/usr"; echo "$root" >"$TMPDIR.started"; exec sleep 4321'
     for signal in TERM HUP KILL; do
-        rm -f started
+        rm -f scratch.started
         "$script" >log 2>&1 3>&- &
         pid=$!
-        for ((i = 0; i < 300; i++)); do [ ! -s started ] && sleep 0.1; done
+        for ((i = 0; i < 300; i++)); do [ -s scratch.started ] || sleep 0.1; done
         cat log
-        [ -d "$(cat started)/usr" ]
-        ! grep -q "$PWD/scratch" /proc/mounts
+        [ -d "$(cat scratch.started)/usr" ]
+        [ -z "$(grep "$PWD/scratch" /proc/mounts)" ]
         kill -$signal $pid
         wait $pid || true
         is_gone
-        ! pgrep -f '^sleep 4321$'
+        [ -z "$(pgrep -f '^sleep 4321$')" ]
     done
 }
 

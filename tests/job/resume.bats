@@ -85,7 +85,7 @@ newest() {
     printf '\x5a\xa5' | dd of="$(newest grids vdb)" bs=1 seek=3000 conv=notrunc status=none
     for out in hurt cut grids; do
         go_on $out
-        [[ "$output" == *"is damaged"*"goes on from the window before"* ]]
+        [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
         same $out
     done
 }
