@@ -109,7 +109,7 @@ copy_tree() { # FOLDER
 @test "every path in a page that begins with a folder of the tree exists" {
     while read -r page; do
         grep -o '`\(pipeline\|stages\|kernels\|tools\|tests\|samples\)/[A-Za-z0-9_./-]*`' "$root/$page" | tr -d '`' | while read -r path; do
-            [ -e "$root/$path" ] || { echo "$page: $path"; false; }
+            [[ "$path" == *NAME* || -e "$root/$path" ]] || { echo "$page: $path"; false; }
         done
     done < <(list_pages)
 }
