@@ -29,12 +29,12 @@
 
 /* The ints that describe one search of one frame, a slot: */
 #define NPG_SLOT             8
-#define NPG_SLOT_QUERIES     0 /* how many points are looked for ...             */
-#define NPG_SLOT_QUERY_BLOCK 1 /* ... and their first block                      */
-#define NPG_SLOT_POINTS      2 /* how many points there are to be found ...      */
-#define NPG_SLOT_POINT_BLOCK 3 /* ... and their first block: the leaves          */
-#define NPG_SLOT_BOX_BLOCK   4 /* the first block of their boxes                 */
-#define NPG_SLOT_RESULT      5 /* where the first answer goes; 6 and 7 are 0     */
+#define NPG_SLOT_QUERIES     0 /* how many points are looked for ...         */
+#define NPG_SLOT_QUERY_BLOCK 1 /* ... and their first block                  */
+#define NPG_SLOT_POINTS      2 /* how many points there are to be found ...  */
+#define NPG_SLOT_POINT_BLOCK 3 /* ... and their first block: the leaves      */
+#define NPG_SLOT_BOX_BLOCK   4 /* the first block of their boxes             */
+#define NPG_SLOT_RESULT      5 /* where the first answer goes; 6 and 7 are 0 */
 
 /* Floats of a known correspondence (op pull): npg_pull of motion.h. */
 #define NPG_PULL_FLOATS 16
@@ -51,10 +51,10 @@
 
 /* The ints that describe one grid to the solve: */
 #define NPG_GRID        4
-#define NPG_GRID_NODES  0 /* n, nodes per axis; 0: the level is copied                   */
-#define NPG_GRID_ROW    1 /* its first node in the table of features                     */
-#define NPG_GRID_LINE   2 /* its first line: a row of nodes along the axis of the pass   */
-#define NPG_GRID_MATRIX 3 /* where its n x n matrix begins                               */
+#define NPG_GRID_NODES  0 /* n, nodes per axis; 0: the level is copied                 */
+#define NPG_GRID_ROW    1 /* its first node in the table of features                   */
+#define NPG_GRID_LINE   2 /* its first line: a row of nodes along the axis of the pass */
+#define NPG_GRID_MATRIX 3 /* where its n x n matrix begins                             */
 
 /* ---- the decoder (mlp) ---- */
 

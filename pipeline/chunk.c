@@ -26,7 +26,7 @@ npg_status npg_chunk_open(npg_chunk **out, size_t capacity)
 
 npg_chunk *npg_chunk_ref(npg_chunk *chunk)
 {
-    /* Relaxed: who makes a reference holds one already.  The last one to go must see what all others wrote. */
+    /* Relaxed: who makes a reference holds one already.  The last to go must see what all others wrote. */
     atomic_fetch_add_explicit(&chunk->references, 1, memory_order_relaxed);
     return chunk;
 }

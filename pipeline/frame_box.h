@@ -13,8 +13,9 @@
 
 #define NPG_UNIT_EXTENT 0.95 /* half of the longest side of the box, in units */
 
-/* The longest side that a capture may have.  Cleaning and normals come before the box and are in local float: below,
- * squares and cubes of the points' spacing leave its range; above, points count as not finite (cleaning.h). */
+/* The longest side that a capture may have.  Cleaning and normals come before the box and are in local float:
+ * below, squares and cubes of the points' spacing leave its range; above, points count as not
+ * finite (cleaning.h). */
 #define NPG_SIDE_MIN 1e-13
 #define NPG_SIDE_MAX 1e12
 
@@ -45,8 +46,8 @@ double npg_bounds_diagonal(const npg_bounds *bounds);
 /* The longest side; 0 while nothing was added. */
 double npg_bounds_longest(const npg_bounds *bounds);
 
-/* The box for local bounds.  NPG_BAD_INPUT when they are empty or not finite, or their longest side is 0 or none that
- * a capture may have. */
+/* The box for local bounds.  NPG_BAD_INPUT when they are empty or not finite, or their longest side is 0
+ * or none that a capture may have. */
 npg_status npg_frame_box_set(npg_frame_box *box, const npg_origin *origin, const npg_bounds *bounds_local);
 
 /* N x 3 each; out may be the input. */

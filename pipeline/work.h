@@ -10,7 +10,7 @@
 #include "pipeline/status.h"
 
 typedef struct npg_work {
-    const char *name; /* row of the table                                               */
+    const char *name; /* row of the table */
     npg_status (*call)(void *user);
     void *user;
     double flops, bytes;  /* operations and bytes of one call, at least; flops 0: not counted */

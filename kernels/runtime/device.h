@@ -24,8 +24,8 @@ typedef struct npg_device_info {
     size_t memory_bytes; /* global memory      */
 } npg_device_info;
 
-/* The i-th device of all platforms; NPG_END after the last, NPG_DEVICE when there is no platform at all or a driver
- * can't be asked (probe.h). */
+/* The i-th device of all platforms; NPG_END after the last, NPG_DEVICE when there is no platform at all
+ * or a driver can't be asked (probe.h). */
 npg_status npg_device_describe(size_t i, npg_device_info *info);
 
 /* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the

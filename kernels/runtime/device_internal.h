@@ -17,7 +17,7 @@ struct npg_device {
     cl_device_id id;
     cl_context context;
     cl_command_queue queue;
-    npg_program *programs; /* built so far, owned */
+    npg_program *programs; /* built so far, owned                                             */
     bool is_in_cache;      /* the kernel cache has been entered and must be left              */
     bool is_distrusted;    /* it has computed wrong: none of its programs goes into the cache */
 };

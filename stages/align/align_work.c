@@ -7,8 +7,8 @@ enum { NODES = 1000 }; /* of the graph; how many there are makes no difference t
 typedef struct dense {
     const npg_mesh *mesh; /* loan */
     npg_graph *graph;
-    double *pose;        /* K x 12          */
-    float *rows, *verts; /* K x 16, V x 3   */
+    double *pose;        /* K x 12        */
+    float *rows, *verts; /* K x 16, V x 3 */
 } dense;
 
 static npg_status pose(void *user)

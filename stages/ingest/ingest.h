@@ -2,8 +2,8 @@
 #ifndef NPG_INGEST_H
 #define NPG_INGEST_H
 
-#include "ingest/formats/reader.h" /* one cloud or mesh from a file or a stream                   */
+#include "ingest/formats/reader.h" /* one cloud or mesh from a file or a stream                    */
 #include "ingest/frame_files.h"    /* which files of an input are frames, and the text of --frames */
-#include "ingest/frame_names.h"    /* names in natural order                                      */
+#include "ingest/frame_names.h"    /* names in natural order                                       */
 
 #endif

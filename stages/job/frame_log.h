@@ -40,8 +40,8 @@ npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts);
 
 /* ---- the log of an earlier run ---- */
 
-/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where they are no
- * such lines. */
+/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where
+ * they are no such lines. */
 npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user);
 
 /* The misfits of a line, exactly as they were; NaN where it has none. */

@@ -41,9 +41,9 @@ void npg_probe_warn(npg_probe *probe, const char *format, ...)
 /* ---- frames ---- */
 
 /* When a frame is worth a warning; set by trial. */
-#define USABLE_LEAST 4    /* points: no closed surface has fewer                      */
-#define JUMP_MOST    0.25 /* of the box's middle from frame to frame, in diagonals    */
-#define GROWTH_MOST  1.5  /* of the box's diagonal from frame to frame, up or down    */
+#define USABLE_LEAST 4    /* points: no closed surface has fewer                   */
+#define JUMP_MOST    0.25 /* of the box's middle from frame to frame, in diagonals */
+#define GROWTH_MOST  1.5  /* of the box's diagonal from frame to frame, up or down */
 
 typedef struct cloud_facts {
     size_t not_finite, zero_normals;
