@@ -63,7 +63,7 @@ static npg_status unknown_option(const npg_verb *verb, const char *name)
 {
     npg_option_info info;
     const char *nearest = NULL;
-    size_t least = strlen(name) / 3 + 2;
+    size_t least = strlen(name) / 3 + 2; /* more edits than a third of the name: not a slip of the hand */
     for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
         size_t edits = edit_distance(name, info.name);
         if (edits < least) {
@@ -86,8 +86,8 @@ static npg_status set_option(npg_cli *cli, const char *name, const char *value)
     return NPG_OK;
 }
 
-/* Take the option at argv[*i], which begins with two dashes. */
-static npg_status take_long(npg_cli *cli, int argc, char **argv, int *i)
+/* The option at argv[*i], which begins with two dashes. */
+static npg_status parse_long_option(npg_cli *cli, int argc, char **argv, int *i)
 {
     char name[NAME_LIMIT];
     npg_option_info info;
@@ -109,7 +109,7 @@ static npg_status take_long(npg_cli *cli, int argc, char **argv, int *i)
     return unknown_option(cli->verb, name);
 }
 
-static npg_status take_short(npg_cli *cli, int argc, char **argv, int *i)
+static npg_status parse_short_option(npg_cli *cli, int argc, char **argv, int *i)
 {
     static const struct {
         char letter;
@@ -139,7 +139,7 @@ static npg_status load_config(npg_cli *cli, int argc, char **argv)
     return NPG_OK;
 }
 
-static npg_status take_all(npg_cli *cli, int argc, char **argv)
+static npg_status parse_all(npg_cli *cli, int argc, char **argv)
 {
     bool only_operands = false;
     for (int i = 1; i < argc; i++) {
@@ -149,9 +149,9 @@ static npg_status take_all(npg_cli *cli, int argc, char **argv)
         else if (!strcmp(text, "--"))
             only_operands = true;
         else if (text[1] == '-')
-            NPG_TRY(take_long(cli, argc, argv, &i));
+            NPG_TRY(parse_long_option(cli, argc, argv, &i));
         else
-            NPG_TRY(take_short(cli, argc, argv, &i));
+            NPG_TRY(parse_short_option(cli, argc, argv, &i));
     }
     return NPG_OK;
 }
@@ -175,7 +175,7 @@ npg_status npg_cli_parse(npg_cli *cli, const char *name, void *values, npg_optio
     for (const npg_option *option = verb->options; option && option->name; option++)
         npg_option_store(option, option->default_text, values);
     NPG_TRY(load_config(cli, argc, argv));
-    NPG_TRY(take_all(cli, argc, argv));
+    NPG_TRY(parse_all(cli, argc, argv));
     if (cli->operand_count < verb->operands_min)
         return npg_error(NPG_USAGE, "missing operand; usage: neupig %s %s", name, verb->operands);
     if (cli->operand_count > verb->operands_max)

@@ -21,7 +21,7 @@ typedef struct npg_cli {
 npg_status npg_cli_parse(npg_cli *cli, const char *verb, void *values, npg_options *options, int argc,
                          char **argv);
 
-/* Say on stderr how it failed, and return the exit code of the status.  NPG_END counts as success. */
+/* Print to stderr how it failed, and return the exit code of the status.  NPG_END counts as success. */
 int npg_cli_end(const char *verb, npg_status status);
 
 /* Help of one verb, and the list of all verbs. */
@@ -31,7 +31,7 @@ void npg_cli_print_verbs(FILE *out);
 /* "--name VALUE" as the help shows it; size includes the closing zero. */
 void npg_cli_spell(char *out, size_t size, const npg_option_info *option);
 
-/* What an option takes: default, range and words, in one line; "" when there is nothing to say. */
+/* What an option takes: default, range and words, in one line; "" when there are none. */
 void npg_cli_limits(char *out, size_t size, const npg_option_info *option);
 
 /* The i-th option of a verb, its own first, then those of the run; NPG_END after the last. */

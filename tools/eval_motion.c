@@ -16,7 +16,7 @@ void npg_eval_motion_close(npg_eval_motion *motion)
     npg_release(&motion->areas);
 }
 
-static npg_status begin(npg_eval_motion *motion, npg_mesh *mesh)
+static npg_status open_motion(npg_eval_motion *motion, npg_mesh *mesh)
 {
     motion->first = npg_mesh_ref(mesh);
     motion->faces = mesh->faces;
@@ -28,6 +28,7 @@ static npg_status begin(npg_eval_motion *motion, npg_mesh *mesh)
     return npg_mesh_edges(&motion->edges, &motion->edge_count, mesh->faces, mesh->face_count);
 }
 
+/* Mean length of the second difference over time. */
 static double jitter_of(const npg_eval_motion *motion, const float *after)
 {
     const float *middle = motion->before[0], *before = motion->before[1];
@@ -57,7 +58,7 @@ static double edge_change_of(const npg_eval_motion *motion, const float *pos)
 
 npg_status npg_eval_motion_add(npg_eval_motion *motion, npg_mesh *mesh)
 {
-    if (!motion->first) NPG_TRY(begin(motion, mesh));
+    if (!motion->first) NPG_TRY(open_motion(motion, mesh));
     motion->vertices_last &= mesh->vert_count == motion->vert_count;
     motion->topology_last &=
         motion->vertices_last && mesh->face_count == motion->face_count &&
@@ -85,6 +86,7 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Share of all faces of all frames whose area is > 10 x or < 0.1 x its median over time. */
 static npg_status bad_share(double *share, const npg_eval_motion *motion)
 {
     size_t bad = 0, frames = motion->frames;

@@ -8,7 +8,8 @@
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"
 
-#define OFF_MOST 1e-4 /* of the diagonal, between reference.ply and the reference of the windows */
+/* Of the diagonal, between reference.ply and the reference of the windows: more than their rounding. */
+#define OFF_MOST 1e-4
 
 /* file[a] = scale sign[a] unit[from[a]] + shift[a]: what --axes, --scale, --centre and the box have made of
  * unit coordinates.  It is found again by comparing the two forms of the reference. */
@@ -63,7 +64,7 @@ static double try_order(placement *place, const moments *m, const int from[3])
         place->factor[a] = m->both[a][from[a]] < 0 ? -scale : scale;
         place->shift[a] = m->mean_w[a] - place->factor[a] * m->mean_u[from[a]];
     }
-    return of_w - 2 * scale * both + scale * scale * of_u;
+    return of_w - 2 * scale * both + scale * scale * of_u; /* sum of (w - scale u)^2 */
 }
 
 static void place_points(const placement *place, float *out, const float *unit, size_t count)
@@ -105,7 +106,8 @@ static npg_status find_placement(npg_job_motion *motion, const npg_mesh *referen
 
 /* ---- the motion ---- */
 
-static npg_status fill(npg_job_motion *motion, const char *job, const npg_mesh *reference, const char *device)
+static npg_status load_motion(npg_job_motion *motion, const char *job, const npg_mesh *reference,
+                              const char *device)
 {
     char *folder;
     NPG_TRY(npg_device_open(&motion->device, device));
@@ -126,7 +128,7 @@ npg_status npg_job_motion_open(npg_job_motion **out, const char *job, const npg_
     npg_job_motion *motion;
     *out = NULL;
     NPG_TRY(npg_alloc(&motion, NPG_FOR_FIT, sizeof *motion));
-    npg_status status = fill(motion, job, reference, device);
+    npg_status status = load_motion(motion, job, reference, device);
     if (status) npg_job_motion_close(&motion);
     *out = motion;
     return status;

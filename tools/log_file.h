@@ -5,7 +5,7 @@
 #include <jansson.h>
 
 /* Append a record (consumed; NULL does nothing) with "time" put in front: one write, so that several
- * processes may append to the same file.  A write that fails is said once on standard error, and *fd (-1:
+ * processes may append to the same file.  A write that fails is reported once on standard error, and *fd (-1:
  * does nothing) becomes -1. */
 void npg_log_file_write(int *fd, json_t *record);
 

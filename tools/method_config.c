@@ -11,10 +11,10 @@
 #include <string.h>
 
 typedef struct word {
-    const char *theirs, *option, *ours; /* option NULL: what we do anyway */
+    const char *published, *option, *own; /* option NULL: what is done anyway */
 } word;
 
-/* Their word, our option, our word. */
+/* The published word, the option here, and its word. */
 /* clang-format off */
 static const word rotations[] = {
     {"quaternions", "rotation", "quaternion"},
@@ -49,7 +49,7 @@ typedef struct rule {
     const word *words;         /* for keys that hold a word */
     const char *options[2];    /* for keys that hold a number */
     double divide_by;          /* 0: the number as it stands */
-    double fixed;              /* the only number that we can do, where there are no options */
+    double fixed;              /* the only number that can be done, where there are no options */
 } rule;
 
 /* clang-format off */
@@ -110,9 +110,9 @@ static npg_status apply(npg_options *options, const rule *r, const json_t *value
     if (!r->words && !json_is_number(value)) return npg_error(NPG_USAGE, "not a number");
     if (r->words) {
         const word *w = r->words;
-        while (w->theirs && strcmp(w->theirs, json_string_value(value)) != 0) w++;
-        if (!w->theirs) name_unmatched(u, r->section, r->key, value);
-        return w->option ? npg_options_set(options, w->option, w->ours) : NPG_OK;
+        while (w->published && strcmp(w->published, json_string_value(value)) != 0) w++;
+        if (!w->published) name_unmatched(u, r->section, r->key, value);
+        return w->option ? npg_options_set(options, w->option, w->own) : NPG_OK;
     }
     if (r->options[0]) return set_number(options, r, json_number_value(value));
     if (json_number_value(value) != r->fixed) name_unmatched(u, r->section, r->key, value);

@@ -11,17 +11,17 @@ const npg_verb npg_verbs[] = {
      "a list file, or - for standard input; or --follow a folder that grows) "
      "in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, "
      "with reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.  "
-     "A run that was stopped or killed goes on where it was when it is started again.  "
+     "A run that was stopped or killed is resumed when it is started again.  "
      "With --segments auto, where the topology changes another reference takes over: DIR/segment_* are then "
-     "runs by themselves, and DIR/segments.json tells their frames, why they were cut, and their overlaps.",
+     "runs by themselves, and DIR/segments.json lists their frames, why they were cut, and their overlaps.",
      npg_run_verb_options, true, npg_verb_run},
-    {"append", "DIR", 1, 1, "Go on with frames that came since a job was done",
+    {"append", "DIR", 1, 1, "Continue a finished job with frames that came since",
      "DIR is the output folder of a run.  "
      "Frames that its input has after the last one of then are solved with the same options, "
-     "going on from the last forward window; the frames of the overlap before them are solved again, "
-     "all other meshes stay as they are.  A job that was broken off is first brought to its end.",
+     "from the last forward window on; the frames of the overlap before them are solved again, "
+     "all other meshes stay as they are.  A job that was stopped is first brought to its end.",
      npg_append_options, false, npg_verb_append},
-    {"batch", "MANIFEST|DIR [-o DIR]", 1, 1, "Run many captures, each in a folder and a process of its own",
+    {"batch", "MANIFEST|DIR [-o DIR]", 1, 1, "Run many captures, each in its own folder and process",
      "MANIFEST is a JSON file: {\"output\": \"results\", "
      "\"defaults\": {\"epochs\": 60, \"max-time\": 7200}, "
      "\"captures\": [{\"input\": \"dancer\"}, {\"input\": \"scan_%04d.ply\", \"name\": \"horse\"}]}; "
@@ -35,8 +35,8 @@ const npg_verb npg_verbs[] = {
      "unless the batch says --no-confine or \"confine\": false.  "
      "--max-memory counts for a run with all it starts; "
      "one that takes more, or longer than --max-time, is asked to stop and then killed.  "
-     "Started again, what is done is left alone and what was stopped goes on.  "
-     "At the end OUT/batch.json and OUT/batch.html tell of all captures.  "
+     "Started again, what is done is left alone and what was stopped is resumed.  "
+     "At the end OUT/batch.json and OUT/batch.html report on all captures.  "
      "Exit code 0 when all are done, 7 when all are done but some with frames skipped "
      "or below the quality bar, 1 when one is not done, 75 after a signal.",
      npg_batch_options, true, npg_verb_batch},
@@ -143,9 +143,9 @@ static int close_stdout(int code)
     return code ? code : npg_status_exit_code(NPG_DISK);
 }
 
-/* Keep what is free from staying with the process.  Windows take and give back arrays of many MiB beside
- * small blocks that stay, on a dozen threads.  Left alone, glibc raises the size from which a block is a
- * mapping of its own with every such array that is freed (to 32 MiB), so that arrays come to lie among the
+/* Have glibc return free memory to the system.  Windows take and give back arrays of many MiB beside
+ * small blocks that stay, on a dozen threads.  Left alone, glibc raises the size from which a block gets its
+ * own mapping with every such array that is freed (to 32 MiB), so that arrays come to lie among the
  * small blocks, and has up to eight arenas a core, each as large as the largest moment it saw: of 380 MiB of
  * heap 100 were free, and how many was a matter of which thread came to which arena.  A library must leave
  * this to its program. */

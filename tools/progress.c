@@ -58,7 +58,7 @@ static json_t *json_of_record(const npg_log_record *record)
     return line;
 }
 
-static void on_log(void *user, const npg_log_record *record)
+static void show_record(void *user, const npg_log_record *record)
 {
     static const char *const words[] = {"error: ", "warning: ", "", ""};
     static const char *const colours[] = {"\033[31m", "\033[33m", "", "\033[2m"};
@@ -78,9 +78,11 @@ static void on_log(void *user, const npg_log_record *record)
 
 /* ---- progress ---- */
 
+#define DRAW_S 0.1 /* the bar is drawn no more often: terminals are slow */
+
 void npg_spell_time(char *out, size_t size, double seconds)
 {
-    if (!(seconds >= 0) || seconds > 1e8) {
+    if (!(seconds >= 0) || seconds > 1e8) { /* three years: an estimate of nothing */
         snprintf(out, size, "?");
         return;
     }
@@ -100,7 +102,7 @@ static int terminal_width(void)
 static void draw_bar(npg_reporter *reporter, const npg_progress *progress)
 {
     char left[32], elapsed[32], tail[160], bar[32];
-    if (reporter->drawn_s >= 0 && progress->elapsed_s - reporter->drawn_s < 0.1 && progress->share < 1)
+    if (reporter->drawn_s >= 0 && progress->elapsed_s - reporter->drawn_s < DRAW_S && progress->share < 1)
         return;
     reporter->drawn_s = progress->elapsed_s;
     npg_spell_time(left, sizeof left, progress->left_s);
@@ -156,7 +158,7 @@ static void print_json(const npg_progress *progress)
     print_line(line);
 }
 
-static void on_progress(void *user, const npg_progress *progress)
+static void show_progress(void *user, const npg_progress *progress)
 {
     npg_reporter *reporter = user;
     if (reporter->show == NPG_SHOW_BAR) draw_bar(reporter, progress);
@@ -165,7 +167,7 @@ static void on_progress(void *user, const npg_progress *progress)
 
 npg_hooks npg_reporter_hooks(npg_reporter *reporter)
 {
-    return (npg_hooks){sizeof(npg_hooks), reporter, on_log, on_progress};
+    return (npg_hooks){sizeof(npg_hooks), reporter, show_record, show_progress};
 }
 
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output)

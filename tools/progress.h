@@ -33,7 +33,7 @@ void npg_reporter_pause(npg_reporter *reporter);
 /* Remove the bar, and write the closing record to the log file and in JSON mode to standard output. */
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output);
 
-/* "1:02:03", "2:03", or "?" where it can't be told. */
+/* "1:02:03", "2:03", or "?" where it is not known. */
 void npg_spell_time(char *out, size_t size, double seconds);
 
 #endif

@@ -8,10 +8,11 @@
 #define NPG_PARENT_VARIABLE "NEUPIG_BATCH_PID"
 
 /* A run from its start to its end.  SIGINT, SIGTERM and SIGHUP stop it; when it does not end in time the
- * process does, with exit code 75: what is on disk can be gone on from at any moment. */
+ * process does, with exit code 75: a run can be resumed from what is on disk at any moment. */
 npg_status npg_run_job(const npg_options *options, npg_reporter *reporter);
 
-/* The same without the reporter's closing word, for one run of several.  *is_open: its options were good. */
+/* The same without the reporter's closing record, for one run of several.  *is_open: its options were
+ * good. */
 npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open);
 
 /* Where the results are, on standard output; how it ended, on standard error. */

@@ -1,4 +1,4 @@
-/* neupig append: goes on with frames that came after a job was done. */
+/* neupig append: continues a finished job with frames that came after it. */
 #include <stddef.h>
 #include <stdio.h>
 #include <unistd.h>
@@ -48,7 +48,7 @@ static npg_status append(npg_options *options, const npg_cli *cli, const setting
     if (status != NPG_OK && status != NPG_PARTIAL) return status;
     NPG_TRY(npg_options_set(options, "append", "yes"));
     status = npg_run_job(options, &reporter);
-    if (status == NPG_OK || status == NPG_PARTIAL) NPG_TRY(npg_segments_forget(cli->operands[0]));
+    if (status == NPG_OK || status == NPG_PARTIAL) NPG_TRY(npg_segments_drop_outdated(cli->operands[0]));
     if (reporter.show != NPG_SHOW_JSON) npg_run_job_results(cli->verb->name, cli->operands[0], status);
     return status;
 }

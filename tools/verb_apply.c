@@ -32,7 +32,7 @@ typedef struct settings {
 } settings;
 
 enum { AS_MESH, AS_PLY, AS_OBJ };
-enum { BY_ANY, BY_WINDOWS, BY_CURVE, BY_LINE };
+enum { BY_ANY, BY_WINDOWS, BY_CURVE, BY_LINE }; /* words of --between */
 static const char *const between_words[] = {"auto", "windows", "curve", "line"};
 
 #define AT(member) offsetof(settings, member)
@@ -54,7 +54,7 @@ const npg_option npg_apply_options[] = {
     NPG_ROW_TEXT  ("device",    AT(device),    "auto",  "DEVICE",
         "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name"),
     NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
-        "Points farther from the reference than this share of its diagonal are said (exit code 7)"),
+        "Points farther from the reference than this share of its diagonal are reported (exit code 7)"),
     NPG_ROW_CHOICE("format",    AT(format),    "mesh",  "mesh|ply|obj",
         "Format of the files; mesh: as the mesh that is carried (PLY for other points)"),
     NPG_ROW_TEXT  ("prefix",    AT(prefix),    "frame", "NAME",
@@ -190,8 +190,8 @@ static npg_status open_job(applying *a)
     return open_motion(a);
 }
 
-/* The mesh in a file, that it is the reference moved; its positions go to vert_pos. */
-static npg_status take_mesh(const applying *a, float *vert_pos, const npg_mesh *mesh, const char *path)
+/* Check that a mesh is the reference moved, and copy its positions. */
+static npg_status copy_positions(const applying *a, float *vert_pos, const npg_mesh *mesh, const char *path)
 {
     const npg_mesh *reference = a->reference;
     for (size_t i = 0; i < 3 * mesh->vert_count; i++)
@@ -219,7 +219,7 @@ static npg_status read_moment(const applying *a, moment *m, const char *file)
         return npg_job_motion_pose(a->motion, m->vert_pos, (double)m->index);
     NPG_TRY(path_of(path, a->job, file));
     NPG_TRY(npg_read_mesh(&mesh, path, &origin));
-    npg_status status = take_mesh(a, m->vert_pos, mesh, path);
+    npg_status status = copy_positions(a, m->vert_pos, mesh, path);
     npg_mesh_unref(&mesh);
     return status;
 }
@@ -233,7 +233,7 @@ static double diagonal_of(const npg_mesh *mesh)
     return npg_bounds_diagonal(&bounds);
 }
 
-static npg_status tie(applying *a)
+static npg_status attach_carried(applying *a)
 {
     const npg_mesh *mesh = a->carried;
     size_t worst;
@@ -271,7 +271,7 @@ static npg_status open_carried(applying *a)
         memcpy(a->normals, mesh->vert_normals, v * 3 * sizeof *a->normals);
     else if (mesh->face_count)
         npg_mesh_vertex_normals(a->normals, mesh->vert_pos, v, mesh->faces, mesh->face_count);
-    return tie(a);
+    return attach_carried(a);
 }
 
 /* ---- the output folder ---- */
@@ -306,7 +306,7 @@ static npg_status clear_files(const applying *a)
     return status;
 }
 
-static void name_files(applying *a)
+static void choose_names(applying *a)
 {
     const char *dot = strrchr(a->s.mesh, '.');
     bool is_obj = a->s.format == AS_MESH ? dot && !strcasecmp(dot, ".obj") : a->s.format == AS_OBJ;
@@ -321,7 +321,7 @@ static void name_files(applying *a)
 static npg_status open_output(applying *a)
 {
     char path[PATH_SIZE];
-    name_files(a);
+    choose_names(a);
     NPG_TRY(npg_folder_probe(a->s.output));
     if (is_in(a->s.output, "frames.jsonl") || is_in(a->s.output, "job"))
         return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", a->s.output);
@@ -450,7 +450,7 @@ static void shift_window(applying *a)
     a->window[3] = (moment){0};
 }
 
-static npg_status take_line(void *user, const json_t *frame, const char *line, size_t size)
+static npg_status visit_frame(void *user, const json_t *frame, const char *line, size_t size)
 {
     applying *a = user;
     const char *file = json_string_value(json_object_get(frame, "file"));
@@ -464,7 +464,7 @@ static npg_status take_line(void *user, const json_t *frame, const char *line, s
     return write_step(a);
 }
 
-static npg_status finish(applying *a)
+static npg_status write_done(applying *a)
 {
     for (int i = 0; i < 2; i++) {
         shift_window(a);
@@ -482,7 +482,7 @@ static npg_status finish(applying *a)
     char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(facts);
     if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
-    npg_status status = npg_file_print(a->done, "\n  ],%s\n", text + 1); /* goes on in the same object */
+    npg_status status = npg_file_print(a->done, "\n  ],%s\n", text + 1); /* the rest of the same object */
     free(text);
     NPG_TRY(status);
     status = npg_file_commit(&a->done);
@@ -503,8 +503,8 @@ static npg_status apply(applying *a)
     NPG_TRY(open_job(a));
     NPG_TRY(open_carried(a));
     NPG_TRY(open_output(a));
-    NPG_TRY(each_line(a, take_line, a));
-    return finish(a);
+    NPG_TRY(each_line(a, visit_frame, a));
+    return write_done(a);
 }
 
 static void close_applying(applying *a)

@@ -1,4 +1,4 @@
-/* neupig batch: many captures, each in a folder and a process of its own. */
+/* neupig batch: many captures, each in its own folder and process. */
 #include <stddef.h>
 #include <string.h>
 
@@ -27,7 +27,7 @@ const npg_option npg_batch_options[] = {
     NPG_ROW_INT   ("jobs",       AT(jobs),       "1",        1,     256,  "N",
         "Captures at work at the same time; each uses all cores"),
     NPG_ROW_REAL  ("max-time",   AT(max_time_s), "-1",       -1,    1e9,  "SECONDS",
-        "Stop a capture after this many seconds, 0: no limit; started again it goes on; "
+        "Stop a capture after this many seconds, 0: no limit; started again it is resumed; "
         "-1: as the manifest says"),
     NPG_ROW_CHOICE("segments",   AT(segments),   "manifest", "manifest|one|auto", /* NPG_BATCH_SEGMENTS_.. */
         "Where the topology of a capture changes: one reference all the same, "
@@ -81,7 +81,7 @@ static npg_status run(npg_batch *batch, const settings *s)
     if (!status) status = npg_batch_report(batch, reporter.show == NPG_SHOW_JSON ? NULL : stdout);
     if (!status) status = status_of(batch, npg_batch_exit_code(batch, false, stopped));
     npg_reporter_end(&reporter, status, batch->output);
-    if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to go on\n", stderr);
+    if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to resume\n", stderr);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
                 "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; "

@@ -34,7 +34,7 @@ const npg_option npg_bench_options[] = {
     NPG_ROW_REAL("tolerance", AT(tolerance), "0.05",   0,     10,    NULL,
         "share by which the quartiles must lie apart for that"),
     NPG_ROW_TEXT("only",      AT(only),      "",       "NAME",
-        "time only rows whose names begin with one of these words, parted by commas"),
+        "time only rows whose names begin with one of these words, separated by commas"),
     NPG_ROW_INT ("vertices",  AT(vertices),  "10000",  16,    1e6,   NULL,
         "vertices of the mesh"),
     NPG_ROW_INT ("points",    AT(points),    "5000",   1,     1e6,   NULL,
@@ -69,14 +69,15 @@ static json_t *json_of_spread(npg_spread spread)
     return json_pack("{s:f, s:f, s:f}", "low", spread.low, "median", spread.median, "high", spread.high);
 }
 
-/* What runs in one thread of the host keeps one unit of a processor busy. */
+/* How many such threads a device has room for: what runs in one thread of the host keeps one unit of a
+ * processor busy. */
 static double units_of(const bench *b)
 {
     const npg_device_info *info = npg_device_facts(b->device);
     return info->is_cpu ? info->units : 1;
 }
 
-static npg_status take_row(void *user, const npg_bench_row *row)
+static npg_status visit_row(void *user, const npg_bench_row *row)
 {
     bench *b = user;
     bool by_bytes;
@@ -163,8 +164,8 @@ static npg_status measure(bench *b, json_t *root)
     NPG_TRY(npg_bench_body_open(&b->body, (size_t)b->s.vertices, (size_t)b->s.points, (size_t)b->s.frames));
     NPG_TRY(npg_meter_open(&b->meter, b->device, (size_t)b->s.repeat));
     describe(b, root);
-    NPG_TRY(npg_bench_kernels(&b->meter, &b->body, b->s.only, take_row, b));
-    if (b->s.dense) NPG_TRY(npg_bench_dense(&b->meter, b->s.only, (size_t)b->s.dense, take_row, b));
+    NPG_TRY(npg_bench_kernels(&b->meter, &b->body, b->s.only, visit_row, b));
+    if (b->s.dense) NPG_TRY(npg_bench_dense(&b->meter, b->s.only, (size_t)b->s.dense, visit_row, b));
     NPG_TRY(bench_fit(b, root));
     if (!json_object_size(b->kernels) && !json_object_get(root, "fit"))
         return npg_error(NPG_USAGE, "option only: no row's name begins with \"%s\"", b->s.only);
@@ -208,7 +209,7 @@ static void print_table(const json_t *root)
                number_of(fit, "cpu_seconds_per_epoch"));
 }
 
-static npg_status give(const settings *s, const json_t *root)
+static npg_status write_report(const settings *s, const json_t *root)
 {
     if (*s->output) NPG_TRY(npg_json_save(s->output, root));
     if (!s->json) {
@@ -220,7 +221,7 @@ static npg_status give(const settings *s, const json_t *root)
     return NPG_OK;
 }
 
-static npg_status compare(const settings *s, const json_t *root)
+static npg_status compare_with_earlier(const settings *s, const json_t *root)
 {
     json_t *before;
     if (!*s->compare) return NPG_OK;
@@ -243,12 +244,12 @@ int npg_verb_bench(int argc, char **argv)
     } else {
         root = json_object();
         status = measure(&b, root);
-        if (!status) status = give(&b.s, root);
+        if (!status) status = write_report(&b.s, root);
     }
     npg_meter_close(&b.meter);
     npg_bench_body_close(&b.body);
     npg_device_close(&b.device);
-    if (!status) status = compare(&b.s, root);
+    if (!status) status = compare_with_earlier(&b.s, root);
     json_decref(b.kernels);
     json_decref(root);
     return npg_cli_end(argv[0], status);

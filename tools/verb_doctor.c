@@ -112,7 +112,7 @@ static void print_text(const json_t *machine, const json_t *libraries, json_t *d
                json_string_value(json_object_get(value, "self_test")));
 }
 
-static npg_status judge(const json_t *devices)
+static npg_status status_of(const json_t *devices)
 {
     if (!json_array_size(devices))
         return npg_error(NPG_DEVICE,
@@ -145,7 +145,7 @@ int npg_verb_doctor(int argc, char **argv)
     } else {
         print_text(machine, libraries, devices);
     }
-    if (!status) status = judge(devices);
+    if (!status) status = status_of(devices);
     json_decref(machine);
     json_decref(libraries);
     json_decref(devices);

@@ -111,7 +111,7 @@ static npg_status list_both(evaluation *e, const npg_cli *cli)
 
 /* ---- figures ---- */
 
-static npg_status begin(evaluation *e, npg_mesh *predicted, npg_mesh *truth, const char *path)
+static npg_status begin_metrics(evaluation *e, npg_mesh *predicted, npg_mesh *truth, const char *path)
 {
     e->metrics = (npg_metrics_settings){.sample_count = (size_t)e->s.samples,
                                         .tau = e->s.tau,
@@ -175,7 +175,7 @@ static npg_status eval_frame(evaluation *e, size_t t, npg_mesh *predicted, npg_m
 {
     npg_frame_metrics m;
     double corr = 0;
-    if (t == 0) NPG_TRY(begin(e, predicted, truth, e->truth.paths[0]));
+    if (t == 0) NPG_TRY(begin_metrics(e, predicted, truth, e->truth.paths[0]));
     NPG_TRY(npg_error_prefix(npg_metrics_compare(&m, predicted, truth, &e->metrics, t), "%s, %s",
                              e->predicted.paths[t], e->truth.paths[t]));
     NPG_TRY(npg_eval_motion_add(&e->motion, predicted));

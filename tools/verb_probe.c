@@ -50,7 +50,7 @@ static npg_status read_stream(job *j)
         status = npg_stream_next(stream, &frame, &j->probe.origin);
         if (status == NPG_END) break;
         bool broken = status == NPG_BAD_INPUT; /* nothing behind it can be found again */
-        status = npg_probe_note(&j->probe, status, &frame, "stream", number);
+        status = npg_probe_count(&j->probe, status, &frame, "stream", number);
         if (broken) break;
     }
     npg_stream_close(&stream);
@@ -121,8 +121,8 @@ static void print_text(job *j, const npg_estimate *e)
     json_array_foreach(p->attention, i, value) printf("attention %s\n", json_string_value(value));
 }
 
-/* Unreadable frames are bad input unless the run would go on without them. */
-static npg_status verdict(const job *j)
+/* Unreadable frames are bad input unless the run would continue without them. */
+static npg_status status_of(const job *j)
 {
     if (j->probe.unreadable && !option_on(j->options, "keep-going"))
         return npg_error(NPG_BAD_INPUT, "%s", j->probe.first_fault);
@@ -133,13 +133,13 @@ static npg_status do_probe(job *j)
 {
     npg_estimate estimate;
     NPG_TRY(read_all(j));
-    npg_probe_judge(&j->probe);
+    npg_probe_warn_of_all(&j->probe);
     npg_probe_estimate_run(&estimate, &j->probe, j->options);
     if (j->s.json)
         print_json(j, &estimate);
     else
         print_text(j, &estimate);
-    return verdict(j);
+    return status_of(j);
 }
 
 int npg_verb_probe(int argc, char **argv)

@@ -48,6 +48,8 @@ const npg_option npg_render_options[] = {
     {0}};
 /* clang-format on */
 
+#define PIXELS_MAX ((int64_t)1 << 28) /* 768 MiB of colours */
+
 typedef struct job {
     settings s;
     npg_listing files;
@@ -105,7 +107,7 @@ static npg_status lay_out(job *j)
     j->columns = j->s.columns ? j->s.columns : 8;
     if (j->columns > count) j->columns = count;
     int64_t rows = (count + j->columns - 1) / j->columns, width = j->columns * j->tile_width;
-    if (width * rows * j->s.height > (int64_t)1 << 28)
+    if (width * rows * j->s.height > PIXELS_MAX)
         return npg_error(NPG_USAGE,
                          "the picture would have %lld x %lld pixels; choose a smaller --height or --count",
                          (long long)width, (long long)(rows * j->s.height));

@@ -45,7 +45,7 @@ const npg_option npg_run_verb_options[] = {
 /* ---- signals ---- */
 
 #define STOP_SECONDS  4 /* a run that has not stopped by then is ended */
-#define AGAIN_SECONDS 1 /* schedulers signal every process of a job, and who started us passes his on */
+#define AGAIN_SECONDS 1 /* schedulers signal every process of a job, and the parent passes its own on */
 
 typedef struct watcher {
     npg_run *run;         /* loan */
@@ -55,7 +55,7 @@ typedef struct watcher {
 } watcher;
 
 /* Signals are blocked in every thread and waited for in one, so that no handler ever runs: the OpenCL
- * compiler brings one of its own, which takes away files that other threads are at work on. */
+ * compiler installs one itself, which removes files that other threads are at work on. */
 static void block_signals(watcher *w)
 {
     static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
@@ -95,7 +95,7 @@ static int wait_for_second(const watcher *w)
  * all that is on disk is whole at every moment. */
 static void *watch_signals(void *argument)
 {
-    static const char text[] = "neupig: stopped on request; run again to go on\n";
+    static const char text[] = "neupig: stopped on request; run again to resume\n";
     const watcher *w = argument;
     if (next_signal(w, NULL) == SIGUSR1) return NULL;
     npg_run_stop(w->run);
@@ -143,7 +143,7 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
     static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl", "exports.jsonl",
                                         "report.json", "segments.json", "done.json"};
     char path[4096];
-    if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to go on\n", verb);
+    if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to resume\n", verb);
     if (status == NPG_PARTIAL)
         fprintf(stderr,
                 "neupig %s: finished, but with frames skipped, unexplained or below the quality bar; "
@@ -195,10 +195,10 @@ static npg_status check_paths(npg_options *options, const npg_cli *cli)
     return NPG_OK;
 }
 
-static npg_status start(const npg_options *options, const settings *s, npg_reporter *reporter)
+static npg_status run_or_segment(const npg_options *options, const settings *s, npg_reporter *reporter)
 {
     if (s->segments == NPG_SEGMENTS_AUTO) return npg_segments_run(options, reporter);
-    NPG_TRY(npg_segments_make_way(options));
+    NPG_TRY(npg_segments_require_none(options));
     return npg_run_job(options, reporter);
 }
 
@@ -214,7 +214,7 @@ int npg_verb_run(int argc, char **argv)
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
         status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
-        if (!status) status = start(options, &s, &reporter);
+        if (!status) status = run_or_segment(options, &s, &reporter);
         if (reporter.show != NPG_SHOW_JSON)
             npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
     }

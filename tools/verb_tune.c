@@ -7,7 +7,8 @@
 #include "tools/bench/bench_rows.h"
 #include "tools/cli.h"
 
-#define GAIN 0.03 /* a set takes the place of the present one when it is faster by this share */
+#define GAIN                                                                                                 \
+    0.03 /* a set takes the place of the present one when it is faster by this share: more than noise */
 
 typedef struct settings {
     int64_t vertices, points, frames, repeat;
@@ -22,7 +23,7 @@ const npg_option npg_tune_options[] = {
     NPG_ROW_TEXT("output",   AT(output),   "",      "FILE",
         "write the set to this file instead of the cache, where runs look for it"),
     NPG_ROW_TEXT("only",     AT(only),     "",      "NAMES",
-        "tune only this: decoder, or names of other numbers of a set, parted by commas"),
+        "tune only this: decoder, or names of other numbers of a set, separated by commas"),
     NPG_ROW_INT ("vertices", AT(vertices), "1500",  16,    1e6,  NULL,
         "vertices of the mesh that is timed"),
     NPG_ROW_INT ("points",   AT(points),   "5000",  1,     1e6,  NULL,
@@ -105,14 +106,14 @@ static npg_status add_row(void *user, const npg_bench_row *row)
 }
 
 /* Largest error of the ops whose names begin so; *agrees: all are within their tolerance. */
-static npg_status check(double *error, bool *agrees, npg_device *device, const char *op)
+static npg_status check_ops(double *error, bool *agrees, npg_device *device, const char *op)
 {
     *error = 0;
     *agrees = true;
     for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++) {
         double one = 0;
         if (strncmp(c->op, op, strlen(op)) != 0) continue;
-        for (int size = 1; size <= 3; size += 2) {
+        for (int size = 1; size <= 3; size += 2) { /* one block, and several with a part of one */
             NPG_TRY(c->check(device, size, 7, &one));
             if (!(one <= c->tolerance)) *agrees = false;
             if (!(one <= *error)) *error = one;
@@ -128,7 +129,7 @@ static npg_status try_set(tune *t, const npg_tuning *set, const char *what, cons
     double error;
     bool agrees;
     NPG_TRY(npg_device_set_tuning(t->device, set));
-    npg_status status = check(&error, &agrees, t->device, op);
+    npg_status status = check_ops(&error, &agrees, t->device, op);
     t->cost = t->flops = 0;
     if (!status && agrees) status = npg_bench_kernels(&t->meter, &t->body, row, add_row, t);
     if (status == NPG_DEVICE) { /* too large for this device: its compiler or its launch says no */
@@ -212,7 +213,7 @@ static npg_status tune_knob(tune *t, const one_number *knob)
     return NPG_OK;
 }
 
-static npg_status keep(const tune *t)
+static npg_status save_best(const tune *t)
 {
     char path[NPG_CACHE_PATH];
     if (*t->s.output)
@@ -237,7 +238,7 @@ static npg_status do_tune(tune *t)
         if (npg_bench_wants(s->only, knob->field)) NPG_TRY(tune_knob(t, knob));
     NPG_TRY(npg_device_set_tuning(t->device, &t->best));
     NPG_TRY(npg_kernels_self_test(t->device));
-    return keep(t);
+    return save_best(t);
 }
 
 int npg_verb_tune(int argc, char **argv)

@@ -62,7 +62,7 @@ newest() {
 @test "SIGTERM ends with 75 within 5 s, and the next run goes on" {
     kill_at stopped TERM 1 --epochs 500
     [ $killed_status -eq 75 ]
-    grep -q "run again to go on" stopped.log
+    grep -q "run again to resume" stopped.log
     go_on stopped --epochs 500
     grep -q resumed_frames stopped/report.json
 }

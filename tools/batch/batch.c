@@ -90,11 +90,11 @@ static npg_status find_input(char **input, const npg_batch *batch, npg_capture *
     struct stat info;
     if (stat(path, &info) || !S_ISDIR(info.st_mode)) return npg_copy_text(input, path);
     if (is_confined && batch->is_folder) NPG_TRY(npg_path_confine(path, batch->path));
-    return npg_batch_look_inside(capture, input, path, is_confined);
+    return npg_batch_find_input(capture, input, path, is_confined);
 }
 
-npg_status npg_batch_finish(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
-                            const npg_batch_given *given)
+npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
+                              const npg_batch_given *given)
 {
     char *path;
     bool is_confined;

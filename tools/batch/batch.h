@@ -1,4 +1,4 @@
-/* Batch: many captures, each in a folder and a process of its own. */
+/* Batch: many captures, each in its own folder and process. */
 #ifndef NPG_BATCH_H
 #define NPG_BATCH_H
 
@@ -66,14 +66,14 @@ npg_status npg_batch_add(npg_batch *batch, npg_capture **capture, const char *na
 /* Set input, output and what the command line gives; the last step.  What leads out of the capture's folder
  * is left alone: the capture then has a refusal.  text: as the manifest or the listing has it; a path that is
  * not absolute is taken from `folder`. */
-npg_status npg_batch_finish(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
-                            const npg_batch_given *given);
+npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
+                              const npg_batch_given *given);
 
 /* Where frames lie in a folder of a capture: its sub-folder points/, point_clouds/, points_clouds/ or
  * pcl_seqs/ when that holds any, else the folder; only meshes in gt/: that.  Sets the option "truth" to the
  * sub-folder truth/ or gt/ unless it is set or is the input.  *input is to be given to npg_release().
  * NPG_BAD_INPUT: one of these sub-folders leads out of the folder, and is_confined. */
-npg_status npg_batch_look_inside(npg_capture *capture, char **input, const char *folder, bool is_confined);
+npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *folder, bool is_confined);
 
 /* An absolute path of `text` seen from `folder`; to be given to npg_release(). */
 npg_status npg_path_from(char **path, const char *folder, const char *text);

@@ -10,8 +10,8 @@ enum {
     TOP = 10,
     BOTTOM = 22,
     RIGHT = 8,
-    POINTS_MAX = 600,
-    MARKS_MAX = 200
+    POINTS_MAX = 600, /* of the line: about one a pixel */
+    MARKS_MAX = 200   /* circles and cuts               */
 };
 
 typedef struct chart {
@@ -33,6 +33,7 @@ static double y_of(const chart *c, double error)
 static double upper_edge(const npg_capture_figures *f)
 {
     double most = f->worst < f->count ? f->frames[f->worst].error : 0;
+    /* The bar is shown, unless it would press the line flat. */
     if (isfinite(f->bar) && f->bar < 20 * most) most = fmax(most, f->bar);
     return most > 0 ? 1.1 * most : 1;
 }

@@ -17,12 +17,12 @@ typedef struct sums {
     double disk_bytes, memory_bytes, time_s; /* memory: of the largest */
 } sums;
 
-typedef struct look {
+typedef struct probed {
     npg_probe probe;
     npg_frame_files *list;
     npg_estimate estimate;
     char cause[1024]; /* why it would fail, "" when it would not */
-} look;
+} probed;
 
 static bool is_on(const npg_options *options, const char *name)
 {
@@ -30,7 +30,7 @@ static bool is_on(const npg_options *options, const char *name)
     return text && strchr("ytoYTO1", text[0]) && strcmp(text, "off") != 0 && text[0];
 }
 
-static npg_status look_at(look *l, const npg_capture *capture)
+static npg_status probe_capture(probed *l, const npg_capture *capture)
 {
     npg_probe_init(&l->probe);
     if (capture->refusal) {
@@ -43,14 +43,14 @@ static npg_status look_at(look *l, const npg_capture *capture)
         snprintf(l->cause, sizeof l->cause, "%s", npg_error_text());
         return NPG_OK;
     }
-    npg_probe_judge(&l->probe);
+    npg_probe_warn_of_all(&l->probe);
     npg_probe_estimate_run(&l->estimate, &l->probe, capture->options);
     if (l->probe.unreadable && !is_on(capture->options, "keep-going"))
         snprintf(l->cause, sizeof l->cause, "%s", l->probe.first_fault);
     return NPG_OK;
 }
 
-static void print_row(const npg_capture *capture, look *l)
+static void print_row(const npg_capture *capture, probed *l)
 {
     char time[32];
     const npg_estimate *e = &l->estimate;
@@ -60,12 +60,12 @@ static void print_row(const npg_capture *capture, look *l)
            e->disk_bytes / 0x1p20, time);
     if (l->cause[0]) printf("    would fail: %s\n", l->cause);
     if (capture->segments == NPG_BATCH_SEGMENTS_AUTO)
-        printf("    segments: the time is that of one reference; each cut solves frames anew\n");
+        printf("    segments: the time is that of one reference; each cut solves frames again\n");
     for (size_t i = 0; i < json_array_size(l->probe.attention); i++)
         printf("    attention: %s\n", json_string_value(json_array_get(l->probe.attention, i)));
 }
 
-static void print_line(const npg_capture *capture, look *l)
+static void print_line(const npg_capture *capture, probed *l)
 {
     const npg_estimate *e = &l->estimate;
     json_t *line = json_pack(
@@ -82,7 +82,7 @@ static void print_line(const npg_capture *capture, look *l)
     json_decref(line);
 }
 
-static void add_up(sums *s, const look *l)
+static void add_up(sums *s, const probed *l)
 {
     const npg_estimate *e = &l->estimate;
     s->captures++;
@@ -95,7 +95,7 @@ static void add_up(sums *s, const look *l)
     if (e->memory_bytes > s->memory_bytes) s->memory_bytes = e->memory_bytes;
 }
 
-/* Free bytes where the output is or will be; -1 when that can't be told. */
+/* Free bytes where the output is or will be; -1 when that is not known. */
 static double free_bytes(const char *output)
 {
     struct statvfs facts;
@@ -129,9 +129,9 @@ npg_status npg_batch_estimate(const npg_batch *batch, bool as_json, int *exit_co
         printf("%-24s  %7s  %5s  %9s  %12s  %12s  %9s\n", "capture", "frames", "gaps", "points", "memory",
                "disk", "time");
     for (size_t i = 0; i < batch->count && !status; i++) {
-        look l = {.list = NULL};
+        probed l = {.list = NULL};
         if (!npg_batch_is_mine(batch, i)) continue;
-        status = look_at(&l, &batch->captures[i]);
+        status = probe_capture(&l, &batch->captures[i]);
         if (!status) {
             as_json ? print_line(&batch->captures[i], &l) : print_row(&batch->captures[i], &l);
             add_up(&s, &l);

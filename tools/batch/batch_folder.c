@@ -76,7 +76,7 @@ static npg_status find_input(char **input, bool *of_mesh_vertices, const inside 
     return *input ? NPG_OK : npg_copy_text(input, *of_mesh_vertices ? truth : in->folder);
 }
 
-npg_status npg_batch_look_inside(npg_capture *capture, char **input, const char *folder, bool is_confined)
+npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *folder, bool is_confined)
 {
     static const char *const truths[] = {"truth", "gt", NULL};
     const inside in = {folder, is_confined};
@@ -157,7 +157,7 @@ static npg_status add_captures(npg_batch *batch, const npg_listing *names, const
         npg_capture *capture;
         name_of(name, sizeof name, batch, names->paths[i]);
         npg_status status = npg_batch_add(batch, &capture, name);
-        if (!status) status = npg_batch_finish(batch, capture, batch->path, names->paths[i], given);
+        if (!status) status = npg_batch_complete(batch, capture, batch->path, names->paths[i], given);
         if (status) return npg_error_prefix(status, "%s/%s", batch->path, names->paths[i]);
     }
     return NPG_OK;

@@ -23,7 +23,7 @@
 #include "tools/batch/batch.h"
 #include "tools/method_config.h"
 
-#define MANIFEST_LIMIT ((size_t)16 << 20)
+#define MANIFEST_LIMIT ((size_t)16 << 20) /* bytes: some hundred thousand captures */
 
 typedef struct manifest {
     npg_batch *batch;
@@ -165,8 +165,8 @@ static npg_status read_capture(const manifest *m, json_t *object, const char *pl
     npg_options_close(&capture->options);
     NPG_TRY(npg_options_copy(&capture->options, m->base.options));
     NPG_TRY(set_keys(m, capture, object, place));
-    return npg_error_prefix(npg_batch_finish(m->batch, capture, m->folder,
-                                             json_string_value(json_object_get(object, "input")), m->given),
+    return npg_error_prefix(npg_batch_complete(m->batch, capture, m->folder,
+                                               json_string_value(json_object_get(object, "input")), m->given),
                             "%s", place);
 }
 

@@ -1,4 +1,4 @@
-/* Process of one capture: neupig run in a child, what it says, its memory, and how it is stopped. */
+/* Process of one capture: neupig run in a child, its output, its memory, and how it is stopped. */
 #include "tools/batch/batch_process.h"
 
 #include <dirent.h>
@@ -70,7 +70,7 @@ static npg_status make_command(command *c, const npg_capture *capture, const cha
 
 /* ---- start ---- */
 
-static void note_done(long long facts[3], const npg_capture *capture)
+static void stat_done(long long facts[3], const npg_capture *capture)
 {
     char *path;
     struct stat info;
@@ -102,8 +102,8 @@ static void log_command(const npg_capture *capture, const command *c)
     log_record(capture, json_pack("{s:s,s:o}", "event", "command", "command", words));
 }
 
-/* In a process group of its own, so that a signal from the terminal reaches it through us alone and that it
- * can be killed with all that it has started; with no signal blocked. */
+/* In its own process group, so that a signal from the terminal reaches it through this process alone and
+ * that it can be killed with all that it has started; with no signal blocked. */
 static npg_status spawn(npg_process *p, const command *c, int out, int err)
 {
     posix_spawn_file_actions_t actions;
@@ -161,7 +161,7 @@ npg_status npg_process_start(npg_process *p, npg_capture *capture)
     char *log_path = NULL;
     *p = (npg_process){.capture = capture, .out = -1, .err = -1, .begun_s = npg_clock_s()};
     npg_status status = npg_make_folder(capture->output);
-    if (!status) note_done(p->done_before, capture);
+    if (!status) stat_done(p->done_before, capture);
     if (!status && !p->done_before[1]) status = npg_verdict_remove(capture);
     if (!status) status = npg_join_path(&log_path, capture->output, "log.jsonl");
     if (!status) status = make_command(&c, capture, log_path);
@@ -175,7 +175,7 @@ npg_status npg_process_start(npg_process *p, npg_capture *capture)
 
 /* ---- what it says ---- */
 
-static void take_record(npg_process *p, const char *line, bool *advanced)
+static void keep_record(npg_process *p, const char *line, bool *advanced)
 {
     json_t *record = json_loads(line, 0, NULL);
     const char *event = json_string_value(json_object_get(record, "event"));
@@ -215,7 +215,7 @@ static bool add_to_line(char *line, size_t size, size_t *length, char c)
     return false;
 }
 
-void npg_process_hear(npg_process *p, bool *advanced)
+void npg_process_read(npg_process *p, bool *advanced)
 {
     char text[4096];
     size_t got;
@@ -223,20 +223,20 @@ void npg_process_hear(npg_process *p, bool *advanced)
     while (read_some(&p->out, text, sizeof text, &got))
         for (size_t i = 0; i < got; i++)
             if (add_to_line(p->line, sizeof p->line, &p->line_length, text[i]))
-                take_record(p, p->line, advanced);
+                keep_record(p, p->line, advanced);
     while (read_some(&p->err, text, sizeof text, &got))
         for (size_t i = 0; i < got; i++)
             if (add_to_line(p->err_line, sizeof p->err_line, &p->err_length, text[i]) && p->err_line[0])
-                snprintf(p->words, sizeof p->words, "%s", p->err_line);
+                snprintf(p->last_error, sizeof p->last_error, "%s", p->err_line);
 }
 
 /* Why it failed: its closing record, or the last that it wrote to standard error. */
-static const char *last_words(const npg_process *p)
+static const char *failure_text(const npg_process *p)
 {
     const char *message = json_string_value(json_object_get(p->end, "message"));
     const char *prefix = "neupig run: ";
     if (message) return message;
-    return !strncmp(p->words, prefix, strlen(prefix)) ? p->words + strlen(prefix) : p->words;
+    return !strncmp(p->last_error, prefix, strlen(prefix)) ? p->last_error + strlen(prefix) : p->last_error;
 }
 
 /* ---- limits ---- */
@@ -320,7 +320,7 @@ void npg_process_watch(npg_process *p)
 static bool was_done(const npg_process *p, int how)
 {
     long long now[3];
-    note_done(now, p->capture);
+    stat_done(now, p->capture);
     bool good = WIFEXITED(how) && (WEXITSTATUS(how) == 0 || WEXITSTATUS(how) == 7);
     return good && now[1] && !memcmp(now, p->done_before, sizeof now);
 }
@@ -331,7 +331,7 @@ static npg_status conclude(npg_process *p, int how, const struct rusage *used)
     npg_verdict *v = &capture->verdict, before;
     size_t own = (size_t)used->ru_maxrss << 10;
     npg_verdict_read(&before, capture);
-    npg_verdict_judge(v, capture, how, p->cause, last_words(p));
+    npg_verdict_judge(v, capture, how, p->cause, failure_text(p));
     v->was_done = was_done(p, how);
     bool keeps = v->was_done && before.is_known;
     v->seconds = keeps ? before.seconds : npg_clock_s() - p->begun_s;
@@ -352,8 +352,8 @@ npg_status npg_process_reap(npg_process *p, bool *ended)
     waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT);
     *ended = info.si_pid == p->pid;
     if (!*ended) return NPG_OK;
-    npg_process_hear(p, &unused);
-    kill(-p->pid, SIGKILL); /* a helper that outlived it; the group is ours until the process is waited for */
+    npg_process_read(p, &unused);
+    kill(-p->pid, SIGKILL); /* a helper that outlived it; the group exists until the process is waited for */
     if (wait4(p->pid, &how, 0, &used) != p->pid)
         return npg_error_errno(NPG_FAILED, "%s: its run can't be waited for", p->capture->name);
     npg_status status = conclude(p, how, &used);

@@ -1,4 +1,4 @@
-/* Process of one capture: neupig run in a child, what it says, its memory, and how it is stopped. */
+/* Process of one capture: neupig run in a child, its output, its memory, and how it is stopped. */
 #ifndef NPG_BATCH_PROCESS_H
 #define NPG_BATCH_PROCESS_H
 
@@ -7,8 +7,8 @@
 typedef struct npg_process {
     npg_capture *capture; /* loan; NULL: nothing runs in this place */
     pid_t pid;
-    int out, err;                /* our ends of its standard output and error; -1: closed */
-    char line[4096], words[512]; /* of the line that is coming in; its last whole line on standard error */
+    int out, err;                     /* this end of its standard output and error; -1: closed */
+    char line[4096], last_error[512]; /* the line that is coming in; its last whole line on standard error */
     size_t line_length, err_length;
     char err_line[512];
     json_t *progress, *end;  /* its last records of these kinds, owned; may be NULL */
@@ -23,9 +23,9 @@ typedef struct npg_process {
 npg_status npg_process_start(npg_process *process, npg_capture *capture);
 
 /* Read what has come; *advanced: there is new progress. */
-void npg_process_hear(npg_process *process, bool *advanced);
+void npg_process_read(npg_process *process, bool *advanced);
 
-/* Look at time and memory, and stop it when it takes too much or does not end although asked. */
+/* Check its time and memory, and stop it when it takes too much or does not end although asked. */
 void npg_process_watch(npg_process *process);
 
 /* Ask it to end (SIGTERM, once); the second time kills it and what it has started. */

@@ -16,7 +16,7 @@
 #include "pipeline/memory.h"
 #include "tools/batch/batch_process.h"
 
-#define TICK_MS        200
+#define TICK_MS        200 /* between two looks at time and memory of the runs */
 #define AGAIN_SECONDS  1   /* a second signal sooner than that is the first on another way */
 #define RECORD_SECONDS 0.5 /* between two records of one capture's progress */
 
@@ -25,7 +25,7 @@ typedef struct work {
     npg_reporter *reporter;
     npg_hooks hooks;
     npg_process *processes; /* `places` of them, owned */
-    double *told_s;         /* when each one's progress was told last, owned */
+    double *reported_s;     /* when each one's progress was reported last, owned */
     size_t places, running, next, mine, ended;
     size_t worked; /* captures ended that were not done before */
     int signals;   /* signalfd, -1: none */
@@ -33,9 +33,9 @@ typedef struct work {
     bool stopped;
 } work;
 
-/* ---- telling ---- */
+/* ---- reports ---- */
 
-static NPG_PRINTF(4, 5) void tell(work *w, npg_log_level level, const char *name, const char *format, ...)
+static NPG_PRINTF(4, 5) void log_line(work *w, npg_log_level level, const char *name, const char *format, ...)
 {
     char text[900];
     va_list arguments;
@@ -56,26 +56,26 @@ static void print_record(work *w, json_t *record)
     json_decref(record);
 }
 
-static void tell_start(work *w, const npg_capture *capture)
+static void report_start(work *w, const npg_capture *capture)
 {
-    tell(w, NPG_LOG_INFO, capture->name, "started (%zu of %zu)", w->ended + w->running + 1, w->mine);
+    log_line(w, NPG_LOG_INFO, capture->name, "started (%zu of %zu)", w->ended + w->running + 1, w->mine);
     if (capture->of_mesh_vertices)
-        tell(w, NPG_LOG_WARNING, capture->name,
-             "%s holds meshes and no clouds: their vertices are the points", capture->input);
+        log_line(w, NPG_LOG_WARNING, capture->name,
+                 "%s holds meshes and no clouds: their vertices are the points", capture->input);
     print_record(w, json_pack("{s:s,s:o}", "event", "start", "name", npg_json_text(capture->name)));
 }
 
-static void tell_end(work *w, const npg_capture *capture)
+static void report_end(work *w, const npg_capture *capture)
 {
     const npg_verdict *v = &capture->verdict;
     npg_log_level level = v->exit_code == 0   ? NPG_LOG_INFO
                           : v->exit_code == 7 ? NPG_LOG_WARNING
                                               : NPG_LOG_ERROR;
     if (v->was_done)
-        tell(w, level, capture->name, "was done already%s%s", *v->message ? ": " : "", v->message);
+        log_line(w, level, capture->name, "was done already%s%s", *v->message ? ": " : "", v->message);
     else
-        tell(w, level, capture->name, "%s after %.0f s%s%s", v->word, v->seconds, *v->message ? ": " : "",
-             v->message);
+        log_line(w, level, capture->name, "%s after %.0f s%s%s", v->word, v->seconds, *v->message ? ": " : "",
+                 v->message);
     json_t *record = npg_verdict_json(capture);
     json_object_set_new(record, "event", json_string("verdict"));
     json_object_set_new(record, "was_done", json_boolean(v->was_done));
@@ -89,8 +89,8 @@ static double share_of(const npg_process *p)
     return p->capture && p->progress ? json_number_value(json_object_get(p->progress, "share")) : 0;
 }
 
-/* What was done before took no time and tells nothing about the rest. */
-static void tell_progress(work *w)
+/* What was done before took no time, so it is left out of the estimate of the rest. */
+static void report_progress(work *w)
 {
     double done = (double)w->worked, skipped = (double)(w->ended - w->worked),
            elapsed_s = npg_clock_s() - w->begun_s;
@@ -111,12 +111,12 @@ static void tell_progress(work *w)
     if (w->reporter->show == NPG_SHOW_BAR) w->hooks.progress(w->hooks.user, &progress);
 }
 
-static void pass_on_progress(work *w, size_t i)
+static void print_progress(work *w, size_t i)
 {
     npg_process *p = &w->processes[i];
     double now_s = npg_clock_s();
-    if (w->reporter->show != NPG_SHOW_JSON || now_s < w->told_s[i] + RECORD_SECONDS) return;
-    w->told_s[i] = now_s;
+    if (w->reporter->show != NPG_SHOW_JSON || now_s < w->reported_s[i] + RECORD_SECONDS) return;
+    w->reported_s[i] = now_s;
     json_t *record = json_pack("{s:s,s:o}", "event", "progress", "name", npg_json_text(p->capture->name));
     json_object_update_missing(record, p->progress);
     print_record(w, record);
@@ -124,7 +124,7 @@ static void pass_on_progress(work *w, size_t i)
 
 /* ---- signals ---- */
 
-static npg_status take_signals(work *w, sigset_t *before)
+static npg_status block_signals(work *w, sigset_t *before)
 {
     static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
     sigset_t all;
@@ -138,29 +138,29 @@ static npg_status take_signals(work *w, sigset_t *before)
     return w->signals >= 0 ? NPG_OK : npg_error_errno(NPG_FAILED, "signals can't be read");
 }
 
-static void ask_all(work *w)
+static void stop_all(work *w)
 {
     for (size_t i = 0; i < w->places; i++)
         if (w->processes[i].capture) npg_process_stop(&w->processes[i], NPG_STOP_REQUEST);
 }
 
-static void hear_signals(work *w)
+static void read_signals(work *w)
 {
     struct signalfd_siginfo info;
     while (read(w->signals, &info, sizeof info) == sizeof info) {
         double now_s = npg_clock_s();
         if (w->stopped && now_s < w->stopped_s + AGAIN_SECONDS) continue;
         if (!w->stopped)
-            tell(w, NPG_LOG_WARNING, "batch", "stopping on request: the runs write their states");
+            log_line(w, NPG_LOG_WARNING, "batch", "stopping on request: the runs write their states");
         w->stopped = true;
         w->stopped_s = now_s;
-        ask_all(w);
+        stop_all(w);
     }
 }
 
 /* ---- captures ---- */
 
-static void end_badly(npg_capture *capture, npg_status status)
+static void fail_capture(npg_capture *capture, npg_status status)
 {
     npg_verdict *v = &capture->verdict;
     *v = (npg_verdict){.is_known = true, .exit_code = npg_status_exit_code(status)};
@@ -172,7 +172,7 @@ static void count_end(work *w, const npg_capture *capture)
 {
     w->ended++;
     w->worked += !capture->verdict.was_done;
-    tell_end(w, capture);
+    report_end(w, capture);
 }
 
 static void start_next(work *w, size_t place)
@@ -180,15 +180,15 @@ static void start_next(work *w, size_t place)
     while (w->next < w->batch->count && !npg_batch_is_mine(w->batch, w->next)) w->next++;
     if (w->next == w->batch->count) return;
     npg_capture *capture = &w->batch->captures[w->next++];
-    tell_start(w, capture);
+    report_start(w, capture);
     npg_status status =
         capture->refusal ? npg_verdict_refuse(capture) : npg_process_start(&w->processes[place], capture);
-    w->told_s[place] = 0;
+    w->reported_s[place] = 0;
     if (!status && !capture->refusal) {
         w->running++;
         return;
     }
-    if (status) end_badly(capture, status);
+    if (status) fail_capture(capture, status);
     count_end(w, capture);
 }
 
@@ -198,23 +198,23 @@ static void start_some(work *w)
         while (!w->processes[i].capture && w->next < w->batch->count) start_next(w, i);
 }
 
-static void look_after(work *w, size_t i)
+static void serve_process(work *w, size_t i)
 {
     npg_process *p = &w->processes[i];
     npg_capture *capture = p->capture;
     bool advanced, ended;
-    npg_process_hear(p, &advanced);
-    if (advanced) pass_on_progress(w, i);
+    npg_process_read(p, &advanced);
+    if (advanced) print_progress(w, i);
     npg_process_watch(p);
     npg_status status = npg_process_reap(p, &ended);
     if (!ended) return;
-    if (status) end_badly(capture, status);
+    if (status) fail_capture(capture, status);
     p->capture = NULL;
     w->running--;
     count_end(w, capture);
 }
 
-static void wait_some(work *w)
+static void wait_for_events(work *w)
 {
     enum { ENDS_MAX = 512 };
     struct pollfd ends[ENDS_MAX + 1] = {{w->signals, POLLIN, 0}};
@@ -227,16 +227,16 @@ static void wait_some(work *w)
     poll(ends, count, TICK_MS);
 }
 
-static void work_off(work *w)
+static void run_all(work *w)
 {
     for (;;) {
-        hear_signals(w);
+        read_signals(w);
         start_some(w);
         if (!w->running) return;
-        tell_progress(w);
-        wait_some(w);
+        report_progress(w);
+        wait_for_events(w);
         for (size_t i = 0; i < w->places; i++)
-            if (w->processes[i].capture) look_after(w, i);
+            if (w->processes[i].capture) serve_process(w, i);
     }
 }
 
@@ -245,7 +245,7 @@ static npg_status open_places(work *w, size_t jobs)
     for (size_t i = 0; i < w->batch->count; i++) w->mine += npg_batch_is_mine(w->batch, i);
     w->places = jobs < w->mine ? jobs : w->mine;
     NPG_TRY(npg_alloc_array(&w->processes, NPG_FOR_RUN, w->places, sizeof *w->processes));
-    return npg_alloc_array(&w->told_s, NPG_FOR_RUN, w->places, sizeof *w->told_s);
+    return npg_alloc_array(&w->reported_s, NPG_FOR_RUN, w->places, sizeof *w->reported_s);
 }
 
 npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, bool *stopped)
@@ -257,10 +257,10 @@ npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, 
               .begun_s = npg_clock_s()};
     sigset_t before;
     npg_status status = open_places(&w, jobs);
-    if (!status) status = take_signals(&w, &before);
+    if (!status) status = block_signals(&w, &before);
     if (!status) {
-        work_off(&w);
-        hear_signals(&w); /* one that came at the very end */
+        run_all(&w);
+        read_signals(&w); /* one that came at the very end */
         close(w.signals);
         sigprocmask(SIG_SETMASK, &before, NULL);
     }
@@ -269,6 +269,6 @@ npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, 
             npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
     *stopped = w.stopped;
     npg_release(&w.processes);
-    npg_release(&w.told_s);
+    npg_release(&w.reported_s);
     return status;
 }

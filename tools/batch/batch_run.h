@@ -8,7 +8,7 @@
 /* Run the captures that are this process's to do, at most `jobs` at a time, and fill in their verdicts;
  * the others' are read.  A capture that fails does not touch the rest.  SIGINT, SIGTERM and SIGHUP
  * are passed on; *stopped then becomes true, and nothing more is started.  NPG_MEMORY, NPG_FAILED: the
- * batch itself can't go on. */
+ * batch itself can't continue. */
 npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, bool *stopped);
 
 #endif

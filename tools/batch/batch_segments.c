@@ -1,4 +1,4 @@
-/* Segments of a capture, as the batch's verdicts, tables and pages tell them. */
+/* Segments of a capture, as the batch's verdicts, tables and pages show them. */
 #include "tools/batch/batch_segments.h"
 
 #include <stdio.h>
@@ -33,14 +33,14 @@ json_t *npg_batch_segments(const npg_capture *capture)
     char *path;
     if (capture->segments != NPG_BATCH_SEGMENTS_AUTO) return NULL;
     if (npg_join_path(&path, capture->output, "segments.json")) return NULL;
-    json_t *told = json_load_file(path, 0, NULL), *list = json_object_get(told, "segments");
+    json_t *saved = json_load_file(path, 0, NULL), *list = json_object_get(saved, "segments");
     json_t *segments = json_array_size(list) ? json_array() : NULL;
     for (size_t i = 0; segments && i < json_array_size(list); i++)
         if (json_array_append_new(segments, json_of(json_array_get(list, i)))) {
             json_decref(segments);
             segments = NULL;
         }
-    json_decref(told);
+    json_decref(saved);
     npg_release(&path);
     return segments;
 }

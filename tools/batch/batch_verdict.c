@@ -37,16 +37,16 @@ static void set(npg_verdict *v, const char *word, int exit_code, const char *mes
 }
 
 /* Of a capture with one reference for all frames: where that ended to explain them, and what helps. */
-static void tell_topology(npg_verdict *v, const npg_capture *capture)
+static void add_topology(npg_verdict *v, const npg_capture *capture)
 {
     static const char *const directions[] = {"forward", "backward"};
     char *path;
     if (capture->segments == NPG_BATCH_SEGMENTS_AUTO || npg_join_path(&path, capture->output, "report.json"))
         return;
     json_t *report = json_load_file(path, 0, NULL), *stages = json_object_get(report, "stages");
-    const json_t *told = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    const json_t *topology = json_object_get(json_object_get(stages, "evaluate"), "topology");
     for (int d = 1; d >= 0; d--) {
-        const json_t *alarm = json_object_get(told, directions[d]);
+        const json_t *alarm = json_object_get(topology, directions[d]);
         if (json_is_object(alarm))
             snprintf(v->message, sizeof v->message,
                      "from frame %lld %s the reference no longer explains the points; "
@@ -67,9 +67,9 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
         set(v, "done", 0, "");
     } else if (code == 7) {
         set(v, "partial", 7, "frames were skipped, are unexplained or below the quality bar");
-        tell_topology(v, capture);
+        add_topology(v, capture);
     } else if (cause == NPG_STOP_TIME) {
-        snprintf(text, sizeof text, "not done after %g s (max-time)%s; started again it goes on",
+        snprintf(text, sizeof text, "not done after %g s (max-time)%s; started again it is resumed",
                  capture->max_time_s, code == 75 ? "" : " and had to be killed");
         set(v, "time", 75, text);
     } else if (cause == NPG_STOP_MEMORY) {
@@ -77,7 +77,7 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
                  npg_options_get(capture->options, "max-memory"), code == 75 ? "" : " and had to be killed");
         set(v, "memory", 6, text);
     } else if (cause == NPG_STOP_REQUEST || code == 75) {
-        set(v, "stopped", code, "stopped on request; started again it goes on");
+        set(v, "stopped", code, "stopped on request; started again it is resumed");
     } else if (WIFSIGNALED(how)) {
         snprintf(text, sizeof text, "killed by signal %d (%s)%s%s", WTERMSIG(how), strsignal(WTERMSIG(how)),
                  *words ? ": " : "", words);

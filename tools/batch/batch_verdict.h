@@ -14,7 +14,7 @@ typedef enum npg_stop_cause {
     NPG_STOP_REQUEST
 } npg_stop_cause;
 
-/* Judge from what waitpid() gave, and say why; words: the run's own last ones. */
+/* From what waitpid() gave, with the cause; words: the run's own last ones. */
 void npg_verdict_judge(npg_verdict *verdict, const npg_capture *capture, int how, npg_stop_cause cause,
                        const char *words);
 

@@ -5,6 +5,7 @@
 
 #include "geometry/geometry.h"
 
+/* In unit coordinates; three different ones, so that no two directions of the search trees are alike. */
 static const double axes[3] = {0.3, 0.4, 0.9};
 
 static void place(double out[3], double normal[3], double polar, double around)
@@ -54,7 +55,8 @@ static npg_status make_points(float **out, size_t point_count, size_t t, size_t 
     NPG_TRY(npg_alloc_array(out, NPG_FOR_FRAMES, point_count, 3 * sizeof(float)));
     for (size_t i = 0; i < point_count; i++) {
         double at[3], normal[3], share = ((double)i + 0.5) / (double)point_count;
-        place(at, normal, acos(1 - 2 * share), M_PI * (1 + sqrt(5)) * ((double)i + (double)t));
+        place(at, normal, acos(1 - 2 * share),
+              M_PI * (1 + sqrt(5)) /* 2 pi times the golden ratio */ * ((double)i + (double)t));
         pose(*out + 3 * i, at, bend);
     }
     return NPG_OK;

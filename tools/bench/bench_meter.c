@@ -5,8 +5,8 @@
 
 #include "pipeline/clock.h"
 
-#define SLICE_S    8e-3
-#define COPY_BYTES ((size_t)64 << 20)
+#define SLICE_S    8e-3               /* of a slice, at least; set by trial */
+#define COPY_BYTES ((size_t)64 << 20) /* of each buffer: more than the caches hold */
 
 static int by_size(const void *a, const void *b)
 {
@@ -137,7 +137,7 @@ npg_status npg_meter_time(npg_timing *timing, npg_meter *m, npg_call *call, void
     NPG_TRY(run(&busy_s, &wall_s, m, call, user, 1)); /* the first may build */
     NPG_TRY(run(&busy_s, &wall_s, m, call, user, 1));
     size_t calls = busy_s < SLICE_S ? (size_t)(SLICE_S / busy_s) + 1 : 1;
-    if (calls > 10000) calls = 10000;
+    if (calls > 10000) calls = 10000; /* a call too short for the clock must not run for ever */
     NPG_TRY(npg_alloc_array(&all, NPG_FOR_RUN, 4 * n, sizeof *all));
     double *figures[4] = {all, all + n, all + 2 * n, all + 3 * n};
     npg_status status = take_pairs(figures, m, call, user, calls);

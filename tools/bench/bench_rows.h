@@ -12,7 +12,7 @@ typedef struct npg_bench_row {
 
 typedef npg_status npg_bench_visit(void *user, const npg_bench_row *row);
 
-/* Whether a name begins with one of the words of `only`, which commas part; "": always. */
+/* Whether a name begins with one of the words of `only`, separated by commas; "": always. */
 bool npg_bench_wants(const char *only, const char *name);
 
 /* Time all rows that `only` wants and hand them over one by one. */

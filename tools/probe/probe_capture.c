@@ -7,8 +7,11 @@
 #include "pipeline/run_settings.h"
 #include "tools/listing.h"
 
-npg_status npg_probe_note(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
-                          int64_t number)
+#define COUNTS_DIFFER                                                                                        \
+    10 /* times between the least and the most points of a frame, for a warning; set by trial */
+
+npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
+                           int64_t number)
 {
     if (status == NPG_BAD_INPUT) {
         npg_probe_add_fault(probe, number);
@@ -36,18 +39,18 @@ npg_status npg_probe_files(npg_probe *probe, npg_frame_files **out, const char *
         const char *format = npg_reader_for(slot->path);
         probe->bytes += npg_file_bytes(slot->path);
         npg_status status = npg_read_cloud(&frame, slot->path, &probe->origin);
-        NPG_TRY(npg_probe_note(probe, status, &frame, format ? format : "unknown", slot->number));
+        NPG_TRY(npg_probe_count(probe, status, &frame, format ? format : "unknown", slot->number));
     }
     if (list->gap_count) {
         char gaps[256];
         npg_frame_files_gaps(gaps, sizeof gaps, list);
-        npg_probe_attend(probe, "%zu frames are missing in the numbering: %s", list->gap_count, gaps);
+        npg_probe_warn(probe, "%zu frames are missing in the numbering: %s", list->gap_count, gaps);
     }
-    if (list->left_out) npg_probe_attend(probe, "%zu files with other endings were left out", list->left_out);
+    if (list->left_out) npg_probe_warn(probe, "%zu files with other endings were left out", list->left_out);
     return NPG_OK;
 }
 
-void npg_probe_judge(npg_probe *probe)
+void npg_probe_warn_of_all(npg_probe *probe)
 {
     size_t readable = probe->frames - probe->unreadable;
     npg_probe_spread counts = npg_probe_counts(probe);
@@ -56,13 +59,13 @@ void npg_probe_judge(npg_probe *probe)
     if (has_points && npg_frame_box_set(&box, &probe->origin, &probe->bounds))
         npg_probe_attend(probe, "%s", npg_error_text());
     if (probe->not_finite)
-        npg_probe_attend(probe, "%zu points have coordinates that are not finite", probe->not_finite);
-    if (probe->zero_normals) npg_probe_attend(probe, "%zu normals have no direction", probe->zero_normals);
+        npg_probe_warn(probe, "%zu points have coordinates that are not finite", probe->not_finite);
+    if (probe->zero_normals) npg_probe_warn(probe, "%zu normals have no direction", probe->zero_normals);
     if (probe->with_normals && probe->with_normals < readable)
-        npg_probe_attend(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
-    if (counts.most > 10 * counts.least)
-        npg_probe_attend(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
-                         counts.most);
+        npg_probe_warn(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
+    if (counts.most > COUNTS_DIFFER * counts.least)
+        npg_probe_warn(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
+                       counts.most);
 }
 
 /* ---- what a run would take ---- */

@@ -5,18 +5,18 @@
 #include "ingest/ingest.h"
 #include "tools/probe/probe_facts.h"
 
-/* Count a frame that was read with `status`, and clear it.  Bad data is noted and looked past; any other
- * failure is returned. */
-npg_status npg_probe_note(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
-                          int64_t number);
+/* Count a frame that was read with `status`, and clear it.  Bad data goes into the list; any other failure
+ * is returned. */
+npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
+                           int64_t number);
 
 /* Read all frames of an input; options: those of the run ("frames").  *list is to be closed by the caller,
  * also after a failure. */
 npg_status npg_probe_files(npg_probe *probe, npg_frame_files **list, const char *input,
                            const npg_options *options);
 
-/* What only shows when all frames have been read. */
-void npg_probe_judge(npg_probe *probe);
+/* Add what only shows when all frames have been read. */
+void npg_probe_warn_of_all(npg_probe *probe);
 
 /* What a run with these options would take. */
 void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_options *options);

@@ -28,7 +28,7 @@ void npg_probe_uninit(npg_probe *probe)
     json_decref(probe->per_frame);
 }
 
-void npg_probe_attend(npg_probe *probe, const char *format, ...)
+void npg_probe_warn(npg_probe *probe, const char *format, ...)
 {
     char text[1200];
     va_list arguments;
@@ -40,12 +40,17 @@ void npg_probe_attend(npg_probe *probe, const char *format, ...)
 
 /* ---- frames ---- */
 
+/* When a frame is worth a warning; set by trial. */
+#define USABLE_LEAST 4    /* points: no closed surface has fewer                      */
+#define JUMP_MOST    0.25 /* of the box's middle from frame to frame, in diagonals    */
+#define GROWTH_MOST  1.5  /* of the box's diagonal from frame to frame, up or down    */
+
 typedef struct cloud_facts {
     size_t not_finite, zero_normals;
     npg_bounds bounds;
 } cloud_facts;
 
-static cloud_facts look_at(const npg_frame *frame)
+static cloud_facts measure_cloud(const npg_frame *frame)
 {
     cloud_facts facts = {.bounds = npg_bounds_empty()};
     for (size_t i = 0; i < frame->point_count; i++) {
@@ -54,6 +59,7 @@ static cloud_facts look_at(const npg_frame *frame)
             npg_bounds_add_points(&facts.bounds, p, 1);
         else
             facts.not_finite++;
+        /* readers give unit length, or 0 where there is no direction */
         if (n && !(fabsf(n[0]) + fabsf(n[1]) + fabsf(n[2]) > 0.5f)) facts.zero_normals++;
     }
     return facts;
@@ -64,15 +70,15 @@ static bool is_empty(const npg_bounds *bounds)
     return !(bounds->lo[0] <= bounds->hi[0]);
 }
 
-static void judge_frame(npg_probe *probe, const cloud_facts *facts, const npg_frame *frame, int64_t number)
+static void warn_of_frame(npg_probe *probe, const cloud_facts *facts, const npg_frame *frame, int64_t number)
 {
     size_t usable = frame->point_count - facts->not_finite;
-    if (usable < 4)
-        npg_probe_attend(probe, "frame %lld has only %zu usable points", (long long)number, usable);
+    if (usable < USABLE_LEAST)
+        npg_probe_warn(probe, "frame %lld has only %zu usable points", (long long)number, usable);
     if (is_empty(&facts->bounds)) return;
     double size = npg_bounds_diagonal(&facts->bounds);
-    if (usable >= 4 && !(size > 0))
-        npg_probe_attend(probe, "frame %lld: all points are equal", (long long)number);
+    if (usable >= USABLE_LEAST && !(size > 0))
+        npg_probe_warn(probe, "frame %lld: all points are equal", (long long)number);
     if (!is_empty(&probe->last)) {
         double before = npg_bounds_diagonal(&probe->last), moved_sq = 0;
         for (int k = 0; k < 3; k++) {
@@ -80,19 +86,19 @@ static void judge_frame(npg_probe *probe, const cloud_facts *facts, const npg_fr
                 0.5 * (facts->bounds.lo[k] + facts->bounds.hi[k] - probe->last.lo[k] - probe->last.hi[k]);
             moved_sq += moved * moved;
         }
-        if (sqrt(moved_sq) > 0.25 * fmax(before, size))
-            npg_probe_attend(probe, "frame %lld: the box's middle jumps by %.0f %% of its diagonal",
-                             (long long)number, 100 * sqrt(moved_sq) / fmax(before, size));
-        if (fmax(before, size) > 1.5 * fmin(before, size))
-            npg_probe_attend(probe, "frame %lld: the box's diagonal changes from %.4g to %.4g",
-                             (long long)number, before, size);
+        if (sqrt(moved_sq) > JUMP_MOST * fmax(before, size))
+            npg_probe_warn(probe, "frame %lld: the box's middle jumps by %.0f %% of its diagonal",
+                           (long long)number, 100 * sqrt(moved_sq) / fmax(before, size));
+        if (fmax(before, size) > GROWTH_MOST * fmin(before, size))
+            npg_probe_warn(probe, "frame %lld: the box's diagonal changes from %.4g to %.4g",
+                           (long long)number, before, size);
     }
     probe->last = facts->bounds;
 }
 
 npg_status npg_probe_add(npg_probe *probe, const npg_frame *frame, const char *format, int64_t number)
 {
-    cloud_facts facts = look_at(frame);
+    cloud_facts facts = measure_cloud(frame);
     NPG_TRY(npg_grow(&probe->counts, &probe->count_room, probe->frames - probe->unreadable + 1,
                      sizeof *probe->counts, NPG_FOR_FILES));
     probe->counts[probe->frames - probe->unreadable] = frame->point_count;
@@ -104,7 +110,7 @@ npg_status npg_probe_add(npg_probe *probe, const npg_frame *frame, const char *f
     if (!is_empty(&facts.bounds)) npg_bounds_add(&probe->bounds, &facts.bounds);
     json_int_t seen = json_integer_value(json_object_get(probe->formats, format));
     json_object_set_new(probe->formats, format, json_integer(seen + 1));
-    judge_frame(probe, &facts, frame, number);
+    warn_of_frame(probe, &facts, frame, number);
     json_array_append_new(probe->per_frame,
                           json_pack("{s:I,s:I,s:I,s:b}", "number", (json_int_t)number, "points",
                                     (json_int_t)frame->point_count, "not_finite",
@@ -118,7 +124,7 @@ void npg_probe_add_fault(npg_probe *probe, int64_t number)
     if (!probe->unreadable) snprintf(probe->first_fault, sizeof probe->first_fault, "%s", text);
     probe->frames++;
     probe->unreadable++;
-    npg_probe_attend(probe, "%s", text);
+    npg_probe_warn(probe, "%s", text);
     json_array_append_new(probe->per_frame,
                           json_pack("{s:I,s:s}", "number", (json_int_t)number, "error", text));
 }
@@ -177,7 +183,7 @@ static void do_burst(float *sums)
     burst_plain(sums);
 }
 
-/* Multiply-adds of one thread for about 30 ms of its own time. */
+/* Multiply-adds of one thread for about 30 ms of its processor time. */
 static void *multiply_add(void *flops)
 {
     float sums[LANES];
@@ -215,6 +221,7 @@ static double measure_flops(void)
 void npg_probe_estimate(npg_estimate *e, const npg_probe *probe, size_t vertices, size_t epochs,
                         size_t window)
 {
+    /* Set so that the estimates fit within a factor of two, as the verb says of them. */
     const double flop_per_vertex = 1.72e6, fit_bytes_per_vertex = 2400, fixed_bytes = 320e6,
                  decoder_bytes = 1.4e6;
     double frames = (double)probe->frames, in_window = fmin(frames, (double)window);

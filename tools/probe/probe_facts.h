@@ -24,8 +24,8 @@ typedef struct npg_probe {
 void npg_probe_init(npg_probe *probe);
 void npg_probe_uninit(npg_probe *probe);
 
-/* Something a run would trip over, or the user should know. */
-void npg_probe_attend(npg_probe *probe, const char *format, ...) NPG_PRINTF(2, 3);
+/* Add to the list under "attention": what a run would stumble over, or the user should know. */
+void npg_probe_warn(npg_probe *probe, const char *format, ...) NPG_PRINTF(2, 3);
 
 /* Count a readable frame. */
 npg_status npg_probe_add(npg_probe *probe, const npg_frame *frame, const char *format, int64_t number);

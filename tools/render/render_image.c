@@ -16,7 +16,8 @@ static const float background[3] = {0.97f, 0.97f, 0.98f};
 
 void npg_eye_turn(npg_eye *eye, double azimuth, double elevation, int up)
 {
-    double a = azimuth * RADIANS, e = fmin(fmax(elevation, -89.9), 89.9) * RADIANS;
+    double a = azimuth * RADIANS,
+           e = fmin(fmax(elevation, -89.9), 89.9) * RADIANS; /* at 90 nothing is right of the eye */
     double back[3] = {sin(a) * cos(e), sin(e), cos(a) * cos(e)}, world_up[3] = {0, 1, 0};
     double *right = eye->axes, *above = eye->axes + 3, *ahead = eye->axes + 6;
     if (up == 2) {
@@ -33,7 +34,8 @@ void npg_eye_turn(npg_eye *eye, double azimuth, double elevation, int up)
 
 void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *reach)
 {
-    const double margin = 1.05, distances = 3.0; /* the eye is that many diagonals away */
+    /* 5 % are left around; the eye is 3 diagonals away, for little perspective. */
+    const double margin = 1.05, distances = 3.0;
     double diagonal = fmax(npg_bounds_diagonal(reach), 1e-12), half[3], middle[3];
     for (int k = 0; k < 3; k++) {
         half[k] = 0.5 * (reach->hi[k] - reach->lo[k]);
@@ -46,7 +48,7 @@ void npg_eye_fit(npg_eye *eye, double *aspect, const npg_bounds *reach)
     double nearest = distances * diagonal - half[2];
     double slope_x = margin * fmax(half[0], 0.01 * diagonal) / nearest;
     double slope_y = margin * fmax(half[1], 0.01 * diagonal) / nearest;
-    if (!(*aspect > 0)) *aspect = fmin(fmax(slope_x / slope_y, 0.25), 4);
+    if (!(*aspect > 0)) *aspect = fmin(fmax(slope_x / slope_y, 0.25), 4); /* no strips */
     eye->slope_y = fmax(slope_y, slope_x / *aspect);
     eye->slope_x = eye->slope_y * *aspect;
 }
@@ -79,7 +81,7 @@ static void shading_normal(double normal[3], const npg_scene *scene, const npg_r
 }
 
 /* A light from the upper left behind the eye and a weaker one from the eye;
- * insides of surfaces are reddish. */
+ * insides of surfaces are reddish.  Directions and weights were set by eye. */
 static void shade(float out[3], const npg_scene *scene, const npg_eye *eye, const npg_ray_hit *hit)
 {
     static const float inside[3] = {0.75f, 0.35f, 0.30f};

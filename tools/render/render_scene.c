@@ -13,7 +13,7 @@
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
 
-enum { BALLS_MAX = 200000 };
+enum { BALLS_MAX = 200000 }; /* points drawn at most: each is a mesh of 8 faces */
 
 npg_status npg_file_has_faces(bool *faces, const char *path)
 {

@@ -13,8 +13,8 @@
 #include "pipeline/file.h"
 #include "pipeline/run_settings.h"
 
-static void say(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
-static void say(npg_reporter *reporter, const char *format, ...)
+static void log_info(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
+static void log_info(npg_reporter *reporter, const char *format, ...)
 {
     char text[512];
     npg_hooks hooks = npg_reporter_hooks(reporter);
@@ -88,7 +88,7 @@ static npg_status set_number(npg_options *options, const char *name, int64_t val
 }
 
 /* What makes the options of the whole those of a segment. */
-static npg_status narrow(npg_options *options, const npg_segments *s, const npg_segment *segment)
+static npg_status set_segment_options(npg_options *options, const npg_segments *s, const npg_segment *segment)
 {
     char *frames, *path;
     if (!strcmp(segment->folder, ".")) return npg_options_set(options, "alarm", "split");
@@ -108,8 +108,8 @@ static npg_status narrow(npg_options *options, const npg_segments *s, const npg_
     return npg_options_set(options, "alarm", "split");
 }
 
-/* With option confine, what stands in the place of a folder of ours must not be a link. */
-static npg_status check_own(const npg_segments *s, const npg_options *options, const char *name)
+/* With option confine, what stands in the place of one of the folders of OUT must not be a link. */
+static npg_status refuse_link(const npg_segments *s, const npg_options *options, const char *name)
 {
     npg_settings settings;
     char *folder;
@@ -126,13 +126,13 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
 {
     npg_options *own;
     bool is_open;
-    NPG_TRY(check_own(s, options, segment->folder));
+    NPG_TRY(refuse_link(s, options, segment->folder));
     NPG_TRY(npg_options_copy(&own, options));
-    npg_status status = narrow(own, s, segment);
+    npg_status status = set_segment_options(own, s, segment);
     if (!status && strcmp(segment->folder, ".") != 0)
-        say(reporter, "%s: frames %lld to %lld", segment->folder,
-            (long long)npg_segment_number(s, segment->first),
-            (long long)npg_segment_number(s, segment->last));
+        log_info(reporter, "%s: frames %lld to %lld", segment->folder,
+                 (long long)npg_segment_number(s, segment->first),
+                 (long long)npg_segment_number(s, segment->last));
     if (!status) status = npg_run_once(own, reporter, &is_open);
     npg_options_close(&own);
     return status;
@@ -140,67 +140,68 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
 
 /* ---- cutting ---- */
 
-static npg_status read_topology(json_t **told, const npg_segments *s, const npg_segment *segment)
+static npg_status read_topology(json_t **topology, const npg_segments *s, const npg_segment *segment)
 {
     char *folder, *path;
     json_error_t error;
-    *told = NULL;
+    *topology = NULL;
     NPG_TRY(npg_segment_path(&folder, s, segment));
     npg_status status = npg_join_path(&path, folder, "topology.json");
     npg_release(&folder);
     NPG_TRY(status);
-    *told = json_load_file(path, 0, &error);
-    if (!*told) status = npg_error(NPG_DISK, "can't read back %s: %s", path, error.text);
+    *topology = json_load_file(path, 0, &error);
+    if (!*topology) status = npg_error(NPG_DISK, "can't read back %s: %s", path, error.text);
     npg_release(&path);
     return status;
 }
 
-static int64_t least(int64_t a, int64_t b)
+static int64_t min_of(int64_t a, int64_t b)
 {
     return a < b ? a : b;
 }
 
 /* The segment of the keyframe keeps its side of the cut; the result is the other. */
-static npg_segment cut(npg_segment *kept, const json_t *told, int64_t overlap)
+static npg_segment cut_segment(npg_segment *kept, const json_t *topology, int64_t overlap)
 {
     npg_segment rest = *kept;
-    const json_t *alarm = json_object_get(told, "alarm");
+    const json_t *alarm = json_object_get(topology, "alarm");
     int64_t begin = kept->first - kept->shared_first;
     int64_t from = begin + (int64_t)json_integer_value(json_object_get(alarm, "from_index"));
     rest.keyframe = -1;
     rest.alarm = json_deep_copy(alarm);
-    if (!strcmp(json_string_value(json_object_get(told, "direction")), "forward")) {
+    if (!strcmp(json_string_value(json_object_get(topology, "direction")), "forward")) {
         rest.first = from;
         kept->last = from - 1;
-        rest.shared_first = least(overlap, from - kept->first);
+        rest.shared_first = min_of(overlap, from - kept->first);
         kept->shared_last = 0;
     } else {
         rest.last = from;
         kept->first = from + 1;
-        rest.shared_last = least(overlap, kept->last - from);
+        rest.shared_last = min_of(overlap, kept->last - from);
         kept->shared_first = 0;
     }
     return rest;
 }
 
-/* What the broken off run left goes first: killed in between, it is made and broken off again. */
-static npg_status split(npg_segments *s, size_t at, const npg_options *options, npg_reporter *reporter)
+/* What the run that ended at the change left goes first: killed in between, it is made again. */
+static npg_status split_segment(npg_segments *s, size_t at, const npg_options *options,
+                                npg_reporter *reporter)
 {
-    json_t *told;
+    json_t *topology;
     npg_segment *segment = &s->list[at];
-    NPG_TRY(read_topology(&told, s, segment));
+    NPG_TRY(read_topology(&topology, s, segment));
     json_decref(s->overlaps);
     s->overlaps = NULL;
     int64_t key = segment->first - segment->shared_first +
-                  (int64_t)json_integer_value(json_object_get(told, "key_index"));
+                  (int64_t)json_integer_value(json_object_get(topology, "key_index"));
     NPG_TRY(npg_segment_remove(s, segment));
-    npg_segment rest = cut(segment, told, option_number(options, "overlap"));
+    npg_segment rest = cut_segment(segment, topology, option_number(options, "overlap"));
     segment->keyframe = npg_segment_number(s, key);
     npg_segment_name(segment, s);
     npg_segment_name(&rest, s);
-    json_decref(told);
-    say(reporter, "a new reference for frames %lld to %lld", (long long)npg_segment_number(s, rest.first),
-        (long long)npg_segment_number(s, rest.last));
+    json_decref(topology);
+    log_info(reporter, "a new reference for frames %lld to %lld",
+             (long long)npg_segment_number(s, rest.first), (long long)npg_segment_number(s, rest.last));
     npg_status status = npg_segments_insert(s, rest.first > segment->first ? at + 1 : at, &rest);
     if (status) json_decref(rest.alarm);
     return status ? status : npg_segments_save(s);
@@ -209,10 +210,11 @@ static npg_status split(npg_segments *s, size_t at, const npg_options *options, 
 /* ---- all of them ---- */
 
 /* Done before without segments, and there was an alarm: what it left makes way for the segments. */
-static npg_status solve_anew(const npg_segments *s, const npg_options *options, npg_reporter *reporter)
+static npg_status solve_again(const npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
-    say(reporter, "%s was done with one reference, which does not explain all frames: it is done anew",
-        s->output);
+    log_info(reporter,
+             "%s was done with one reference, which does not explain all frames: it is solved again",
+             s->output);
     NPG_TRY(npg_segment_remove(s, &s->list[0]));
     return run_segment(s, &s->list[0], options, reporter);
 }
@@ -222,10 +224,10 @@ static npg_status solve_all(npg_segments *s, const npg_options *options, npg_rep
     for (size_t i = 0; i < s->count;) {
         npg_status status = run_segment(s, &s->list[i], options, reporter);
         if (status == NPG_PARTIAL && !strcmp(s->list[i].folder, ".") && npg_segments_was_alarmed(s))
-            status = solve_anew(s, options, reporter);
+            status = solve_again(s, options, reporter);
         if (status == NPG_CHANGED) {
-            NPG_TRY(split(s, i, options, reporter));
-            i = 0; /* those before are done and say so at once */
+            NPG_TRY(split_segment(s, i, options, reporter));
+            i = 0; /* those before are found done at once */
             continue;
         }
         if (status && status != NPG_PARTIAL) return status;
@@ -234,7 +236,7 @@ static npg_status solve_all(npg_segments *s, const npg_options *options, npg_rep
     return NPG_OK;
 }
 
-static npg_status begin(npg_segments *s, const npg_options *options)
+static npg_status load_or_begin(npg_segments *s, const npg_options *options)
 {
     bool restarts = !strcmp(npg_options_get(options, "restart"), "yes");
     npg_segment whole = {
@@ -265,14 +267,14 @@ static npg_status take_lock(int *fd, const char *output)
     return status;
 }
 
-static npg_status work(npg_segments *s, const npg_options *options, npg_reporter *reporter)
+static npg_status run_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
     json_t *overlaps = NULL;
     bool is_partial = false;
     bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
     NPG_TRY(npg_frame_files_open(&s->frames, npg_options_get(options, "input"), s->selection, finds_gaps));
-    NPG_TRY(begin(s, options));
-    NPG_TRY(check_own(s, options, "links"));
+    NPG_TRY(load_or_begin(s, options));
+    NPG_TRY(refuse_link(s, options, "links"));
     NPG_TRY(solve_all(s, options, reporter));
     for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;
     npg_status status = NPG_OK;
@@ -296,21 +298,21 @@ npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter)
         status =
             npg_error(NPG_USAGE, "segments = auto reads frames again; a live source can't give them again");
     if (!status) status = take_lock(&lock, s.output);
-    if (!status) status = work(&s, options, reporter);
+    if (!status) status = run_all(&s, options, reporter);
     if (lock >= 0) close(lock);
     npg_segments_clear(&s);
     npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }
 
-npg_status npg_segments_make_way(const npg_options *options)
+npg_status npg_segments_require_none(const npg_options *options)
 {
     npg_segments s = {.output = npg_options_get(options, "output"), .selection = NULL};
     npg_status status = npg_segments_load(&s);
     bool are_many = s.count > 1, restarts = !strcmp(npg_options_get(options, "restart"), "yes");
     if (!status && are_many && !restarts)
         status = npg_error(NPG_USAGE,
-                           "%s holds a capture in %zu segments: give --segments auto to go on with it, "
+                           "%s holds a capture in %zu segments: give --segments auto to continue it, "
                            "--restart to discard it, or choose another output folder",
                            s.output, s.count);
     if (!status && restarts && s.count) status = npg_segments_remove(&s);

@@ -1,15 +1,16 @@
 /* Segments: a capture whose topology changes, as several runs with a reference each
  * (neupig run --segments auto).
  *
- * The first run is that of the whole capture, in OUT itself.  Where its alarm goes off (evaluate/alarm.h) it
- * ends; the frames on the keyframe's side are solved anew with the same keyframe, the others become a segment
- * with a keyframe of its own, and so on until every segment explains its frames.  The newer segment also
- * solves the --overlap frames before the cut that its neighbour explains ("shared" in its frames.jsonl).
+ * The first run is that of the whole capture, in OUT itself.  Where its alarm goes off (evaluate/alarm.h)
+ * it ends; the frames on the keyframe's side are solved again with the same keyframe, the others become a
+ * segment with its own keyframe, and so on until every segment explains its frames.  The newer segment
+ * also solves the --overlap frames before the cut that its neighbour explains ("shared" in its
+ * frames.jsonl).
  *
  *     OUT/segment_<number>/       a job like any other; the number is that of its first own frame
  *     OUT/links/<b>_on_<a>.csv    each vertex of segment b on the surface of segment a, in a frame of both
  *     OUT/segments.json           the segments, why and where they were cut, their overlaps
- *     OUT/segments.partial.json   the same while the work goes on: started again, it goes on from there
+ *     OUT/segments.partial.json   the same while the run is at work, from which it is resumed
  *     OUT/done.json               last of all
  *
  * A capture that one reference explains leaves what a run without --segments leaves, and segments.json. */
@@ -34,11 +35,11 @@ npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter);
  * (frames that came later belong to all). */
 npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone);
 
-/* After neupig append has gone on with OUT: a list of one segment that is not of all frames any more goes. */
-npg_status npg_segments_forget(const char *output);
+/* After neupig append has continued OUT: a list of one segment that is not of all frames any more goes. */
+npg_status npg_segments_drop_outdated(const char *output);
 
 /* Before a run without --segments: OUT must not hold segments, unless the run is to restart; then they go. */
-npg_status npg_segments_make_way(const npg_options *options);
+npg_status npg_segments_require_none(const npg_options *options);
 
 /* ---- between the files of segments ---- */
 
@@ -79,7 +80,7 @@ npg_status npg_segments_save(const npg_segments *s);
 /* Whether the files of the overlaps that were loaded are there. */
 bool npg_segments_are_linked(const npg_segments *s);
 
-/* Whether OUT was done by a run without segments, which raised an alarm and went on. */
+/* Whether OUT was done by a run without segments, which raised an alarm and continued. */
 bool npg_segments_was_alarmed(const npg_segments *s);
 
 /* Remove what is in OUT of the segments that were loaded, and their lists. */

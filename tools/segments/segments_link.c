@@ -15,7 +15,8 @@
 #include "pipeline/json_lines.h"
 #include "tools/segments/segments.h"
 
-#define NEAR 0.01 /* of the diagonal */
+#define NEAR                                                                                                 \
+    0.01 /* of the diagonal: vertices no farther from the other surface count as near; set by trial */
 
 /* ---- a frame's mesh ---- */
 
@@ -25,7 +26,7 @@ typedef struct wanted {
     char *path; /* owned */
 } wanted;
 
-static npg_status look_at_line(void *user, const json_t *frame, const char *line, size_t size)
+static npg_status find_frame(void *user, const json_t *frame, const char *line, size_t size)
 {
     wanted *w = user;
     const char *file = json_string_value(json_object_get(frame, "file"));
@@ -45,7 +46,7 @@ static npg_status read_frame(npg_mesh **mesh, const npg_segments *s, const npg_s
     wanted w = {.number = number, .folder = folder};
     npg_status status = npg_join_path(&list, folder, "frames.jsonl");
     if (!status && stat(list, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", list);
-    if (!status) status = npg_json_lines_each(list, (int64_t)info.st_size, look_at_line, &w);
+    if (!status) status = npg_json_lines_each(list, (int64_t)info.st_size, find_frame, &w);
     if (!status && w.path) status = npg_read_mesh(mesh, w.path, origin);
     npg_release(&w.path);
     npg_release(&list);

@@ -60,7 +60,7 @@ static int64_t number_in(const json_t *object, const char *key)
     return (int64_t)json_integer_value(json_object_get(object, key));
 }
 
-static npg_status take(npg_segments *s, const json_t *entry)
+static npg_status add_saved(npg_segments *s, const json_t *entry)
 {
     const char *folder = json_string_value(json_object_get(entry, "folder"));
     npg_segment segment = {.first = number_in(entry, "first"),
@@ -77,11 +77,11 @@ static npg_status take(npg_segments *s, const json_t *entry)
     return npg_segments_insert(s, s->count, &segment);
 }
 
-static bool is_of_these(const npg_segments *s, const json_t *told)
+static bool is_of_these(const npg_segments *s, const json_t *saved)
 {
-    const char *selection = json_string_value(json_object_get(told, "selection"));
+    const char *selection = json_string_value(json_object_get(saved, "selection"));
     return !s->frames || (selection && !strcmp(selection, s->selection) &&
-                          number_in(told, "frames") == (int64_t)s->frames->count);
+                          number_in(saved, "frames") == (int64_t)s->frames->count);
 }
 
 static npg_status load(npg_segments *s, const char *name)
@@ -90,20 +90,21 @@ static npg_status load(npg_segments *s, const char *name)
     json_error_t error;
     NPG_TRY(npg_join_path(&path, s->output, name));
     npg_status status = NPG_OK;
-    json_t *told = access(path, F_OK) == 0 ? json_load_file(path, 0, &error) : json_null();
-    if (!told)
+    json_t *saved = access(path, F_OK) == 0 ? json_load_file(path, 0, &error) : json_null();
+    if (!saved)
         status =
             npg_error(NPG_USAGE, "%s is damaged (%s); --restart discards what is there", path, error.text);
-    const json_t *list = json_object_get(told, "segments");
-    for (size_t i = 0; i < json_array_size(list) && !status; i++) status = take(s, json_array_get(list, i));
-    if (!status && s->count && !is_of_these(s, told))
+    const json_t *list = json_object_get(saved, "segments");
+    for (size_t i = 0; i < json_array_size(list) && !status; i++)
+        status = add_saved(s, json_array_get(list, i));
+    if (!status && s->count && !is_of_these(s, saved))
         status = npg_error(NPG_USAGE,
                            "%s holds segments of other frames; "
                            "give --restart to discard what is there, or choose another output folder",
                            s->output);
     if (!status && s->count && !strcmp(name, WHOLE))
-        s->overlaps = json_incref(json_object_get(told, "overlaps"));
-    json_decref(told);
+        s->overlaps = json_incref(json_object_get(saved, "overlaps"));
+    json_decref(saved);
     npg_release(&path);
     return status;
 }
@@ -138,9 +139,9 @@ static json_t *read_in(const char *folder, const char *name)
 {
     char *path;
     if (npg_join_path(&path, folder, name)) return NULL;
-    json_t *told = json_load_file(path, 0, NULL);
+    json_t *saved = json_load_file(path, 0, NULL);
     npg_release(&path);
-    return told;
+    return saved;
 }
 
 bool npg_segments_was_alarmed(const npg_segments *s)
@@ -148,10 +149,10 @@ bool npg_segments_was_alarmed(const npg_segments *s)
     json_t *done = read_in(s->output, "done.json"), *report = read_in(s->output, "report.json");
     const char *mode = json_string_value(json_object_get(json_object_get(done, "options"), "alarm"));
     const json_t *stages = json_object_get(report, "stages"),
-                 *told = json_object_get(json_object_get(stages, "evaluate"), "topology");
+                 *saved = json_object_get(json_object_get(stages, "evaluate"), "topology");
     bool was = mode && !strcmp(mode, "report") &&
-               (json_is_object(json_object_get(told, "forward")) ||
-                json_is_object(json_object_get(told, "backward")));
+               (json_is_object(json_object_get(saved, "forward")) ||
+                json_is_object(json_object_get(saved, "backward")));
     json_decref(done);
     json_decref(report);
     return was;
@@ -178,13 +179,13 @@ static bool is_part(const char *folder)
     bool found = false;
     if (slash && slash > real && !npg_copy_text(&above, real)) {
         above[slash - real] = 0;
-        json_t *told = read_in(above, WHOLE);
-        const json_t *list = json_object_get(told, "segments");
+        json_t *saved = read_in(above, WHOLE);
+        const json_t *list = json_object_get(saved, "segments");
         for (size_t i = 0; i < json_array_size(list); i++) {
             const char *name = json_string_value(json_object_get(json_array_get(list, i), "folder"));
             found = found || (name && !strcmp(name, slash + 1));
         }
-        json_decref(told);
+        json_decref(saved);
         npg_release(&above);
     }
     free(real);
@@ -192,7 +193,7 @@ static bool is_part(const char *folder)
 }
 
 /* "OUT/segment_0000 (frames 0 to 6), ...", as many as there is room for. */
-static void spell(char *text, size_t size, const json_t *list, const char *output)
+static void describe_segments(char *text, size_t size, const json_t *list, const char *output)
 {
     size_t used = 0;
     for (size_t i = 0; i < json_array_size(list) && used < size; i++) {
@@ -206,39 +207,39 @@ static void spell(char *text, size_t size, const json_t *list, const char *outpu
 
 npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone)
 {
-    json_t *told = read_in(folder, WHOLE), *open = read_in(folder, PARTIAL);
-    const json_t *list = json_object_get(open ? open : told, "segments");
+    json_t *saved = read_in(folder, WHOLE), *open = read_in(folder, PARTIAL);
+    const json_t *list = json_object_get(open ? open : saved, "segments");
     npg_status status = NPG_OK;
     char text[512];
     if (json_array_size(list) > 1 && !is_alone) {
-        spell(text, sizeof text, list, folder);
+        describe_segments(text, sizeof text, list, folder);
         status = npg_error(NPG_USAGE,
                            "%s holds a capture in %zu segments with a reference each; "
                            "neupig %s takes one of them: %s",
                            folder, json_array_size(list), verb, text);
     } else if (json_array_size(list) > 1) {
         status = npg_error(NPG_USAGE,
-                           "%s holds a capture in %zu segments, and neupig %s goes on with one reference: "
+                           "%s holds a capture in %zu segments, and neupig %s continues with one reference: "
                            "run the frames that came later into a folder of their own "
                            "(neupig run INPUT -o NEW --segments auto --frames FIRST:), "
-                           "or all of them anew (--restart)",
+                           "or all of them again (--restart)",
                            folder, json_array_size(list), verb);
     } else if (is_alone && is_part(folder)) {
         status = npg_error(NPG_USAGE,
-                           "%s is one segment of a capture; neupig %s would part it from the others: "
+                           "%s is one segment of a capture; neupig %s would separate it from the others: "
                            "run the frames that came later into a folder of their own",
                            folder, verb);
     }
-    json_decref(told);
+    json_decref(saved);
     json_decref(open);
     return status;
 }
 
-npg_status npg_segments_forget(const char *output)
+npg_status npg_segments_drop_outdated(const char *output)
 {
-    json_t *told = read_in(output, WHOLE), *done = read_in(output, "done.json");
-    bool is_old = told && number_in(told, "frames") != number_in(done, "frames");
-    json_decref(told);
+    json_t *saved = read_in(output, WHOLE), *done = read_in(output, "done.json");
+    bool is_old = saved && number_in(saved, "frames") != number_in(done, "frames");
+    json_decref(saved);
     json_decref(done);
     return is_old ? remove_in(output, WHOLE) : NPG_OK;
 }
@@ -265,9 +266,9 @@ static json_t *json_of_all(const npg_segments *s)
 
 npg_status npg_segments_save(const npg_segments *s)
 {
-    json_t *told = json_of_all(s);
-    npg_status status = npg_json_write(s->output, PARTIAL, told);
-    json_decref(told);
+    json_t *saved = json_of_all(s);
+    npg_status status = npg_json_write(s->output, PARTIAL, saved);
+    json_decref(saved);
     return status;
 }
 
@@ -356,14 +357,14 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
 
 npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool is_partial)
 {
-    json_t *told = json_of_all(s), *list = json_object_get(told, "segments");
+    json_t *saved = json_of_all(s), *list = json_object_get(saved, "segments");
     npg_status status = NPG_OK;
     for (size_t i = 0; i < s->count && !status; i++)
         status = add_report(json_array_get(list, i), s, &s->list[i]);
-    json_object_set(told, "overlaps", overlaps);
-    json_object_set_new(told, "status", json_string(is_partial ? "partial" : "ok"));
-    if (!status) status = write_if_new(s, WHOLE, told);
-    json_decref(told);
+    json_object_set(saved, "overlaps", overlaps);
+    json_object_set_new(saved, "status", json_string(is_partial ? "partial" : "ok"));
+    if (!status) status = write_if_new(s, WHOLE, saved);
+    json_decref(saved);
     if (!status && s->count > 1) status = write_done(s, is_partial);
     return status ? status : remove_in(s->output, PARTIAL);
 }

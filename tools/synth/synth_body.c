@@ -24,12 +24,13 @@ struct npg_body {
  * between two limbs) as heat would, over about `reach` metres. */
 static npg_status open_weights(npg_body *body, double cell)
 {
-    const double reach = 0.07;
+    const double reach = 0.07; /* metres over which elbows and knees bend; set by eye */
     const npg_mesh *rest = body->rest;
     size_t edge_count, size = rest->vert_count * NPG_BONES;
     uint32_t(*edges)[2];
     float *next = NULL, *degree = NULL;
-    int rounds = (int)ceil(reach * reach / (cell * cell));
+    int rounds =
+        (int)ceil(reach * reach / (cell * cell)); /* a round carries heat one cell, n rounds sqrt(n) */
     NPG_TRY(npg_alloc_array(&body->weights, NPG_FOR_MESH, size, sizeof(float)));
     NPG_TRY(npg_mesh_edges(&edges, &edge_count, rest->faces, rest->face_count));
     npg_status status = npg_alloc_array(&next, NPG_FOR_MESH, size, sizeof *next);

@@ -1,4 +1,4 @@
-/* Synthetic cameras: a ring of depth cameras around the body, each with a depth buffer of its own. */
+/* Synthetic cameras: a ring of depth cameras around the body, each with its own depth buffer. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,6 +23,7 @@ typedef struct picture {
 /* The i-th of a ring at half the diagonal's height above the middle, turned to the middle. */
 static camera camera_of_ring(const npg_scan *capture, int64_t i)
 {
+    /* Far enough that the whole body is in the picture; at two heights, so that tops of limbs are seen. */
     const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
     double angle = 2 * PI * (double)i / (double)capture->cameras;
     camera c = {.width = capture->width, .focal = 0.95 * (double)capture->width};
@@ -79,8 +80,8 @@ static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint3
 }
 
 /* The surface point behind every pixel that sees a front side, with noise along its ray. */
-static npg_status take_points(npg_scanned *points, const picture *seen, const camera *c, const npg_mesh *mesh,
-                              double noise, npg_random *random)
+static npg_status add_seen_points(npg_scanned *points, const picture *seen, const camera *c,
+                                  const npg_mesh *mesh, double noise, npg_random *random)
 {
     for (int64_t at = 0; at < c->width * c->width; at++) {
         double depth = seen->depth[at], pos[3], normal[3];
@@ -102,14 +103,14 @@ npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const n
 {
     picture seen = {0};
     size_t pixels = (size_t)(capture->width * capture->width);
-    npg_random random = npg_random_stream(capture->seed, frame, 10);
+    npg_random random = npg_random_stream(capture->seed, frame, NPG_FOR_CAMERAS);
     npg_status status = npg_alloc_array(&seen.depth, NPG_FOR_FRAMES, pixels, sizeof *seen.depth);
     if (!status) status = npg_alloc_array(&seen.face, NPG_FOR_FRAMES, pixels, sizeof *seen.face);
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
         camera c = camera_of_ring(capture, i);
         for (size_t p = 0; p < pixels; p++) seen.depth[p] = INFINITY;
         for (size_t f = 0; f < mesh->face_count; f++) draw_face(&seen, &c, mesh, (uint32_t)f);
-        status = take_points(points, &seen, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
+        status = add_seen_points(points, &seen, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
     }
     npg_release(&seen.depth);
     npg_release(&seen.face);

@@ -52,7 +52,7 @@ static npg_status open_field(field *f, npg_distance_fn *distance, const void *us
         double p[3];
         node_position(f, n, p);
         f->value[n] = distance(p, user);
-        if (fabs(f->value[n]) < 1e-9) f->value[n] = 1e-9;
+        if (fabs(f->value[n]) < 1e-9) f->value[n] = 1e-9; /* no vertex lies on a node: each is on one edge */
     }
     return NPG_OK;
 }
@@ -75,7 +75,7 @@ static npg_status cut_edge(field *f, size_t a, size_t b, uint32_t *vertex)
         NPG_TRY(npg_grow(&f->vert_pos, &f->vert_room, f->vert_count + 1, 3 * sizeof(float), NPG_FOR_MESH));
         node_position(f, a, pa);
         node_position(f, b, pb);
-        t = fmin(fmax(t, 0.05), 0.95);
+        t = fmin(fmax(t, 0.05), 0.95); /* vertices that nearly coincide would give faces without area */
         for (int k = 0; k < 3; k++) f->vert_pos[3 * f->vert_count + k] = (float)(pa[k] + t * (pb[k] - pa[k]));
         *slot = (uint32_t)++f->vert_count;
     }
@@ -142,6 +142,7 @@ static npg_status march(field *f)
 
 /* ---- even triangles ---- */
 
+/* Newton's steps along the gradient of the distance. */
 static void back_to_surface(float *p, npg_distance_fn *distance, const void *user, double cell)
 {
     const double h = 0.01 * cell;

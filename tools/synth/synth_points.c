@@ -10,7 +10,7 @@
 #include "pipeline/random.h"
 
 /* Keys of the random streams of a frame. */
-enum { FOR_SAMPLES = 1, FOR_COUNT, FOR_NOISE, FOR_OUTLIERS, FOR_HOLES, FOR_CHOICE };
+enum { FOR_SAMPLES = 1, FOR_COUNT, FOR_NOISE, FOR_OUTLIERS, FOR_HOLES, FOR_CHOICE }; /* and NPG_FOR_CAMERAS */
 
 void npg_scanned_close(npg_scanned *points)
 {
@@ -54,7 +54,7 @@ static void choose(npg_scanned *points, size_t count, npg_random random)
 static void cut_holes(npg_scanned *points, const npg_scan *capture, uint64_t frame)
 {
     npg_random random = npg_random_stream(capture->seed, frame, FOR_HOLES);
-    double radius = 0.06 * capture->diagonal;
+    double radius = 0.06 * capture->diagonal; /* as the help of --holes says */
     for (int64_t hole = 0; hole < capture->holes && points->count; hole++) {
         size_t kept = 0, at = (size_t)npg_random_below(&random, points->count);
         float middle[3];
@@ -98,8 +98,8 @@ static void add_outliers(npg_scanned *points, const npg_scan *capture, uint64_t 
     }
 }
 
-static npg_status take_surface(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
-                               size_t count, uint64_t frame)
+static npg_status sample_surface(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
+                                 size_t count, uint64_t frame)
 {
     NPG_TRY(make_room(points, count));
     points->count = count;
@@ -119,7 +119,7 @@ npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const np
         cut_holes(points, capture, frame);
         choose(points, count, npg_random_stream(capture->seed, frame, FOR_CHOICE));
     } else {
-        NPG_TRY(take_surface(points, capture, mesh, count, frame));
+        NPG_TRY(sample_surface(points, capture, mesh, count, frame));
         cut_holes(points, capture, frame);
         if (capture->noise > 0) add_noise(points, capture, frame);
     }

@@ -30,6 +30,8 @@ npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const np
 
 /* ---- between the files of a capture ---- */
 
+#define NPG_FOR_CAMERAS 10 /* key of the cameras' random stream */
+
 npg_status npg_scanned_add(npg_scanned *points, const double pos[3], const double normal[3]);
 
 /* All surface points that a ring of cameras sees, one per pixel, in the order of cameras and pixels. */

@@ -6,7 +6,8 @@
 
 #define PI 3.14159265358979323846
 
-/* A bone turns about its joint; sides come as pairs, left (x > 0) first. */
+/* A bone turns about its joint; sides come as pairs, left (x > 0) first.  Metres; sizes and angles of the
+ * gait were set by eye. */
 typedef struct bone {
     int parent;
     double joint[3], from[3], to[3], radius_from, radius_to;
@@ -60,7 +61,7 @@ static double bone_distance(const bone *rest, const npg_rigid *pose, const doubl
 /* The smooth minimum of the distances to all bones: -k log sum exp(-d / k). */
 double npg_walker_distance(const double p[3], const void *user)
 {
-    const double softness = 0.018;
+    const double softness = 0.018; /* metres: how round limbs join; set by eye */
     double sum = 0, distances[NPG_BONES], least = INFINITY;
     const npg_rigid *pose = user;
     for (int b = 0; b < NPG_BONES; b++)
