@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2034
 # The Debian 12 packages this project needs, and how they come onto the machine.  Read by samples/run.sh and
-# tests/run.sh: this is the only list.
+# the scripts of tests/: this is the only list.
 
 packages_to_build="build-essential cmake ninja-build pkg-config pocl-opencl-icd ocl-icd-opencl-dev opencl-headers
 libpcl-dev libeigen3-dev libboost-dev libembree-dev libopenvdb-dev libtbb-dev libmeshoptimizer-dev libjansson-dev
@@ -11,10 +11,13 @@ libxml2-utils parallel slurmctld slurmd slurm-client munge"
 # Node from elsewhere brings an npm that Debian's would not go with.
 command -v npm >/dev/null || packages_to_test="$packages_to_test nodejs npm"
 
-# Install those of the named packages that are missing; says what it installs, asks nothing.
+# For tests/clean_machine.sh.
+packages_to_make_roots="debootstrap git"
+
+# Install those of the named packages that are missing; says what it installs, and more only where that fails.
 install_packages()
 {
-    local missing="" package as_root=""
+    local missing="" package as_root="" log
     for package in "$@"; do
         case $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) in
             installed) ;;
@@ -29,8 +32,14 @@ install_packages()
         fi
         as_root="sudo"
     fi
-    echo "Installing:$missing"
-    $as_root apt-get update -qq
+    echo "Installing, which can take some minutes:$missing"
+    log=$(mktemp)
     # shellcheck disable=SC2086  # the lists are meant to be split
-    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing
+    if ! { $as_root apt-get update -qq && $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq \
+        --no-install-recommends -o Acquire::Retries=3 $missing; } >"$log" 2>&1; then
+        tail -n 30 "$log" >&2
+        echo "The packages could not be installed; all that apt-get said is in $log" >&2
+        return 1
+    fi
+    rm -f "$log"
 }
