@@ -14,7 +14,8 @@ epochs=${EPOCHS:-100}
 install_packages $packages_to_build
 
 # Without the tests: their libraries are in packages_to_test.  tests/run.sh configures the same folder with them.
-cmake --preset release -DNPG_TESTS=OFF
+echo "== Build"
+cmake --preset release -DNPG_TESTS=OFF >/dev/null
 cmake --build build --target neupig
 
 echo "== A capture: $frames frames of a walking figure, with noise and outliers, without normals"
