@@ -80,6 +80,17 @@ copy_tree() { # FOLDER
     [ ! -e after ]
 }
 
+@test "marked blocks are left out and listed; on a clean machine those of that test run" {
+    printf '<!-- run by: tests/clean_machine.sh -->\n```sh\ntouch one\n```\n<!-- not run: slow -->\n```sh\ntouch two\n```\n' >page.md
+    [ "$("$commands" --list page.md)" = $'3\trun by: tests/clean_machine.sh\ttouch one \n7\tnot run: slow\ttouch two ' ]
+    run "$commands" page.md
+    [ "${lines[-1]}" = "page.md: 0 commands run, 2 marked" ]
+    run "$commands" --clean page.md
+    [ "${lines[-1]}" = "page.md: 1 commands run, 1 marked" ]
+    [ -e one ]
+    [ ! -e two ]
+}
+
 @test "every option that a page names is one of the command or of a script" {
     for verb in run batch append apply probe eval synth render bench tune doctor man; do "$NEUPIG" help $verb; done >known
     for script in explore plot_explore figures; do "$root/tools/$script.py" --help; done >>known
