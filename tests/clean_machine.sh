@@ -1,11 +1,12 @@
 #!/bin/bash
 # A clean machine: runs the README's first command, samples/run.sh, in a new minimal root of this machine's Debian
-# release, with nothing in it but what that command installs, and checks the meshes, report and picture it promises.
+# release, with nothing in it but what that command installs, and checks the meshes, report and picture it promises;
+# then the README's other commands.
 #
 #   tests/clean_machine.sh [--user] [--tests]
 #
 #   --user    as an ordinary user with sudo; else as root
-#   --tests   then the README's second command, tests/run.sh, in the same root
+#   --tests   then all of the tests, tests/run.sh, in the same root
 #
 # The clone in the root has what is committed.  Package sources, proxies and name servers are those of this machine.
 # Takes about 6 minutes and 5 GB below TMPDIR (/var/tmp), with --tests 45 minutes and 12 GB; needs root, or sudo that
@@ -223,11 +224,13 @@ inside() # SCRATCH AS_USER WITH_TESTS
     in_clone "$root" "$home" "$name" "$command" 2>&1 | tee "$log" || failed "the README's first command failed"
     echo "== What it promises"
     check_results "$root" "$home/neupig" "$log"
+    echo "== The README's other commands"
+    in_clone "$root" "$home" "$name" "tests/delivery/page_commands.sh README.md" 2>&1 || failed "a command of the README failed"
 
     [ "$3" = yes ] || return 0
     command=$(readme_command "$readme" tests/run.sh)
-    echo "== The README's second command, as $name: $command"
-    in_clone "$root" "$home" "$name" "$command" 2>&1 || failed "the README's second command failed"
+    echo "== All tests, as $name: $command"
+    in_clone "$root" "$home" "$name" "$command" 2>&1 || failed "the tests failed"
 }
 
 if [ "${1:-}" = --inside ]; then
