@@ -16,23 +16,24 @@
 
 /* ---- finding devices ---- */
 
-static npg_status all_devices(cl_device_id *ids, size_t capacity, size_t *count)
+/* ids: of NPG_DEVICES_MAX places. */
+static npg_status all_devices(cl_device_id *ids, size_t *count)
 {
-    cl_platform_id platforms[16];
+    cl_platform_id platforms[NPG_PLATFORMS_MAX];
     cl_uint platform_count = 0, found;
     *count = 0;
     NPG_TRY(npg_probe_drivers());
-    cl_int code = clGetPlatformIDs(16, platforms, &platform_count);
-    if (code == -1001 || (!code && !platform_count))
+    cl_int code = clGetPlatformIDs(NPG_PLATFORMS_MAX, platforms, &platform_count);
+    if (code == CL_PLATFORM_NOT_FOUND_KHR || (!code && !platform_count))
         return npg_error(NPG_DEVICE,
                          "no OpenCL driver is installed (on Debian: apt-get install pocl-opencl-icd)");
     NPG_TRY(npg_cl_status(code, "clGetPlatformIDs"));
-    for (cl_uint i = 0; i < platform_count && i < 16; i++) {
-        code = clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, (cl_uint)(capacity - *count), ids + *count,
-                              &found);
+    for (cl_uint i = 0; i < platform_count && i < NPG_PLATFORMS_MAX && *count < NPG_DEVICES_MAX; i++) {
+        size_t room = NPG_DEVICES_MAX - *count;
+        code = clGetDeviceIDs(platforms[i], CL_DEVICE_TYPE_ALL, (cl_uint)room, ids + *count, &found);
         if (code == CL_DEVICE_NOT_FOUND) continue;
         NPG_TRY(npg_cl_status(code, "clGetDeviceIDs"));
-        *count += found < capacity - *count ? found : capacity - *count;
+        *count += found < room ? found : room;
     }
     return NPG_OK;
 }
@@ -62,10 +63,10 @@ static npg_status read_facts(npg_device_info *info, cl_device_id id)
 
 npg_status npg_device_describe(size_t i, npg_device_info *info)
 {
-    cl_device_id ids[32];
+    cl_device_id ids[NPG_DEVICES_MAX];
     size_t count;
     NPG_TRY(npg_kernel_cache_enter());
-    npg_status status = all_devices(ids, 32, &count);
+    npg_status status = all_devices(ids, &count);
     if (!status) status = i < count ? read_facts(info, ids[i]) : NPG_END;
     npg_kernel_cache_leave();
     return status;
@@ -91,10 +92,10 @@ static bool matches_spec(const npg_device_info *info, size_t i, const char *spec
 
 static npg_status choose_device(npg_device *device, const char *spec)
 {
-    cl_device_id ids[32];
+    cl_device_id ids[NPG_DEVICES_MAX];
     size_t count;
     char list[1024] = "";
-    NPG_TRY(all_devices(ids, 32, &count));
+    NPG_TRY(all_devices(ids, &count));
     for (int any = 0; any < (*spec ? 1 : 2); any++)
         for (size_t i = 0; i < count; i++) {
             NPG_TRY(read_facts(&device->info, ids[i]));
@@ -134,7 +135,7 @@ npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *devi
     return npg_error(NPG_DISK, "there is no folder for the cache (XDG_CACHE_HOME, HOME)");
 }
 
-/* The set of this kind of device, and over it what was tuned. */
+/* The set of this kind of device, and over it what was tuned.  16 floats in a vector: AVX-512. */
 static void choose_set_by_kind(npg_device *device)
 {
     char path[NPG_CACHE_PATH];

@@ -9,26 +9,23 @@
 
 #include "kernels/runtime/probe.h"
 
-#define PLATFORMS_MAX 16
-#define DEVICES_MAX   32
-
 static void ask_platform(cl_platform_id platform)
 {
-    cl_device_id devices[DEVICES_MAX];
+    cl_device_id devices[NPG_DEVICES_MAX];
     cl_uint count = 0;
     cl_ulong memory;
-    if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, DEVICES_MAX, devices, &count)) return;
-    for (cl_uint i = 0; i < count && i < DEVICES_MAX; i++)
+    if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, NPG_DEVICES_MAX, devices, &count)) return;
+    for (cl_uint i = 0; i < count && i < NPG_DEVICES_MAX; i++)
         clGetDeviceInfo(devices[i], CL_DEVICE_GLOBAL_MEM_SIZE, sizeof memory, &memory, NULL);
 }
 
 int main(void)
 {
-    cl_platform_id platforms[PLATFORMS_MAX];
+    cl_platform_id platforms[NPG_PLATFORMS_MAX];
     cl_uint count = 0;
     prctl(PR_SET_DUMPABLE, 0); /* its death is reported; no core file for it */
-    if (!clGetPlatformIDs(PLATFORMS_MAX, platforms, &count))
-        for (cl_uint i = 0; i < count && i < PLATFORMS_MAX; i++) ask_platform(platforms[i]);
+    if (!clGetPlatformIDs(NPG_PLATFORMS_MAX, platforms, &count))
+        for (cl_uint i = 0; i < count && i < NPG_PLATFORMS_MAX; i++) ask_platform(platforms[i]);
     ssize_t put = write(STDOUT_FILENO, NPG_PROBE_ANSWER, strlen(NPG_PROBE_ANSWER));
     _exit(put < 0); /* without the drivers' own ends, which are no concern here */
 }

@@ -4,6 +4,10 @@
 
 #include "pipeline/status.h"
 
+/* More OpenCL platforms (drivers), and devices of all together, than these are neither asked nor listed. */
+#define NPG_PLATFORMS_MAX 16
+#define NPG_DEVICES_MAX   32
+
 /* What neupig-devices prints when it has got through. */
 #define NPG_PROBE_ANSWER "asked\n"
 

@@ -13,7 +13,7 @@
 #include "tools/progress.h"
 
 typedef struct sums {
-    size_t captures, frames, gaps, bad, attended;
+    size_t captures, frames, gaps, bad, with_attention;
     double disk_bytes, memory_bytes, time_s; /* memory: of the largest */
 } sums;
 
@@ -30,50 +30,50 @@ static bool is_on(const npg_options *options, const char *name)
     return text && strchr("ytoYTO1", text[0]) && strcmp(text, "off") != 0 && text[0];
 }
 
-static npg_status probe_capture(probed *l, const npg_capture *capture)
+static npg_status probe_capture(probed *p, const npg_capture *capture)
 {
-    npg_probe_init(&l->probe);
+    npg_probe_init(&p->probe);
     if (capture->refusal) {
-        snprintf(l->cause, sizeof l->cause, "%s", capture->refusal);
+        snprintf(p->cause, sizeof p->cause, "%s", capture->refusal);
         return NPG_OK;
     }
-    npg_status status = npg_probe_files(&l->probe, &l->list, capture->input, capture->options);
+    npg_status status = npg_probe_files(&p->probe, &p->list, capture->input, capture->options);
     if (status == NPG_MEMORY) return status;
     if (status) {
-        snprintf(l->cause, sizeof l->cause, "%s", npg_error_text());
+        snprintf(p->cause, sizeof p->cause, "%s", npg_error_text());
         return NPG_OK;
     }
-    npg_probe_warn_of_all(&l->probe);
-    npg_probe_estimate_run(&l->estimate, &l->probe, capture->options);
-    if (l->probe.unreadable && !is_on(capture->options, "keep-going"))
-        snprintf(l->cause, sizeof l->cause, "%s", l->probe.first_fault);
+    npg_probe_warn_of_all(&p->probe);
+    npg_probe_estimate_run(&p->estimate, &p->probe, capture->options);
+    if (p->probe.unreadable && !is_on(capture->options, "keep-going"))
+        snprintf(p->cause, sizeof p->cause, "%s", p->probe.first_fault);
     return NPG_OK;
 }
 
-static void print_row(const npg_capture *capture, probed *l)
+static void print_row(const npg_capture *capture, probed *p)
 {
     char time[32];
-    const npg_estimate *e = &l->estimate;
+    const npg_estimate *e = &p->estimate;
     npg_spell_time(time, sizeof time, e->time_s);
-    printf("%-24s  %7zu  %5zu  %9zu  %8.0f MiB  %8.0f MiB  %9s\n", capture->name, l->probe.frames,
-           l->list ? l->list->gap_count : 0, npg_probe_counts(&l->probe).median, e->memory_bytes / 0x1p20,
+    printf("%-24s  %7zu  %5zu  %9zu  %8.0f MiB  %8.0f MiB  %9s\n", capture->name, p->probe.frames,
+           p->list ? p->list->gap_count : 0, npg_probe_counts(&p->probe).median, e->memory_bytes / 0x1p20,
            e->disk_bytes / 0x1p20, time);
-    if (l->cause[0]) printf("    would fail: %s\n", l->cause);
+    if (p->cause[0]) printf("    would fail: %s\n", p->cause);
     if (capture->segments == NPG_BATCH_SEGMENTS_AUTO)
         printf("    segments: the time is that of one reference; each cut solves frames again\n");
-    for (size_t i = 0; i < json_array_size(l->probe.attention); i++)
-        printf("    attention: %s\n", json_string_value(json_array_get(l->probe.attention, i)));
+    for (size_t i = 0; i < json_array_size(p->probe.attention); i++)
+        printf("    attention: %s\n", json_string_value(json_array_get(p->probe.attention, i)));
 }
 
-static void print_line(const npg_capture *capture, probed *l)
+static void print_line(const npg_capture *capture, probed *p)
 {
-    const npg_estimate *e = &l->estimate;
+    const npg_estimate *e = &p->estimate;
     json_t *line = json_pack(
         "{s:s,s:o,s:o,s:I,s:I,s:I,s:f,s:f,s:f,s:O,s:s}", "event", "estimate", "name",
         npg_json_text(capture->name), "input", npg_json_text(capture->input), "frames",
-        (json_int_t)l->probe.frames, "gaps", (json_int_t)(l->list ? l->list->gap_count : 0), "points_median",
-        (json_int_t)npg_probe_counts(&l->probe).median, "memory_bytes", e->memory_bytes, "disk_bytes",
-        e->disk_bytes, "time_s", e->time_s, "attention", l->probe.attention, "would_fail", l->cause);
+        (json_int_t)p->probe.frames, "gaps", (json_int_t)(p->list ? p->list->gap_count : 0), "points_median",
+        (json_int_t)npg_probe_counts(&p->probe).median, "memory_bytes", e->memory_bytes, "disk_bytes",
+        e->disk_bytes, "time_s", e->time_s, "attention", p->probe.attention, "would_fail", p->cause);
     bool is_auto = capture->segments == NPG_BATCH_SEGMENTS_AUTO;
     json_object_set_new(line, "segments", json_string(is_auto ? "auto" : "one"));
     char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(6));
@@ -82,14 +82,14 @@ static void print_line(const npg_capture *capture, probed *l)
     json_decref(line);
 }
 
-static void add_up(sums *s, const probed *l)
+static void add_up(sums *s, const probed *p)
 {
-    const npg_estimate *e = &l->estimate;
+    const npg_estimate *e = &p->estimate;
     s->captures++;
-    s->frames += l->probe.frames;
-    s->gaps += l->list ? l->list->gap_count : 0;
-    s->bad += l->cause[0] != 0;
-    s->attended += json_array_size(l->probe.attention) > 0;
+    s->frames += p->probe.frames;
+    s->gaps += p->list ? p->list->gap_count : 0;
+    s->bad += p->cause[0] != 0;
+    s->with_attention += json_array_size(p->probe.attention) > 0;
     s->disk_bytes += e->disk_bytes;
     s->time_s += e->time_s;
     if (e->memory_bytes > s->memory_bytes) s->memory_bytes = e->memory_bytes;
@@ -129,18 +129,18 @@ npg_status npg_batch_estimate(const npg_batch *batch, bool as_json, int *exit_co
         printf("%-24s  %7s  %5s  %9s  %12s  %12s  %9s\n", "capture", "frames", "gaps", "points", "memory",
                "disk", "time");
     for (size_t i = 0; i < batch->count && !status; i++) {
-        probed l = {.list = NULL};
+        probed p = {.list = NULL};
         if (!npg_batch_is_mine(batch, i)) continue;
-        status = probe_capture(&l, &batch->captures[i]);
+        status = probe_capture(&p, &batch->captures[i]);
         if (!status) {
-            as_json ? print_line(&batch->captures[i], &l) : print_row(&batch->captures[i], &l);
-            add_up(&s, &l);
+            as_json ? print_line(&batch->captures[i], &p) : print_row(&batch->captures[i], &p);
+            add_up(&s, &p);
         }
-        npg_frame_files_close(&l.list);
-        npg_probe_uninit(&l.probe);
+        npg_frame_files_close(&p.list);
+        npg_probe_uninit(&p.probe);
     }
     if (!status && !as_json) print_sums(batch, &s);
     double room = free_bytes(batch->output);
-    *exit_code = s.bad ? 1 : s.attended || (room >= 0 && room < s.disk_bytes) ? 7 : 0;
+    *exit_code = s.bad ? 1 : s.with_attention || (room >= 0 && room < s.disk_bytes) ? 7 : 0;
     return status;
 }
