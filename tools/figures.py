@@ -295,7 +295,16 @@ def text_of(cell, runs):
     return shown(cell.key, run.get(cell.key))
 
 
+def is_measured(line, runs):
+    """Whether the file has one of the line's runs; a line without runs (heads, the published code) always stands."""
+    cells = [cell for cell in line if isinstance(cell, Cell)]
+    return not cells or any((cell.capture, cell.options) in runs for cell in cells)
+
+
 def markdown(rows, runs):
+    rows = [line for line in rows if is_measured(line, runs)]
+    if len(rows) == 1:
+        return ["Not measured yet."]
     lines = ["| " + " | ".join(text_of(cell, runs) for cell in line) + " |" for line in rows]
     lines.insert(1, "|" + "---|" * len(rows[0]))
     return lines
