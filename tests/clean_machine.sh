@@ -58,7 +58,7 @@ carry_network_settings() # ROOT
 {
     cp -L /etc/resolv.conf "$1/etc/resolv.conf"
     cp -L /etc/hosts "$1/etc/hosts"
-    getent hosts "$(hostname)" >/dev/null || echo "127.0.0.1 $(hostname)" >>"$1/etc/hosts"
+    grep -qw "$(hostname)" "$1/etc/hosts" || echo "127.0.0.1 $(hostname)" >>"$1/etc/hosts"
     if [ -d /usr/local/share/ca-certificates ]; then
         mkdir -p "$1/usr/local/share"
         cp -rL /usr/local/share/ca-certificates "$1/usr/local/share/"
