@@ -20,15 +20,16 @@
 
 extern char **environ;
 
-#define POLL_MS 100
+#define POLL_MS        100 /* should_stop and the time limit are checked this often */
+#define EXIT_NO_MEMORY 6   /* by agreement with the helpers, as of neupig itself */
 
 typedef struct child {
     const npg_child_job *job;
     pid_t pid;
-    int in, out, words; /* our ends; -1: closed */
-    size_t sent;
-    size_t capacity;
-    size_t word_count;
+    int in, out, err;    /* our ends of its standard streams; -1: closed */
+    size_t sent;         /* bytes of the input */
+    size_t capacity;     /* of the output */
+    size_t error_length; /* of what is kept of its standard error */
     npg_child_result *result;
 } child;
 
@@ -82,7 +83,7 @@ static void close_end(int *fd)
 }
 
 /* Signals that the host blocks or ignores must not change what the child does. */
-static npg_status spawn(child *c, const char *path, int in, int out, int words)
+static npg_status spawn(child *c, const char *path, int in, int out, int err)
 {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
@@ -92,7 +93,7 @@ static npg_status spawn(child *c, const char *path, int in, int out, int words)
     posix_spawnattr_init(&attributes);
     posix_spawn_file_actions_adddup2(&actions, in, 0);
     posix_spawn_file_actions_adddup2(&actions, out, 1);
-    posix_spawn_file_actions_adddup2(&actions, words, 2);
+    posix_spawn_file_actions_adddup2(&actions, err, 2);
     posix_spawn_file_actions_addclosefrom_np(&actions, 3);
     sigemptyset(&none);
     sigfillset(&all);
@@ -109,28 +110,30 @@ static npg_status spawn(child *c, const char *path, int in, int out, int words)
 /* Sockets instead of pipes: a write to a dead child must not raise SIGPIPE in the host. */
 static npg_status start(child *c, const char *path)
 {
-    int in[2] = {-1, -1}, out[2] = {-1, -1}, words[2] = {-1, -1};
+    int in[2] = {-1, -1}, out[2] = {-1, -1}, err[2] = {-1, -1};
     npg_status status = NPG_OK;
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) || pipe2(out, O_CLOEXEC) ||
-        pipe2(words, O_CLOEXEC))
+        pipe2(err, O_CLOEXEC))
         status = npg_error_errno(NPG_FAILED, "can't make a pipe to %s", path);
-    if (!status) status = spawn(c, path, in[1], out[1], words[1]);
+    if (!status) status = spawn(c, path, in[1], out[1], err[1]);
     close_end(&in[1]);
     close_end(&out[1]);
-    close_end(&words[1]);
+    close_end(&err[1]);
     c->in = in[0];
     c->out = out[0];
-    c->words = words[0];
+    c->err = err[0];
     if (status) return status;
     fcntl(c->in, F_SETFL, O_NONBLOCK);
     fcntl(c->out, F_SETFL, O_NONBLOCK);
-    fcntl(c->words, F_SETFL, O_NONBLOCK);
+    fcntl(c->err, F_SETFL, O_NONBLOCK);
     return NPG_OK;
 }
 
-/* ---- talk ---- */
+/* ---- its input and output ---- */
 
-static void send_some(child *c)
+#define READ_MIN 65536 /* free room before each read of the output: what a pipe holds */
+
+static void send_input(child *c)
 {
     const npg_child_job *job = c->job;
     size_t first = job->input_size[0], part = c->sent >= first, skip = part ? c->sent - first : c->sent;
@@ -141,11 +144,11 @@ static void send_some(child *c)
     if (broken || c->sent == first + job->input_size[1]) close_end(&c->in);
 }
 
-static npg_status receive_some(child *c)
+static npg_status read_output(child *c)
 {
     npg_child_result *r = c->result;
-    if (c->capacity - r->output_size < 65536)
-        NPG_TRY(npg_grow(&r->output, &c->capacity, r->output_size + 65536, 1, NPG_FOR_MESH));
+    if (c->capacity - r->output_size < READ_MIN)
+        NPG_TRY(npg_grow(&r->output, &c->capacity, r->output_size + READ_MIN, 1, NPG_FOR_MESH));
     ssize_t got = read(c->out, r->output + r->output_size, c->capacity - r->output_size);
     if (got > 0) r->output_size += (size_t)got;
     if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) close_end(&c->out);
@@ -155,55 +158,55 @@ static npg_status receive_some(child *c)
     return NPG_OK;
 }
 
-/* Keeps the end of what the child prints. */
-static void hear_some(child *c)
+/* Keep the end of what the child prints on standard error. */
+static void read_errors(child *c)
 {
-    char text[256], *kept = c->result->words;
-    size_t room = sizeof c->result->words - 1;
-    ssize_t got = read(c->words, text, sizeof text);
-    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) close_end(&c->words);
+    char text[256], *kept = c->result->last_line;
+    size_t room = sizeof c->result->last_line - 1;
+    ssize_t got = read(c->err, text, sizeof text);
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) close_end(&c->err);
     for (ssize_t i = 0; i < got; i++) {
-        if (c->word_count == room) memmove(kept, kept + 1, --c->word_count);
-        kept[c->word_count++] = text[i];
+        if (c->error_length == room) memmove(kept, kept + 1, --c->error_length);
+        kept[c->error_length++] = text[i];
     }
 }
 
 static npg_status exchange(child *c)
 {
     double end_s = npg_clock_s() + c->job->time_limit_s;
-    while (c->out >= 0 || c->words >= 0) {
-        struct pollfd ends[3] = {{c->in, POLLOUT, 0}, {c->out, POLLIN, 0}, {c->words, POLLIN, 0}};
+    while (c->out >= 0 || c->err >= 0) {
+        struct pollfd ends[3] = {{c->in, POLLOUT, 0}, {c->out, POLLIN, 0}, {c->err, POLLIN, 0}};
         poll(ends, 3, POLL_MS);
         if (c->job->should_stop && c->job->should_stop(c->job->user)) return NPG_STOPPED;
         if (npg_clock_s() > end_s)
             return npg_error(NPG_FAILED, "%s was not done after %g s and was stopped", c->job->program,
                              c->job->time_limit_s);
-        if (ends[0].revents) send_some(c);
-        if (ends[1].revents) NPG_TRY(receive_some(c));
-        if (ends[2].revents) hear_some(c);
+        if (ends[0].revents) send_input(c);
+        if (ends[1].revents) NPG_TRY(read_output(c));
+        if (ends[2].revents) read_errors(c);
     }
     return NPG_OK;
 }
 
 /* ---- end ---- */
 
-static void keep_last_line(char *words)
+static void keep_last_line(char *text)
 {
-    size_t length = strlen(words);
-    while (length && (words[length - 1] == '\n' || words[length - 1] == '\r')) words[--length] = 0;
-    char *line = strrchr(words, '\n');
-    if (line) memmove(words, line + 1, strlen(line));
+    size_t length = strlen(text);
+    while (length && (text[length - 1] == '\n' || text[length - 1] == '\r')) text[--length] = 0;
+    char *line = strrchr(text, '\n');
+    if (line) memmove(text, line + 1, strlen(line));
 }
 
 static npg_status judge(const child *c, int how)
 {
-    const char *program = c->job->program, *words = c->result->words;
+    const char *program = c->job->program, *line = c->result->last_line;
     if (WIFEXITED(how) && WEXITSTATUS(how) == 0) return NPG_OK;
     if (WIFSIGNALED(how))
         return npg_error(NPG_FAILED, "%s was killed by signal %d (%s)%s%s", program, WTERMSIG(how),
-                         strsignal(WTERMSIG(how)), *words ? ": " : "", words);
-    return npg_error(WEXITSTATUS(how) == 6 ? NPG_MEMORY : NPG_FAILED, "%s ended with exit code %d%s%s",
-                     program, WEXITSTATUS(how), *words ? ": " : "", words);
+                         strsignal(WTERMSIG(how)), *line ? ": " : "", line);
+    return npg_error(WEXITSTATUS(how) == EXIT_NO_MEMORY ? NPG_MEMORY : NPG_FAILED,
+                     "%s ended with exit code %d%s%s", program, WEXITSTATUS(how), *line ? ": " : "", line);
 }
 
 /* A host that ignores SIGCHLD gets no exit status: then the answer's own end mark must do. */
@@ -213,18 +216,18 @@ static npg_status reap(child *c, npg_status status)
     pid_t pid;
     close_end(&c->in);
     close_end(&c->out);
-    close_end(&c->words);
+    close_end(&c->err);
     if (status) kill(c->pid, SIGKILL);
     do pid = waitpid(c->pid, &how, 0);
     while (pid < 0 && errno == EINTR);
-    keep_last_line(c->result->words);
+    keep_last_line(c->result->last_line);
     return status || pid < 0 ? status : judge(c, how);
 }
 
 npg_status npg_child_run(npg_child_result *result, const npg_child_job *job)
 {
     char path[4096];
-    child c = {.job = job, .in = -1, .out = -1, .words = -1, .result = result};
+    child c = {.job = job, .in = -1, .out = -1, .err = -1, .result = result};
     memset(result, 0, sizeof *result);
     NPG_TRY(find_program(path, job->program));
     npg_status status = start(&c, path);
@@ -233,7 +236,7 @@ npg_status npg_child_run(npg_child_result *result, const npg_child_job *job)
     } else {
         close_end(&c.in);
         close_end(&c.out);
-        close_end(&c.words);
+        close_end(&c.err);
     }
     if (status) npg_release(&result->output);
     return status;

@@ -21,12 +21,12 @@ typedef struct npg_child_job {
 typedef struct npg_child_result {
     uint8_t *output; /* owned by the caller: npg_release */
     size_t output_size;
-    char words[400]; /* the last line on standard error, "" if none */
+    char last_line[400]; /* the last one on standard error, "" if none */
 } npg_child_result;
 
 /* Run to the end.  NPG_OK: exit code 0.  NPG_MEMORY: exit code 6.  NPG_STOPPED: should_stop said so.
  * NPG_FAILED says: not found, exit code, signal, or time limit (the child is then killed), with the child's
- * last words.  No process, descriptor or signal is left behind; the caller's SIGPIPE setting does not matter.
+ * last line.  No process, descriptor or signal is left behind; the caller's SIGPIPE setting does not matter.
  * Threads: any number at a time. */
 npg_status npg_child_run(npg_child_result *result, const npg_child_job *job);
 

@@ -30,7 +30,8 @@ static npg_status ask(void)
     bool is_whole = !status && answer.output_size == strlen(NPG_PROBE_ANSWER) &&
                     !memcmp(answer.output, NPG_PROBE_ANSWER, answer.output_size);
     if (!status) npg_release(&answer.output);
-    if (!status && !is_whole) status = npg_error(NPG_FAILED, "neupig-devices ended early: %s", answer.words);
+    if (!status && !is_whole)
+        status = npg_error(NPG_FAILED, "neupig-devices ended early: %s", answer.last_line);
     if (status != NPG_FAILED) return status;
     char cause[1024];
     snprintf(cause, sizeof cause, "%s", npg_error_text());

@@ -13,7 +13,7 @@
 
 /* Ask them first in a process of its own (devices_main.c): a driver that can't work on a machine may end
  * the process that asks, as PoCL does in a root without /sys, and a library must not end its host.  Once
- * per process when all is well, about 30 ms.  NPG_DEVICE with the driver's last words and what is missing;
+ * per process when all is well, about 30 ms.  NPG_DEVICE with the driver's last line and what is missing;
  * errors that a driver returns are left to the caller's own call.  Threads: any. */
 npg_status npg_probe_drivers(void);
 
