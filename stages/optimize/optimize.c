@@ -32,6 +32,7 @@ typedef struct state {
 #define WINDOW(member) offsetof(state, window_settings.member)
 #define FIT(member)    WINDOW(fit.member)
 #define MATCH(member)  WINDOW(match.member)
+#define JOINT(member)  WINDOW(joint.member)
 
 /* clang-format off */
 static const npg_option options[] = {
@@ -110,6 +111,18 @@ static const npg_option options[] = {
         "weight of all points of an aligned frame"),
     NPG_ROW_REAL  ("match-tie",        MATCH(tie),            "1",          0,     1e6,  NULL,
         "weight of staying where the window before has put a frame, against its points"),
+    NPG_ROW_FLAG  ("joint",            WINDOW(is_joint),      "yes",
+        "fit the aligned frames of a window together before the decoder; not with 0 epochs"),
+    NPG_ROW_INT   ("joint-points",     JOINT(points),         "5000",       10,    1e7,  "N",
+        "most points of a frame that pull in the joint fit"),
+    NPG_ROW_INT   ("joint-rounds",     JOINT(rounds),         "1",          0,     100,  "N",
+        "times that the joint fit matches the points; 0: frames are smoothed in time alone"),
+    NPG_ROW_INT   ("joint-steps",      JOINT(steps),          "60",         1,     1e4,  "N",
+        "most steps of each round's solution"),
+    NPG_ROW_REAL  ("joint-shape",      JOINT(shape),          "0.2",        0,     1e6,  NULL,
+        "weight of an edge's change in the joint fit, against a point's distance"),
+    NPG_ROW_REAL  ("joint-along",      JOINT(along),          "0",          0,     1,    NULL,
+        "share of distances along the surface, 0 to 1"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
         "frames whose hidden layer is kept at a time"),
     {0}};
@@ -248,6 +261,15 @@ static void note_result(npg_worker *worker)
                    result->chamfer, result->isometry);
 }
 
+static void note_joint(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_joint_result r = npg_window_joint_result(s->solver);
+    npg_worker_log(worker, NPG_LOG_DEBUG, -1,
+                   "window %lld: joint fit: noise %.5f, lambda %.3g, moved %.5f in %lld steps",
+                   (long long)s->window_at, r.noise, r.lambda, r.moved, (long long)r.steps);
+}
+
 static npg_status solve_window(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -258,6 +280,7 @@ static npg_status solve_window(npg_worker *worker)
     npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
     npg_release(&frames);
     if (!status) note_result(worker);
+    if (!status) note_joint(worker);
     return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
                             (long long)s->window.first, (long long)s->window.last);
 }

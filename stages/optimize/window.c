@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "optimize/joint_window.h"
 #include "pipeline/parallel.h"
 
 #define MATCHERS_MAX 8
@@ -14,6 +15,8 @@ struct npg_window_solver {
     bool is_aligned;
     npg_fit *fit;
     npg_carry *carry;
+    npg_joint_window *joint; /* NULL without */
+    npg_joint_result joint_result;
     npg_matcher *matchers[MATCHERS_MAX]; /* each for a frame at a time */
     size_t matcher_count;
     float *surfaces;   /* per matcher W x 3 */
@@ -34,6 +37,11 @@ struct npg_window_solver {
 size_t npg_window_sample_count(const npg_window_solver *solver)
 {
     return solver->carry ? solver->carry->samples->mesh->vert_count : solver->facts->reference->vert_count;
+}
+
+npg_joint_result npg_window_joint_result(const npg_window_solver *solver)
+{
+    return solver->joint_result;
 }
 
 npg_fit *npg_window_fit(npg_window_solver *solver)
@@ -60,6 +68,7 @@ void npg_window_solver_close(npg_window_solver **slot)
     npg_fit_close(&(*slot)->fit);
     for (size_t m = 0; m < MATCHERS_MAX; m++) npg_matcher_close(&(*slot)->matchers[m]);
     npg_release(&(*slot)->surfaces);
+    npg_joint_window_close(&(*slot)->joint);
     npg_carry_close(&(*slot)->carry);
     npg_release(slot);
 }
@@ -128,6 +137,12 @@ static npg_status open_matchers(npg_window_solver *s)
     return NPG_OK;
 }
 
+/* --epochs 0 leaves the aligned poses as they are. */
+static bool is_joint(const npg_window_settings *settings)
+{
+    return settings->is_joint && settings->fit.epochs > 0;
+}
+
 npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
                                   const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
                                   bool is_aligned)
@@ -146,6 +161,8 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     if (is_aligned)
         status = npg_carry_open(&s->carry, facts->reference, (size_t)settings->samples, NPG_THIN_SURFACE);
     if (is_aligned && !status) status = open_matchers(s);
+    if (is_aligned && !status && is_joint(settings))
+        status = npg_joint_window_open(&s->joint, s->carry->surface, facts->reference, &settings->joint);
     s->figure = (npg_figure){.scale = 1};
     if (!status)
         status = is_aligned ? open_aligned_fit(s, device, seed)
@@ -174,7 +191,8 @@ size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, s
     size_t pulls = frames * (looked_at + 2 * samples) * sizeof(npg_pull);
     return npg_fit_memory(&settings->fit, samples, frames, looked_at, UNITS) + solved + clouds + 2 * pulls +
            4 * frames * samples * vector + vert_count * (sizeof(npg_carrier) + vector) +
-           (1 + matcher_count()) * surface * SURFACE_BYTES;
+           (1 + matcher_count()) * surface * SURFACE_BYTES +
+           (is_joint(settings) ? npg_joint_window_memory(&settings->joint, vert_count, frames) : 0);
 }
 
 /* ---- the window's frames ---- */
@@ -191,6 +209,20 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
     return NPG_OK;
 }
 
+/* The aligned positions of the window's frames become those of the joint fit. */
+static npg_status fit_jointly(npg_window_solver *s, npg_held *const *held)
+{
+    npg_joint_part *parts;
+    if (!s->joint) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&parts, NPG_FOR_FIT, s->count, sizeof *parts));
+    for (size_t i = 0; i < s->count; i++)
+        parts[i] =
+            (npg_joint_part){&held[i]->frame, s->points + 3 * s->point_start[i], held[i]->solved != NULL};
+    npg_status status = npg_joint_window_move(s->joint, &s->joint_result, parts, s->count);
+    npg_release(&parts);
+    return status;
+}
+
 double npg_window_time(const npg_plan *plan, double index)
 {
     npg_window first = npg_plan_key_window(plan);
@@ -204,6 +236,7 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
     close_frames(s);
     s->count = count;
     NPG_TRY(take_points(s, held));
+    NPG_TRY(fit_jointly(s, held));
     NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FIT, count, sizeof *s->frames));
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, count, size * sizeof(float)));
     NPG_TRY(npg_alloc_array(&s->dense, NPG_FOR_FIT, verts, 3 * sizeof(float)));

@@ -8,6 +8,7 @@
 #define NPG_WINDOW_H
 
 #include "optimize/fit.h"
+#include "optimize/joint.h"
 #include "optimize/match.h"
 #include "pipeline/stage.h"
 
@@ -17,6 +18,9 @@ typedef struct npg_window_settings {
     int64_t samples;     /* 0: all vertices                                             */
     int64_t rounds;      /* times the matches are made                                  */
     double aligned_rate; /* share of the fit's learning rates where frames come aligned */
+    npg_joint_settings joint;
+    bool
+        is_joint; /* whether aligned frames are fitted jointly before the decoder (joint.h); not with 0 epochs */
 } npg_window_settings;
 
 /* A frame in hand. */
@@ -55,6 +59,9 @@ void npg_window_solver_close(npg_window_solver **solver);
 /* Bytes that a solver takes at most, with windows of `frames` frames of at most `points` points. */
 size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, size_t vert_count,
                          size_t frames, size_t points);
+
+/* What the last window's joint fit did; all 0 without one. */
+npg_joint_result npg_window_joint_result(const npg_window_solver *solver);
 npg_fit *npg_window_fit(npg_window_solver *solver); /* a loan */
 size_t npg_window_sample_count(const npg_window_solver *solver);
 

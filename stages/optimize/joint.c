@@ -1,0 +1,345 @@
+/* Joint: rounds of matching and solving, and how much the shape may give. */
+#include "optimize/joint.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "optimize/joint_match.h"
+#include "optimize/joint_system.h"
+#include "pipeline/parallel.h"
+
+#define THREADS_MAX 8
+#define WIDTH       3    /* of the robust weight, in standard deviations of the frame */
+#define TOLERANCE   1e-2 /* of a solution                                             */
+#define EVEN        0.05 /* lambda at which a frame's own pose counts half along the surface */
+
+struct npg_joint {
+    npg_joint_settings settings;
+    npg_mesh *mesh; /* counted reference */
+    uint32_t (*edges)[2];
+    size_t edge_count;
+    double edge_mean;
+    npg_joint_ring ring;
+    size_t threads;
+    npg_joint_matcher matchers[THREADS_MAX];
+    /* of the window at work, owned */
+    float *positions; /* T x W x 3: where the frames' surfaces are */
+    float *kept;      /* the same, before the points pulled        */
+    float *shares, *lambda, *bend, *ties;
+    const npg_joint_frame *given; /* loan */
+    bool *is_fixed;
+    double *spreads, *scores; /* T */
+    npg_joint_frame *frames;  /* T, on `positions` */
+    npg_joint_pull *pulls;
+    size_t *pull_counts;
+    npg_joint_system system;
+    double noise;
+};
+
+static void close_window(npg_joint *j)
+{
+    void *all[] = {&j->positions, &j->kept,    &j->shares, &j->lambda, &j->bend,  &j->ties,
+                   &j->is_fixed,  &j->spreads, &j->scores, &j->frames, &j->pulls, &j->pull_counts};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_joint_system_close(&j->system);
+}
+
+void npg_joint_close(npg_joint **slot)
+{
+    if (!slot || !*slot) return;
+    npg_joint *j = *slot;
+    close_window(j);
+    for (size_t i = 0; i < THREADS_MAX; i++) {
+        npg_joint_matcher_close(&j->matchers[i]);
+    }
+    npg_joint_ring_close(&j->ring);
+    npg_release(&j->edges);
+    npg_mesh_unref(&j->mesh);
+    npg_release(slot);
+}
+
+static double edge_mean(const npg_joint *j)
+{
+    double sum = 0;
+    for (size_t e = 0; e < j->edge_count; e++) {
+        double sq = 0;
+        for (size_t a = 0; a < 3; a++) {
+            double off = (double)j->mesh->vert_pos[3 * (size_t)j->edges[e][0] + a] -
+                         (double)j->mesh->vert_pos[3 * (size_t)j->edges[e][1] + a];
+            sq += off * off;
+        }
+        sum += sqrt(sq);
+    }
+    return j->edge_count ? sum / (double)j->edge_count : 1;
+}
+
+static npg_status open_parts(npg_joint *j)
+{
+    const npg_mesh *mesh = j->mesh;
+    NPG_TRY(npg_mesh_edges(&j->edges, &j->edge_count, mesh->faces, mesh->face_count));
+    j->edge_mean = edge_mean(j);
+    NPG_TRY(npg_joint_ring_open(&j->ring, (const uint32_t(*)[2])j->edges, j->edge_count, mesh->vert_count));
+    j->threads = npg_parallel_parts(THREADS_MAX, 1, THREADS_MAX);
+    for (size_t i = 0; i < j->threads; i++) {
+        NPG_TRY(npg_joint_matcher_open(&j->matchers[i], mesh, (size_t)j->settings.points));
+    }
+    return NPG_OK;
+}
+
+npg_status npg_joint_open(npg_joint **out, npg_mesh *surface, const npg_joint_settings *settings)
+{
+    npg_joint *j;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&j, NPG_FOR_FIT, sizeof *j));
+    j->settings = *settings;
+    j->mesh = npg_mesh_ref(surface);
+    npg_status status = open_parts(j);
+    if (status) npg_joint_close(&j);
+    *out = j;
+    return status;
+}
+
+/* ---- a window ---- */
+
+static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_t count)
+{
+    size_t w = j->mesh->vert_count, most = (size_t)j->settings.points;
+    close_window(j);
+    NPG_TRY(npg_alloc_array(&j->positions, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&j->kept, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&j->shares, NPG_FOR_FIT, count, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&j->lambda, NPG_FOR_FIT, w, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&j->bend, NPG_FOR_FIT, w, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&j->ties, NPG_FOR_FIT, w, sizeof(float)));
+    NPG_TRY(npg_alloc_array(&j->is_fixed, NPG_FOR_FIT, count, sizeof(bool)));
+    NPG_TRY(npg_alloc_array(&j->spreads, NPG_FOR_FIT, count, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&j->scores, NPG_FOR_FIT, count, sizeof(double)));
+    NPG_TRY(npg_alloc_array(&j->frames, NPG_FOR_FIT, count, sizeof *j->frames));
+    NPG_TRY(npg_alloc_array(&j->pulls, NPG_FOR_FIT, count * most, sizeof *j->pulls));
+    NPG_TRY(npg_alloc_array(&j->pull_counts, NPG_FOR_FIT, count, sizeof *j->pull_counts));
+    for (size_t t = 0; t < count; t++) {
+        j->frames[t] = frames[t];
+        j->frames[t].positions = j->positions + t * w * 3;
+        memcpy(j->frames[t].positions, frames[t].positions, w * 3 * sizeof(float));
+        j->is_fixed[t] = frames[t].is_fixed;
+    }
+    return npg_joint_system_open(&j->system, count, w);
+}
+
+/* What threads do: frame after frame. */
+typedef struct round {
+    npg_joint *j;
+    size_t count;
+} round_of;
+
+static npg_status measure_frames(void *user, size_t part)
+{
+    round_of *r = user;
+    for (size_t t = part; t < r->count; t += r->j->threads)
+        NPG_TRY(npg_joint_measure(&r->j->matchers[part], &r->j->spreads[t], &r->j->frames[t]));
+    return NPG_OK;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Median over the frames that have points; 0 where none has.  Uses scores as scratch. */
+static double median_spread(npg_joint *j, size_t count)
+{
+    size_t seen = 0;
+    for (size_t t = 0; t < count; t++)
+        if (j->frames[t].point_count) j->scores[seen++] = j->spreads[t];
+    if (!seen) return 0;
+    qsort(j->scores, seen, sizeof *j->scores, by_value);
+    return j->scores[seen / 2];
+}
+
+/* What each frame's pose is worth: little where its surface is much farther from its points than usual. */
+static npg_status weigh_frames(npg_joint *j, size_t count)
+{
+    round_of r = {j, count};
+    NPG_TRY(npg_parallel(measure_frames, &r, j->threads));
+    double usual = median_spread(j, count);
+    for (size_t t = 0; t < count; t++) {
+        double over = usual > 0 ? j->spreads[t] / usual : 1, off = fmax(0, over - 1);
+        j->shares[t] = j->frames[t].point_count ? (float)(1 / (1 + off * off)) : 0;
+    }
+    return NPG_OK;
+}
+
+static npg_status smooth(npg_joint *j, size_t count)
+{
+    const npg_time_frames f = {count, j->mesh->vert_count, j->positions, j->shares, j->is_fixed};
+    NPG_TRY(weigh_frames(j, count));
+    NPG_TRY(npg_time_smooth_choose(j->lambda, &f, (const uint32_t(*)[2])j->edges, j->edge_count));
+    NPG_TRY(npg_time_smooth_apply(&f, j->lambda));
+    round_of r = {j, count};
+    NPG_TRY(npg_parallel(measure_frames, &r, j->threads));
+    j->noise = fmax(median_spread(j, count), 1e-3 * j->edge_mean);
+    return NPG_OK;
+}
+
+/* ---- a round ---- */
+
+static void pull_to_pose(npg_joint *j, float *right, size_t t)
+{
+    const npg_mesh *mesh = j->mesh;
+    float *normals = j->system.normals + t * mesh->vert_count * 3;
+    const float *now = j->frames[t].positions, *pose = j->given[t].positions;
+    npg_mesh_vertex_normals(normals, now, mesh->vert_count, mesh->faces, mesh->face_count);
+    for (size_t i = 0; i < 3 * mesh->vert_count; i += 3) {
+        float off[3] = {pose[i] - now[i], pose[i + 1] - now[i + 1], pose[i + 2] - now[i + 2]};
+        float tie = j->shares[t] * j->ties[i / 3];
+        float across = off[0] * normals[i] + off[1] * normals[i + 1] + off[2] * normals[i + 2];
+        for (size_t a = 0; a < 3; a++) right[i + a] += tie * (off[a] - across * normals[i + a]);
+    }
+}
+
+/* The right side: -gradient / 2 of the energy where the surface is now. */
+static void fill_right(npg_joint *j, size_t t)
+{
+    npg_joint_system *s = &j->system;
+    size_t w = s->vert_count;
+    float *right = s->right + t * w * 3, along = (float)s->along;
+    memset(right, 0, w * 3 * sizeof *right);
+    if (j->is_fixed[t]) return;
+    npg_joint_keep_shape(right, s, j->kept + t * w * 3, j->frames[t].positions);
+    npg_joint_bend(right, s, j->positions, t, -1);
+    pull_to_pose(j, right, t);
+    for (size_t i = 0; i < s->pull_counts[t]; i++) {
+        const npg_joint_pull *p = &s->pulls[t * s->most + i];
+        float across = 0;
+        for (int a = 0; a < 3; a++) across += p->normal[a] * p->offset[a];
+        for (size_t c = 0; c < 3; c++)
+            for (size_t a = 0; a < 3; a++)
+                right[3 * (size_t)p->corner[c] + a] +=
+                    p->weight[c] * p->strength * ((1 - along) * across * p->normal[a] + along * p->offset[a]);
+    }
+}
+
+static npg_status match_frames(void *user, size_t part)
+{
+    round_of *r = user;
+    npg_joint *j = r->j;
+    for (size_t t = part; t < r->count; t += j->threads) {
+        npg_joint_pull *pulls = j->pulls + t * j->system.most;
+        double width = WIDTH * fmax(j->spreads[t], j->noise);
+        NPG_TRY(npg_joint_match(&j->matchers[part], pulls, &j->pull_counts[t], &j->frames[t], width));
+    }
+    return NPG_OK;
+}
+
+static npg_status fill_frames(void *user, size_t part)
+{
+    round_of *r = user;
+    for (size_t t = part; t < r->count; t += r->j->threads) fill_right(r->j, t);
+    return NPG_OK;
+}
+
+/* lambda in units of the points that pull at a vertex. */
+static void set_bend(npg_joint *j, size_t count)
+{
+    double strength = 0, frames = 0;
+    for (size_t t = 0; t < count; t++) {
+        for (size_t i = 0; i < j->pull_counts[t]; i++)
+            strength += (double)j->pulls[t * j->system.most + i].strength;
+        frames += j->pull_counts[t] > 0;
+    }
+    double each = frames > 0 ? strength / (frames * (double)j->mesh->vert_count) : 1;
+    for (size_t v = 0; v < j->mesh->vert_count; v++) j->bend[v] = (float)(each * (double)j->lambda[v]);
+    for (size_t v = 0; v < j->mesh->vert_count; v++)
+        j->ties[v] = (float)(each / (1 + (double)j->lambda[v] / EVEN));
+}
+
+static npg_status do_round(npg_joint *j, size_t count, int64_t *steps)
+{
+    npg_joint_system *s = &j->system;
+    round_of r = {j, count};
+    int64_t taken;
+    s->ring = j->ring;
+    s->lambda = j->bend;
+    s->is_fixed = j->is_fixed;
+    s->ties = j->ties;
+    s->shares = j->shares;
+    s->pulls = j->pulls;
+    s->pull_counts = j->pull_counts;
+    s->most = (size_t)j->settings.points;
+    s->along = j->settings.along;
+    s->shape = j->settings.shape;
+    NPG_TRY(npg_parallel(match_frames, &r, j->threads));
+    set_bend(j, count);
+    NPG_TRY(npg_parallel(fill_frames, &r, j->threads));
+    NPG_TRY(npg_joint_system_solve(s, TOLERANCE, j->settings.steps, &taken));
+    *steps += taken;
+    for (size_t i = 0; i < 3 * count * s->vert_count; i++) {
+        if (!isfinite(s->step[i])) return npg_error(NPG_DIVERGED, "the joint fit is not finite");
+        j->positions[i] += s->step[i];
+    }
+    return NPG_OK;
+}
+
+/* ---- all of it ---- */
+
+static int by_float(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static void note(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames, size_t count)
+{
+    size_t w = j->mesh->vert_count;
+    double sum = 0;
+    for (size_t t = 0; t < count; t++)
+        for (size_t v = 0; v < w; v++) {
+            double sq = 0;
+            for (size_t i = 3 * v; i < 3 * v + 3; i++) {
+                double off = (double)j->frames[t].positions[i] - (double)frames[t].positions[i];
+                sq += off * off;
+            }
+            sum += sqrt(sq);
+        }
+    result->moved = sum / (double)(count * w);
+    result->noise = j->noise;
+    memcpy(j->bend, j->lambda, w * sizeof *j->bend);
+    qsort(j->bend, w, sizeof *j->bend, by_float);
+    result->lambda = (double)j->bend[w / 2];
+}
+
+static npg_status solve(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames, size_t count)
+{
+    size_t bytes = count * j->mesh->vert_count * 3 * sizeof(float);
+    j->given = frames;
+    NPG_TRY(smooth(j, count));
+    memcpy(j->kept, j->positions, bytes);
+    for (int64_t i = 0; i < j->settings.rounds; i++) NPG_TRY(do_round(j, count, &result->steps));
+    return NPG_OK;
+}
+
+npg_status npg_joint_solve(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames,
+                           size_t count)
+{
+    *result = (npg_joint_result){0};
+    NPG_REQUIRE(j && frames && count);
+    npg_status status = open_window(j, frames, count);
+    if (!status) status = solve(j, result, frames, count);
+    if (!status) note(j, result, frames, count);
+    for (size_t t = 0; t < count && !status; t++)
+        if (!frames[t].is_fixed)
+            memcpy(frames[t].positions, j->frames[t].positions, j->mesh->vert_count * 3 * sizeof(float));
+    close_window(j);
+    return status;
+}
+
+size_t npg_joint_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames)
+{
+    const size_t vector = 3 * sizeof(float);
+    size_t errors = 16 * vert_count * sizeof(double);
+    return npg_joint_system_memory(frames, vert_count) + 2 * frames * vert_count * vector + errors +
+           frames * (size_t)settings->points * sizeof(npg_joint_pull) + vert_count * 22 * sizeof(float) * 8;
+}

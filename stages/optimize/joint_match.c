@@ -1,0 +1,100 @@
+/* Joint match: closest points of the surface, weighed. */
+#include "optimize/joint_match.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "geometry/query.h"
+
+#define OPPOSITE -0.2f  /* cosine below which a point's normal speaks against the surface's        */
+#define NORMAL   1.4826 /* standard deviation of a normal distribution, in median absolute values   */
+
+npg_status npg_joint_matcher_open(npg_joint_matcher *m, const npg_mesh *mesh, size_t most)
+{
+    const size_t vector = 3 * sizeof(float);
+    m->mesh = mesh;
+    m->most = most;
+    NPG_TRY(npg_surface_open(&m->surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_alloc_array(&m->targets, NPG_FOR_FIT, most, vector));
+    NPG_TRY(npg_alloc_array(&m->target_normals, NPG_FOR_FIT, most, vector));
+    NPG_TRY(npg_alloc_array(&m->vert_normals, NPG_FOR_FIT, mesh->vert_count, vector));
+    NPG_TRY(npg_alloc_array(&m->dists, NPG_FOR_FIT, most, sizeof *m->dists));
+    return npg_alloc_array(&m->hits, NPG_FOR_FIT, most, sizeof *m->hits);
+}
+
+void npg_joint_matcher_close(npg_joint_matcher *m)
+{
+    npg_surface_close(&m->surface);
+    void *all[] = {&m->targets, &m->target_normals, &m->vert_normals, &m->dists, &m->hits};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+}
+
+/* The frame's points, thinned, and where the surface is closest to them. */
+static npg_status look(npg_joint_matcher *m, size_t *count, const npg_joint_frame *frame)
+{
+    *count = 0;
+    if (!frame->point_count) return NPG_OK;
+    *count = npg_points_spread(m->targets, m->target_normals, m->most, frame->points, frame->normals,
+                               frame->point_count);
+    NPG_TRY(npg_surface_move(m->surface, frame->positions));
+    return npg_surface_closest_near(m->surface, m->hits, m->targets, *count, NULL, NULL, 1);
+}
+
+static int by_value(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+npg_status npg_joint_measure(npg_joint_matcher *m, double *spread, const npg_joint_frame *frame)
+{
+    size_t count;
+    *spread = 0;
+    NPG_TRY(look(m, &count, frame));
+    if (!count) return NPG_OK;
+    for (size_t i = 0; i < count; i++) m->dists[i] = sqrtf(m->hits[i].dist_sq);
+    qsort(m->dists, count, sizeof *m->dists, by_value);
+    *spread = NORMAL * (double)m->dists[count / 2];
+    return NPG_OK;
+}
+
+static void set_pull(npg_joint_pull *p, const npg_joint_matcher *m, size_t i, const float *positions,
+                     double width)
+{
+    const npg_surface_hit *hit = &m->hits[i];
+    double robust = 1 / (1 + (double)hit->dist_sq / (width * width));
+    *p = (npg_joint_pull){.strength = (float)(robust * robust)};
+    memcpy(p->weight, hit->weights, sizeof p->weight);
+    memcpy(p->offset, m->targets + 3 * i, sizeof p->offset);
+    float length = 0;
+    for (size_t c = 0; c < 3; c++) {
+        size_t v = p->corner[c] = m->mesh->faces[3 * (size_t)hit->face + c];
+        for (size_t a = 0; a < 3; a++) {
+            p->normal[a] += hit->weights[c] * m->vert_normals[3 * v + a];
+            p->offset[a] -= hit->weights[c] * positions[3 * v + a];
+        }
+    }
+    for (int a = 0; a < 3; a++) length += p->normal[a] * p->normal[a];
+    for (int a = 0; a < 3; a++) p->normal[a] /= fmaxf(sqrtf(length), 1e-9f);
+}
+
+npg_status npg_joint_match(npg_joint_matcher *m, npg_joint_pull *pulls, size_t *count,
+                           const npg_joint_frame *frame, double width)
+{
+    size_t seen;
+    *count = 0;
+    NPG_TRY(look(m, &seen, frame));
+    npg_mesh_vertex_normals(m->vert_normals, frame->positions, m->mesh->vert_count, m->mesh->faces,
+                            m->mesh->face_count);
+    for (size_t i = 0; i < seen; i++) {
+        npg_joint_pull *p = &pulls[*count];
+        float facing = 0;
+        set_pull(p, m, i, frame->positions, width);
+        for (size_t a = 0; a < 3 && frame->normals; a++)
+            facing += p->normal[a] * m->target_normals[3 * i + a];
+        *count += facing >= OPPOSITE;
+    }
+    return NPG_OK;
+}

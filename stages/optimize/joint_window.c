@@ -1,0 +1,101 @@
+/* Joint window: the thinned surface there, the whole one back. */
+#include "optimize/joint_window.h"
+
+#include <string.h>
+
+#include "geometry/query.h"
+
+struct npg_joint_window {
+    const npg_thin *surface; /* loan, W vertices */
+    size_t vert_count;       /* V */
+    npg_joint *joint;
+    npg_carrier *carriers; /* V: corners of the surface's faces */
+    float *before, *now;   /* T x W x 3 */
+};
+
+void npg_joint_window_close(npg_joint_window **slot)
+{
+    if (!slot || !*slot) return;
+    npg_joint_close(&(*slot)->joint);
+    void *all[] = {&(*slot)->carriers, &(*slot)->before, &(*slot)->now};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_release(slot);
+}
+
+/* Where the whole reference's vertices are on the thinned surface. */
+static npg_status find_carriers(npg_joint_window *window, const npg_mesh *reference)
+{
+    const npg_mesh *mesh = window->surface->mesh;
+    npg_surface *rest = NULL;
+    npg_surface_hit *hits;
+    NPG_TRY(npg_alloc_array(&window->carriers, NPG_FOR_FIT, window->vert_count, sizeof *window->carriers));
+    NPG_TRY(npg_alloc_array(&hits, NPG_FOR_FIT, window->vert_count, sizeof *hits));
+    npg_status status =
+        npg_surface_open(&rest, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
+    if (!status)
+        status = npg_surface_closest_near(rest, hits, reference->vert_pos, window->vert_count, NULL, NULL, 0);
+    for (size_t v = 0; v < window->vert_count && !status; v++)
+        for (size_t c = 0; c < 3; c++) {
+            window->carriers[v].sample[c] = (int32_t)mesh->faces[3 * (size_t)hits[v].face + c];
+            window->carriers[v].share[c] = hits[v].weights[c];
+        }
+    npg_surface_close(&rest);
+    npg_release(&hits);
+    return status;
+}
+
+npg_status npg_joint_window_open(npg_joint_window **out, const npg_thin *surface, const npg_mesh *reference,
+                                 const npg_joint_settings *settings)
+{
+    npg_joint_window *window;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&window, NPG_FOR_FIT, sizeof *window));
+    window->surface = surface;
+    window->vert_count = reference->vert_count;
+    npg_status status = npg_joint_open(&window->joint, surface->mesh, settings);
+    if (!status) status = find_carriers(window, reference);
+    if (status) npg_joint_window_close(&window);
+    *out = window;
+    return status;
+}
+
+static npg_status solve(npg_joint_window *window, npg_joint_result *result, const npg_joint_part *parts,
+                        size_t count)
+{
+    size_t size = 3 * window->surface->mesh->vert_count;
+    npg_joint_frame *frames;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
+    for (size_t t = 0; t < count; t++) {
+        const npg_frame *frame = parts[t].frame;
+        npg_thin_gather(window->surface, window->before + t * size, frame->vert_unit);
+        memcpy(window->now + t * size, window->before + t * size, size * sizeof(float));
+        frames[t] = (npg_joint_frame){window->now + t * size, parts[t].points, frame->normals,
+                                      frame->point_count, parts[t].is_solved};
+    }
+    npg_status status = npg_joint_solve(window->joint, result, frames, count);
+    for (size_t t = 0; t < count && !status; t++)
+        if (!parts[t].is_solved)
+            npg_carriers_move(window->carriers, window->vert_count, parts[t].frame->vert_unit,
+                              window->before + t * size, window->now + t * size);
+    npg_release(&frames);
+    return status;
+}
+
+npg_status npg_joint_window_move(npg_joint_window *window, npg_joint_result *result,
+                                 const npg_joint_part *parts, size_t count)
+{
+    size_t w = window->surface->mesh->vert_count;
+    npg_status status = npg_alloc_array(&window->before, NPG_FOR_FIT, count * w, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&window->now, NPG_FOR_FIT, count * w, 3 * sizeof(float));
+    if (!status) status = solve(window, result, parts, count);
+    npg_release(&window->before);
+    npg_release(&window->now);
+    return status;
+}
+
+size_t npg_joint_window_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames)
+{
+    size_t surface = vert_count < 2 * NPG_THIN_SURFACE ? vert_count : NPG_THIN_SURFACE;
+    return npg_joint_memory(settings, surface, frames) + 2 * frames * surface * 3 * sizeof(float) +
+           vert_count * sizeof(npg_carrier);
+}

@@ -1,0 +1,227 @@
+/* Time smooth: banded solutions, leave-one-out errors, and the choice of lambda. */
+#include "optimize/time_smooth.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "pipeline/parallel.h"
+
+#define LADDER       15   /* lambdas that are tried */
+#define LADDER_FIRST -3.0 /* decimal logarithms     */
+#define LADDER_STEP  0.5
+#define POOL_ROUNDS  30 /* steps of averaging over neighbours: about five edges wide */
+
+/* ---- five diagonals ---- */
+
+void npg_band_add_bend(npg_band *b, double lambda)
+{
+    for (size_t t = 1; t + 1 < b->count; t++) {
+        b->main[t - 1] += lambda;
+        b->main[t] += 4 * lambda;
+        b->main[t + 1] += lambda;
+        b->near[t - 1] -= 2 * lambda;
+        b->near[t] -= 2 * lambda;
+        b->far[t - 1] += lambda;
+    }
+}
+
+void npg_band_factor(npg_band *b)
+{
+    size_t n = b->count;
+    for (size_t i = 0; i < n; i++) {
+        double pivot = b->main[i], near = i + 1 < n ? b->near[i] : 0, far = i + 2 < n ? b->far[i] : 0;
+        if (i + 1 < n) {
+            b->main[i + 1] -= near * near / pivot;
+            b->near[i] = near / pivot;
+        }
+        if (i + 2 < n) {
+            b->near[i + 1] -= near * far / pivot;
+            b->main[i + 2] -= far * far / pivot;
+            b->far[i] = far / pivot;
+        }
+    }
+}
+
+void npg_band_solve(const npg_band *b, double *x, size_t stride)
+{
+    size_t n = b->count;
+    for (size_t i = 0; i < n; i++) {
+        if (i + 1 < n) x[(i + 1) * stride] -= b->near[i] * x[i * stride];
+        if (i + 2 < n) x[(i + 2) * stride] -= b->far[i] * x[i * stride];
+    }
+    for (size_t i = n; i-- > 0;) {
+        x[i * stride] /= b->main[i];
+        if (i + 1 < n) x[i * stride] -= b->near[i] * x[(i + 1) * stride];
+        if (i + 2 < n) x[i * stride] -= b->far[i] * x[(i + 2) * stride];
+    }
+}
+
+/* ---- one lambda ---- */
+
+typedef struct smoother {
+    npg_band band;
+    double *memory; /* of the band and the two arrays */
+    double *leave;  /* T: 1 / (1 - S_tt), 0 where a frame is not judged */
+    double *line;   /* T x 3 */
+} smoother;
+
+static npg_status open_smoother(smoother *s, size_t frames)
+{
+    NPG_TRY(npg_alloc_array(&s->memory, NPG_FOR_FIT, 7 * frames, sizeof *s->memory));
+    s->band = (npg_band){frames, s->memory, s->memory + frames, s->memory + 2 * frames};
+    s->leave = s->memory + 3 * frames;
+    s->line = s->memory + 4 * frames;
+    return NPG_OK;
+}
+
+/* Fixed frames are as good as known. */
+static double share_of(const npg_time_frames *f, size_t t)
+{
+    return f->is_fixed && f->is_fixed[t] ? 100 : (double)f->shares[t] + 1e-6;
+}
+
+static void set_lambda(smoother *s, const npg_time_frames *f, double lambda)
+{
+    size_t n = f->frame_count;
+    memset(s->memory, 0, 3 * n * sizeof *s->memory);
+    for (size_t t = 0; t < n; t++) s->band.main[t] = share_of(f, t);
+    npg_band_add_bend(&s->band, lambda);
+    npg_band_factor(&s->band);
+}
+
+static void set_leave(smoother *s, const npg_time_frames *f)
+{
+    size_t n = f->frame_count;
+    for (size_t t = 0; t < n; t++) {
+        memset(s->line, 0, n * sizeof *s->line);
+        s->line[t] = share_of(f, t);
+        npg_band_solve(&s->band, s->line, 1);
+        bool is_judged = !(f->is_fixed && f->is_fixed[t]) && f->shares[t] > 0;
+        s->leave[t] = is_judged ? sqrt((double)f->shares[t]) / fmax(1e-6, 1 - s->line[t]) : 0;
+    }
+}
+
+static void smooth_vertex(const smoother *s, const npg_time_frames *f, size_t v)
+{
+    for (size_t t = 0; t < f->frame_count; t++)
+        for (size_t k = 0; k < 3; k++)
+            s->line[3 * t + k] = share_of(f, t) * (double)f->positions[3 * (t * f->vert_count + v) + k];
+    for (size_t k = 0; k < 3; k++) npg_band_solve(&s->band, s->line + k, 3);
+}
+
+static double vertex_error(const smoother *s, const npg_time_frames *f, size_t v)
+{
+    double sum = 0;
+    smooth_vertex(s, f, v);
+    for (size_t t = 0; t < f->frame_count; t++)
+        for (size_t k = 0; k < 3; k++) {
+            double off =
+                ((double)f->positions[3 * (t * f->vert_count + v) + k] - s->line[3 * t + k]) * s->leave[t];
+            sum += off * off;
+        }
+    return sum;
+}
+
+/* ---- neighbourhoods ---- */
+
+/* values (W): each becomes the mean of itself and its neighbours, a few times. */
+static void pool(double *values, double *sums, const float *degree, size_t vert_count,
+                 const uint32_t (*edges)[2], size_t edge_count)
+{
+    for (int round = 0; round < POOL_ROUNDS; round++) {
+        memcpy(sums, values, vert_count * sizeof *sums);
+        for (size_t e = 0; e < edge_count; e++) {
+            sums[edges[e][0]] += values[edges[e][1]];
+            sums[edges[e][1]] += values[edges[e][0]];
+        }
+        for (size_t v = 0; v < vert_count; v++) values[v] = sums[v] / (1 + (double)degree[v]);
+    }
+}
+
+/* ---- choosing ---- */
+
+typedef struct choice {
+    const npg_time_frames *frames;
+    const uint32_t (*edges)[2];
+    size_t edge_count, threads;
+    const float *degree;
+    double *errors; /* LADDER x W */
+} choice;
+
+static double ladder(int step)
+{
+    return pow(10, LADDER_FIRST + LADDER_STEP * step);
+}
+
+static npg_status try_steps(void *user, size_t part)
+{
+    const choice *c = user;
+    size_t w = c->frames->vert_count;
+    smoother s = {0};
+    double *sums = NULL;
+    npg_status status = open_smoother(&s, c->frames->frame_count);
+    if (!status) status = npg_alloc_array(&sums, NPG_FOR_FIT, w, sizeof *sums);
+    for (size_t step = part; step < LADDER && !status; step += c->threads) {
+        double *errors = c->errors + step * w;
+        set_lambda(&s, c->frames, ladder((int)step));
+        set_leave(&s, c->frames);
+        for (size_t v = 0; v < w; v++) errors[v] = vertex_error(&s, c->frames, v);
+        pool(errors, sums, c->degree, w, c->edges, c->edge_count);
+    }
+    npg_release(&s.memory);
+    npg_release(&sums);
+    return status;
+}
+
+/* The best step of each vertex, as logarithm, made smooth over the surface. */
+static void choose(float *lambda, const choice *c)
+{
+    size_t w = c->frames->vert_count;
+    double *log_of = c->errors, *sums = c->errors + w; /* once all of a vertex' errors are seen */
+    for (size_t v = 0; v < w; v++) {
+        int best = 0;
+        for (int step = 1; step < LADDER; step++)
+            if (c->errors[(size_t)step * w + v] < c->errors[(size_t)best * w + v]) best = step;
+        log_of[v] = LADDER_FIRST + LADDER_STEP * best;
+    }
+    pool(log_of, sums, c->degree, w, c->edges, c->edge_count);
+    for (size_t v = 0; v < w; v++) lambda[v] = (float)pow(10, log_of[v]);
+}
+
+npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames, const uint32_t (*edges)[2],
+                                  size_t edge_count)
+{
+    size_t w = frames->vert_count;
+    float *degree = NULL;
+    choice c = {.frames = frames, .edges = edges, .edge_count = edge_count};
+    memset(lambda, 0, w * sizeof *lambda);
+    if (frames->frame_count < NPG_TIME_SMOOTH_LEAST) return NPG_OK;
+    c.threads = npg_parallel_parts(LADDER, 1, 0);
+    npg_status status = npg_alloc_array(&c.errors, NPG_FOR_FIT, LADDER * w, sizeof *c.errors);
+    if (!status) status = npg_alloc_array(&degree, NPG_FOR_FIT, w, sizeof *degree);
+    for (size_t e = 0; e < 2 * edge_count && !status; e++) degree[edges[e / 2][e % 2]]++;
+    c.degree = degree;
+    if (!status) status = npg_parallel(try_steps, &c, c.threads);
+    if (!status) choose(lambda, &c);
+    npg_release(&c.errors);
+    npg_release(&degree);
+    return status;
+}
+
+npg_status npg_time_smooth_apply(const npg_time_frames *f, const float *lambda)
+{
+    smoother s;
+    if (f->frame_count < NPG_TIME_SMOOTH_LEAST) return NPG_OK;
+    NPG_TRY(open_smoother(&s, f->frame_count));
+    for (size_t v = 0; v < f->vert_count; v++) {
+        set_lambda(&s, f, (double)lambda[v]);
+        smooth_vertex(&s, f, v);
+        for (size_t t = 0; t < f->frame_count; t++) {
+            if (f->is_fixed && f->is_fixed[t]) continue;
+            for (size_t k = 0; k < 3; k++)
+                f->positions[3 * (t * f->vert_count + v) + k] = (float)s.line[3 * t + k];
+        }
+    }
+    npg_release(&s.memory);
+    return NPG_OK;
+}

@@ -1,0 +1,53 @@
+/* Time smooth: positions over time, each frame's own error taken out, as far as the motion itself allows.
+ *
+ *     sum_t share_t |x_t - y_t|^2 + lambda sum_t |x_(t-1) - 2 x_t + x_(t+1)|^2
+ *
+ * is least at x = S y (Whittaker's smoother; five diagonals).  How much is too much says the motion: a frame
+ * left out must be predicted by the others.  The error of that prediction is (y_t - x_t) / (1 - S_tt), so no
+ * fit is repeated (leave-one-out cross-validation).  Its sum over the frames and over a neighbourhood on the
+ * surface chooses lambda for each vertex: still parts are smoothed far, fast ones hardly, clean captures
+ * hardly at all.
+ *
+ * Based on: Paul Eilers, A perfect smoother, 2003. */
+#ifndef NPG_TIME_SMOOTH_H
+#define NPG_TIME_SMOOTH_H
+
+#include <stdbool.h>
+
+#include "pipeline/mesh.h"
+
+#define NPG_TIME_SMOOTH_LEAST 5 /* frames; of fewer the motion is not known */
+
+/* Frames of positions: T x W x 3, and what each frame's are worth. */
+typedef struct npg_time_frames {
+    size_t frame_count, vert_count; /* T, W */
+    float *positions;               /* T x W x 3 */
+    const float *shares;            /* T: 0 for a frame that says nothing, 1 for an ordinary one     */
+    const bool *is_fixed;           /* T: neither smoothed nor judged, only looked at                */
+} npg_time_frames;
+
+/* lambda (W) by cross-validation over neighbourhoods of the mesh's edges (E pairs of its W vertices); 0 where
+ * there are fewer than NPG_TIME_SMOOTH_LEAST frames.  NPG_MEMORY. */
+npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames, const uint32_t (*edges)[2],
+                                  size_t edge_count);
+
+/* Replace the positions by smoothed ones. */
+npg_status npg_time_smooth_apply(const npg_time_frames *frames, const float *lambda);
+
+/* ---- five diagonals ---- */
+
+/* A symmetric matrix of five diagonals of n rows: main[i], near[i] = (i, i + 1), far[i] = (i, i + 2).
+ * Factored in place as L D L^T. */
+typedef struct npg_band {
+    size_t count;
+    double *main, *near, *far;
+} npg_band;
+
+/* Add lambda D^T D, D the second differences. */
+void npg_band_add_bend(npg_band *band, double lambda);
+void npg_band_factor(npg_band *band);
+
+/* x (every `stride`-th of n values) = the factored matrix's inverse times x. */
+void npg_band_solve(const npg_band *band, double *x, size_t stride);
+
+#endif
