@@ -1,4 +1,4 @@
-/* Joint: rounds of matching and solving, and how much the shape may give. */
+/* Joint: smoothing, then rounds of matching and solving. */
 #include "optimize/joint.h"
 
 #include <math.h>
@@ -13,14 +13,17 @@
 #define THREADS_MAX 8
 #define WIDTH       3    /* of the robust weight, in standard deviations of the frame */
 #define TOLERANCE   1e-2 /* of a solution                                             */
-#define EVEN        0.05 /* lambda at which a frame's own pose counts half along the surface */
+#define NOISE_LEAST 1e-5 /* units: points without noise still have a width */
+/* A frame's own pose counts as much as TRUST times its points where frames move smoothly without help (lambda
+ * small) and hardly where it takes neighbours in time to see the motion (lambda large): half at EVEN. */
+#define TRUST 3
+#define EVEN  0.02
 
 struct npg_joint {
     npg_joint_settings settings;
     npg_mesh *mesh; /* counted reference */
     uint32_t (*edges)[2];
     size_t edge_count;
-    double edge_mean;
     npg_joint_ring ring;
     size_t threads;
     npg_joint_matcher matchers[THREADS_MAX];
@@ -35,7 +38,7 @@ struct npg_joint {
     npg_joint_pull *pulls;
     size_t *pull_counts;
     npg_joint_system system;
-    double noise;
+    double noise, lambda_median;
 };
 
 static void close_window(npg_joint *j)
@@ -51,40 +54,21 @@ void npg_joint_close(npg_joint **slot)
     if (!slot || !*slot) return;
     npg_joint *j = *slot;
     close_window(j);
-    for (size_t i = 0; i < THREADS_MAX; i++) {
-        npg_joint_matcher_close(&j->matchers[i]);
-    }
+    for (size_t i = 0; i < THREADS_MAX; i++) npg_joint_matcher_close(&j->matchers[i]);
     npg_joint_ring_close(&j->ring);
     npg_release(&j->edges);
     npg_mesh_unref(&j->mesh);
     npg_release(slot);
 }
 
-static double edge_mean(const npg_joint *j)
-{
-    double sum = 0;
-    for (size_t e = 0; e < j->edge_count; e++) {
-        double sq = 0;
-        for (size_t a = 0; a < 3; a++) {
-            double off = (double)j->mesh->vert_pos[3 * (size_t)j->edges[e][0] + a] -
-                         (double)j->mesh->vert_pos[3 * (size_t)j->edges[e][1] + a];
-            sq += off * off;
-        }
-        sum += sqrt(sq);
-    }
-    return j->edge_count ? sum / (double)j->edge_count : 1;
-}
-
 static npg_status open_parts(npg_joint *j)
 {
     const npg_mesh *mesh = j->mesh;
     NPG_TRY(npg_mesh_edges(&j->edges, &j->edge_count, mesh->faces, mesh->face_count));
-    j->edge_mean = edge_mean(j);
     NPG_TRY(npg_joint_ring_open(&j->ring, (const uint32_t(*)[2])j->edges, j->edge_count, mesh->vert_count));
     j->threads = npg_parallel_parts(THREADS_MAX, 1, THREADS_MAX);
-    for (size_t i = 0; i < j->threads; i++) {
+    for (size_t i = 0; i < j->threads; i++)
         NPG_TRY(npg_joint_matcher_open(&j->matchers[i], mesh, (size_t)j->settings.points));
-    }
     return NPG_OK;
 }
 
@@ -172,15 +156,31 @@ static npg_status weigh_frames(npg_joint *j, size_t count)
     return NPG_OK;
 }
 
+static int by_float(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* Uses bend as scratch. */
+static double lambda_median(npg_joint *j)
+{
+    size_t w = j->mesh->vert_count;
+    memcpy(j->bend, j->lambda, w * sizeof *j->bend);
+    qsort(j->bend, w, sizeof *j->bend, by_float);
+    return (double)j->bend[w / 2];
+}
+
 static npg_status smooth(npg_joint *j, size_t count)
 {
     const npg_time_frames f = {count, j->mesh->vert_count, j->positions, j->shares, j->is_fixed};
     NPG_TRY(weigh_frames(j, count));
     NPG_TRY(npg_time_smooth_choose(j->lambda, &f, (const uint32_t(*)[2])j->edges, j->edge_count));
+    j->lambda_median = lambda_median(j);
     NPG_TRY(npg_time_smooth_apply(&f, j->lambda));
     round_of r = {j, count};
     NPG_TRY(npg_parallel(measure_frames, &r, j->threads));
-    j->noise = fmax(median_spread(j, count), 1e-3 * j->edge_mean);
+    j->noise = fmax(median_spread(j, count), NOISE_LEAST);
     return NPG_OK;
 }
 
@@ -188,16 +188,9 @@ static npg_status smooth(npg_joint *j, size_t count)
 
 static void pull_to_pose(npg_joint *j, float *right, size_t t)
 {
-    const npg_mesh *mesh = j->mesh;
-    float *normals = j->system.normals + t * mesh->vert_count * 3;
     const float *now = j->frames[t].positions, *pose = j->given[t].positions;
-    npg_mesh_vertex_normals(normals, now, mesh->vert_count, mesh->faces, mesh->face_count);
-    for (size_t i = 0; i < 3 * mesh->vert_count; i += 3) {
-        float off[3] = {pose[i] - now[i], pose[i + 1] - now[i + 1], pose[i + 2] - now[i + 2]};
-        float tie = j->shares[t] * j->ties[i / 3];
-        float across = off[0] * normals[i] + off[1] * normals[i + 1] + off[2] * normals[i + 2];
-        for (size_t a = 0; a < 3; a++) right[i + a] += tie * (off[a] - across * normals[i + a]);
-    }
+    for (size_t i = 0; i < 3 * j->mesh->vert_count; i++)
+        right[i] += j->shares[t] * j->ties[i / 3] * (pose[i] - now[i]);
 }
 
 /* The right side: -gradient / 2 of the energy where the surface is now. */
@@ -251,9 +244,11 @@ static void set_bend(npg_joint *j, size_t count)
         frames += j->pull_counts[t] > 0;
     }
     double each = frames > 0 ? strength / (frames * (double)j->mesh->vert_count) : 1;
-    for (size_t v = 0; v < j->mesh->vert_count; v++) j->bend[v] = (float)(each * (double)j->lambda[v]);
-    for (size_t v = 0; v < j->mesh->vert_count; v++)
-        j->ties[v] = (float)(each / (1 + (double)j->lambda[v] / EVEN));
+    for (size_t v = 0; v < j->mesh->vert_count; v++) {
+        double even = (double)j->lambda[v] * j->lambda_median / (EVEN * EVEN);
+        j->ties[v] = (float)(TRUST * each / (1 + even));
+        j->bend[v] = (float)((double)j->lambda[v] * (each + (double)j->ties[v]));
+    }
 }
 
 static npg_status do_round(npg_joint *j, size_t count, int64_t *steps)
@@ -285,12 +280,6 @@ static npg_status do_round(npg_joint *j, size_t count, int64_t *steps)
 
 /* ---- all of it ---- */
 
-static int by_float(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static void note(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames, size_t count)
 {
     size_t w = j->mesh->vert_count;
@@ -306,9 +295,7 @@ static void note(npg_joint *j, npg_joint_result *result, const npg_joint_frame *
         }
     result->moved = sum / (double)(count * w);
     result->noise = j->noise;
-    memcpy(j->bend, j->lambda, w * sizeof *j->bend);
-    qsort(j->bend, w, sizeof *j->bend, by_float);
-    result->lambda = (double)j->bend[w / 2];
+    result->lambda = j->lambda_median;
 }
 
 static npg_status solve(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames, size_t count)

@@ -1,18 +1,23 @@
 /* Joint: the surface of a window's frames, moved by the points of all of them at once.
  *
- *     E = sum_t sum_p w_p ((1 - a) (n_p . (x(c_p) - p))^2 + a |x(c_p) - p|^2)          points
- *       + shape sum_t sum_(i,j) |x_i - x_j - (R_i + R_j) / 2 (r_i - r_j)|^2   shape
- *       + points per vertex  sum_v lambda_v sum_t |x_(t-1) - 2 x_t + x_(t+1)|^2           motion
+ *     E = sum_t sum_p w_p ((1 - a) (n_p . (x(c_p) - p))^2 + a |x(c_p) - p|^2)    points
+ *       + c sum_v sum_t lambda_v |x_(t-1) - 2 x_t + x_(t+1)|^2                   motion
+ *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
+ *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
  *
- * c_p: the closest point of the surface to the point p, n_p its normal there; w_p: Geman and McClure's weight,
- * whose width is a few times the frame's median distance; s: the capture's noise, that median, as a standard
- * deviation; r: the reference, l its mean edge; R: each vertex's rotation from it (as rigid as possible);
- * lambda: how even a vertex' motion is, found by cross-validation (time_smooth.h).  So the points count
- * against shape and motion by how good they are.
+ * y: the frames' own aligned poses; s: those, smoothed in time; lambda_v: how even a vertex's motion is, found
+ * by cross-validation (time_smooth.h).  c_p: the closest point of the surface to the point p, n_p its normal
+ * there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
- * One step of Gauss and Newton for each time the points are matched; conjugate gradients over all frames,
- * preconditioned by each vertex' own five diagonals in time.  Based on: Olga Sorkine, Marc Alexa,
- * As-Rigid-As-Possible Surface Modeling, 2007.  Not in the paper. */
+ *     tie_v = trust e / (1 + lambda_v median(lambda) / even^2)          c = e + tie_v
+ *
+ * e: the points per vertex.  Where frames agree with each other already (small lambda), their poses are
+ * believed; where each is off by its own noise, or has few points, the points of all frames decide, and the
+ * motion is even.  share_t: small where the frame's pose is far from its points, 0 without points: its
+ * neighbours in time carry it.
+ *
+ * One step of Gauss and Newton each time the points are matched; conjugate gradients over all frames,
+ * preconditioned by each vertex's own five diagonals in time.  Not in the paper. */
 #ifndef NPG_JOINT_H
 #define NPG_JOINT_H
 
@@ -37,7 +42,7 @@ typedef struct npg_joint_frame {
 
 /* What a solve did; lengths in units. */
 typedef struct npg_joint_result {
-    double noise;  /* s of the formula                                   */
+    double noise;  /* median distance of points from the smoothed poses, as a standard deviation */
     double lambda; /* median of lambda                                   */
     double moved;  /* mean way of a vertex                               */
     int64_t steps; /* of conjugate gradients, all rounds                 */

@@ -18,19 +18,18 @@ npg_status npg_joint_system_open(npg_joint_system *s, size_t frame_count, size_t
     NPG_TRY(npg_alloc_array(&s->precond, NPG_FOR_FIT, count, vector));
     NPG_TRY(npg_alloc_array(&s->direction, NPG_FOR_FIT, count, vector));
     NPG_TRY(npg_alloc_array(&s->image, NPG_FOR_FIT, count, vector));
-    NPG_TRY(npg_alloc_array(&s->normals, NPG_FOR_FIT, count, vector));
     return npg_alloc_array(&s->diagonal, NPG_FOR_FIT, count, sizeof(float));
 }
 
 void npg_joint_system_close(npg_joint_system *s)
 {
-    void *all[] = {&s->right, &s->step, &s->precond, &s->direction, &s->image, &s->normals, &s->diagonal};
+    void *all[] = {&s->right, &s->step, &s->precond, &s->direction, &s->image, &s->diagonal};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 
 size_t npg_joint_system_memory(size_t frame_count, size_t vert_count)
 {
-    return frame_count * vert_count * 19 * sizeof(float);
+    return frame_count * vert_count * 16 * sizeof(float);
 }
 
 npg_status npg_joint_ring_open(npg_joint_ring *ring, const uint32_t (*edges)[2], size_t edge_count,
@@ -107,12 +106,7 @@ void npg_joint_keep_shape(float *image, const npg_joint_system *s, const float *
 
 static void add_tie(float *restrict image, const npg_joint_system *s, const float *restrict x, size_t t)
 {
-    const float *restrict normals = s->normals + t * s->vert_count * 3;
-    for (size_t i = 0; i < 3 * s->vert_count; i += 3) {
-        float tie = s->shares[t] * s->ties[i / 3];
-        float across = normals[i] * x[i] + normals[i + 1] * x[i + 1] + normals[i + 2] * x[i + 2];
-        for (size_t a = i; a < i + 3; a++) image[a] += tie * (x[a] - across * normals[a]);
-    }
+    for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += s->shares[t] * s->ties[i / 3] * x[i];
 }
 
 static void add_pull(float *image, const npg_joint_pull *p, const float *x, float along)
@@ -163,7 +157,7 @@ static void gather_diagonal(npg_joint_system *s, size_t t)
     float *diagonal = s->diagonal + t * s->vert_count;
     for (size_t v = 0; v < s->vert_count; v++)
         diagonal[v] = (float)s->shape * (float)(s->ring.start[v + 1] - s->ring.start[v]) +
-                      s->shares[t] * s->ties[v] * 2 / 3 + 1e-6f;
+                      s->shares[t] * s->ties[v] + 1e-6f;
     for (size_t i = 0; i < s->pull_counts[t]; i++) {
         const npg_joint_pull *p = &s->pulls[t * s->most + i];
         float strength = p->strength * ((1 - (float)s->along) / 3 + (float)s->along);

@@ -25,11 +25,10 @@ typedef struct npg_joint_system {
     const npg_joint_pull *pulls;    /* `most` per frame; loan */
     const size_t *pull_counts;      /* T; loan */
     size_t most;
-    const float *ties;   /* W: weight of staying where a frame's own pose is, along the surface; loan */
+    const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
     const float *shares; /* T: of the frames' ties; loan                                            */
     /* T x W x 3, owned */
     float *right, *step, *precond, *direction, *image; /* precond: main, near, far of the factors */
-    float *normals;                                    /* of the vertices, unit; filled by the caller */
     float *diagonal;                                   /* T x W */
 } npg_joint_system;
 

@@ -1,0 +1,177 @@
+/* Joint fit: banded solutions, smoothing that knows noise from motion, and a moving ball whose poses are wrong
+ * by noise, with one frame lost, put right by the points of all frames. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "optimize/joint.h"
+#include "optimize/time_smooth.h"
+#include "pipeline/random.h"
+#include "tests/support/ball_mesh.h"
+
+enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 12 };
+
+static const npg_joint_settings usual = {.points = 1000, .rounds = 2, .steps = 60, .shape = 0.2};
+
+static float noise_of(npg_random *random)
+{
+    double sum = -6;
+    for (int i = 0; i < 12; i++) sum += npg_random_real(random);
+    return (float)sum;
+}
+
+/* ---- five diagonals ---- */
+
+static void band_solves(void **state)
+{
+    enum { N = 9 };
+    double memory[3 * N] = {0}, x[N], wanted[N], right[N] = {0};
+    npg_band band = {N, memory, memory + N, memory + 2 * N};
+    (void)state;
+    for (int i = 0; i < N; i++) wanted[i] = sin(i), right[i] = wanted[i] * (1 + 0.1 * i);
+    for (int t = 1; t + 1 < N; t++) { /* lambda D^T D wanted, difference by difference */
+        double bend = 3 * (wanted[t - 1] - 2 * wanted[t] + wanted[t + 1]);
+        right[t - 1] += bend, right[t] -= 2 * bend, right[t + 1] += bend;
+    }
+    for (int i = 0; i < N; i++) band.main[i] = 1 + 0.1 * i;
+    npg_band_add_bend(&band, 3);
+    npg_band_factor(&band);
+    memcpy(x, right, sizeof x);
+    npg_band_solve(&band, x, 1);
+    for (int i = 0; i < N; i++) assert_true(fabs(x[i] - wanted[i]) < 1e-10);
+}
+
+/* ---- a ball that moves ---- */
+
+typedef struct capture {
+    npg_mesh *ball;
+    float truth[FRAMES][3 * VERTS], pose[FRAMES][3 * VERTS], points[FRAMES][3 * VERTS];
+} capture;
+
+static void make_capture(capture *c, float pose_noise, float point_noise)
+{
+    npg_random random = npg_random_stream(5, 0, 0);
+    c->ball = ball_mesh(RINGS, SPOKES);
+    for (int t = 0; t < FRAMES; t++) {
+        pose_ball(c->truth[t], c->ball->vert_pos, VERTS, 2 * sin(0.4 * t));
+        for (int i = 0; i < 3 * VERTS; i++) {
+            c->pose[t][i] = c->truth[t][i] + pose_noise * noise_of(&random);
+            c->points[t][i] = c->truth[t][i] + point_noise * noise_of(&random);
+        }
+    }
+}
+
+static double error_of(const capture *c, int first, int last)
+{
+    double sum = 0;
+    for (int t = first; t <= last; t++)
+        for (int i = 0; i < 3 * VERTS; i++) sum += pow((double)c->pose[t][i] - (double)c->truth[t][i], 2);
+    return sqrt(sum / ((last - first + 1) * VERTS));
+}
+
+static void fill_frames(npg_joint_frame *frames, capture *c)
+{
+    for (int t = 0; t < FRAMES; t++)
+        frames[t] = (npg_joint_frame){.positions = c->pose[t], .points = c->points[t], .point_count = VERTS};
+}
+
+static npg_joint_result solve(capture *c, const npg_joint_frame *frames)
+{
+    npg_joint *joint;
+    npg_joint_result result;
+    assert_int_equal(npg_joint_open(&joint, c->ball, &usual), NPG_OK);
+    assert_int_equal(npg_joint_solve(joint, &result, frames, FRAMES), NPG_OK);
+    npg_joint_close(&joint);
+    return result;
+}
+
+/* Cross-validation smooths noise far and a clean motion hardly. */
+static void smoothing_follows_the_noise(void **state)
+{
+    static capture noisy, clean;
+    npg_joint_frame frames[FRAMES];
+    (void)state;
+    make_capture(&noisy, 0.01f, 0.01f);
+    make_capture(&clean, 1e-5f, 0);
+    fill_frames(frames, &noisy);
+    double before = error_of(&noisy, 0, FRAMES - 1), noisy_lambda = solve(&noisy, frames).lambda;
+    double after = error_of(&noisy, 0, FRAMES - 1);
+    fill_frames(frames, &clean);
+    double clean_lambda = solve(&clean, frames).lambda;
+    print_message("noisy: lambda %.3g, error %.4f, then %.4f; clean: lambda %.3g, error %.6f\n", noisy_lambda,
+                  before, after, clean_lambda, error_of(&clean, 0, FRAMES - 1));
+    assert_true(after < 0.6 * before && clean_lambda < 0.2 * noisy_lambda);
+    assert_true(error_of(&clean, 0, FRAMES - 1) < 1e-3);
+    npg_mesh_unref(&noisy.ball);
+    npg_mesh_unref(&clean.ball);
+}
+
+/* A frame without points goes where its neighbours in time are; a fixed one stays. */
+static void neighbours_carry_what_is_not_seen(void **state)
+{
+    static capture c;
+    float fixed[3 * VERTS];
+    npg_joint_frame frames[FRAMES];
+    (void)state;
+    make_capture(&c, 0.003f, 0.003f);
+    fill_frames(frames, &c);
+    for (int i = 0; i < VERTS; i++) c.pose[6][3 * i] += 0.2f;
+    frames[6].point_count = 0;
+    frames[0].is_fixed = true;
+    memcpy(fixed, c.pose[0], sizeof fixed);
+    solve(&c, frames);
+    print_message("without points: %.4f, the others %.4f\n", error_of(&c, 6, 6), error_of(&c, 1, 5));
+    assert_true(error_of(&c, 6, 6) < 0.02);
+    assert_memory_equal(fixed, c.pose[0], sizeof fixed);
+    npg_mesh_unref(&c.ball);
+}
+
+static void equal_input_gives_equal_bits(void **state)
+{
+    static capture a, b;
+    npg_joint_frame frames[FRAMES];
+    (void)state;
+    make_capture(&a, 0.01f, 0.005f);
+    make_capture(&b, 0.01f, 0.005f);
+    fill_frames(frames, &a);
+    solve(&a, frames);
+    fill_frames(frames, &b);
+    solve(&b, frames);
+    assert_memory_equal(a.pose, b.pose, sizeof a.pose);
+    npg_mesh_unref(&a.ball);
+    npg_mesh_unref(&b.ball);
+}
+
+/* A window of one frame, and one without any point, are left as they are or nearly so. */
+static void short_windows_work(void **state)
+{
+    static capture c;
+    npg_joint_frame frames[FRAMES];
+    npg_joint *joint;
+    npg_joint_result result;
+    (void)state;
+    make_capture(&c, 0.001f, 0);
+    fill_frames(frames, &c);
+    assert_int_equal(npg_joint_open(&joint, c.ball, &usual), NPG_OK);
+    for (size_t count = 1; count <= 5; count++)
+        assert_int_equal(npg_joint_solve(joint, &result, frames, count), NPG_OK);
+    for (int t = 0; t < 3; t++) frames[t].point_count = 0;
+    assert_int_equal(npg_joint_solve(joint, &result, frames, 3), NPG_OK);
+    assert_true(error_of(&c, 0, 4) < 0.005);
+    npg_joint_close(&joint);
+    npg_mesh_unref(&c.ball);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(band_solves), cmocka_unit_test(smoothing_follows_the_noise),
+        cmocka_unit_test(neighbours_carry_what_is_not_seen), cmocka_unit_test(equal_input_gives_equal_bits),
+        cmocka_unit_test(short_windows_work)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
