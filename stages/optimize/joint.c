@@ -15,9 +15,11 @@
 #define TOLERANCE   1e-2 /* of a solution                                             */
 #define NOISE_LEAST 1e-5 /* units: points without noise still have a width */
 /* A frame's own pose counts as much as TRUST times its points where frames move smoothly without help (lambda
- * small) and hardly where it takes neighbours in time to see the motion (lambda large): half at EVEN. */
-#define TRUST 3
-#define EVEN  0.02
+ * small), half at EVEN, and TRUST_LEAST where it takes neighbours in time to see the motion (lambda large): what
+ * slides along the surface is seen by poses alone. */
+#define TRUST       3
+#define TRUST_LEAST 0.1
+#define EVEN        0.02
 
 struct npg_joint {
     npg_joint_settings settings;
@@ -246,7 +248,7 @@ static void set_bend(npg_joint *j, size_t count)
     double each = frames > 0 ? strength / (frames * (double)j->mesh->vert_count) : 1;
     for (size_t v = 0; v < j->mesh->vert_count; v++) {
         double even = (double)j->lambda[v] * j->lambda_median / (EVEN * EVEN);
-        j->ties[v] = (float)(TRUST * each / (1 + even));
+        j->ties[v] = (float)(each * (TRUST_LEAST + TRUST / (1 + even)));
         j->bend[v] = (float)((double)j->lambda[v] * (each + (double)j->ties[v]));
     }
 }

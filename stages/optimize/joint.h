@@ -9,7 +9,7 @@
  * by cross-validation (time_smooth.h).  c_p: the closest point of the surface to the point p, n_p its normal
  * there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
- *     tie_v = trust e / (1 + lambda_v median(lambda) / even^2)          c = e + tie_v
+ *     tie_v = e (least + trust / (1 + lambda_v median(lambda) / even^2))          c = e + tie_v
  *
  * e: the points per vertex.  Where frames agree with each other already (small lambda), their poses are
  * believed; where each is off by its own noise, or has few points, the points of all frames decide, and the

@@ -59,35 +59,41 @@ npg_status npg_joint_window_open(npg_joint_window **out, const npg_thin *surface
     return status;
 }
 
-static npg_status solve(npg_joint_window *window, npg_joint_result *result, const npg_joint_part *parts,
-                        size_t count)
+/* What solving takes: the thinned surfaces before and after. */
+static npg_status fill_frames(npg_joint_window *window, npg_joint_frame *frames, npg_held *const *held,
+                              size_t count, const float *points, const size_t *point_start)
 {
-    size_t size = 3 * window->surface->mesh->vert_count;
-    npg_joint_frame *frames;
-    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
+    size_t w = window->surface->mesh->vert_count, size = 3 * w;
+    NPG_TRY(npg_alloc_array(&window->before, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&window->now, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
     for (size_t t = 0; t < count; t++) {
-        const npg_frame *frame = parts[t].frame;
+        const npg_frame *frame = &held[t]->frame;
         npg_thin_gather(window->surface, window->before + t * size, frame->vert_unit);
-        memcpy(window->now + t * size, window->before + t * size, size * sizeof(float));
-        frames[t] = (npg_joint_frame){window->now + t * size, parts[t].points, frame->normals,
-                                      frame->point_count, parts[t].is_solved};
+        frames[t] = (npg_joint_frame){window->now + t * size, points + 3 * point_start[t], frame->normals,
+                                      frame->point_count, held[t]->solved != NULL};
     }
-    npg_status status = npg_joint_solve(window->joint, result, frames, count);
-    for (size_t t = 0; t < count && !status; t++)
-        if (!parts[t].is_solved)
-            npg_carriers_move(window->carriers, window->vert_count, parts[t].frame->vert_unit,
-                              window->before + t * size, window->now + t * size);
-    npg_release(&frames);
-    return status;
+    memcpy(window->now, window->before, count * size * sizeof(float));
+    return NPG_OK;
 }
 
-npg_status npg_joint_window_move(npg_joint_window *window, npg_joint_result *result,
-                                 const npg_joint_part *parts, size_t count)
+static void carry(const npg_joint_window *window, npg_held *const *held, size_t count)
 {
-    size_t w = window->surface->mesh->vert_count;
-    npg_status status = npg_alloc_array(&window->before, NPG_FOR_FIT, count * w, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&window->now, NPG_FOR_FIT, count * w, 3 * sizeof(float));
-    if (!status) status = solve(window, result, parts, count);
+    size_t size = 3 * window->surface->mesh->vert_count;
+    for (size_t t = 0; t < count; t++)
+        if (!held[t]->solved)
+            npg_carriers_move(window->carriers, window->vert_count, held[t]->frame.vert_unit,
+                              window->before + t * size, window->now + t * size);
+}
+
+npg_status npg_joint_window_move(npg_joint_window *window, npg_joint_result *result, npg_held *const *held,
+                                 size_t count, const float *points, const size_t *point_start)
+{
+    npg_joint_frame *frames;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
+    npg_status status = fill_frames(window, frames, held, count, points, point_start);
+    if (!status) status = npg_joint_solve(window->joint, result, frames, count);
+    if (!status) carry(window, held, count);
+    npg_release(&frames);
     npg_release(&window->before);
     npg_release(&window->now);
     return status;

@@ -119,7 +119,7 @@ static const npg_option options[] = {
         "times that the joint fit matches the points; 0: frames are smoothed in time alone"),
     NPG_ROW_INT   ("joint-steps",      JOINT(steps),          "60",         1,     1e4,  "N",
         "most steps of each round's solution"),
-    NPG_ROW_REAL  ("joint-shape",      JOINT(shape),          "0.2",        0,     1e6,  NULL,
+    NPG_ROW_REAL  ("joint-shape",      JOINT(shape),          "0.1",        0,     1e6,  NULL,
         "weight of an edge's change in the joint fit, against a point's distance"),
     NPG_ROW_REAL  ("joint-along",      JOINT(along),          "0",          0,     1,    NULL,
         "share of distances along the surface, 0 to 1"),

@@ -209,20 +209,6 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
     return NPG_OK;
 }
 
-/* The aligned positions of the window's frames become those of the joint fit. */
-static npg_status fit_jointly(npg_window_solver *s, npg_held *const *held)
-{
-    npg_joint_part *parts;
-    if (!s->joint) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&parts, NPG_FOR_FIT, s->count, sizeof *parts));
-    for (size_t i = 0; i < s->count; i++)
-        parts[i] =
-            (npg_joint_part){&held[i]->frame, s->points + 3 * s->point_start[i], held[i]->solved != NULL};
-    npg_status status = npg_joint_window_move(s->joint, &s->joint_result, parts, s->count);
-    npg_release(&parts);
-    return status;
-}
-
 double npg_window_time(const npg_plan *plan, double index)
 {
     npg_window first = npg_plan_key_window(plan);
@@ -236,7 +222,8 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
     close_frames(s);
     s->count = count;
     NPG_TRY(take_points(s, held));
-    NPG_TRY(fit_jointly(s, held));
+    if (s->joint) /* aligned positions become those of the joint fit */
+        NPG_TRY(npg_joint_window_move(s->joint, &s->joint_result, held, count, s->points, s->point_start));
     NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FIT, count, sizeof *s->frames));
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, count, size * sizeof(float)));
     NPG_TRY(npg_alloc_array(&s->dense, NPG_FOR_FIT, verts, 3 * sizeof(float)));
