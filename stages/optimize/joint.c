@@ -34,7 +34,7 @@ struct npg_joint {
     float *kept;      /* the same, before the points pulled        */
     float *shares, *lambda, *bend, *ties;
     const npg_joint_frame *given; /* loan */
-    bool *is_fixed;
+    bool *is_known;
     double *spreads, *scores; /* T */
     npg_joint_frame *frames;  /* T, on `positions` */
     npg_joint_pull *pulls;
@@ -46,7 +46,7 @@ struct npg_joint {
 static void close_window(npg_joint *j)
 {
     void *all[] = {&j->positions, &j->kept,    &j->shares, &j->lambda, &j->bend,  &j->ties,
-                   &j->is_fixed,  &j->spreads, &j->scores, &j->frames, &j->pulls, &j->pull_counts};
+                   &j->is_known,  &j->spreads, &j->scores, &j->frames, &j->pulls, &j->pull_counts};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_joint_system_close(&j->system);
 }
@@ -99,7 +99,7 @@ static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_
     NPG_TRY(npg_alloc_array(&j->lambda, NPG_FOR_FIT, w, sizeof(float)));
     NPG_TRY(npg_alloc_array(&j->bend, NPG_FOR_FIT, w, sizeof(float)));
     NPG_TRY(npg_alloc_array(&j->ties, NPG_FOR_FIT, w, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->is_fixed, NPG_FOR_FIT, count, sizeof(bool)));
+    NPG_TRY(npg_alloc_array(&j->is_known, NPG_FOR_FIT, count, sizeof(bool)));
     NPG_TRY(npg_alloc_array(&j->spreads, NPG_FOR_FIT, count, sizeof(double)));
     NPG_TRY(npg_alloc_array(&j->scores, NPG_FOR_FIT, count, sizeof(double)));
     NPG_TRY(npg_alloc_array(&j->frames, NPG_FOR_FIT, count, sizeof *j->frames));
@@ -109,7 +109,7 @@ static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_
         j->frames[t] = frames[t];
         j->frames[t].positions = j->positions + t * w * 3;
         memcpy(j->frames[t].positions, frames[t].positions, w * 3 * sizeof(float));
-        j->is_fixed[t] = frames[t].is_fixed;
+        j->is_known[t] = frames[t].is_known;
     }
     return npg_joint_system_open(&j->system, count, w);
 }
@@ -175,7 +175,7 @@ static double lambda_median(npg_joint *j)
 
 static npg_status smooth(npg_joint *j, size_t count)
 {
-    const npg_time_frames f = {count, j->mesh->vert_count, j->positions, j->shares, j->is_fixed};
+    const npg_time_frames f = {count, j->mesh->vert_count, j->positions, j->shares, j->is_known};
     NPG_TRY(weigh_frames(j, count));
     NPG_TRY(npg_time_smooth_choose(j->lambda, &f, (const uint32_t(*)[2])j->edges, j->edge_count));
     j->lambda_median = lambda_median(j);
@@ -202,7 +202,6 @@ static void fill_right(npg_joint *j, size_t t)
     size_t w = s->vert_count;
     float *right = s->right + t * w * 3, along = (float)s->along;
     memset(right, 0, w * 3 * sizeof *right);
-    if (j->is_fixed[t]) return;
     npg_joint_keep_shape(right, s, j->kept + t * w * 3, j->frames[t].positions);
     npg_joint_bend(right, s, j->positions, t, -1);
     pull_to_pose(j, right, t);
@@ -260,7 +259,6 @@ static npg_status do_round(npg_joint *j, size_t count, int64_t *steps)
     int64_t taken;
     s->ring = j->ring;
     s->lambda = j->bend;
-    s->is_fixed = j->is_fixed;
     s->ties = j->ties;
     s->shares = j->shares;
     s->pulls = j->pulls;
@@ -319,8 +317,7 @@ npg_status npg_joint_solve(npg_joint *j, npg_joint_result *result, const npg_joi
     if (!status) status = solve(j, result, frames, count);
     if (!status) note(j, result, frames, count);
     for (size_t t = 0; t < count && !status; t++)
-        if (!frames[t].is_fixed)
-            memcpy(frames[t].positions, j->frames[t].positions, j->mesh->vert_count * 3 * sizeof(float));
+        memcpy(frames[t].positions, j->frames[t].positions, j->mesh->vert_count * 3 * sizeof(float));
     close_window(j);
     return status;
 }

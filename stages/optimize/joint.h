@@ -32,12 +32,12 @@ typedef struct npg_joint_settings {
 } npg_joint_settings;
 
 /* A frame: where the surface is (W x 3, owned by the caller, moved), and its points (N x 3; normals may be
- * NULL).  A fixed one stays where it is and binds the others' motion. */
+ * NULL).  A known one was part of an earlier solve: its noise is gone, so it does not speak for how much there is. */
 typedef struct npg_joint_frame {
     float *positions;
     const float *points, *normals;
     size_t point_count;
-    bool is_fixed;
+    bool is_known;
 } npg_joint_frame;
 
 /* What a solve did; lengths in units. */

@@ -140,7 +140,6 @@ static npg_status multiply_frames(void *user, size_t part)
         const float *x = s->direction + t * size;
         memset(image, 0, size * sizeof *image);
         w->frame_sums[t] = 0;
-        if (s->is_fixed[t]) continue;
         add_shape(image, s, x);
         npg_joint_bend(image, s, s->direction, t, 1);
         add_tie(image, s, x, t);
@@ -170,8 +169,7 @@ static void factor_vertex(npg_joint_system *s, npg_band *band, size_t v)
     size_t n = s->frame_count;
     memset(band->main, 0, 3 * n * sizeof *band->main);
     npg_band_add_bend(band, (double)s->lambda[v]);
-    for (size_t t = 0; t < n; t++)
-        band->main[t] += s->is_fixed[t] ? 1e20 : (double)s->diagonal[t * s->vert_count + v];
+    for (size_t t = 0; t < n; t++) band->main[t] += (double)s->diagonal[t * s->vert_count + v];
     npg_band_factor(band);
     for (size_t t = 0; t < n; t++) {
         float *to = s->precond + 3 * (t * s->vert_count + v);
@@ -241,7 +239,7 @@ static npg_status move_blocks(void *user, size_t part)
             for (size_t t = 0; t < s->frame_count; t++)
                 for (size_t k = 0; k < 3; k++) {
                     size_t i = t * row + 3 * v + k;
-                    s->image[i] = s->is_fixed[t] ? 0 : (float)line[3 * t + k];
+                    s->image[i] = (float)line[3 * t + k];
                     w->sums[block] += (double)s->image[i] * (double)s->right[i];
                 }
         }

@@ -20,7 +20,6 @@ typedef struct npg_joint_system {
     size_t frame_count, vert_count; /* T, W */
     npg_joint_ring ring;            /* loan */
     const float *lambda;            /* W: bend of the motion, times points per vertex; loan */
-    const bool *is_fixed;           /* T; loan */
     double shape, along;            /* weight of an edge; share along the surface */
     const npg_joint_pull *pulls;    /* `most` per frame; loan */
     const size_t *pull_counts;      /* T; loan */

@@ -76,23 +76,29 @@ static npg_status fill_frames(npg_joint_window *window, npg_joint_frame *frames,
     return NPG_OK;
 }
 
-static void carry(const npg_joint_window *window, npg_held *const *held, size_t count)
+static void carry(npg_joint_window *window, npg_held *const *held, size_t count, const npg_window *at)
 {
     size_t size = 3 * window->surface->mesh->vert_count;
-    for (size_t t = 0; t < count; t++)
-        if (!held[t]->solved)
-            npg_carriers_move(window->carriers, window->vert_count, held[t]->frame.vert_unit,
-                              window->before + t * size, window->now + t * size);
+    for (size_t t = 0; t < count; t++) {
+        float *before = window->before + t * size, *now = window->now + t * size;
+        float share = (float)npg_window_share(at, (double)held[t]->frame.index);
+        for (size_t i = 0; held[t]->solved && i < size; i++)
+            now[i] = before[i] + share * (now[i] - before[i]);
+        npg_carriers_move(window->carriers, window->vert_count, held[t]->frame.vert_unit, before, now);
+        if (held[t]->solved)
+            npg_carriers_move(window->carriers, window->vert_count, held[t]->solved, before, now);
+    }
 }
 
 npg_status npg_joint_window_move(npg_joint_window *window, npg_joint_result *result, npg_held *const *held,
-                                 size_t count, const float *points, const size_t *point_start)
+                                 const npg_window *at, const float *points, const size_t *point_start)
 {
+    size_t count = (size_t)(at->last - at->first + 1);
     npg_joint_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
     npg_status status = fill_frames(window, frames, held, count, points, point_start);
     if (!status) status = npg_joint_solve(window->joint, result, frames, count);
-    if (!status) carry(window, held, count);
+    if (!status) carry(window, held, count, at);
     npg_release(&frames);
     npg_release(&window->before);
     npg_release(&window->now);

@@ -1,8 +1,9 @@
 /* Joint window: the joint fit (joint.h) of a window's frames, over the thinned surface that carries the whole
  * reference.
  *
- * It replaces the aligned positions of the frames that no earlier window has solved; those that one has are
- * fixed and bind the motion, so that windows meet without a seam. */
+ * It moves the aligned positions of all frames; those that an earlier window has solved go only the share of
+ * the way that this window has in them (npg_window_share), and their solved positions go with them: windows
+ * meet without a seam. */
 #ifndef NPG_JOINT_WINDOW_H
 #define NPG_JOINT_WINDOW_H
 
@@ -17,10 +18,10 @@ npg_status npg_joint_window_open(npg_joint_window **window, const npg_thin *surf
                                  const npg_mesh *reference, const npg_joint_settings *settings);
 void npg_joint_window_close(npg_joint_window **window);
 
-/* Move frame.vert_unit of the held frames (in order of time) that are not solved; the points of frame i begin
- * at point_start[i] of points (x 3, unit). */
+/* Move frame.vert_unit of the held frames (in order of time), which are those of `at`; the points of frame i
+ * begin at point_start[i] of points (x 3, unit). */
 npg_status npg_joint_window_move(npg_joint_window *window, npg_joint_result *result, npg_held *const *held,
-                                 size_t count, const float *points, const size_t *point_start);
+                                 const npg_window *at, const float *points, const size_t *point_start);
 
 /* Bytes that it takes at most. */
 size_t npg_joint_window_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames);

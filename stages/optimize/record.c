@@ -55,7 +55,7 @@ static npg_status put_bases(npg_archive_writer *out, const npg_record_source *fr
     for (size_t i = 0; i < from->held_count; i++) {
         const npg_frame *frame = &from->held[i].frame;
         char name[NPG_BLOCK_NAME];
-        if (frame->index < from->window->new_first || frame->index > from->window->new_last) continue;
+        if (frame->index < from->window->first || frame->index > from->window->last) continue;
         snprintf(name, sizeof name, "base.%lld", (long long)frame->index);
         NPG_TRY(npg_archive_put(out, name, frame->vert_unit, size));
     }

@@ -262,18 +262,22 @@ void npg_replay_range(const npg_replay *r, int64_t *first, int64_t *last)
 
 /* ---- the coarse alignment at any time ---- */
 
-/* NULL with NPG_OK where there is no such frame. */
+/* From the last window that had the frame: each moves it a little (joint_window.h).  NULL with NPG_OK where
+ * there is no such frame. */
 static npg_status base_of(npg_replay *r, const float **base, int64_t index)
 {
     *base = NULL;
-    for (size_t i = 0; i < r->count; i++) {
+    for (size_t i = r->count; i-- > 0;) {
         const npg_record_facts *f = &r->records[i].facts;
         const npg_archive *in;
         char name[NPG_BLOCK_NAME];
+        size_t found;
         npg_status status = NPG_OK;
-        if (index < f->new_first || index > f->new_last) continue;
+        if (index < f->first || index > f->last) continue;
         NPG_TRY(open_one(r, i, &in));
         snprintf(name, sizeof name, "base.%lld", (long long)index);
+        bool is_new = index >= f->new_first && index <= f->new_last;
+        if (!is_new && !npg_archive_find(in, name, &found)) continue; /* of an earlier version */
         *base = block(&status, in, &r->records[i], name, r->verts * 3 * sizeof(float));
         return status;
     }

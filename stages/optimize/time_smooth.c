@@ -74,10 +74,10 @@ static npg_status open_smoother(smoother *s, size_t frames)
     return NPG_OK;
 }
 
-/* Fixed frames are as good as known. */
+/* A frame that says nothing goes where the others lead it. */
 static double share_of(const npg_time_frames *f, size_t t)
 {
-    return f->is_fixed && f->is_fixed[t] ? 100 : (double)f->shares[t] + 1e-6;
+    return (double)f->shares[t] + 1e-6;
 }
 
 static void set_lambda(smoother *s, const npg_time_frames *f, double lambda)
@@ -96,7 +96,7 @@ static void set_leave(smoother *s, const npg_time_frames *f)
         memset(s->line, 0, n * sizeof *s->line);
         s->line[t] = share_of(f, t);
         npg_band_solve(&s->band, s->line, 1);
-        bool is_judged = !(f->is_fixed && f->is_fixed[t]) && f->shares[t] > 0;
+        bool is_judged = !f->is_known[t] && f->shares[t] > 0;
         s->leave[t] = is_judged ? sqrt((double)f->shares[t]) / fmax(1e-6, 1 - s->line[t]) : 0;
     }
 }
@@ -217,7 +217,6 @@ npg_status npg_time_smooth_apply(const npg_time_frames *f, const float *lambda)
         set_lambda(&s, f, (double)lambda[v]);
         smooth_vertex(&s, f, v);
         for (size_t t = 0; t < f->frame_count; t++) {
-            if (f->is_fixed && f->is_fixed[t]) continue;
             for (size_t k = 0; k < 3; k++)
                 f->positions[3 * (t * f->vert_count + v) + k] = (float)s.line[3 * t + k];
         }

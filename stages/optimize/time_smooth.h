@@ -23,7 +23,7 @@ typedef struct npg_time_frames {
     size_t frame_count, vert_count; /* T, W */
     float *positions;               /* T x W x 3 */
     const float *shares;            /* T: 0 for a frame that says nothing, 1 for an ordinary one     */
-    const bool *is_fixed;           /* T: neither smoothed nor judged, only looked at                */
+    const bool *is_known;           /* T: already smooth, so left out of the judgement               */
 } npg_time_frames;
 
 /* lambda (W) by cross-validation over neighbourhoods of the mesh's edges (E pairs of its W vertices); 0 where

@@ -216,14 +216,15 @@ double npg_window_time(const npg_plan *plan, double index)
     return length ? (index - (double)first.first) / (double)length : 0;
 }
 
-static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_t count)
+static npg_status open_frames(npg_window_solver *s, npg_held *const *held, const npg_window *window)
 {
+    size_t count = (size_t)(window->last - window->first + 1);
     size_t size = 3 * npg_window_sample_count(s), verts = s->facts->reference->vert_count;
     close_frames(s);
     s->count = count;
     NPG_TRY(take_points(s, held));
     if (s->joint) /* aligned positions become those of the joint fit */
-        NPG_TRY(npg_joint_window_move(s->joint, &s->joint_result, held, count, s->points, s->point_start));
+        NPG_TRY(npg_joint_window_move(s->joint, &s->joint_result, held, window, s->points, s->point_start));
     NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FIT, count, sizeof *s->frames));
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, count, size * sizeof(float)));
     NPG_TRY(npg_alloc_array(&s->dense, NPG_FOR_FIT, verts, 3 * sizeof(float)));
@@ -378,7 +379,7 @@ npg_status npg_window_solve(npg_window_solver *s, npg_held *const *held, const n
                             npg_fit_watch *watch, void *user)
 {
     size_t verts = s->facts->reference->vert_count, size = 3 * npg_window_sample_count(s);
-    NPG_TRY(open_frames(s, held, (size_t)(window->last - window->first + 1)));
+    NPG_TRY(open_frames(s, held, window));
     NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
     if (s->is_aligned) {
         NPG_TRY(run_rounds(s, held, watch, user));
