@@ -140,7 +140,7 @@ static npg_status open_matchers(npg_window_solver *s)
 /* --epochs 0 leaves the aligned poses as they are. */
 static bool is_joint(const npg_window_settings *settings)
 {
-    return settings->is_joint && settings->fit.epochs > 0;
+    return settings->is_joint;
 }
 
 npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
