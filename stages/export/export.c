@@ -190,7 +190,7 @@ static npg_form_facts form_facts(const npg_worker *worker)
                             .diagonal = is_known ? state->scale * box->diagonal : 0,
                             .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
                             .voxel_share = state->voxel_share,
-                            .has_grids = npg_job_of(worker) != NULL,
+                            .has_grids = npg_job_of(worker) && !npg_worker_has_field(worker, NPG_FIELD_POSE),
                             .placement = &state->map};
 }
 
@@ -390,7 +390,8 @@ static npg_status write_forms(npg_worker *worker)
     if (!status && npg_forms_name(state->exports, "vdb") && !facts.has_grids)
         npg_worker_warn(
             worker, false, -1,
-            "vdb has no latent grids: a run without a job folder (live, or pulled from) keeps none");
+            "vdb has no latent grids: only a run without alignment has any, and keeps them in a job folder (not "
+            "live or pulled from)");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, "

@@ -101,13 +101,11 @@ static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, cons
 static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
 {
     npg_window window = npg_plan_window(&facts->plan, hand->window_at);
-    npg_vdb_place place = {.unit_per_world = facts->box.scale * hand->figure.scale,
+    npg_vdb_place place = {.unit_per_world = facts->box.scale,
                            .frame_first = window.first,
                            .frame_last = window.last,
                            .window = hand->window_at};
-    for (int a = 0; a < 3; a++)
-        place.world_centre[a] =
-            facts->box.origin[a] + facts->box.centre[a] + hand->figure.centre[a] / facts->box.scale;
+    for (int a = 0; a < 3; a++) place.world_centre[a] = facts->box.origin[a] + facts->box.centre[a];
     return place;
 }
 
@@ -115,7 +113,7 @@ static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
 typedef struct saving {
     npg_worker *worker;
     const npg_hand *hand;
-    npg_fit *fit;
+    npg_fit *fit; /* or NULL */
 } saving;
 
 static npg_status write_state(void *user, npg_archive_writer *out, const char *grids_path)
@@ -124,7 +122,7 @@ static npg_status write_state(void *user, npg_archive_writer *out, const char *g
     const npg_facts *facts = npg_worker_facts(s->worker);
     npg_vdb_place place = place_of(facts, s->hand);
     NPG_TRY(put_hand(out, facts, s->hand));
-    return npg_fit_save(s->fit, out, grids_path, &place);
+    return s->fit ? npg_fit_save(s->fit, out, grids_path, &place) : NPG_OK;
 }
 
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit)

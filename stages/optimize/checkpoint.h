@@ -14,11 +14,11 @@ typedef struct npg_hand {
     int64_t emitted;   /* frames passed on before it closed              */
     double last_chamfer, last_isometry;
     bool is_aligned;
-    npg_figure figure; /* the grids' coordinates; of a hand to save */
 } npg_hand;
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until
- * all frames passed on before are on disk, so that what is solved is never lost.  Held frames that no window
+ * all frames passed on before are on disk, so that what is solved is never lost.  fit: NULL where frames come
+ * aligned.  Held frames that no window
  * has solved yet are read again by a resumed run.  NPG_DISK, NPG_ABORTED. */
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit);
 

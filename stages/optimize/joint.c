@@ -1,4 +1,4 @@
-/* Joint: smoothing, then rounds of matching and solving. */
+/* Joint: smoothing, then matching and solving. */
 #include "optimize/joint.h"
 
 #include <math.h>
@@ -115,14 +115,14 @@ static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_
 }
 
 /* What threads do: frame after frame. */
-typedef struct round {
+typedef struct frame_work {
     npg_joint *j;
     size_t count;
-} round_of;
+} frame_work;
 
 static npg_status measure_frames(void *user, size_t part)
 {
-    round_of *r = user;
+    frame_work *r = user;
     for (size_t t = part; t < r->count; t += r->j->threads)
         NPG_TRY(npg_joint_measure(&r->j->matchers[part], &r->j->spreads[t], &r->j->frames[t]));
     return NPG_OK;
@@ -148,7 +148,7 @@ static double median_spread(npg_joint *j, size_t count)
 /* What each frame's pose is worth: little where its surface is much farther from its points than usual. */
 static npg_status weigh_frames(npg_joint *j, size_t count)
 {
-    round_of r = {j, count};
+    frame_work r = {j, count};
     NPG_TRY(npg_parallel(measure_frames, &r, j->threads));
     double usual = median_spread(j, count);
     for (size_t t = 0; t < count; t++) {
@@ -180,13 +180,13 @@ static npg_status smooth(npg_joint *j, size_t count)
     NPG_TRY(npg_time_smooth_choose(j->lambda, &f, (const uint32_t(*)[2])j->edges, j->edge_count));
     j->lambda_median = lambda_median(j);
     NPG_TRY(npg_time_smooth_apply(&f, j->lambda));
-    round_of r = {j, count};
+    frame_work r = {j, count};
     NPG_TRY(npg_parallel(measure_frames, &r, j->threads));
     j->noise = fmax(median_spread(j, count), NOISE_LEAST);
     return NPG_OK;
 }
 
-/* ---- a round ---- */
+/* ---- the system ---- */
 
 static void pull_to_pose(npg_joint *j, float *right, size_t t)
 {
@@ -200,7 +200,7 @@ static void fill_right(npg_joint *j, size_t t)
 {
     npg_joint_system *s = &j->system;
     size_t w = s->vert_count;
-    float *right = s->right + t * w * 3, along = (float)s->along;
+    float *right = s->right + t * w * 3;
     memset(right, 0, w * 3 * sizeof *right);
     npg_joint_keep_shape(right, s, j->kept + t * w * 3, j->frames[t].positions);
     npg_joint_bend(right, s, j->positions, t, -1);
@@ -211,14 +211,13 @@ static void fill_right(npg_joint *j, size_t t)
         for (int a = 0; a < 3; a++) across += p->normal[a] * p->offset[a];
         for (size_t c = 0; c < 3; c++)
             for (size_t a = 0; a < 3; a++)
-                right[3 * (size_t)p->corner[c] + a] +=
-                    p->weight[c] * p->strength * ((1 - along) * across * p->normal[a] + along * p->offset[a]);
+                right[3 * (size_t)p->corner[c] + a] += p->weight[c] * p->strength * across * p->normal[a];
     }
 }
 
 static npg_status match_frames(void *user, size_t part)
 {
-    round_of *r = user;
+    frame_work *r = user;
     npg_joint *j = r->j;
     for (size_t t = part; t < r->count; t += j->threads) {
         npg_joint_pull *pulls = j->pulls + t * j->system.most;
@@ -230,7 +229,7 @@ static npg_status match_frames(void *user, size_t part)
 
 static npg_status fill_frames(void *user, size_t part)
 {
-    round_of *r = user;
+    frame_work *r = user;
     for (size_t t = part; t < r->count; t += r->j->threads) fill_right(r->j, t);
     return NPG_OK;
 }
@@ -252,11 +251,10 @@ static void set_bend(npg_joint *j, size_t count)
     }
 }
 
-static npg_status do_round(npg_joint *j, size_t count, int64_t *steps)
+static npg_status solve_system(npg_joint *j, size_t count, int64_t *steps, npg_joint_watch *watch, void *user)
 {
     npg_joint_system *s = &j->system;
-    round_of r = {j, count};
-    int64_t taken;
+    frame_work r = {j, count};
     s->ring = j->ring;
     s->lambda = j->bend;
     s->ties = j->ties;
@@ -264,13 +262,11 @@ static npg_status do_round(npg_joint *j, size_t count, int64_t *steps)
     s->pulls = j->pulls;
     s->pull_counts = j->pull_counts;
     s->most = (size_t)j->settings.points;
-    s->along = j->settings.along;
     s->shape = j->settings.shape;
     NPG_TRY(npg_parallel(match_frames, &r, j->threads));
     set_bend(j, count);
     NPG_TRY(npg_parallel(fill_frames, &r, j->threads));
-    NPG_TRY(npg_joint_system_solve(s, TOLERANCE, j->settings.steps, &taken));
-    *steps += taken;
+    NPG_TRY(npg_joint_system_solve(s, TOLERANCE, j->settings.steps, steps, watch, user));
     for (size_t i = 0; i < 3 * count * s->vert_count; i++) {
         if (!isfinite(s->step[i])) return npg_error(NPG_DIVERGED, "the joint fit is not finite");
         j->positions[i] += s->step[i];
@@ -298,23 +294,17 @@ static void note(npg_joint *j, npg_joint_result *result, const npg_joint_frame *
     result->lambda = j->lambda_median;
 }
 
-static npg_status solve(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames, size_t count)
-{
-    size_t bytes = count * j->mesh->vert_count * 3 * sizeof(float);
-    j->given = frames;
-    NPG_TRY(smooth(j, count));
-    memcpy(j->kept, j->positions, bytes);
-    for (int64_t i = 0; i < j->settings.rounds; i++) NPG_TRY(do_round(j, count, &result->steps));
-    return NPG_OK;
-}
-
 npg_status npg_joint_solve(npg_joint *j, npg_joint_result *result, const npg_joint_frame *frames,
-                           size_t count)
+                           size_t count, npg_joint_watch *watch, void *user)
 {
     *result = (npg_joint_result){0};
     NPG_REQUIRE(j && frames && count);
+    if (!j->settings.steps) return NPG_OK;
     npg_status status = open_window(j, frames, count);
-    if (!status) status = solve(j, result, frames, count);
+    j->given = frames;
+    if (!status) status = smooth(j, count);
+    if (!status) memcpy(j->kept, j->positions, count * j->mesh->vert_count * 3 * sizeof(float));
+    if (!status) status = solve_system(j, count, &result->steps, watch, user);
     if (!status) note(j, result, frames, count);
     for (size_t t = 0; t < count && !status; t++)
         memcpy(frames[t].positions, j->frames[t].positions, j->mesh->vert_count * 3 * sizeof(float));

@@ -1,6 +1,6 @@
 /* Joint: the surface of a window's frames, moved by the points of all of them at once.
  *
- *     E = sum_t sum_p w_p ((1 - a) (n_p . (x(c_p) - p))^2 + a |x(c_p) - p|^2)    points
+ *     E = sum_t sum_p w_p (n_p . (x(c_p) - p))^2                                 points
  *       + c sum_v sum_t lambda_v |x_(t-1) - 2 x_t + x_(t+1)|^2                   motion
  *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
@@ -16,19 +16,18 @@
  * motion is even.  share_t: small where the frame's pose is far from its points, 0 without points: its
  * neighbours in time carry it.
  *
- * One step of Gauss and Newton each time the points are matched; conjugate gradients over all frames,
- * preconditioned by each vertex's own five diagonals in time.  Not in the paper. */
+ * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic.  Conjugate
+ * gradients over all frames, preconditioned by each vertex's own five diagonals in time.  Not in the paper:
+ * samples/guide/why_these_defaults.md compares. */
 #ifndef NPG_JOINT_H
 #define NPG_JOINT_H
 
 #include "pipeline/mesh.h"
 
 typedef struct npg_joint_settings {
-    int64_t points; /* most of a frame that pull                                */
-    int64_t rounds; /* times the points are matched                             */
-    int64_t steps;  /* of conjugate gradients, at most                          */
-    double shape;   /* weight of an edge's change against a point's distance    */
-    double along;   /* share of distances along the surface                     */
+    int64_t points; /* most of a frame that pull                                           */
+    int64_t steps;  /* of conjugate gradients, at most; 0: the frames are left as they are */
+    double shape;   /* weight of an edge's change against a point's distance               */
 } npg_joint_settings;
 
 /* A frame: where the surface is (W x 3, owned by the caller, moved), and its points (N x 3; normals may be
@@ -45,7 +44,7 @@ typedef struct npg_joint_result {
     double noise;  /* median distance of points from the smoothed poses, as a standard deviation */
     double lambda; /* median of lambda                                   */
     double moved;  /* mean way of a vertex                               */
-    int64_t steps; /* of conjugate gradients, all rounds                 */
+    int64_t steps; /* of conjugate gradients                             */
 } npg_joint_result;
 
 typedef struct npg_joint npg_joint;
@@ -54,9 +53,14 @@ typedef struct npg_joint npg_joint;
 npg_status npg_joint_open(npg_joint **joint, npg_mesh *surface, const npg_joint_settings *settings);
 void npg_joint_close(npg_joint **joint);
 
-/* Move the frames' surfaces, in order of time.  Equal input gives equal bits, however many threads. */
+/* Asked after each step of conjugate gradients: how many there were, how many there will be at most, and what is
+ * left of the first residual (1 .. 0).  Anything but NPG_OK ends the solve with that status. */
+typedef npg_status npg_joint_watch(void *user, int64_t step, int64_t most, double residual);
+
+/* Move the frames' surfaces, in order of time; those are left alone where it fails or there are no steps.  Equal
+ * input gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY, NPG_DIVERGED, the watch's. */
 npg_status npg_joint_solve(npg_joint *joint, npg_joint_result *result, const npg_joint_frame *frames,
-                           size_t frame_count);
+                           size_t frame_count, npg_joint_watch *watch, void *user);
 
 /* Bytes that it takes at most. */
 size_t npg_joint_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames);

@@ -109,15 +109,16 @@ static void add_tie(float *restrict image, const npg_joint_system *s, const floa
     for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += s->shares[t] * s->ties[i / 3] * x[i];
 }
 
-static void add_pull(float *image, const npg_joint_pull *p, const float *x, float along)
+static void add_pull(float *image, const npg_joint_pull *p, const float *x)
 {
     float at[3] = {0}, across = 0;
     for (size_t c = 0; c < 3; c++)
         for (size_t a = 0; a < 3; a++) at[a] += p->weight[c] * x[3 * (size_t)p->corner[c] + a];
     for (int a = 0; a < 3; a++) across += p->normal[a] * at[a];
-    for (int a = 0; a < 3; a++) at[a] = p->strength * ((1 - along) * across * p->normal[a] + along * at[a]);
+    across *= p->strength;
     for (size_t c = 0; c < 3; c++)
-        for (size_t a = 0; a < 3; a++) image[3 * (size_t)p->corner[c] + a] += p->weight[c] * at[a];
+        for (size_t a = 0; a < 3; a++)
+            image[3 * (size_t)p->corner[c] + a] += p->weight[c] * across * p->normal[a];
 }
 
 /* ---- conjugate gradients ---- */
@@ -143,8 +144,7 @@ static npg_status multiply_frames(void *user, size_t part)
         add_shape(image, s, x);
         npg_joint_bend(image, s, s->direction, t, 1);
         add_tie(image, s, x, t);
-        for (size_t i = 0; i < s->pull_counts[t]; i++)
-            add_pull(image, &s->pulls[t * s->most + i], x, (float)s->along);
+        for (size_t i = 0; i < s->pull_counts[t]; i++) add_pull(image, &s->pulls[t * s->most + i], x);
         for (size_t i = 0; i < size; i++) w->frame_sums[t] += (double)image[i] * (double)x[i];
     }
     return NPG_OK;
@@ -159,8 +159,8 @@ static void gather_diagonal(npg_joint_system *s, size_t t)
                       s->shares[t] * s->ties[v] + 1e-6f;
     for (size_t i = 0; i < s->pull_counts[t]; i++) {
         const npg_joint_pull *p = &s->pulls[t * s->most + i];
-        float strength = p->strength * ((1 - (float)s->along) / 3 + (float)s->along);
-        for (size_t c = 0; c < 3; c++) diagonal[p->corner[c]] += strength * p->weight[c] * p->weight[c];
+        for (size_t c = 0; c < 3; c++) /* a third: the mean over the directions */
+            diagonal[p->corner[c]] += p->strength / 3 * p->weight[c] * p->weight[c];
     }
 }
 
@@ -255,12 +255,13 @@ static double sum_of(const double *values, size_t count)
     return sum;
 }
 
-static npg_status iterate(work *w, double tolerance, int64_t most, int64_t *taken)
+static npg_status iterate(work *w, double tolerance, int64_t most, int64_t *taken, npg_joint_watch *watch,
+                          void *user)
 {
     npg_joint_system *s = w->s;
     size_t count = 3 * s->frame_count * s->vert_count;
     NPG_TRY(npg_parallel(move_blocks, w, w->threads)); /* by 0: the first preconditioned residual */
-    double now = sum_of(w->sums, BLOCKS), goal = tolerance * tolerance * now, share = 0;
+    double start = sum_of(w->sums, BLOCKS), now = start, goal = tolerance * tolerance * start, share = 0;
     for (*taken = 0; *taken < most && now > goal; ++*taken) {
         for (size_t i = 0; i < count; i++) s->direction[i] = s->image[i] + (float)share * s->direction[i];
         NPG_TRY(npg_parallel(multiply_frames, w, w->threads));
@@ -270,11 +271,13 @@ static npg_status iterate(work *w, double tolerance, int64_t most, int64_t *take
         NPG_TRY(npg_parallel(move_blocks, w, w->threads));
         now = sum_of(w->sums, BLOCKS);
         share = now / before;
+        if (watch) NPG_TRY(watch(user, *taken, most, sqrt(fmax(0, now) / start)));
     }
     return NPG_OK;
 }
 
-npg_status npg_joint_system_solve(npg_joint_system *s, double tolerance, int64_t most, int64_t *taken)
+npg_status npg_joint_system_solve(npg_joint_system *s, double tolerance, int64_t most, int64_t *taken,
+                                  npg_joint_watch *watch, void *user)
 {
     work w = {.s = s, .threads = npg_parallel_parts(s->frame_count, 1, BLOCKS)};
     size_t bytes = 3 * s->frame_count * s->vert_count * sizeof(float);
@@ -284,7 +287,7 @@ npg_status npg_joint_system_solve(npg_joint_system *s, double tolerance, int64_t
     NPG_TRY(npg_alloc_array(&w.frame_sums, NPG_FOR_FIT, s->frame_count, sizeof *w.frame_sums));
     npg_status status = npg_parallel(gather_diagonals, &w, w.threads);
     if (!status) status = npg_parallel(factor_vertices, &w, w.threads);
-    if (!status) status = iterate(&w, tolerance, most, taken);
+    if (!status) status = iterate(&w, tolerance, most, taken, watch, user);
     npg_release(&w.frame_sums);
     return status;
 }

@@ -2,6 +2,7 @@
 #ifndef NPG_JOINT_SYSTEM_H
 #define NPG_JOINT_SYSTEM_H
 
+#include "optimize/joint.h"
 #include "optimize/time_smooth.h"
 
 /* A point that pulls: at the face's corners with these weights, normal there, and its strength. */
@@ -20,12 +21,12 @@ typedef struct npg_joint_system {
     size_t frame_count, vert_count; /* T, W */
     npg_joint_ring ring;            /* loan */
     const float *lambda;            /* W: bend of the motion, times points per vertex; loan */
-    double shape, along;            /* weight of an edge; share along the surface */
+    double shape;                   /* weight of an edge                            */
     const npg_joint_pull *pulls;    /* `most` per frame; loan */
     const size_t *pull_counts;      /* T; loan */
     size_t most;
     const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
-    const float *shares; /* T: of the frames' ties; loan                                            */
+    const float *shares; /* T: of the frames' ties; loan                     */
     /* T x W x 3, owned */
     float *right, *step, *precond, *direction, *image; /* precond: main, near, far of the factors */
     float *diagonal;                                   /* T x W */
@@ -37,8 +38,10 @@ void npg_joint_system_close(npg_joint_system *system);
 size_t npg_joint_system_memory(size_t frame_count, size_t vert_count);
 
 /* Solve for `step` from `right`; both pieces of the left side are taken from the members.  Ends when the
- * residual's preconditioned norm has fallen to `tolerance`, or after `most` steps; *taken of them. */
-npg_status npg_joint_system_solve(npg_joint_system *system, double tolerance, int64_t most, int64_t *taken);
+ * residual's preconditioned norm has fallen to `tolerance`, or after `most` steps; *taken of them.  watch may be
+ * NULL. */
+npg_status npg_joint_system_solve(npg_joint_system *system, double tolerance, int64_t most, int64_t *taken,
+                                  npg_joint_watch *watch, void *user);
 
 /* image_t += the part of the bend in time: sum_s B_ts lambda_v x_s, B = D^T D. */
 void npg_joint_bend(float *image, const npg_joint_system *system, const float *x, size_t t, float sign);

@@ -4,19 +4,21 @@
 #include <string.h>
 
 #include "geometry/query.h"
+#include "optimize/carry.h"
 
 struct npg_joint_window {
-    const npg_thin *surface; /* loan, W vertices */
-    size_t vert_count;       /* V */
+    npg_thin *surface; /* W vertices; owned */
+    size_t vert_count; /* V */
     npg_joint *joint;
-    npg_carrier *carriers; /* V: corners of the surface's faces */
-    float *before, *now;   /* T x W x 3 */
+    npg_carrier *carriers; /* V: corners of the surface's faces; owned        */
+    float *before, *now;   /* T x W x 3, of the window at work; owned         */
 };
 
 void npg_joint_window_close(npg_joint_window **slot)
 {
     if (!slot || !*slot) return;
     npg_joint_close(&(*slot)->joint);
+    npg_thin_close(&(*slot)->surface);
     void *all[] = {&(*slot)->carriers, &(*slot)->before, &(*slot)->now};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
@@ -44,15 +46,15 @@ static npg_status find_carriers(npg_joint_window *window, const npg_mesh *refere
     return status;
 }
 
-npg_status npg_joint_window_open(npg_joint_window **out, const npg_thin *surface, const npg_mesh *reference,
+npg_status npg_joint_window_open(npg_joint_window **out, const npg_mesh *reference,
                                  const npg_joint_settings *settings)
 {
     npg_joint_window *window;
     *out = NULL;
     NPG_TRY(npg_alloc(&window, NPG_FOR_FIT, sizeof *window));
-    window->surface = surface;
     window->vert_count = reference->vert_count;
-    npg_status status = npg_joint_open(&window->joint, surface->mesh, settings);
+    npg_status status = npg_thin_open(&window->surface, reference, NPG_THIN_SURFACE);
+    if (!status) status = npg_joint_open(&window->joint, window->surface->mesh, settings);
     if (!status) status = find_carriers(window, reference);
     if (status) npg_joint_window_close(&window);
     *out = window;
@@ -61,44 +63,59 @@ npg_status npg_joint_window_open(npg_joint_window **out, const npg_thin *surface
 
 /* What solving takes: the thinned surfaces before and after. */
 static npg_status fill_frames(npg_joint_window *window, npg_joint_frame *frames, npg_held *const *held,
-                              size_t count, const float *points, const size_t *point_start)
+                              size_t count, const npg_joint_points *points)
 {
     size_t w = window->surface->mesh->vert_count, size = 3 * w;
     NPG_TRY(npg_alloc_array(&window->before, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&window->now, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
     for (size_t t = 0; t < count; t++) {
         const npg_frame *frame = &held[t]->frame;
-        npg_thin_gather(window->surface, window->before + t * size, frame->vert_unit);
-        frames[t] = (npg_joint_frame){window->now + t * size, points + 3 * point_start[t], frame->normals,
-                                      frame->point_count, held[t]->solved != NULL};
+        const float *from = held[t]->solved ? held[t]->solved : frame->vert_unit;
+        npg_thin_gather(window->surface, window->before + t * size, from);
+        frames[t] = (npg_joint_frame){window->now + t * size, points->all + 3 * points->start[t],
+                                      frame->normals, frame->point_count, held[t]->solved != NULL};
     }
     memcpy(window->now, window->before, count * size * sizeof(float));
     return NPG_OK;
 }
 
-static void carry(npg_joint_window *window, npg_held *const *held, size_t count, const npg_window *at)
+static void carry(npg_joint_window *window, npg_held *held, size_t t, const npg_window *at)
 {
     size_t size = 3 * window->surface->mesh->vert_count;
-    for (size_t t = 0; t < count; t++) {
-        float *before = window->before + t * size, *now = window->now + t * size;
-        float share = (float)npg_window_share(at, (double)held[t]->frame.index);
-        for (size_t i = 0; held[t]->solved && i < size; i++)
-            now[i] = before[i] + share * (now[i] - before[i]);
-        npg_carriers_move(window->carriers, window->vert_count, held[t]->frame.vert_unit, before, now);
-        if (held[t]->solved)
-            npg_carriers_move(window->carriers, window->vert_count, held[t]->solved, before, now);
+    float *before = window->before + t * size, *now = window->now + t * size;
+    float share = (float)npg_window_share(at, (double)held->frame.index);
+    if (!held->solved) {
+        held->solved = held->frame.vert_unit;
+        held->frame.vert_unit = NULL;
+    } else {
+        for (size_t i = 0; i < size; i++) now[i] = before[i] + share * (now[i] - before[i]);
     }
+    npg_carriers_move(window->carriers, window->vert_count, held->solved, before, now);
 }
 
-npg_status npg_joint_window_move(npg_joint_window *window, npg_joint_result *result, npg_held *const *held,
-                                 const npg_window *at, const float *points, const size_t *point_start)
+typedef struct watching {
+    npg_fit_watch *watch;
+    void *user;
+} watching;
+
+static npg_status watch_step(void *user, int64_t step, int64_t most, double residual)
+{
+    const watching *w = user;
+    const npg_fit_step at = {.epoch = step, .epochs = most, .loss = residual};
+    return w->watch ? w->watch(w->user, &at) : NPG_OK;
+}
+
+npg_status npg_joint_window_solve(npg_joint_window *window, npg_joint_result *result, npg_held *const *held,
+                                  const npg_window *at, const npg_joint_points *points, npg_fit_watch *watch,
+                                  void *user)
 {
     size_t count = (size_t)(at->last - at->first + 1);
+    watching w = {watch, user};
     npg_joint_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
-    npg_status status = fill_frames(window, frames, held, count, points, point_start);
-    if (!status) status = npg_joint_solve(window->joint, result, frames, count);
-    if (!status) carry(window, held, count, at);
+    npg_status status = fill_frames(window, frames, held, count, points);
+    if (!status) status = npg_joint_solve(window->joint, result, frames, count, watch_step, &w);
+    for (size_t t = 0; t < count && !status; t++) carry(window, held[t], t, at);
     npg_release(&frames);
     npg_release(&window->before);
     npg_release(&window->now);

@@ -1,8 +1,8 @@
 /* optimize: slides windows over time and finds the deformation of the reference in every
  * frame (paper, method).
  *
- * Holds the frames of one window, fits them jointly on the OpenCL device, writes vertices into each frame and
- * passes on what no later window needs. */
+ * Holds the frames of one window and fits them jointly - aligned ones by joint.h, others as in the paper on the
+ * OpenCL device -, writes vertices into each frame and passes on what no later window needs. */
 #include <math.h>
 #include <string.h>
 
@@ -31,14 +31,17 @@ typedef struct state {
 
 #define WINDOW(member) offsetof(state, window_settings.member)
 #define FIT(member)    WINDOW(fit.member)
-#define MATCH(member)  WINDOW(match.member)
 #define JOINT(member)  WINDOW(joint.member)
 
 /* clang-format off */
 static const npg_option options[] = {
     /* type        name                place                  default       least  most  shown as or words */
-    NPG_ROW_INT   ("epochs",           FIT(epochs),           "10",         0,     1e6,  "N",
-        "steps of each window's joint fit"),
+    NPG_ROW_INT   ("epochs",           FIT(epochs),           "60",         0,     1e6,  "N",
+        "steps of each window's joint fit, at most; 0 leaves the frames as the alignment put them"),
+    NPG_ROW_INT   ("joint-points",     JOINT(points),         "5000",       10,    1e7,  "N",
+        "most points of an aligned frame that pull at the surface"),
+    NPG_ROW_REAL  ("joint-shape",      JOINT(shape),          "0.1",        0,     1e6,  NULL,
+        "weight of the change of the surface's edges against the distance of a point, of aligned frames"),
     NPG_ROW_CHOICE("rotation",         FIT(rotation),         "quaternion", "quaternion|cayley|exponential",
         "how the decoder's output becomes a rotation"),
     NPG_ROW_CHOICE("time-code",        FIT(time_code),        "fourier",
@@ -94,35 +97,6 @@ static const npg_option options[] = {
     NPG_ROW_CHOICE("deliver",          FIT(deliver),          "least",      "least|last",
         "result of a joint fit by Chamfer distance: "
         "of all the states between its steps the one with the least loss, or the last"),
-    NPG_ROW_REAL  ("aligned-rate",     WINDOW(aligned_rate),  "0.1",        0,     100,  NULL,
-        "share of the learning rates where frames come aligned: "
-        "the fit then starts beside its goal, and full steps would first lead away from it"),
-    NPG_ROW_INT   ("samples",          WINDOW(samples),       "1500",       0,     1e6,  "N",
-        "vertices of aligned frames that are fitted and carry the others, 0: all"),
-    NPG_ROW_INT   ("rounds",           WINDOW(rounds),        "2",          1,     1000, "N",
-        "times in a window's fit that aligned frames are matched with their points"),
-    NPG_ROW_INT   ("match-points",     MATCH(points),         "5000",       10,    1e7,  "N",
-        "most points of an aligned frame that pull at the surface"),
-    NPG_ROW_REAL  ("match-along",      MATCH(along),          "0.02",       0,     1,    NULL,
-        "share of distances along the surface, 0 to 1"),
-    NPG_ROW_REAL  ("match-reverse",    MATCH(reverse),        "0.5",        0,     100,  NULL,
-        "weight of surface to points against points to surface"),
-    NPG_ROW_REAL  ("match-total",      MATCH(total),          "5000",       1,     1e9,  NULL,
-        "weight of all points of an aligned frame"),
-    NPG_ROW_REAL  ("match-tie",        MATCH(tie),            "1",          0,     1e6,  NULL,
-        "weight of staying where the window before has put a frame, against its points"),
-    NPG_ROW_FLAG  ("joint",            WINDOW(is_joint),      "yes",
-        "fit the aligned frames of a window together before the decoder; not with 0 epochs"),
-    NPG_ROW_INT   ("joint-points",     JOINT(points),         "5000",       10,    1e7,  "N",
-        "most points of a frame that pull in the joint fit"),
-    NPG_ROW_INT   ("joint-rounds",     JOINT(rounds),         "1",          0,     100,  "N",
-        "times that the joint fit matches the points; 0: frames are smoothed in time alone"),
-    NPG_ROW_INT   ("joint-steps",      JOINT(steps),          "60",         1,     1e4,  "N",
-        "most steps of each round's solution"),
-    NPG_ROW_REAL  ("joint-shape",      JOINT(shape),          "0.1",        0,     1e6,  NULL,
-        "weight of an edge's change in the joint fit, against a point's distance"),
-    NPG_ROW_REAL  ("joint-along",      JOINT(along),          "0",          0,     1,    NULL,
-        "share of distances along the surface, 0 to 1"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
         "frames whose hidden layer is kept at a time"),
     {0}};
@@ -157,22 +131,28 @@ static void note_tuning(npg_worker *worker)
                    source);
 }
 
+static bool is_resumed(const npg_worker *worker)
+{
+    return npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_worker_facts(worker)->is_resumed;
+}
+
+/* Aligned frames are fitted on the host: no device is looked for. */
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     s->total = -1;
     NPG_TRY(check_widths(&s->window_settings.fit));
+    if (npg_worker_has_field(worker, NPG_FIELD_POSE)) return is_resumed(worker) ? resume(worker) : NPG_OK;
     NPG_TRY(npg_device_open_tuned(&s->device, npg_worker_settings(worker)->device,
                                   npg_worker_settings(worker)->tuning));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
-    bool is_resumed = npg_worker_facts(worker)->is_resumed;
-    if (npg_worker_facts(worker)->is_live || is_resumed) NPG_TRY(npg_kernels_self_test(s->device));
+    if (npg_worker_facts(worker)->is_live || is_resumed(worker)) NPG_TRY(npg_kernels_self_test(s->device));
     const npg_device_info *info = npg_device_facts(s->device);
     npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
                    info->units);
     json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
     note_tuning(worker);
-    return is_resumed ? resume(worker) : NPG_OK;
+    return is_resumed(worker) ? resume(worker) : NPG_OK;
 }
 
 static void clear_held(npg_held *held)
@@ -199,8 +179,6 @@ static npg_status open_solver(npg_worker *worker, bool is_aligned)
     s->window = npg_live_window(&facts->plan, 0, s->total);
     NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
                                    (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
-    json_object_set_new(npg_worker_report(worker), "samples",
-                        json_integer((json_int_t)npg_window_sample_count(s->solver)));
     return NPG_OK;
 }
 
@@ -251,23 +229,20 @@ static npg_status watch(void *user, const npg_fit_step *step)
 static void note_result(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    const npg_fit_step *result = npg_fit_result(npg_window_fit(s->solver));
-    if (!result) return;
-    s->last_chamfer = result->chamfer;
-    s->last_isometry = result->isometry;
+    const npg_joint_result *joint = npg_window_result(s->solver);
+    const npg_fit_step *least = joint ? NULL : npg_fit_result(npg_window_fit(s->solver));
+    if (joint)
+        npg_worker_log(
+            worker, NPG_LOG_INFO, -1,
+            "window %lld: joint fit in %lld steps: points %.5f off, vertices moved by %.5f in the mean",
+            (long long)s->window_at, (long long)joint->steps, joint->noise, joint->moved);
+    if (!least) return;
+    s->last_chamfer = least->chamfer;
+    s->last_isometry = least->isometry;
     npg_worker_log(worker, NPG_LOG_INFO, -1,
                    "window %lld: least loss after %lld of %lld steps, kept: chamfer %.4g isometry %.4g",
-                   (long long)s->window_at, (long long)result->epoch, (long long)result->epochs,
-                   result->chamfer, result->isometry);
-}
-
-static void note_joint(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    const npg_joint_result r = npg_window_joint_result(s->solver);
-    npg_worker_log(worker, NPG_LOG_DEBUG, -1,
-                   "window %lld: joint fit: noise %.5f, lambda %.3g, moved %.5f in %lld steps",
-                   (long long)s->window_at, r.noise, r.lambda, r.moved, (long long)r.steps);
+                   (long long)s->window_at, (long long)least->epoch, (long long)least->epochs, least->chamfer,
+                   least->isometry);
 }
 
 static npg_status solve_window(npg_worker *worker)
@@ -280,7 +255,6 @@ static npg_status solve_window(npg_worker *worker)
     npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
     npg_release(&frames);
     if (!status) note_result(worker);
-    if (!status) note_joint(worker);
     return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
                             (long long)s->window.first, (long long)s->window.last);
 }
@@ -359,9 +333,8 @@ static npg_status save_state(npg_worker *worker)
     state *s = npg_worker_state(worker);
     if (!npg_job_of(worker)) return NPG_OK;
     NPG_TRY(save_record(worker));
-    const npg_hand hand = {s->held,          s->held_count, s->held_capacity,
-                           s->window_at,     s->emitted,    s->last_chamfer,
-                           s->last_isometry, s->is_aligned, npg_window_figure(s->solver)};
+    const npg_hand hand = {s->held,    s->held_count,   s->held_capacity, s->window_at,
+                           s->emitted, s->last_chamfer, s->last_isometry, s->is_aligned};
     return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));
 }
 
@@ -380,7 +353,7 @@ static npg_status resume(npg_worker *worker)
     s->last_chamfer = hand.last_chamfer;
     s->last_isometry = hand.last_isometry;
     if (!status) status = open_solver(worker, hand.is_aligned);
-    if (!status)
+    if (!status && !hand.is_aligned)
         status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(job), npg_job_grids_path(job));
     if (status) return npg_error_prefix(status, "the state to resume from");
     s->window_at = hand.window_at;
@@ -442,6 +415,7 @@ static npg_status flush(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "windows", json_integer(s->window_count));
     json_object_set_new(report, "epochs", json_integer(s->window_settings.fit.epochs));
+    if (s->is_aligned) return NPG_OK;
     json_object_set_new(report, "last_chamfer", json_real(s->last_chamfer));
     json_object_set_new(report, "last_isometry", json_real(s->last_isometry));
     return NPG_OK;

@@ -16,23 +16,21 @@ static npg_record_facts facts_of(const npg_record_source *from)
                               .new_last = w->new_last,
                               .direction = w->direction,
                               .time_plan = from->facts->plan,
-                              .is_aligned = npg_window_carry(from->solver) != NULL,
+                              .is_aligned = npg_window_result(from->solver) != NULL,
                               .vert_count = (int64_t)from->facts->reference->vert_count,
-                              .sample_count = (int64_t)npg_window_sample_count(from->solver),
                               .rotation = s->rotation,
                               .time_kind = s->time_code,
                               .frequencies = s->frequencies,
                               .width_1 = s->width_1,
                               .width_2 = s->width_2,
                               .seed = from->seed,
-                              .slope = s->slope,
-                              .scale = npg_window_figure(from->solver).scale};
+                              .slope = s->slope};
 }
 
-static npg_status put_features(npg_archive_writer *out, npg_fit *fit, size_t sample_count)
+static npg_status put_features(npg_archive_writer *out, npg_fit *fit, size_t vert_count)
 {
     float *features;
-    size_t size = sample_count * NPG_LATENT_CHANNELS * sizeof *features;
+    size_t size = vert_count * NPG_LATENT_CHANNELS * sizeof *features;
     NPG_TRY(npg_alloc(&features, NPG_FOR_FILES, size));
     npg_status status = npg_fit_features(fit, features);
     if (!status) status = npg_archive_put(out, "features", features, size);
@@ -50,33 +48,30 @@ static npg_status put_decoder(npg_archive_writer *out, npg_fit *fit)
     return npg_archive_put(out, "time", code, count * sizeof *code);
 }
 
-static npg_status put_bases(npg_archive_writer *out, const npg_record_source *from, size_t size)
+/* Aligned frames: where they are now. */
+static npg_status put_poses(npg_archive_writer *out, const npg_record_source *from, size_t size)
 {
     for (size_t i = 0; i < from->held_count; i++) {
-        const npg_frame *frame = &from->held[i].frame;
+        const npg_held *held = &from->held[i];
+        int64_t index = held->frame.index;
         char name[NPG_BLOCK_NAME];
-        if (frame->index < from->window->first || frame->index > from->window->last) continue;
-        snprintf(name, sizeof name, "base.%lld", (long long)frame->index);
-        NPG_TRY(npg_archive_put(out, name, frame->vert_unit, size));
+        if (index < from->window->first || index > from->window->last) continue;
+        snprintf(name, sizeof name, "pose.%lld", (long long)index);
+        NPG_TRY(npg_archive_put(out, name, held->solved, size));
     }
     return NPG_OK;
 }
 
 static npg_status put_all(npg_archive_writer *out, const npg_record_source *from)
 {
-    const npg_carry *carry = npg_window_carry(from->solver);
     const npg_record_facts facts = facts_of(from);
     npg_fit *fit = npg_window_fit(from->solver);
-    size_t verts = (size_t)facts.vert_count, samples = (size_t)facts.sample_count;
-    size_t size = verts * 3 * sizeof(float);
+    size_t verts = (size_t)facts.vert_count, size = verts * 3 * sizeof(float);
     NPG_TRY(npg_archive_put(out, "window", &facts, sizeof facts));
-    NPG_TRY(put_decoder(out, fit));
-    NPG_TRY(put_features(out, fit, samples));
     NPG_TRY(npg_archive_put(out, "rest", from->facts->reference->vert_pos, size));
-    if (!carry) return NPG_OK;
-    NPG_TRY(npg_archive_put(out, "samples", carry->vertex, samples * sizeof *carry->vertex));
-    NPG_TRY(npg_archive_put(out, "carriers", carry->carriers, verts * sizeof *carry->carriers));
-    return put_bases(out, from, size);
+    if (facts.is_aligned) return put_poses(out, from, size);
+    NPG_TRY(put_decoder(out, fit));
+    return put_features(out, fit, verts);
 }
 
 npg_status npg_record_save(const char *path, const npg_record_source *source)

@@ -4,16 +4,19 @@
  *     OUT/job/motion_000012.npg     of the 12th window, an archive (pipeline/archive.h) that stays:
  *
  *     window     npg_record_facts
+ *     rest       V x 3 floats: the reference, unit coordinates
+ *
+ * without alignment
+ *
  *     decoder    its parameters (npg_mlp_param_count floats)
  *     time       parameters of a learned time code and their moments, doubles; else empty
- *     features   S x NPG_LATENT_CHANNELS floats: what the latent grids give at the S points that are decoded
- *     rest       V x 3 floats: the reference, unit coordinates
- *     samples    S integers: which vertices the decoded points are          } only where frames
- *     carriers   V of npg_carrier: which of them carry each vertex          } come aligned; else S is V
- *     base.I     V x 3 floats: frame I as the coarse alignment has it       } and all begin at rest
+ *     features   V x NPG_LATENT_CHANNELS floats: what the latent grids give at the vertices
  *
- * Bases are those of the frames that this window was the first to solve: 12 V bytes a frame.  Beside them a
- * window takes about 1.2 MB with the usual decoder and samples. */
+ * where frames come aligned
+ *
+ *     pose.I     V x 3 floats: frame I after this window, for all frames of the window
+ *
+ * 12 V bytes a frame, or about 1.2 MB and 128 V bytes a window. */
 #ifndef NPG_RECORD_H
 #define NPG_RECORD_H
 
@@ -22,11 +25,10 @@
 typedef struct npg_record_facts {                        /* no padding: the same bytes every time */
     int64_t first, last, new_first, new_last, direction; /* as npg_window                         */
     npg_plan time_plan;                                  /* what npg_window_time() needs          */
-    int64_t is_aligned, vert_count, sample_count;
+    int64_t is_aligned, vert_count;
     int64_t rotation, time_kind, frequencies, width_1, width_2;
     uint64_t seed; /* of the time code */
     double slope;
-    double scale; /* of the figure coordinates (window.h) that the decoder's motion is in */
 } npg_record_facts;
 
 /* What a record is of; all loans. */

@@ -1,4 +1,4 @@
-/* Replay: records of windows read back, and their decoders asked for any time. */
+/* Replay: records of windows read back, their decoders or poses asked for any time. */
 #include "optimize/replay.h"
 
 #include <math.h>
@@ -33,12 +33,13 @@ struct npg_replay {
     size_t count;
     open_record open[OPEN_MOST];
     uint64_t clock;
+    bool is_aligned;
+    size_t verts;
+    float *rest; /* V x 3 */
+    /* without alignment */
     npg_mlp mlp; /* of one frame */
     npg_time_code *time_code;
-    size_t verts, samples;
-    float *rest;                         /* V x 3 */
-    float *base, *dense;                 /* V x 3: y at the moment, and what a window makes of it */
-    float *before, *after, *out, *codes; /* S x 3, S x 3, rows x 8, 2 M */
+    float *dense, *out, *codes; /* V x 3: what a window makes of the moment; rows x 8; 2 M */
 };
 
 /* ---- records ---- */
@@ -75,8 +76,7 @@ static bool are_sane(const npg_record_facts *f)
 {
     bool has_order = f->first >= 0 && f->first <= f->new_first && f->new_first <= f->new_last &&
                      f->new_last <= f->last && f->last < INT32_MAX && llabs(f->direction) <= 1;
-    bool has_sizes = f->vert_count > 0 && f->vert_count < INT32_MAX && f->sample_count > 0 &&
-                     f->sample_count <= f->vert_count && (f->is_aligned || f->sample_count == f->vert_count);
+    bool has_sizes = f->vert_count > 0 && f->vert_count < INT32_MAX;
     bool has_shape = f->width_1 >= 32 && f->width_1 <= 4096 && f->width_2 >= 32 && f->width_2 <= 4096 &&
                      f->width_1 % 32 == 0 && f->width_2 % 32 == 0 && f->frequencies > 0 &&
                      f->frequencies <= 16;
@@ -84,41 +84,33 @@ static bool are_sane(const npg_record_facts *f)
     bool has_time = plan->frame_count > 0 && plan->frame_count < INT32_MAX && plan->window > 0 &&
                     plan->window < INT32_MAX && plan->key >= 0 && plan->key < INT32_MAX &&
                     plan->first_count >= 0 && plan->first_count < INT32_MAX;
-    return has_order && has_sizes && has_shape && has_time && f->scale > 0 && f->scale < 1e6 &&
-           f->time_kind >= NPG_TIME_FOURIER && f->time_kind <= NPG_TIME_LEARNED &&
-           f->rotation >= NPG_ROTATION_QUATERNION && f->rotation <= NPG_ROTATION_EXPONENTIAL;
+    return has_order && has_sizes && has_shape && has_time && f->time_kind >= NPG_TIME_FOURIER &&
+           f->time_kind <= NPG_TIME_LEARNED && f->rotation >= NPG_ROTATION_QUATERNION &&
+           f->rotation <= NPG_ROTATION_EXPONENTIAL;
 }
 
 static bool belong_together(const npg_record_facts *a, const npg_record_facts *b)
 {
-    return a->vert_count == b->vert_count && a->sample_count == b->sample_count &&
-           a->is_aligned == b->is_aligned && a->width_1 == b->width_1 && a->width_2 == b->width_2 &&
-           a->frequencies == b->frequencies && a->time_kind == b->time_kind && a->rotation == b->rotation &&
-           a->scale == b->scale;
+    return a->vert_count == b->vert_count && a->is_aligned == b->is_aligned && a->width_1 == b->width_1 &&
+           a->width_2 == b->width_2 && a->frequencies == b->frequencies && a->time_kind == b->time_kind &&
+           a->rotation == b->rotation;
 }
 
-/* Sizes of all blocks, and that every index is one, so that a record which opens can be used. */
+/* Sizes of all blocks, so that a record which opens can be used. */
 static npg_status check_blocks(const npg_archive *in, const record *of)
 {
     const npg_record_facts *f = &of->facts;
     const npg_mlp_shape shape = {(size_t)f->width_1, (size_t)f->width_2, 2 * (size_t)f->frequencies, 0};
-    size_t verts = (size_t)f->vert_count, samples = (size_t)f->sample_count;
+    size_t verts = (size_t)f->vert_count;
     npg_status status = NPG_OK;
-    block(&status, in, of, "decoder", npg_mlp_param_count(&shape) * sizeof(float));
-    block(&status, in, of, "features", samples * NPG_LATENT_CHANNELS * sizeof(float));
     block(&status, in, of, "rest", verts * 3 * sizeof(float));
-    if (!f->is_aligned) return status;
-    const uint32_t *vertex = block(&status, in, of, "samples", samples * sizeof *vertex);
-    const npg_carrier *carriers = block(&status, in, of, "carriers", verts * sizeof *carriers);
-    for (size_t s = 0; s < samples && !status; s++)
-        if (vertex[s] >= verts) status = bad(of->serial, "a sample is no vertex of the reference");
-    for (size_t v = 0; v < 3 * verts && !status; v++) {
-        int32_t sample = carriers[v / 3].sample[v % 3];
-        if (sample < 0 || (size_t)sample >= samples) status = bad(of->serial, "a carrier is no sample");
+    if (!f->is_aligned) {
+        block(&status, in, of, "decoder", npg_mlp_param_count(&shape) * sizeof(float));
+        block(&status, in, of, "features", verts * NPG_LATENT_CHANNELS * sizeof(float));
     }
-    for (int64_t i = f->new_first; i <= f->new_last && !status; i++) {
+    for (int64_t i = f->first; f->is_aligned && i <= f->last && !status; i++) {
         char name[NPG_BLOCK_NAME];
-        snprintf(name, sizeof name, "base.%lld", (long long)i);
+        snprintf(name, sizeof name, "pose.%lld", (long long)i);
         block(&status, in, of, name, verts * 3 * sizeof(float));
     }
     return status;
@@ -197,13 +189,10 @@ static npg_status open_decoder(npg_replay *r, npg_device *device)
     const npg_record_facts *f = &r->records[0].facts;
     const npg_mlp_shape shape = {(size_t)f->width_1, (size_t)f->width_2, 2 * (size_t)f->frequencies,
                                  (float)f->slope};
-    size_t rows = npg_mlp_rows(device, r->samples);
+    size_t rows = npg_mlp_rows(device, r->verts);
     NPG_TRY(npg_time_code_open(&r->time_code, (npg_time_kind)f->time_kind, (size_t)f->frequencies, f->seed));
     NPG_TRY(npg_alloc_array(&r->codes, NPG_FOR_FIT, shape.code_size, sizeof(float)));
     NPG_TRY(npg_alloc_array(&r->out, NPG_FOR_FIT, rows, NPG_MLP_OUT * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&r->before, NPG_FOR_FIT, r->samples, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&r->after, NPG_FOR_FIT, r->samples, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&r->base, NPG_FOR_FIT, r->verts, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&r->dense, NPG_FOR_FIT, r->verts, 3 * sizeof(float)));
     return npg_mlp_open(&r->mlp, device, &shape, rows, 1, 0);
 }
@@ -218,8 +207,8 @@ npg_status npg_replay_open(npg_replay **out, npg_device *device, const char *fol
     if (!status) status = read_records(r);
     if (!status) {
         r->verts = (size_t)r->records[0].facts.vert_count;
-        r->samples = (size_t)r->records[0].facts.sample_count;
-        status = open_decoder(r, device);
+        r->is_aligned = r->records[0].facts.is_aligned != 0;
+        if (!r->is_aligned) status = open_decoder(r, device);
     }
     if (status) npg_replay_close(&r);
     *out = r;
@@ -233,8 +222,7 @@ void npg_replay_close(npg_replay **slot)
     for (size_t i = 0; i < OPEN_MOST; i++) npg_archive_close(&r->open[i].archive);
     npg_mlp_close(&r->mlp);
     npg_time_code_close(&r->time_code);
-    void *all[] = {&r->folder, &r->records, &r->rest, &r->base, &r->dense,
-                   &r->before, &r->after,   &r->out,  &r->codes};
+    void *all[] = {&r->folder, &r->records, &r->rest, &r->dense, &r->out, &r->codes};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -260,32 +248,29 @@ void npg_replay_range(const npg_replay *r, int64_t *first, int64_t *last)
     }
 }
 
-/* ---- the coarse alignment at any time ---- */
+/* ---- aligned frames at any time ---- */
 
-/* From the last window that had the frame: each moves it a little (joint_window.h).  NULL with NPG_OK where
- * there is no such frame. */
-static npg_status base_of(npg_replay *r, const float **base, int64_t index)
+/* From the last window that had the frame: each moves those it shares a little.  NULL with NPG_OK where there is
+ * no such frame. */
+static npg_status frame_pose(npg_replay *r, const float **pose, int64_t index)
 {
-    *base = NULL;
+    *pose = NULL;
     for (size_t i = r->count; i-- > 0;) {
         const npg_record_facts *f = &r->records[i].facts;
         const npg_archive *in;
         char name[NPG_BLOCK_NAME];
-        size_t found;
         npg_status status = NPG_OK;
         if (index < f->first || index > f->last) continue;
         NPG_TRY(open_one(r, i, &in));
-        snprintf(name, sizeof name, "base.%lld", (long long)index);
-        bool is_new = index >= f->new_first && index <= f->new_last;
-        if (!is_new && !npg_archive_find(in, name, &found)) continue; /* of an earlier version */
-        *base = block(&status, in, &r->records[i], name, r->verts * 3 * sizeof(float));
+        snprintf(name, sizeof name, "pose.%lld", (long long)index);
+        *pose = block(&status, in, &r->records[i], name, r->verts * 3 * sizeof(float));
         return status;
     }
     return NPG_OK;
 }
 
 /* Catmull-Rom; one-sided slopes at the ends of the run. */
-static void mix_bases(float *out, const float *const at[4], double share, size_t count)
+static void mix_poses(float *out, const float *const at[4], double share, size_t count)
 {
     double u = share, u2 = u * u, u3 = u2 * u;
     double w1 = 2 * u3 - 3 * u2 + 1, w2 = 3 * u2 - 2 * u3, s1 = u3 - 2 * u2 + u, s2 = u3 - u2;
@@ -297,31 +282,26 @@ static void mix_bases(float *out, const float *const at[4], double share, size_t
     }
 }
 
-static npg_status fill_base(npg_replay *r, double index)
+static npg_status mix_frames(npg_replay *r, float *out, double index)
 {
     int64_t from = (int64_t)floor(index);
     double share = index - (double)from;
     const float *at[4] = {NULL, NULL, NULL, NULL};
-    size_t size = r->verts * 3 * sizeof(float);
-    if (!r->records[0].facts.is_aligned) {
-        memcpy(r->base, r->rest, size);
-        return NPG_OK;
-    }
     for (int64_t k = share > 0 ? 0 : 1; k < (share > 0 ? 4 : 2); k++)
-        NPG_TRY(base_of(r, &at[k], from + k - 1));
+        NPG_TRY(frame_pose(r, &at[k], from + k - 1));
     if (!at[1] || (share > 0 && !at[2]))
         return npg_error(NPG_BAD_INPUT, "job: no record has frame %lld",
                          (long long)(at[1] ? from + 1 : from));
     if (share > 0)
-        mix_bases(r->base, at, share, 3 * r->verts);
+        mix_poses(out, at, share, 3 * r->verts);
     else
-        memcpy(r->base, at[1], size);
+        memcpy(out, at[1], r->verts * 3 * sizeof(float));
     return NPG_OK;
 }
 
-/* ---- a window at any time ---- */
+/* ---- a decoder at any time ---- */
 
-/* r->out: what the decoder says of the samples. */
+/* r->out: what the decoder says of the vertices. */
 static npg_status decode(npg_replay *r, const npg_archive *in, const record *of, double index)
 {
     npg_mlp *m = &r->mlp;
@@ -331,37 +311,18 @@ static npg_status decode(npg_replay *r, const npg_archive *in, const record *of,
     double *parts = npg_time_code_parts(r->time_code, &count, &step);
     const double *saved = npg_archive_find(in, "time", &found);
     const float *params = block(&status, in, of, "decoder", npg_mlp_param_count(&m->shape) * sizeof(float));
-    const float *features = block(&status, in, of, "features", r->samples * row_size);
+    const float *features = block(&status, in, of, "features", r->verts * row_size);
     NPG_TRY(status);
     if (!saved || found != count * sizeof *saved) return bad(of->serial, "its time code has another size");
     if (count) memcpy(parts, saved, found);
     double time = npg_window_time(&of->facts.time_plan, index);
     npg_time_code_fill(r->time_code, r->codes, &time, 1);
     NPG_TRY(npg_buffer_write(&m->params, 0, params, npg_mlp_param_count(&m->shape) * sizeof(float)));
-    NPG_TRY(npg_buffer_write(&m->z, 0, features, r->samples * row_size));
+    NPG_TRY(npg_buffer_write(&m->z, 0, features, r->verts * row_size));
     NPG_TRY(npg_buffer_write(&m->code, 0, r->codes, m->shape.code_size * sizeof(float)));
     NPG_TRY(npg_mlp_begin(m));
     NPG_TRY(npg_mlp_forward(m, 0, 1));
-    return npg_buffer_read(&m->out, 0, r->out, r->samples * NPG_MLP_OUT * sizeof(float));
-}
-
-static npg_status move_samples(npg_replay *r, const record *of, const uint32_t *vertex)
-{
-    npg_figure figure = {.scale = of->facts.scale};
-    for (size_t s = 0; s < r->samples; s++)
-        memcpy(r->before + 3 * s, r->base + 3 * (vertex ? (size_t)vertex[s] : s), 3 * sizeof(float));
-    if (of->facts.is_aligned) npg_figure_centre(figure.centre, r->before, r->samples);
-    npg_figure_from_unit(&figure, r->after, r->before, r->samples);
-    for (size_t s = 0; s < r->samples; s++) {
-        double out[7], base[3], x[3];
-        for (int i = 0; i < 7; i++) out[i] = (double)r->out[s * NPG_MLP_OUT + (size_t)i];
-        for (size_t i = 0; i < 3; i++) base[i] = (double)r->after[3 * s + i];
-        npg_transform_ref(x, out, base, (npg_rotation)of->facts.rotation);
-        if (!isfinite(x[0] + x[1] + x[2])) return bad(of->serial, "its decoder gives what is not finite");
-        for (size_t i = 0; i < 3; i++) r->after[3 * s + i] = (float)x[i];
-    }
-    npg_figure_to_unit(&figure, r->after, r->after, r->samples);
-    return NPG_OK;
+    return npg_buffer_read(&m->out, 0, r->out, r->verts * NPG_MLP_OUT * sizeof(float));
 }
 
 /* r->dense: where this window alone puts the surface. */
@@ -369,20 +330,16 @@ static npg_status pose_of(npg_replay *r, size_t which, double index)
 {
     const record *of = &r->records[which];
     const npg_archive *in;
-    npg_status status = NPG_OK;
     NPG_TRY(open_one(r, which, &in));
     NPG_TRY(decode(r, in, of, index));
-    if (!of->facts.is_aligned) {
-        NPG_TRY(move_samples(r, of, NULL));
-        memcpy(r->dense, r->after, r->verts * 3 * sizeof(float));
-        return NPG_OK;
+    for (size_t v = 0; v < r->verts; v++) {
+        double out[7], rest[3], x[3];
+        for (int i = 0; i < 7; i++) out[i] = (double)r->out[v * NPG_MLP_OUT + (size_t)i];
+        for (size_t i = 0; i < 3; i++) rest[i] = (double)r->rest[3 * v + i];
+        npg_transform_ref(x, out, rest, (npg_rotation)of->facts.rotation);
+        if (!isfinite(x[0] + x[1] + x[2])) return bad(of->serial, "its decoder gives what is not finite");
+        for (size_t i = 0; i < 3; i++) r->dense[3 * v + i] = (float)x[i];
     }
-    const uint32_t *vertex = block(&status, in, of, "samples", r->samples * sizeof *vertex);
-    const npg_carrier *carriers = block(&status, in, of, "carriers", r->verts * sizeof *carriers);
-    NPG_TRY(status);
-    NPG_TRY(move_samples(r, of, vertex));
-    memcpy(r->dense, r->base, r->verts * 3 * sizeof(float));
-    npg_carriers_move(carriers, r->verts, r->dense, r->before, r->after);
     return NPG_OK;
 }
 
@@ -395,15 +352,9 @@ static npg_window window_of(const npg_record_facts *f)
                         .direction = (int)f->direction};
 }
 
-npg_status npg_replay_vertices(npg_replay *r, float *vert_unit, double index)
+static npg_status mix_windows(npg_replay *r, float *vert_unit, double index)
 {
-    int64_t first, last;
     bool is_first = true;
-    npg_replay_range(r, &first, &last);
-    if (!(index >= (double)first && index <= (double)last))
-        return npg_error(NPG_BAD_INPUT, "job: no record has frame %g, only %lld to %lld are there", index,
-                         (long long)first, (long long)last);
-    NPG_TRY(fill_base(r, index));
     for (size_t w = 0; w < r->count; w++) {
         npg_window window = window_of(&r->records[w].facts);
         if (index <= (double)(window.first - 1) || index >= (double)(window.last + 1)) continue;
@@ -415,4 +366,14 @@ npg_status npg_replay_vertices(npg_replay *r, float *vert_unit, double index)
         is_first = false;
     }
     return is_first ? npg_error(NPG_BAD_INPUT, "job: no record has frame %g", index) : NPG_OK;
+}
+
+npg_status npg_replay_vertices(npg_replay *r, float *vert_unit, double index)
+{
+    int64_t first, last;
+    npg_replay_range(r, &first, &last);
+    if (!(index >= (double)first && index <= (double)last))
+        return npg_error(NPG_BAD_INPUT, "job: no record has frame %g, only %lld to %lld are there", index,
+                         (long long)first, (long long)last);
+    return r->is_aligned ? mix_frames(r, vert_unit, index) : mix_windows(r, vert_unit, index);
 }

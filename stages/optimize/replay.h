@@ -1,13 +1,14 @@
 /* Replay: the deformation of a finished run at any time, from the records of its windows alone (record.h).
  *
- *     x(t)   = x + share_w(t) (x_w(t) - x) for the windows w around t, one after the other in the order they
- *              were solved
- *     x_w(t) = y(t), carried by the samples that w's decoder moves at t       (y: the coarse alignment)
+ * Where frames come aligned it is what the run has written at frames, and between them the cubic through the
+ * frames around (Catmull-Rom).  Without alignment
  *
- * At a frame that is what the run has written, but for rounding.  Between frames the decoder is asked for
- * that very time - it is a function of it - and y is the cubic through the alignments of the frames around
- * (Catmull-Rom); without alignment y is the reference, and the motion the decoder's alone.  In overlaps the
- * windows fade as they do at frames, so the motion is continuous.
+ *     x(t) = x + share_w(t) (x_w(t) - x) for the windows w around t, one after the other in the order they
+ *            were solved
+ *
+ * x_w(t): the reference, moved by w's decoder, which is asked for that very time, at frames and between them.
+ * At frames that is what the run has written, but for rounding; in overlaps the windows fade as they do there, so
+ * the motion is continuous.
  *
  * Memory: the reference, and the records of a few windows.  Threads: one at a time. */
 #ifndef NPG_REPLAY_H

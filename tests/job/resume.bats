@@ -1,6 +1,6 @@
 # Runs that are killed, stopped, damaged, out of room, changed, or continued with more frames.
 
-small=(--epochs 10 --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --window 5 --overlap 2 --samples 100
+small=(--epochs 10 --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --window 5 --overlap 2
     --align-nodes 40 --align-steps 6 --grid-levels 3 --max-residual 100 --max-flipped 100 --quiet)
 
 setup_file() {

@@ -16,7 +16,7 @@
 
 enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 12 };
 
-static const npg_joint_settings usual = {.points = 1000, .rounds = 2, .steps = 60, .shape = 0.2};
+static const npg_joint_settings usual = {.points = 1000, .steps = 60, .shape = 0.2};
 
 static float noise_of(npg_random *random)
 {
@@ -85,7 +85,7 @@ static npg_joint_result solve(capture *c, const npg_joint_frame *frames)
     npg_joint *joint;
     npg_joint_result result;
     assert_int_equal(npg_joint_open(&joint, c->ball, &usual), NPG_OK);
-    assert_int_equal(npg_joint_solve(joint, &result, frames, FRAMES), NPG_OK);
+    assert_int_equal(npg_joint_solve(joint, &result, frames, FRAMES, NULL, NULL), NPG_OK);
     npg_joint_close(&joint);
     return result;
 }
@@ -155,9 +155,9 @@ static void short_windows_work(void **state)
     fill_frames(frames, &c);
     assert_int_equal(npg_joint_open(&joint, c.ball, &usual), NPG_OK);
     for (size_t count = 1; count <= 5; count++)
-        assert_int_equal(npg_joint_solve(joint, &result, frames, count), NPG_OK);
+        assert_int_equal(npg_joint_solve(joint, &result, frames, count, NULL, NULL), NPG_OK);
     for (int t = 0; t < 3; t++) frames[t].point_count = 0;
-    assert_int_equal(npg_joint_solve(joint, &result, frames, 3), NPG_OK);
+    assert_int_equal(npg_joint_solve(joint, &result, frames, 3, NULL, NULL), NPG_OK);
     assert_true(error_of(&c, 0, 4) < 0.005);
     npg_joint_close(&joint);
     npg_mesh_unref(&c.ball);

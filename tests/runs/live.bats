@@ -2,7 +2,7 @@
 
 small=(--epochs 2 --width-1 32 --width-2 32 --faces 300 --poisson-depth 6 --quiet --max-residual 100
        --min-coverage 0 --max-stretched 100 --max-flipped 100 --window 8 --overlap 2 --look-ahead 10
-       --align-nodes 60 --samples 200)
+       --align-nodes 60)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

@@ -78,7 +78,6 @@ static void run_capture(const temp_folder *folder, const char *output)
                                        {"width-1", "32"},
                                        {"width-2", "32"},
                                        {"grid-levels", "2"},
-                                       {"samples", "100"},
                                        {"align-nodes", "20"},
                                        {"align-steps", "2"},
                                        {"poisson-depth", "4"},

@@ -1,6 +1,6 @@
 # Captures whose topology changes: the alarm, a reference per segment, their overlap, and going on after a kill.
 
-small=(--epochs 10 --width-1 64 --width-2 64 --faces 2000 --poisson-depth 6 --window 10 --overlap 2 --samples 200
+small=(--epochs 10 --width-1 64 --width-2 64 --faces 2000 --poisson-depth 6 --window 10 --overlap 2
     --align-nodes 300 --align-steps 8 --grid-levels 4 --max-residual 100 --max-flipped 100 --min-coverage 0
     --segment-min 4 --quiet)
 
