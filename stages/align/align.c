@@ -1,25 +1,35 @@
 /* align: brings the reference coarsely into every frame, from the pose of the frame before it (tracker.h).
  *
- * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  The
- * aligned positions are where the joint fit starts; the fit then only looks for what the coarse alignment
- * can't express. */
+ * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They wait until
+ * their window is complete: then those that were lost are tried again from what is known around them (recover.h).
+ * The aligned positions are where the joint fit starts. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "align/tracker.h"
+#include "align/recover.h"
+#include "geometry/mesh_tools.h"
 #include "job/job.h"
+#include "pipeline/live_plan.h"
 
-/* Set by trial on captures with fast motion. */
-#define LOST               1.5 /* times the usual Chamfer distance, from which a frame counts as lost */
-#define RETRIED_IN_ROW     3   /* lost frames in a row that are all tried again                       */
-#define RETRIED_AFTERWARDS 4   /* of those behind them every so many                                  */
+#define POINTS_MOST 4  /* times the samples: points of a frame that are kept for the alignment */
+#define GROUP_MOST  96 /* frames that wait: a longer window is taken in parts                 */
+
+/* A frame that waits for its window. */
+typedef struct waiting {
+    npg_frame frame;
+    double *pose;            /* K x 12 */
+    float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
+    size_t point_count;
+    npg_tracked tracked;
+} waiting;
 
 /* The two last poses on one side of the key. */
 typedef struct side {
     double *now, *before; /* K x 12, owned */
     int64_t index;        /* of now        */
-    bool has_before;
-    int lost_in_row;
+    bool has_now, has_before;
+    npg_tracked now_tracked, before_tracked;
 } side;
 
 typedef struct state {
@@ -27,14 +37,15 @@ typedef struct state {
     int64_t nodes, samples, steps;
     double stiffness, along;
     npg_tracker *tracker;
-    side sides[2]; /* forward, backward */
-    float *points; /* of the frame at work, owned */
-    size_t points_capacity;
-    double *start, *trial; /* K x 12 each, owned */
-    int64_t read;          /* frames of the plan so far */
+    side sides[2];  /* forward, backward: of the frames that are passed on */
+    side ways[2];   /* the same with those that wait                       */
+    waiting *group; /* in order of arrival; owned, with what they own */
+    size_t group_count, group_capacity;
+    int64_t read;                 /* frames of the plan so far                           */
+    int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
     struct figures {
-        double worst_dist, dist_sum, chamfer_sum;
-        int64_t worst_frame, frames, tried_again;
+        double worst_dist, dist_sum;
+        int64_t worst_frame, frames, lost, found;
     } sum;
 } state;
 
@@ -58,6 +69,14 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
+static void clear_waiting(waiting *w)
+{
+    npg_frame_clear(&w->frame);
+    npg_release(&w->pose);
+    npg_release(&w->points);
+    npg_release(&w->normals);
+}
+
 static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -65,10 +84,11 @@ static void uninit(npg_worker *worker)
     for (int i = 0; i < 2; i++) {
         npg_release(&s->sides[i].now);
         npg_release(&s->sides[i].before);
+        npg_release(&s->ways[i].now);
+        npg_release(&s->ways[i].before);
     }
-    npg_release(&s->points);
-    npg_release(&s->start);
-    npg_release(&s->trial);
+    for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
+    npg_release(&s->group);
 }
 
 /* ---- what a resumed run needs: both sides and the figures so far ---- */
@@ -76,6 +96,17 @@ static void uninit(npg_worker *worker)
 static size_t pose_bytes(const state *s)
 {
     return npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
+}
+
+/* A side without its arrays, for the state on disk; no padding is left to chance. */
+static void strip(side *plain, const side *from)
+{
+    memset(plain, 0, sizeof *plain);
+    plain->index = from->index;
+    plain->has_now = from->has_now;
+    plain->has_before = from->has_before;
+    plain->now_tracked = from->now_tracked;
+    plain->before_tracked = from->before_tracked;
 }
 
 /* The last frame that a window waits for takes it along: it comes to the stage that writes the state just
@@ -86,9 +117,8 @@ static npg_status attach_state(const state *s, npg_frame *frame)
     unsigned char *all;
     NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, size));
     for (int i = 0; i < 2; i++) {
-        const side plain = {.index = s->sides[i].index,
-                            .has_before = s->sides[i].has_before,
-                            .lost_in_row = s->sides[i].lost_in_row};
+        side plain;
+        strip(&plain, &s->sides[i]);
         memcpy(all + at, &plain, sizeof plain);
         memcpy(all + at + sizeof plain, s->sides[i].now, bytes);
         memcpy(all + at + sizeof plain + bytes, s->sides[i].before, bytes);
@@ -98,6 +128,16 @@ static npg_status attach_state(const state *s, npg_frame *frame)
     frame->align_state = all;
     frame->align_state_size = size;
     return NPG_OK;
+}
+
+static void copy_side(const state *s, side *to, const side *from)
+{
+    side copy = *from;
+    copy.now = to->now;
+    copy.before = to->before;
+    memcpy(copy.now, from->now, pose_bytes(s));
+    memcpy(copy.before, from->before, pose_bytes(s));
+    *to = copy;
 }
 
 static npg_status restore_state(npg_worker *worker)
@@ -110,22 +150,31 @@ static npg_status restore_state(npg_worker *worker)
     for (int i = 0; i < 2; i++) {
         side plain;
         memcpy(&plain, all + at, sizeof plain);
-        s->sides[i].index = plain.index;
-        s->sides[i].has_before = plain.has_before;
-        s->sides[i].lost_in_row = plain.lost_in_row;
-        memcpy(s->sides[i].now, all + at + sizeof plain, bytes);
-        memcpy(s->sides[i].before, all + at + sizeof plain + bytes, bytes);
+        plain.now = s->sides[i].now;
+        plain.before = s->sides[i].before;
+        memcpy(plain.now, all + at + sizeof plain, bytes);
+        memcpy(plain.before, all + at + sizeof plain + bytes, bytes);
+        s->sides[i] = plain;
+        copy_side(s, &s->ways[i], &s->sides[i]);
         at += sizeof plain + 2 * bytes;
     }
     memcpy(&s->sum, all + at, sizeof s->sum);
     return NPG_OK;
 }
 
-static bool closes_window(const npg_plan *plan, int64_t read)
+/* Whether the last frame read is the last that a window waits for. */
+static bool closes_window(state *s, const npg_plan *plan)
 {
-    for (int64_t w = 0; w < npg_plan_window_count(plan); w++)
-        if (npg_plan_read_before(plan, w) == read) return true;
-    return false;
+    if (!npg_plan_is_open(plan)) {
+        for (int64_t w = 0; w < npg_plan_window_count(plan); w++)
+            if (npg_plan_read_before(plan, w) == s->read) return true;
+        return false;
+    }
+    while (s->closes_at < s->read || !s->window_at) {
+        npg_window window = npg_live_window(plan, s->window_at++, -1);
+        s->closes_at += window.new_last - window.new_first + 1;
+    }
+    return s->closes_at == s->read;
 }
 
 static npg_status open_tracker(npg_worker *worker)
@@ -136,124 +185,213 @@ static npg_status open_tracker(npg_worker *worker)
     NPG_TRY(npg_tracker_open(&s->tracker, npg_worker_facts(worker)->reference, &settings));
     size_t nodes = npg_tracker_node_count(s->tracker);
     for (int i = 0; i < 2; i++) {
-        NPG_TRY(npg_alloc_array(&s->sides[i].now, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
-        NPG_TRY(npg_alloc_array(&s->sides[i].before, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
-        npg_pose_rest(s->sides[i].now, nodes);
+        side *both[2] = {&s->sides[i], &s->ways[i]};
+        for (int k = 0; k < 2; k++) {
+            NPG_TRY(npg_alloc_array(&both[k]->now, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
+            NPG_TRY(npg_alloc_array(&both[k]->before, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
+            npg_pose_rest(both[k]->now, nodes);
+        }
     }
-    NPG_TRY(npg_alloc_array(&s->start, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
-    NPG_TRY(npg_alloc_array(&s->trial, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
     return npg_worker_facts(worker)->is_resumed ? restore_state(worker) : NPG_OK;
 }
 
+/* ---- frame after frame ---- */
+
 /* The pose to start from becomes `now`, the last one `before`. */
-static void step_on(state *s, side *at, int64_t index)
+static void step_on(const state *s, side *at, int64_t index)
 {
-    size_t nodes = npg_tracker_node_count(s->tracker), bytes = nodes * NPG_POSE_SIZE * sizeof(double);
+    size_t nodes = npg_tracker_node_count(s->tracker);
     double *start = at->before; /* its content is not needed once the extrapolation is made */
     if (at->has_before)
         npg_pose_extrapolate(start, at->now, at->before, nodes);
     else
-        memcpy(start, at->now, bytes);
+        memcpy(start, at->now, pose_bytes(s));
     at->before = at->now;
+    at->before_tracked = at->now_tracked;
     at->now = start;
     at->has_before = true;
     at->index = index;
 }
 
-static npg_status fit_pose(npg_worker *worker, npg_tracked *tracked, double *pose, const npg_frame *frame,
-                           const npg_tracker_effort *effort)
-{
-    state *s = npg_worker_state(worker);
-    NPG_TRY(
-        npg_tracker_fit(s->tracker, tracked, pose, s->points, frame->normals, frame->point_count, effort));
-    npg_worker_log(worker, NPG_LOG_DEBUG, frame->number,
-                   "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps", tracked->point_dist_mean,
-                   tracked->chamfer, tracked->steps);
-    return NPG_OK;
-}
-
-static bool is_lost(const state *s, const npg_tracked *tracked)
-{
-    return s->sum.frames && tracked->chamfer > LOST * s->sum.chamfer_sum / (double)s->sum.frames;
-}
-
-/* Where the usual fit lost the surface: with more effort, from where the motion should have led
- * and from where the surface was.  The pose that explains the frame best stays. */
-static npg_status fit_with_effort(npg_worker *worker, npg_tracked *best, side *at, const npg_frame *frame)
-{
-    /* The usual fit has up to --align-steps steps, begins ten times as stiff as it ends, and is 0.08 wide.
-     * A lost frame has moved farther than that: more steps, a stiffer beginning that moves the body
-     * as a whole, and twice, then four times the width.  What is lost must not slide away along the surface,
-     * hence ten times `along`. Figures: why_these_defaults.md, lost frames. */
-    static const npg_tracker_effort efforts[] = {
-        {.steps = 40, .stiffness = 100, .width_unit = 0.2, .along = 10},
-        {.steps = 80, .stiffness = 100, .width_unit = 0.4, .along = 10},
-    };
-    state *s = npg_worker_state(worker);
-    const double *starts[] = {at->before, s->start};
-    s->sum.tried_again++;
-    for (int i = 0; i < 4 && is_lost(s, best); i++) {
-        npg_tracked tracked;
-        if (i % 2 == 0 && !at->has_before) continue; /* both starts are the same */
-        memcpy(s->trial, starts[i % 2], pose_bytes(s));
-        NPG_TRY(fit_pose(worker, &tracked, s->trial, frame, &efforts[i / 2]));
-        if (npg_worker_stopping(worker)) return NPG_STOPPED;
-        if (tracked.chamfer >= best->chamfer) continue;
-        *best = tracked;
-        memcpy(at->now, s->trial, pose_bytes(s));
-    }
-    return NPG_OK;
-}
-
-/* A capture that the reference does not explain at all must not cost every frame five fits. */
-static npg_status retry_lost(npg_worker *worker, npg_tracked *tracked, side *at, const npg_frame *frame)
+static npg_status take_points(const npg_worker *worker, waiting *w)
 {
     const state *s = npg_worker_state(worker);
-    bool is_retried = at->lost_in_row < RETRIED_IN_ROW || at->lost_in_row % RETRIED_AFTERWARDS == 0;
-    if (is_lost(s, tracked) && is_retried) NPG_TRY(fit_with_effort(worker, tracked, at, frame));
-    at->lost_in_row = is_lost(s, tracked) ? at->lost_in_row + 1 : 0;
+    const npg_frame *frame = &w->frame;
+    size_t most = POINTS_MOST * (size_t)s->samples;
+    w->point_count = frame->point_count < most ? frame->point_count : most;
+    if (!w->point_count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&w->points, NPG_FOR_FIT, w->point_count, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&w->normals, NPG_FOR_FIT, w->point_count, 3 * sizeof(float)));
+    npg_points_spread(w->points, w->normals, most, frame->pos_local, frame->normals, frame->point_count);
+    npg_box_local_to_unit(&npg_worker_facts(worker)->box, w->points, w->points, w->point_count);
     return NPG_OK;
 }
 
-static void add_to_report(state *s, const npg_tracked *tracked, const npg_frame *frame)
+/* The pose that the motion so far leads to, fitted to the points; without any it stays. */
+static npg_status fit_pose(npg_worker *worker, waiting *w, side *at)
 {
-    s->sum.frames++;
-    s->sum.dist_sum += tracked->point_dist_mean;
-    s->sum.chamfer_sum += tracked->chamfer;
-    if (tracked->point_dist_mean <= s->sum.worst_dist) return;
-    s->sum.worst_dist = tracked->point_dist_mean;
-    s->sum.worst_frame = frame->number;
-}
-
-static npg_status fit_side(npg_worker *worker, side *at, const npg_frame *frame)
-{
-    state *s = npg_worker_state(worker);
-    npg_tracked tracked;
-    if (!frame->point_count) return NPG_OK; /* nothing to see: the motion goes on as before */
-    NPG_TRY(npg_grow(&s->points, &s->points_capacity, frame->point_count, 3 * sizeof(float), NPG_FOR_FIT));
-    npg_box_local_to_unit(&npg_worker_facts(worker)->box, s->points, frame->pos_local, frame->point_count);
-    memcpy(s->start, at->now, pose_bytes(s));
-    NPG_TRY(fit_pose(worker, &tracked, at->now, frame, NULL));
-    NPG_TRY(retry_lost(worker, &tracked, at, frame));
-    add_to_report(s, &tracked, frame);
+    const state *s = npg_worker_state(worker);
+    if (w->point_count) {
+        NPG_TRY(
+            npg_tracker_fit(s->tracker, &w->tracked, at->now, w->points, w->normals, w->point_count, NULL));
+        npg_worker_log(worker, NPG_LOG_DEBUG, w->frame.number,
+                       "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps",
+                       w->tracked.point_dist_mean, w->tracked.chamfer, w->tracked.steps);
+    }
+    memcpy(w->pose, at->now, pose_bytes(s));
+    at->now_tracked = w->tracked;
+    at->has_now = w->point_count > 0;
     return NPG_OK;
 }
 
+/* Takes the frame's content. */
 static npg_status align_frame(npg_worker *worker, npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    const npg_mesh *reference = facts->reference;
-    size_t bytes = npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
-    side *at = &s->sides[frame->index < facts->plan.key];
-    if (frame->index != facts->plan.key) step_on(s, at, frame->index);
-    NPG_TRY(fit_side(worker, at, frame));
-    if (frame->index == facts->plan.key) memcpy(s->sides[1].now, at->now, bytes);
+    NPG_TRY(npg_grow(&s->group, &s->group_capacity, s->group_count + 1, sizeof *s->group, NPG_FOR_FIT));
+    waiting *w = &s->group[s->group_count++];
+    *w = (waiting){.frame = *frame};
+    memset(frame, 0, sizeof *frame);
+    NPG_TRY(npg_alloc(&w->pose, NPG_FOR_FIT, pose_bytes(s)));
+    NPG_TRY(take_points(worker, w));
+    side *at = &s->ways[w->frame.index < facts->plan.key];
+    bool is_key = w->frame.index == facts->plan.key;
+    if (!is_key) step_on(s, at, w->frame.index);
+    NPG_TRY(fit_pose(worker, w, at));
+    at->index = w->frame.index;
+    if (is_key) copy_side(s, &s->ways[1], at);
+    return NPG_OK;
+}
+
+/* ---- a group ---- */
+
+static int by_index(const void *a, const void *b)
+{
+    const npg_recover_frame *x = a, *y = b;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+/* The frames that wait and, as fixed ones, the last two of either side. */
+static size_t list_frames(const state *s, npg_recover_frame *frames)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < s->group_count; i++) {
+        const waiting *w = &s->group[i];
+        frames[count++] = (npg_recover_frame){w->frame.index, w->pose,        w->tracked, w->points,
+                                              w->normals,     w->point_count, false};
+    }
+    for (int d = 0; d < 2; d++) {
+        const side *at = &s->sides[d];
+        int64_t away = d ? 1 : -1;
+        if (at->has_now) /* the key, which both sides begin with, once */
+            frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, NULL, NULL, 1, true};
+        if (at->has_now && at->has_before && at->before_tracked.steps)
+            frames[count++] =
+                (npg_recover_frame){at->index + away, at->before, at->before_tracked, NULL, NULL, 1, true};
+    }
+    qsort(frames, count, sizeof *frames, by_index);
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i++)
+        if (!kept || frames[i].index != frames[kept - 1].index) frames[kept++] = frames[i];
+    return kept;
+}
+
+static npg_recover_frame *frame_of(npg_recover_frame *frames, size_t count, int64_t index)
+{
+    for (size_t i = 0; i < count; i++)
+        if (frames[i].index == index) return &frames[i];
+    return NULL;
+}
+
+/* The sides end with the group's outermost frames; what follows starts from there. */
+static void move_sides(state *s, npg_recover_frame *frames, size_t count)
+{
+    for (int d = 0; d < 2; d++) {
+        side *to = &s->sides[d], next = s->ways[d];
+        int64_t away = d ? 1 : -1;
+        const npg_recover_frame *now = frame_of(frames, count, next.index);
+        const npg_recover_frame *before = frame_of(frames, count, next.index + away);
+        if (!now || now->is_fixed) continue;
+        double *now_pose = s->ways[d].now, *before_pose = s->ways[d].before;
+        memcpy(now_pose, now->pose, pose_bytes(s));
+        next.now_tracked = now->tracked;
+        next.has_before = next.has_before && before;
+        if (next.has_before) {
+            memcpy(before_pose, before->pose, pose_bytes(s));
+            next.before_tracked = before->tracked;
+        }
+        s->ways[d] = next;
+        copy_side(s, to, &s->ways[d]);
+    }
+}
+
+static bool should_stop(void *worker)
+{
+    return npg_worker_stopping(worker);
+}
+
+static npg_status recover_group(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    npg_recover_frame *frames;
+    npg_recover_result result;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
+    size_t count = list_frames(s, frames);
+    npg_status status = npg_recover(s->tracker, &result, frames, count, should_stop, worker);
+    for (size_t i = 0; i < s->group_count && !status; i++)
+        s->group[i].tracked = frame_of(frames, count, s->group[i].frame.index)->tracked;
+    if (!status) move_sides(s, frames, count);
+    npg_release(&frames);
+    NPG_TRY(status);
+    s->sum.lost += result.lost;
+    s->sum.found += result.found;
+    if (result.lost)
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "of %zu frames %lld were lost, %lld of them found again in %lld fits", s->group_count,
+                       (long long)result.lost, (long long)result.found, (long long)result.tried);
+    return NPG_OK;
+}
+
+static void add_to_report(state *s, const waiting *w)
+{
+    if (!w->point_count) return;
+    s->sum.frames++;
+    s->sum.dist_sum += w->tracked.point_dist_mean;
+    if (w->tracked.point_dist_mean <= s->sum.worst_dist) return;
+    s->sum.worst_dist = w->tracked.point_dist_mean;
+    s->sum.worst_frame = w->frame.number;
+}
+
+static npg_status pass_on(npg_worker *worker, waiting *w)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_mesh *reference = npg_worker_facts(worker)->reference;
+    npg_chunk *chunk;
+    npg_frame *frame = &w->frame;
     NPG_TRY(npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
     frame->vert_count = reference->vert_count;
     frame->fields |= NPG_FIELD_POSE;
-    npg_tracker_vertices(s->tracker, frame->vert_unit, at->now);
+    npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
+    NPG_TRY(npg_chunk_open(&chunk, 1));
+    npg_chunk_add(chunk, frame);
+    npg_status status = npg_worker_push(worker, &chunk);
+    npg_chunk_unref(&chunk);
+    return status;
+}
+
+/* with_state: the group ends a window. */
+static npg_status close_group(npg_worker *worker, bool with_state)
+{
+    state *s = npg_worker_state(worker);
+    if (!s->group_count) return NPG_OK;
+    NPG_TRY(recover_group(worker));
+    for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
+    if (with_state && npg_job_of(worker)) NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
+    for (size_t i = 0; i < s->group_count; i++) NPG_TRY(pass_on(worker, &s->group[i]));
+    for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
+    s->group_count = 0;
     return NPG_OK;
 }
 
@@ -267,11 +405,14 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     }
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
-        NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)frame->number));
+        int64_t number = frame->number;
+        NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)number));
         s->read++;
-        if (npg_job_of(worker) && closes_window(&facts->plan, s->read)) NPG_TRY(attach_state(s, frame));
+        bool is_window = closes_window(s, &facts->plan);
+        if (is_window || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, is_window));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
+    npg_chunk_unref(chunk);
     return NPG_OK;
 }
 
@@ -279,11 +420,13 @@ static npg_status flush(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
+    NPG_TRY(close_group(worker, false));
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
     json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));
     json_object_set_new(report, "worst_frame", json_integer(s->sum.worst_frame));
-    json_object_set_new(report, "frames_tried_again", json_integer(s->sum.tried_again));
+    json_object_set_new(report, "frames_lost", json_integer(s->sum.lost));
+    json_object_set_new(report, "frames_found_again", json_integer(s->sum.found));
     return NPG_OK;
 }
 
@@ -298,11 +441,17 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     size_t verts = npg_worker_verts_at_most(worker), nodes = (size_t)s->nodes;
-    *chunks_held = 1;
-    /* two sides of two poses; blocks of the equations, about 20 pairs a node; per vertex weights and the
-     * graph's search for them, positions, normals */
-    return nodes * (4 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 320 +
-           facts->point_count_max * 40;
+    npg_window window = npg_live_window(&facts->plan, 0, -1);
+    int64_t length = window.last - window.first + 1, most = length < GROUP_MOST ? length : GROUP_MOST;
+    size_t group = (size_t)most, chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
+    size_t points = facts->point_count_max < POINTS_MOST * (size_t)s->samples
+                        ? facts->point_count_max
+                        : POINTS_MOST * (size_t)s->samples;
+    *chunks_held = (group + chunk - 1) / chunk + 1;
+    /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node; per vertex weights and the
+     * graph's search for them, positions, normals; the waiting frames' poses and thinned points */
+    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 320 +
+           group * (nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float));
 }
 
 extern const npg_stage npg_stage_align;

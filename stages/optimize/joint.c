@@ -39,14 +39,16 @@ struct npg_joint {
     npg_joint_frame *frames;  /* T, on `positions` */
     npg_joint_pull *pulls;
     size_t *pull_counts;
+    npg_time_quadric *quadrics; /* T x W: what the points say of the frames as they came */
     npg_joint_system system;
     double noise, lambda_median;
 };
 
 static void close_window(npg_joint *j)
 {
-    void *all[] = {&j->positions, &j->kept,    &j->shares, &j->lambda, &j->bend,  &j->ties,
-                   &j->is_known,  &j->spreads, &j->scores, &j->frames, &j->pulls, &j->pull_counts};
+    void *all[] = {&j->positions, &j->kept,        &j->shares,  &j->lambda, &j->bend,
+                   &j->ties,      &j->is_known,    &j->spreads, &j->scores, &j->frames,
+                   &j->pulls,     &j->pull_counts, &j->quadrics};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_joint_system_close(&j->system);
 }
@@ -105,6 +107,7 @@ static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_
     NPG_TRY(npg_alloc_array(&j->frames, NPG_FOR_FIT, count, sizeof *j->frames));
     NPG_TRY(npg_alloc_array(&j->pulls, NPG_FOR_FIT, count * most, sizeof *j->pulls));
     NPG_TRY(npg_alloc_array(&j->pull_counts, NPG_FOR_FIT, count, sizeof *j->pull_counts));
+    NPG_TRY(npg_alloc_array(&j->quadrics, NPG_FOR_FIT, count * w, sizeof *j->quadrics));
     for (size_t t = 0; t < count; t++) {
         j->frames[t] = frames[t];
         j->frames[t].positions = j->positions + t * w * 3;
@@ -173,14 +176,46 @@ static double lambda_median(npg_joint *j)
     return (double)j->bend[w / 2];
 }
 
+static npg_status match_frames(void *user, size_t part)
+{
+    frame_work *r = user;
+    npg_joint *j = r->j;
+    for (size_t t = part; t < r->count; t += j->threads) {
+        npg_joint_pull *pulls = j->pulls + t * (size_t)j->settings.points;
+        double width = WIDTH * fmax(fmax(j->spreads[t], j->noise), NOISE_LEAST);
+        NPG_TRY(npg_joint_match(&j->matchers[part], pulls, &j->pull_counts[t], &j->frames[t], width));
+    }
+    return NPG_OK;
+}
+
+/* What the points say, at their faces' corners. */
+static npg_status gather_quadrics(void *user, size_t part)
+{
+    frame_work *r = user;
+    npg_joint *j = r->j;
+    for (size_t t = part; t < r->count; t += j->threads)
+        for (size_t i = 0; i < j->pull_counts[t]; i++) {
+            const npg_joint_pull *p = &j->pulls[t * (size_t)j->settings.points + i];
+            float across = 0;
+            for (int a = 0; a < 3; a++) across += p->normal[a] * p->offset[a];
+            for (int c = 0; c < 3; c++)
+                npg_time_quadric_add(&j->quadrics[t * j->mesh->vert_count + p->corner[c]],
+                                     p->weight[c] * p->strength, p->normal, across);
+        }
+    return NPG_OK;
+}
+
 static npg_status smooth(npg_joint *j, size_t count)
 {
     const npg_time_frames f = {count, j->mesh->vert_count, j->positions, j->shares, j->is_known};
+    frame_work r = {j, count};
     NPG_TRY(weigh_frames(j, count));
-    NPG_TRY(npg_time_smooth_choose(j->lambda, &f, (const uint32_t(*)[2])j->edges, j->edge_count));
+    NPG_TRY(npg_parallel(match_frames, &r, j->threads));
+    NPG_TRY(npg_parallel(gather_quadrics, &r, j->threads));
+    NPG_TRY(
+        npg_time_smooth_choose(j->lambda, &f, j->quadrics, (const uint32_t(*)[2])j->edges, j->edge_count));
     j->lambda_median = lambda_median(j);
     NPG_TRY(npg_time_smooth_apply(&f, j->lambda));
-    frame_work r = {j, count};
     NPG_TRY(npg_parallel(measure_frames, &r, j->threads));
     j->noise = fmax(median_spread(j, count), NOISE_LEAST);
     return NPG_OK;
@@ -213,18 +248,6 @@ static void fill_right(npg_joint *j, size_t t)
             for (size_t a = 0; a < 3; a++)
                 right[3 * (size_t)p->corner[c] + a] += p->weight[c] * p->strength * across * p->normal[a];
     }
-}
-
-static npg_status match_frames(void *user, size_t part)
-{
-    frame_work *r = user;
-    npg_joint *j = r->j;
-    for (size_t t = part; t < r->count; t += j->threads) {
-        npg_joint_pull *pulls = j->pulls + t * j->system.most;
-        double width = WIDTH * fmax(j->spreads[t], j->noise);
-        NPG_TRY(npg_joint_match(&j->matchers[part], pulls, &j->pull_counts[t], &j->frames[t], width));
-    }
-    return NPG_OK;
 }
 
 static npg_status fill_frames(void *user, size_t part)
@@ -315,7 +338,8 @@ npg_status npg_joint_solve(npg_joint *j, npg_joint_result *result, const npg_joi
 size_t npg_joint_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames)
 {
     const size_t vector = 3 * sizeof(float);
-    size_t errors = 16 * vert_count * sizeof(double);
-    return npg_joint_system_memory(frames, vert_count) + 2 * frames * vert_count * vector + errors +
+    size_t errors = 41 * vert_count * sizeof(double);
+    return npg_joint_system_memory(frames, vert_count) + frames * vert_count * sizeof(npg_time_quadric) +
+           2 * frames * vert_count * vector + errors +
            frames * (size_t)settings->points * sizeof(npg_joint_pull) + vert_count * 22 * sizeof(float) * 8;
 }

@@ -6,10 +6,12 @@
 
 #include "pipeline/parallel.h"
 
-#define LADDER       15   /* lambdas that are tried */
-#define LADDER_FIRST -3.0 /* decimal logarithms     */
+#define LADDER       20   /* lambdas that are tried */
+#define LADDER_FIRST -5.5 /* decimal logarithms     */
 #define LADDER_STEP  0.5
-#define POOL_ROUNDS  30 /* steps of averaging over neighbours: about five edges wide */
+#define FARTHER      1.5  /* times the mean square of the points' distances: more is motion smoothed away */
+#define FLOOR        1e-5 /* units: distances below do not matter */
+#define POOL_ROUNDS  30   /* steps of averaging over neighbours: about five edges wide */
 
 /* ---- five diagonals ---- */
 
@@ -109,17 +111,40 @@ static void smooth_vertex(const smoother *s, const npg_time_frames *f, size_t v)
     for (size_t k = 0; k < 3; k++) npg_band_solve(&s->band, s->line + k, 3);
 }
 
-static double vertex_error(const smoother *s, const npg_time_frames *f, size_t v)
+/* The sum of squares of the points' distances after a way d. */
+static double quadric_at(const npg_time_quadric *q, const double d[3])
 {
-    double sum = 0;
+    const float *a = q->a, *b = q->b;
+    double squares = (double)a[0] * d[0] * d[0] + (double)a[3] * d[1] * d[1] + (double)a[5] * d[2] * d[2];
+    double mixed = (double)a[1] * d[0] * d[1] + (double)a[2] * d[0] * d[2] + (double)a[4] * d[1] * d[2];
+    double along = (double)b[0] * d[0] + (double)b[1] * d[1] + (double)b[2] * d[2];
+    return fmax(0, squares + 2 * mixed - 2 * along + (double)q->c);
+}
+
+/* *error: of the predictions of left-out frames; *far: of the points, smoothed. */
+static void judge_vertex(double *error, double *far, const smoother *s, const npg_time_frames *f,
+                         const npg_time_quadric *quadrics, size_t v)
+{
+    *error = *far = 0;
     smooth_vertex(s, f, v);
-    for (size_t t = 0; t < f->frame_count; t++)
+    for (size_t t = 0; t < f->frame_count; t++) {
+        double way[3];
         for (size_t k = 0; k < 3; k++) {
-            double off =
-                ((double)f->positions[3 * (t * f->vert_count + v) + k] - s->line[3 * t + k]) * s->leave[t];
-            sum += off * off;
+            way[k] = s->line[3 * t + k] - (double)f->positions[3 * (t * f->vert_count + v) + k];
+            *error += way[k] * way[k] * s->leave[t] * s->leave[t];
         }
-    return sum;
+        *far += quadric_at(&quadrics[t * f->vert_count + v], way);
+    }
+}
+
+void npg_time_quadric_add(npg_time_quadric *q, float weight, const float n[3], float r)
+{
+    int at = 0;
+    for (int i = 0; i < 3; i++) {
+        for (int k = i; k < 3; k++) q->a[at++] += weight * n[i] * n[k];
+        q->b[i] += weight * r * n[i];
+    }
+    q->c += weight * r * r;
 }
 
 /* ---- neighbourhoods ---- */
@@ -142,10 +167,12 @@ static void pool(double *values, double *sums, const float *degree, size_t vert_
 
 typedef struct choice {
     const npg_time_frames *frames;
+    const npg_time_quadric *quadrics;
     const uint32_t (*edges)[2];
     size_t edge_count, threads;
     const float *degree;
-    double *errors; /* LADDER x W */
+    double *errors, *fars; /* LADDER x W */
+    double *here;          /* W: the points' squares without smoothing, and what may not matter */
 } choice;
 
 static double ladder(int step)
@@ -162,15 +189,28 @@ static npg_status try_steps(void *user, size_t part)
     npg_status status = open_smoother(&s, c->frames->frame_count);
     if (!status) status = npg_alloc_array(&sums, NPG_FOR_FIT, w, sizeof *sums);
     for (size_t step = part; step < LADDER && !status; step += c->threads) {
-        double *errors = c->errors + step * w;
+        double *errors = c->errors + step * w, *fars = c->fars + step * w;
         set_lambda(&s, c->frames, ladder((int)step));
         set_leave(&s, c->frames);
-        for (size_t v = 0; v < w; v++) errors[v] = vertex_error(&s, c->frames, v);
+        for (size_t v = 0; v < w; v++) judge_vertex(&errors[v], &fars[v], &s, c->frames, c->quadrics, v);
         pool(errors, sums, c->degree, w, c->edges, c->edge_count);
+        pool(fars, sums, c->degree, w, c->edges, c->edge_count);
     }
     npg_release(&s.memory);
     npg_release(&sums);
     return status;
+}
+
+/* What the points' squares come to where nothing is smoothed. */
+static void sum_here(const choice *c, double *sums)
+{
+    const npg_time_frames *f = c->frames;
+    for (size_t i = 0; i < f->frame_count * f->vert_count; i++) {
+        const npg_time_quadric *q = &c->quadrics[i];
+        double weight = (double)q->a[0] + (double)q->a[3] + (double)q->a[5]; /* |n|^2 = 1 */
+        c->here[i % f->vert_count] += (double)q->c + weight * FLOOR * FLOOR;
+    }
+    pool(c->here, sums, c->degree, f->vert_count, c->edges, c->edge_count);
 }
 
 /* The best step of each vertex, as logarithm, made smooth over the surface. */
@@ -180,7 +220,7 @@ static void choose(float *lambda, const choice *c)
     double *log_of = c->errors, *sums = c->errors + w; /* once all of a vertex' errors are seen */
     for (size_t v = 0; v < w; v++) {
         int best = 0;
-        for (int step = 1; step < LADDER; step++)
+        for (int step = 1; step < LADDER && c->fars[(size_t)step * w + v] <= FARTHER * c->here[v]; step++)
             if (c->errors[(size_t)step * w + v] < c->errors[(size_t)best * w + v]) best = step;
         log_of[v] = LADDER_FIRST + LADDER_STEP * best;
     }
@@ -188,22 +228,28 @@ static void choose(float *lambda, const choice *c)
     for (size_t v = 0; v < w; v++) lambda[v] = (float)pow(10, log_of[v]);
 }
 
-npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames, const uint32_t (*edges)[2],
+npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames,
+                                  const npg_time_quadric *quadrics, const uint32_t (*edges)[2],
                                   size_t edge_count)
 {
     size_t w = frames->vert_count;
     float *degree = NULL;
-    choice c = {.frames = frames, .edges = edges, .edge_count = edge_count};
+    choice c = {.frames = frames, .quadrics = quadrics, .edges = edges, .edge_count = edge_count};
     memset(lambda, 0, w * sizeof *lambda);
     if (frames->frame_count < NPG_TIME_SMOOTH_LEAST) return NPG_OK;
     c.threads = npg_parallel_parts(LADDER, 1, 0);
     npg_status status = npg_alloc_array(&c.errors, NPG_FOR_FIT, LADDER * w, sizeof *c.errors);
+    if (!status) status = npg_alloc_array(&c.fars, NPG_FOR_FIT, LADDER * w, sizeof *c.fars);
+    if (!status) status = npg_alloc_array(&c.here, NPG_FOR_FIT, w, sizeof *c.here);
     if (!status) status = npg_alloc_array(&degree, NPG_FOR_FIT, w, sizeof *degree);
     for (size_t e = 0; e < 2 * edge_count && !status; e++) degree[edges[e / 2][e % 2]]++;
     c.degree = degree;
+    if (!status) sum_here(&c, c.errors);
     if (!status) status = npg_parallel(try_steps, &c, c.threads);
     if (!status) choose(lambda, &c);
     npg_release(&c.errors);
+    npg_release(&c.fars);
+    npg_release(&c.here);
     npg_release(&degree);
     return status;
 }
