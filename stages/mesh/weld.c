@@ -14,11 +14,11 @@
 #define EXPLAINED     0.5 /* spacings from points to surface, in a frame that is heard */
 #define LEAN_LONGER   1.4 /* the same, for faces that go with those beside them        */
 #define LEAN_SPACINGS 0.6
-#define FRAMES_LEAST  3   /* that speak against a face                                             */
-#define SEEDS_LEAST   2   /* faces of a patch that are spoken against                              */
-#define BORDER_NEAR   0.7 /* times the faces' distance from the points, for the border around them */
-#define SAVED_LEAST   0.7 /* the new faces' area, at most, of the patch in its worst pose          */
-#define LOOPS_LEAST   2   /* of its border: a tube between two parts; a cap or a crease is left    */
+#define FRAMES_LEAST  3    /* that speak against a face                                             */
+#define SEEDS_LEAST   2    /* faces of a patch that are spoken against                              */
+#define BORDER_NEAR   0.85 /* times the faces' distance from the points, for the border around them */
+#define SAVED_LEAST   0.7  /* the new faces' area, at most, of the patch in its worst pose          */
+#define LOOPS_LEAST   2    /* of its border: a tube between two parts; a cap or a crease is left    */
 #define TIDY_ROUNDS   10
 #define ISLAND_MOST   0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
 #define PATCH_MOST    0.2  /* of the faces: more is no weld but a surface that fits nowhere */
