@@ -23,15 +23,24 @@ const npg_service *const npg_services[] = {
 static const npg_preset_value paper[] = {
     {"align", "no"},              /* from the reference */
     {"keyframe-choice", "paper"}, /* by score alone */
-    {"hold-apart", "loose"},      /* a little of the gap helps a fit that knows only distances */
-    {"welds", "keep"},            /* nothing is cut */
-    {"window", "0"},              /* all frames at once */
-    {"epochs", "250"},            /* of every vertex */
-    {"isometry", "100"},          /* as published, like the rest */
+    {"hold-apart", "no"},         /* the keyframe's points as they are */
+    {"smooth", "no"},
+    {"welds", "keep"}, /* nothing is cut */
+    {"window", "-1"},  /* all frames at once, up to 60 */
+    {"epochs", "250"}, /* of every vertex */
+    {"isometry", "100"},
     {"confidence", "cumulative"},
-    {"smoothing", "doubled"},
+    {"smoothing", "doubled"}, /* as in the published code */
     {"rate-end", "1"},
     {"feature-start", "0"},
+    {"deliver", "last"},
+    {NULL, NULL}};
+static const npg_preset_value grids[] = {
+    {"align", "no"},         /* grids and decoder alone carry the motion */
+    {"distance", "surface"}, /* of few samples */
+    {"epochs", "60"},
+    {"rounds", "4"},
+    {"isometry", "20"},
     {NULL, NULL}};
 static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps", "20"}, {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
@@ -39,5 +48,7 @@ static const npg_preset_value none[] = {{NULL, NULL}};
 const npg_preset npg_presets[] = {
     {"default", "coarse alignment, then windows of few samples", none},
     {"best", "the same with a finer graph and more steps: slower, closer", best},
-    {"paper", "the method as the paper has it: every vertex, from the reference, one joint window", paper},
+    {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
+     paper},
+    {"grids", "the paper's grids and decoder with our distance and warm starts: no alignment, windows", grids},
     {NULL, NULL, NULL}};

@@ -47,6 +47,7 @@ struct npg_fit {
     size_t frame_count;
     npg_fit_step result;                /* what the present state measures; of a run that keeps the least */
     bool is_pulled;                     /* by known correspondences, from bases */
+    size_t tied_count;                  /* frames, the first outward, that follow their tie */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
     size_t *rank;                       /* its inverse */
     int64_t *index;                     /* by k */
@@ -252,7 +253,7 @@ static void close_window(npg_fit *fit)
     npg_release(&fit->codes);
     npg_release(&fit->packed);
     npg_release(&fit->has_points);
-    fit->frame_count = 0;
+    fit->frame_count = fit->tied_count = 0;
 }
 
 void npg_fit_close(npg_fit **slot)
@@ -310,6 +311,7 @@ static void sort_outward(npg_fit *fit, const npg_fit_frame *frames, size_t count
         fit->index[k] = frame->index;
         fit->times[k] = frame->time;
         fit->has_points[k] = frame->count > 0;
+        if (frame->tie && k == fit->tied_count) fit->tied_count++;
     }
 }
 
@@ -337,6 +339,36 @@ static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
                            fit->frame_count);
 }
 
+/* Every vertex of the tied frames pulled to where it is known to be, by the mean over vertices of d^2 times
+ * TIE_WEIGHT: about what all distances of a frame of 5000 points weigh. */
+#define TIE_WEIGHT 15000
+
+static npg_status set_ties(npg_fit *fit, const npg_fit_frame *frames)
+{
+    npg_pull *pulls;
+    int32_t *start;
+    size_t count = fit->tied_count * fit->real;
+    if (!count) return NPG_OK;
+    NPG_REQUIRE(count < INT32_MAX);
+    NPG_TRY(npg_alloc_array(&pulls, NPG_FOR_FIT, count, sizeof *pulls));
+    npg_status status = npg_alloc_array(&start, NPG_FOR_FIT, fit->frame_count + 1, sizeof *start);
+    for (size_t i = 0; !status && i < count; i++) {
+        int32_t row = (int32_t)(i % fit->real);
+        const float *at = frames[fit->place[i / fit->real]].tie + 3 * (size_t)fit->order[row];
+        pulls[i] = (npg_pull){.vertex = {row, row, row},
+                              .share = {1, 0, 0},
+                              .along = 1,
+                              .weight = (float)(TIE_WEIGHT / (double)fit->real),
+                              .constant = {-at[0], -at[1], -at[2]}};
+    }
+    for (size_t k = 0; !status && k < fit->frame_count; k++)
+        start[k + 1] = (int32_t)((k < fit->tied_count ? k + 1 : fit->tied_count) * fit->real);
+    if (!status) status = npg_motion_set_pulls(&fit->motion, pulls, start);
+    npg_release(&pulls);
+    npg_release(&start);
+    return status;
+}
+
 static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
 {
     npg_target *targets;
@@ -347,7 +379,7 @@ static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
     if (!status) status = open_motion_on(fit, targets);
     for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
     npg_release(&targets);
-    return status;
+    return status ? status : set_ties(fit, frames);
 }
 
 /* The bases in the order of rows and outward. */
@@ -426,6 +458,15 @@ static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, i
     return NPG_OK;
 }
 
+/* Losses of the frames and their gradients by position: tied frames by their ties, the others by distance. */
+static npg_status measure_frames(npg_fit *fit, size_t first, size_t count)
+{
+    size_t ties = first < fit->tied_count ? fit->tied_count - first : 0;
+    if (fit->is_pulled || ties >= count) return npg_motion_pull(&fit->motion, first, count);
+    if (ties) NPG_TRY(npg_motion_pull(&fit->motion, first, ties));
+    return npg_motion_chamfer(&fit->motion, fit->settings.alpha, first + ties, count - ties);
+}
+
 /* Positions, losses, and the gradient at the decoder's end. */
 static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
 {
@@ -433,12 +474,13 @@ static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first
     double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
     NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
     NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
-    NPG_TRY(fit->is_pulled ? npg_motion_pull(&fit->motion, first, count)
-                           : npg_motion_chamfer(&fit->motion, s->alpha, first, count));
+    NPG_TRY(measure_frames(fit, first, count));
     NPG_TRY(npg_buffer_read(&fit->motion.cd, first * sizeof(float), fit->cd + first, count * sizeof(float)));
     NPG_TRY(check_losses(fit, first, count, epoch));
     for (size_t k = first; k < first + count; k++)
-        fit->gains[k] = (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
+        fit->gains[k] = k < fit->tied_count ? (float)weights->share
+                                            : (float)npg_weights_next(weights, fit->index[k], fit->cd[k],
+                                                                      fit->has_points[k]);
     return npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first,
                            count);
 }
@@ -474,9 +516,9 @@ static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
     npg_release(&part);
     step->chamfer = 0;
     for (size_t k = 0; k < fit->frame_count; k++) {
-        if (!fit->has_points[k]) continue;
-        step->chamfer += (double)fit->cd[k];
         weighted += (double)(fit->cd[k] * fit->gains[k]);
+        if (!fit->has_points[k] || k < fit->tied_count) continue;
+        step->chamfer += (double)fit->cd[k];
         solved++;
     }
     step->chamfer /= solved ? (double)solved : 1;
@@ -540,9 +582,19 @@ static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_
         NPG_TRY(measure_epoch(fit, step, true));
         NPG_TRY(offer(fit, least, step));
         NPG_TRY(end_epoch(fit));
-        if (watch) NPG_TRY(watch(user, step));
+        npg_status status = watch ? watch(user, step) : NPG_OK;
+        if (status == NPG_END) {
+            step->epoch++;
+            return NPG_OK;
+        }
+        NPG_TRY(status);
     }
     return NPG_OK;
+}
+
+void npg_fit_set_epochs(npg_fit *fit, int64_t epochs)
+{
+    fit->settings.epochs = epochs;
 }
 
 /* The last step's outcome is measured as well; then the fit returns to the state with the least loss. */

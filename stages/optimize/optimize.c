@@ -110,6 +110,12 @@ static const npg_option options[] = {
         "weight of all points of an aligned frame"),
     NPG_ROW_REAL  ("match-tie",        MATCH(tie),            "1",          0,     1e6,  NULL,
         "weight of staying where the window before has put a frame, against its points"),
+    NPG_ROW_CHOICE("distance",         WINDOW(warm.distance), "vertices", "vertices|surface",
+        "without alignment: the paper's distance between all vertices and the points, "
+        "or that between points and surface, over --samples vertices"),
+    NPG_ROW_FLAG  ("warm-start",       WINDOW(warm.is_on),    "yes",
+        "without alignment: bring a window's new frames near their pose from those that are solved, "
+        "before all are fitted"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
         "frames whose hidden layer is kept at a time"),
     {0}};

@@ -13,6 +13,7 @@ struct npg_window_solver {
     const npg_facts *facts; /* loan */
     bool is_aligned;
     npg_fit *fit;
+    npg_warm *warm; /* of windows without alignment, or NULL */
     npg_carry *carry;
     npg_matcher *matchers[MATCHERS_MAX]; /* each for a frame at a time */
     size_t matcher_count;
@@ -46,6 +47,11 @@ const npg_carry *npg_window_carry(const npg_window_solver *solver)
     return solver->carry;
 }
 
+npg_warm *npg_window_warm(npg_window_solver *solver)
+{
+    return solver->warm;
+}
+
 static void close_frames(npg_window_solver *s)
 {
     void *all[] = {&s->points, &s->point_start, &s->bases,  &s->now,       &s->dense,
@@ -58,6 +64,7 @@ void npg_window_solver_close(npg_window_solver **slot)
     if (!slot || !*slot) return;
     close_frames(*slot);
     npg_fit_close(&(*slot)->fit);
+    npg_warm_close(&(*slot)->warm);
     for (size_t m = 0; m < MATCHERS_MAX; m++) npg_matcher_close(&(*slot)->matchers[m]);
     npg_release(&(*slot)->surfaces);
     npg_carry_close(&(*slot)->carry);
@@ -150,6 +157,9 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     if (!status)
         status = is_aligned ? open_aligned_fit(s, device, seed)
                             : npg_fit_open(&s->fit, device, &s->settings.fit, facts->reference, seed);
+    if (!status && !is_aligned && settings->warm.is_on)
+        status = npg_warm_open(&s->warm, device, &s->settings.warm, &s->settings.fit, &s->settings.match,
+                               (size_t)settings->samples, settings->rounds, facts, seed);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
@@ -168,7 +178,9 @@ size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, s
     size_t samples = all + all / 10 + 16, looked_at = (size_t)settings->match.points;
     size_t solved = frames * vert_count * vector, clouds = frames * points * vector;
     if (!is_aligned)
-        return npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS) + solved + clouds;
+        return npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS) + solved + clouds +
+               npg_warm_memory(&settings->warm, &settings->fit, &settings->match, (size_t)settings->samples,
+                               vert_count, frames);
     if (samples > vert_count) samples = vert_count;
     size_t surface = vert_count < 2 * NPG_THIN_SURFACE ? vert_count : NPG_THIN_SURFACE;
     size_t pulls = frames * (looked_at + 2 * samples) * sizeof(npg_pull);
@@ -221,9 +233,11 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held, size_
             npg_figure_centre(s->figures[i].centre, base, size / 3);
             npg_figure_from_unit(&s->figures[i], s->fit_bases + i * size, base, size / 3);
         }
-        s->frames[i] = (npg_fit_frame){frame->index, npg_window_time(&s->facts->plan, (double)frame->index),
-                                       s->points + 3 * s->point_start[i], frame->point_count,
-                                       s->is_aligned ? s->fit_bases + i * size : NULL};
+        s->frames[i] = (npg_fit_frame){.index = frame->index,
+                                       .time = npg_window_time(&s->facts->plan, (double)frame->index),
+                                       .points = s->points + 3 * s->point_start[i],
+                                       .count = frame->point_count,
+                                       .base = s->is_aligned ? s->fit_bases + i * size : NULL};
     }
     return NPG_OK;
 }
@@ -354,16 +368,36 @@ static npg_status keep_solved(npg_held *held, const float *dense, size_t verts, 
     return NPG_OK;
 }
 
+/* Frames without alignment. */
+static npg_status solve_unaligned(npg_window_solver *s, npg_held *const *held, const npg_window *window,
+                                  npg_fit_watch *watch, void *user)
+{
+    const float **both;
+    if (!s->warm) {
+        NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
+        return npg_fit_run(s->fit, 0, s->settings.fit.epochs, watch, user);
+    }
+    NPG_TRY(npg_alloc_array(&both, NPG_FOR_FIT, 2 * s->count, sizeof *both));
+    for (size_t i = 0; i < s->count; i++) {
+        both[i] = held[i]->frame.normals;
+        both[s->count + i] = held[i]->solved;
+    }
+    const npg_warm_frames frames = {s->frames, both, both + s->count, s->count};
+    npg_status status = npg_warm_solve(s->warm, s->fit, &frames, window, watch, user);
+    npg_release(&both);
+    return status;
+}
+
 npg_status npg_window_solve(npg_window_solver *s, npg_held *const *held, const npg_window *window,
                             npg_fit_watch *watch, void *user)
 {
     size_t verts = s->facts->reference->vert_count, size = 3 * npg_window_sample_count(s);
     NPG_TRY(open_frames(s, held, (size_t)(window->last - window->first + 1)));
-    NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
     if (s->is_aligned) {
+        NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
         NPG_TRY(run_rounds(s, held, watch, user));
     } else {
-        NPG_TRY(npg_fit_run(s->fit, 0, s->settings.fit.epochs, watch, user));
+        NPG_TRY(solve_unaligned(s, held, window, watch, user));
         NPG_TRY(read_samples(s));
     }
     for (size_t i = 0; i < s->count; i++) {

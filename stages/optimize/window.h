@@ -9,6 +9,7 @@
 
 #include "optimize/fit.h"
 #include "optimize/match.h"
+#include "optimize/warm_start.h"
 #include "pipeline/stage.h"
 
 typedef struct npg_window_settings {
@@ -17,6 +18,7 @@ typedef struct npg_window_settings {
     int64_t samples;     /* 0: all vertices                                             */
     int64_t rounds;      /* times the matches are made                                  */
     double aligned_rate; /* share of the fit's learning rates where frames come aligned */
+    npg_warm_settings warm;
 } npg_window_settings;
 
 /* A frame in hand. */
@@ -60,6 +62,9 @@ size_t npg_window_sample_count(const npg_window_solver *solver);
 
 /* The samples that carry the surface; NULL where every vertex is decoded.  A loan. */
 const npg_carry *npg_window_carry(const npg_window_solver *solver);
+
+/* What is kept for windows without alignment (warm_start.h); NULL for aligned frames and cold starts.  A loan. */
+npg_warm *npg_window_warm(npg_window_solver *solver);
 
 /* What the time code is a function of: the absolute frame with a fixed period,
  * the length of the first window, so that frames which two windows share mean the same to both.

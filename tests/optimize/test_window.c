@@ -239,7 +239,7 @@ static void the_warm_start_is_exact_on_the_overlap(void **state)
     (void)state;
     for (int i = 0; i < FRAMES; i++) {
         pose_ball(points[i], ball->vert_pos, VERTS, i);
-        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL, NULL};
     }
     assert_int_equal(npg_fit_open(&fit, device, &small, ball, 3), 0);
     assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
@@ -289,7 +289,7 @@ static void overshoot(npg_mesh *ball, npg_deliver deliver, npg_time_kind time_co
     settings.time_code = time_code;
     for (int i = 0; i < FRAMES; i++) {
         pose_ball(points[i], ball->vert_pos, VERTS, i);
-        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL, NULL};
     }
     assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
     assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
@@ -329,7 +329,7 @@ static void a_fit_ends_with_its_least_loss(void **state)
  * its solved vertices then are from the first's, in the mean. */
 static double way_from_the_first(npg_mesh *ball, double tie)
 {
-    npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, tie}, 100, 2, 1};
+    npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, tie}, 100, 2, 1, {0}};
     npg_facts facts = {.reference = ball, .plan = {.frame_count = 3, .window = 2, .overlap = 1}};
     const npg_window first = {0, 1, -1, 0, 1, 0}, second = {1, 2, 0, 2, 2, 1};
     npg_window_solver *solver;
@@ -381,7 +381,7 @@ static void ties_hold_what_is_solved(void **state)
 /* One window over frames that have all gone `way` along x: where it puts the last one's first vertices. */
 static void solve_gone(float solved[3 * VERTS], npg_mesh *ball, float way)
 {
-    const npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, 1}, 100, 2, 1};
+    const npg_window_settings settings = {small, {500, 0.5, 0.5, 5000, 1}, 100, 2, 1, {0}};
     npg_facts facts = {.reference = ball, .plan = {.frame_count = 2, .window = 2}};
     const npg_window window = {0, 1, -1, 0, 1, 0};
     npg_window_solver *solver;
