@@ -38,6 +38,8 @@ static const npg_preset_value paper[] = {
 static const npg_preset_value grids[] = {
     {"align", "no"},         /* grids and decoder alone carry the motion */
     {"distance", "surface"}, /* of few samples */
+    {"width-1", "256"}, /* a third of the cost, and as good: samples/guide/why_these_defaults.md */
+    {"width-2", "256"},
     {"epochs", "60"},
     {"rounds", "4"},
     {"isometry", "20"},

@@ -617,9 +617,20 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
     if (!status && is_kept) status = return_to_least(fit, &least, &step);
     npg_fit_least_clear(&least);
     if (status) return status;
-    NPG_TRY(npg_buffer_read(&fit->mlp.params, 0, fit->params,
-                            npg_mlp_param_count(&fit->mlp.shape) * sizeof(float)));
+    NPG_TRY(npg_fit_read_params(fit));
     return decode(fit);
+}
+
+npg_status npg_fit_read_params(npg_fit *fit)
+{
+    size_t bytes = npg_mlp_param_count(&fit->mlp.shape) * sizeof(float);
+    return fit->frame_count ? npg_buffer_read(&fit->mlp.params, 0, fit->params, bytes) : NPG_OK;
+}
+
+npg_status npg_fit_write_params(npg_fit *fit)
+{
+    size_t bytes = npg_mlp_param_count(&fit->mlp.shape) * sizeof(float);
+    return fit->frame_count ? npg_buffer_write(&fit->mlp.params, 0, fit->params, bytes) : NPG_OK;
 }
 
 const npg_fit_step *npg_fit_result(const npg_fit *fit)

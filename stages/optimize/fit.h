@@ -127,6 +127,11 @@ typedef struct npg_fit_parts {
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit);
 
+/* While a window is begun its decoder is on the device: into parts.params, and from there.  Nothing to do
+ * without a window. */
+npg_status npg_fit_read_params(npg_fit *fit);
+npg_status npg_fit_write_params(npg_fit *fit);
+
 /* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
 size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points,
                       int units);

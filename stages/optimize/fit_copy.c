@@ -45,6 +45,7 @@ npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit)
 {
     part parts[PARTS_MAX];
     size_t count = parts_of(parts, fit), size = size_of(parts, count), at = 0;
+    NPG_TRY(npg_fit_read_params(fit));
     if (copy->size != size) npg_fit_copy_clear(copy);
     if (!copy->bytes) NPG_TRY(npg_alloc(&copy->bytes, NPG_FOR_FIT, size));
     copy->size = size;
@@ -65,7 +66,7 @@ npg_status npg_fit_copy_give(const npg_fit_copy *copy, npg_fit *fit)
         if (parts[i].buffer) NPG_TRY(npg_buffer_write(parts[i].buffer, 0, copy->bytes + at, parts[i].size));
         if (parts[i].host && parts[i].size) memcpy(parts[i].host, copy->bytes + at, parts[i].size);
     }
-    return NPG_OK;
+    return npg_fit_write_params(fit);
 }
 
 void npg_fit_copy_clear(npg_fit_copy *copy)

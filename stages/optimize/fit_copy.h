@@ -13,7 +13,7 @@ typedef struct npg_fit_copy {
     size_t size;
 } npg_fit_copy;
 
-/* The state after the fit's last run; the second into a fit before npg_fit_begin. */
+/* The present state, between steps. */
 npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit);
 npg_status npg_fit_copy_give(const npg_fit_copy *copy, npg_fit *fit);
 void npg_fit_copy_clear(npg_fit_copy *copy);

@@ -14,10 +14,10 @@
 #define SAMPLES       1500 /* where the option says 0                                      */
 #define GROUP (size_t)GETE("GR",2)    /* new frames that are brought near their pose together         */
 #define CONTEXT (size_t)GETE("CO",3)    /* solved frames beside them, which hold the field in place     */
-#define DISTIL_EPOCHS (int64_t)GETE("DE",10)   /* to a group's predicted poses                                 */
-#define OPEN_ROUNDS (int64_t)GETE("OR",3)    /* times a group is matched                                     */
-#define OPEN_EPOCHS (int64_t)GETE("OE",8)    /* of each round                                                */
-#define GATHER_EPOCHS (int64_t)GETE("GE",20)   /* to the poses of all frames, before they are fitted together  */
+#define DISTIL_EPOCHS (int64_t)GETE("DE",25)   /* to a group's predicted poses                                 */
+#define OPEN_ROUNDS (int64_t)GETE("OR",4)    /* times a group is matched                                     */
+#define OPEN_EPOCHS (int64_t)GETE("OE",20)    /* of each round                                                */
+#define GATHER_EPOCHS (int64_t)GETE("GE",40)   /* to the poses of all frames, before they are fitted together  */
 #define OPEN_WIDTH GETE("OW",0.2)  /* unit distances that count in full there                      */
 #define LAST_WIDTH GETE("LW",0.05) /* and when all frames are fitted together                      */
 #define VELOCITY GETE("VE",0.8)  /* share of the last step that the next is taken to be          */
