@@ -299,7 +299,9 @@ static npg_status mark_key(npg_worker *worker, npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     int64_t key = npg_worker_facts(worker)->plan.key;
-    bool is_first = state->passed_count++ == 0 && !npg_worker_facts(worker)->is_resumed;
+    const npg_facts *facts = npg_worker_facts(worker);
+    bool is_begun = facts->is_resumed && (facts->resumed_read || facts->plan.appended_at);
+    bool is_first = state->passed_count++ == 0 && !is_begun;
     frame->is_key = frame->index == key;
     frame->fields |= NPG_FIELD_KEY;
     if (is_first != frame->is_key)

@@ -45,6 +45,7 @@ struct npg_fit {
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
+    npg_fit_least least;                /* of a run at work                                          */
     npg_fit_step result;                /* what the present state measures; of a run that keeps the least */
     bool is_pulled;                     /* by known correspondences, from bases */
     size_t tied_count;                  /* frames, the first outward, that follow their tie */
@@ -261,6 +262,7 @@ void npg_fit_close(npg_fit **slot)
     if (!slot || !*slot) return;
     npg_fit *fit = *slot;
     close_window(fit);
+    npg_fit_least_clear(&(*slot)->least);
     npg_latent_close(&fit->latent);
     npg_sobolev_close(&fit->sobolev);
     npg_adam_close(&fit->grid_adam);
@@ -566,21 +568,30 @@ static npg_fit_knowns knowns_of(npg_fit *fit)
     return (npg_fit_knowns){&fit->u, &fit->mlp.params, fit->time_code};
 }
 
-/* The state that step measured, where it is the best so far. */
-static npg_status offer(npg_fit *fit, npg_fit_least *least, const npg_fit_step *step)
+static bool keeps_least(const npg_fit *fit)
 {
-    npg_fit_knowns now = knowns_of(fit);
-    if (!least) return NPG_OK;
-    return npg_fit_least_offer(least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
+    return fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled;
 }
 
-static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_least *least,
-                             npg_fit_watch *watch, void *user)
+struct npg_fit_least *npg_fit_open_least(npg_fit *fit)
+{
+    return &fit->least;
+}
+
+/* The state that step measured, where it is the best so far. */
+static npg_status offer(npg_fit *fit, const npg_fit_step *step)
+{
+    npg_fit_knowns now = knowns_of(fit);
+    if (!keeps_least(fit)) return NPG_OK;
+    return npg_fit_least_offer(&fit->least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
+}
+
+static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_watch *watch, void *user)
 {
     for (; step->epoch < end; step->epoch++) {
         fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
         NPG_TRY(measure_epoch(fit, step, true));
-        NPG_TRY(offer(fit, least, step));
+        NPG_TRY(offer(fit, step));
         NPG_TRY(end_epoch(fit));
         npg_status status = watch ? watch(user, step) : NPG_OK;
         if (status == NPG_END) {
@@ -592,30 +603,34 @@ static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_
     return NPG_OK;
 }
 
+void npg_fit_set_isometry(npg_fit *fit, double weight)
+{
+    fit->settings.isometry = weight;
+}
+
 void npg_fit_set_epochs(npg_fit *fit, int64_t epochs)
 {
     fit->settings.epochs = epochs;
 }
 
 /* The last step's outcome is measured as well; then the fit returns to the state with the least loss. */
-static npg_status return_to_least(npg_fit *fit, npg_fit_least *least, npg_fit_step *step)
+static npg_status return_to_least(npg_fit *fit, npg_fit_step *step)
 {
     npg_fit_knowns now = knowns_of(fit);
     NPG_TRY(measure_epoch(fit, step, false));
-    NPG_TRY(offer(fit, least, step));
-    fit->result = least->step;
-    return npg_fit_least_restore(least, &now);
+    NPG_TRY(offer(fit, step));
+    fit->result = fit->least.step;
+    return npg_fit_least_restore(&fit->least, &now);
 }
 
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
 {
     npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
-    npg_fit_least least = {.rows = NULL};
-    bool is_kept = fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled && end > first;
     fit->result.epochs = 0;
-    npg_status status = run_epochs(fit, &step, end, is_kept ? &least : NULL, watch, user);
-    if (!status && is_kept) status = return_to_least(fit, &least, &step);
-    npg_fit_least_clear(&least);
+    if (first == 0) npg_fit_least_clear(&fit->least);
+    npg_status status = run_epochs(fit, &step, end, watch, user);
+    if (!status && end > first && keeps_least(fit)) status = return_to_least(fit, &step);
+    npg_fit_least_clear(&fit->least);
     if (status) return status;
     NPG_TRY(npg_fit_read_params(fit));
     return decode(fit);

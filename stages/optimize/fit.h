@@ -97,10 +97,14 @@ npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count
  * pulls[start[i]] .. pulls[start[i + 1]].  Their vertices are changed to the fit's own order. */
 npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start);
 
+/* The weight of isometry from now on. */
+void npg_fit_set_isometry(npg_fit *fit, double weight);
+
 /* The length of the fit that the rates and the confidence of following epochs are laid out for. */
 void npg_fit_set_epochs(npg_fit *fit, int64_t epochs);
 
-/* Epochs first .. end - 1 of settings.epochs; afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED
+/* Epochs first .. end - 1 of settings.epochs (first > 0 continues a run that was broken off, or the rounds of
+ * one by pulls); afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED
  * names epoch and frame. */
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user);
 
@@ -126,6 +130,9 @@ typedef struct npg_fit_parts {
 } npg_fit_parts;
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit);
+
+/* Of a run at work that keeps the state of least loss (fit_least.h): that state, for saving and restoring. */
+struct npg_fit_least *npg_fit_open_least(npg_fit *fit);
 
 /* While a window is begun its decoder is on the device: into parts.params, and from there.  Nothing to do
  * without a window. */

@@ -11,6 +11,7 @@
 #include "optimize/fit_state.h"
 #include "optimize/record.h"
 #include "optimize/window.h"
+#include "pipeline/clock.h"
 #include "pipeline/live_plan.h"
 
 typedef struct state {
@@ -24,7 +25,8 @@ typedef struct state {
     bool is_aligned;
     int64_t total; /* frames of the capture, -1 until the stream has ended */
     double last_chamfer, last_isometry;
-    int64_t emitted;
+    int64_t emitted, state_every_s;
+    double saved_s; /* when the last state was written */
 } state;
 
 /* ---- options ---- */
@@ -116,6 +118,9 @@ static const npg_option options[] = {
     NPG_ROW_FLAG  ("warm-start",       WINDOW(warm.is_on),    "yes",
         "without alignment: bring a window's new frames near their pose from those that are solved, "
         "before all are fitted"),
+    NPG_ROW_INT   ("state-every",      offsetof(state, state_every_s), "120", 0, 1e6, "SECONDS",
+        "without alignment: a window that takes longer than this writes its state meanwhile, so that no more is "
+        "lost when the run is killed"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
         "frames whose hidden layer is kept at a time"),
     {0}};
@@ -129,6 +134,8 @@ void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
 }
 
 /* ---- opening ---- */
+
+static npg_status keep_inside(void *user);
 
 static npg_status check_widths(const npg_fit_settings *s)
 {
@@ -192,6 +199,8 @@ static npg_status open_solver(npg_worker *worker, bool is_aligned)
     s->window = npg_live_window(&facts->plan, 0, s->total);
     NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
                                    (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
+    if (npg_window_warm(s->solver)) npg_warm_set_keep(npg_window_warm(s->solver), keep_inside);
+    s->saved_s = npg_clock_s();
     json_object_set_new(npg_worker_report(worker), "samples",
                         json_integer((json_int_t)npg_window_sample_count(s->solver)));
     return NPG_OK;
@@ -337,15 +346,35 @@ static npg_status save_record(npg_worker *worker)
     return status;
 }
 
+static npg_hand hand_of(state *s, int64_t window_at)
+{
+    return (npg_hand){s->held,          s->held_count,   s->held_capacity,
+                      window_at,        s->emitted,      s->last_chamfer,
+                      s->last_isometry, s->is_aligned,   npg_window_figure(s->solver),
+                      npg_window_warm(s->solver)};
+}
+
 static npg_status save_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (!npg_job_of(worker)) return NPG_OK;
     NPG_TRY(save_record(worker));
-    const npg_hand hand = {s->held,          s->held_count, s->held_capacity,
-                           s->window_at,     s->emitted,    s->last_chamfer,
-                           s->last_isometry, s->is_aligned, npg_window_figure(s->solver)};
+    const npg_hand hand = hand_of(s, s->window_at);
+    s->saved_s = npg_clock_s();
     return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));
+}
+
+/* Inside a window that takes long, and when the run is to stop. */
+static npg_status keep_inside(void *user)
+{
+    npg_worker *worker = user;
+    state *s = npg_worker_state(worker);
+    bool is_due = npg_clock_s() - s->saved_s >= (double)s->state_every_s || npg_worker_stopping(worker);
+    if (!is_due || !npg_job_of(worker)) return NPG_OK;
+    const npg_hand hand = hand_of(s, s->window_at - 1);
+    NPG_TRY(npg_checkpoint_save_inside(worker, &hand));
+    s->saved_s = npg_clock_s();
+    return NPG_OK;
 }
 
 /* Where the state on disk was taken: the window is solved, its frames are not passed on. */
@@ -353,7 +382,6 @@ static npg_status resume(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    const npg_job *job = npg_job_of(worker);
     npg_hand hand = {0};
     npg_status status = npg_checkpoint_restore_hand(worker, &hand);
     s->held = hand.held;
@@ -364,7 +392,7 @@ static npg_status resume(npg_worker *worker)
     s->last_isometry = hand.last_isometry;
     if (!status) status = open_solver(worker, hand.is_aligned);
     if (!status)
-        status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(job), npg_job_grids_path(job));
+        status = npg_checkpoint_restore_fit(worker, npg_window_fit(s->solver), npg_window_warm(s->solver));
     if (status) return npg_error_prefix(status, "the state to resume from");
     s->window_at = hand.window_at;
     if (s->window_at >= 0) NPG_TRY(emit_done(worker));

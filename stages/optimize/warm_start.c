@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "optimize/fit_least.h"
 #include "pipeline/parallel.h"
 
 #define MATCHERS_MAX 8
@@ -19,10 +20,25 @@
 #define OPEN_EPOCHS (int64_t)GETE("OE",20)    /* of each round                                                */
 #define GATHER_EPOCHS (int64_t)GETE("GE",40)   /* to the poses of all frames, before they are fitted together  */
 #define OPEN_WIDTH GETE("OW",0.2)  /* unit distances that count in full there                      */
+#define STIFF GETE("ST",10)
 #define LAST_WIDTH GETE("LW",0.05) /* and when all frames are fitted together                      */
 #define VELOCITY GETE("VE",0.8)  /* share of the last step that the next is taken to be          */
 #define GETE(n, d) (getenv(n) ? atof(getenv(n)) : (d))
 #define ISOMETRY      20   /* beside match_total 5000                                      */
+
+/* What a window goes through, in this order. */
+typedef enum phase {
+    PHASE_NONE,
+    PHASE_OPEN,     /* new frames are brought near their pose     */
+    PHASE_SURFACE,  /* all frames by the surface; count is rounds */
+    PHASE_VERTICES  /* all frames by vertices; count is epochs    */
+} phase;
+
+/* Where a window's fit is. */
+typedef struct progress {
+    int64_t phase, count, step;
+    double loss, loss_before; /* sums over epochs, of what has to settle */
+} progress;
 
 struct npg_warm {
     npg_device *device;     /* loan */
@@ -31,6 +47,9 @@ struct npg_warm {
     npg_fit_settings fit_settings;
     npg_match_settings match;
     int64_t rounds;
+    size_t sample_target;
+    double isometry; /* of the samples' fit */
+    uint64_t seed;
     npg_carry *carry;
     npg_fit *probe; /* over the samples */
     npg_matcher *matchers[MATCHERS_MAX];
@@ -48,17 +67,22 @@ struct npg_warm {
     npg_fit_watch *watch;
     void *user;
     int64_t step, steps; /* of the window's epochs of all kinds */
+    npg_warm_keep *keep; /* or NULL */
+    progress at;
+    bool is_resumed;   /* `at`, poses and the fits are from an archive */
+    size_t pose_count; /* of an archive: frames that have poses        */
 };
 
 /* ---- opening ---- */
 
-static npg_status open_probe(npg_warm *w, uint64_t seed)
+static npg_status open_probe_fit(npg_warm *w)
 {
     npg_fit_settings probe = w->fit_settings;
     probe.confidence = NPG_CONFIDENCE_CONSTANT;
     probe.rate_end = 0.1;
     if (w->settings.distance == NPG_DISTANCE_VERTICES) probe.isometry = ISOMETRY;
-    return npg_fit_open(&w->probe, w->device, &probe, w->carry->samples->mesh, seed);
+    w->isometry = probe.isometry;
+    return npg_fit_open(&w->probe, w->device, &probe, w->carry->samples->mesh, w->seed);
 }
 
 static npg_status open_matchers(npg_warm *w)
@@ -69,6 +93,17 @@ static npg_status open_matchers(npg_warm *w)
     for (; w->matcher_count < count; w->matcher_count++)
         NPG_TRY(npg_matcher_open(&w->matchers[w->matcher_count], w->carry, &w->match));
     return NPG_OK;
+}
+
+/* What only windows need that start warm, once the first of them comes. */
+static npg_status open_probe(npg_warm *w)
+{
+    size_t samples = w->sample_target ? w->sample_target : SAMPLES;
+    if (w->probe) return NPG_OK;
+    NPG_TRY(npg_carry_open(&w->carry, w->facts->reference, samples, NPG_THIN_SURFACE));
+    w->samples = w->carry->samples->mesh->vert_count;
+    NPG_TRY(open_matchers(w));
+    return open_probe_fit(w);
 }
 
 npg_status npg_warm_open(npg_warm **out, npg_device *device, const npg_warm_settings *settings,
@@ -84,14 +119,10 @@ npg_status npg_warm_open(npg_warm **out, npg_device *device, const npg_warm_sett
     w->fit_settings = *fit;
     w->match = *match;
     w->rounds = rounds;
-    npg_status status =
-        npg_carry_open(&w->carry, facts->reference, samples ? samples : SAMPLES, NPG_THIN_SURFACE);
-    if (!status) w->samples = w->carry->samples->mesh->vert_count;
-    if (!status) status = open_matchers(w);
-    if (!status) status = open_probe(w, seed);
-    if (status) npg_warm_close(&w);
+    w->sample_target = samples;
+    w->seed = seed;
     *out = w;
-    return status;
+    return NPG_OK;
 }
 
 static void close_window(npg_warm *w)
@@ -122,6 +153,19 @@ void npg_warm_close(npg_warm **slot)
 npg_fit_copy *npg_warm_first(npg_warm *warm)
 {
     return &warm->first;
+}
+
+void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep)
+{
+    warm->keep = keep;
+}
+
+static npg_status keep(npg_warm *w, phase now, int64_t count)
+{
+    w->at.phase = now;
+    w->at.count = count;
+    w->at.step = w->step;
+    return w->keep ? w->keep(w->user) : NPG_OK;
 }
 
 /* ---- the samples' fit ---- */
@@ -276,10 +320,13 @@ static npg_status open_group(npg_warm *w, size_t last, int step, size_t count)
     NPG_TRY(read_poses(w, of, known));
     for (int round = 0; round < OPEN_ROUNDS; round++) {
         widen(w, OPEN_WIDTH);
+        double softer = OPEN_ROUNDS > 1 ? (double)round / (double)(OPEN_ROUNDS - 1) : 1;
+        npg_fit_set_isometry(w->probe, w->isometry * pow(STIFF, 1 - softer));
         NPG_TRY(set_pulls(w, of, known, false));
         NPG_TRY(run(w, OPEN_EPOCHS));
         NPG_TRY(read_poses(w, of, known));
     }
+    npg_fit_set_isometry(w->probe, w->isometry);
     for (size_t i = 0; i < count; i++) w->is_known[place[known + i]] = true;
     return NPG_OK;
 }
@@ -291,6 +338,7 @@ static npg_status open_way(npg_warm *w, size_t last, int step)
         size_t left = step > 0 ? w->in->count - 1 - last : last;
         size_t count = left < GROUP ? left : GROUP;
         NPG_TRY(open_group(w, last, step, count));
+        NPG_TRY(keep(w, PHASE_OPEN, 0));
         last += (size_t)step * count;
     }
     return NPG_OK;
@@ -303,6 +351,7 @@ static void find_known(npg_warm *w)
         const float *rest = w->carry->samples->mesh->vert_pos;
         bool is_key = w->in->frames[i].index == w->facts->plan.key;
         w->is_known[i] = is_key || w->in->solved[i];
+        if (!w->carry) continue; /* nothing is brought near */
         if (w->in->solved[i])
             npg_carry_gather(w->carry, pose_of(w, i), w->in->solved[i]);
         else if (is_key)
@@ -336,13 +385,13 @@ static npg_status decode(npg_warm *w)
     return npg_fit_run(w->dense, 0, 0, NULL, NULL);
 }
 
-static npg_status begin_dense(npg_warm *w, bool is_pulled)
+static npg_status begin_dense(npg_warm *w, bool is_pulled, bool is_handed_over)
 {
     for (size_t i = 0; i < w->in->count; i++) {
         w->in->frames[i].base = is_pulled ? w->facts->reference->vert_pos : NULL;
         w->in->frames[i].tie = is_pulled ? NULL : w->in->solved[i];
     }
-    NPG_TRY(npg_fit_hand_over(w->dense, w->probe));
+    if (is_handed_over) NPG_TRY(npg_fit_hand_over(w->dense, w->probe));
     return npg_fit_begin(w->dense, w->in->frames, w->in->count, w->facts->plan.key);
 }
 
@@ -351,9 +400,11 @@ static npg_status fit_surface(npg_warm *w, some all)
     size_t size = 3 * w->carry->vert_count;
     int64_t epochs = w->fit_settings.epochs;
     NPG_TRY(npg_alloc_array(&w->wide, NPG_FOR_FIT, w->in->count, size * sizeof(float)));
-    NPG_TRY(begin_dense(w, true));
+    NPG_TRY(begin_dense(w, true, true));
     widen(w, LAST_WIDTH);
-    for (int64_t round = 0; round < w->rounds; round++) {
+    for (int64_t round = w->is_resumed ? w->at.count : 0; round < w->rounds; round++) {
+        if (!w->is_resumed) NPG_TRY(keep(w, PHASE_SURFACE, round));
+        w->is_resumed = false;
         NPG_TRY(decode(w));
         for (size_t i = 0; i < all.count; i++) NPG_TRY(npg_fit_vertices(w->dense, w->wide + i * size, i));
         NPG_TRY(read_poses(w, all, 0));
@@ -370,33 +421,35 @@ static npg_status fit_surface(npg_warm *w, some all)
 #define LOOK_BACK 10   /* epochs whose mean loss is compared with that of those before */
 #define SETTLED   0.01 /* share that it has fallen at least while it is going on       */
 
-typedef struct settling {
-    npg_warm *w;
-    double now, before;
-    int64_t count;
-} settling;
+static npg_status watch_vertices(void *user, const npg_fit_step *step)
+{
+    npg_warm *w = user;
+    NPG_TRY(watch_step(w, step));
+    return keep(w, PHASE_VERTICES, step->epoch + 1);
+}
 
 static npg_status watch_settling(void *user, const npg_fit_step *step)
 {
-    settling *s = user;
-    NPG_TRY(watch_step(s->w, step));
-    s->now += step->chamfer + s->w->fit_settings.isometry * step->isometry;
-    if (++s->count % LOOK_BACK) return NPG_OK;
-    bool is_settled = s->count > LOOK_BACK && s->now > (1 - SETTLED) * s->before;
-    s->before = s->now;
-    s->now = 0;
-    return is_settled ? NPG_END : NPG_OK;
+    npg_warm *w = user;
+    int64_t count = step->epoch + 1;
+    bool is_settled = false;
+    NPG_TRY(watch_step(w, step));
+    w->at.loss += step->chamfer + w->fit_settings.isometry * step->isometry;
+    if (count % LOOK_BACK == 0) {
+        is_settled = count > LOOK_BACK && w->at.loss > (1 - SETTLED) * w->at.loss_before;
+        w->at.loss_before = w->at.loss;
+        w->at.loss = 0;
+    }
+    return is_settled ? NPG_END : keep(w, PHASE_VERTICES, count);
 }
 
 /* After the first window a third of its epochs are the most. */
 static npg_status fit_vertices(npg_warm *w, bool is_first)
 {
-    settling s = {.w = w};
-    int64_t epochs = w->fit_settings.epochs;
+    int64_t epochs = w->fit_settings.epochs, first = w->is_resumed ? w->at.count : 0;
     if (!is_first) epochs = (epochs + 2) / 3;
     npg_fit_set_epochs(w->dense, epochs);
-    return npg_fit_run(w->dense, 0, epochs, is_first ? watch_step : watch_settling,
-                       is_first ? (void *)w : (void *)&s);
+    return npg_fit_run(w->dense, first, epochs, is_first ? watch_vertices : watch_settling, w);
 }
 
 /* ---- a window ---- */
@@ -404,10 +457,15 @@ static npg_status fit_vertices(npg_warm *w, bool is_first)
 static npg_status open_window(npg_warm *w, const npg_warm_frames *in)
 {
     size_t size = 3 * w->samples * sizeof(float);
-    close_window(w);
+    if (!w->is_resumed) {
+        close_window(w);
+        NPG_TRY(npg_alloc_array(&w->poses, NPG_FOR_FIT, in->count, size));
+        NPG_TRY(npg_alloc_array(&w->is_known, NPG_FOR_FIT, in->count, sizeof *w->is_known));
+    } else if (w->pose_count != in->count) {
+        return npg_error(NPG_BAD_INPUT, "the state inside the window has %zu frames, not %zu", w->pose_count,
+                         in->count);
+    }
     w->in = in;
-    NPG_TRY(npg_alloc_array(&w->poses, NPG_FOR_FIT, in->count, size));
-    NPG_TRY(npg_alloc_array(&w->is_known, NPG_FOR_FIT, in->count, sizeof *w->is_known));
     NPG_TRY(npg_alloc_array(&w->pull_start, NPG_FOR_FIT, in->count + 1, sizeof *w->pull_start));
     return npg_alloc_array(&w->pull_count, NPG_FOR_FIT, in->count + 1, sizeof *w->pull_count);
 }
@@ -436,38 +494,111 @@ static npg_status solve_cold(npg_warm *w)
     return fit_vertices(w, true);
 }
 
+/* Up to where all frames of the window are near their pose and the samples' fit has them all. */
+static npg_status come_near(npg_warm *w, const npg_window *window, some all)
+{
+    if (w->is_resumed && w->at.phase == PHASE_SURFACE) {
+        NPG_TRY(begin(w, all));
+        return npg_fit_run(w->probe, 0, 0, NULL, NULL);
+    }
+    if (!w->is_resumed) NPG_TRY(start(w, window));
+    w->is_resumed = false;
+    NPG_TRY(open_new(w));
+    return gather(w, all);
+}
+
 static npg_status solve_warm(npg_warm *w, const npg_window *window)
 {
     size_t *place;
-    NPG_TRY(start(w, window));
-    NPG_TRY(open_new(w));
+    bool is_by_surface = w->settings.distance == NPG_DISTANCE_SURFACE, is_near = w->at.phase == PHASE_VERTICES;
     NPG_TRY(npg_alloc_array(&place, NPG_FOR_FIT, w->in->count, sizeof *place));
     for (size_t i = 0; i < w->in->count; i++) place[i] = i;
     some all = {place, w->in->count};
-    npg_status status = gather(w, all);
-    if (!status && w->settings.distance == NPG_DISTANCE_SURFACE) status = fit_surface(w, all);
+    npg_status status = is_near ? NPG_OK : come_near(w, window, all);
+    if (!status && is_by_surface) status = fit_surface(w, all);
     npg_release(&place);
-    if (status || w->settings.distance == NPG_DISTANCE_SURFACE) return status;
-    NPG_TRY(begin_dense(w, false));
+    if (status || is_by_surface) return status;
+    NPG_TRY(begin_dense(w, false, !is_near));
     return fit_vertices(w, false);
 }
 
 npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *frames, const npg_window *window,
                           npg_fit_watch *watch, void *user)
 {
-    bool is_first = window->direction == 0;
-    bool is_cold = is_first && w->settings.distance == NPG_DISTANCE_VERTICES;
+    bool is_first = window->direction == 0, by_vertices = w->settings.distance == NPG_DISTANCE_VERTICES;
+    bool is_cold = by_vertices && (is_first || !w->settings.is_on);
+    NPG_TRY(is_cold ? NPG_OK : open_probe(w));
     NPG_TRY(open_window(w, frames));
     w->dense = fit;
     w->watch = watch;
     w->user = user;
-    find_known(w);
-    w->step = 0;
+    if (!w->is_resumed) {
+        w->at = (progress){.phase = PHASE_NONE};
+        find_known(w);
+    }
+    w->step = w->at.step;
     w->steps = steps_of(w, is_cold);
     npg_status status = is_cold ? solve_cold(w) : solve_warm(w, window);
-    if (!status && is_first) status = npg_fit_copy_take(&w->first, fit);
+    w->is_resumed = false;
+    if (!status && is_first && w->settings.is_on) status = npg_fit_copy_take(&w->first, fit);
     close_window(w);
     return status;
+}
+
+/* ---- states inside a window ---- */
+
+npg_status npg_warm_save(npg_warm *w, npg_archive_writer *archive)
+{
+    npg_fit_copy copy = {0};
+    size_t count = w->in->count;
+    NPG_TRY(npg_archive_put(archive, "inside", &w->at, sizeof w->at));
+    if (w->carry) {
+        NPG_TRY(npg_archive_put(archive, "inside.poses", w->poses, count * 3 * w->samples * sizeof(float)));
+    }
+    NPG_TRY(npg_archive_put(archive, "inside.known", w->is_known, count * sizeof *w->is_known));
+    npg_status status = npg_fit_copy_take(&copy, w->dense);
+    if (!status) status = npg_fit_copy_save(&copy, archive, "inside.fit");
+    if (!status && w->probe) status = npg_fit_copy_take(&copy, w->probe);
+    if (!status && w->probe) status = npg_fit_copy_save(&copy, archive, "inside.probe");
+    npg_fit_copy_clear(&copy);
+    return status ? status : npg_fit_least_save(npg_fit_open_least(w->dense), archive);
+}
+
+static npg_status restore_fit(npg_fit *fit, const npg_archive *archive, const char *block)
+{
+    npg_fit_copy copy = {0};
+    npg_status status = npg_fit_copy_load(&copy, archive, block);
+    if (!status && copy.bytes) status = npg_fit_copy_give(&copy, fit);
+    npg_fit_copy_clear(&copy);
+    return status;
+}
+
+static npg_status restore_poses(npg_warm *w, const npg_archive *archive)
+{
+    size_t poses = 0, known = 0;
+    npg_archive_find(archive, "inside.known", &known);
+    if (npg_archive_find(archive, "inside.poses", &poses)) {
+        NPG_TRY(open_probe(w));
+        NPG_TRY(restore_fit(w->probe, archive, "inside.probe"));
+        NPG_TRY(npg_alloc(&w->poses, NPG_FOR_FIT, poses));
+        NPG_TRY(npg_archive_get(archive, "inside.poses", w->poses, poses));
+        if (poses != known / sizeof *w->is_known * 3 * w->samples * sizeof(float))
+            return npg_error(NPG_BAD_INPUT, "the block inside.poses has not the size of its frames");
+    }
+    NPG_TRY(npg_alloc(&w->is_known, NPG_FOR_FIT, known));
+    w->pose_count = known / sizeof *w->is_known;
+    return npg_archive_get(archive, "inside.known", w->is_known, known);
+}
+
+npg_status npg_warm_restore(npg_warm *w, npg_fit *fit, const npg_archive *archive)
+{
+    close_window(w);
+    NPG_TRY(npg_archive_get(archive, "inside", &w->at, sizeof w->at));
+    NPG_TRY(restore_fit(fit, archive, "inside.fit"));
+    NPG_TRY(restore_poses(w, archive));
+    NPG_TRY(npg_fit_least_load(npg_fit_open_least(fit), archive));
+    w->is_resumed = true;
+    return NPG_OK;
 }
 
 /* ---- memory ---- */

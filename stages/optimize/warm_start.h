@@ -35,6 +35,9 @@ typedef struct npg_warm_frames {
 
 typedef struct npg_warm npg_warm;
 
+/* Called between steps from which the window's fit could be continued: it may save that (npg_warm_save). */
+typedef npg_status npg_warm_keep(void *user);
+
 /* samples: of the reference, 0 for the usual number; rounds: times that the last fit by the surface is
  * matched.  device and facts outlive it. */
 npg_status npg_warm_open(npg_warm **warm, npg_device *device, const npg_warm_settings *settings,
@@ -46,9 +49,17 @@ void npg_warm_close(npg_warm **warm);
 size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings *fit,
                        const npg_match_settings *match, size_t samples, size_t vert_count, size_t frames);
 
+/* keep gets the user of npg_warm_solve. */
+void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep);
+
 /* Solve a window with `fit`, over all vertices: it then holds the frames' positions. */
 npg_status npg_warm_solve(npg_warm *warm, npg_fit *fit, const npg_warm_frames *frames,
                           const npg_window *window, npg_fit_watch *watch, void *user);
+
+/* How far the window at work is, during a keep: as blocks of an archive; and before npg_warm_solve of the same
+ * window, which then continues there. */
+npg_status npg_warm_save(npg_warm *warm, npg_archive_writer *archive);
+npg_status npg_warm_restore(npg_warm *warm, npg_fit *fit, const npg_archive *archive);
 
 /* What the fit knew after the window around the keyframe, while a later window may start from it. */
 npg_fit_copy *npg_warm_first(npg_warm *warm);

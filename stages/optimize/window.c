@@ -157,7 +157,7 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     if (!status)
         status = is_aligned ? open_aligned_fit(s, device, seed)
                             : npg_fit_open(&s->fit, device, &s->settings.fit, facts->reference, seed);
-    if (!status && !is_aligned && settings->warm.is_on)
+    if (!status && !is_aligned)
         status = npg_warm_open(&s->warm, device, &s->settings.warm, &s->settings.fit, &s->settings.match,
                                (size_t)settings->samples, settings->rounds, facts, seed);
     if (status) npg_window_solver_close(&s);
@@ -373,10 +373,6 @@ static npg_status solve_unaligned(npg_window_solver *s, npg_held *const *held, c
                                   npg_fit_watch *watch, void *user)
 {
     const float **both;
-    if (!s->warm) {
-        NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
-        return npg_fit_run(s->fit, 0, s->settings.fit.epochs, watch, user);
-    }
     NPG_TRY(npg_alloc_array(&both, NPG_FOR_FIT, 2 * s->count, sizeof *both));
     for (size_t i = 0; i < s->count; i++) {
         both[i] = held[i]->frame.normals;

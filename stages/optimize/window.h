@@ -63,7 +63,7 @@ size_t npg_window_sample_count(const npg_window_solver *solver);
 /* The samples that carry the surface; NULL where every vertex is decoded.  A loan. */
 const npg_carry *npg_window_carry(const npg_window_solver *solver);
 
-/* What is kept for windows without alignment (warm_start.h); NULL for aligned frames and cold starts.  A loan. */
+/* Windows without alignment (warm_start.h); NULL for aligned frames.  A loan. */
 npg_warm *npg_window_warm(npg_window_solver *solver);
 
 /* What the time code is a function of: the absolute frame with a fixed period,
