@@ -348,14 +348,13 @@ static npg_status open_way(npg_warm *w, size_t last, int step)
 static void find_known(npg_warm *w)
 {
     for (size_t i = 0; i < w->in->count; i++) {
-        const float *rest = w->carry->samples->mesh->vert_pos;
         bool is_key = w->in->frames[i].index == w->facts->plan.key;
         w->is_known[i] = is_key || w->in->solved[i];
         if (!w->carry) continue; /* nothing is brought near */
         if (w->in->solved[i])
             npg_carry_gather(w->carry, pose_of(w, i), w->in->solved[i]);
         else if (is_key)
-            memcpy(pose_of(w, i), rest, 3 * w->samples * sizeof(float));
+            memcpy(pose_of(w, i), w->carry->samples->mesh->vert_pos, 3 * w->samples * sizeof(float));
     }
 }
 
