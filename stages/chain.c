@@ -35,6 +35,21 @@ static const npg_preset_value paper[] = {
     {"feature-start", "0"},
     {"deliver", "last"},
     {NULL, NULL}};
+static const npg_preset_value paper_1000[] = {
+    {"align", "no"},
+    {"keyframe-choice", "paper"},
+    {"hold-apart", "no"},
+    {"smooth", "no"},
+    {"welds", "keep"},
+    {"window", "-1"},
+    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
+    {"isometry", "100"},
+    {"confidence", "cumulative"},
+    {"smoothing", "doubled"},
+    {"rate-end", "1"},
+    {"feature-start", "0"},
+    {"deliver", "last"},
+    {NULL, NULL}};
 static const npg_preset_value grids[] = {
     {"align", "no"},         /* grids and decoder alone carry the motion */
     {"distance", "surface"}, /* of few samples */
@@ -52,5 +67,6 @@ const npg_preset npg_presets[] = {
     {"best", "the same with a finer graph and more steps: slower, closer", best},
     {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
      paper},
+    {"paper-1000", "the same with its 1000 epochs", paper_1000},
     {"grids", "the paper's grids and decoder with our distance and warm starts: no alignment, windows", grids},
     {NULL, NULL, NULL}};

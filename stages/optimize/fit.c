@@ -19,9 +19,6 @@
 #define HASH_ROWS      16384
 #define HASH_FIRST     16
 #define HASH_GROWTH    1.35
-#define POSITION_FIRST 0 /* channels of the position grids */
-#define POSITION_END   30
-#define NORMAL_END     32 /* channels of the normal grid: 30, 31 */
 
 struct npg_fit {
     npg_fit_settings settings;
@@ -77,8 +74,8 @@ static void add_grids(npg_levels *levels, const npg_fit_settings *s)
         npg_levels_add(levels,
                        (npg_level){.kind = NPG_LEVEL_POSITION,
                                    .nodes = (int)(s->grid_base + l * s->grid_step),
-                                   .channel_first = POSITION_FIRST,
-                                   .channel_end = POSITION_END,
+                                   .channel_first = 0,
+                                   .channel_end = (int)s->position_channels,
                                    .share = single ? 1.0 : 1.0 / (double)s->grid_levels,
                                    .lambda = s->lambda * pow(s->lambda_growth, (double)l),
                                    .screen = screen_of(s, s->lambda * pow(s->lambda_growth, (double)l)),
@@ -89,7 +86,7 @@ static void add_grids(npg_levels *levels, const npg_fit_settings *s)
 
 static void add_hash(npg_levels *levels, const npg_fit_settings *s)
 {
-    for (int l = 0; l < HASH_LEVELS; l++)
+    for (int l = 0; l < HASH_LEVELS && 2 * l + 2 <= s->position_channels; l++)
         npg_levels_add(levels,
                        (npg_level){.kind = NPG_LEVEL_HASHED,
                                    .nodes = (int)floor(HASH_FIRST * pow(HASH_GROWTH, l)),
@@ -110,8 +107,8 @@ static void choose_levels(npg_levels *levels, const npg_fit_settings *s)
     npg_levels_add(levels,
                    (npg_level){.kind = NPG_LEVEL_NORMAL,
                                .nodes = (int)s->normal_nodes,
-                               .channel_first = POSITION_END,
-                               .channel_end = NORMAL_END,
+                               .channel_first = (int)s->position_channels,
+                               .channel_end = (int)(s->position_channels + s->normal_channels),
                                .share = 1,
                                .lambda = s->lambda,
                                .screen = screen_of(s, s->lambda),
@@ -202,7 +199,8 @@ static npg_status draw_params(npg_fit *fit)
     npg_mlp_shape s = shape_of(&fit->settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
     size_t count = npg_mlp_param_count(&s);
-    double first = 1 / sqrt((double)(NPG_LATENT_CHANNELS + s.code_size)), second = 1 / sqrt((double)s.w1);
+    int64_t channels = fit->settings.position_channels + fit->settings.normal_channels; /* the others are 0 */
+    double first = 1 / sqrt((double)channels + (double)s.code_size), second = 1 / sqrt((double)s.w1);
     NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
     for (size_t i = 0; i < count; i++) {
         double value = 2 * npg_random_real(&random) - 1;

@@ -47,6 +47,7 @@ typedef struct npg_fit_settings {
     int rotation, time_code, encoding, confidence, catch_up, smoothing, deliver /* enums of these names */;
     int64_t frequencies;
     int64_t grid_base, grid_step, grid_levels, normal_nodes;
+    int64_t position_channels, normal_channels; /* |z_p| and |z_n|, together NPG_LATENT_CHANNELS at most */
     bool normal_grid;
     double lambda, lambda_growth, grid_rate, grid_rate_growth;
     double mlp_rate, slope, isometry, alpha;

@@ -70,6 +70,10 @@ static const npg_option options[] = {
         "features by normal direction beside those by position"),
     NPG_ROW_INT   ("normal-nodes",     FIT(normal_nodes),     "4",          2,     32,   "N",
         "nodes per axis of the normal grid"),
+    NPG_ROW_INT   ("position-channels", FIT(position_channels), "30",       2,     31,   "N",
+        "features that the position grids give the decoder"),
+    NPG_ROW_INT   ("normal-channels",  FIT(normal_channels),  "2",          1,     30,   "N",
+        "features that the normal grid gives it; both together are 32 at most"),
     NPG_ROW_INT   ("width-1",          FIT(width_1),          "512",        32,    4096, "N",
         "units of the first hidden layer"),
     NPG_ROW_INT   ("width-2",          FIT(width_2),          "512",        32,    4096, "N",
@@ -142,6 +146,9 @@ static npg_status check_widths(const npg_fit_settings *s)
     if (s->width_1 % 32 || s->width_2 % 32)
         return npg_error(NPG_USAGE, "option width-%d: %lld is not a multiple of 32", s->width_1 % 32 ? 1 : 2,
                          (long long)(s->width_1 % 32 ? s->width_1 : s->width_2));
+    if (s->position_channels + s->normal_channels > NPG_LATENT_CHANNELS)
+        return npg_error(NPG_USAGE, "options position-channels and normal-channels: %lld and %lld are more than %d",
+                         (long long)s->position_channels, (long long)s->normal_channels, NPG_LATENT_CHANNELS);
     return NPG_OK;
 }
 
