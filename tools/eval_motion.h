@@ -11,13 +11,13 @@ typedef struct npg_eval_motion {
     uint32_t *faces; /* of the first frame, a loan of `first` */
     npg_mesh *first;
     uint32_t (*edges)[2];
-    uint32_t *star_start, *star; /* V + 1; the neighbours of each vertex */
-    float *star_rest, *star_now; /* of the largest star, x 3             */
-    float *before[2];                  /* the last frame's positions, and those before; owned */
-    float *areas;                      /* frames x F, owned                                   */
-    size_t area_room;                  /* rows                                                */
+    uint32_t *star_start, *star;            /* V + 1; the neighbours of each vertex */
+    float *star_rest, *star_now;            /* of the largest star, x 3             */
+    float *before[2];                       /* the last frame's positions, and those before; owned */
+    float *areas;                           /* frames x F, owned                                   */
+    size_t area_room;                       /* rows                                                */
     double jitter_sum, edge_sum, rigid_sum; /* sums of means per frame                        */
-    bool vertices_last, topology_last; /* the same count, the same faces, so far              */
+    bool vertices_last, topology_last;      /* the same count, the same faces, so far              */
 } npg_eval_motion;
 
 typedef struct npg_eval_motion_figures {

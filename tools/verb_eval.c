@@ -245,7 +245,8 @@ static void print_text(const evaluation *e, const npg_frame_metrics *mean, doubl
     printf("\nconstant topology %s", e->motion.topology_last ? "yes" : "no");
     if (isfinite(e->moved.jitter)) printf("  jitter %.3g", e->moved.jitter);
     if (isfinite(e->moved.edge))
-        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", e->moved.edge, e->moved.rigid, e->moved.bad);
+        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", e->moved.edge, e->moved.rigid,
+               e->moved.bad);
     putchar('\n');
 }
 

@@ -13,8 +13,8 @@
  *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those
  *                                  of all windows stay, for neupig apply
  *
- *     OUT/job/inside.npg           state inside the window at work, where that takes long: all that a window's
- *                                  state has, the fit's progress, and its grids.  It goes with the window's end
+ *     OUT/job/inside.npg           state inside the window at work, where that takes long: what a window's
+ *                                  state has, the fit's progress, its grids; removed when it is solved
  *
  * The two newest windows stay, and the one that later frames start from (neupig append);
  * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the
@@ -100,8 +100,8 @@ typedef npg_status npg_job_write_state(void *user, npg_archive_writer *out, cons
 npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                               void *user);
 
-/* The same for the window at work, which is not solved yet; it replaces the one before.  write() gets no path for
- * grids. */
+/* The same for the window at work, which is not solved yet; it replaces the one before.  write() gets no path
+ * for grids. */
 npg_status npg_job_save_inside(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                                void *user);
 

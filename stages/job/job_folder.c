@@ -281,7 +281,8 @@ static npg_status open_inside(npg_job *job, npg_worker *worker, bool with_log)
     if (status) {
         npg_archive_close(&archive);
         if (status < 0 && status != NPG_MEMORY)
-            npg_worker_warn(worker, false, -1, "%s; the job resumes from the window before", npg_error_text());
+            npg_worker_warn(worker, false, -1, "%s; the job resumes from the window before",
+                            npg_error_text());
         return status == NPG_MEMORY ? status : NPG_OK;
     }
     npg_archive_close(&job->archive);

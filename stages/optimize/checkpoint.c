@@ -166,9 +166,9 @@ static npg_status write_inside(void *user, npg_archive_writer *out, const char *
 npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
 {
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    const npg_job_moment moment = {
-        .emitted = hand->emitted,
-        .read = hand->window_at >= 0 ? npg_plan_read_before(plan, hand->window_at) : 0};
+    const npg_job_moment moment = {.emitted = hand->emitted,
+                                   .read = hand->window_at >= 0 ? npg_plan_read_before(plan, hand->window_at)
+                                                                : 0};
     saving s = {worker, hand, NULL};
     return npg_job_save_inside(worker, &moment, write_inside, &s);
 }

@@ -15,10 +15,10 @@
 #include "optimize/fit_weights.h"
 #include "pipeline/random.h"
 
-#define HASH_LEVELS    15
-#define HASH_ROWS      16384
-#define HASH_FIRST     16
-#define HASH_GROWTH    1.35
+#define HASH_LEVELS 15
+#define HASH_ROWS   16384
+#define HASH_FIRST  16
+#define HASH_GROWTH 1.35
 
 struct npg_fit {
     npg_fit_settings settings;
@@ -339,8 +339,7 @@ static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
                            fit->frame_count);
 }
 
-/* Every vertex of the tied frames pulled to where it is known to be, by the mean over vertices of d^2 times
- * TIE_WEIGHT: about what all distances of a frame of 5000 points weigh. */
+/* Of a tied frame, for the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
 #define TIE_WEIGHT 15000
 
 static npg_status set_ties(npg_fit *fit, const npg_fit_frame *frames)
@@ -478,9 +477,9 @@ static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first
     NPG_TRY(npg_buffer_read(&fit->motion.cd, first * sizeof(float), fit->cd + first, count * sizeof(float)));
     NPG_TRY(check_losses(fit, first, count, epoch));
     for (size_t k = first; k < first + count; k++)
-        fit->gains[k] = k < fit->tied_count ? (float)weights->share
-                                            : (float)npg_weights_next(weights, fit->index[k], fit->cd[k],
-                                                                      fit->has_points[k]);
+        fit->gains[k] = k < fit->tied_count
+                            ? (float)weights->share
+                            : (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
     return npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first,
                            count);
 }
@@ -636,14 +635,14 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
 
 npg_status npg_fit_read_params(npg_fit *fit)
 {
-    size_t bytes = npg_mlp_param_count(&fit->mlp.shape) * sizeof(float);
-    return fit->frame_count ? npg_buffer_read(&fit->mlp.params, 0, fit->params, bytes) : NPG_OK;
+    return fit->frame_count ? npg_buffer_read(&fit->mlp.params, 0, fit->params, fit->mlp.params.size)
+                            : NPG_OK;
 }
 
 npg_status npg_fit_write_params(npg_fit *fit)
 {
-    size_t bytes = npg_mlp_param_count(&fit->mlp.shape) * sizeof(float);
-    return fit->frame_count ? npg_buffer_write(&fit->mlp.params, 0, fit->params, bytes) : NPG_OK;
+    return fit->frame_count ? npg_buffer_write(&fit->mlp.params, 0, fit->params, fit->mlp.params.size)
+                            : NPG_OK;
 }
 
 const npg_fit_step *npg_fit_result(const npg_fit *fit)

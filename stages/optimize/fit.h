@@ -60,9 +60,9 @@ typedef struct npg_fit_settings {
 /* The values that the options have now (table of the optimize stage). */
 void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *options);
 
-/* One frame of a window.  All frames of a window have bases (and follow by pulls), or none has: then those that
- * are tied follow their tie, the others their points by Chamfer distance.  Tied frames are nearer to the key
- * than all others: what an earlier window solved. */
+/* One frame of a window.  All frames of a window have bases (and follow by pulls), or none has: then those
+ * that are tied follow their tie, the others their points by Chamfer distance.  Tied frames are nearer to the
+ * key than all others: what an earlier window solved. */
 typedef struct npg_fit_frame {
     int64_t index;       /* place in time; |index - key| orders the confidence        */
     double time;         /* what the time code is a function of, 0..1 over the window */
@@ -81,8 +81,8 @@ typedef struct npg_fit_step {
     double chamfer, isometry, loss;
 } npg_fit_step;
 
-/* Asked after each epoch; anything but NPG_OK ends the fit with that status, but NPG_END ends it as if that had
- * been the last epoch. */
+/* Asked after each epoch; NPG_END ends the fit as if that had been the last epoch, anything else but NPG_OK
+ * with that status. */
 typedef npg_status npg_fit_watch(void *user, const npg_fit_step *step);
 
 /* The device is a loan.  reference: unit coordinates with normals; a loan. */

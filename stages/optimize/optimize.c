@@ -123,8 +123,8 @@ static const npg_option options[] = {
         "without alignment: bring a window's new frames near their pose from those that are solved, "
         "before all are fitted"),
     NPG_ROW_INT   ("state-every",      offsetof(state, state_every_s), "120", 0, 1e6, "SECONDS",
-        "without alignment: a window that takes longer than this writes its state meanwhile, so that no more is "
-        "lost when the run is killed"),
+        "without alignment: a window that takes longer writes its state meanwhile, "
+        "so that no more is lost when the run is killed"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
         "frames whose hidden layer is kept at a time"),
     {0}};
@@ -147,7 +147,8 @@ static npg_status check_widths(const npg_fit_settings *s)
         return npg_error(NPG_USAGE, "option width-%d: %lld is not a multiple of 32", s->width_1 % 32 ? 1 : 2,
                          (long long)(s->width_1 % 32 ? s->width_1 : s->width_2));
     if (s->position_channels + s->normal_channels > NPG_LATENT_CHANNELS)
-        return npg_error(NPG_USAGE, "options position-channels and normal-channels: %lld and %lld are more than %d",
+        return npg_error(NPG_USAGE,
+                         "options position-channels and normal-channels: %lld and %lld are more than %d",
                          (long long)s->position_channels, (long long)s->normal_channels, NPG_LATENT_CHANNELS);
     return NPG_OK;
 }
@@ -355,9 +356,15 @@ static npg_status save_record(npg_worker *worker)
 
 static npg_hand hand_of(state *s, int64_t window_at)
 {
-    return (npg_hand){s->held,          s->held_count,   s->held_capacity,
-                      window_at,        s->emitted,      s->last_chamfer,
-                      s->last_isometry, s->is_aligned,   npg_window_figure(s->solver),
+    return (npg_hand){s->held,
+                      s->held_count,
+                      s->held_capacity,
+                      window_at,
+                      s->emitted,
+                      s->last_chamfer,
+                      s->last_isometry,
+                      s->is_aligned,
+                      npg_window_figure(s->solver),
                       npg_window_warm(s->solver)};
 }
 

@@ -2,8 +2,6 @@
 #include "optimize/warm_start.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "optimize/fit_least.h"
@@ -12,26 +10,25 @@
 #define MATCHERS_MAX 8
 
 /* By trial (samples/guide/why_these_defaults.md, "Warm starts"). */
-#define SAMPLES       1500 /* where the option says 0                                      */
-#define GROUP (size_t)GETE("GR",2)    /* new frames that are brought near their pose together         */
-#define CONTEXT (size_t)GETE("CO",3)    /* solved frames beside them, which hold the field in place     */
-#define DISTIL_EPOCHS (int64_t)GETE("DE",25)   /* to a group's predicted poses                                 */
-#define OPEN_ROUNDS (int64_t)GETE("OR",4)    /* times a group is matched                                     */
-#define OPEN_EPOCHS (int64_t)GETE("OE",20)    /* of each round                                                */
-#define GATHER_EPOCHS (int64_t)GETE("GE",40)   /* to the poses of all frames, before they are fitted together  */
-#define OPEN_WIDTH GETE("OW",0.2)  /* unit distances that count in full there                      */
-#define STIFF GETE("ST",10)
-#define LAST_WIDTH GETE("LW",0.05) /* and when all frames are fitted together                      */
-#define VELOCITY GETE("VE",0.8)  /* share of the last step that the next is taken to be          */
-#define GETE(n, d) (getenv(n) ? atof(getenv(n)) : (d))
-#define ISOMETRY      20   /* beside match_total 5000                                      */
+#define SAMPLES       1500 /* where the option says 0                                        */
+#define GROUP         1    /* new frames that are brought near their pose together           */
+#define CONTEXT       3    /* solved frames beside them, which hold the field in place       */
+#define VELOCITY      0.8  /* share of the last step that the next is taken to be            */
+#define DISTIL_EPOCHS 25   /* to the predicted poses                                         */
+#define OPEN_ROUNDS   4    /* times a new frame is matched                                   */
+#define OPEN_EPOCHS   15   /* of each round                                                  */
+#define OPEN_WIDTH    0.2  /* unit distances that count in full there                        */
+#define OPEN_ISOMETRY 10   /* in the last round, beside match-total 5000 ...                 */
+#define OPEN_STIFFER  20   /* ... and so much more in the first: limbs go as a whole at first */
+#define GATHER_EPOCHS 40   /* to the poses of all frames, before they are fitted together    */
+#define LAST_WIDTH    0.05 /* unit distances that count in full when they are                */
 
 /* What a window goes through, in this order. */
 typedef enum phase {
     PHASE_NONE,
-    PHASE_OPEN,     /* new frames are brought near their pose     */
-    PHASE_SURFACE,  /* all frames by the surface; count is rounds */
-    PHASE_VERTICES  /* all frames by vertices; count is epochs    */
+    PHASE_OPEN,    /* new frames are brought near their pose     */
+    PHASE_SURFACE, /* all frames by the surface; count is rounds */
+    PHASE_VERTICES /* all frames by vertices; count is epochs    */
 } phase;
 
 /* Where a window's fit is. */
@@ -80,7 +77,7 @@ static npg_status open_probe_fit(npg_warm *w)
     npg_fit_settings probe = w->fit_settings;
     probe.confidence = NPG_CONFIDENCE_CONSTANT;
     probe.rate_end = 0.1;
-    if (w->settings.distance == NPG_DISTANCE_VERTICES) probe.isometry = ISOMETRY;
+    if (w->settings.distance == NPG_DISTANCE_VERTICES) probe.isometry = OPEN_ISOMETRY;
     w->isometry = probe.isometry;
     return npg_fit_open(&w->probe, w->device, &probe, w->carry->samples->mesh, w->seed);
 }
@@ -177,7 +174,6 @@ static npg_status watch_step(void *user, const npg_fit_step *step)
     npg_fit_step of_window = *step;
     of_window.epoch = w->step++;
     of_window.epochs = w->steps;
-    if (getenv("DBG") && (step->epoch == 0 || step->epoch + 1 == step->epochs || step->epoch % 15 == 14)) fprintf(stderr, "%lld/%lld c %.5f i %.6f l %.5f\n", (long long)step->epoch, (long long)step->epochs, step->chamfer, step->isometry, step->loss);
     return w->watch ? w->watch(w->user, &of_window) : NPG_OK;
 }
 
@@ -199,9 +195,8 @@ static npg_status begin(npg_warm *w, some of)
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, of.count, sizeof *frames));
     for (size_t i = 0; i < of.count; i++) {
         const npg_fit_frame *from = &w->in->frames[of.place[i]];
-        frames[i] = (npg_fit_frame){.index = from->index,
-                                    .time = from->time,
-                                    .base = w->carry->samples->mesh->vert_pos};
+        frames[i] = (npg_fit_frame){
+            .index = from->index, .time = from->time, .base = w->carry->samples->mesh->vert_pos};
     }
     npg_status status = npg_fit_begin(w->probe, frames, of.count, w->facts->plan.key);
     npg_release(&frames);
@@ -306,7 +301,7 @@ static void predict(npg_warm *w, size_t place, size_t last, int step, int ahead)
 /* New frames beyond `last`, one way in time (step 1 or -1). */
 static npg_status open_group(npg_warm *w, size_t last, int step, size_t count)
 {
-    size_t place[64], known = 0;
+    size_t place[CONTEXT + GROUP], known = 0;
     for (size_t at = last; known < CONTEXT && at < w->in->count && w->is_known[at]; at -= (size_t)step)
         place[known++] = at;
     for (size_t i = 0; i < count; i++) {
@@ -314,14 +309,14 @@ static npg_status open_group(npg_warm *w, size_t last, int step, size_t count)
         predict(w, place[known + i], last, step, (int)i + 1);
     }
     some of = {place, known + count};
+    widen(w, OPEN_WIDTH);
     NPG_TRY(begin(w, of));
     NPG_TRY(set_pulls(w, of, of.count, false));
     NPG_TRY(run(w, DISTIL_EPOCHS));
     NPG_TRY(read_poses(w, of, known));
     for (int round = 0; round < OPEN_ROUNDS; round++) {
-        widen(w, OPEN_WIDTH);
-        double softer = OPEN_ROUNDS > 1 ? (double)round / (double)(OPEN_ROUNDS - 1) : 1;
-        npg_fit_set_isometry(w->probe, w->isometry * pow(STIFF, 1 - softer));
+        double stiffness = 1 - (double)round / (OPEN_ROUNDS - 1);
+        npg_fit_set_isometry(w->probe, OPEN_ISOMETRY * pow(OPEN_STIFFER, stiffness));
         NPG_TRY(set_pulls(w, of, known, false));
         NPG_TRY(run(w, OPEN_EPOCHS));
         NPG_TRY(read_poses(w, of, known));
@@ -509,7 +504,8 @@ static npg_status come_near(npg_warm *w, const npg_window *window, some all)
 static npg_status solve_warm(npg_warm *w, const npg_window *window)
 {
     size_t *place;
-    bool is_by_surface = w->settings.distance == NPG_DISTANCE_SURFACE, is_near = w->at.phase == PHASE_VERTICES;
+    bool is_by_surface = w->settings.distance == NPG_DISTANCE_SURFACE,
+         is_near = w->at.phase == PHASE_VERTICES;
     NPG_TRY(npg_alloc_array(&place, NPG_FOR_FIT, w->in->count, sizeof *place));
     for (size_t i = 0; i < w->in->count; i++) place[i] = i;
     some all = {place, w->in->count};

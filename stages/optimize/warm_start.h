@@ -27,9 +27,9 @@ typedef struct npg_warm_settings {
 
 /* The frames of a window as the solver has them, in order of time; loans. */
 typedef struct npg_warm_frames {
-    npg_fit_frame *frames;        /* points, no bases; ties and bases are filled in here  */
-    const float *const *normals;  /* of the points, or NULL for a frame                   */
-    const float *const *solved;   /* V x 3 where an earlier window solved the frame, else NULL */
+    npg_fit_frame *frames;       /* points, no bases; ties and bases are filled in here  */
+    const float *const *normals; /* of the points, or NULL for a frame                   */
+    const float *const *solved;  /* V x 3 where an earlier window solved the frame, else NULL */
     size_t count;
 } npg_warm_frames;
 
@@ -56,8 +56,8 @@ void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep);
 npg_status npg_warm_solve(npg_warm *warm, npg_fit *fit, const npg_warm_frames *frames,
                           const npg_window *window, npg_fit_watch *watch, void *user);
 
-/* How far the window at work is, during a keep: as blocks of an archive; and before npg_warm_solve of the same
- * window, which then continues there. */
+/* How far the window at work is: during a keep, as blocks of an archive; and back, before npg_warm_solve of
+ * the same window, which then continues there. */
 npg_status npg_warm_save(npg_warm *warm, npg_archive_writer *archive);
 npg_status npg_warm_restore(npg_warm *warm, npg_fit *fit, const npg_archive *archive);
 
