@@ -231,8 +231,8 @@ static void report_windows(npg_worker *worker)
                         json_integer((json_int_t)npg_plan_window_count(plan)));
 }
 
-/* Windows where none were asked for: one latent space is good for so many frames (the paper's table: CD 0.53 at
- * 40 frames and 1.31 at 120), and windows of 24 work. */
+/* Windows where none were asked for: one latent space is good for so many frames (the paper's table:
+ * CD 0.53 at 40 frames and 1.31 at 120), and windows of 24 work. */
 enum { JOINT_MOST = 60, WINDOW_AUTO = 24 };
 
 static int64_t window_for(const keyframe_state *state, int64_t frame_count)

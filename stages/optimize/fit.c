@@ -199,8 +199,8 @@ static npg_status draw_params(npg_fit *fit)
     npg_mlp_shape s = shape_of(&fit->settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
     size_t count = npg_mlp_param_count(&s);
-    int64_t channels = fit->settings.position_channels + fit->settings.normal_channels; /* the others are 0 */
-    double first = 1 / sqrt((double)channels + (double)s.code_size), second = 1 / sqrt((double)s.w1);
+    size_t inputs = (size_t)(fit->settings.position_channels + fit->settings.normal_channels) + s.code_size;
+    double first = 1 / sqrt((double)inputs), second = 1 / sqrt((double)s.w1);
     NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
     for (size_t i = 0; i < count; i++) {
         double value = 2 * npg_random_real(&random) - 1;
@@ -339,7 +339,7 @@ static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
                            fit->frame_count);
 }
 
-/* Of a tied frame, for the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
+/* Of the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
 #define TIE_WEIGHT 15000
 
 static npg_status set_ties(npg_fit *fit, const npg_fit_frame *frames)
@@ -460,10 +460,11 @@ static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, i
 /* Losses of the frames and their gradients by position: tied frames by their ties, the others by distance. */
 static npg_status measure_frames(npg_fit *fit, size_t first, size_t count)
 {
-    size_t ties = first < fit->tied_count ? fit->tied_count - first : 0;
-    if (fit->is_pulled || ties >= count) return npg_motion_pull(&fit->motion, first, count);
-    if (ties) NPG_TRY(npg_motion_pull(&fit->motion, first, ties));
-    return npg_motion_chamfer(&fit->motion, fit->settings.alpha, first + ties, count - ties);
+    size_t tied = first < fit->tied_count ? fit->tied_count - first : 0;
+    size_t pulled = fit->is_pulled || tied > count ? count : tied;
+    if (pulled) NPG_TRY(npg_motion_pull(&fit->motion, first, pulled));
+    if (pulled == count) return NPG_OK;
+    return npg_motion_chamfer(&fit->motion, fit->settings.alpha, first + pulled, count - pulled);
 }
 
 /* Positions, losses, and the gradient at the decoder's end. */
@@ -591,11 +592,10 @@ static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_
         NPG_TRY(offer(fit, step));
         NPG_TRY(end_epoch(fit));
         npg_status status = watch ? watch(user, step) : NPG_OK;
-        if (status == NPG_END) {
-            step->epoch++;
-            return NPG_OK;
-        }
-        NPG_TRY(status);
+        if (status == NPG_END)
+            end = step->epoch + 1;
+        else
+            NPG_TRY(status);
     }
     return NPG_OK;
 }
@@ -628,8 +628,8 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
     npg_status status = run_epochs(fit, &step, end, watch, user);
     if (!status && end > first && keeps_least(fit)) status = return_to_least(fit, &step);
     npg_fit_least_clear(&fit->least);
-    if (status) return status;
-    NPG_TRY(npg_fit_read_params(fit));
+    if (!status) status = npg_fit_read_params(fit);
+    NPG_TRY(status);
     return decode(fit);
 }
 
