@@ -26,7 +26,7 @@ const npg_option npg_run_options[] = {
         "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one"),
     NPG_ROW_TEXT  ("output",     AT(output),         "",        "DIR",
         "Folder for the results; empty: results are only pulled"),
-    NPG_ROW_CHOICE("preset",     AT(preset),         "default", "default|best|paper",
+    NPG_ROW_CHOICE("preset",     AT(preset),         "default", "default|best|paper|paper-1000|grids",
         "A named set of option values"),
     NPG_ROW_CHOICE("quality",    AT(quality),        "usual",   "usual|best",
         "usual, or best: the preset of that name, slower and closer"),

@@ -20,24 +20,49 @@ const npg_service *const npg_services[] = {
     &npg_service_job, /* resumes what an earlier run of the same job left */
     NULL};
 
-static const npg_preset_value paper[] = {
-    {"align", "no"},              /* from the reference */
-    {"keyframe-choice", "paper"}, /* by score alone */
-    {"hold-apart", "loose"},      /* a little of the gap helps a fit that knows only distances */
-    {"welds", "keep"},            /* nothing is cut */
-    {"window", "0"},              /* all frames at once */
-    {"epochs", "250"},            /* of every vertex */
-    {"isometry", "100"},          /* as published, like the rest */
+static const npg_preset_value paper[] = {{"align", "no"},              /* from the reference */
+                                         {"keyframe-choice", "paper"}, /* by score alone */
+                                         {"hold-apart", "no"},         /* the keyframe's points as they are */
+                                         {"smooth", "no"},
+                                         {"welds", "keep"}, /* nothing is cut */
+                                         {"window", "-1"},  /* all frames at once, up to 60 */
+                                         {"epochs", "250"}, /* of every vertex */
+                                         {"isometry", "100"},
+                                         {"confidence", "cumulative"},
+                                         {"smoothing", "doubled"}, /* as in the published code */
+                                         {"rate-end", "1"},
+                                         {"feature-start", "0"},
+                                         {"deliver", "last"},
+                                         {NULL, NULL}};
+static const npg_preset_value paper_1000[] = {
+    {"align", "no"},
+    {"keyframe-choice", "paper"},
+    {"hold-apart", "no"},
+    {"smooth", "no"},
+    {"welds", "keep"},
+    {"window", "-1"},
+    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
+    {"isometry", "100"},
     {"confidence", "cumulative"},
     {"smoothing", "doubled"},
     {"rate-end", "1"},
     {"feature-start", "0"},
+    {"deliver", "last"},
     {NULL, NULL}};
+static const npg_preset_value grids[] = {
+    {"align", "no"},         /* grids and decoder alone carry the motion */
+    {"distance", "surface"}, /* of few samples */
+    {"width-1", "256"},      /* a third of the cost, and as good (samples/guide/why_these_defaults.md) */
+    {"width-2", "256"},      {"epochs", "60"}, {"rounds", "4"}, {NULL, NULL}};
 static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps", "20"}, {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
 
 const npg_preset npg_presets[] = {
     {"default", "coarse alignment, then windows of few samples", none},
     {"best", "the same with a finer graph and more steps: slower, closer", best},
-    {"paper", "the method as the paper has it: every vertex, from the reference, one joint window", paper},
+    {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
+     paper},
+    {"paper-1000", "the same with its 1000 epochs", paper_1000},
+    {"grids", "the paper's grids and decoder with our distance and warm starts: no alignment, windows",
+     grids},
     {NULL, NULL, NULL}};

@@ -71,8 +71,8 @@ static const rule rules[] = {
     {"grid",         "lr",                 NULL,        {"grid-rate"},          0, 0},
     {"mlp",          "hidden",             NULL,        {"width-1", "width-2"}, 0, 0},
     {"mlp",          "layers",             NULL,        {0},                    0, 3},
-    {"mlp",          "point_dim",          NULL,        {0},                    0, 30},
-    {"mlp",          "normal_dim",         NULL,        {0},                    0, 2},
+    {"mlp",          "point_dim",          NULL,        {"position-channels"},  0, 0},
+    {"mlp",          "normal_dim",         NULL,        {"normal-channels"},    0, 0},
     {"mlp",          "time_dim",           NULL,        {"time-frequencies"},   2, 0},
 };
 /* clang-format on */

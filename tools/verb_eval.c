@@ -223,6 +223,7 @@ static void print_json(const evaluation *e, const npg_frame_metrics *mean, doubl
     set_real(object, "Corr", corr);
     set_real(object, "jitter", e->moved.jitter);
     set_real(object, "edge", e->moved.edge);
+    set_real(object, "rigidity", e->moved.rigid);
     set_real(object, "bad_area", e->moved.bad);
     json_object_set_new(object, "pred_constant_topology", json_boolean(e->motion.topology_last));
     static const char *const names[] = {"pred_vertices", "pred_faces", "gt_vertices", "gt_faces"};
@@ -243,7 +244,9 @@ static void print_text(const evaluation *e, const npg_frame_metrics *mean, doubl
     if (isfinite(corr)) printf("  Corr %.5f", corr);
     printf("\nconstant topology %s", e->motion.topology_last ? "yes" : "no");
     if (isfinite(e->moved.jitter)) printf("  jitter %.3g", e->moved.jitter);
-    if (isfinite(e->moved.edge)) printf("  edge change %.3g  bad areas %.3g", e->moved.edge, e->moved.bad);
+    if (isfinite(e->moved.edge))
+        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", e->moved.edge, e->moved.rigid,
+               e->moved.bad);
     putchar('\n');
 }
 

@@ -6,6 +6,7 @@
 #include "geometry/mesh_tools.h" /* normals, edges, areas, components, checks (synth, render) */
 #include "geometry/metrics.h"    /* measures against a ground truth, samples (eval, synth)    */
 #include "geometry/query.h"      /* rays (render)                                             */
+#include "geometry/rigid.h"      /* the rotation that fits best (eval)                        */
 #include "geometry/vec3.h"       /* dot and cross products, normals of faces                  */
 
 #endif

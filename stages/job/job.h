@@ -13,6 +13,9 @@
  *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those
  *                                  of all windows stay, for neupig apply
  *
+ *     OUT/job/inside.npg           state inside the window at work, where that takes long: what a window's
+ *                                  state has, the fit's progress, its grids; removed when it is solved
+ *
  * The two newest windows stay, and the one that later frames start from (neupig append);
  * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the
  * checksum of its grids and of the frame log, so that a damaged one is noticed and the one before it used.
@@ -54,7 +57,7 @@ int64_t npg_job_frame_count(const npg_job *job);
 /* The newest state that is whole, NULL when there is none (NPG_JOB_FRESH); a loan. */
 const npg_archive *npg_job_archive(const npg_job *job);
 
-/* Its latent grids. */
+/* Its latent grids; NULL for a state inside a window, which has them itself. */
 const char *npg_job_grids_path(const npg_job *job);
 
 /* From now on the job is of this run: forget older states and write job.json.  keeps_grids:
@@ -97,6 +100,11 @@ typedef npg_status npg_job_write_state(void *user, npg_archive_writer *out, cons
 npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                               void *user);
 
+/* The same for the window at work, which is not solved yet; it replaces the one before.  write() gets no path
+ * for grids. */
+npg_status npg_job_save_inside(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
+                               void *user);
+
 /* Facts, reference, reports and warnings from the open archive; before the first pass.  NPG_BAD_INPUT. */
 npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job);
 
@@ -113,6 +121,8 @@ typedef struct npg_job_log {
 } npg_job_log;
 npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path);
 npg_status npg_job_commit(npg_job *job, bool is_forward_end);
+npg_status npg_job_inside_path(const npg_job *job, char **path);
+int64_t npg_job_serial(const npg_job *job);         /* of the newest window's state, -1 while there is none */
 int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 
 /* ---- what the results are made of (job_inputs.c) ---- */

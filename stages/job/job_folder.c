@@ -17,6 +17,7 @@
 
 #define STATE_NAME  "window_%06lld.%s"
 #define MOTION_NAME "motion_%06lld.npg"
+#define INSIDE_NAME "inside.npg"
 
 struct npg_job {
     char *output, *folder; /* owned */
@@ -266,6 +267,43 @@ static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_log)
     return NPG_OK;
 }
 
+/* A state inside the window that follows the newest state is newer than that. */
+static npg_status open_inside(npg_job *job, npg_worker *worker, bool with_log)
+{
+    npg_archive *archive = NULL;
+    int64_t after = -1;
+    char *path;
+    NPG_TRY(npg_job_inside_path(job, &path));
+    bool is_there = access(path, F_OK) == 0;
+    npg_status status = is_there ? npg_archive_open(&archive, path) : NPG_END;
+    if (!status) status = npg_archive_get(archive, "after", &after, sizeof after);
+    if (!status && after != (job->archive ? job->serial : -1)) status = NPG_END;
+    if (!status && with_log) status = npg_error_prefix(check_log(job, archive), "%s", path);
+    if (!status) status = npg_archive_get(archive, "forward", &job->forward_serial, sizeof(int64_t));
+    npg_release(&path);
+    if (status) {
+        npg_archive_close(&archive);
+        if (status < 0 && status != NPG_MEMORY)
+            npg_worker_warn(worker, false, -1, "%s; the job resumes from the window before",
+                            npg_error_text());
+        return status == NPG_MEMORY ? status : NPG_OK;
+    }
+    npg_archive_close(&job->archive);
+    npg_release(&job->grids_path);
+    job->archive = archive;
+    return NPG_OK;
+}
+
+npg_status npg_job_inside_path(const npg_job *job, char **path)
+{
+    return npg_join_path(path, job->folder, INSIDE_NAME);
+}
+
+int64_t npg_job_serial(const npg_job *job)
+{
+    return job->serial;
+}
+
 int64_t npg_job_frame_count(const npg_job *job)
 {
     return job->frame_count;
@@ -338,6 +376,7 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     if (status == NPG_USAGE) return differs(job);
     NPG_TRY(status);
     NPG_TRY(open_newest(job, worker, !is_done));
+    if (!is_done) NPG_TRY(open_inside(job, worker, true));
     if (!job->archive && !is_done) return NPG_OK;
     NPG_TRY(choose_start(job, start, worker, is_done, append));
     if (*start == NPG_JOB_DONE && was_partial)
@@ -425,6 +464,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
         NPG_TRY(remove_file(job, "job.json"));
         NPG_TRY(each_state(job, remove_state));
         NPG_TRY(remove_motions(job));
+        NPG_TRY(remove_file(job, INSIDE_NAME));
         job->serial = job->forward_serial = -1;
         NPG_TRY(write_description(job));
     }
@@ -462,6 +502,7 @@ npg_status npg_job_commit(npg_job *job, bool is_forward_end)
 {
     job->serial++;
     if (is_forward_end) job->forward_serial = job->serial;
+    NPG_TRY(remove_file(job, INSIDE_NAME));
     return each_state(job, remove_old);
 }
 

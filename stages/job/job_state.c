@@ -75,6 +75,26 @@ npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, 
     return status ? status : npg_job_commit(job, moment->is_forward_end);
 }
 
+npg_status npg_job_save_inside(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
+                               void *user)
+{
+    npg_job *job = npg_job_of(worker);
+    npg_archive_writer *out = NULL;
+    char *path;
+    const int64_t serial = npg_job_serial(job);
+    NPG_TRY(npg_job_inside_path(job, &path));
+    npg_status status = npg_archive_create(&out, path);
+    if (!status) status = put_all(out, worker, moment, npg_job_forward_serial(job));
+    if (!status) status = npg_archive_put(out, "after", &serial, sizeof serial);
+    if (!status) status = write(user, out, NULL);
+    if (!status)
+        status = npg_archive_commit(&out);
+    else
+        npg_archive_discard(&out);
+    npg_release(&path);
+    return status;
+}
+
 /* ---- restoring ---- */
 
 static npg_status get_reports(npg_worker *worker, const npg_archive *in)

@@ -109,6 +109,21 @@ static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
     return place;
 }
 
+/* A later window starts from the first one. */
+static bool is_first_needed(const npg_plan *plan, int64_t window_at)
+{
+    if (plan->appended_at) return false;
+    for (int64_t i = window_at + 1; i < npg_plan_window_count(plan); i++)
+        if (i > 0 && npg_plan_window(plan, i).from == 0) return true;
+    return false;
+}
+
+static npg_status put_first(npg_archive_writer *out, const npg_facts *facts, const npg_hand *hand)
+{
+    if (!hand->warm || !is_first_needed(&facts->plan, hand->window_at)) return NPG_OK;
+    return npg_fit_copy_save(npg_warm_first(hand->warm), out, "first");
+}
+
 /* What npg_job_save_state() has written by us. */
 typedef struct saving {
     npg_worker *worker;
@@ -122,7 +137,9 @@ static npg_status write_state(void *user, npg_archive_writer *out, const char *g
     const npg_facts *facts = npg_worker_facts(s->worker);
     npg_vdb_place place = place_of(facts, s->hand);
     NPG_TRY(put_hand(out, facts, s->hand));
-    return s->fit ? npg_fit_save(s->fit, out, grids_path, &place) : NPG_OK;
+    if (!s->fit) return NPG_OK;
+    NPG_TRY(put_first(out, facts, s->hand));
+    return npg_fit_save(s->fit, out, grids_path, &place);
 }
 
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit)
@@ -133,6 +150,38 @@ npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit
                                    .is_forward_end = npg_plan_is_last_forward(plan, hand->window_at)};
     saving s = {worker, hand, fit};
     return npg_job_save_state(worker, &moment, write_state, &s);
+}
+
+static npg_status write_inside(void *user, npg_archive_writer *out, const char *grids_path)
+{
+    const saving *s = user;
+    const npg_facts *facts = npg_worker_facts(s->worker);
+    (void)grids_path;
+    NPG_TRY(put_hand(out, facts, s->hand));
+    NPG_TRY(put_first(out, facts, s->hand));
+    return npg_warm_save(s->hand->warm, out);
+}
+
+npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
+{
+    const npg_plan *plan = &npg_worker_facts(worker)->plan;
+    const npg_job_moment moment = {.emitted = hand->emitted,
+                                   .read = hand->window_at >= 0 ? npg_plan_read_before(plan, hand->window_at)
+                                                                : 0};
+    saving s = {worker, hand, NULL};
+    return npg_job_save_inside(worker, &moment, write_inside, &s);
+}
+
+/* ---- restoring: the fit ---- */
+
+npg_status npg_checkpoint_restore_fit(npg_worker *worker, npg_fit *fit, npg_warm *warm)
+{
+    const npg_job *job = npg_job_of(worker);
+    const npg_archive *in = npg_job_archive(job);
+    size_t size;
+    if (warm) NPG_TRY(npg_fit_copy_load(npg_warm_first(warm), in, "first"));
+    if (!npg_archive_find(in, "inside", &size)) return npg_fit_restore(fit, in, npg_job_grids_path(job));
+    return warm ? npg_warm_restore(warm, fit, in) : npg_error(NPG_BAD_INPUT, "a block that is not expected");
 }
 
 /* ---- restoring: frames ---- */

@@ -14,6 +14,7 @@ typedef struct npg_hand {
     int64_t emitted;   /* frames passed on before it closed              */
     double last_chamfer, last_isometry;
     bool is_aligned;
+    npg_warm *warm; /* of windows without alignment, or NULL; a loan */
 } npg_hand;
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until
@@ -21,6 +22,12 @@ typedef struct npg_hand {
  * aligned.  Held frames that no window
  * has solved yet are read again by a resumed run.  NPG_DISK, NPG_ABORTED. */
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit);
+
+/* The same inside the window after hand->window_at (-1: the first), which is not solved yet. */
+npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand);
+
+/* Restore what the fit knew, and how far the window at work was. */
+npg_status npg_checkpoint_restore_fit(npg_worker *worker, npg_fit *fit, npg_warm *warm);
 
 /* Restore what the optimize stage had in hand; with appended frames only those which the first new window
  * shares.  facts.plan has which. */

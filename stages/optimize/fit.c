@@ -15,13 +15,10 @@
 #include "optimize/fit_weights.h"
 #include "pipeline/random.h"
 
-#define HASH_LEVELS    15
-#define HASH_ROWS      16384
-#define HASH_FIRST     16
-#define HASH_GROWTH    1.35
-#define POSITION_FIRST 0 /* channels of the position grids */
-#define POSITION_END   30
-#define NORMAL_END     32 /* channels of the normal grid: 30, 31 */
+#define HASH_LEVELS 15
+#define HASH_ROWS   16384
+#define HASH_FIRST  16
+#define HASH_GROWTH 1.35
 
 struct npg_fit {
     npg_fit_settings settings;
@@ -45,8 +42,10 @@ struct npg_fit {
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
+    npg_fit_least least;                /* of a run at work                                          */
     npg_fit_step result;                /* what the present state measures; of a run that keeps the least */
     bool is_pulled;                     /* by known correspondences, from bases */
+    size_t tied_count;                  /* frames, the first outward, that follow their tie */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
     size_t *rank;                       /* its inverse */
     int64_t *index;                     /* by k */
@@ -75,8 +74,8 @@ static void add_grids(npg_levels *levels, const npg_fit_settings *s)
         npg_levels_add(levels,
                        (npg_level){.kind = NPG_LEVEL_POSITION,
                                    .nodes = (int)(s->grid_base + l * s->grid_step),
-                                   .channel_first = POSITION_FIRST,
-                                   .channel_end = POSITION_END,
+                                   .channel_first = 0,
+                                   .channel_end = (int)s->position_channels,
                                    .share = single ? 1.0 : 1.0 / (double)s->grid_levels,
                                    .lambda = s->lambda * pow(s->lambda_growth, (double)l),
                                    .screen = screen_of(s, s->lambda * pow(s->lambda_growth, (double)l)),
@@ -87,7 +86,7 @@ static void add_grids(npg_levels *levels, const npg_fit_settings *s)
 
 static void add_hash(npg_levels *levels, const npg_fit_settings *s)
 {
-    for (int l = 0; l < HASH_LEVELS; l++)
+    for (int l = 0; l < HASH_LEVELS && 2 * l + 2 <= s->position_channels; l++)
         npg_levels_add(levels,
                        (npg_level){.kind = NPG_LEVEL_HASHED,
                                    .nodes = (int)floor(HASH_FIRST * pow(HASH_GROWTH, l)),
@@ -108,8 +107,8 @@ static void choose_levels(npg_levels *levels, const npg_fit_settings *s)
     npg_levels_add(levels,
                    (npg_level){.kind = NPG_LEVEL_NORMAL,
                                .nodes = (int)s->normal_nodes,
-                               .channel_first = POSITION_END,
-                               .channel_end = NORMAL_END,
+                               .channel_first = (int)s->position_channels,
+                               .channel_end = (int)(s->position_channels + s->normal_channels),
                                .share = 1,
                                .lambda = s->lambda,
                                .screen = screen_of(s, s->lambda),
@@ -200,7 +199,8 @@ static npg_status draw_params(npg_fit *fit)
     npg_mlp_shape s = shape_of(&fit->settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
     size_t count = npg_mlp_param_count(&s);
-    double first = 1 / sqrt((double)(NPG_LATENT_CHANNELS + s.code_size)), second = 1 / sqrt((double)s.w1);
+    size_t inputs = (size_t)(fit->settings.position_channels + fit->settings.normal_channels) + s.code_size;
+    double first = 1 / sqrt((double)inputs), second = 1 / sqrt((double)s.w1);
     NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
     for (size_t i = 0; i < count; i++) {
         double value = 2 * npg_random_real(&random) - 1;
@@ -252,7 +252,7 @@ static void close_window(npg_fit *fit)
     npg_release(&fit->codes);
     npg_release(&fit->packed);
     npg_release(&fit->has_points);
-    fit->frame_count = 0;
+    fit->frame_count = fit->tied_count = 0;
 }
 
 void npg_fit_close(npg_fit **slot)
@@ -260,6 +260,7 @@ void npg_fit_close(npg_fit **slot)
     if (!slot || !*slot) return;
     npg_fit *fit = *slot;
     close_window(fit);
+    npg_fit_least_clear(&(*slot)->least);
     npg_latent_close(&fit->latent);
     npg_sobolev_close(&fit->sobolev);
     npg_adam_close(&fit->grid_adam);
@@ -310,6 +311,7 @@ static void sort_outward(npg_fit *fit, const npg_fit_frame *frames, size_t count
         fit->index[k] = frame->index;
         fit->times[k] = frame->time;
         fit->has_points[k] = frame->count > 0;
+        if (frame->tie && k == fit->tied_count) fit->tied_count++;
     }
 }
 
@@ -337,6 +339,35 @@ static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
                            fit->frame_count);
 }
 
+/* Of the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
+#define TIE_WEIGHT 15000
+
+static npg_status set_ties(npg_fit *fit, const npg_fit_frame *frames)
+{
+    npg_pull *pulls;
+    int32_t *start;
+    size_t count = fit->tied_count * fit->real;
+    if (!count) return NPG_OK;
+    NPG_REQUIRE(count < INT32_MAX);
+    NPG_TRY(npg_alloc_array(&pulls, NPG_FOR_FIT, count, sizeof *pulls));
+    npg_status status = npg_alloc_array(&start, NPG_FOR_FIT, fit->frame_count + 1, sizeof *start);
+    for (size_t i = 0; !status && i < count; i++) {
+        int32_t row = (int32_t)(i % fit->real);
+        const float *at = frames[fit->place[i / fit->real]].tie + 3 * (size_t)fit->order[row];
+        pulls[i] = (npg_pull){.vertex = {row, row, row},
+                              .share = {1, 0, 0},
+                              .along = 1,
+                              .weight = (float)(TIE_WEIGHT / (double)fit->real),
+                              .constant = {-at[0], -at[1], -at[2]}};
+    }
+    for (size_t k = 0; !status && k < fit->frame_count; k++)
+        start[k + 1] = (int32_t)((k < fit->tied_count ? k + 1 : fit->tied_count) * fit->real);
+    if (!status) status = npg_motion_set_pulls(&fit->motion, pulls, start);
+    npg_release(&pulls);
+    npg_release(&start);
+    return status;
+}
+
 static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
 {
     npg_target *targets;
@@ -347,7 +378,7 @@ static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
     if (!status) status = open_motion_on(fit, targets);
     for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
     npg_release(&targets);
-    return status;
+    return status ? status : set_ties(fit, frames);
 }
 
 /* The bases in the order of rows and outward. */
@@ -426,6 +457,16 @@ static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, i
     return NPG_OK;
 }
 
+/* Losses of the frames and their gradients by position: tied frames by their ties, the others by distance. */
+static npg_status measure_frames(npg_fit *fit, size_t first, size_t count)
+{
+    size_t tied = first < fit->tied_count ? fit->tied_count - first : 0;
+    size_t pulled = fit->is_pulled || tied > count ? count : tied;
+    if (pulled) NPG_TRY(npg_motion_pull(&fit->motion, first, pulled));
+    if (pulled == count) return NPG_OK;
+    return npg_motion_chamfer(&fit->motion, fit->settings.alpha, first + pulled, count - pulled);
+}
+
 /* Positions, losses, and the gradient at the decoder's end. */
 static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
 {
@@ -433,12 +474,13 @@ static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first
     double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
     NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
     NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
-    NPG_TRY(fit->is_pulled ? npg_motion_pull(&fit->motion, first, count)
-                           : npg_motion_chamfer(&fit->motion, s->alpha, first, count));
+    NPG_TRY(measure_frames(fit, first, count));
     NPG_TRY(npg_buffer_read(&fit->motion.cd, first * sizeof(float), fit->cd + first, count * sizeof(float)));
     NPG_TRY(check_losses(fit, first, count, epoch));
     for (size_t k = first; k < first + count; k++)
-        fit->gains[k] = (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
+        fit->gains[k] = k < fit->tied_count
+                            ? (float)weights->share
+                            : (float)npg_weights_next(weights, fit->index[k], fit->cd[k], fit->has_points[k]);
     return npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains + first, iso, first,
                            count);
 }
@@ -474,9 +516,9 @@ static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
     npg_release(&part);
     step->chamfer = 0;
     for (size_t k = 0; k < fit->frame_count; k++) {
-        if (!fit->has_points[k]) continue;
-        step->chamfer += (double)fit->cd[k];
         weighted += (double)(fit->cd[k] * fit->gains[k]);
+        if (!fit->has_points[k] || k < fit->tied_count) continue;
+        step->chamfer += (double)fit->cd[k];
         solved++;
     }
     step->chamfer /= solved ? (double)solved : 1;
@@ -524,50 +566,83 @@ static npg_fit_knowns knowns_of(npg_fit *fit)
     return (npg_fit_knowns){&fit->u, &fit->mlp.params, fit->time_code};
 }
 
-/* The state that step measured, where it is the best so far. */
-static npg_status offer(npg_fit *fit, npg_fit_least *least, const npg_fit_step *step)
+static bool keeps_least(const npg_fit *fit)
 {
-    npg_fit_knowns now = knowns_of(fit);
-    if (!least) return NPG_OK;
-    return npg_fit_least_offer(least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
+    return fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled;
 }
 
-static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_least *least,
-                             npg_fit_watch *watch, void *user)
+struct npg_fit_least *npg_fit_open_least(npg_fit *fit)
+{
+    return &fit->least;
+}
+
+/* The state that step measured, where it is the best so far. */
+static npg_status offer(npg_fit *fit, const npg_fit_step *step)
+{
+    npg_fit_knowns now = knowns_of(fit);
+    if (!keeps_least(fit)) return NPG_OK;
+    return npg_fit_least_offer(&fit->least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
+}
+
+static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_watch *watch, void *user)
 {
     for (; step->epoch < end; step->epoch++) {
         fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
         NPG_TRY(measure_epoch(fit, step, true));
-        NPG_TRY(offer(fit, least, step));
+        NPG_TRY(offer(fit, step));
         NPG_TRY(end_epoch(fit));
-        if (watch) NPG_TRY(watch(user, step));
+        npg_status status = watch ? watch(user, step) : NPG_OK;
+        if (status == NPG_END)
+            end = step->epoch + 1;
+        else
+            NPG_TRY(status);
     }
     return NPG_OK;
 }
 
+void npg_fit_set_isometry(npg_fit *fit, double weight)
+{
+    fit->settings.isometry = weight;
+}
+
+void npg_fit_set_epochs(npg_fit *fit, int64_t epochs)
+{
+    fit->settings.epochs = epochs;
+}
+
 /* The last step's outcome is measured as well; then the fit returns to the state with the least loss. */
-static npg_status return_to_least(npg_fit *fit, npg_fit_least *least, npg_fit_step *step)
+static npg_status return_to_least(npg_fit *fit, npg_fit_step *step)
 {
     npg_fit_knowns now = knowns_of(fit);
     NPG_TRY(measure_epoch(fit, step, false));
-    NPG_TRY(offer(fit, least, step));
-    fit->result = least->step;
-    return npg_fit_least_restore(least, &now);
+    NPG_TRY(offer(fit, step));
+    fit->result = fit->least.step;
+    return npg_fit_least_restore(&fit->least, &now);
 }
 
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
 {
     npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
-    npg_fit_least least = {.rows = NULL};
-    bool is_kept = fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled && end > first;
     fit->result.epochs = 0;
-    npg_status status = run_epochs(fit, &step, end, is_kept ? &least : NULL, watch, user);
-    if (!status && is_kept) status = return_to_least(fit, &least, &step);
-    npg_fit_least_clear(&least);
-    if (status) return status;
-    NPG_TRY(npg_buffer_read(&fit->mlp.params, 0, fit->params,
-                            npg_mlp_param_count(&fit->mlp.shape) * sizeof(float)));
+    if (first == 0) npg_fit_least_clear(&fit->least);
+    npg_status status = run_epochs(fit, &step, end, watch, user);
+    if (!status && end > first && keeps_least(fit)) status = return_to_least(fit, &step);
+    npg_fit_least_clear(&fit->least);
+    if (!status) status = npg_fit_read_params(fit);
+    NPG_TRY(status);
     return decode(fit);
+}
+
+npg_status npg_fit_read_params(npg_fit *fit)
+{
+    return fit->frame_count ? npg_buffer_read(&fit->mlp.params, 0, fit->params, fit->mlp.params.size)
+                            : NPG_OK;
+}
+
+npg_status npg_fit_write_params(npg_fit *fit)
+{
+    return fit->frame_count ? npg_buffer_write(&fit->mlp.params, 0, fit->params, fit->mlp.params.size)
+                            : NPG_OK;
 }
 
 const npg_fit_step *npg_fit_result(const npg_fit *fit)

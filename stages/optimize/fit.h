@@ -47,6 +47,7 @@ typedef struct npg_fit_settings {
     int rotation, time_code, encoding, confidence, catch_up, smoothing, deliver /* enums of these names */;
     int64_t frequencies;
     int64_t grid_base, grid_step, grid_levels, normal_nodes;
+    int64_t position_channels, normal_channels; /* |z_p| and |z_n|, together NPG_LATENT_CHANNELS at most */
     bool normal_grid;
     double lambda, lambda_growth, grid_rate, grid_rate_growth;
     double mlp_rate, slope, isometry, alpha;
@@ -59,14 +60,16 @@ typedef struct npg_fit_settings {
 /* The values that the options have now (table of the optimize stage). */
 void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *options);
 
-/* One frame of a window.  All frames of a window have points (and follow by Chamfer distance), or all have
- * bases (and follow by pulls). */
+/* One frame of a window.  All frames of a window have bases (and follow by pulls), or none has: then those
+ * that are tied follow their tie, the others their points by Chamfer distance.  Tied frames are nearer to the
+ * key than all others: what an earlier window solved. */
 typedef struct npg_fit_frame {
     int64_t index;       /* place in time; |index - key| orders the confidence        */
     double time;         /* what the time code is a function of, 0..1 over the window */
     const float *points; /* N x 3, unit, finite; a loan during npg_fit_begin          */
     size_t count;        /* N; 0: no points, the frame follows from the others        */
     const float *base; /* V x 3: positions that the decoder moves, or NULL: the reference; a loan likewise */
+    const float *tie;  /* V x 3: known positions, or NULL; a loan likewise                                 */
 } npg_fit_frame;
 
 typedef struct npg_fit npg_fit;
@@ -78,7 +81,8 @@ typedef struct npg_fit_step {
     double chamfer, isometry, loss;
 } npg_fit_step;
 
-/* Asked after each epoch; anything but NPG_OK ends the fit with that status. */
+/* Asked after each epoch; NPG_END ends the fit as if that had been the last epoch, anything else but NPG_OK
+ * with that status. */
 typedef npg_status npg_fit_watch(void *user, const npg_fit_step *step);
 
 /* The device is a loan.  reference: unit coordinates with normals; a loan. */
@@ -94,7 +98,14 @@ npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count
  * pulls[start[i]] .. pulls[start[i + 1]].  Their vertices are changed to the fit's own order. */
 npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start);
 
-/* Epochs first .. end - 1 of settings.epochs; afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED
+/* The weight of isometry from now on. */
+void npg_fit_set_isometry(npg_fit *fit, double weight);
+
+/* The length of the fit that the rates and the confidence of following epochs are laid out for. */
+void npg_fit_set_epochs(npg_fit *fit, int64_t epochs);
+
+/* Epochs first .. end - 1 of settings.epochs (first > 0 continues a run that was broken off, or the rounds of
+ * one by pulls); afterwards npg_fit_vertices() gives the result.  NPG_DIVERGED
  * names epoch and frame. */
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user);
 
@@ -114,12 +125,20 @@ typedef struct npg_fit_parts {
     const struct npg_levels *levels;
     npg_buffer *u; /* [row_count][32] */
     struct npg_adam *grid_adam, *mlp_adam;
-    float *params;
+    float *params; /* of the decoder after the last run */
     size_t param_count;
     npg_time_code *time_code;
 } npg_fit_parts;
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit);
+
+/* Of a run at work that keeps the state of least loss (fit_least.h): that state, for saving and restoring. */
+struct npg_fit_least *npg_fit_open_least(npg_fit *fit);
+
+/* While a window is begun its decoder is on the device: into parts.params, and from there.  Nothing to do
+ * without a window. */
+npg_status npg_fit_read_params(npg_fit *fit);
+npg_status npg_fit_write_params(npg_fit *fit);
 
 /* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
 size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points,

@@ -6,6 +6,7 @@
 #define NPG_FIT_LEAST_H
 
 #include "optimize/fit.h"
+#include "pipeline/archive.h"
 
 /* All that steps change, where it lives: loans. */
 typedef struct npg_fit_knowns {
@@ -19,6 +20,7 @@ typedef struct npg_fit_least {
     double loss;          /* of that step, without confidence; only with rows    */
     float *rows, *params; /* copies, owned; NULL: none yet                       */
     double *code;         /* of the time code's parameters, owned                */
+    size_t row_bytes, param_bytes, code_bytes;
 } npg_fit_least;
 
 /* Chamfer distance and weighted isometry without the confidence of frames, which changes
@@ -32,5 +34,9 @@ npg_status npg_fit_least_offer(npg_fit_least *least, const npg_fit_step *step, d
 /* Put the copy where it came from; there must be one. */
 npg_status npg_fit_least_restore(const npg_fit_least *least, const npg_fit_knowns *to);
 void npg_fit_least_clear(npg_fit_least *least);
+
+/* As blocks "least.*" of an archive; where they are missing there is none yet. */
+npg_status npg_fit_least_save(const npg_fit_least *least, npg_archive_writer *archive);
+npg_status npg_fit_least_load(npg_fit_least *least, const npg_archive *archive);
 
 #endif

@@ -26,6 +26,7 @@ struct npg_matcher {
     uint32_t *near;           /* S */
     float *near_sq;           /* S */
     size_t target_count;
+    double least_width;
 };
 
 void npg_matcher_close(npg_matcher **slot)
@@ -62,6 +63,11 @@ npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg
     if (status) npg_matcher_close(&m);
     *out = m;
     return status;
+}
+
+void npg_matcher_widen(npg_matcher *m, double width)
+{
+    m->least_width = width;
 }
 
 size_t npg_matcher_most(const npg_matcher *m)
@@ -119,7 +125,7 @@ static void match_targets(npg_matcher *m, npg_pull *pulls, size_t *count, const 
                           const float *samples, bool with_normals)
 {
     for (size_t i = 0; i < m->target_count; i++) m->sorted[i] = sqrtf(m->hits[i].dist_sq);
-    double width = 3 * median_of(m->sorted, m->target_count) + 1e-4;
+    double width = fmax(3 * median_of(m->sorted, m->target_count) + 1e-4, m->least_width);
     double share = m->settings.total / (double)m->target_count;
     for (size_t i = 0; i < m->target_count; i++) {
         float weight = (float)share * robust_weight((double)m->hits[i].dist_sq, width);
@@ -141,7 +147,7 @@ static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, 
     npg_kdtree_close(&tree);
     NPG_TRY(status);
     for (size_t s = 0; s < s_count; s++) m->sorted[s] = sqrtf(m->near_sq[s]);
-    double width = 3 * median_of(m->sorted, s_count) + 1e-4;
+    double width = fmax(3 * median_of(m->sorted, s_count) + 1e-4, m->least_width);
     double share = m->settings.reverse * m->settings.total / (double)s_count;
     for (size_t s = 0; s < s_count; s++) {
         const float *to = points + 3 * (size_t)m->near[s];

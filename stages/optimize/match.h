@@ -22,6 +22,10 @@ npg_status npg_matcher_open(npg_matcher **matcher, const npg_carry *carry,
                             const npg_match_settings *settings);
 void npg_matcher_close(npg_matcher **matcher);
 
+/* Distances that count in full (unit), where that is more than three times the frame's median: for surfaces
+ * that may be far from where they belong.  0 at first. */
+void npg_matcher_widen(npg_matcher *matcher, double width);
+
 /* The most pulls of one frame. */
 size_t npg_matcher_most(const npg_matcher *matcher);
 

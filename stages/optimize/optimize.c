@@ -11,6 +11,7 @@
 #include "optimize/fit_state.h"
 #include "optimize/record.h"
 #include "optimize/window.h"
+#include "pipeline/clock.h"
 #include "pipeline/live_plan.h"
 
 typedef struct state {
@@ -24,13 +25,15 @@ typedef struct state {
     bool is_aligned;
     int64_t total; /* frames of the capture, -1 until the stream has ended */
     double last_chamfer, last_isometry;
-    int64_t emitted;
+    int64_t emitted, state_every_s;
+    double saved_s; /* when the last state was written */
 } state;
 
 /* ---- options ---- */
 
 #define WINDOW(member) offsetof(state, window_settings.member)
 #define FIT(member)    WINDOW(fit.member)
+#define MATCH(member)  WINDOW(match.member)
 #define JOINT(member)  WINDOW(joint.member)
 
 /* clang-format off */
@@ -72,6 +75,10 @@ static const npg_option options[] = {
         "features by normal direction beside those by position"),
     NPG_ROW_INT   ("normal-nodes",     FIT(normal_nodes),     "4",          2,     32,   "N",
         "nodes per axis of the normal grid"),
+    NPG_ROW_INT   ("position-channels", FIT(position_channels), "30",       2,     31,   "N",
+        "features that the position grids give the decoder"),
+    NPG_ROW_INT   ("normal-channels",  FIT(normal_channels),  "2",          1,     30,   "N",
+        "features that the normal grid gives it; both together are 32 at most"),
     NPG_ROW_INT   ("width-1",          FIT(width_1),          "512",        32,    4096, "N",
         "units of the first hidden layer"),
     NPG_ROW_INT   ("width-2",          FIT(width_2),          "512",        32,    4096, "N",
@@ -97,6 +104,30 @@ static const npg_option options[] = {
     NPG_ROW_CHOICE("deliver",          FIT(deliver),          "least",      "least|last",
         "result of a joint fit by Chamfer distance: "
         "of all the states between its steps the one with the least loss, or the last"),
+    NPG_ROW_CHOICE("distance",         WINDOW(warm.distance), "vertices", "vertices|surface",
+        "without alignment: the paper's distance between all vertices and the points, "
+        "or that between points and surface, over --samples vertices"),
+    NPG_ROW_FLAG  ("warm-start",       WINDOW(warm.is_on),    "yes",
+        "without alignment: bring a window's new frames near their pose from those that are solved, "
+        "before all are fitted"),
+    NPG_ROW_INT   ("samples",          WINDOW(samples),       "1500",       0,     1e6,  "N",
+        "vertices that such frames are brought near their pose with, and that the distance to the surface is "
+        "fitted over, 0: the usual number"),
+    NPG_ROW_INT   ("rounds",           WINDOW(rounds),        "2",          1,     1000, "N",
+        "times that a fit by the distance to the surface is matched"),
+    NPG_ROW_INT   ("match-points",     MATCH(points),         "5000",       10,    1e7,  "N",
+        "most points of a frame that pull there"),
+    NPG_ROW_REAL  ("match-along",      MATCH(along),          "0.02",       0,     1,    NULL,
+        "share of distances along the surface there, 0 to 1"),
+    NPG_ROW_REAL  ("match-reverse",    MATCH(reverse),        "0.5",        0,     100,  NULL,
+        "weight of surface to points against points to surface there"),
+    NPG_ROW_REAL  ("match-total",      MATCH(total),          "5000",       1,     1e9,  NULL,
+        "weight of all points of a frame there"),
+    NPG_ROW_REAL  ("match-tie",        MATCH(tie),            "1",          0,     1e6,  NULL,
+        "weight of staying where the window before has put a frame, against its points"),
+    NPG_ROW_INT   ("state-every",      offsetof(state, state_every_s), "120", 0, 1e6, "SECONDS",
+        "without alignment: a window that takes longer writes its state meanwhile, "
+        "so that no more is lost when the run is killed"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
         "frames whose hidden layer is kept at a time"),
     {0}};
@@ -111,11 +142,17 @@ void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
 
 /* ---- opening ---- */
 
+static npg_status keep_inside(void *user);
+
 static npg_status check_widths(const npg_fit_settings *s)
 {
     if (s->width_1 % 32 || s->width_2 % 32)
         return npg_error(NPG_USAGE, "option width-%d: %lld is not a multiple of 32", s->width_1 % 32 ? 1 : 2,
                          (long long)(s->width_1 % 32 ? s->width_1 : s->width_2));
+    if (s->position_channels + s->normal_channels > NPG_LATENT_CHANNELS)
+        return npg_error(NPG_USAGE,
+                         "options position-channels and normal-channels: %lld and %lld are more than %d",
+                         (long long)s->position_channels, (long long)s->normal_channels, NPG_LATENT_CHANNELS);
     return NPG_OK;
 }
 
@@ -179,6 +216,8 @@ static npg_status open_solver(npg_worker *worker, bool is_aligned)
     s->window = npg_live_window(&facts->plan, 0, s->total);
     NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
                                    (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
+    if (npg_window_warm(s->solver)) npg_warm_set_keep(npg_window_warm(s->solver), keep_inside);
+    s->saved_s = npg_clock_s();
     return NPG_OK;
 }
 
@@ -328,14 +367,34 @@ static npg_status save_record(npg_worker *worker)
     return status;
 }
 
+static npg_hand hand_of(state *s, int64_t window_at)
+{
+    return (npg_hand){s->held,          s->held_count, s->held_capacity,
+                      window_at,        s->emitted,    s->last_chamfer,
+                      s->last_isometry, s->is_aligned, npg_window_warm(s->solver)};
+}
+
 static npg_status save_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (!npg_job_of(worker)) return NPG_OK;
     NPG_TRY(save_record(worker));
-    const npg_hand hand = {s->held,    s->held_count,   s->held_capacity, s->window_at,
-                           s->emitted, s->last_chamfer, s->last_isometry, s->is_aligned};
+    const npg_hand hand = hand_of(s, s->window_at);
+    s->saved_s = npg_clock_s();
     return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));
+}
+
+/* Inside a window that takes long, and when the run is to stop. */
+static npg_status keep_inside(void *user)
+{
+    npg_worker *worker = user;
+    state *s = npg_worker_state(worker);
+    bool is_due = npg_clock_s() - s->saved_s >= (double)s->state_every_s || npg_worker_stopping(worker);
+    if (!is_due || !npg_job_of(worker)) return NPG_OK;
+    const npg_hand hand = hand_of(s, s->window_at - 1);
+    NPG_TRY(npg_checkpoint_save_inside(worker, &hand));
+    s->saved_s = npg_clock_s();
+    return NPG_OK;
 }
 
 /* Where the state on disk was taken: the window is solved, its frames are not passed on. */
@@ -343,7 +402,6 @@ static npg_status resume(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    const npg_job *job = npg_job_of(worker);
     npg_hand hand = {0};
     npg_status status = npg_checkpoint_restore_hand(worker, &hand);
     s->held = hand.held;
@@ -354,7 +412,7 @@ static npg_status resume(npg_worker *worker)
     s->last_isometry = hand.last_isometry;
     if (!status) status = open_solver(worker, hand.is_aligned);
     if (!status && !hand.is_aligned)
-        status = npg_fit_restore(npg_window_fit(s->solver), npg_job_archive(job), npg_job_grids_path(job));
+        status = npg_checkpoint_restore_fit(worker, npg_window_fit(s->solver), npg_window_warm(s->solver));
     if (status) return npg_error_prefix(status, "the state to resume from");
     s->window_at = hand.window_at;
     if (s->window_at >= 0) NPG_TRY(emit_done(worker));

@@ -10,6 +10,7 @@ struct npg_window_solver {
     npg_window_settings settings;
     const npg_facts *facts;  /* loan */
     npg_fit *fit;            /* of frames without alignment, or NULL */
+    npg_warm *warm;          /* of the same, or NULL                 */
     npg_joint_window *joint; /* of aligned ones, or NULL             */
     npg_joint_result result; /* of that                              */
     /* of the window at work, owned */
@@ -30,6 +31,11 @@ npg_fit *npg_window_fit(npg_window_solver *solver)
     return solver->fit;
 }
 
+npg_warm *npg_window_warm(npg_window_solver *solver)
+{
+    return solver->warm;
+}
+
 static void close_frames(npg_window_solver *s)
 {
     void *all[] = {&s->points, &s->point_start, &s->now, &s->frames};
@@ -41,6 +47,7 @@ void npg_window_solver_close(npg_window_solver **slot)
     if (!slot || !*slot) return;
     close_frames(*slot);
     npg_fit_close(&(*slot)->fit);
+    npg_warm_close(&(*slot)->warm);
     npg_joint_window_close(&(*slot)->joint);
     npg_release(slot);
 }
@@ -57,6 +64,9 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     s->facts = facts;
     npg_status status = is_aligned ? npg_joint_window_open(&s->joint, facts->reference, &s->settings.joint)
                                    : npg_fit_open(&s->fit, device, &s->settings.fit, facts->reference, seed);
+    if (!status && !is_aligned)
+        status = npg_warm_open(&s->warm, device, &s->settings.warm, &s->settings.fit, &s->settings.match,
+                               (size_t)settings->samples, settings->rounds, facts, seed);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
@@ -69,9 +79,10 @@ size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, s
 {
     const size_t vector = 3 * sizeof(float);
     size_t solved = frames * vert_count * vector, clouds = frames * points * vector;
-    return solved + clouds +
-           (is_aligned ? npg_joint_window_memory(&settings->joint, vert_count, frames)
-                       : npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS));
+    if (is_aligned) return solved + clouds + npg_joint_window_memory(&settings->joint, vert_count, frames);
+    return solved + clouds + npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS) +
+           npg_warm_memory(&settings->warm, &settings->fit, &settings->match, (size_t)settings->samples,
+                           vert_count, frames);
 }
 
 /* ---- the window's frames ---- */
@@ -102,8 +113,10 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held)
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, s->count * verts, 3 * sizeof(float)));
     for (size_t i = 0; i < s->count; i++) {
         const npg_frame *frame = &held[i]->frame;
-        s->frames[i] = (npg_fit_frame){frame->index, npg_window_time(&s->facts->plan, (double)frame->index),
-                                       s->points + 3 * s->point_start[i], frame->point_count, NULL};
+        s->frames[i] = (npg_fit_frame){.index = frame->index,
+                                       .time = npg_window_time(&s->facts->plan, (double)frame->index),
+                                       .points = s->points + 3 * s->point_start[i],
+                                       .count = frame->point_count};
     }
     return NPG_OK;
 }
@@ -131,14 +144,28 @@ static npg_status keep_solved(npg_held *held, const float *now, size_t verts, fl
     return NPG_OK;
 }
 
-/* As in the paper: all vertices from the reference. */
+static npg_status fit_unaligned(npg_window_solver *s, npg_held *const *held, const npg_window *window,
+                                npg_fit_watch *watch, void *user)
+{
+    const float **both;
+    NPG_TRY(npg_alloc_array(&both, NPG_FOR_FIT, 2 * s->count, sizeof *both));
+    for (size_t i = 0; i < s->count; i++) {
+        both[i] = held[i]->frame.normals;
+        both[s->count + i] = held[i]->solved;
+    }
+    const npg_warm_frames frames = {s->frames, both, both + s->count, s->count};
+    npg_status status = npg_warm_solve(s->warm, s->fit, &frames, window, watch, user);
+    npg_release(&both);
+    return status;
+}
+
+/* All vertices from the reference. */
 static npg_status solve_unaligned(npg_window_solver *s, npg_held *const *held, const npg_window *window,
                                   npg_fit_watch *watch, void *user)
 {
     size_t verts = s->facts->reference->vert_count;
     NPG_TRY(open_frames(s, held));
-    NPG_TRY(npg_fit_begin(s->fit, s->frames, s->count, s->facts->plan.key));
-    NPG_TRY(npg_fit_run(s->fit, 0, s->settings.fit.epochs, watch, user));
+    NPG_TRY(fit_unaligned(s, held, window, watch, user));
     for (size_t i = 0; i < s->count; i++) {
         float *now = s->now + i * verts * 3;
         NPG_TRY(npg_fit_vertices(s->fit, now, i));

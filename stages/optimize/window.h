@@ -8,11 +8,18 @@
 
 #include "optimize/fit.h"
 #include "optimize/joint.h"
+#include "optimize/match.h"
+#include "optimize/warm_start.h"
 #include "pipeline/stage.h"
 
 typedef struct npg_window_settings {
     npg_fit_settings fit;     /* its epochs are the steps of aligned frames' fit, too */
     npg_joint_settings joint; /* its steps are filled in from there                   */
+    /* without alignment */
+    npg_match_settings match;
+    int64_t samples; /* 0: the usual number        */
+    int64_t rounds;  /* times the matches are made */
+    npg_warm_settings warm;
 } npg_window_settings;
 
 /* A frame in hand. */
@@ -39,6 +46,9 @@ npg_fit *npg_window_fit(npg_window_solver *solver);
 
 /* How the last window of aligned frames went; NULL without alignment.  A loan. */
 const npg_joint_result *npg_window_result(const npg_window_solver *solver);
+
+/* Windows without alignment (warm_start.h); NULL for aligned frames.  A loan. */
+npg_warm *npg_window_warm(npg_window_solver *solver);
 
 /* What the time code is a function of: the absolute frame with a fixed period,
  * the length of the first window, so that frames which two windows share mean the same to both.

@@ -215,6 +215,8 @@ static const npg_fit_settings small = {.epochs = 12,
                                        .grid_step = 3,
                                        .grid_levels = 3,
                                        .normal_nodes = 4,
+                                       .position_channels = 30,
+                                       .normal_channels = 2,
                                        .normal_grid = true,
                                        .lambda = 0.4,
                                        .lambda_growth = 1.5,
@@ -239,7 +241,7 @@ static void the_warm_start_is_exact_on_the_overlap(void **state)
     (void)state;
     for (int i = 0; i < FRAMES; i++) {
         pose_ball(points[i], ball->vert_pos, VERTS, i);
-        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL, NULL};
     }
     assert_int_equal(npg_fit_open(&fit, device, &small, ball, 3), 0);
     assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
@@ -289,7 +291,7 @@ static void overshoot(npg_mesh *ball, npg_deliver deliver, npg_time_kind time_co
     settings.time_code = time_code;
     for (int i = 0; i < FRAMES; i++) {
         pose_ball(points[i], ball->vert_pos, VERTS, i);
-        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL, NULL};
     }
     assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
     assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);

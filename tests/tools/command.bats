@@ -149,7 +149,7 @@ while (( $# )); do
 done
 EOF
     timeout 30 zsh -f ask.zsh 'neupig syn' 'neupig synth ' 'neupig run --prese' 'neupig run --preset ' \
-        'neupig run --preset pap' 'neupig run --preset paper ' 'neupig eval --jso' 'neupig eval --json '
+        'neupig run --preset gri' 'neupig run --preset grids ' 'neupig eval --jso' 'neupig eval --json '
 }
 
 @test "output that can't be written is a disk failure" {

@@ -39,6 +39,19 @@ figure() { sed -n "s/.*$1 \([0-9.e+-]*\).*/\1/p" <<<"$output" | head -n 1; }
     [ "$(figure Corr)" = "0.35355" ]
 }
 
+@test "rigidity: a turn leaves nothing, a stretch does" {
+    mkdir moved still
+    for t in 0 1; do square still/$t.obj 0; done
+    square moved/0.obj 0
+    printf 'v 0 0 0\nv 0 1 0\nv -1 1 0\nv -1 0 0\nf 1 2 3\nf 1 3 4\n' >moved/1.obj # a quarter turn
+    run "$NEUPIG" eval moved still
+    awk -v r="$(figure rigidity)" 'BEGIN { exit !(r >= 0 && r < 1e-6) }'
+    printf 'v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n' >moved/1.obj # twice as long
+    run "$NEUPIG" eval moved still
+    # over two frames; three points (0 0, 1 0, 1 1 and 0 0, 1 1, 0 1) or all four: half of what the stretch leaves
+    awk -v r="$(figure rigidity)" 'BEGIN { exit !(r > 0.1 && r < 0.5) }'
+}
+
 @test "no correspondence where the truth changes its faces" {
     printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 4\nf 2 3 4\n' >truth/2.obj
     run "$NEUPIG" eval shifted truth

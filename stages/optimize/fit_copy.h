@@ -1,0 +1,28 @@
+/* Copy: what a fit knows (grids, decoder, time code and their optimisers) on the host: to start a window from
+ * another than the one before it, and to let two fits of the same settings over different points of the
+ * surface share one state. */
+#ifndef NPG_FIT_COPY_H
+#define NPG_FIT_COPY_H
+
+#include "optimize/fit.h"
+#include "pipeline/archive.h"
+
+/* {0} is none yet. */
+typedef struct npg_fit_copy {
+    char *bytes; /* all parts one behind the other, owned; NULL: none */
+    size_t size;
+} npg_fit_copy;
+
+/* The present state, between steps. */
+npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit);
+npg_status npg_fit_copy_give(const npg_fit_copy *copy, npg_fit *fit);
+void npg_fit_copy_clear(npg_fit_copy *copy);
+
+/* Both at once. */
+npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from);
+
+/* As a block of an archive; loading a block that is missing leaves none. */
+npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_archive_writer *archive, const char *block);
+npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_archive *archive, const char *block);
+
+#endif

@@ -1,0 +1,79 @@
+# Runs without alignment that are killed inside a window: they continue there, with the same bytes.
+
+small=(--align=no --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --samples 100 --grid-levels 3 --max-residual 100
+    --max-flipped 100 --quiet --state-every 0)
+joint=(--window 0 --epochs 60 --deliver least)
+warm=(--window 5 --overlap 2 --epochs 30)
+surface=(--preset grids --window 5 --overlap 2 --epochs 6)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 8 --points 500 -o capture >synth.log
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# Start a run into $1 and kill it with signal $2 once it has written $3 states inside windows; then its options.
+kill_inside() {
+    local out=$1 signal=$2 wanted=$3 seen=0 last=none now
+    shift 3
+    "$NEUPIG" run capture/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ $seen -lt "$wanted" ]; do
+        now=$(stat -c %i-%Y "$out/job/inside.npg" 2>/dev/null || echo none)
+        if [ "$now" != none ] && [ "$now" != "$last" ]; then
+            seen=$((seen + 1))
+            last=$now
+        fi
+    done
+    kill "-$signal" $pid 2>/dev/null || true
+    killed_status=0
+    wait $pid || killed_status=$?
+}
+
+# The job in $1, killed at $2 places and finished, against one that was left alone; then its options.
+check_killed() {
+    local name=$1 places=$2
+    shift 2
+    "$NEUPIG" run capture/points -o "$name-whole" "${small[@]}" "$@" >"$name.log"
+    [ ! -e "$name-whole/job/inside.npg" ]
+    for place in $places; do
+        kill_inside "$name" KILL "$place" "$@"
+        [ ! -e "$name/done.json" ]
+    done
+    [ -e "$name/job/inside.npg" ]
+    "$NEUPIG" run capture/points -o "$name" "${small[@]}" "$@"
+    grep -q resumed_frames "$name/report.json"
+    [ ! -e "$name/job/inside.npg" ]
+    cmp "$name-whole/reference.ply" "$name/reference.ply"
+    cmp "$name-whole/frames.jsonl" "$name/frames.jsonl"
+    diff -r "$name-whole/meshes" "$name/meshes"
+    for record in "$name-whole"/job/motion_*; do cmp "$record" "$name/job/$(basename "$record")"; done
+}
+
+@test "one joint window that is killed twice gives the same bytes" {
+    check_killed joint "5 9" "${joint[@]}"
+}
+
+@test "windows by vertices that are killed inside give the same bytes" {
+    check_killed warm "3 20" "${warm[@]}"
+}
+
+@test "windows by the surface that are killed inside give the same bytes" {
+    check_killed surface "2 3" "${surface[@]}"
+}
+
+@test "SIGTERM inside a window keeps what was done" {
+    kill_inside stopped TERM 3 "${joint[@]}" --epochs 5000
+    [ $killed_status -eq 75 ]
+    [ -e stopped/job/inside.npg ]
+}
+
+@test "a damaged state inside a window is said" {
+    kill_inside hurt KILL 3 "${joint[@]}" --epochs 5000
+    truncate -s -100 hurt/job/inside.npg
+    run "$NEUPIG" run capture/points -o hurt "${small[@]}" "${joint[@]}" --epochs 5000 --restart=no --max-memory 1
+    [[ "$output" == *inside.npg* ]]
+}
