@@ -10,6 +10,7 @@
 
 /* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */
 #define LOST        1.4  /* times the Chamfer distance of the best quarter                              */
+#define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */
 #define BETTER      0.95 /* times a frame's Chamfer distance: what a new pose must reach                */
 #define SWEEPS      5    /* at most                                                                     */
 #define ALIKE       3    /* frames whose points look alike that are started from                        */
@@ -65,7 +66,7 @@ static void set_level(recovery *r)
     for (size_t i = 0; i < r->count; i++)
         if (is_known(&r->frames[i])) r->sorted[known++] = r->frames[i].tracked.chamfer;
     qsort(r->sorted, known, sizeof *r->sorted, by_value);
-    r->level = known ? r->sorted[known / 4] : 0;
+    r->level = fmax(LEVEL_LEAST, known ? r->sorted[known / 4] : 0);
 }
 
 /* ---- frames that look alike ---- */

@@ -2,7 +2,7 @@
 
 small=(--epochs 10 --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --window 5 --overlap 2
     --align-nodes 40 --align-steps 6 --grid-levels 3 --max-residual 100 --max-flipped 100 --quiet)
-forms=(--export obj,ply,pc2,mdd,glb,usda,npz,vdb --unit cm --up z --fps 24 --vdb-voxel 0.04)
+forms=(--no-align --export obj,ply,pc2,mdd,glb,usda,npz,vdb --unit cm --up z --fps 24 --vdb-voxel 0.04)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -77,6 +77,14 @@ find_modules() {
         vdb_print whole/latents/window_000000.vdb | grep pc1
         vdb_print whole/volumes/frame_0000.vdb | grep surface
     fi
+}
+
+@test "aligned frames have no latent grids, and that is said" {
+    run "$NEUPIG" run capture/points -o aligned "${small[@]}" --export vdb
+    echo "$output"
+    [[ "$output" == *"vdb has no latent grids"* ]]
+    [ -e aligned/volumes/frame_0000.vdb ]
+    [ ! -e aligned/latents ]
 }
 
 @test "OBJ files keep colours and texture coordinates of the user's mesh" {

@@ -1,0 +1,139 @@
+/* Recover: lost frames are found again from the frames around them; what is not lost is left alone; where nothing
+ * helps the attempts end. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/recover.h"
+#include "pipeline/random.h"
+#include "tests/support/ball_mesh.h"
+
+enum { RINGS = 20, SPOKES = 30, VERTS = RINGS * SPOKES + 2, FRAMES = 8 };
+
+static const npg_tracker_settings settings = {60, VERTS, 12, 0.1, 0.02};
+
+typedef struct capture {
+    npg_mesh *ball;
+    npg_tracker *tracker;
+    float points[FRAMES][3 * VERTS];
+    double *poses; /* FRAMES x K x 12 */
+    size_t size;   /* of a pose       */
+    npg_recover_frame frames[FRAMES];
+} capture;
+
+/* All frames found, one after the other. */
+static void open_capture(capture *c)
+{
+    npg_random random = npg_random_stream(4, 0, 0);
+    c->ball = ball_mesh(RINGS, SPOKES);
+    assert_int_equal(npg_tracker_open(&c->tracker, c->ball, &settings), NPG_OK);
+    c->size = npg_tracker_node_count(c->tracker) * NPG_POSE_SIZE;
+    assert_int_equal(npg_alloc_array(&c->poses, NPG_FOR_RUN, FRAMES * c->size, sizeof(double)), NPG_OK);
+    npg_pose_rest(c->poses, c->size / NPG_POSE_SIZE);
+    for (int t = 0; t < FRAMES; t++) {
+        double *pose = c->poses + (size_t)t * c->size;
+        npg_tracked tracked;
+        if (t) memcpy(pose, pose - c->size, c->size * sizeof *pose);
+        pose_ball(c->points[t], c->ball->vert_pos, VERTS, 0.3 * t);
+        for (int i = 0; i < 3 * VERTS; i++)
+            c->points[t][i] += (float)(0.02 * (npg_random_real(&random) - 0.5));
+        assert_int_equal(npg_tracker_fit(c->tracker, &tracked, pose, c->points[t], NULL, VERTS, NULL),
+                         NPG_OK);
+        c->frames[t] = (npg_recover_frame){
+            .index = 10 + t, .pose = pose, .tracked = tracked, .points = c->points[t], .point_count = VERTS};
+    }
+}
+
+static void close_capture(capture *c)
+{
+    npg_release(&c->poses);
+    npg_tracker_close(&c->tracker);
+    npg_mesh_unref(&c->ball);
+}
+
+static void lose(capture *c, int t)
+{
+    npg_recover_frame *frame = &c->frames[t];
+    for (size_t k = 0; k < c->size; k += NPG_POSE_SIZE) frame->pose[k + 9] += 0.7;
+    frame->tracked.chamfer = 0.5;
+}
+
+static void lost_frames_are_found_from_those_around(void **state)
+{
+    static capture c;
+    npg_recover_result result;
+    double before[FRAMES];
+    (void)state;
+    open_capture(&c);
+    for (int t = 0; t < FRAMES; t++) before[t] = c.frames[t].tracked.chamfer;
+    lose(&c, 0);
+    lose(&c, 3);
+    lose(&c, 4);
+    lose(&c, 5);
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    print_message("%d lost, %d found in %d fits\n", (int)result.lost, (int)result.found, (int)result.tried);
+    assert_int_equal(result.lost, 4);
+    for (int t = 0; t < FRAMES; t++) {
+        print_message("frame %d: %.2g, first %.2g\n", t, c.frames[t].tracked.chamfer, before[t]);
+        assert_true(c.frames[t].tracked.chamfer < 2 * before[t]);
+    }
+    close_capture(&c);
+}
+
+static void what_is_found_is_left_alone(void **state)
+{
+    static capture c;
+    npg_recover_result result;
+    (void)state;
+    open_capture(&c);
+    double *poses;
+    assert_int_equal(npg_alloc_array(&poses, NPG_FOR_RUN, FRAMES * c.size, sizeof(double)), NPG_OK);
+    for (int t = 0; t < FRAMES; t++) c.frames[t].tracked.chamfer = 1e-4;
+    lose(&c, 2);
+    memcpy(poses, c.poses, FRAMES * c.size * sizeof *poses);
+    c.frames[2].is_fixed =
+        true; /* of the group before: no place to start from, and not this group's to mend */
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    assert_int_equal(result.lost + result.tried, 0);
+    assert_memory_equal(poses, c.poses, FRAMES * c.size * sizeof *poses);
+    npg_release(&poses);
+    close_capture(&c);
+}
+
+static bool stop_at_once(void *user)
+{
+    (void)user;
+    return true;
+}
+
+static void attempts_end(void **state)
+{
+    static capture c;
+    npg_recover_result result;
+    (void)state;
+    open_capture(&c);
+    for (int t = 0; t < FRAMES;
+         t++) { /* what no pose of a ball explains, and what one frame claims to explain */
+        for (int i = 0; i < 3 * VERTS; i++)
+            c.points[t][i] = (float)((i * 7919 + t * 104729) % 2003) / 1001.5f - 1;
+        c.frames[t].tracked.chamfer = t > 4 ? 1e-5 : 1e-3;
+    }
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    print_message("%d lost, %d found in %d fits\n", (int)result.lost, (int)result.found, (int)result.tried);
+    assert_int_equal(result.found, 0);
+    assert_true(result.tried > 0 && result.tried <= 4 * 7);
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, stop_at_once, NULL), NPG_STOPPED);
+    close_capture(&c);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lost_frames_are_found_from_those_around),
+                                       cmocka_unit_test(what_is_found_is_left_alone),
+                                       cmocka_unit_test(attempts_end)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
