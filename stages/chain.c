@@ -53,7 +53,8 @@ static const npg_preset_value grids[] = {
     {"align", "no"},         /* grids and decoder alone carry the motion */
     {"distance", "surface"}, /* of few samples */
     {"width-1", "256"},      /* a third of the cost, and as good (samples/guide/why_these_defaults.md) */
-    {"width-2", "256"},      {"epochs", "60"}, {"rounds", "4"}, {NULL, NULL}};
+    {"width-2", "256"},      {"grid-rate", "0.015"}, /* with few samples larger steps pay */
+    {"mlp-rate", "0.002"},   {"epochs", "60"},       {"rounds", "4"}, {NULL, NULL}};
 static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps", "20"}, {NULL, NULL}};
 static const npg_preset_value none[] = {{NULL, NULL}};
 

@@ -77,11 +77,22 @@ void npg_fit_copy_clear(npg_fit_copy *copy)
 
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from)
 {
-    npg_fit_copy copy = {0};
-    npg_status status = npg_fit_copy_take(&copy, from);
-    if (!status) status = npg_fit_copy_give(&copy, to);
-    npg_fit_copy_clear(&copy);
-    return status;
+    npg_fit_parts source = npg_fit_open_parts(from), target = npg_fit_open_parts(to);
+    size_t count, same;
+    int64_t *step;
+    float *rows;
+    NPG_TRY(npg_fit_read_params(from));
+    const double *code = npg_time_code_parts(source.time_code, &count, &step);
+    double *to_code = npg_time_code_parts(target.time_code, &same, &step);
+    NPG_REQUIRE(source.u->size == target.u->size && source.param_count == target.param_count &&
+                same == count);
+    memcpy(target.params, source.params, source.param_count * sizeof(float));
+    if (count) memcpy(to_code, code, count * sizeof *code);
+    NPG_TRY(npg_alloc(&rows, NPG_FOR_FIT, source.u->size));
+    npg_status status = npg_buffer_read(source.u, 0, rows, source.u->size);
+    if (!status) status = npg_buffer_write(target.u, 0, rows, source.u->size);
+    npg_release(&rows);
+    return status ? status : npg_fit_write_params(to);
 }
 
 npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_archive_writer *archive, const char *block)

@@ -18,7 +18,8 @@ npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit);
 npg_status npg_fit_copy_give(const npg_fit_copy *copy, npg_fit *fit);
 void npg_fit_copy_clear(npg_fit_copy *copy);
 
-/* Both at once. */
+/* Grids, decoder and time code from one fit to another, whose optimiser stays its own: the moments of another
+ * loss would shorten or lengthen its steps for hundreds of epochs. */
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from);
 
 /* As a block of an archive; loading a block that is missing leaves none. */

@@ -475,10 +475,10 @@ static int64_t steps_of(const npg_warm *w, bool is_cold)
     return groups * (DISTIL_EPOCHS + OPEN_ROUNDS * OPEN_EPOCHS) + GATHER_EPOCHS + epochs;
 }
 
-/* Into the samples' fit: what was known after the window that this one borders on. */
+/* What was known after the window that this one borders on, into both fits. */
 static npg_status start(npg_warm *w, const npg_window *window)
 {
-    if (window->from == 0 && w->first.bytes) return npg_fit_copy_give(&w->first, w->probe);
+    if (window->from == 0 && w->first.bytes) NPG_TRY(npg_fit_copy_give(&w->first, w->dense));
     return npg_fit_hand_over(w->probe, w->dense);
 }
 
