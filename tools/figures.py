@@ -133,9 +133,10 @@ TABLES = {
         [((words, f"`{options}`" if options else ""), options) for words, options in (
             ("one joint window, every vertex, from the reference (the paper)", "--preset paper"),
             ("alignment from frame to frame alone", "--epochs 0"),
-            ("alignment, then a joint fit of 30 epochs at full rates", "--epochs 30 --aligned-rate 1"),
-            ("the same with 8 epochs", "--epochs 8 --aligned-rate 1"),
-            ("alignment, then 10 epochs at a tenth of the rates (default)", ""))]),
+            ("alignment, then the joint fit of windows (default)", ""))]),
+    "joint": table_of_runs(("CD", "NC", "Corr", "jitter", "cpu_s"), *[
+        row(CAPTURES[capture][0] if not options else "", capture, options, ("CD", "NC", "Corr", "jitter", "cpu_s"))
+        for capture in ("dancer17", "horse17", "noisy40", "sparse40", "fast24", "cameras48") for options in ("", "--epochs 0")]),
     "hundreds": table_of_captures(
         ("way", "options"), ("dancer96", "walker96"), ("CD", "Corr", "worst_Corr"),
         [((words, f"`{options}`" if options else ""), options) for words, options in (
@@ -153,7 +154,7 @@ TABLES = {
     "fit": table_of_captures(
         ("options",), ("dancer17", "horse17"), ("CD", "Corr"),
         coded(*("--preset paper" + options for options in (
-            " --smoothing screened --deliver last", " --smoothing screened", " --deliver last", "")))),
+            " --smoothing screened", " --hold-apart loose --deliver least", "")))),
     "apart": table_of_captures(
         ("options",), ("dancer40", "horse17"), ("CD", "Corr"),
         coded("--hold-apart no", "--hold-apart loose", "")),
