@@ -88,8 +88,10 @@ def source(neupig):
     version = subprocess.run([neupig, "version"], check=True, stdout=subprocess.PIPE, text=True).stdout.split()[1]
     tree = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     code = [f"{folder}/*.[ch]*" for folder in ("pipeline", "stages", "kernels", "tools")]
-    found = subprocess.run(["git", "-C", tree, "log", "-1", "--format=%h", "--"] + code, stdout=subprocess.PIPE,
-                           stderr=subprocess.DEVNULL, text=True, check=False).stdout.strip()
+    found = ""
+    if shutil.which("git"):
+        found = subprocess.run(["git", "-C", tree, "log", "-1", "--format=%h", "--"] + code, stdout=subprocess.PIPE,
+                               stderr=subprocess.DEVNULL, text=True, check=False).stdout.strip()
     return {"version": version, "commit": found or "unknown", "date": datetime.date.today().isoformat()}
 
 

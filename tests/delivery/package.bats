@@ -3,16 +3,16 @@
 setup_file() {
     build=$(dirname "$NEUPIG")
     grep -q '^NPG_SANITIZE:STRING=.' "$build/CMakeCache.txt" && return 0
-    command -v dpkg-shlibdeps >/dev/null || return 0
+    command -v dpkg-shlibdeps >/dev/null && command -v file >/dev/null || return 0
     cd "$BATS_FILE_TMPDIR"
-    cpack --config "$build/CPackConfig.cmake" -G DEB -B "$PWD" >cpack.log 2>&1
+    cpack --config "$build/CPackConfig.cmake" -G DEB -B "$PWD" >cpack.log 2>&1 || { cat cpack.log; return 1; }
     rm -rf _CPack_Packages
     dpkg-deb -x neupig_*.deb root
     export packed=yes
 }
 
 setup() {
-    [ -n "${packed:-}" ] || skip "needs dpkg-dev, and a build without sanitizers"
+    [ -n "${packed:-}" ] || skip "needs dpkg-dev and file, and a build without sanitizers"
     cd "$BATS_FILE_TMPDIR"
     libdir=$(dirname "$(find root -name libneupig.so)")
 }
