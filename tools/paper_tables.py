@@ -35,7 +35,8 @@ WALKER = ("walker", "--frames 120 --points 5000 --cycles 6")
 POINTS = 5000  # a frame, where a row asks for noise alone
 SAME = 1.05    # factors below count as no difference, unless other seeds differ more
 TITLES = {"CD": "CD", "NC": "NC", "F": "F-0.5 %", "Corr": "Corr", "cpu_s": "s"}
-FORMATS = {"CD": "{:.2f}", "NC": "{:.3f}", "F": "{:.3f}", "Corr": "{:.3f}", "cpu_s": "{:.0f}"}
+FORMATS = {"CD": "{:.2f}", "NC": "{:.3f}", "F": "{:.3f}", "Corr": "{:.4f}", "cpu_s": "{:.0f}"}
+OF_PAPER = {**FORMATS, "Corr": "{:.3f}"}  # as many digits as it has
 COMPARED = ("CD", "Corr")
 
 # ---- the tables ----
@@ -138,10 +139,11 @@ TABLES = {
         "of layers, which the paper does not vary. Paper: AMA, 40 frames.", [
             Row("time code of 2", "--time-frequencies 1", (0.63, 0.945, 0.970, 0.027)),
             Row("time code of 32", "--time-frequencies 16", (0.64, 0.943, 0.973, 0.040)),
-            Row("1 feature by normal", "--normal-features 1", (0.55, 0.946, 0.979, 0.026)),
-            Row("8 features by normal", "--normal-features 8", (0.57, 0.947, 0.978, 0.026)),
-            Row("8 features by position", "--position-features 8", (0.61, 0.945, 0.975, 0.023)),
-            Row("120 features by position", "--position-features 120", (0.59, 0.947, 0.978, 0.032)),
+            Row("1 feature by normal", "--normal-channels 1", (0.55, 0.946, 0.979, 0.026)),
+            Row("8 by normal (here with 24 by position)", "--position-channels 24 --normal-channels 8",
+                (0.57, 0.947, 0.978, 0.026)),
+            Row("8 features by position", "--position-channels 8", (0.61, 0.945, 0.975, 0.023)),
+            Row("120 features by position (here 32 in all)", paper=(0.59, 0.947, 0.978, 0.032), run=False),
             Row("layers of 128", "--width-1 128 --width-2 128", (0.76, 0.938, 0.959, 0.045)),
             Row("layers of 2048", "--width-1 2048 --width-2 2048", (0.54, 0.948, 0.980, 0.021)),
             Row("1 hidden layer", "--hidden-layers 1"),
@@ -506,9 +508,9 @@ def found_run(runs, row, table, size, capture, arguments):
     return runs.get(key_of_row(row, table, size, capture, arguments)) if row.is_run else None
 
 
-def shown(figures, key):
+def shown(figures, key, formats):
     value = figures.get(key)
-    return "-" if value is None or (key == "cpu_s" and figures.get("resumed")) else FORMATS[key].format(value)
+    return "-" if value is None or (key == "cpu_s" and figures.get("resumed")) else formats[key].format(value)
 
 
 def cells_of(run, keys):
@@ -516,7 +518,7 @@ def cells_of(run, keys):
         return ["-"] * len(keys)
     if "error" in run:
         return ["failed: " + run["error"].replace("|", "/")] + ["-"] * (len(keys) - 1)
-    return [shown(run, key) for key in keys]
+    return [shown(run, key, FORMATS) for key in keys]
 
 
 def markdown(rows):
@@ -533,7 +535,7 @@ def table_lines(table, names, found):
     for row in table.rows:
         if row.is_run and not any(found[row, name] for name in names):
             continue
-        cells = [row.label] + [shown(row.paper, key) for key in table.keys]
+        cells = [row.label] + [shown(row.paper, key, OF_PAPER) for key in table.keys]
         for name in names:
             cells += cells_of(found[row, name], table.keys)
         rows.append(cells)
@@ -567,13 +569,13 @@ class Comparison:
         self.alike, self.all = 0, 0
 
     def cell(self, paper, own, margin):
-        """The factor as text; bold where the paper's row is better, worse or equal and this one is not."""
+        """The factor as text; bold where the paper's row is better, worse or equal, and this one, clearly, is not."""
         if own is None:
             return "-"
         text = f"{own:.2f}"
         if paper is None:
             return text
-        is_alike = kind_of(paper, margin) == kind_of(own, margin)
+        is_alike = kind_of(paper, margin) == kind_of(own, margin) or kind_of(paper / own, margin) == "same"
         self.all += 1
         self.alike += is_alike
         return text if is_alike else f"**{text}**"
@@ -584,7 +586,8 @@ def compare_table(table, names, found, margins):
     comparison, rows = Comparison(), [["against"] + [f"{who}: {key}" for key in COMPARED for who in ("paper", *names)]]
     for row in table.rows:
         base = base_of(row, table)
-        if not base or row is base or not row.is_run or not any(found[row, name] for name in names):
+        own = [found[row, name] for name in names]
+        if not base or not row.is_run or not any(own) or own == [found[base, name] for name in names]:
             continue
         cells = []
         for key in COMPARED:
@@ -598,9 +601,9 @@ def compare_table(table, names, found, margins):
 
 
 def table_block(table, size, runs, names, arguments):
-    """(lines, comparison) of one table; no lines where nothing of it is measured."""
+    """(lines, comparison) of one table, of the captures of which it has two runs at least."""
     found = {(row, name): found_run(runs, row, table, size, name, arguments) for row in table.rows for name in names}
-    names = [name for name in names if any(found[row, name] for row in table.rows)]
+    names = [name for name in names if len({id(found[row, name]) for row in table.rows if found[row, name]}) > 1]
     if not names:
         return [], None
     seeds = TABLES["seeds"]
@@ -646,9 +649,9 @@ from the paper's, so absolute figures can't be compared; what a change makes of 
 consistency, F-0.5 % the F-score, Corr the correspondence error, as `neupig eval` has them.
 
 Under each table stand CD and Corr as factors of the row that is the paper's method. Bold: the paper's row is worse, better or equal
-and ours is not. Factors up to 1.05, or up to what other seeds make of the same run (table Seeds), count as equal.
+and ours, by more than the slack, is not. The slack is 1.05, or what other seeds make of the same run (table Seeds).
 
-Rows that were not measured are not shown. What there is, with estimates of time:
+Rows that were not measured are not shown, nor tables with one run alone. What there is, with estimates of time:
 
 ```sh
 tools/paper_tables.py --list --quick
