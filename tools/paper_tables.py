@@ -8,8 +8,8 @@
     tools/paper_tables.py --check
 
 The rows stand in tools/paper_rows.py.  The first command measures those that the results file does not have yet, the cheapest
-first, and writes each into the file as it ends; stopped or killed, the same command resumes, in the middle of a run where that run has a state.  A run that fails is a
-row with its error.  Without --capture a walking figure is made (neupig synth).  --quick takes smaller meshes and fewer
+first, and writes each into the file as it ends; stopped or killed, the same command resumes, in the middle of a run where
+that run has a state.  A run that fails is a row with its error.  Without --capture a walking figure is made (neupig synth).  --quick takes smaller meshes and fewer
 epochs.  --list measures nothing and says what would be, with estimates of time.  The last two write the page from the file,
 or fail where it is not what the file says (exit code 1).  Points of rows with another number of points or with noise are
 sampled here on the true meshes (PLY or OBJ).  Needs Python 3 alone.
