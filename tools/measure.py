@@ -1,25 +1,35 @@
-"""What tools/explore.py and tools/figures.py share: one run of the command, timed and compared with its truth.
+"""What explore.py, figures.py and paper_tables.py share: one run of the command, timed and compared with its truth.
 
 Cost is that of the whole command, files in to files out: wall and processor seconds, and the most resident memory of its
 largest process.  Needs Python 3 alone.
 """
+import ctypes
 import datetime
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
 
 FIGURES = ("CD", "NC", "F", "Corr", "jitter")
 SYNTH_LIKE_A_SCAN = ("--noise", "0.2", "--outliers", "1")
+LIBC = ctypes.CDLL(None)
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+def end_with_parent():
+    """In a child process: it does not outlive a script that is killed, nor keep its folder locked."""
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def timed(command, log):
     """Exit code, wall seconds, processor seconds with those of child processes, MiB resident at most."""
     start = time.monotonic()
     with open(log, "ab") as out:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out,
+                                   preexec_fn=end_with_parent)
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     return {"exit_code": process.returncode, "wall_s": round(time.monotonic() - start, 3),
