@@ -1,8 +1,8 @@
 /* align: brings the reference coarsely into every frame, from the pose of the frame before it (tracker.h).
  *
- * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They wait until
- * their window is complete: then those that were lost are tried again from what is known around them (recover.h).
- * The aligned positions are where the joint fit starts. */
+ * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They
+ * wait until their window is complete: then those that were lost are tried again from what is known around
+ * them (recover.h). The aligned positions are where the joint fit starts. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -448,8 +448,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
                         ? facts->point_count_max
                         : POINTS_MOST * (size_t)s->samples;
     *chunks_held = (group + chunk - 1) / chunk + 1;
-    /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node; per vertex weights and the
-     * graph's search for them, positions, normals; the waiting frames' poses and thinned points */
+    /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node; per vertex weights and
+     * the graph's search for them, positions, normals; the waiting frames' poses and thinned points */
     return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 320 +
            group * (nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float));
 }

@@ -18,9 +18,9 @@
 #define VAIN_MOST   4    /* lost frames in a row that no start improves: the reference does not fit     */
 #define STARTS_MOST (ALIKE + 4)
 
-/* The usual fit begins ten times as stiff as it ends, and its weight is 0.08 wide.  A lost frame has moved farther
- * than that: more steps, a stiffer beginning that moves the body as a whole, and two, then four times the
- * width.  What is lost must not slide away along the surface, hence ten times `along`. */
+/* The usual fit begins ten times as stiff as it ends, and its weight is 0.08 wide.  A lost frame has moved
+ * farther than that: more steps, a stiffer beginning that moves the body as a whole, and two, then four times
+ * the width.  What is lost must not slide away along the surface, hence ten times `along`. */
 static const npg_tracker_effort wide = {.steps = 40, .stiffness = 100, .width_unit = 0.2, .along = 10};
 static const npg_tracker_effort wider = {.steps = 80, .stiffness = 100, .width_unit = 0.4, .along = 10};
 

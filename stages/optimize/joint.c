@@ -15,8 +15,8 @@
 #define TOLERANCE   1e-2 /* of a solution                                             */
 #define NOISE_LEAST 1e-5 /* units: points without noise still have a width */
 /* A frame's own pose counts as much as TRUST times its points where frames move smoothly without help (lambda
- * small), half at EVEN, and TRUST_LEAST where it takes neighbours in time to see the motion (lambda large): what
- * slides along the surface is seen by poses alone. */
+ * small), half at EVEN, and TRUST_LEAST where it takes neighbours in time to see the motion (lambda large):
+ * what slides along the surface is seen by poses alone. */
 #define TRUST       3
 #define TRUST_LEAST 0.1
 #define EVEN        0.02

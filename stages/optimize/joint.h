@@ -5,9 +5,9 @@
  *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
  *
- * y: the frames' own aligned poses; s: those, smoothed in time; lambda_v: how even a vertex's motion is, found
- * by cross-validation (time_smooth.h).  c_p: the closest point of the surface to the point p, n_p its normal
- * there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
+ * y: the frames' own aligned poses; s: those, smoothed in time; lambda_v: how even a vertex's motion is,
+ * found by cross-validation (time_smooth.h).  c_p: the closest point of the surface to the point p, n_p its
+ * normal there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
  *     tie_v = e (least + trust / (1 + lambda_v median(lambda) / even^2))          c = e + tie_v
  *
@@ -31,7 +31,8 @@ typedef struct npg_joint_settings {
 } npg_joint_settings;
 
 /* A frame: where the surface is (W x 3, owned by the caller, moved), and its points (N x 3; normals may be
- * NULL).  A known one was part of an earlier solve: its noise is gone, so it does not speak for how much there is. */
+ * NULL).  A known one was part of an earlier solve: its noise is gone, so it does not speak for how much
+ * there is. */
 typedef struct npg_joint_frame {
     float *positions;
     const float *points, *normals;
@@ -53,12 +54,13 @@ typedef struct npg_joint npg_joint;
 npg_status npg_joint_open(npg_joint **joint, npg_mesh *surface, const npg_joint_settings *settings);
 void npg_joint_close(npg_joint **joint);
 
-/* Asked after each step of conjugate gradients: how many there were, how many there will be at most, and what is
- * left of the first residual (1 .. 0).  Anything but NPG_OK ends the solve with that status. */
+/* Asked after each step of conjugate gradients: how many there were, how many there will be at most, and what
+ * is left of the first residual (1 .. 0).  Anything but NPG_OK ends the solve with that status. */
 typedef npg_status npg_joint_watch(void *user, int64_t step, int64_t most, double residual);
 
-/* Move the frames' surfaces, in order of time; those are left alone where it fails or there are no steps.  Equal
- * input gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY, NPG_DIVERGED, the watch's. */
+/* Move the frames' surfaces, in order of time; those are left alone where it fails or there are no steps.
+ * Equal input gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY, NPG_DIVERGED, the
+ * watch's. */
 npg_status npg_joint_solve(npg_joint *joint, npg_joint_result *result, const npg_joint_frame *frames,
                            size_t frame_count, npg_joint_watch *watch, void *user);
 

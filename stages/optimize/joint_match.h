@@ -21,8 +21,8 @@ void npg_joint_matcher_close(npg_joint_matcher *matcher);
  * distribution. */
 npg_status npg_joint_measure(npg_joint_matcher *matcher, double *spread, const npg_joint_frame *frame);
 
-/* pulls (M) of the frame, *count of them; weights fall beyond `width`.  Points whose normal is opposite to the
- * surface's do not pull. */
+/* pulls (M) of the frame, *count of them; weights fall beyond `width`.  Points whose normal is opposite to
+ * the surface's do not pull. */
 npg_status npg_joint_match(npg_joint_matcher *matcher, npg_joint_pull *pulls, size_t *count,
                            const npg_joint_frame *frame, double width);
 

@@ -38,8 +38,8 @@ void npg_joint_system_close(npg_joint_system *system);
 size_t npg_joint_system_memory(size_t frame_count, size_t vert_count);
 
 /* Solve for `step` from `right`; both pieces of the left side are taken from the members.  Ends when the
- * residual's preconditioned norm has fallen to `tolerance`, or after `most` steps; *taken of them.  watch may be
- * NULL. */
+ * residual's preconditioned norm has fallen to `tolerance`, or after `most` steps; *taken of them.  watch may
+ * be NULL. */
 npg_status npg_joint_system_solve(npg_joint_system *system, double tolerance, int64_t most, int64_t *taken,
                                   npg_joint_watch *watch, void *user);
 

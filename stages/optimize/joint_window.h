@@ -27,9 +27,9 @@ npg_status npg_joint_window_open(npg_joint_window **window, const npg_mesh *refe
                                  const npg_joint_settings *settings);
 void npg_joint_window_close(npg_joint_window **window);
 
-/* Solve the held frames (in order of time), which are those of `at`: `solved` of each is filled, or moved where
- * it is there already.  A frame that is solved for the first time gives its vert_unit for it.  Where this fails
- * nothing has changed. */
+/* Solve the held frames (in order of time), which are those of `at`: `solved` of each is filled, or moved
+ * where it is there already.  A frame that is solved for the first time gives its vert_unit for it.  Where
+ * this fails nothing has changed. */
 npg_status npg_joint_window_solve(npg_joint_window *window, npg_joint_result *result, npg_held *const *held,
                                   const npg_window *at, const npg_joint_points *points, npg_fit_watch *watch,
                                   void *user);

@@ -1,8 +1,8 @@
 /* optimize: slides windows over time and finds the deformation of the reference in every
  * frame (paper, method).
  *
- * Holds the frames of one window and fits them jointly - aligned ones by joint.h, others as in the paper on the
- * OpenCL device -, writes vertices into each frame and passes on what no later window needs. */
+ * Holds the frames of one window and fits them jointly - aligned ones by joint.h, others as in the paper on
+ * the OpenCL device -, writes vertices into each frame and passes on what no later window needs. */
 #include <math.h>
 #include <string.h>
 

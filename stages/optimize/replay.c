@@ -250,8 +250,8 @@ void npg_replay_range(const npg_replay *r, int64_t *first, int64_t *last)
 
 /* ---- aligned frames at any time ---- */
 
-/* From the last window that had the frame: each moves those it shares a little.  NULL with NPG_OK where there is
- * no such frame. */
+/* From the last window that had the frame: each moves those it shares a little.  NULL with NPG_OK where there
+ * is no such frame. */
 static npg_status frame_pose(npg_replay *r, const float **pose, int64_t index)
 {
     *pose = NULL;

@@ -7,8 +7,8 @@
  *            were solved
  *
  * x_w(t): the reference, moved by w's decoder, which is asked for that very time, at frames and between them.
- * At frames that is what the run has written, but for rounding; in overlaps the windows fade as they do there, so
- * the motion is continuous.
+ * At frames that is what the run has written, but for rounding; in overlaps the windows fade as they do
+ * there, so the motion is continuous.
  *
  * Memory: the reference, and the records of a few windows.  Threads: one at a time. */
 #ifndef NPG_REPLAY_H

@@ -6,9 +6,9 @@
  * left out must be predicted by the others.  The error of that prediction is (y_t - x_t) / (1 - S_tt), so no
  * fit is repeated (leave-one-out cross-validation).  Its sum over the frames and over a neighbourhood on the
  * surface chooses lambda for each vertex: still parts are smoothed far, fast ones hardly, clean captures
- * hardly at all.  Motion that is too fast for the frames can't be predicted with any lambda, so the points have
- * the last word: no lambda that moves the surface away from them by more than a fit to their noise had brought it
- * nearer.
+ * hardly at all.  Motion that is too fast for the frames can't be predicted with any lambda, so the points
+ * have the last word: no lambda that moves the surface away from them by more than a fit to their noise had
+ * brought it nearer.
  *
  * Based on: Paul Eilers, A perfect smoother, 2003. */
 #ifndef NPG_TIME_SMOOTH_H
@@ -28,9 +28,9 @@ typedef struct npg_time_frames {
     const bool *is_known;           /* T: already smooth, so left out of the judgement               */
 } npg_time_frames;
 
-/* What a frame's points say of a vertex' way d from where the frame has it: the mean square of their distances is
- * (d^T A d - 2 b^T d + c) / weight, A = sum w n n^T, b = sum w r n, c = sum w r^2, over the points that are nearest to
- * the faces around it; n: normal, r: signed distance. */
+/* What a frame's points say of a vertex' way d from where the frame has it: the mean square of their
+ * distances is (d^T A d - 2 b^T d + c) / weight, A = sum w n n^T, b = sum w r n, c = sum w r^2, over the
+ * points that are nearest to the faces around it; n: normal, r: signed distance. */
 typedef struct npg_time_quadric {
     float a[6], b[3], c; /* A: xx, xy, xz, yy, yz, zz */
 } npg_time_quadric;

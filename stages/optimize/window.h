@@ -1,8 +1,8 @@
 /* Window: the joint fit of consecutive frames, and what goes from one window to the next.
  *
- * Aligned frames (stage align) are moved together by the points of all of them (joint.h).  Without alignment it
- * is the paper's fit: all vertices from the reference by Chamfer distance.  Frames that an earlier window has
- * solved are cross-faded. */
+ * Aligned frames (stage align) are moved together by the points of all of them (joint.h).  Without alignment
+ * it is the paper's fit: all vertices from the reference by Chamfer distance.  Frames that an earlier window
+ * has solved are cross-faded. */
 #ifndef NPG_WINDOW_H
 #define NPG_WINDOW_H
 
@@ -30,8 +30,8 @@ typedef struct npg_held {
 
 typedef struct npg_window_solver npg_window_solver;
 
-/* The device (NULL where frames come aligned) and facts are loans that outlive the solver; facts->reference and
- * box are known. */
+/* The device (NULL where frames come aligned) and facts are loans that outlive the solver; facts->reference
+ * and box are known. */
 npg_status npg_window_solver_open(npg_window_solver **solver, npg_device *device,
                                   const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
                                   bool is_aligned);

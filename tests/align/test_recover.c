@@ -1,5 +1,5 @@
-/* Recover: lost frames are found again from the frames around them; what is not lost is left alone; where nothing
- * helps the attempts end. */
+/* Recover: lost frames are found again from the frames around them; what is not lost is left alone; where
+ * nothing helps the attempts end. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
-/* Joint fit: banded solutions, smoothing that knows noise from motion, and a moving ball whose poses are wrong
- * by noise, with one frame lost, put right by the points of all frames. */
+/* Joint fit: banded solutions, smoothing that knows noise from motion, and a moving ball whose poses are
+ * wrong by noise, with one frame lost, put right by the points of all frames. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -329,8 +329,8 @@ static void a_fit_ends_with_its_least_loss(void **state)
 
 static const npg_window_settings aligned = {.fit = {.epochs = 60}, .joint = {.points = 500, .shape = 0.1}};
 
-/* Two windows over frames of which they share two; the second sees the points of those elsewhere.  How far its
- * solved vertices then are from the first's, in the mean. */
+/* Two windows over frames of which they share two; the second sees the points of those elsewhere.  How far
+ * its solved vertices then are from the first's, in the mean. */
 static void way_from_the_first(double way[2], npg_mesh *ball)
 {
     npg_facts facts = {.reference = ball, .plan = {.frame_count = 8, .window = 5, .overlap = 2}};
