@@ -59,7 +59,7 @@ static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps",
 static const npg_preset_value none[] = {{NULL, NULL}};
 
 const npg_preset npg_presets[] = {
-    {"default", "coarse alignment, then windows of few samples", none},
+    {"default", "alignment frame by frame, then a joint fit of windows of frames", none},
     {"best", "the same with a finer graph and more steps: slower, closer", best},
     {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
      paper},

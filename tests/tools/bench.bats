@@ -56,7 +56,7 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     [ "$status" -eq 0 ]
     file="$(sed -n 's/^written: //p' <<<"$output")"
     [ -f "$file" ]
-    settings=(--epochs 2 --width-1 64 --width-2 64 --faces 400 --poisson-depth 6 --max-residual 100 --max-flipped 100 --max-stretched 100 --quiet)
+    settings=(--no-align --epochs 2 --width-1 64 --width-2 64 --faces 400 --poisson-depth 6 --max-residual 100 --max-flipped 100 --max-stretched 100 --quiet)
     "$NEUPIG" run in/points -o tuned "${settings[@]}"
     grep -qF "$file" tuned/report.json
     echo '{"kind"' >"$file"
