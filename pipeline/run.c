@@ -31,7 +31,8 @@ const npg_option npg_run_options[] = {
     NPG_ROW_CHOICE("quality",    AT(quality),        "usual",   "usual|best",
         "usual, or best: the preset of that name, slower and closer"),
     NPG_ROW_TEXT  ("device",     AT(device),         "auto",    "DEVICE",
-        "OpenCL device of fits without alignment: part of its name, its number, or auto (neupig doctor lists them)"),
+        "OpenCL device of fits without alignment: part of its name, its number, or auto (neupig doctor "
+        "lists them)"),
     NPG_ROW_TEXT  ("tuning",     AT(tuning),         "auto",    "SET",
         "parameters of its kernels: auto (what neupig tune found, else by device), "
         "wide, narrow, gpu, or a file"),

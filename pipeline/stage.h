@@ -137,7 +137,8 @@ npg_pass npg_worker_pass(const npg_worker *worker);
 /* Vertices of the reference mesh; before it is known, as many as the stage that makes it may give it. */
 size_t npg_worker_verts_at_most(const npg_worker *worker);
 
-/* Whether frames have this field (NPG_FIELD_*) when they come to the worker's stage in this run. */
+/* Whether frames have this field (NPG_FIELD_*) when they come to the worker's stage in the solving pass of
+ * this run.  Can be asked in any pass. */
 bool npg_worker_has_field(const npg_worker *worker, uint32_t field);
 
 /* Write a fact of the stage's own kind.  The run owns the value from now on, in case of failure, too. */

@@ -53,8 +53,11 @@ size_t npg_worker_verts_at_most(const npg_worker *worker)
 
 bool npg_worker_has_field(const npg_worker *worker, uint32_t field)
 {
-    for (const npg_worker *before = worker->run->workers; before < worker; before++)
-        if (before->is_in_pass && (before->stage->gives & field)) return true;
+    for (const npg_worker *before = worker->run->workers; before < worker; before++) {
+        const npg_stage *stage = before->stage;
+        bool solves = (stage->passes & NPG_PASS_SOLVE) && (!stage->takes_part || stage->takes_part(before));
+        if (solves && (stage->gives & field)) return true;
+    }
     return false;
 }
 

@@ -3,14 +3,14 @@
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
     "$NEUPIG" synth --body bar --frames 2 --points 300 -o capture >synth.log
-    small=(epochs=2 width-1=32 width-2=32 faces=200 poisson-depth=5)
+    small=(align=no epochs=2 width-1=32 width-2=32 faces=200 poisson-depth=5)
 }
 
 # Exit code 4 and a line with these words from all that opens a device, and nothing is killed.
 expect_device_failure() { # WORDS COMMAND...
     local words=$1 status=0 call
     shift
-    for call in "$NEUPIG doctor" "$NEUPIG doctor --json" "$NEUPIG run capture/points -o out --quiet" \
+    for call in "$NEUPIG doctor" "$NEUPIG doctor --json" "$NEUPIG run capture/points -o out --no-align --quiet" \
         "$NEUPIG bench --only isometry --vertices 300 --points 300" "$(dirname "$NEUPIG")/sample_run_folder capture/points out ${small[*]}"; do
         echo "$call"
         # shellcheck disable=SC2086  # a command line
@@ -26,6 +26,16 @@ expect_device_failure() { # WORDS COMMAND...
     shim=$(dirname "$NEUPIG")/fault_shim.so
     [ -e "$shim" ] || skip "not under a sanitizer"
     expect_device_failure "signal 6 .*out of luck" env LD_PRELOAD="$shim" NPG_FAULT_DRIVER="out of luck"
+}
+
+@test "a run of aligned frames asks no driver" {
+    shim=$(dirname "$NEUPIG")/fault_shim.so
+    [ -e "$shim" ] || skip "not under a sanitizer"
+    run env LD_PRELOAD="$shim" NPG_FAULT_DRIVER="out of luck" "$NEUPIG" run capture/points -o aligned --faces 200 \
+        --poisson-depth 5 --quiet
+    echo "$output"
+    [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
+    [ -e aligned/done.json ]
 }
 
 @test "in a root without /sys, where PoCL aborts, the line says what is missing" {
