@@ -139,7 +139,8 @@ TABLES = {
             ("alignment, then the joint fit of windows (default)", ""))]),
     "joint": table_of_runs(("CD", "NC", "Corr", "jitter", "cpu_s"), *[
         row(CAPTURES[capture][0] if not options else "", capture, options, ("CD", "NC", "Corr", "jitter", "cpu_s"))
-        for capture in ("dancer17", "horse17", "noisy40", "sparse40", "fast24", "cameras48") for options in ("", "--epochs 0")]),
+        for capture in ("dancer17", "dancer175", "horse17", "noisy40", "sparse40", "fast24", "cameras48")
+        for options in ("", "--epochs 0")]),
     "hundreds": table_of_captures(
         ("way", "options"), ("dancer96", "walker96"), ("CD", "Corr", "worst_Corr"),
         [((words, f"`{options}`" if options else ""), options) for words, options in (
