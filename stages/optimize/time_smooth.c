@@ -9,7 +9,7 @@
 #define LADDER       20   /* lambdas that are tried */
 #define LADDER_FIRST -5.5 /* decimal logarithms     */
 #define LADDER_STEP  0.5
-#define FARTHER      4   /* times the mean square of the points' distances: more is motion smoothed away */
+#define FARTHER      4    /* times the mean square of the points' distances: more is motion smoothed away */
 #define FLOOR        1e-5 /* units: distances below do not matter */
 #define POOL_ROUNDS  30   /* steps of averaging over neighbours: about five edges wide */
 
