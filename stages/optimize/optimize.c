@@ -25,6 +25,7 @@ typedef struct state {
     bool is_aligned;
     int64_t total; /* frames of the capture, -1 until the stream has ended */
     double last_chamfer, last_isometry;
+    npg_fit_step last_step; /* of the window at work */
     int64_t emitted, state_every_s;
     double saved_s; /* when the last state was written */
 } state;
@@ -237,12 +238,10 @@ static bool window_is_complete(state *s)
     return true;
 }
 
-static void report_epoch(npg_worker *worker, const npg_fit_step *step)
+/* Most windows settle before their last step: `of_window`, not the steps, says how much is done. */
+static void report_progress(npg_worker *worker, const npg_fit_step *step, double of_window)
 {
     state *s = npg_worker_state(worker);
-    double of_window = (double)(step->epoch + 1) / (double)step->epochs;
-    s->last_chamfer = step->chamfer;
-    s->last_isometry = step->isometry;
     npg_progress progress = {.share = ((double)s->window_at + of_window) / (double)s->window_count,
                              .step = step->epoch + 1,
                              .steps = step->epochs,
@@ -252,6 +251,15 @@ static void report_epoch(npg_worker *worker, const npg_fit_step *step)
                              .frames = npg_worker_facts(worker)->frame_count,
                              .loss = step->loss};
     npg_worker_progress(worker, &progress);
+}
+
+static void report_epoch(npg_worker *worker, const npg_fit_step *step)
+{
+    state *s = npg_worker_state(worker);
+    s->last_chamfer = step->chamfer;
+    s->last_isometry = step->isometry;
+    s->last_step = *step;
+    report_progress(worker, step, (double)(step->epoch + 1) / (double)step->epochs);
     if (step->epoch % 25 == 0 || step->epoch + 1 == step->epochs)
         npg_worker_log(
             worker, NPG_LOG_DEBUG, -1, "window %lld epoch %lld: chamfer %.4g isometry %.4g loss %.4g",
@@ -291,9 +299,13 @@ static npg_status solve_window(npg_worker *worker)
     npg_held **frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
     for (size_t i = 0; i < count; i++) frames[i] = held_frame(s, s->window.first + (int64_t)i);
+    memset(&s->last_step, 0, sizeof s->last_step);
     npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
     npg_release(&frames);
-    if (!status) note_result(worker);
+    if (!status) {
+        note_result(worker);
+        report_progress(worker, &s->last_step, 1);
+    }
     return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
                             (long long)s->window.first, (long long)s->window.last);
 }

@@ -30,7 +30,8 @@ make_capture() { # FOLDER UNIT
         diff -r "one.out/$name" "tiny.out/$name"
         diff -r "one.out/$name" "large.out/$name"
     done
-    [ -s tiny.out/latents/window_000000.vdb ]
+    "$NEUPIG" run tiny -o tiny.grids "${small[@]}" --no-align --export vdb --scale 549755813888
+    [ -s tiny.grids/latents/window_000000.vdb ]
 }
 
 @test "a capture of 1e-12 units is written as it is; a form that can't hold it says so before the fit" {
