@@ -231,28 +231,18 @@ static void report_windows(npg_worker *worker)
                         json_integer((json_int_t)npg_plan_window_count(plan)));
 }
 
-/* Windows where none were asked for: one latent space is good for so many frames (the paper's table:
- * CD 0.53 at 40 frames and 1.31 at 120), and windows of 24 work. */
-enum { JOINT_MOST = 60, WINDOW_AUTO = 24 };
-
-static int64_t window_for(const keyframe_state *state, int64_t frame_count)
-{
-    if (state->window >= 0) return state->window;
-    return frame_count > JOINT_MOST ? WINDOW_AUTO : 0;
-}
-
 static npg_status set_plan(npg_worker *worker, int64_t frame_count)
 {
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
     candidate key = {0};
     NPG_TRY(choose(state, &key));
-    int64_t asked = window_for(state, frame_count);
+    int64_t asked = npg_plan_window_asked(state->window, frame_count);
     int64_t window = asked && asked < frame_count ? asked : frame_count;
     int64_t overlap = window < frame_count ? state->overlap : 0;
     facts->plan =
         (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
-    facts->window_asked = window_for(state, INT64_MAX);
+    facts->window_asked = npg_plan_window_asked(state->window, INT64_MAX);
     facts->overlap_asked = state->overlap;
     bool is_own = *own_mesh(worker) != 0, is_named = state->number != NO_NUMBER;
     bool cuts_welds = state->welds == WELDS_CUT && !is_own, is_open = has_candidates(worker);
@@ -357,7 +347,7 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     if (is_open)
         facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
                                  .key = facts->plan.key,
-                                 .window = window_for(state, INT64_MAX),
+                                 .window = npg_plan_window_asked(state->window, INT64_MAX),
                                  .overlap = state->overlap};
     json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
     state->is_planned = true;
@@ -378,7 +368,7 @@ static npg_status take_live(npg_worker *worker, npg_frame *frame)
     if (!state->is_planned) NPG_TRY(plan_live(worker, true));
     npg_look_ahead_watch(worker, &state->held, frame);
     NPG_TRY(npg_look_ahead_add(&state->held, frame));
-    return npg_look_ahead_release(worker, &state->held, limit + (size_t)window_for(state, INT64_MAX), false);
+    return npg_look_ahead_release(worker, &state->held, limit + (size_t)npg_plan_window_asked(state->window, INT64_MAX), false);
 }
 
 static npg_status end_live(npg_worker *worker)
@@ -399,7 +389,7 @@ static npg_status init(npg_worker *worker)
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
-    int64_t window = window_for(state, INT64_MAX);
+    int64_t window = npg_plan_window_asked(state->window, INT64_MAX);
     if (window && state->overlap >= window)
         return npg_error(NPG_USAGE, "option overlap: %lld frames don't fit in windows of %lld",
                          (long long)state->overlap, (long long)window);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "ingest/ingest.h"
+#include "pipeline/plan.h"
 #include "pipeline/run_settings.h"
 #include "tools/listing.h"
 
@@ -76,14 +77,28 @@ static int64_t option_number(const npg_options *options, const char *name, int64
     const char *text = npg_options_get(options, name);
     char *end = NULL;
     long long value = text ? strtoll(text, &end, 10) : 0;
-    return text && end != text && value > 0 ? value : otherwise;
+    return text && end != text ? value : otherwise;
+}
+
+/* The same where 0 and less have no meaning. */
+static size_t positive_number(const npg_options *options, const char *name, int64_t otherwise)
+{
+    int64_t value = option_number(options, name, otherwise);
+    return (size_t)(value > 0 ? value : otherwise);
+}
+
+/* The length of the run's windows, as the keyframe stage chooses it. */
+static size_t window_of(const npg_probe *probe, const npg_options *options)
+{
+    int64_t frames = (int64_t)probe->frames;
+    int64_t window = npg_plan_window_asked(option_number(options, "window", 0), frames);
+    return (size_t)(window > 0 && window < frames ? window : frames);
 }
 
 void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_options *options)
 {
     /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
-    size_t faces = (size_t)option_number(options, "faces", 20000), most = npg_probe_counts(probe).most;
+    size_t faces = positive_number(options, "faces", 20000), most = npg_probe_counts(probe).most;
     npg_probe_estimate(estimate, probe, (faces < 4 * most ? faces : 4 * most) / 2,
-                       (size_t)option_number(options, "epochs", 250),
-                       (size_t)option_number(options, "window", INT64_MAX));
+                       positive_number(options, "epochs", 250), window_of(probe, options));
 }
