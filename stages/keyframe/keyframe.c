@@ -368,7 +368,8 @@ static npg_status take_live(npg_worker *worker, npg_frame *frame)
     if (!state->is_planned) NPG_TRY(plan_live(worker, true));
     npg_look_ahead_watch(worker, &state->held, frame);
     NPG_TRY(npg_look_ahead_add(&state->held, frame));
-    return npg_look_ahead_release(worker, &state->held, limit + (size_t)npg_plan_window_asked(state->window, INT64_MAX), false);
+    return npg_look_ahead_release(worker, &state->held,
+                                  limit + (size_t)npg_plan_window_asked(state->window, INT64_MAX), false);
 }
 
 static npg_status end_live(npg_worker *worker)

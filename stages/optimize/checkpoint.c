@@ -95,6 +95,7 @@ static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, cons
                                      hand->last_isometry};
     NPG_TRY(npg_archive_put(out, "progress", &progress, sizeof progress));
     if (hand->is_aligned) NPG_TRY(put_alignment(out, hand, &facts->plan));
+    if (hand->usual > 0) NPG_TRY(npg_archive_put(out, "usual", &hand->usual, sizeof hand->usual));
     return put_frames(out, hand, facts->reference->vert_count);
 }
 
@@ -257,6 +258,9 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     hand->is_aligned = progress.is_aligned != 0;
     hand->last_chamfer = progress.last_chamfer;
     hand->last_isometry = progress.last_isometry;
+    size_t size;
+    if (npg_archive_find(in, "usual", &size))
+        NPG_TRY(npg_archive_get(in, "usual", &hand->usual, sizeof hand->usual));
     npg_job_exported(job, &hand->emitted, &log_bytes);
     return get_frames(hand, in, first_index, facts->reference->vert_count);
 }

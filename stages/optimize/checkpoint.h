@@ -15,6 +15,7 @@ typedef struct npg_hand {
     double last_chamfer, last_isometry;
     bool is_aligned;
     npg_warm *warm; /* of windows without alignment, or NULL; a loan */
+    double usual;   /* Chamfer distance that those came to, or 0     */
 } npg_hand;
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until

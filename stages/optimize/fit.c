@@ -540,6 +540,16 @@ void npg_fit_set_isometry(npg_fit *fit, double weight)
     fit->settings.isometry = weight;
 }
 
+void npg_fit_set_confidence(npg_fit *fit, npg_confidence confidence)
+{
+    fit->settings.confidence = (int)confidence;
+}
+
+void npg_fit_set_rate_end(npg_fit *fit, double share)
+{
+    fit->settings.rate_end = share;
+}
+
 void npg_fit_set_epochs(npg_fit *fit, int64_t epochs)
 {
     fit->settings.epochs = epochs;

@@ -101,6 +101,10 @@ npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start)
 /* The weight of isometry from now on. */
 void npg_fit_set_isometry(npg_fit *fit, double weight);
 
+/* The confidence and the last learning rates (as a share of the first) from now on. */
+void npg_fit_set_confidence(npg_fit *fit, npg_confidence confidence);
+void npg_fit_set_rate_end(npg_fit *fit, double share);
+
 /* The length of the fit that the rates and the confidence of following epochs are laid out for. */
 void npg_fit_set_epochs(npg_fit *fit, int64_t epochs);
 

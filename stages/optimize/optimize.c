@@ -25,6 +25,8 @@ typedef struct state {
     bool is_aligned;
     int64_t total; /* frames of the capture, -1 until the stream has ended */
     double last_chamfer, last_isometry;
+    double usual_chamfer;   /* the least that a window without alignment came to, 0 before the first */
+    int64_t lost_count;     /* windows that a warm start did not bring there                         */
     npg_fit_step last_step; /* of the window at work */
     int64_t emitted, state_every_s;
     double saved_s; /* when the last state was written */
@@ -292,6 +294,23 @@ static void note_result(npg_worker *worker)
                    least->isometry);
 }
 
+/* A window that a warm start lost is no silent matter. */
+static void note_warm(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    if (!npg_window_warm(s->solver)) return;
+    if (npg_warm_lost_by(npg_window_warm(s->solver)) > 0) {
+        s->lost_count++;
+        npg_worker_log(
+            worker, NPG_LOG_WARNING, -1,
+            "window %lld: the warm start left it at %.3g times the distance of the others; it had all "
+            "epochs and is now at %.3g times",
+            (long long)s->window_at, npg_warm_lost_by(npg_window_warm(s->solver)),
+            s->last_chamfer / s->usual_chamfer);
+    }
+    if (!s->usual_chamfer || s->last_chamfer < s->usual_chamfer) s->usual_chamfer = s->last_chamfer;
+}
+
 static npg_status solve_window(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -300,10 +319,12 @@ static npg_status solve_window(npg_worker *worker)
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
     for (size_t i = 0; i < count; i++) frames[i] = held_frame(s, s->window.first + (int64_t)i);
     memset(&s->last_step, 0, sizeof s->last_step);
+    if (npg_window_warm(s->solver)) npg_warm_set_usual(npg_window_warm(s->solver), s->usual_chamfer);
     npg_status status = npg_window_solve(s->solver, frames, &s->window, watch, worker);
     npg_release(&frames);
     if (!status) {
         note_result(worker);
+        note_warm(worker);
         report_progress(worker, &s->last_step, 1);
     }
     return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
@@ -383,7 +404,8 @@ static npg_hand hand_of(state *s, int64_t window_at)
 {
     return (npg_hand){s->held,          s->held_count, s->held_capacity,
                       window_at,        s->emitted,    s->last_chamfer,
-                      s->last_isometry, s->is_aligned, npg_window_warm(s->solver)};
+                      s->last_isometry, s->is_aligned, npg_window_warm(s->solver),
+                      s->usual_chamfer};
 }
 
 static npg_status save_state(npg_worker *worker)
@@ -422,6 +444,7 @@ static npg_status resume(npg_worker *worker)
     s->emitted = hand.emitted;
     s->last_chamfer = hand.last_chamfer;
     s->last_isometry = hand.last_isometry;
+    s->usual_chamfer = hand.usual;
     if (!status) status = open_solver(worker, hand.is_aligned);
     if (!status && !hand.is_aligned)
         status = npg_checkpoint_restore_fit(worker, npg_window_fit(s->solver), npg_window_warm(s->solver));
@@ -486,6 +509,7 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "windows", json_integer(s->window_count));
     json_object_set_new(report, "epochs", json_integer(s->window_settings.fit.epochs));
     if (s->is_aligned) return NPG_OK;
+    json_object_set_new(report, "windows_lost", json_integer(s->lost_count));
     json_object_set_new(report, "last_chamfer", json_real(s->last_chamfer));
     json_object_set_new(report, "last_isometry", json_real(s->last_isometry));
     return NPG_OK;

@@ -10,31 +10,34 @@
 #define MATCHERS_MAX 8
 
 /* By trial (samples/guide/why_these_defaults.md, "Warm starts"). */
-#define SAMPLES       1500 /* where the option says 0                                        */
-#define GROUP         1    /* new frames that are brought near their pose together           */
-#define CONTEXT       3    /* solved frames beside them, which hold the field in place       */
-#define VELOCITY      0.8  /* share of the last step that the next is taken to be            */
-#define DISTIL_EPOCHS 25   /* to the predicted poses                                         */
-#define OPEN_ROUNDS   4    /* times a new frame is matched                                   */
-#define OPEN_EPOCHS   15   /* of each round                                                  */
-#define OPEN_WIDTH    0.2  /* unit distances that count in full there                        */
-#define OPEN_ISOMETRY 10   /* in the last round, beside match-total 5000 ...                 */
-#define OPEN_STIFFER  20   /* ... and so much more in the first: limbs go as a whole at first */
-#define GATHER_EPOCHS 40   /* to the poses of all frames, before they are fitted together    */
-#define LAST_WIDTH    0.05 /* unit distances that count in full when they are                */
+#define SAMPLES       1500 /* where the option says 0                                          */
+#define NEAR          3    /* solved frames beside a new one, which hold the field in place    */
+#define FAR           3    /* and others, by turns                                             */
+#define RATE_FACTOR   2    /* of the fit by few samples, to that over all vertices             */
+#define DISTIL_EPOCHS 40   /* of a new frame to where it is predicted                          */
+#define OPEN_ROUNDS   12   /* times that it is matched then                                    */
+#define OPEN_EPOCHS   10   /* of each round                                                    */
+#define OPEN_WIDTH    0.2  /* unit distances that count in full there                          */
+#define OPEN_ISOMETRY 20   /* in the last round, beside match-total 5000 ...                   */
+#define OPEN_STIFFER  20   /* ... and so much more in the first: limbs go as a whole at first  */
+#define LAST_WIDTH    0.05 /* unit distances that count in full when all frames are fitted     */
+#define RATE_END      0.1  /* at most, of the fit by vertices                                  */
 
 /* What a window goes through, in this order. */
 typedef enum phase {
     PHASE_NONE,
-    PHASE_OPEN,    /* new frames are brought near their pose     */
-    PHASE_SURFACE, /* all frames by the surface; count is rounds */
-    PHASE_VERTICES /* all frames by vertices; count is epochs    */
+    PHASE_OPEN,     /* new frames are brought near their pose     */
+    PHASE_SURFACE,  /* all frames by the surface; count is rounds */
+    PHASE_VERTICES, /* all frames by vertices; count is epochs    */
+    PHASE_LONGER    /* the same, of a window that was lost        */
 } phase;
 
 /* Where a window's fit is. */
 typedef struct progress {
     int64_t phase, count, step;
     double loss, loss_before; /* sums over epochs, of what has to settle */
+    double chamfer;           /* of the last of them                     */
+    double lost_by;           /* see npg_warm_lost_by                    */
 } progress;
 
 struct npg_warm {
@@ -58,6 +61,7 @@ struct npg_warm {
     npg_fit *dense;            /* loan */
     float *poses;              /* count x S x 3                              */
     bool *is_known;            /* count: has a pose                          */
+    size_t *known;             /* count: places of some of those, and of a new one */
     float *wide;               /* count x V x 3, or NULL: the field's values */
     npg_pull *pulls;
     size_t *pull_start, *pull_count;
@@ -66,6 +70,7 @@ struct npg_warm {
     int64_t step, steps; /* of the window's epochs of all kinds */
     npg_warm_keep *keep; /* or NULL */
     progress at;
+    double usual;      /* Chamfer distance that other windows came to, or 0 */
     bool is_resumed;   /* `at`, poses and the fits are from an archive */
     size_t pose_count; /* of an archive: frames that have poses        */
 };
@@ -77,7 +82,11 @@ static npg_status open_probe_fit(npg_warm *w)
     npg_fit_settings probe = w->fit_settings;
     probe.confidence = NPG_CONFIDENCE_CONSTANT;
     probe.rate_end = 0.1;
-    if (w->settings.distance == NPG_DISTANCE_VERTICES) probe.isometry = OPEN_ISOMETRY;
+    if (w->settings.distance == NPG_DISTANCE_VERTICES) {
+        probe.isometry = OPEN_ISOMETRY;
+        probe.grid_rate *= RATE_FACTOR;
+        probe.mlp_rate *= RATE_FACTOR;
+    }
     w->isometry = probe.isometry;
     return npg_fit_open(&w->probe, w->device, &probe, w->carry->samples->mesh, w->seed);
 }
@@ -126,6 +135,7 @@ static void close_window(npg_warm *w)
 {
     npg_release(&w->poses);
     npg_release(&w->is_known);
+    npg_release(&w->known);
     npg_release(&w->wide);
     npg_release(&w->pulls);
     npg_release(&w->pull_start);
@@ -155,6 +165,16 @@ npg_fit_copy *npg_warm_first(npg_warm *warm)
 void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep)
 {
     warm->keep = keep;
+}
+
+void npg_warm_set_usual(npg_warm *warm, double chamfer)
+{
+    warm->usual = chamfer;
+}
+
+double npg_warm_lost_by(const npg_warm *warm)
+{
+    return warm->at.lost_by;
 }
 
 static npg_status keep(npg_warm *w, phase now, int64_t count)
@@ -287,28 +307,20 @@ static npg_status set_pulls(npg_warm *w, some of, size_t tied, bool with_ties)
 
 /* ---- new frames, brought near their pose ---- */
 
-/* The pose of the frame `ahead` steps beyond the last known one. */
-static void predict(npg_warm *w, size_t place, size_t last, int step, int ahead)
+/* The pose of the frame beyond the last known one, which moves on as it did. */
+static void predict(npg_warm *w, size_t place, size_t last, int step)
 {
     const float *now = pose_of(w, last), *before = now;
     float *out = pose_of(w, place);
     size_t behind = last - (size_t)step;
     if (behind < w->in->count && w->is_known[behind]) before = pose_of(w, behind);
-    for (size_t i = 0; i < 3 * w->samples; i++)
-        out[i] = now[i] + (float)(VELOCITY * ahead) * (now[i] - before[i]);
+    for (size_t i = 0; i < 3 * w->samples; i++) out[i] = now[i] + (now[i] - before[i]);
 }
 
-/* New frames beyond `last`, one way in time (step 1 or -1). */
-static npg_status open_group(npg_warm *w, size_t last, int step, size_t count)
+/* The last of `of` is new, the others are held at their poses: the field forgets none of them. */
+static npg_status fit_new(npg_warm *w, some of)
 {
-    size_t place[CONTEXT + GROUP], known = 0;
-    for (size_t at = last; known < CONTEXT && at < w->in->count && w->is_known[at]; at -= (size_t)step)
-        place[known++] = at;
-    for (size_t i = 0; i < count; i++) {
-        place[known + i] = last + (size_t)step * (i + 1);
-        predict(w, place[known + i], last, step, (int)i + 1);
-    }
-    some of = {place, known + count};
+    size_t known = of.count - 1;
     widen(w, OPEN_WIDTH);
     NPG_TRY(begin(w, of));
     NPG_TRY(set_pulls(w, of, of.count, false));
@@ -322,20 +334,43 @@ static npg_status open_group(npg_warm *w, size_t last, int step, size_t count)
         NPG_TRY(read_poses(w, of, known));
     }
     npg_fit_set_isometry(w->probe, w->isometry);
-    for (size_t i = 0; i < count; i++) w->is_known[place[known + i]] = true;
     return NPG_OK;
 }
 
-/* From a known frame to the end of the window, one way. */
+/* Known frames that are held while the one after `last` is opened: those before it, and some of the others, by turns,
+ * so that the field forgets none of them. */
+static void remember(const npg_warm *w, some *of, size_t last, int step)
+{
+    size_t *place = w->known, others = 0, near = 0;
+    for (size_t at = last; near < NEAR && at < w->in->count && w->is_known[at]; at -= (size_t)step)
+        place[near++] = at;
+    for (size_t i = 0; i < w->in->count; i++) others += w->is_known[i];
+    others -= near;
+    size_t every = (others + FAR - 1) / FAR, seen = 0;
+    of->count = near;
+    for (size_t i = 0; i < w->in->count && every; i++) {
+        bool is_near = step > 0 ? i <= last && i + near > last : i >= last && i < last + near;
+        if (w->is_known[i] && !is_near && seen++ % every == last % every) place[of->count++] = i;
+    }
+}
+
+static npg_status open_frame(npg_warm *w, size_t place, size_t last, int step)
+{
+    some of = {w->known, 0};
+    remember(w, &of, last, step);
+    w->known[of.count++] = place;
+    predict(w, place, last, step);
+    NPG_TRY(fit_new(w, of));
+    w->is_known[place] = true;
+    return keep(w, PHASE_OPEN, 0);
+}
+
+/* From a known frame to the end of the window, one way (step 1 or -1). */
 static npg_status open_way(npg_warm *w, size_t last, int step)
 {
-    while (last + (size_t)step < w->in->count && !w->is_known[last + (size_t)step]) {
-        size_t left = step > 0 ? w->in->count - 1 - last : last;
-        size_t count = left < GROUP ? left : GROUP;
-        NPG_TRY(open_group(w, last, step, count));
-        NPG_TRY(keep(w, PHASE_OPEN, 0));
-        last += (size_t)step * count;
-    }
+    for (size_t place = last + (size_t)step; place < w->in->count && !w->is_known[place];
+         place += (size_t)step)
+        NPG_TRY(open_frame(w, place, place - (size_t)step, step));
     return NPG_OK;
 }
 
@@ -364,13 +399,6 @@ static npg_status open_new(npg_warm *w)
 }
 
 /* ---- all frames together ---- */
-
-static npg_status gather(npg_warm *w, some all)
-{
-    NPG_TRY(begin(w, all));
-    NPG_TRY(set_pulls(w, all, all.count, false));
-    return run(w, GATHER_EPOCHS);
-}
 
 /* The field's values at every vertex, into the dense fit. */
 static npg_status decode(npg_warm *w)
@@ -412,10 +440,12 @@ static npg_status fit_surface(npg_warm *w, some all)
 
 /* ---- the paper's distance, until the loss has settled ---- */
 
-#define LOOK_BACK 10   /* epochs whose mean loss is compared with that of those before */
-#define SETTLED   0.01 /* share that it has fallen at least while it is going on       */
+#define LOOK_BACK 10   /* epochs whose mean loss is compared with that of those before           */
+#define LOOK_FROM 30   /* epochs before that: the first steps may go up                          */
+#define SETTLED   0.01 /* share that it has fallen at least while it is going on                 */
+#define LOST      1.5  /* times the usual distance: such a window gets all the epochs of a cold one */
 
-static npg_status watch_vertices(void *user, const npg_fit_step *step)
+static npg_status watch_cold(void *user, const npg_fit_step *step)
 {
     npg_warm *w = user;
     NPG_TRY(watch_step(w, step));
@@ -428,22 +458,39 @@ static npg_status watch_settling(void *user, const npg_fit_step *step)
     int64_t count = step->epoch + 1;
     bool is_settled = false;
     NPG_TRY(watch_step(w, step));
+    w->at.chamfer = step->chamfer;
     w->at.loss += step->chamfer + w->fit_settings.isometry * step->isometry;
     if (count % LOOK_BACK == 0) {
-        is_settled = count > LOOK_BACK && w->at.loss > (1 - SETTLED) * w->at.loss_before;
+        is_settled = count > LOOK_FROM && w->at.loss > (1 - SETTLED) * w->at.loss_before;
         w->at.loss_before = w->at.loss;
         w->at.loss = 0;
     }
-    return is_settled ? NPG_END : keep(w, PHASE_VERTICES, count);
+    return is_settled ? NPG_END : keep(w, (phase)w->at.phase, count);
 }
 
-/* After the first window a third of its epochs are the most. */
-static npg_status fit_vertices(npg_warm *w, bool is_first)
+static npg_status fit_epochs(npg_warm *w, phase now, int64_t epochs, npg_fit_watch *watch_epoch)
 {
-    int64_t epochs = w->fit_settings.epochs, first = w->is_resumed ? w->at.count : 0;
-    if (!is_first) epochs = (epochs + 2) / 3;
+    int64_t first = w->is_resumed ? w->at.count : 0;
+    w->is_resumed = false;
+    w->at.phase = now;
     npg_fit_set_epochs(w->dense, epochs);
-    return npg_fit_run(w->dense, first, epochs, is_first ? watch_vertices : watch_settling, w);
+    return npg_fit_run(w->dense, first, epochs, watch_epoch, w);
+}
+
+/* Frames that were brought near need no gate, and a third of the epochs at most; a window that does not get where the
+ * others are gets as many as from a cold start. */
+static npg_status fit_vertices(npg_warm *w)
+{
+    int64_t epochs = w->fit_settings.epochs;
+    npg_fit_set_confidence(w->dense, NPG_CONFIDENCE_CONSTANT);
+    npg_fit_set_rate_end(w->dense, fmin(RATE_END, w->fit_settings.rate_end));
+    if (w->at.phase != PHASE_LONGER) {
+        NPG_TRY(fit_epochs(w, PHASE_VERTICES, (epochs + 2) / 3, watch_settling));
+        if (!(w->usual > 0 && w->at.chamfer > LOST * w->usual)) return NPG_OK;
+        w->at.lost_by = w->at.chamfer / w->usual;
+        w->steps += epochs;
+    }
+    return fit_epochs(w, PHASE_LONGER, epochs, watch_settling);
 }
 
 /* ---- a window ---- */
@@ -460,6 +507,7 @@ static npg_status open_window(npg_warm *w, const npg_warm_frames *in)
                          in->count);
     }
     w->in = in;
+    NPG_TRY(npg_alloc_array(&w->known, NPG_FOR_FIT, in->count, sizeof *w->known));
     NPG_TRY(npg_alloc_array(&w->pull_start, NPG_FOR_FIT, in->count + 1, sizeof *w->pull_start));
     return npg_alloc_array(&w->pull_count, NPG_FOR_FIT, in->count + 1, sizeof *w->pull_count);
 }
@@ -467,12 +515,11 @@ static npg_status open_window(npg_warm *w, const npg_warm_frames *in)
 /* Epochs of all kinds, for the progress. */
 static int64_t steps_of(const npg_warm *w, bool is_cold)
 {
-    int64_t groups = 0, new_frames = 0, epochs = w->fit_settings.epochs;
+    int64_t new_frames = 0, epochs = w->fit_settings.epochs;
     for (size_t i = 0; i < w->in->count; i++) new_frames += !w->is_known[i];
-    groups = (new_frames + GROUP - 1) / GROUP;
     if (is_cold) return epochs;
     if (w->settings.distance == NPG_DISTANCE_VERTICES) epochs = (epochs + 2) / 3;
-    return groups * (DISTIL_EPOCHS + OPEN_ROUNDS * OPEN_EPOCHS) + GATHER_EPOCHS + epochs;
+    return new_frames * (DISTIL_EPOCHS + OPEN_ROUNDS * OPEN_EPOCHS) + epochs;
 }
 
 /* What was known after the window that this one borders on, into both fits. */
@@ -485,27 +532,27 @@ static npg_status start(npg_warm *w, const npg_window *window)
 static npg_status solve_cold(npg_warm *w)
 {
     NPG_TRY(npg_fit_begin(w->dense, w->in->frames, w->in->count, w->facts->plan.key));
-    return fit_vertices(w, true);
+    return fit_epochs(w, PHASE_VERTICES, w->fit_settings.epochs, watch_cold);
 }
 
 /* Up to where all frames of the window are near their pose and the samples' fit has them all. */
 static npg_status come_near(npg_warm *w, const npg_window *window, some all)
 {
-    if (w->is_resumed && w->at.phase == PHASE_SURFACE) {
-        NPG_TRY(begin(w, all));
-        return npg_fit_run(w->probe, 0, 0, NULL, NULL);
-    }
+    bool is_near = w->is_resumed && w->at.phase == PHASE_SURFACE;
     if (!w->is_resumed) NPG_TRY(start(w, window));
-    w->is_resumed = false;
-    NPG_TRY(open_new(w));
-    return gather(w, all);
+    if (!is_near) {
+        w->is_resumed = false;
+        NPG_TRY(open_new(w));
+    }
+    NPG_TRY(begin(w, all));
+    return npg_fit_run(w->probe, 0, 0, NULL, NULL);
 }
 
 static npg_status solve_warm(npg_warm *w, const npg_window *window)
 {
     size_t *place;
     bool is_by_surface = w->settings.distance == NPG_DISTANCE_SURFACE,
-         is_near = w->at.phase == PHASE_VERTICES;
+         is_near = w->at.phase >= PHASE_VERTICES;
     NPG_TRY(npg_alloc_array(&place, NPG_FOR_FIT, w->in->count, sizeof *place));
     for (size_t i = 0; i < w->in->count; i++) place[i] = i;
     some all = {place, w->in->count};
@@ -514,14 +561,15 @@ static npg_status solve_warm(npg_warm *w, const npg_window *window)
     npg_release(&place);
     if (status || is_by_surface) return status;
     NPG_TRY(begin_dense(w, false, !is_near));
-    return fit_vertices(w, false);
+    return fit_vertices(w);
 }
 
 npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *frames, const npg_window *window,
                           npg_fit_watch *watch, void *user)
 {
     bool is_first = window->direction == 0, by_vertices = w->settings.distance == NPG_DISTANCE_VERTICES;
-    bool is_cold = by_vertices && (is_first || !w->settings.is_on);
+    bool is_alone = w->facts->plan.window >= w->facts->plan.frame_count; /* then it is the paper's */
+    bool is_cold = by_vertices && (is_alone || !w->settings.is_on);
     NPG_TRY(is_cold ? NPG_OK : open_probe(w));
     NPG_TRY(open_window(w, frames));
     w->dense = fit;

@@ -52,6 +52,11 @@ size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings
 /* keep gets the user of npg_warm_solve. */
 void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep);
 
+/* The Chamfer distance that windows before came to (0: unknown), for npg_warm_solve; and the factor by which the last
+ * window failed to get there with the epochs of a warm start, so that it had those of a cold one then (0: it did not). */
+void npg_warm_set_usual(npg_warm *warm, double chamfer);
+double npg_warm_lost_by(const npg_warm *warm);
+
 /* Solve a window with `fit`, over all vertices: it then holds the frames' positions. */
 npg_status npg_warm_solve(npg_warm *warm, npg_fit *fit, const npg_warm_frames *frames,
                           const npg_window *window, npg_fit_watch *watch, void *user);
