@@ -28,8 +28,8 @@ typedef struct npg_window {
     int direction;               /* 0 around the keyframe, +1 forward, -1 backward */
 } npg_window;
 
-/* The length of windows for an option: < 0 chooses by the frames that there are (INT64_MAX: no end is known), 0 is
- * one joint window. */
+/* The length of windows for an option: < 0 chooses by the frames that there are (INT64_MAX: no end is known),
+ * 0 is one joint window. */
 int64_t npg_plan_window_asked(int64_t option, int64_t frame_count);
 
 /* The plan for frame_count frames when those of `plan` are solved. */

@@ -337,8 +337,8 @@ static npg_status fit_new(npg_warm *w, some of)
     return NPG_OK;
 }
 
-/* Known frames that are held while the one after `last` is opened: those before it, and some of the others, by turns,
- * so that the field forgets none of them. */
+/* Known frames that are held while the one after `last` is opened: those before it, and some of the others,
+ * by turns, so that the field forgets none of them. */
 static void remember(const npg_warm *w, some *of, size_t last, int step)
 {
     size_t *place = w->known, others = 0, near = 0;
@@ -477,8 +477,8 @@ static npg_status fit_epochs(npg_warm *w, phase now, int64_t epochs, npg_fit_wat
     return npg_fit_run(w->dense, first, epochs, watch_epoch, w);
 }
 
-/* Frames that were brought near need no gate, and a third of the epochs at most; a window that does not get where the
- * others are gets as many as from a cold start. */
+/* Frames that were brought near need no gate, and a third of the epochs at most; a window that does not get
+ * where the others are gets as many as from a cold start. */
 static npg_status fit_vertices(npg_warm *w)
 {
     int64_t epochs = w->fit_settings.epochs;

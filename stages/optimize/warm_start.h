@@ -1,12 +1,15 @@
 /* Warm start: windows of frames that come without alignment.
  *
  * A window starts from what the fit knew after the window it borders on in time.  Its new frames are brought
- * near their pose first, a few at a time, outward from those that are solved: the last pose moved on by its
- * velocity is fitted to as a known target (vertices against vertices, no search), then the frames' points
- * pull at the surface.  Few samples of the reference do for that.  Then all frames of the window are fitted
- * together: by the paper's distance over all vertices, with the frames that the window shares tied to where
- * they are solved, until the loss has settled; or by the distance to the surface over the samples, whose
- * result the field of the decoder gives for every vertex. */
+ * near their pose first, one by one, outward from those that are solved (in the first window: from the
+ * keyframe, which is the reference): the last pose moved on by its velocity is fitted to as a known target
+ * (vertices against vertices, no search), then the frame's points pull at the surface, matched again and
+ * again.  Few samples of the reference do for that.  Then all frames of the window are fitted together: by
+ * the paper's distance over all vertices, with the frames that the window shares tied to where they are
+ * solved, until the loss has settled; or by the distance to the surface over the samples, whose result the
+ * field of the decoder gives for every vertex.
+ *
+ * A capture of one window by the paper's distance is solved as in the paper, without any of this. */
 #ifndef NPG_WARM_START_H
 #define NPG_WARM_START_H
 
@@ -52,8 +55,9 @@ size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings
 /* keep gets the user of npg_warm_solve. */
 void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep);
 
-/* The Chamfer distance that windows before came to (0: unknown), for npg_warm_solve; and the factor by which the last
- * window failed to get there with the epochs of a warm start, so that it had those of a cold one then (0: it did not). */
+/* The Chamfer distance that windows before came to (0: unknown), for npg_warm_solve; and the factor by which
+ * the last window failed to get there with the epochs of a warm start, so that it had those of a cold one
+ * then (0: it did not). */
 void npg_warm_set_usual(npg_warm *warm, double chamfer);
 double npg_warm_lost_by(const npg_warm *warm);
 
