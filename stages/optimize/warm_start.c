@@ -441,7 +441,6 @@ static npg_status fit_surface(npg_warm *w, some all)
 /* ---- the paper's distance, until the loss has settled ---- */
 
 #define LOOK_BACK 10   /* epochs whose mean loss is compared with that of those before           */
-#define LOOK_FROM 30   /* epochs before that: the first steps may go up                          */
 #define SETTLED   0.01 /* share that it has fallen at least while it is going on                 */
 #define LOST      1.5  /* times the usual distance: such a window gets all the epochs of a cold one */
 
@@ -452,6 +451,7 @@ static npg_status watch_cold(void *user, const npg_fit_step *step)
     return keep(w, PHASE_VERTICES, step->epoch + 1);
 }
 
+/* In the last quarter: before it the steps are long, and what they leave is one draw of many. */
 static npg_status watch_settling(void *user, const npg_fit_step *step)
 {
     npg_warm *w = user;
@@ -461,7 +461,7 @@ static npg_status watch_settling(void *user, const npg_fit_step *step)
     w->at.chamfer = step->chamfer;
     w->at.loss += step->chamfer + w->fit_settings.isometry * step->isometry;
     if (count % LOOK_BACK == 0) {
-        is_settled = count > LOOK_FROM && w->at.loss > (1 - SETTLED) * w->at.loss_before;
+        is_settled = 4 * count > 3 * step->epochs && w->at.loss > (1 - SETTLED) * w->at.loss_before;
         w->at.loss_before = w->at.loss;
         w->at.loss = 0;
     }
