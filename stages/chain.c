@@ -2,7 +2,7 @@
 #include "pipeline/stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
-    npg_stage_align, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
+    npg_stage_align, npg_stage_fuse, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
 extern const npg_service npg_service_job;
 
 const npg_stage *const npg_chain[] = {
@@ -11,6 +11,7 @@ const npg_stage *const npg_chain[] = {
     &npg_stage_keyframe, /* box, keyframe, plan of the windows                   */
     &npg_stage_mesh,     /* the reference surface of the keyframe                */
     &npg_stage_align,    /* the reference brought coarsely into each frame       */
+    &npg_stage_fuse,     /* the points of all frames, for a better reference     */
     &npg_stage_optimize, /* its deformation in every frame                       */
     &npg_stage_evaluate, /* figures and a verdict per frame                      */
     &npg_stage_export,   /* meshes, report, done.json                            */

@@ -388,7 +388,7 @@ static npg_status close_group(npg_worker *worker, bool with_state)
     if (!s->group_count) return NPG_OK;
     NPG_TRY(recover_group(worker));
     for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
-    if (with_state && npg_job_of(worker)) NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
+    if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE) NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
     for (size_t i = 0; i < s->group_count; i++) NPG_TRY(pass_on(worker, &s->group[i]));
     for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
     s->group_count = 0;
@@ -460,7 +460,7 @@ const npg_stage npg_stage_align = {
     .help = "brings the reference coarsely into each frame",
     .options = options,
     .state_size = sizeof(state),
-    .passes = NPG_PASS_SOLVE,
+    .passes = NPG_PASS_FUSE | NPG_PASS_SOLVE,
     .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
     .gives = NPG_FIELD_POSE,
     .takes_part = takes_part,

@@ -7,6 +7,7 @@
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "mesh/denoise.h"
+#include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
 #include "mesh/vdb.h"
@@ -36,6 +37,7 @@ typedef struct mesh_state {
     double point_weight, trim, invented_max;
     int apart; /* npg_apart_way */
     bool smooth;
+    bool is_made; /* the reference of this pass */
 } mesh_state;
 
 #define AT(member) offsetof(mesh_state, member)
@@ -85,6 +87,7 @@ typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
     const mesh_state *state;
     const npg_frame *frame;
+    const npg_fused *fused; /* points of all frames, loan; NULL: those of the frame */
     size_t count;    /* N, of the points used */
     float *points;   /* N x 3, unit, owned */
     float *normals;  /* N x 3 or NULL, owned */
@@ -116,7 +119,7 @@ static bool should_stop(void *worker)
 /* The points to reconstruct from, in unit coordinates, with their normals.
  * Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
  * and Poisson's time goes with the points. */
-static npg_status take_points(making *m)
+static npg_status take_frame_points(making *m)
 {
     const npg_frame *frame = m->frame;
     size_t n = frame->point_count;
@@ -132,12 +135,24 @@ static npg_status take_points(making *m)
     return NPG_OK;
 }
 
+/* Those of all frames are thinned already. */
+static npg_status take_points(making *m)
+{
+    if (!m->fused) return take_frame_points(m);
+    m->count = m->fused->count;
+    NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    memcpy(m->points, m->fused->points, m->count * 3 * sizeof(float));
+    memcpy(m->normals, m->fused->normals, m->count * 3 * sizeof(float));
+    return NPG_OK;
+}
+
 static npg_status measure_points(making *m)
 {
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, m->points, m->count);
     m->diagonal = npg_bounds_diagonal(&bounds);
-    note_count(m, "points", m->frame->point_count);
+    note_count(m, "points", m->fused ? m->fused->count : m->frame->point_count);
     note_count(m, "points_used", m->count);
     NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->count));
     note(m, "point_spacing_unit", m->spacing);
@@ -282,7 +297,7 @@ static npg_status rebuild_on_request(making *m)
 static npg_status decimate(making *m)
 {
     npg_mending mending;
-    size_t budget = FACES_PER_POINT * m->frame->point_count;
+    size_t budget = FACES_PER_POINT * (m->fused ? m->fused->count : m->frame->point_count);
     if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
     NPG_TRY(npg_mesh_mend(&m->mesh, &mending)); /* closes small holes before the faces are counted */
     size_t holes = mending.holes;
@@ -384,7 +399,9 @@ static void report_welds(making *m, const npg_weld_cut *cut)
 /* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
 static npg_status cut_welds(making *m)
 {
-    npg_sights *sights = npg_worker_take_fact(m->worker, &npg_fact_sights);
+    bool is_last = npg_worker_pass(m->worker) == NPG_PASS_SOLVE;
+    npg_sights *sights = is_last ? npg_worker_take_fact(m->worker, &npg_fact_sights)
+                                 : npg_worker_fact(m->worker, &npg_fact_sights);
     npg_weld_settings settings = {.spacing_unit = m->spacing, .should_stop = should_stop, .user = m->worker};
     npg_weld_cut done;
     if (!sights) return NPG_OK;
@@ -394,7 +411,7 @@ static npg_status cut_welds(making *m)
         at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
     if (!status && at < sights->count) report_welds(m, &done);
     note(m, "welds_s", npg_clock_s() - since);
-    npg_sights_close(&sights); /* a few MB that no later frame needs */
+    if (is_last) npg_sights_close(&sights); /* a few MB that no later frame needs */
     return status == NPG_DIVERGED ? NPG_OK : status;
 }
 
@@ -441,9 +458,9 @@ static npg_status measure_reference(making *m)
     return NPG_OK;
 }
 
-static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
+static npg_status make_reference(npg_worker *worker, const npg_frame *frame, const npg_fused *fused)
 {
-    making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame};
+    making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame, .fused = fused};
     npg_facts *facts = npg_worker_facts(worker);
     bool is_given = npg_worker_settings(worker)->reference[0];
     double since = npg_clock_s();
@@ -456,6 +473,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
     npg_release(&m.points);
     npg_release(&m.normals);
     if (status) npg_mesh_unref(&m.mesh);
+    npg_mesh_unref(&facts->reference);
     facts->reference = m.mesh;
     if (!status) npg_worker_close_report(worker);
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)frame->number,
@@ -464,17 +482,31 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
 
 /* ---- the stage ---- */
 
+/* The first one from the keyframe's points, those of later passes from all frames'. */
+static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
+{
+    mesh_state *s = npg_worker_state(worker);
+    npg_fused *fused = npg_worker_take_fact(worker, &npg_fact_fused);
+    if (key->is_skipped || !key->point_count)
+        return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)key->number);
+    npg_status status = make_reference(worker, key, fused);
+    npg_fused_close(&fused);
+    s->is_made = !status;
+    return status;
+}
+
 static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
+    const mesh_state *s = npg_worker_state(worker);
+    bool is_there = s->is_made || facts->is_resumed;
+    for (size_t i = 0; i < npg_chunk_count(*chunk) && !is_there; i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
-        if (frame->is_skipped || !frame->point_count)
-            return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)frame->number);
-        NPG_TRY(make_reference(worker, frame));
+        NPG_TRY(make_of_pass(worker, frame));
+        is_there = true;
     }
-    if (!facts->reference) return npg_error(NPG_FAILED, "the keyframe does not come first");
+    if (!is_there) return npg_error(NPG_FAILED, "the keyframe does not come first");
     return NPG_OK;
 }
 
@@ -504,7 +536,7 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
                                   .state_size = sizeof(mesh_state),
-                                  .passes = NPG_PASS_SOLVE,
+                                  .passes = NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,

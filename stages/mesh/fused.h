@@ -1,0 +1,21 @@
+/* Fused: what all frames saw of the body, in the pose of the reference.  Stage fuse makes it, stage mesh takes a
+ * surface from it. */
+#ifndef NPG_FUSED_H
+#define NPG_FUSED_H
+
+#include "pipeline/stage.h"
+
+/* The points of all frames, carried back to the keyframe's pose, averaged and thinned. */
+typedef struct npg_fused {
+    float *points, *normals; /* N x 3 each, unit coordinates, unit normals outward; owned */
+    size_t count;            /* N */
+    double spacing_unit;     /* side of the cells that points were averaged over */
+    int64_t frames;          /* whose points are in it */
+} npg_fused;
+
+/* Written by stage fuse at the end of a fusing pass; stage mesh takes it in the pass that follows. */
+extern const npg_fact_kind npg_fact_fused;
+
+void npg_fused_close(npg_fused **fused);
+
+#endif
