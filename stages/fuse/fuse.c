@@ -18,14 +18,15 @@
 
 #define POINTS_MOST   40000  /* of a frame; more add time and nothing that 100 000 cells could hold    */
 #define CELLS_MOST    120000 /* of the sum: the points that the next reference is made from            */
-#define POINTS_A_CELL 4      /* that a cell should average, from all frames                            */
-#define SIDE_LEAST    0.25   /* of a cell, in spacings of the keyframe's points                        */
+static double ev(const char *n,double d){const char*t=getenv(n);return t?atof(t):d;}
+#define POINTS_A_CELL ev("PAC",4)      /* that a cell should average, from all frames                            */
+#define SIDE_LEAST ev("SL",0.25)   /* of a cell, in spacings of the keyframe's points                        */
 /* By trial, as all below. */
-#define NEAR_MEDIANS   2.5  /* median distances within which a point lies on the surface but for noise */
-#define FAR_SPACINGS   2.5  /* spacings beyond which a point belongs to nothing that is known          */
+#define NEAR_MEDIANS ev("NM",2.5)  /* median distances within which a point lies on the surface but for noise */
+#define FAR_SPACINGS ev("FS",2.5)  /* spacings beyond which a point belongs to nothing that is known          */
 #define AGREEMENT      0.3  /* least cosine of a point's normal and the surface's                      */
 #define MISALIGNED     2.5  /* usual median distances; a frame that is farther off has lost its way    */
-#define FRAMES_SHARE   0.05 /* of all frames must have seen a place, ...                               */
+#define FRAMES_SHARE ev("FSH",0.05) /* of all frames must have seen a place, ...                               */
 #define FRAMES_AT_LEAST 2   /* ... and so many                                                         */
 
 enum { FROM_KEY, FROM_ALL };

@@ -299,6 +299,11 @@ npg_status npg_job_inside_path(const npg_job *job, char **path)
     return npg_join_path(path, job->folder, INSIDE_NAME);
 }
 
+npg_status npg_job_poses_path(const npg_job *job, char **path)
+{
+    return npg_join_path(path, job->folder, "poses.bin");
+}
+
 int64_t npg_job_serial(const npg_job *job)
 {
     return job->serial;

