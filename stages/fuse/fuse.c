@@ -19,7 +19,7 @@
 #define POINTS_MOST   40000  /* of a frame; more add time and nothing that 100 000 cells could hold    */
 #define CELLS_MOST    120000 /* of the sum: the points that the next reference is made from            */
 static double ev(const char *n,double d){const char*t=getenv(n);return t?atof(t):d;}
-#define POINTS_A_CELL ev("PAC",4)      /* that a cell should average, from all frames                            */
+#define POINTS_A_CELL ev("PAC",1)      /* that a cell should average, from all frames                            */
 #define SIDE_LEAST ev("SL",0.25)   /* of a cell, in spacings of the keyframe's points                        */
 /* By trial, as all below. */
 #define NEAR_MEDIANS ev("NM",2.5)  /* median distances within which a point lies on the surface but for noise */

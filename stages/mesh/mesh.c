@@ -8,6 +8,7 @@
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "mesh/denoise.h"
+#include "mesh/flatten.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
@@ -20,6 +21,7 @@
 #define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
 #define SMOOTH_NEIGHBOURS 24
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
+#define FLAT_SPACINGS     1.2  /* surface farther than this from every point is drawn tight */
 #define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
 #define PIECE_SHARE       0.01 /* of the area */
 #define PIECE_DIST        0.1  /* in diagonals */
@@ -187,7 +189,7 @@ static npg_status smooth(making *m)
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
                    "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    sigma);
-    return npg_cloud_smooth(m->points, m->normals, n, m->fused&&getenv("SK")?atoi(getenv("SK")):SMOOTH_NEIGHBOURS);
+    return npg_cloud_smooth(m->points, m->normals, n, m->fused?(getenv("SK")?atoi(getenv("SK")):60):SMOOTH_NEIGHBOURS);
 }
 
 static npg_status reconstruct(making *m)
@@ -195,6 +197,7 @@ static npg_status reconstruct(making *m)
     npg_poisson_settings settings = settings_of(m->state);
     settings.should_stop = should_stop;
     settings.user = m->worker;
+    if (m->fused) settings.rounds_max = 1; /* the surface that carried them has told their sides */
     if (!m->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t n = m->count, turned, moved;
@@ -326,10 +329,22 @@ static npg_status is_sound(bool *sound, const npg_mesh *mesh)
     return NPG_OK;
 }
 
+/* The closed balloon over what nobody saw becomes the least surface there. */
+static npg_status flatten(making *m)
+{
+    size_t moved;
+    npg_mending mending;
+    if (m->state->unseen != UNSEEN_AUTO) return NPG_OK;
+    NPG_TRY(npg_mesh_flatten(m->mesh, &moved, m->points, m->count, FLAT_SPACINGS * m->spacing));
+    note_count(m, "vertices_flattened", moved);
+    return moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
+}
+
 static npg_status shape(making *m, bool *sound)
 {
     NPG_TRY(trim(m));
     NPG_TRY(decimate(m));
+    NPG_TRY(flatten(m));
     return is_sound(sound, m->mesh);
 }
 
