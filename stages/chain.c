@@ -25,9 +25,10 @@ static const npg_preset_value paper[] = {{"align", "no"},              /* from t
                                          {"keyframe-choice", "paper"}, /* by score alone */
                                          {"hold-apart", "no"},         /* the keyframe's points as they are */
                                          {"smooth", "no"},
-                                         {"welds", "keep"}, /* nothing is cut */
-                                         {"window", "-1"},  /* all frames at once, up to 60 */
-                                         {"epochs", "250"}, /* of every vertex */
+                                         {"unseen", "keep"}, /* as Poisson closed it */
+                                         {"welds", "keep"},  /* nothing is cut */
+                                         {"window", "-1"},   /* all frames at once, up to 60 */
+                                         {"epochs", "250"},  /* of every vertex */
                                          {"isometry", "100"},
                                          {"confidence", "cumulative"},
                                          {"smoothing", "doubled"}, /* as in the published code */
@@ -36,19 +37,11 @@ static const npg_preset_value paper[] = {{"align", "no"},              /* from t
                                          {"deliver", "last"},
                                          {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
-    {"align", "no"},
-    {"keyframe-choice", "paper"},
-    {"hold-apart", "no"},
-    {"smooth", "no"},
-    {"welds", "keep"},
-    {"window", "-1"},
-    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
-    {"isometry", "100"},
-    {"confidence", "cumulative"},
-    {"smoothing", "doubled"},
-    {"rate-end", "1"},
-    {"feature-start", "0"},
-    {"deliver", "last"},
+    {"align", "no"},     {"keyframe-choice", "paper"}, {"hold-apart", "no"},
+    {"smooth", "no"},    {"unseen", "keep"},           {"welds", "keep"},
+    {"window", "-1"},    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
+    {"isometry", "100"}, {"confidence", "cumulative"}, {"smoothing", "doubled"},
+    {"rate-end", "1"},   {"feature-start", "0"},       {"deliver", "last"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {
     {"align", "no"},         /* grids and decoder alone carry the motion */

@@ -52,13 +52,13 @@ typedef struct state {
     int64_t nodes, samples, steps;
     double stiffness, along;
     npg_tracker *tracker;
-    npg_poses *known;     /* of the pass before, with the way to this one's nodes; owned, or NULL */
+    npg_poses *known; /* of the pass before, with the way to this one's nodes; owned, or NULL */
     npg_pose_map map;
     double *known_pose; /* of its nodes; owned */
-    npg_poses *found;     /* of a fusing pass, for the next one; owned                             */
-    side sides[2];  /* forward, backward: of the frames that are passed on */
-    side ways[2];   /* the same with those that wait                       */
-    waiting *group; /* in order of arrival; owned, with what they own */
+    npg_poses *found;   /* of a fusing pass, for the next one; owned                             */
+    side sides[2];      /* forward, backward: of the frames that are passed on */
+    side ways[2];       /* the same with those that wait                       */
+    waiting *group;     /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
@@ -520,7 +520,8 @@ static npg_status close_group(npg_worker *worker, bool with_state)
     if (!s->group_count) return NPG_OK;
     NPG_TRY(recover_group(worker));
     for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
-    if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE) NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
+    if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE)
+        NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
     for (size_t i = 0; i < s->group_count; i++) NPG_TRY(pass_on(worker, &s->group[i]));
     for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
     s->group_count = 0;

@@ -145,7 +145,8 @@ npg_status npg_poses_get(npg_poses *p, int64_t index, double *pose, bool *is_the
     if (head < sizeof hash || !hash) return NPG_OK;
     NPG_TRY(read_all(p, p->record, &body, place_of(p, index) + (off_t)sizeof hash));
     if (body < record_bytes(p) || hash_of(p) != hash)
-        return npg_error(NPG_BAD_INPUT, "%s: the pose of frame %lld is damaged", name_of(p), (long long)index);
+        return npg_error(NPG_BAD_INPUT, "%s: the pose of frame %lld is damaged", name_of(p),
+                         (long long)index);
     for (size_t i = 0; i < p->node_count * NPG_POSE_SIZE; i++) pose[i] = (double)p->record[i];
     *is_there = true;
     return NPG_OK;

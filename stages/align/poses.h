@@ -38,11 +38,11 @@ npg_status npg_poses_sync(npg_poses *poses);
 
 /* Where each new node hangs on the old graph. */
 typedef struct npg_pose_map {
-    size_t count;                      /* K', new nodes */
-    uint32_t (*node)[NPG_GRAPH_BIND];  /* old nodes, UINT32_MAX where there are fewer; owned */
-    float (*weight)[NPG_GRAPH_BIND];   /* owned */
-    size_t old_count;                  /* K */
-    float *old_pos;                    /* K x 3, at rest; owned */
+    size_t count;                     /* K', new nodes */
+    uint32_t (*node)[NPG_GRAPH_BIND]; /* old nodes, UINT32_MAX where there are fewer; owned */
+    float (*weight)[NPG_GRAPH_BIND];  /* owned */
+    size_t old_count;                 /* K */
+    float *old_pos;                   /* K x 3, at rest; owned */
 } npg_pose_map;
 
 /* A node of `to` hangs on what carries the nearest place of the surface of `from`.  NPG_MEMORY. */

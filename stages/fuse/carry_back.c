@@ -29,8 +29,8 @@ npg_status npg_carry_back_open(npg_carry_back **out, npg_mesh *reference)
     NPG_REQUIRE(reference->vert_normals);
     NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
     c->mesh = npg_mesh_ref(reference);
-    npg_status status = npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces,
-                                         reference->face_count);
+    npg_status status =
+        npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces, reference->face_count);
     if (!status) status = npg_alloc_array(&c->now, NPG_FOR_MESH, v, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&c->normals, NPG_FOR_MESH, v, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&c->turns, NPG_FOR_MESH, v, 9 * sizeof(float));

@@ -16,18 +16,16 @@
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 
-#define POINTS_MOST   40000  /* of a frame; more add time and nothing that 100 000 cells could hold    */
-#define CELLS_MOST    120000 /* of the sum: the points that the next reference is made from            */
-static double ev(const char *n,double d){const char*t=getenv(n);return t?atof(t):d;}
-#define POINTS_A_CELL ev("PAC",1)      /* that a cell should average, from all frames                            */
-#define SIDE_LEAST ev("SL",0.25)   /* of a cell, in spacings of the keyframe's points                        */
-/* By trial, as all below. */
-#define NEAR_MEDIANS ev("NM",2.5)  /* median distances within which a point lies on the surface but for noise */
-#define FAR_SPACINGS ev("FS",2.5)  /* spacings beyond which a point belongs to nothing that is known          */
-#define AGREEMENT      0.3  /* least cosine of a point's normal and the surface's                      */
-#define MISALIGNED     2.5  /* usual median distances; a frame that is farther off has lost its way    */
-#define FRAMES_SHARE ev("FSH",0.05) /* of all frames must have seen a place, ...                               */
-#define FRAMES_AT_LEAST 2   /* ... and so many                                                         */
+#define POINTS_MOST 40000 /* of a frame: more add time, and nothing that the cells could hold */
+/* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
+#define POINTS_A_CELL   1    /* that a cell should average, from all frames ...                        */
+#define SIDE_LEAST      0.25 /* ... but for its side, in spacings of the keyframe's points             */
+#define NEAR_MEDIANS    2.5  /* median distances within which a point lies on the surface but for noise */
+#define FAR_SPACINGS    2.5  /* spacings beyond which a point belongs to nothing that is known         */
+#define AGREEMENT       0.3  /* least cosine of a point's normal and the surface's                     */
+#define MISALIGNED      2.5  /* usual median distances: a frame that is farther off has lost its way   */
+#define FRAMES_SHARE    0.05 /* of all frames must have seen a place, ...                              */
+#define FRAMES_AT_LEAST 2    /* ... and so many                                                        */
 
 enum { FROM_KEY, FROM_ALL };
 
@@ -76,8 +74,8 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
     NPG_TRY(npg_alloc_array(&c->points, NPG_FOR_MESH, most, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&c->normals, NPG_FOR_MESH, most, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&c->carried, NPG_FOR_MESH, most, sizeof *c->carried));
-    c->count = npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals,
-                                 frame->point_count);
+    c->count =
+        npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, c->points, c->count);
     return NPG_OK;
 }
@@ -111,20 +109,27 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
             s->strays++;
             continue;
         }
-        NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal, p->point,
-                              p->normal, (float)(robust * robust), frame));
+        NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,
+                              p->point, p->normal, (float)(robust * robust), frame));
     }
     s->points += (int64_t)c->count;
     return NPG_OK;
+}
+
+static size_t most_cells(const npg_facts *facts)
+{
+    size_t points = (size_t)facts->frame_count * facts->point_count_max;
+    return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
 static npg_status open_gathering(npg_worker *worker, const cloud *key)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    double per_frame = POINTS_A_CELL / (double)facts->frame_count;
+    double per_frame = (double)POINTS_A_CELL / (double)facts->frame_count; /* of the points of one frame */
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
-    NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))), CELLS_MOST));
+    NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
+                           most_cells(facts)));
     return npg_carry_back_open(&s->carry, facts->reference);
 }
 
@@ -189,7 +194,8 @@ static npg_status publish(npg_worker *worker)
     json_object_set_new(report, "cell_unit", json_real(fused->spacing_unit));
     npg_worker_log(worker, NPG_LOG_INFO, -1,
                    "%lld points of %lld frames in the keyframe's pose: %zu means over %.5f units",
-                   (long long)(s->points - s->strays), (long long)s->frames, fused->count, fused->spacing_unit);
+                   (long long)(s->points - s->strays), (long long)s->frames, fused->count,
+                   fused->spacing_unit);
     return npg_worker_publish(worker, &npg_fact_fused, fused);
 }
 
@@ -236,6 +242,15 @@ static bool takes_part(const npg_worker *worker)
            !npg_worker_settings(worker)->reference[0] && npg_worker_has_field(worker, NPG_FIELD_POSE);
 }
 
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    size_t points = facts->point_count_max < POINTS_MOST ? facts->point_count_max : POINTS_MOST;
+    *chunks_held = 1;
+    return npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
+           npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
+}
+
 extern const npg_stage npg_stage_fuse;
 const npg_stage npg_stage_fuse = {.name = "fuse",
                                   .help = "gathers the points of all frames for the reference",
@@ -246,4 +261,5 @@ const npg_stage npg_stage_fuse = {.name = "fuse",
                                   .takes_part = takes_part,
                                   .process = process,
                                   .flush = flush,
-                                  .uninit = uninit};
+                                  .uninit = uninit,
+                                  .memory = memory};

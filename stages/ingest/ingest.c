@@ -435,9 +435,8 @@ const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .help = "reads the frames",
                                     .options = ingest_options,
                                     .state_size = sizeof(state),
-                                    .passes =
-                                        NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
-                                        NPG_PASS_FUSE | NPG_PASS_SOLVE,
+                                    .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
+                                              NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                     .gives = NPG_FIELD_POINTS,
                                     .init = init,
                                     .process = process,

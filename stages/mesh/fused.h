@@ -5,6 +5,8 @@
 
 #include "pipeline/stage.h"
 
+#define NPG_FUSED_MOST 120000 /* points at most: 20 000 faces hold no more detail, with reserve */
+
 /* The points of all frames, carried back to the keyframe's pose, averaged and thinned. */
 typedef struct npg_fused {
     float *points, *normals; /* N x 3 each, unit coordinates, unit normals outward; owned */

@@ -2,7 +2,6 @@
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
 #include <string.h>
-#include <stdlib.h>
 
 #include "align/sights.h"
 #include "geometry/mesh_tools.h"
@@ -20,6 +19,7 @@
 #define POINTS_MAX        80000
 #define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
 #define SMOOTH_NEIGHBOURS 24
+#define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
 #define FLAT_SPACINGS     1.2  /* surface farther than this from every point is drawn tight */
 #define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
@@ -75,8 +75,8 @@ static const npg_option mesh_options[] = {
         "in diagonals of the keyframe's box"),
     NPG_ROW_CHOICE("unseen",         AT(unseen),           "auto",    "auto|keep|trim",
         "Surface without points near it (holes, the far side of a single view): "
-        "keep it, trim it, or trim it when it is more than a quarter of the area; "
-        "it is reported in any case"),
+        "keep it as the mesher closed it, trim it, or draw it tight between what was seen, "
+        "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
     NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
         "that no point of the keyframe saw and that was kept, in per cent; "
@@ -90,14 +90,14 @@ typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
     const mesh_state *state;
     const npg_frame *frame;
-    const npg_fused *fused; /* points of all frames, loan; NULL: those of the frame */
-    size_t count;    /* N, of the points used */
-    float *points;   /* N x 3, unit, owned */
-    float *normals;  /* N x 3 or NULL, owned */
-    double spacing;  /* of the points */
-    double diagonal; /* of the points */
-    double invented; /* share of the mesh that no point saw, once it is trimmed */
-    npg_mesh *mesh;  /* owned */
+    const npg_fused *fused; /* points of all frames, a loan; NULL: those of the frame */
+    size_t count;           /* N, of the points used */
+    float *points;          /* N x 3, unit, owned */
+    float *normals;         /* N x 3 or NULL, owned */
+    double spacing;         /* of the points */
+    double diagonal;        /* of the points */
+    double invented;        /* share of the mesh that no point saw, once it is trimmed */
+    npg_mesh *mesh;         /* owned */
 } making;
 
 /* ---- report ---- */
@@ -189,7 +189,7 @@ static npg_status smooth(making *m)
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
                    "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    sigma);
-    return npg_cloud_smooth(m->points, m->normals, n, m->fused?(getenv("SK")?atoi(getenv("SK")):60):SMOOTH_NEIGHBOURS);
+    return npg_cloud_smooth(m->points, m->normals, n, m->fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
 
 static npg_status reconstruct(making *m)
@@ -240,10 +240,12 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
     json_object_set_new(npg_worker_report(m->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
     if (share > UNSEEN_TOLERATED)
-        npg_worker_warn(
-            m->worker, false, m->frame->number,
-            "%.1f %% of the reconstructed surface has no point near it: unseen in the keyframe, %s",
-            100 * share, *trim_unseen ? "trimmed off" : "kept as Poisson closed it");
+        npg_worker_warn(m->worker, false, m->frame->number,
+                        "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
+                        100 * share, m->fused ? "all frames" : "the keyframe",
+                        *trim_unseen                      ? "trimmed off"
+                        : m->state->unseen == UNSEEN_KEEP ? "kept as Poisson closed it"
+                                                          : "closed tightly");
     return NPG_OK;
 }
 
@@ -366,9 +368,9 @@ static void judge_invented(making *m)
     note(m, "invented_share", m->invented);
     if (100 * m->invented > m->state->invented_max)
         npg_worker_warn(m->worker, true, m->frame->number,
-                        "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, "
+                        "%.1f %% of the reference's surface is invented: no point of %s saw it, "
                         "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
-                        100 * m->invented, m->state->invented_max);
+                        100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
@@ -529,12 +531,16 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 /* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point,
  * and 80 bytes a face with its share of vertices, normals and the links that mending needs. */
 #define RAW_FACES_PER_POINT 16
+#define RAW_FACES_PER_FUSED 6 /* points that lie closer share the octree's cells; measured: 3 */
 #define BYTES_PER_RAW_FACE  80
 
 static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
 {
+    const npg_fused *fused = npg_worker_fact(worker, &npg_fact_fused);
+    size_t faces = npg_worker_facts(worker)->point_count_max * RAW_FACES_PER_POINT;
     *chunks_held = 1;
-    return npg_worker_facts(worker)->point_count_max * RAW_FACES_PER_POINT * BYTES_PER_RAW_FACE;
+    if (fused && fused->count * RAW_FACES_PER_FUSED > faces) faces = fused->count * RAW_FACES_PER_FUSED;
+    return faces * BYTES_PER_RAW_FACE;
 }
 
 /* A closed mesh has half as many vertices as faces, and two; the budget is decimate()'s. */

@@ -361,9 +361,8 @@ const npg_stage npg_stage_outlier = {.name = "outlier",
                                      .help = "Cleans points, makes and mends normals",
                                      .options = outlier_options,
                                      .state_size = sizeof(outlier_state),
-                                     .passes =
-                                         NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
-                                         NPG_PASS_FUSE | NPG_PASS_SOLVE,
+                                     .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
+                                               NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                      .needs = NPG_FIELD_POINTS,
                                      .gives = NPG_FIELD_CLEAN,
                                      .init = outlier_init,
