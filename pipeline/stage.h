@@ -63,7 +63,7 @@ typedef struct npg_facts {
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass and
                             in the solving one, before the first frame is passed on */
     double unseen_share; /* share of the reference's area that no point of its frame saw */
-    /* evaluate, at the end of the solving pass; forward and backward from the keyframe */
+    /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
     /* the service job, before the first pass */

@@ -238,12 +238,18 @@ static npg_status open_known(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     between *b = npg_worker_kept(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (b &&
+        (facts->has_changed[0] || facts->has_changed[1])) { /* poses that were stretched to what is new */
+        npg_poses_close(&b->poses);
+        npg_tracker_close(&b->tracker);
+    }
     if (b && b->poses) {
         NPG_TRY(npg_pose_map_open(&s->map, b->tracker, s->tracker));
         s->known = b->poses;
         b->poses = NULL;
         npg_tracker_close(&b->tracker);
-    } else if (npg_worker_facts(worker)->is_resumed) {
+    } else if (facts->is_resumed) {
         NPG_TRY(restore_known(worker));
     }
     if (!s->known) return NPG_OK;

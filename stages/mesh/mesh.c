@@ -500,11 +500,23 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, con
 
 /* ---- the stage ---- */
 
+/* What all frames saw is one body only where the reference so far explains the capture to its ends: parts that
+ * come, go or open belong to no common surface, and hiding them in one would silence the alarm. */
+static void drop_if_changed(npg_worker *worker, npg_fused **fused)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (!*fused || !(facts->has_changed[0] || facts->has_changed[1])) return;
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "the keyframe's surface does not explain all frames: the reference is made from it alone");
+    npg_fused_close(fused);
+}
+
 /* The first one from the keyframe's points, those of later passes from all frames'. */
 static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
 {
     mesh_state *s = npg_worker_state(worker);
     npg_fused *fused = npg_worker_take_fact(worker, &npg_fact_fused);
+    drop_if_changed(worker, &fused);
     if (key->is_skipped || !key->point_count)
         return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)key->number);
     npg_status status = make_reference(worker, key, fused);
