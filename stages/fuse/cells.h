@@ -15,7 +15,7 @@
 
 typedef struct npg_cells npg_cells;
 
-/* side: of a cell, at first; most: cells at most.  NPG_MEMORY. */
+/* side: of a cell, at first, 1e-5 at least; most: cells at most, 65 at least.  NPG_MEMORY. */
 npg_status npg_cells_open(npg_cells **cells, double side, size_t most);
 void npg_cells_close(npg_cells **cells);
 
