@@ -227,6 +227,9 @@ static npg_status restore_known(npg_worker *worker)
         npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN_MAP, &size);
     if (!map) return NPG_OK; /* the reference is the keyframe's own */
     NPG_TRY(npg_pose_map_unpack(&s->map, map, size));
+    if (s->map.count != npg_tracker_node_count(s->tracker))
+        return npg_error(NPG_BAD_INPUT, "the state to resume from has poses for %zu nodes, not %zu",
+                         s->map.count, npg_tracker_node_count(s->tracker));
     NPG_TRY(poses_path(worker, &path));
     npg_status status = npg_poses_open(&s->known, path, s->map.old_count);
     npg_release(&path);
