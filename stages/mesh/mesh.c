@@ -187,8 +187,8 @@ static npg_status smooth(making *m)
     note(m, "noise_unit", sigma);
     if (!m->state->smooth || sigma < NOISE_MIN * m->spacing) return NPG_OK;
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
-                   "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
-                   sigma);
+                   "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   m->fused ? "all frames" : "the keyframe", sigma);
     return npg_cloud_smooth(m->points, m->normals, n, m->fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
 
