@@ -5,8 +5,8 @@
  *
  *     mean = sum w x / sum w,   normal = sum w n / |sum w n|
  *
- * Where the cubes would become too many they grow: each takes in its neighbours of twice the side.  What fewer
- * frames than asked for saw, counted over cubes of four times the side, is left out at the end.
+ * Where the cubes would become too many they grow: each takes in its neighbours of twice the side.  What
+ * fewer frames than asked for saw, counted over cubes of four times the side, is left out at the end.
  * Equal input in equal order gives equal bits. */
 #ifndef NPG_CELLS_H
 #define NPG_CELLS_H

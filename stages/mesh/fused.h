@@ -1,5 +1,5 @@
-/* Fused: what all frames saw of the body, in the pose of the reference.  Stage fuse makes it, stage mesh takes a
- * surface from it. */
+/* Fused: what all frames saw of the body, in the pose of the reference.  Stage fuse makes it, stage mesh
+ * takes a surface from it. */
 #ifndef NPG_FUSED_H
 #define NPG_FUSED_H
 
