@@ -118,7 +118,7 @@ npg_status npg_job_motion_path(const npg_job *job, char **path);
 npg_status npg_job_poses_path(const npg_job *job, char **path);
 
 /* Block of a state: what stage align needs (npg_frame.align_state). */
-#define NPG_BLOCK_ALIGN "align"
+#define NPG_BLOCK_ALIGN     "align"
 #define NPG_BLOCK_ALIGN_MAP "align.map" /* from the nodes of those poses to the reference's */
 
 /* What job_state.c needs of the folder: block "log" of a state, paths of the next one, what is kept. */

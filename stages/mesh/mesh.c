@@ -1,6 +1,8 @@
 /* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "align/sights.h"
@@ -79,7 +81,7 @@ static const npg_option mesh_options[] = {
         "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
     NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
-        "that no point of the keyframe saw and that was kept, in per cent; "
+        "that no point saw and that was kept, in per cent; "
         "above it the run ends with exit code 7"),
     {0}};
 /* clang-format on */
@@ -110,6 +112,21 @@ static void note(making *m, const char *key, double value)
 static void note_count(making *m, const char *key, size_t value)
 {
     json_object_set_new(npg_worker_report(m->worker), key, json_integer((json_int_t)value));
+}
+
+/* Of the reference that the run delivers; what is said of those before is for the log alone. */
+NPG_PRINTF(3, 4)
+static void warn(const making *m, bool partial, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (npg_worker_pass(m->worker) == NPG_PASS_SOLVE)
+        npg_worker_warn(m->worker, partial, m->frame->number, "%s", text);
+    else
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number, "%s", text);
 }
 
 static bool should_stop(void *worker)
@@ -220,12 +237,10 @@ static npg_status keep_main(making *m, const char *when)
     NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, PIECE_SHARE, dist_max));
     note_count(m, "components", pieces.kept);
     if (pieces.kept > 1)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+        warn(m, false, "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
     if (pieces.lost_share > LOST_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
-                        pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
+        warn(m, false, "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+             pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
     return NPG_OK;
 }
 
@@ -240,12 +255,11 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
     json_object_set_new(npg_worker_report(m->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
     if (share > UNSEEN_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
-                        100 * share, m->fused ? "all frames" : "the keyframe",
-                        *trim_unseen                      ? "trimmed off"
-                        : m->state->unseen == UNSEEN_KEEP ? "kept as Poisson closed it"
-                                                          : "closed tightly");
+        warn(m, false, "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
+             100 * share, m->fused ? "all frames" : "the keyframe",
+             *trim_unseen                      ? "trimmed off"
+             : m->state->unseen == UNSEEN_KEEP ? "kept as Poisson closed it"
+                                               : "closed tightly");
     return NPG_OK;
 }
 
@@ -260,10 +274,10 @@ static npg_status trim(making *m)
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
     NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
     if (!trim_unseen && share > LOST_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
-                        "and was trimmed off",
-                        100 * share, m->state->trim);
+        warn(m, false,
+             "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
+             "and was trimmed off",
+             100 * share, m->state->trim);
     return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
 }
 
@@ -367,10 +381,10 @@ static void judge_invented(making *m)
     npg_worker_facts(m->worker)->unseen_share = m->invented;
     note(m, "invented_share", m->invented);
     if (100 * m->invented > m->state->invented_max)
-        npg_worker_warn(m->worker, true, m->frame->number,
-                        "%.1f %% of the reference's surface is invented: no point of %s saw it, "
-                        "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
-                        100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
+        warn(m, true,
+             "%.1f %% of the reference's surface is invented: no point of %s saw it, "
+             "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
+             100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
@@ -387,8 +401,7 @@ static npg_status make(making *m)
     if (!status && !sound) status = is_closed(&closed, whole);
     if (!status && !sound && closed) status = make_again(m, &whole, &sound);
     if (!status && !sound)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "the reference mesh still has flipped or degenerate faces after all mending");
+        warn(m, false, "the reference mesh still has flipped or degenerate faces after all mending");
     if (!status) judge_invented(m);
     npg_mesh_unref(&whole);
     return status;
@@ -448,9 +461,8 @@ static npg_status read_reference(making *m)
     NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
     note(m, "unseen_share", facts->unseen_share);
     if (facts->unseen_share > 0.5)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
-                        100 * facts->unseen_share, path);
+        warn(m, false, "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
+             100 * facts->unseen_share, path);
     return NPG_OK;
 }
 

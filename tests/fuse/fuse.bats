@@ -59,6 +59,15 @@ fusing_passes() {
     [ "$(fusing_passes rounds.log)" -eq 2 ]
 }
 
+@test "only the reference that is delivered has its faults in the report" {
+    run "$NEUPIG" run parts/points -o bare "${small[@]}" --frames 0:6 --max-invented 0 --unseen keep
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [[ "$output" == *"no point of the keyframe saw it"*"no point of any frame saw it"* ]]
+    run grep -h -o "no point of .* saw it" bare/report.json
+    [ "$output" = "no point of any frame saw it" ]
+}
+
 # Kill a run into $1 in its solving pass, once it has a state.
 kill_in_solving() {
     rm -rf "$1"
