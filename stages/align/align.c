@@ -211,11 +211,11 @@ static void release_between(void *thing)
 }
 
 /* Where poses are kept: NULL for a run without a job folder. */
-static npg_status poses_path(const npg_worker *worker, char **path)
+static npg_status poses_path(const npg_worker *worker, char **path, bool is_new)
 {
     const npg_job *job = npg_job_of(worker);
     *path = NULL;
-    return job ? npg_job_poses_path(job, path) : NPG_OK;
+    return job ? npg_job_poses_path(job, path, is_new) : NPG_OK;
 }
 
 static npg_status restore_known(npg_worker *worker)
@@ -230,7 +230,7 @@ static npg_status restore_known(npg_worker *worker)
     if (s->map.count != npg_tracker_node_count(s->tracker))
         return npg_error(NPG_BAD_INPUT, "the state to resume from has poses for %zu nodes, not %zu",
                          s->map.count, npg_tracker_node_count(s->tracker));
-    NPG_TRY(poses_path(worker, &path));
+    NPG_TRY(poses_path(worker, &path, false));
     npg_status status = npg_poses_open(&s->known, path, s->map.old_count);
     npg_release(&path);
     return status;
@@ -246,6 +246,8 @@ static npg_status open_known(npg_worker *worker)
         s->known = b->poses;
         b->poses = NULL;
         npg_tracker_close(&b->tracker);
+        if (npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_job_of(worker))
+            NPG_TRY(npg_job_keep_poses(npg_job_of(worker)));
     } else if (npg_worker_facts(worker)->is_resumed) {
         NPG_TRY(restore_known(worker));
     }
@@ -258,7 +260,7 @@ static npg_status open_found(npg_worker *worker)
     state *s = npg_worker_state(worker);
     char *path;
     if (npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
-    NPG_TRY(poses_path(worker, &path));
+    NPG_TRY(poses_path(worker, &path, true));
     npg_status status = NPG_OK;
     if (path && unlink(path) && errno != ENOENT) /* `known` still reads what had the name before */
         status = npg_error_errno(NPG_DISK, "can't remove %s", path);

@@ -96,6 +96,20 @@ same() {
     same killed
 }
 
+@test "a run that starts over and is killed while it gathers leaves the unfinished job as it was" {
+    [ -d hurt ] || skip "needs the job that the test before left"
+    cp -r hurt again
+    "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --align-steps 200 --align-nodes 500 >again.log 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ ! -e again/job/poses.new ]; do sleep 0.02; done
+    kill -KILL $pid
+    wait $pid || true
+    [ -e again/job/poses.new ]
+    "$NEUPIG" run noisy/points -o again "${small[@]}" --quiet
+    grep -q resumed_frames again/report.json
+    same again
+}
+
 @test "damaged or missing poses of an unfinished job are bad input, named; --restart discards them" {
     [ -d hurt ] || skip "needs the job that the test before left"
     cp -r hurt missing
