@@ -24,8 +24,7 @@ typedef enum npg_pass {
     NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe   */
     NPG_PASS_SOLVE = 4,   /* the work itself; the only pass of a live source */
     NPG_PASS_CHOOSE = 8,  /* files, after SCORE: look closer at a few frames */
-    NPG_PASS_FUSE = 16    /* files, after CHOOSE, as often as facts.fuse_left says: follow the reference so far
-                             through all frames and gather their points for the next one */
+    NPG_PASS_FUSE = 16    /* files, facts.fuse_left times: all frames' points    */
 } npg_pass;
 
 /* The frames that the choosing pass reads, in time order. */
@@ -58,10 +57,11 @@ typedef struct npg_facts {
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
     /* fuse */
-    int64_t fuse_left; /* fusing passes that are still to be walked */
+    int64_t fuse_left; /* fusing passes that are still to be walked: each follows the reference so far through
+                          all frames and gathers their points for the next one */
     /* mesh */
-    npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass and
-                            in the solving one, before the first frame is passed on */
+    npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass
+                            and in the solving one, before the first frame is passed on */
     double unseen_share; /* share of the reference's area that no point of its frame saw */
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */

@@ -211,11 +211,11 @@ static void release_between(void *thing)
 }
 
 /* Where poses are kept: NULL for a run without a job folder. */
-static npg_status poses_path(const npg_worker *worker, char **path)
+static npg_status poses_path(const npg_worker *worker, char **path, bool is_new)
 {
     const npg_job *job = npg_job_of(worker);
     *path = NULL;
-    return job ? npg_job_poses_path(job, path) : NPG_OK;
+    return job ? npg_job_poses_path(job, path, is_new) : NPG_OK;
 }
 
 static npg_status restore_known(npg_worker *worker)
@@ -227,8 +227,26 @@ static npg_status restore_known(npg_worker *worker)
         npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN_MAP, &size);
     if (!map) return NPG_OK; /* the reference is the keyframe's own */
     NPG_TRY(npg_pose_map_unpack(&s->map, map, size));
-    NPG_TRY(poses_path(worker, &path));
+    if (s->map.count != npg_tracker_node_count(s->tracker))
+        return npg_error(NPG_BAD_INPUT, "the state to resume from has poses for %zu nodes, not %zu",
+                         s->map.count, npg_tracker_node_count(s->tracker));
+    NPG_TRY(poses_path(worker, &path, false));
     npg_status status = npg_poses_open(&s->known, path, s->map.old_count);
+    npg_release(&path);
+    return status;
+}
+
+/* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
+static npg_status drop_if_changed(npg_worker *worker, between *b)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    char *path;
+    if (!b || !(facts->has_changed[0] || facts->has_changed[1])) return NPG_OK;
+    npg_poses_close(&b->poses);
+    npg_tracker_close(&b->tracker);
+    NPG_TRY(poses_path(worker, &path, true));
+    npg_status status = NPG_OK;
+    if (path && unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
     npg_release(&path);
     return status;
 }
@@ -238,18 +256,15 @@ static npg_status open_known(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     between *b = npg_worker_kept(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    if (b &&
-        (facts->has_changed[0] || facts->has_changed[1])) { /* poses that were stretched to what is new */
-        npg_poses_close(&b->poses);
-        npg_tracker_close(&b->tracker);
-    }
+    NPG_TRY(drop_if_changed(worker, b));
     if (b && b->poses) {
         NPG_TRY(npg_pose_map_open(&s->map, b->tracker, s->tracker));
         s->known = b->poses;
         b->poses = NULL;
         npg_tracker_close(&b->tracker);
-    } else if (facts->is_resumed) {
+        if (npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_job_of(worker))
+            NPG_TRY(npg_job_keep_poses(npg_job_of(worker)));
+    } else if (npg_worker_facts(worker)->is_resumed) {
         NPG_TRY(restore_known(worker));
     }
     if (!s->known) return NPG_OK;
@@ -261,7 +276,7 @@ static npg_status open_found(npg_worker *worker)
     state *s = npg_worker_state(worker);
     char *path;
     if (npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
-    NPG_TRY(poses_path(worker, &path));
+    NPG_TRY(poses_path(worker, &path, true));
     npg_status status = NPG_OK;
     if (path && unlink(path) && errno != ENOENT) /* `known` still reads what had the name before */
         status = npg_error_errno(NPG_DISK, "can't remove %s", path);

@@ -257,6 +257,17 @@ npg_status npg_pose_map_pack(const npg_pose_map *map, unsigned char **bytes, siz
     return NPG_OK;
 }
 
+/* Every new node hangs on old ones that are there, on one at least. */
+static bool hangs_well(const npg_pose_map *map)
+{
+    for (size_t k = 0; k < map->count; k++)
+        for (int b = 0; b < NPG_GRAPH_BIND; b++) {
+            uint32_t old = map->node[k][b];
+            if (old >= map->old_count && (old != UINT32_MAX || !b)) return false;
+        }
+    return true;
+}
+
 npg_status npg_pose_map_unpack(npg_pose_map *map, const unsigned char *bytes, size_t size)
 {
     uint64_t counts[2] = {0, 0};
@@ -267,13 +278,14 @@ npg_status npg_pose_map_unpack(npg_pose_map *map, const unsigned char *bytes, si
     if (!is_sane || size != sizeof counts + counts[0] * each + counts[1] * place)
         return npg_error(NPG_BAD_INPUT, "the state to resume from has no poses to start from");
     npg_status status = alloc_map(map, counts[0], counts[1]);
-    if (status) {
-        npg_pose_map_close(map);
-        return status;
+    if (!status) {
+        const unsigned char *at = bytes + sizeof counts;
+        memcpy(map->node, at, counts[0] * sizeof *map->node);
+        memcpy(map->weight, at += counts[0] * sizeof *map->node, counts[0] * sizeof *map->weight);
+        if (counts[1]) memcpy(map->old_pos, at + counts[0] * sizeof *map->weight, counts[1] * place);
+        if (!hangs_well(map))
+            status = npg_error(NPG_BAD_INPUT, "the state to resume from hangs nodes on poses that it lacks");
     }
-    const unsigned char *at = bytes + sizeof counts;
-    memcpy(map->node, at, counts[0] * sizeof *map->node);
-    memcpy(map->weight, at += counts[0] * sizeof *map->node, counts[0] * sizeof *map->weight);
-    memcpy(map->old_pos, at + counts[0] * sizeof *map->weight, counts[1] * place);
-    return NPG_OK;
+    if (status) npg_pose_map_close(map);
+    return status;
 }

@@ -136,7 +136,7 @@ static void make_unitf(float v[3])
     for (int i = 0; i < 3; i++) v[i] = length > 0 ? v[i] / length : 0;
 }
 
-/* The rotation nearest to a sum of similar rotations, nearly: its rows made orthonormal (Gram and Schmidt). */
+/* Nearly the rotation nearest to a sum of similar ones: its rows made orthonormal (Gram and Schmidt). */
 static void straighten(float m[9])
 {
     make_unitf(m);

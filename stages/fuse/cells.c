@@ -10,6 +10,8 @@
 #define VOTE_CELLS  4   /* sides of the cubes over which frames are counted, in cells */
 #define NONE        UINT32_MAX
 #define COORDS_BITS 20 /* of a key; the unit box in cells of 1e-5 fits */
+#define SIDE_LEAST  1e-5
+#define CELLS_LEAST 65 /* cubes on both sides of 0 never become one: 8 of them, facing 8 octants, and room */
 
 typedef struct cell {
     uint64_t key;
@@ -154,9 +156,10 @@ npg_status npg_cells_add(npg_cells *c, const float at[3], const float facing[3],
 npg_status npg_cells_open(npg_cells **out, double side, size_t most)
 {
     npg_cells *c;
-    NPG_REQUIRE(side > 0 && most);
+    *out = NULL;
     NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
-    c->side = side;
+    c->side = fmax(side, SIDE_LEAST);
+    if (most < CELLS_LEAST) most = CELLS_LEAST;
     npg_status status = open_table(&c->fine, most);
     if (!status) status = open_table(&c->votes, most);
     if (status) npg_cells_close(&c);
@@ -211,6 +214,7 @@ npg_status npg_cells_means(const npg_cells *c, float *points, float *normals, si
 
 size_t npg_cells_memory(size_t most)
 {
+    if (most < CELLS_LEAST) most = CELLS_LEAST;
     /* two tables, each twice while it grows */
     return 4 * ((most + 1) * sizeof(cell) + ((size_t)1 << bits_for(most)) * sizeof(uint32_t));
 }

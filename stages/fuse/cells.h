@@ -5,8 +5,8 @@
  *
  *     mean = sum w x / sum w,   normal = sum w n / |sum w n|
  *
- * Where the cubes would become too many they grow: each takes in its neighbours of twice the side.  What fewer
- * frames than asked for saw, counted over cubes of four times the side, is left out at the end.
+ * Where the cubes would become too many they grow: each takes in its neighbours of twice the side.  What
+ * fewer frames than asked for saw, counted over cubes of four times the side, is left out at the end.
  * Equal input in equal order gives equal bits. */
 #ifndef NPG_CELLS_H
 #define NPG_CELLS_H
@@ -15,7 +15,7 @@
 
 typedef struct npg_cells npg_cells;
 
-/* side: of a cell, at first; most: cells at most.  NPG_MEMORY. */
+/* side: of a cell, at first, 1e-5 at least; most: cells at most, 65 at least.  NPG_MEMORY. */
 npg_status npg_cells_open(npg_cells **cells, double side, size_t most);
 void npg_cells_close(npg_cells **cells);
 

@@ -5,14 +5,14 @@
  *
  *     x_v = sum_{w ~ v} x_w / |{w ~ v}|,
  *
- * while the seen ones stay.  Not in the paper. */
+ * while the seen ones stay, and pieces of the mesh without any.  Not in the paper. */
 #ifndef NPG_FLATTEN_H
 #define NPG_FLATTEN_H
 
 #include "pipeline/mesh.h"
 
 /* Move the vertices of the mesh that are farther than seen_dist from all N points (N x 3), in place; its
- * normals are left as they are.  *moved: how many.  NPG_MEMORY. */
+ * normals are left as they are.  *moved: how many did.  NPG_MEMORY. */
 npg_status npg_mesh_flatten(npg_mesh *mesh, size_t *moved, const float *points, size_t point_count,
                             double seen_dist);
 

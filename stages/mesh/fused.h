@@ -1,5 +1,5 @@
-/* Fused: what all frames saw of the body, in the pose of the reference.  Stage fuse makes it, stage mesh takes a
- * surface from it. */
+/* Fused: what all frames saw of the body, in the pose of the reference.  Stage fuse makes it, stage mesh
+ * takes a surface from it. */
 #ifndef NPG_FUSED_H
 #define NPG_FUSED_H
 
@@ -12,6 +12,7 @@ typedef struct npg_fused {
     float *points, *normals; /* N x 3 each, unit coordinates, unit normals outward; owned */
     size_t count;            /* N */
     double spacing_unit;     /* side of the cells that points were averaged over */
+    double key_spacing_unit; /* of the keyframe's points                            */
     int64_t frames;          /* whose points are in it */
 } npg_fused;
 

@@ -1,6 +1,8 @@
 /* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "align/sights.h"
@@ -21,6 +23,7 @@
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
+#define KEY_SPACINGS      0.5  /* of the keyframe's points: all frames lie closer, but not everywhere */
 #define FLAT_SPACINGS     1.2  /* surface farther than this from every point is drawn tight */
 #define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
 #define PIECE_SHARE       0.01 /* of the area */
@@ -79,7 +82,7 @@ static const npg_option mesh_options[] = {
         "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
     NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
-        "that no point of the keyframe saw and that was kept, in per cent; "
+        "that no point saw and that was kept, in per cent; "
         "above it the run ends with exit code 7"),
     {0}};
 /* clang-format on */
@@ -94,6 +97,7 @@ typedef struct making { /* what is known while the reference is made */
     size_t count;           /* N, of the points used */
     float *points;          /* N x 3, unit, owned */
     float *normals;         /* N x 3 or NULL, owned */
+    double seen;            /* what SEEN_SPACINGS and FLAT_SPACINGS are taken of */
     double spacing;         /* of the points */
     double diagonal;        /* of the points */
     double invented;        /* share of the mesh that no point saw, once it is trimmed */
@@ -110,6 +114,21 @@ static void note(making *m, const char *key, double value)
 static void note_count(making *m, const char *key, size_t value)
 {
     json_object_set_new(npg_worker_report(m->worker), key, json_integer((json_int_t)value));
+}
+
+/* Of the reference that the run delivers; what is said of those before is for the log alone. */
+NPG_PRINTF(3, 4)
+static void warn(const making *m, bool partial, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (npg_worker_pass(m->worker) == NPG_PASS_SOLVE)
+        npg_worker_warn(m->worker, partial, m->frame->number, "%s", text);
+    else
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number, "%s", text);
 }
 
 static bool should_stop(void *worker)
@@ -159,6 +178,8 @@ static npg_status measure_points(making *m)
     note_count(m, "points_used", m->count);
     NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->count));
     note(m, "point_spacing_unit", m->spacing);
+    m->seen = m->spacing;
+    if (m->fused) m->seen = fmax(m->seen, KEY_SPACINGS * m->fused->key_spacing_unit);
     return NPG_OK;
 }
 
@@ -187,8 +208,8 @@ static npg_status smooth(making *m)
     note(m, "noise_unit", sigma);
     if (!m->state->smooth || sigma < NOISE_MIN * m->spacing) return NPG_OK;
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
-                   "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
-                   sigma);
+                   "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   m->fused ? "all frames" : "the keyframe", sigma);
     return npg_cloud_smooth(m->points, m->normals, n, m->fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
 
@@ -220,19 +241,17 @@ static npg_status keep_main(making *m, const char *when)
     NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, PIECE_SHARE, dist_max));
     note_count(m, "components", pieces.kept);
     if (pieces.kept > 1)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+        warn(m, false, "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
     if (pieces.lost_share > LOST_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
-                        pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
+        warn(m, false, "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+             pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
     return NPG_OK;
 }
 
 /* What no point saw: measured on the closed surface, before anything is trimmed. */
 static npg_status judge_unseen(making *m, bool *trim_unseen)
 {
-    double share, seen_dist = SEEN_SPACINGS * m->spacing;
+    double share, seen_dist = SEEN_SPACINGS * m->seen;
     NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->count, seen_dist));
     *trim_unseen =
         m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
@@ -240,12 +259,11 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
     json_object_set_new(npg_worker_report(m->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
     if (share > UNSEEN_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
-                        100 * share, m->fused ? "all frames" : "the keyframe",
-                        *trim_unseen                      ? "trimmed off"
-                        : m->state->unseen == UNSEEN_KEEP ? "kept as Poisson closed it"
-                                                          : "closed tightly");
+        warn(m, false, "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
+             100 * share, m->fused ? "all frames" : "the keyframe",
+             *trim_unseen                      ? "trimmed off"
+             : m->state->unseen == UNSEEN_KEEP ? "kept as Poisson closed it"
+                                               : "closed tightly");
     return NPG_OK;
 }
 
@@ -254,16 +272,16 @@ static npg_status trim(making *m)
     bool trim_unseen;
     double limit = m->state->trim * m->diagonal, share;
     NPG_TRY(judge_unseen(m, &trim_unseen));
-    if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->spacing);
+    if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->seen);
     NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->count, limit));
     note(m, "trimmed_share", share);
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
-    NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
+    NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->seen));
     if (!trim_unseen && share > LOST_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
-                        "and was trimmed off",
-                        100 * share, m->state->trim);
+        warn(m, false,
+             "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
+             "and was trimmed off",
+             100 * share, m->state->trim);
     return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
 }
 
@@ -337,7 +355,7 @@ static npg_status flatten(making *m)
     size_t moved;
     npg_mending mending;
     if (m->state->unseen != UNSEEN_AUTO) return NPG_OK;
-    NPG_TRY(npg_mesh_flatten(m->mesh, &moved, m->points, m->count, FLAT_SPACINGS * m->spacing));
+    NPG_TRY(npg_mesh_flatten(m->mesh, &moved, m->points, m->count, FLAT_SPACINGS * m->seen));
     note_count(m, "vertices_flattened", moved);
     return moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
 }
@@ -367,10 +385,10 @@ static void judge_invented(making *m)
     npg_worker_facts(m->worker)->unseen_share = m->invented;
     note(m, "invented_share", m->invented);
     if (100 * m->invented > m->state->invented_max)
-        npg_worker_warn(m->worker, true, m->frame->number,
-                        "%.1f %% of the reference's surface is invented: no point of %s saw it, "
-                        "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
-                        100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
+        warn(m, true,
+             "%.1f %% of the reference's surface is invented: no point of %s saw it, "
+             "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
+             100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
@@ -387,8 +405,7 @@ static npg_status make(making *m)
     if (!status && !sound) status = is_closed(&closed, whole);
     if (!status && !sound && closed) status = make_again(m, &whole, &sound);
     if (!status && !sound)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "the reference mesh still has flipped or degenerate faces after all mending");
+        warn(m, false, "the reference mesh still has flipped or degenerate faces after all mending");
     if (!status) judge_invented(m);
     npg_mesh_unref(&whole);
     return status;
@@ -445,12 +462,11 @@ static npg_status read_reference(making *m)
             return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
-    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
+    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->seen));
     note(m, "unseen_share", facts->unseen_share);
     if (facts->unseen_share > 0.5)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
-                        100 * facts->unseen_share, path);
+        warn(m, false, "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
+             100 * facts->unseen_share, path);
     return NPG_OK;
 }
 
