@@ -201,7 +201,8 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
     run->pass = pass;
     atomic_store(&run->ended_count, 0);
     npg_status status = open_worker_states(run);
-    if (!status && pass == NPG_PASS_SOLVE && !run->facts.is_live) npg_run_announce_memory(run);
+    bool is_heavy = pass == NPG_PASS_FUSE || (pass == NPG_PASS_SOLVE && !run->facts.is_live);
+    if (!status && is_heavy) npg_run_announce_memory(run);
     if (!status) status = open_rings(run);
     if (!status) status = start_threads(run);
     if (status) npg_run_fail(run, "run", status);
@@ -237,7 +238,11 @@ void npg_run_announce_memory(npg_run *run)
     npg_run_log(run, NPG_LOG_INFO, "run", -1, text);
     json_object_set_new(parts, "rings", json_integer((json_int_t)(rings * chunk_bytes)));
     json_object_set_new(parts, "total", json_integer((json_int_t)total));
-    json_object_set_new(run->report, "memory_bound_bytes", parts);
+    json_t *before = json_object_get(json_object_get(run->report, "memory_bound_bytes"), "total");
+    if (before && (size_t)json_integer_value(before) > total) /* a fusing pass that takes more */
+        json_decref(parts);
+    else
+        json_object_set_new(run->report, "memory_bound_bytes", parts);
 }
 
 /* ---- the conductor ---- */
@@ -288,6 +293,7 @@ static npg_status do_passes(npg_run *run)
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
         if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
+        while (run->facts.fuse_left) NPG_TRY(do_pass(run, NPG_PASS_FUSE));
     }
     run->closed_reports = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));

@@ -23,7 +23,8 @@ typedef enum npg_pass {
     NPG_PASS_MEASURE = 1, /* files: find count, box and sizes                */
     NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe   */
     NPG_PASS_SOLVE = 4,   /* the work itself; the only pass of a live source */
-    NPG_PASS_CHOOSE = 8   /* files, after SCORE: look closer at a few frames */
+    NPG_PASS_CHOOSE = 8,  /* files, after SCORE: look closer at a few frames */
+    NPG_PASS_FUSE = 16    /* files, facts.fuse_left times: all frames' points    */
 } npg_pass;
 
 /* The frames that the choosing pass reads, in time order. */
@@ -55,10 +56,14 @@ typedef struct npg_facts {
     int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture                  */
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
+    /* fuse */
+    int64_t fuse_left; /* fusing passes that are still to be walked: each follows the reference so far through
+                          all frames and gathers their points for the next one */
     /* mesh */
-    npg_mesh *reference; /* unit coordinates, with normals; owned by the run             */
+    npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass
+                            and in the solving one, before the first frame is passed on */
     double unseen_share; /* share of the reference's area that no point of its frame saw */
-    /* evaluate, at the end of the solving pass; forward and backward from the keyframe */
+    /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
     /* the service job, before the first pass */
@@ -141,7 +146,8 @@ size_t npg_worker_verts_at_most(const npg_worker *worker);
  * this run.  Can be asked in any pass. */
 bool npg_worker_has_field(const npg_worker *worker, uint32_t field);
 
-/* Write a fact of the stage's own kind.  The run owns the value from now on, in case of failure, too. */
+/* Write a fact of the stage's own kind, once, or again after it was taken.  The run owns the value from now
+ * on, in case of failure, too. */
 npg_status npg_worker_publish(npg_worker *worker, const npg_fact_kind *kind, void *value);
 
 /* Read one: NULL while nobody has written it.  A loan for the run's whole life. */

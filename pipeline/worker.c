@@ -75,10 +75,14 @@ npg_status npg_worker_publish(npg_worker *worker, const npg_fact_kind *kind, voi
     npg_run *run = worker->run;
     npg_status status = NPG_OK;
     pthread_mutex_lock(&run->lock);
-    if (strcmp(kind->owner, worker->name) != 0 || find_fact(run, kind) ||
-        run->published_count == NPG_FACTS_MAX)
+    npg_published *taken = find_fact(run, kind);
+    bool is_written = taken && taken->value;
+    if (strcmp(kind->owner, worker->name) != 0 || is_written ||
+        (!taken && run->published_count == NPG_FACTS_MAX))
         status = npg_error(NPG_USAGE, "the fact %s is not stage %s's to write, or is written", kind->name,
                            worker->name);
+    else if (taken)
+        taken->value = value;
     else
         run->published[run->published_count++] = (npg_published){kind, value};
     pthread_mutex_unlock(&run->lock);

@@ -2,7 +2,7 @@
 #include "pipeline/stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
-    npg_stage_align, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
+    npg_stage_align, npg_stage_fuse, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
 extern const npg_service npg_service_job;
 
 const npg_stage *const npg_chain[] = {
@@ -11,6 +11,7 @@ const npg_stage *const npg_chain[] = {
     &npg_stage_keyframe, /* box, keyframe, plan of the windows                   */
     &npg_stage_mesh,     /* the reference surface of the keyframe                */
     &npg_stage_align,    /* the reference brought coarsely into each frame       */
+    &npg_stage_fuse,     /* the points of all frames, for a better reference     */
     &npg_stage_optimize, /* its deformation in every frame                       */
     &npg_stage_evaluate, /* figures and a verdict per frame                      */
     &npg_stage_export,   /* meshes, report, done.json                            */
@@ -24,9 +25,10 @@ static const npg_preset_value paper[] = {{"align", "no"},              /* from t
                                          {"keyframe-choice", "paper"}, /* by score alone */
                                          {"hold-apart", "no"},         /* the keyframe's points as they are */
                                          {"smooth", "no"},
-                                         {"welds", "keep"}, /* nothing is cut */
-                                         {"window", "-1"},  /* all frames at once, up to 60 */
-                                         {"epochs", "250"}, /* of every vertex */
+                                         {"unseen", "keep"}, /* as Poisson closed it */
+                                         {"welds", "keep"},  /* nothing is cut */
+                                         {"window", "-1"},   /* all frames at once, up to 60 */
+                                         {"epochs", "250"},  /* of every vertex */
                                          {"isometry", "100"},
                                          {"confidence", "cumulative"},
                                          {"smoothing", "doubled"}, /* as in the published code */
@@ -35,19 +37,11 @@ static const npg_preset_value paper[] = {{"align", "no"},              /* from t
                                          {"deliver", "last"},
                                          {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
-    {"align", "no"},
-    {"keyframe-choice", "paper"},
-    {"hold-apart", "no"},
-    {"smooth", "no"},
-    {"welds", "keep"},
-    {"window", "-1"},
-    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
-    {"isometry", "100"},
-    {"confidence", "cumulative"},
-    {"smoothing", "doubled"},
-    {"rate-end", "1"},
-    {"feature-start", "0"},
-    {"deliver", "last"},
+    {"align", "no"},     {"keyframe-choice", "paper"}, {"hold-apart", "no"},
+    {"smooth", "no"},    {"unseen", "keep"},           {"welds", "keep"},
+    {"window", "-1"},    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
+    {"isometry", "100"}, {"confidence", "cumulative"}, {"smoothing", "doubled"},
+    {"rate-end", "1"},   {"feature-start", "0"},       {"deliver", "last"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {
     {"align", "no"},         /* grids and decoder alone carry the motion */

@@ -3,10 +3,13 @@
  * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They
  * wait until their window is complete: then those that were lost are tried again from what is known around
  * them (recover.h). The aligned positions are where the joint fit starts. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "align/poses.h"
 #include "align/recover.h"
 #include "geometry/mesh_tools.h"
 #include "job/job.h"
@@ -15,6 +18,17 @@
 #define POINTS_MOST 4  /* times the samples: points of a frame that are kept for the alignment */
 #define GROUP_MOST  96 /* frames that wait: a longer window is taken in parts                 */
 
+/* Steps of a fit that starts from what the pass before found: near its end, so neither loose nor many. */
+#define AGAIN_STEPS     6    /* at most; fewer where align-steps says so     */
+#define AGAIN_STIFFNESS 2    /* of the first step, in final stiffnesses      */
+#define AGAIN_WIDTH     0.02 /* of the first step's robust weight, in units  */
+
+/* What one pass leaves to the next. */
+typedef struct between {
+    npg_tracker *tracker; /* of the reference that the poses are of */
+    npg_poses *poses;
+} between;
+
 /* A frame that waits for its window. */
 typedef struct waiting {
     npg_frame frame;
@@ -22,6 +36,7 @@ typedef struct waiting {
     float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
     size_t point_count;
     npg_tracked tracked;
+    bool is_known; /* starts from the pose that the pass before found */
 } waiting;
 
 /* The two last poses on one side of the key. */
@@ -37,9 +52,13 @@ typedef struct state {
     int64_t nodes, samples, steps;
     double stiffness, along;
     npg_tracker *tracker;
-    side sides[2];  /* forward, backward: of the frames that are passed on */
-    side ways[2];   /* the same with those that wait                       */
-    waiting *group; /* in order of arrival; owned, with what they own */
+    npg_poses *known; /* of the pass before, with the way to this one's nodes; owned, or NULL */
+    npg_pose_map map;
+    double *known_pose; /* of its nodes; owned */
+    npg_poses *found;   /* of a fusing pass, for the next one; owned                             */
+    side sides[2];      /* forward, backward: of the frames that are passed on */
+    side ways[2];       /* the same with those that wait                       */
+    waiting *group;     /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
@@ -81,6 +100,10 @@ static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_tracker_close(&s->tracker);
+    npg_poses_close(&s->known);
+    npg_poses_close(&s->found);
+    npg_pose_map_close(&s->map);
+    npg_release(&s->known_pose);
     for (int i = 0; i < 2; i++) {
         npg_release(&s->sides[i].now);
         npg_release(&s->sides[i].before);
@@ -177,6 +200,121 @@ static bool closes_window(state *s, const npg_plan *plan)
     return s->closes_at == s->read;
 }
 
+/* ---- what one pass leaves to the next ---- */
+
+static void release_between(void *thing)
+{
+    between *b = thing;
+    npg_tracker_close(&b->tracker);
+    npg_poses_close(&b->poses);
+    npg_release(&b);
+}
+
+/* Where poses are kept: NULL for a run without a job folder. */
+static npg_status poses_path(const npg_worker *worker, char **path, bool is_new)
+{
+    const npg_job *job = npg_job_of(worker);
+    *path = NULL;
+    return job ? npg_job_poses_path(job, path, is_new) : NPG_OK;
+}
+
+static npg_status restore_known(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    char *path;
+    size_t size;
+    const unsigned char *map =
+        npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN_MAP, &size);
+    if (!map) return NPG_OK; /* the reference is the keyframe's own */
+    NPG_TRY(npg_pose_map_unpack(&s->map, map, size));
+    if (s->map.count != npg_tracker_node_count(s->tracker))
+        return npg_error(NPG_BAD_INPUT, "the state to resume from has poses for %zu nodes, not %zu",
+                         s->map.count, npg_tracker_node_count(s->tracker));
+    NPG_TRY(poses_path(worker, &path, false));
+    npg_status status = npg_poses_open(&s->known, path, s->map.old_count);
+    npg_release(&path);
+    return status;
+}
+
+/* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
+static npg_status drop_if_changed(npg_worker *worker, between *b)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    char *path;
+    if (!b || !(facts->has_changed[0] || facts->has_changed[1])) return NPG_OK;
+    npg_poses_close(&b->poses);
+    npg_tracker_close(&b->tracker);
+    NPG_TRY(poses_path(worker, &path, true));
+    npg_status status = NPG_OK;
+    if (path && unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
+    npg_release(&path);
+    return status;
+}
+
+/* The poses of the pass before, or of the run that is resumed. */
+static npg_status open_known(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    between *b = npg_worker_kept(worker);
+    NPG_TRY(drop_if_changed(worker, b));
+    if (b && b->poses) {
+        NPG_TRY(npg_pose_map_open(&s->map, b->tracker, s->tracker));
+        s->known = b->poses;
+        b->poses = NULL;
+        npg_tracker_close(&b->tracker);
+        if (npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_job_of(worker))
+            NPG_TRY(npg_job_keep_poses(npg_job_of(worker)));
+    } else if (npg_worker_facts(worker)->is_resumed) {
+        NPG_TRY(restore_known(worker));
+    }
+    if (!s->known) return NPG_OK;
+    return npg_alloc_array(&s->known_pose, NPG_FOR_FIT, s->map.old_count, NPG_POSE_SIZE * sizeof(double));
+}
+
+static npg_status open_found(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    char *path;
+    if (npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
+    NPG_TRY(poses_path(worker, &path, true));
+    npg_status status = NPG_OK;
+    if (path && unlink(path) && errno != ENOENT) /* `known` still reads what had the name before */
+        status = npg_error_errno(NPG_DISK, "can't remove %s", path);
+    if (!status) status = npg_poses_create(&s->found, path, npg_tracker_node_count(s->tracker));
+    npg_release(&path);
+    return status;
+}
+
+static npg_status leave_found(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    between *b = npg_worker_kept(worker);
+    if (!s->found) return NPG_OK;
+    NPG_TRY(npg_poses_sync(s->found));
+    if (!b) {
+        NPG_TRY(npg_alloc(&b, NPG_FOR_FIT, sizeof *b));
+        npg_worker_keep(worker, b, release_between);
+    }
+    b->tracker = s->tracker;
+    b->poses = s->found;
+    s->tracker = NULL;
+    s->found = NULL;
+    return NPG_OK;
+}
+
+/* Of a state on disk: the map does not change while frames pass. */
+static npg_status save(const npg_worker *worker, npg_archive_writer *out)
+{
+    const state *s = npg_worker_state(worker);
+    unsigned char *bytes;
+    size_t size;
+    if (!s->known) return NPG_OK;
+    NPG_TRY(npg_pose_map_pack(&s->map, &bytes, &size));
+    npg_status status = npg_archive_put(out, NPG_BLOCK_ALIGN_MAP, bytes, size);
+    npg_release(&bytes);
+    return status;
+}
+
 static npg_status open_tracker(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -193,6 +331,8 @@ static npg_status open_tracker(npg_worker *worker)
         }
     }
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
+    NPG_TRY(open_known(worker));
+    NPG_TRY(open_found(worker));
     return npg_worker_facts(worker)->is_resumed ? restore_state(worker) : NPG_OK;
 }
 
@@ -228,13 +368,25 @@ static npg_status take_points(const npg_worker *worker, waiting *w)
     return NPG_OK;
 }
 
+/* In place of where the motion leads: what the pass before found. */
+static npg_status start_from_known(const state *s, waiting *w, side *at)
+{
+    if (!s->known) return NPG_OK;
+    NPG_TRY(npg_poses_get(s->known, w->frame.index, s->known_pose, &w->is_known));
+    if (w->is_known) npg_pose_map_apply(&s->map, s->tracker, at->now, s->known_pose);
+    return NPG_OK;
+}
+
 /* The pose that the motion so far leads to, fitted to the points; without any it stays. */
 static npg_status fit_pose(npg_worker *worker, waiting *w, side *at)
 {
     const state *s = npg_worker_state(worker);
+    const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
+                                      AGAIN_WIDTH, 1};
+    NPG_TRY(start_from_known(s, w, at));
     if (w->point_count) {
-        NPG_TRY(
-            npg_tracker_fit(s->tracker, &w->tracked, at->now, w->points, w->normals, w->point_count, NULL));
+        NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, w->points, w->normals, w->point_count,
+                                w->is_known ? &again : NULL));
         npg_worker_log(worker, NPG_LOG_DEBUG, w->frame.number,
                        "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps",
                        w->tracked.point_dist_mean, w->tracked.chamfer, w->tracked.steps);
@@ -374,6 +526,7 @@ static npg_status pass_on(npg_worker *worker, waiting *w)
     frame->vert_count = reference->vert_count;
     frame->fields |= NPG_FIELD_POSE;
     npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
+    if (s->found) NPG_TRY(npg_poses_put(s->found, frame->index, w->pose));
     NPG_TRY(npg_chunk_open(&chunk, 1));
     npg_chunk_add(chunk, frame);
     npg_status status = npg_worker_push(worker, &chunk);
@@ -388,7 +541,8 @@ static npg_status close_group(npg_worker *worker, bool with_state)
     if (!s->group_count) return NPG_OK;
     NPG_TRY(recover_group(worker));
     for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
-    if (with_state && npg_job_of(worker)) NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
+    if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE)
+        NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
     for (size_t i = 0; i < s->group_count; i++) NPG_TRY(pass_on(worker, &s->group[i]));
     for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
     s->group_count = 0;
@@ -421,6 +575,7 @@ static npg_status flush(npg_worker *worker)
     state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
     NPG_TRY(close_group(worker, false));
+    NPG_TRY(leave_found(worker));
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
     json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));
@@ -460,7 +615,7 @@ const npg_stage npg_stage_align = {
     .help = "brings the reference coarsely into each frame",
     .options = options,
     .state_size = sizeof(state),
-    .passes = NPG_PASS_SOLVE,
+    .passes = NPG_PASS_FUSE | NPG_PASS_SOLVE,
     .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
     .gives = NPG_FIELD_POSE,
     .takes_part = takes_part,
@@ -468,4 +623,5 @@ const npg_stage npg_stage_align = {
     .flush = flush,
     .uninit = uninit,
     .memory = memory,
+    .save = save,
 };

@@ -65,6 +65,16 @@ size_t npg_tracker_node_count(const npg_tracker *tracker)
     return tracker->graph->node_count;
 }
 
+const npg_graph *npg_tracker_graph(const npg_tracker *tracker)
+{
+    return tracker->whole;
+}
+
+const npg_mesh *npg_tracker_reference(const npg_tracker *tracker)
+{
+    return tracker->reference;
+}
+
 void npg_tracker_close(npg_tracker **slot)
 {
     if (!slot || !*slot) return;
@@ -486,9 +496,7 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
 
 /* ---- extrapolation ---- */
 
-/* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt): products of
- * products would else triple their rounding errors with every frame. */
-static void straighten(double m[9])
+void npg_pose_straighten(double m[9])
 {
     double *first = m, *second = m + 3, *third = m + 6;
     npg_vec3_make_unit(first);
@@ -511,7 +519,8 @@ void npg_pose_extrapolate(double *next, const double *now, const double *before,
             next[i] = 0;
             for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
         }
-        straighten(next);
+        npg_pose_straighten(
+            next); /* products of products would triple their rounding errors with every frame */
         for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
     }
 }

@@ -40,6 +40,10 @@ npg_status npg_tracker_open(npg_tracker **tracker, npg_mesh *reference, const np
 void npg_tracker_close(npg_tracker **tracker);
 size_t npg_tracker_node_count(const npg_tracker *tracker);
 
+/* The graph over the whole reference, and the reference; loans. */
+const npg_graph *npg_tracker_graph(const npg_tracker *tracker);
+const npg_mesh *npg_tracker_reference(const npg_tracker *tracker);
+
 /* How a fit goes about it. */
 typedef struct npg_tracker_effort {
     int steps;         /* at most                                          */
@@ -55,6 +59,9 @@ npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *p
 
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
+
+/* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt). */
+void npg_pose_straighten(double rotation[9]);
 
 /* next = the pose after `now`, if the motion since `before` goes on:
  * next_k = now_k before_k^-1 now_k.  K x 12 each. */

@@ -391,6 +391,8 @@ static json_t *json_of_sums(const evaluate_state *state)
 static npg_status flush(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE)
+        return state->topology ? npg_topology_finish(state->topology, worker) : NPG_OK;
     json_t *report = npg_worker_report(worker), *bad = json_array();
     if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
     for (size_t i = 0; i < state->bad_count; i++)
@@ -460,14 +462,29 @@ static npg_status restore(npg_worker *worker)
 static npg_status init(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;
     if (npg_worker_facts(worker)->is_resumed) NPG_TRY(restore(worker));
     if (!state->truth_folder[0]) return NPG_OK;
     return npg_truth_open(&state->truth, state->truth_folder, npg_worker_settings(worker)->confine);
 }
 
+/* In a fusing pass: whether the reference explains the capture to its ends, so that what all frames saw may be
+ * taken together. */
+static npg_status watch_frame(npg_worker *worker, npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    frame->figures = no_figures();
+    frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
+    if (frame->vert_unit) NPG_TRY(measure_frame(worker, frame));
+    return watch_topology(worker, frame);
+}
+
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
     evaluate_state *state = npg_worker_state(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk) && npg_worker_pass(worker) == NPG_PASS_FUSE; i++)
+        NPG_TRY(watch_frame(worker, npg_chunk_frame(*chunk, i)));
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit;
@@ -552,7 +569,7 @@ const npg_stage npg_stage_evaluate = {.name = "evaluate",
                                       .help = "Measure every frame and judge it",
                                       .options = options,
                                       .state_size = sizeof(evaluate_state),
-                                      .passes = NPG_PASS_SOLVE,
+                                      .passes = NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                       .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE |
                                                NPG_FIELD_VERTICES,
                                       .gives = NPG_FIELD_FIGURES,

@@ -88,8 +88,10 @@ static npg_status report_direction(npg_topology *t, npg_worker *worker, int dire
     return NPG_OK;
 }
 
+/* A fusing pass only wants to know. */
 static npg_status report_both(npg_topology *t, npg_worker *worker)
 {
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;
     for (int d = 0; d < NPG_DIRECTIONS; d++) NPG_TRY(report_direction(t, worker, d));
     return NPG_OK;
 }

@@ -150,11 +150,12 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
     const npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
     int64_t count = pass == NPG_PASS_CHOOSE ? (int64_t)facts->choice.count : facts->frame_count;
-    if (pass == NPG_PASS_SOLVE) count = npg_plan_read_count(&facts->plan);
+    bool is_in_order = pass == NPG_PASS_SOLVE || pass == NPG_PASS_FUSE;
+    if (is_in_order) count = npg_plan_read_count(&facts->plan);
     while (s->next < count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
         npg_frame frame;
         int64_t index = s->next;
-        if (pass == NPG_PASS_SOLVE) index = npg_plan_frame(&facts->plan, s->next);
+        if (is_in_order) index = npg_plan_frame(&facts->plan, s->next);
         if (pass == NPG_PASS_CHOOSE) index = facts->choice.frames[s->next];
         if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
         NPG_TRY(read_frame(worker, &frame, index));
@@ -434,8 +435,8 @@ const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .help = "reads the frames",
                                     .options = ingest_options,
                                     .state_size = sizeof(state),
-                                    .passes =
-                                        NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
+                                    .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
+                                              NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                     .gives = NPG_FIELD_POINTS,
                                     .init = init,
                                     .process = process,

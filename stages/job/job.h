@@ -16,6 +16,9 @@
  *     OUT/job/inside.npg           state inside the window at work, where that takes long: what a window's
  *                                  state has, the fit's progress, its grids; removed when it is solved
  *
+ *     OUT/job/poses.bin            where the last fusing pass brought the reference so far, frame by frame
+ *                                  (align/poses.h): where the solving pass starts
+ *
  * The two newest windows stay, and the one that later frames start from (neupig append);
  * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the
  * checksum of its grids and of the frame log, so that a damaged one is noticed and the one before it used.
@@ -111,8 +114,14 @@ npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job);
 /* Where the record of the next window goes (optimize/record.h); to npg_release(). */
 npg_status npg_job_motion_path(const npg_job *job, char **path);
 
+/* Where stage align keeps the poses of the last fusing pass (align/poses.h); to npg_release().  New ones have
+ * another name until the solving pass begins: those of an earlier run belong to its states. */
+npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new);
+npg_status npg_job_keep_poses(const npg_job *job);
+
 /* Block of a state: what stage align needs (npg_frame.align_state). */
-#define NPG_BLOCK_ALIGN "align"
+#define NPG_BLOCK_ALIGN     "align"
+#define NPG_BLOCK_ALIGN_MAP "align.map" /* from the nodes of those poses to the reference's */
 
 /* What job_state.c needs of the folder: block "log" of a state, paths of the next one, what is kept. */
 typedef struct npg_job_log {

@@ -18,6 +18,8 @@
 #define STATE_NAME  "window_%06lld.%s"
 #define MOTION_NAME "motion_%06lld.npg"
 #define INSIDE_NAME "inside.npg"
+#define POSES_NAME  "poses.bin"
+#define POSES_NEW   "poses.new"
 
 struct npg_job {
     char *output, *folder; /* owned */
@@ -299,6 +301,22 @@ npg_status npg_job_inside_path(const npg_job *job, char **path)
     return npg_join_path(path, job->folder, INSIDE_NAME);
 }
 
+npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new)
+{
+    return npg_join_path(path, job->folder, is_new ? POSES_NEW : POSES_NAME);
+}
+
+npg_status npg_job_keep_poses(const npg_job *job)
+{
+    char *from, *to = NULL;
+    NPG_TRY(npg_job_poses_path(job, &from, true));
+    npg_status status = npg_job_poses_path(job, &to, false);
+    if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
+    npg_release(&from);
+    npg_release(&to);
+    return status;
+}
+
 int64_t npg_job_serial(const npg_job *job)
 {
     return job->serial;
@@ -465,6 +483,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
         NPG_TRY(each_state(job, remove_state));
         NPG_TRY(remove_motions(job));
         NPG_TRY(remove_file(job, INSIDE_NAME));
+        NPG_TRY(remove_file(job, POSES_NAME));
         job->serial = job->forward_serial = -1;
         NPG_TRY(write_description(job));
     }

@@ -431,6 +431,7 @@ static npg_status flush(npg_worker *worker)
     case NPG_PASS_MEASURE: return close_measuring(worker);
     case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
     case NPG_PASS_CHOOSE: return close_choosing(worker);
+    case NPG_PASS_FUSE:
     case NPG_PASS_SOLVE: break;
     }
     return facts->is_live ? end_live(worker) : NPG_OK;
@@ -490,7 +491,7 @@ const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .options = options,
                                       .state_size = sizeof(keyframe_state),
                                       .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
-                                                NPG_PASS_SOLVE,
+                                                NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                       .needs = NPG_FIELD_POINTS,
                                       .gives = NPG_FIELD_KEY,
                                       .init = init,

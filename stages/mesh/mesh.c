@@ -1,12 +1,16 @@
 /* Mesh: the reference surface.  The stage takes the keyframe's oriented points to a clean mesh in unit
  * coordinates (or reads the user's own), puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "align/sights.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "mesh/denoise.h"
+#include "mesh/flatten.h"
+#include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
 #include "mesh/vdb.h"
@@ -17,7 +21,10 @@
 #define POINTS_MAX        80000
 #define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
 #define SMOOTH_NEIGHBOURS 24
+#define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
+#define KEY_SPACINGS      0.5  /* of the keyframe's points: all frames lie closer, but not everywhere */
+#define FLAT_SPACINGS     1.2  /* surface farther than this from every point is drawn tight */
 #define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
 #define PIECE_SHARE       0.01 /* of the area */
 #define PIECE_DIST        0.1  /* in diagonals */
@@ -36,6 +43,7 @@ typedef struct mesh_state {
     double point_weight, trim, invented_max;
     int apart; /* npg_apart_way */
     bool smooth;
+    bool is_made; /* the reference of this pass */
 } mesh_state;
 
 #define AT(member) offsetof(mesh_state, member)
@@ -70,11 +78,11 @@ static const npg_option mesh_options[] = {
         "in diagonals of the keyframe's box"),
     NPG_ROW_CHOICE("unseen",         AT(unseen),           "auto",    "auto|keep|trim",
         "Surface without points near it (holes, the far side of a single view): "
-        "keep it, trim it, or trim it when it is more than a quarter of the area; "
-        "it is reported in any case"),
+        "keep it as the mesher closed it, trim it, or draw it tight between what was seen, "
+        "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
     NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
-        "that no point of the keyframe saw and that was kept, in per cent; "
+        "that no point saw and that was kept, in per cent; "
         "above it the run ends with exit code 7"),
     {0}};
 /* clang-format on */
@@ -85,13 +93,15 @@ typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
     const mesh_state *state;
     const npg_frame *frame;
-    size_t count;    /* N, of the points used */
-    float *points;   /* N x 3, unit, owned */
-    float *normals;  /* N x 3 or NULL, owned */
-    double spacing;  /* of the points */
-    double diagonal; /* of the points */
-    double invented; /* share of the mesh that no point saw, once it is trimmed */
-    npg_mesh *mesh;  /* owned */
+    const npg_fused *fused; /* points of all frames, a loan; NULL: those of the frame */
+    size_t count;           /* N, of the points used */
+    float *points;          /* N x 3, unit, owned */
+    float *normals;         /* N x 3 or NULL, owned */
+    double seen;            /* what SEEN_SPACINGS and FLAT_SPACINGS are taken of */
+    double spacing;         /* of the points */
+    double diagonal;        /* of the points */
+    double invented;        /* share of the mesh that no point saw, once it is trimmed */
+    npg_mesh *mesh;         /* owned */
 } making;
 
 /* ---- report ---- */
@@ -106,6 +116,21 @@ static void note_count(making *m, const char *key, size_t value)
     json_object_set_new(npg_worker_report(m->worker), key, json_integer((json_int_t)value));
 }
 
+/* Of the reference that the run delivers; what is said of those before is for the log alone. */
+NPG_PRINTF(3, 4)
+static void warn(const making *m, bool partial, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (npg_worker_pass(m->worker) == NPG_PASS_SOLVE)
+        npg_worker_warn(m->worker, partial, m->frame->number, "%s", text);
+    else
+        npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number, "%s", text);
+}
+
 static bool should_stop(void *worker)
 {
     return npg_worker_stopping(worker);
@@ -116,7 +141,7 @@ static bool should_stop(void *worker)
 /* The points to reconstruct from, in unit coordinates, with their normals.
  * Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
  * and Poisson's time goes with the points. */
-static npg_status take_points(making *m)
+static npg_status take_frame_points(making *m)
 {
     const npg_frame *frame = m->frame;
     size_t n = frame->point_count;
@@ -132,15 +157,29 @@ static npg_status take_points(making *m)
     return NPG_OK;
 }
 
+/* Those of all frames are thinned already. */
+static npg_status take_points(making *m)
+{
+    if (!m->fused) return take_frame_points(m);
+    m->count = m->fused->count;
+    NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
+    memcpy(m->points, m->fused->points, m->count * 3 * sizeof(float));
+    memcpy(m->normals, m->fused->normals, m->count * 3 * sizeof(float));
+    return NPG_OK;
+}
+
 static npg_status measure_points(making *m)
 {
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, m->points, m->count);
     m->diagonal = npg_bounds_diagonal(&bounds);
-    note_count(m, "points", m->frame->point_count);
+    note_count(m, "points", m->fused ? m->fused->count : m->frame->point_count);
     note_count(m, "points_used", m->count);
     NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->count));
     note(m, "point_spacing_unit", m->spacing);
+    m->seen = m->spacing;
+    if (m->fused) m->seen = fmax(m->seen, KEY_SPACINGS * m->fused->key_spacing_unit);
     return NPG_OK;
 }
 
@@ -169,9 +208,9 @@ static npg_status smooth(making *m)
     note(m, "noise_unit", sigma);
     if (!m->state->smooth || sigma < NOISE_MIN * m->spacing) return NPG_OK;
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
-                   "the keyframe's points are noisy (%.2g of the unit box): smoothed for the reconstruction",
-                   sigma);
-    return npg_cloud_smooth(m->points, m->normals, n, SMOOTH_NEIGHBOURS);
+                   "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   m->fused ? "all frames" : "the keyframe", sigma);
+    return npg_cloud_smooth(m->points, m->normals, n, m->fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
 
 static npg_status reconstruct(making *m)
@@ -179,6 +218,7 @@ static npg_status reconstruct(making *m)
     npg_poisson_settings settings = settings_of(m->state);
     settings.should_stop = should_stop;
     settings.user = m->worker;
+    if (m->fused) settings.rounds_max = 1; /* the surface that carried them has told their sides */
     if (!m->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t n = m->count, turned, moved;
@@ -201,19 +241,17 @@ static npg_status keep_main(making *m, const char *when)
     NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, PIECE_SHARE, dist_max));
     note_count(m, "components", pieces.kept);
     if (pieces.kept > 1)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+        warn(m, false, "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
     if (pieces.lost_share > LOST_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
-                        pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
+        warn(m, false, "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+             pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
     return NPG_OK;
 }
 
 /* What no point saw: measured on the closed surface, before anything is trimmed. */
 static npg_status judge_unseen(making *m, bool *trim_unseen)
 {
-    double share, seen_dist = SEEN_SPACINGS * m->spacing;
+    double share, seen_dist = SEEN_SPACINGS * m->seen;
     NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->count, seen_dist));
     *trim_unseen =
         m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
@@ -221,10 +259,11 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
     json_object_set_new(npg_worker_report(m->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
     if (share > UNSEEN_TOLERATED)
-        npg_worker_warn(
-            m->worker, false, m->frame->number,
-            "%.1f %% of the reconstructed surface has no point near it: unseen in the keyframe, %s",
-            100 * share, *trim_unseen ? "trimmed off" : "kept as Poisson closed it");
+        warn(m, false, "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
+             100 * share, m->fused ? "all frames" : "the keyframe",
+             *trim_unseen                      ? "trimmed off"
+             : m->state->unseen == UNSEEN_KEEP ? "kept as Poisson closed it"
+                                               : "closed tightly");
     return NPG_OK;
 }
 
@@ -233,16 +272,16 @@ static npg_status trim(making *m)
     bool trim_unseen;
     double limit = m->state->trim * m->diagonal, share;
     NPG_TRY(judge_unseen(m, &trim_unseen));
-    if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->spacing);
+    if (trim_unseen) limit = fmin(limit, SEEN_SPACINGS * m->seen);
     NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->count, limit));
     note(m, "trimmed_share", share);
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
-    NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
+    NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->seen));
     if (!trim_unseen && share > LOST_TOLERATED)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
-                        "and was trimmed off",
-                        100 * share, m->state->trim);
+        warn(m, false,
+             "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
+             "and was trimmed off",
+             100 * share, m->state->trim);
     return share > 0 ? keep_main(m, "after trimming") : NPG_OK;
 }
 
@@ -282,7 +321,7 @@ static npg_status rebuild_on_request(making *m)
 static npg_status decimate(making *m)
 {
     npg_mending mending;
-    size_t budget = FACES_PER_POINT * m->frame->point_count;
+    size_t budget = FACES_PER_POINT * (m->fused ? m->fused->count : m->frame->point_count);
     if (budget > (size_t)m->state->face_max) budget = (size_t)m->state->face_max;
     NPG_TRY(npg_mesh_mend(&m->mesh, &mending)); /* closes small holes before the faces are counted */
     size_t holes = mending.holes;
@@ -310,10 +349,22 @@ static npg_status is_sound(bool *sound, const npg_mesh *mesh)
     return NPG_OK;
 }
 
+/* The closed balloon over what nobody saw becomes the least surface there. */
+static npg_status flatten(making *m)
+{
+    size_t moved;
+    npg_mending mending;
+    if (m->state->unseen != UNSEEN_AUTO) return NPG_OK;
+    NPG_TRY(npg_mesh_flatten(m->mesh, &moved, m->points, m->count, FLAT_SPACINGS * m->seen));
+    note_count(m, "vertices_flattened", moved);
+    return moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
+}
+
 static npg_status shape(making *m, bool *sound)
 {
     NPG_TRY(trim(m));
     NPG_TRY(decimate(m));
+    NPG_TRY(flatten(m));
     return is_sound(sound, m->mesh);
 }
 
@@ -334,10 +385,10 @@ static void judge_invented(making *m)
     npg_worker_facts(m->worker)->unseen_share = m->invented;
     note(m, "invented_share", m->invented);
     if (100 * m->invented > m->state->invented_max)
-        npg_worker_warn(m->worker, true, m->frame->number,
-                        "%.1f %% of the reference's surface is invented: no point of the keyframe saw it, "
-                        "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
-                        100 * m->invented, m->state->invented_max);
+        warn(m, true,
+             "%.1f %% of the reference's surface is invented: no point of %s saw it, "
+             "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
+             100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
@@ -354,8 +405,7 @@ static npg_status make(making *m)
     if (!status && !sound) status = is_closed(&closed, whole);
     if (!status && !sound && closed) status = make_again(m, &whole, &sound);
     if (!status && !sound)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "the reference mesh still has flipped or degenerate faces after all mending");
+        warn(m, false, "the reference mesh still has flipped or degenerate faces after all mending");
     if (!status) judge_invented(m);
     npg_mesh_unref(&whole);
     return status;
@@ -384,7 +434,9 @@ static void report_welds(making *m, const npg_weld_cut *cut)
 /* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
 static npg_status cut_welds(making *m)
 {
-    npg_sights *sights = npg_worker_take_fact(m->worker, &npg_fact_sights);
+    bool is_last = npg_worker_pass(m->worker) == NPG_PASS_SOLVE;
+    npg_sights *sights = is_last ? npg_worker_take_fact(m->worker, &npg_fact_sights)
+                                 : npg_worker_fact(m->worker, &npg_fact_sights);
     npg_weld_settings settings = {.spacing_unit = m->spacing, .should_stop = should_stop, .user = m->worker};
     npg_weld_cut done;
     if (!sights) return NPG_OK;
@@ -394,7 +446,7 @@ static npg_status cut_welds(making *m)
         at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
     if (!status && at < sights->count) report_welds(m, &done);
     note(m, "welds_s", npg_clock_s() - since);
-    npg_sights_close(&sights); /* a few MB that no later frame needs */
+    if (is_last) npg_sights_close(&sights); /* a few MB that no later frame needs */
     return status == NPG_DIVERGED ? NPG_OK : status;
 }
 
@@ -410,12 +462,11 @@ static npg_status read_reference(making *m)
             return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
-    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->spacing));
+    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->seen));
     note(m, "unseen_share", facts->unseen_share);
     if (facts->unseen_share > 0.5)
-        npg_worker_warn(m->worker, false, m->frame->number,
-                        "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
-                        100 * facts->unseen_share, path);
+        warn(m, false, "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
+             100 * facts->unseen_share, path);
     return NPG_OK;
 }
 
@@ -441,9 +492,9 @@ static npg_status measure_reference(making *m)
     return NPG_OK;
 }
 
-static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
+static npg_status make_reference(npg_worker *worker, const npg_frame *frame, const npg_fused *fused)
 {
-    making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame};
+    making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame, .fused = fused};
     npg_facts *facts = npg_worker_facts(worker);
     bool is_given = npg_worker_settings(worker)->reference[0];
     double since = npg_clock_s();
@@ -456,6 +507,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
     npg_release(&m.points);
     npg_release(&m.normals);
     if (status) npg_mesh_unref(&m.mesh);
+    npg_mesh_unref(&facts->reference);
     facts->reference = m.mesh;
     if (!status) npg_worker_close_report(worker);
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)frame->number,
@@ -464,29 +516,59 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame)
 
 /* ---- the stage ---- */
 
+/* What all frames saw is one body only where the reference so far explains the capture to its ends: parts that
+ * come, go or open belong to no common surface, and hiding them in one would silence the alarm. */
+static void drop_if_changed(npg_worker *worker, npg_fused **fused)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (!*fused || !(facts->has_changed[0] || facts->has_changed[1])) return;
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "the keyframe's surface does not explain all frames: the reference is made from it alone");
+    npg_fused_close(fused);
+}
+
+/* The first one from the keyframe's points, those of later passes from all frames'. */
+static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
+{
+    mesh_state *s = npg_worker_state(worker);
+    npg_fused *fused = npg_worker_take_fact(worker, &npg_fact_fused);
+    drop_if_changed(worker, &fused);
+    if (key->is_skipped || !key->point_count)
+        return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)key->number);
+    npg_status status = make_reference(worker, key, fused);
+    npg_fused_close(&fused);
+    s->is_made = !status;
+    return status;
+}
+
 static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    for (size_t i = 0; i < npg_chunk_count(*chunk) && !facts->reference; i++) {
+    const mesh_state *s = npg_worker_state(worker);
+    bool is_there = s->is_made || facts->is_resumed;
+    for (size_t i = 0; i < npg_chunk_count(*chunk) && !is_there; i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
-        if (frame->is_skipped || !frame->point_count)
-            return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)frame->number);
-        NPG_TRY(make_reference(worker, frame));
+        NPG_TRY(make_of_pass(worker, frame));
+        is_there = true;
     }
-    if (!facts->reference) return npg_error(NPG_FAILED, "the keyframe does not come first");
+    if (!is_there) return npg_error(NPG_FAILED, "the keyframe does not come first");
     return NPG_OK;
 }
 
 /* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point,
  * and 80 bytes a face with its share of vertices, normals and the links that mending needs. */
 #define RAW_FACES_PER_POINT 16
+#define RAW_FACES_PER_FUSED 6 /* points that lie closer share the octree's cells; measured: 3 */
 #define BYTES_PER_RAW_FACE  80
 
 static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
 {
+    const npg_fused *fused = npg_worker_fact(worker, &npg_fact_fused);
+    size_t faces = npg_worker_facts(worker)->point_count_max * RAW_FACES_PER_POINT;
     *chunks_held = 1;
-    return npg_worker_facts(worker)->point_count_max * RAW_FACES_PER_POINT * BYTES_PER_RAW_FACE;
+    if (fused && fused->count * RAW_FACES_PER_FUSED > faces) faces = fused->count * RAW_FACES_PER_FUSED;
+    return faces * BYTES_PER_RAW_FACE;
 }
 
 /* A closed mesh has half as many vertices as faces, and two; the budget is decimate()'s. */
@@ -504,7 +586,7 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
                                   .state_size = sizeof(mesh_state),
-                                  .passes = NPG_PASS_SOLVE,
+                                  .passes = NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,

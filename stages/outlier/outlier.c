@@ -235,7 +235,7 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
             if (choice->frames[i] == frame->index) return choice->is_candidate[i];
         return false;
     }
-    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return false;
+    if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
     return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || is_planned_key;
 }
@@ -361,8 +361,8 @@ const npg_stage npg_stage_outlier = {.name = "outlier",
                                      .help = "Cleans points, makes and mends normals",
                                      .options = outlier_options,
                                      .state_size = sizeof(outlier_state),
-                                     .passes =
-                                         NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE | NPG_PASS_SOLVE,
+                                     .passes = NPG_PASS_MEASURE | NPG_PASS_SCORE | NPG_PASS_CHOOSE |
+                                               NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                      .needs = NPG_FIELD_POINTS,
                                      .gives = NPG_FIELD_CLEAN,
                                      .init = outlier_init,

@@ -142,7 +142,7 @@ box() {
     run "$NEUPIG" run half -o trimmed --max-residual 100 --min-coverage 0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 0 ]
-    grep -q 'unseen in the keyframe, trimmed off' trimmed/report.json
+    grep -q 'unseen in all frames, trimmed off' trimmed/report.json
     run "$NEUPIG" run half -o kept --unseen keep --max-residual 100 --min-coverage 0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 7 ]

@@ -29,18 +29,33 @@ static npg_status make_number(int **value)
 /* ---- a stage that writes facts, one that reads them, one that sits out ---- */
 
 static struct {
-    bool writes_twice, writes_foreign, takes, waits;
+    bool writes_twice, writes_again, writes_foreign, takes, waits;
     int seen, after_taking;
     bool had_pose;
     int sat_frames;
     npg_latch *latch;
 } scene;
 
+/* Twice, with the first one taken in between; the second is 8. */
+static npg_status write_again(npg_worker *worker)
+{
+    int *value, *taken;
+    NPG_TRY(make_number(&value));
+    NPG_TRY(npg_worker_publish(worker, &number, value));
+    taken = npg_worker_take_fact(worker, &number);
+    if (taken != value) return npg_error(NPG_FAILED, "another value was taken");
+    npg_release(&taken);
+    NPG_TRY(make_number(&value));
+    ++*value;
+    return npg_worker_publish(worker, &number, value);
+}
+
 static npg_status write_fact(npg_worker *worker, npg_chunk **chunk)
 {
     int *value;
     (void)chunk;
     if (npg_worker_fact(worker, &number) && !scene.writes_twice) return NPG_OK;
+    if (scene.writes_again) return write_again(worker);
     NPG_TRY(make_number(&value));
     return npg_worker_publish(worker, scene.writes_foreign ? &foreign : &number, value);
 }
@@ -152,6 +167,26 @@ static void what_was_taken_is_gone(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
+static void what_was_taken_can_be_written_again(void **state)
+{
+    (void)state;
+    scene.writes_again = true;
+    assert_int_equal(run_chain(chain, plain, NULL), NPG_OK);
+    assert_int_equal(scene.seen, 8);
+    assert_int_equal(released, 1); /* the second one, with the run */
+    assert_int_equal(npg_memory_used(), 0);
+}
+
+static void what_was_written_again_is_not_written_a_third_time(void **state)
+{
+    char text[1024];
+    (void)state;
+    scene.writes_again = scene.writes_twice = true;
+    assert_int_equal(run_chain(chain, plain, text), NPG_USAGE);
+    assert_non_null(strstr(text, "number"));
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 static void a_stage_may_sit_out(void **state)
 {
     (void)state;
@@ -188,6 +223,8 @@ int main(void)
         cmocka_unit_test_setup(a_second_word_is_refused, set_up),
         cmocka_unit_test_setup(nobody_writes_for_another, set_up),
         cmocka_unit_test_setup(what_was_taken_is_gone, set_up),
+        cmocka_unit_test_setup(what_was_taken_can_be_written_again, set_up),
+        cmocka_unit_test_setup(what_was_written_again_is_not_written_a_third_time, set_up),
         cmocka_unit_test_setup(a_stage_may_sit_out, set_up),
         cmocka_unit_test_setup(a_stop_ends_a_wait, set_up),
     };

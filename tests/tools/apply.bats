@@ -3,7 +3,7 @@
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --body bar --frames 5 --points 1200 -o capture >synth.log
-    "$NEUPIG" run capture/points -o job --keyframe 0 --epochs 8 --width-1 64 --width-2 64 --faces 800 \
+    "$NEUPIG" run capture/points -o job --keyframe 0 --reference-from key --epochs 8 --width-1 64 --width-2 64 --faces 800 \
         --poisson-depth 7 --quiet --max-residual 100 >job.log || [ $? -eq 7 ]
 }
 

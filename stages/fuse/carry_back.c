@@ -1,0 +1,208 @@
+/* Carry back: rotations of the surface, and points through them. */
+#include "fuse/carry_back.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/mesh_tools.h"
+#include "geometry/query.h"
+#include "geometry/vec3.h"
+#include "pipeline/parallel.h"
+
+#define SMOOTHINGS 2 /* of the rotations, over the corners of faces: noise of a face is not its motion */
+#define PARTS_MAX  8
+
+struct npg_carry_back {
+    npg_mesh *mesh;        /* counted reference; V, F */
+    npg_surface *surface;  /* where it is now */
+    float *now, *normals;  /* V x 3: positions and normals there */
+    float *turns, *spread; /* V x 9: rotation of the neighbourhood, rows */
+    npg_surface_hit *hits; /* of the points at work */
+    size_t hit_capacity;
+};
+
+npg_status npg_carry_back_open(npg_carry_back **out, npg_mesh *reference)
+{
+    npg_carry_back *c;
+    size_t v = reference->vert_count;
+    *out = NULL;
+    NPG_REQUIRE(reference->vert_normals);
+    NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
+    c->mesh = npg_mesh_ref(reference);
+    npg_status status =
+        npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+    if (!status) status = npg_alloc_array(&c->now, NPG_FOR_MESH, v, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&c->normals, NPG_FOR_MESH, v, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&c->turns, NPG_FOR_MESH, v, 9 * sizeof(float));
+    if (!status) status = npg_alloc_array(&c->spread, NPG_FOR_MESH, v, 9 * sizeof(float));
+    if (status) npg_carry_back_close(&c);
+    *out = c;
+    return status;
+}
+
+void npg_carry_back_close(npg_carry_back **slot)
+{
+    if (!slot || !*slot) return;
+    npg_carry_back *c = *slot;
+    npg_surface_close(&c->surface);
+    npg_mesh_unref(&c->mesh);
+    void *all[] = {&c->now, &c->normals, &c->turns, &c->spread, &c->hits};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_release(slot);
+}
+
+/* ---- rotations ---- */
+
+/* A face's frame as columns: along its first edge, along its normal, and across both. */
+static void face_frame(float frame[9], const float *vert_pos, const uint32_t *face)
+{
+    const float *a = vert_pos + 3 * (size_t)face[0], *b = vert_pos + 3 * (size_t)face[1],
+                *c = vert_pos + 3 * (size_t)face[2];
+    double along[3], side[3], normal[3], across[3];
+    npg_vec3_between(along, a, b);
+    npg_vec3_between(side, a, c);
+    npg_vec3_cross(normal, along, side);
+    npg_vec3_make_unit(along);
+    npg_vec3_make_unit(normal);
+    npg_vec3_cross(across, along, normal);
+    for (int i = 0; i < 3; i++) {
+        frame[3 * i] = (float)along[i];
+        frame[3 * i + 1] = (float)normal[i];
+        frame[3 * i + 2] = (float)across[i];
+    }
+}
+
+/* turns[corner] += now rest^T, times the face's area at rest. */
+static void add_face(const npg_carry_back *c, const uint32_t *face)
+{
+    float rest[9], now[9], turn[9];
+    float area = (float)npg_face_area(c->mesh->vert_pos, face);
+    face_frame(rest, c->mesh->vert_pos, face);
+    face_frame(now, c->now, face);
+    for (int i = 0; i < 9; i++) {
+        turn[i] = 0;
+        for (int k = 0; k < 3; k++) turn[i] += now[i / 3 * 3 + k] * rest[i % 3 * 3 + k];
+        turn[i] *= area;
+    }
+    for (int corner = 0; corner < 3; corner++)
+        for (int i = 0; i < 9; i++) c->turns[9 * (size_t)face[corner] + (size_t)i] += turn[i];
+}
+
+static void smooth_turns(npg_carry_back *c)
+{
+    const npg_mesh *mesh = c->mesh;
+    memset(c->spread, 0, mesh->vert_count * 9 * sizeof(float));
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *face = mesh->faces + 3 * f;
+        for (size_t i = 0; i < 9; i++) {
+            float sum = 0;
+            for (int corner = 0; corner < 3; corner++) sum += c->turns[9 * (size_t)face[corner] + i];
+            for (int corner = 0; corner < 3; corner++) c->spread[9 * (size_t)face[corner] + i] += sum;
+        }
+    }
+    float *last = c->turns;
+    c->turns = c->spread;
+    c->spread = last;
+}
+
+npg_status npg_carry_back_move(npg_carry_back *c, const float *vert_unit)
+{
+    const npg_mesh *mesh = c->mesh;
+    memcpy(c->now, vert_unit, mesh->vert_count * 3 * sizeof(float));
+    NPG_TRY(npg_surface_move(c->surface, c->now));
+    npg_mesh_vertex_normals(c->normals, c->now, mesh->vert_count, mesh->faces, mesh->face_count);
+    memset(c->turns, 0, mesh->vert_count * 9 * sizeof(float));
+    for (size_t f = 0; f < mesh->face_count; f++) add_face(c, mesh->faces + 3 * f);
+    for (int i = 0; i < SMOOTHINGS; i++) smooth_turns(c);
+    return NPG_OK;
+}
+
+/* ---- points ---- */
+
+/* out = the mean over a face's corners of rows (V x width), by a hit's weights. */
+static void at_hit(float *out, const npg_carry_back *c, const npg_surface_hit *hit, const float *rows,
+                   size_t width)
+{
+    for (size_t i = 0; i < width; i++) {
+        out[i] = 0;
+        for (size_t corner = 0; corner < 3; corner++)
+            out[i] += hit->weights[corner] * rows[width * c->mesh->faces[3 * (size_t)hit->face + corner] + i];
+    }
+}
+
+static void make_unitf(float v[3])
+{
+    float length = npg_vec3_lengthf(v);
+    for (int i = 0; i < 3; i++) v[i] = length > 0 ? v[i] / length : 0;
+}
+
+/* Nearly the rotation nearest to a sum of similar ones: its rows made orthonormal (Gram and Schmidt). */
+static void straighten(float m[9])
+{
+    make_unitf(m);
+    float along = npg_vec3_dotf(m, m + 3);
+    for (int i = 0; i < 3; i++) m[3 + i] -= along * m[i];
+    make_unitf(m + 3);
+    m[6] = m[1] * m[5] - m[2] * m[4];
+    m[7] = m[2] * m[3] - m[0] * m[5];
+    m[8] = m[0] * m[4] - m[1] * m[3];
+}
+
+static void turn_back(float out[3], const float turn[9], const float v[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = turn[i] * v[0] + turn[3 + i] * v[1] + turn[6 + i] * v[2];
+}
+
+static void carry(npg_carried *out, const npg_carry_back *c, const npg_surface_hit *hit, const float *point,
+                  const float *normal)
+{
+    float now[3], facing_now[3], turn[9], away[3];
+    at_hit(now, c, hit, c->now, 3);
+    at_hit(facing_now, c, hit, c->normals, 3);
+    at_hit(turn, c, hit, c->turns, 9);
+    at_hit(out->foot, c, hit, c->mesh->vert_pos, 3);
+    at_hit(out->facing, c, hit, c->mesh->vert_normals, 3);
+    make_unitf(facing_now);
+    make_unitf(out->facing);
+    straighten(turn);
+    for (int i = 0; i < 3; i++) away[i] = point[i] - now[i];
+    turn_back(out->point, turn, away);
+    for (int i = 0; i < 3; i++) out->point[i] += out->foot[i];
+    out->dist = npg_vec3_lengthf(away);
+    out->offset = npg_vec3_dotf(away, facing_now);
+    out->agreement = normal ? npg_vec3_dotf(normal, facing_now) : 1;
+    if (normal)
+        turn_back(out->normal, turn, normal);
+    else
+        memcpy(out->normal, out->facing, sizeof out->normal);
+}
+
+typedef struct carrying {
+    npg_carry_back *c;
+    npg_carried *out;
+    const float *points, *normals;
+    size_t count, parts;
+} carrying;
+
+static npg_status carry_part(void *user, size_t part)
+{
+    const carrying *w = user;
+    for (size_t i = part * w->count / w->parts; i < (part + 1) * w->count / w->parts; i++)
+        carry(&w->out[i], w->c, &w->c->hits[i], w->points + 3 * i, w->normals ? w->normals + 3 * i : NULL);
+    return NPG_OK;
+}
+
+npg_status npg_carry_back_points(npg_carry_back *c, npg_carried *out, const float *points,
+                                 const float *normals, size_t count)
+{
+    NPG_TRY(npg_grow(&c->hits, &c->hit_capacity, count, sizeof *c->hits, NPG_FOR_MESH));
+    NPG_TRY(npg_surface_closest(c->surface, c->hits, points, count));
+    carrying w = {c, out, points, normals, count, npg_parallel_parts(count, 1000, PARTS_MAX)};
+    return npg_parallel(carry_part, &w, w.parts);
+}
+
+/* Positions, normals, rotations twice, Embree's tree (about 100 bytes a face, two faces a vertex); hits. */
+size_t npg_carry_back_memory(size_t vert_count, size_t points)
+{
+    return vert_count * (24 * sizeof(float) + 200) + points * (sizeof(npg_surface_hit) + sizeof(npg_carried));
+}

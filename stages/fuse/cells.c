@@ -1,0 +1,220 @@
+/* Cells: an open-addressed table of cubes. */
+#include "fuse/cells.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "pipeline/memory.h"
+
+#define FULL        0.6 /* of the table's places, at most */
+#define VOTE_CELLS  4   /* sides of the cubes over which frames are counted, in cells */
+#define NONE        UINT32_MAX
+#define COORDS_BITS 20 /* of a key; the unit box in cells of 1e-5 fits */
+#define SIDE_LEAST  1e-5
+#define CELLS_LEAST 65 /* cubes on both sides of 0 never become one: 8 of them, facing 8 octants, and room */
+
+typedef struct cell {
+    uint64_t key;
+    float point[3], normal[3]; /* weighted sums */
+    float weight;
+    uint32_t frames; /* that added to it */
+    int64_t last;    /* of them */
+} cell;
+
+typedef struct table {
+    cell *cells;     /* in the order in which they were met; owned */
+    uint32_t *place; /* 2^bits places of the table: which cell, or NONE; owned */
+    size_t count, most;
+    int bits;
+} table;
+
+struct npg_cells {
+    table fine, votes;
+    double side;
+};
+
+/* ---- a table ---- */
+
+static int bits_for(size_t most)
+{
+    int bits = 4;
+    while ((double)((size_t)1 << bits) * FULL < (double)most + 1) bits++;
+    return bits;
+}
+
+static npg_status open_table(table *t, size_t most)
+{
+    size_t places = (size_t)1 << bits_for(most);
+    t->most = most;
+    t->bits = bits_for(most);
+    NPG_TRY(npg_alloc_array(&t->cells, NPG_FOR_MESH, most + 1, sizeof *t->cells));
+    NPG_TRY(npg_alloc_array(&t->place, NPG_FOR_MESH, places, sizeof *t->place));
+    memset(t->place, 0xff, places * sizeof *t->place);
+    return NPG_OK;
+}
+
+static void close_table(table *t)
+{
+    npg_release(&t->cells);
+    npg_release(&t->place);
+}
+
+/* The cell of the key, made where it is new. */
+static cell *find(table *t, uint64_t key)
+{
+    size_t mask = ((size_t)1 << t->bits) - 1;
+    size_t at = (size_t)((key * UINT64_C(0x9e3779b97f4a7c15)) >> (64 - t->bits)); /* Fibonacci hashing */
+    while (t->place[at] != NONE && t->cells[t->place[at]].key != key) at = (at + 1) & mask;
+    if (t->place[at] == NONE) {
+        t->place[at] = (uint32_t)t->count;
+        t->cells[t->count++] = (cell){.key = key, .last = -1};
+    }
+    return &t->cells[t->place[at]];
+}
+
+/* ---- keys: three coordinates in cells, and the octant that the surface faces ---- */
+
+static uint64_t coordinate(double x, double side)
+{
+    double at = floor(x / side) + (double)(1 << (COORDS_BITS - 1));
+    return (uint64_t)fmin(fmax(at, 0), (double)((1 << COORDS_BITS) - 1));
+}
+
+static uint64_t key_of(const float at[3], const float facing[3], double side)
+{
+    uint64_t key = 0;
+    for (int a = 0; a < 3; a++) key = key << COORDS_BITS | coordinate((double)at[a], side);
+    for (int a = 0; a < 3; a++) key = key << 1 | (facing[a] < 0);
+    return key;
+}
+
+/* The key of the cube of twice the side around a cell. */
+static uint64_t key_of_double(uint64_t key)
+{
+    const uint64_t mask = (UINT64_C(1) << COORDS_BITS) - 1, middle = UINT64_C(1) << (COORDS_BITS - 1);
+    uint64_t out = 0;
+    for (int a = 2; a >= 0; a--) {
+        uint64_t at = key >> (3 + a * COORDS_BITS) & mask; /* counted from -middle */
+        out = out << COORDS_BITS | ((at + middle) >> 1);
+    }
+    return out << 3 | (key & 7);
+}
+
+/* ---- adding ---- */
+
+static void add(cell *c, const float point[3], const float normal[3], float weight)
+{
+    for (int a = 0; a < 3; a++) {
+        c->point[a] += weight * point[a];
+        c->normal[a] += weight * normal[a];
+    }
+    c->weight += weight;
+}
+
+static void count_frame(cell *c, int64_t frame)
+{
+    c->frames += c->last != frame;
+    c->last = frame;
+}
+
+/* All cells into cubes of twice the side: at most as many as before, on a surface a quarter. */
+static npg_status grow(table *t)
+{
+    table wide = {0};
+    npg_status status = open_table(&wide, t->most);
+    for (size_t i = 0; i < t->count && !status; i++) {
+        const cell *from = &t->cells[i];
+        cell *to = find(&wide, key_of_double(from->key));
+        for (int a = 0; a < 3; a++) {
+            to->point[a] += from->point[a];
+            to->normal[a] += from->normal[a];
+        }
+        to->weight += from->weight;
+        to->frames = from->frames > to->frames ? from->frames : to->frames;
+        to->last = from->last > to->last ? from->last : to->last;
+    }
+    close_table(status ? &wide : t);
+    if (!status) *t = wide;
+    return status;
+}
+
+npg_status npg_cells_add(npg_cells *c, const float at[3], const float facing[3], const float point[3],
+                         const float normal[3], float weight, int64_t frame)
+{
+    while (c->fine.count >= c->fine.most || c->votes.count >= c->votes.most) {
+        NPG_TRY(grow(&c->fine));
+        NPG_TRY(grow(&c->votes));
+        c->side *= 2;
+    }
+    add(find(&c->fine, key_of(at, facing, c->side)), point, normal, weight);
+    count_frame(find(&c->votes, key_of(at, facing, VOTE_CELLS * c->side)), frame);
+    return NPG_OK;
+}
+
+/* ---- the whole ---- */
+
+npg_status npg_cells_open(npg_cells **out, double side, size_t most)
+{
+    npg_cells *c;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
+    c->side = fmax(side, SIDE_LEAST);
+    if (most < CELLS_LEAST) most = CELLS_LEAST;
+    npg_status status = open_table(&c->fine, most);
+    if (!status) status = open_table(&c->votes, most);
+    if (status) npg_cells_close(&c);
+    *out = c;
+    return status;
+}
+
+void npg_cells_close(npg_cells **slot)
+{
+    if (!slot || !*slot) return;
+    close_table(&(*slot)->fine);
+    close_table(&(*slot)->votes);
+    npg_release(slot);
+}
+
+size_t npg_cells_count(const npg_cells *cells)
+{
+    return cells->fine.count;
+}
+
+double npg_cells_side(const npg_cells *cells)
+{
+    return cells->side;
+}
+
+/* The frames around a cell: those of the cube of votes that it lies in. */
+static int64_t votes_of(const npg_cells *c, const cell *of)
+{
+    uint64_t key = of->key;
+    for (int side = 1; side < VOTE_CELLS; side *= 2) key = key_of_double(key);
+    table votes = c->votes; /* a copy: looking up a key that is there changes nothing */
+    return find(&votes, key)->frames;
+}
+
+npg_status npg_cells_means(const npg_cells *c, float *points, float *normals, size_t *count,
+                           int64_t frames_least)
+{
+    *count = 0;
+    for (size_t i = 0; i < c->fine.count; i++) {
+        const cell *of = &c->fine.cells[i];
+        float length = sqrtf(of->normal[0] * of->normal[0] + of->normal[1] * of->normal[1] +
+                             of->normal[2] * of->normal[2]);
+        if (!(of->weight > 0) || !(length > 0) || votes_of(c, of) < frames_least) continue;
+        for (int a = 0; a < 3; a++) {
+            points[3 * *count + (size_t)a] = of->point[a] / of->weight;
+            normals[3 * *count + (size_t)a] = of->normal[a] / length;
+        }
+        ++*count;
+    }
+    return NPG_OK;
+}
+
+size_t npg_cells_memory(size_t most)
+{
+    if (most < CELLS_LEAST) most = CELLS_LEAST;
+    /* two tables, each twice while it grows */
+    return 4 * ((most + 1) * sizeof(cell) + ((size_t)1 << bits_for(most)) * sizeof(uint32_t));
+}

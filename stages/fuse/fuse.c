@@ -1,0 +1,266 @@
+/* fuse: gathers what all frames saw of the body, for a reference that no single frame could give.
+ *
+ * In a fusing pass the reference so far is aligned with every frame.  Each frame's points are then carried
+ * back to the keyframe's pose by that motion (carry_back.h) and averaged with those of the other frames
+ * (cells.h); stage mesh makes the next reference from what comes out.  Parts that touch in a frame are told
+ * apart by the surface that each point belongs to, so one frame's contact joins nothing.
+ *
+ * Not in the paper, whose reference is the surface of one frame. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fuse/carry_back.h"
+#include "fuse/cells.h"
+#include "geometry/mesh_tools.h"
+#include "mesh/fused.h"
+#include "mesh/mesh_clean.h"
+
+#define POINTS_MOST 40000 /* of a frame: more add time, and nothing that the cells could hold */
+/* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
+#define POINTS_A_CELL   1    /* that a cell should average, from all frames ...                        */
+#define SIDE_LEAST      0.25 /* ... but for its side, in spacings of the keyframe's points             */
+#define NEAR_MEDIANS    2.5  /* median distances within which a point lies on the surface but for noise */
+#define FAR_SPACINGS    2.5  /* spacings beyond which a point belongs to nothing that is known         */
+#define AGREEMENT       0.3  /* least cosine of a point's normal and the surface's                     */
+#define MISALIGNED      2.5  /* usual median distances: a frame that is farther off has lost its way   */
+#define FRAMES_SHARE    0.05 /* of all frames must have seen a place, ...                              */
+#define FRAMES_AT_LEAST 2    /* ... and so many                                                        */
+
+enum { FROM_KEY, FROM_ALL };
+
+typedef struct state {
+    int from;       /* option */
+    int64_t rounds; /* option */
+    int64_t usable; /* frames with points, of the measuring pass */
+    npg_carry_back *carry;
+    npg_cells *cells;
+    double spacing; /* of the keyframe's points */
+    double usual;   /* mean of the frames' median distances */
+    int64_t frames, misaligned, points, strays;
+} state;
+
+#define AT(member) offsetof(state, member)
+
+/* clang-format off */
+static const npg_option options[] = {
+    /* type        name              place       default  least  most  shown as or words */
+    NPG_ROW_CHOICE("reference-from", AT(from),   "all",   "key|all",
+        "What the reference is made from: the keyframe's points alone, "
+        "or those of all frames, brought to its pose (files only)"),
+    NPG_ROW_INT   ("reference-rounds", AT(rounds), "1",   1,     20,   "N",
+        "Times that the points of all frames are gathered with the reference so far"),
+    {0}};
+/* clang-format on */
+
+/* ---- a frame ---- */
+
+typedef struct cloud {
+    float *points, *normals; /* unit; owned */
+    npg_carried *carried;
+    size_t count;
+} cloud;
+
+static void close_cloud(cloud *c)
+{
+    npg_release(&c->points);
+    npg_release(&c->normals);
+    npg_release(&c->carried);
+}
+
+static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame *frame)
+{
+    size_t most = frame->point_count < POINTS_MOST ? frame->point_count : POINTS_MOST;
+    NPG_TRY(npg_alloc_array(&c->points, NPG_FOR_MESH, most, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&c->normals, NPG_FOR_MESH, most, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&c->carried, NPG_FOR_MESH, most, sizeof *c->carried));
+    c->count =
+        npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
+    npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, c->points, c->count);
+    return NPG_OK;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static npg_status median_dist(double *median, const cloud *c)
+{
+    float *dists;
+    NPG_TRY(npg_alloc_array(&dists, NPG_FOR_MESH, c->count, sizeof *dists));
+    for (size_t i = 0; i < c->count; i++) dists[i] = c->carried[i].dist;
+    qsort(dists, c->count, sizeof *dists, by_size);
+    *median = (double)dists[c->count / 2];
+    npg_release(&dists);
+    return NPG_OK;
+}
+
+/* Weights fall with the distance as the tracker's do (Geman and McClure); what is near is averaged where the
+ * surface is, so that noise across the surface averages out; what is not, where it is. */
+static npg_status add_points(state *s, const cloud *c, int64_t frame, double near_dist, double far_dist)
+{
+    for (size_t i = 0; i < c->count; i++) {
+        const npg_carried *p = &c->carried[i];
+        bool is_near = (double)p->dist <= near_dist;
+        double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
+        if ((double)p->dist > far_dist || p->agreement < (float)AGREEMENT) {
+            s->strays++;
+            continue;
+        }
+        NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,
+                              p->point, p->normal, (float)(robust * robust), frame));
+    }
+    s->points += (int64_t)c->count;
+    return NPG_OK;
+}
+
+static size_t most_cells(const npg_facts *facts)
+{
+    size_t points = (size_t)facts->frame_count * facts->point_count_max;
+    return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
+}
+
+static npg_status open_gathering(npg_worker *worker, const cloud *key)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    double per_frame = (double)POINTS_A_CELL / (double)facts->frame_count; /* of the points of one frame */
+    NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
+    NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
+                           most_cells(facts)));
+    return npg_carry_back_open(&s->carry, facts->reference);
+}
+
+static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    double median;
+    NPG_TRY(open_cloud(c, worker, frame));
+    if (!s->carry) NPG_TRY(open_gathering(worker, c));
+    NPG_TRY(npg_carry_back_move(s->carry, frame->vert_unit));
+    NPG_TRY(npg_carry_back_points(s->carry, c->carried, c->points, c->normals, c->count));
+    NPG_TRY(median_dist(&median, c));
+    if (s->frames > 1 && median > MISALIGNED * s->usual) {
+        s->misaligned++;
+        return NPG_OK;
+    }
+    s->usual = (s->usual * (double)s->frames + median) / (double)(s->frames + 1);
+    s->frames++;
+    return add_points(s, c, frame->index, NEAR_MEDIANS * median,
+                      fmax(FAR_SPACINGS * s->spacing, NEAR_MEDIANS * median));
+}
+
+static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
+{
+    cloud c = {0};
+    if (frame->is_skipped || !frame->point_count) return NPG_OK;
+    npg_status status = gather(worker, &c, frame);
+    close_cloud(&c);
+    return npg_error_prefix(status, "frame %lld", (long long)frame->number);
+}
+
+/* ---- the end of a pass ---- */
+
+static npg_status collect(const state *s, npg_fused *fused)
+{
+    size_t most = npg_cells_count(s->cells);
+    double least = fmax(FRAMES_AT_LEAST, FRAMES_SHARE * (double)s->frames);
+    int64_t frames_least = s->frames < 2 * FRAMES_AT_LEAST ? 1 : (int64_t)least;
+    NPG_TRY(npg_alloc_array(&fused->points, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
+    fused->spacing_unit = npg_cells_side(s->cells);
+    fused->key_spacing_unit = s->spacing;
+    fused->frames = s->frames;
+    return npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least);
+}
+
+static npg_status publish(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    npg_fused *fused;
+    NPG_TRY(npg_alloc(&fused, NPG_FOR_MESH, sizeof *fused));
+    npg_status status = collect(s, fused);
+    if (status) {
+        npg_fused_close(&fused);
+        return status;
+    }
+    json_t *report = npg_worker_report(worker);
+    json_object_set_new(report, "frames", json_integer(s->frames));
+    json_object_set_new(report, "frames_misaligned", json_integer(s->misaligned));
+    json_object_set_new(report, "points", json_integer(s->points));
+    json_object_set_new(report, "points_stray", json_integer(s->strays));
+    json_object_set_new(report, "points_fused", json_integer((json_int_t)fused->count));
+    json_object_set_new(report, "cell_unit", json_real(fused->spacing_unit));
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "%lld points of %lld frames in the keyframe's pose: %zu means over %.5f units",
+                   (long long)(s->points - s->strays), (long long)s->frames, fused->count,
+                   fused->spacing_unit);
+    return npg_worker_publish(worker, &npg_fact_fused, fused);
+}
+
+/* ---- the stage ---- */
+
+static npg_status process(npg_worker *worker, npg_chunk **chunk)
+{
+    state *s = npg_worker_state(worker);
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
+        const npg_frame *frame = npg_chunk_frame(*chunk, i);
+        if (npg_worker_pass(worker) == NPG_PASS_MEASURE)
+            s->usable += !frame->is_skipped;
+        else
+            NPG_TRY(gather_frame(worker, frame));
+        if (npg_worker_stopping(worker)) return NPG_STOPPED;
+    }
+    return NPG_OK;
+}
+
+static npg_status flush(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
+        facts->fuse_left = s->usable > 1 ? s->rounds : 0;
+        return NPG_OK;
+    }
+    facts->fuse_left--;
+    return publish(worker);
+}
+
+static void uninit(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    npg_carry_back_close(&s->carry);
+    npg_cells_close(&s->cells);
+}
+
+/* Files are walked again, live sources are not; without alignment nothing is known to carry points by. */
+static bool takes_part(const npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    return s->from == FROM_ALL && !npg_worker_facts(worker)->is_live &&
+           !npg_worker_settings(worker)->reference[0] && npg_worker_has_field(worker, NPG_FIELD_POSE);
+}
+
+static size_t memory(const npg_worker *worker, size_t *chunks_held)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    size_t points = facts->point_count_max < POINTS_MOST ? facts->point_count_max : POINTS_MOST;
+    *chunks_held = 1;
+    return npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
+           npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
+}
+
+extern const npg_stage npg_stage_fuse;
+const npg_stage npg_stage_fuse = {.name = "fuse",
+                                  .help = "gathers the points of all frames for the reference",
+                                  .options = options,
+                                  .state_size = sizeof(state),
+                                  .passes = NPG_PASS_MEASURE | NPG_PASS_FUSE,
+                                  .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
+                                  .takes_part = takes_part,
+                                  .process = process,
+                                  .flush = flush,
+                                  .uninit = uninit,
+                                  .memory = memory};

@@ -1,0 +1,127 @@
+# The reference from the points of all frames: better than from one, resumed with the same bytes, left out on request.
+
+small=(--epochs 10 --faces 800 --poisson-depth 5 --window 5 --overlap 2 --align-nodes 60 --align-steps 10
+    --keyframe 5 --max-residual 100 --max-flipped 100 --max-stretched 100 --max-invented 100)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 -o noisy >synth.log
+    "$NEUPIG" synth --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
+    for capture in noisy parts; do
+        for from in key all; do
+            "$NEUPIG" run $capture/points -o $capture-$from --reference-from $from "${small[@]}" >$capture-$from.log 2>&1
+        done
+    done
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# A figure of an evaluation: figure NAME CAPTURE FROM
+figure() {
+    "$NEUPIG" eval "$2-$3" "$2" --samples 20000 | sed -n "s/.*\b$1 \([0-9.]*\).*/\1/p"
+}
+
+# report FILE KEY: of its stage fuse
+report() {
+    sed -n '/"fuse": {/,/}/s/.*"'"$2"'": \([0-9.e+-]*\).*/\1/p' "$1/report.json"
+}
+
+fusing_passes() {
+    grep -c "frames in the keyframe's pose" "$1" || true
+}
+
+@test "frames that are noisy, or see parts only, are followed better with a reference from all of them" {
+    for capture in noisy parts; do
+        key=$(figure CD $capture key)
+        all=$(figure CD $capture all)
+        echo "$capture: CD $key from the keyframe, $all from all frames"
+        awk -v key="$key" -v all="$all" 'BEGIN { exit !(all > 0 && all < 0.97 * key) }'
+    done
+}
+
+@test "the report says what was gathered" {
+    [ "$(report noisy-all frames)" -eq 14 ]
+    [ "$(report noisy-all frames_misaligned)" -eq 0 ]
+    [ "$(report noisy-all points)" -gt 10000 ]
+    [ "$(report noisy-all points_stray)" -lt 1000 ]
+    [ "$(report noisy-all points_fused)" -gt 800 ] # more than any frame has
+    awk -v side="$(report noisy-all cell_unit)" 'BEGIN { exit !(side > 0.001 && side < 0.2) }'
+    [ "$(fusing_passes noisy-all.log)" -eq 1 ]
+}
+
+@test "--reference-from key makes no fusing pass, --reference-rounds as many as it says" {
+    [ "$(fusing_passes noisy-key.log)" -eq 0 ]
+    [ -z "$(report noisy-key frames)" ]
+    [ ! -e noisy-key/job/poses.bin ]
+    "$NEUPIG" run noisy/points -o rounds --reference-rounds 2 "${small[@]}" --frames 0:6 >rounds.log 2>&1
+    [ "$(fusing_passes rounds.log)" -eq 2 ]
+}
+
+@test "only the reference that is delivered has its faults in the report" {
+    run "$NEUPIG" run parts/points -o bare "${small[@]}" --frames 0:6 --max-invented 0 --unseen keep
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [[ "$output" == *"no point of the keyframe saw it"*"no point of any frame saw it"* ]]
+    run grep -h -o "no point of .* saw it" bare/report.json
+    [ "$output" = "no point of any frame saw it" ]
+}
+
+# Kill a run into $1 in its solving pass, once it has a state.
+kill_in_solving() {
+    rm -rf "$1"
+    "$NEUPIG" run noisy/points -o "$1" "${small[@]}" >"$1.log" 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && ! ls "$1"/job/window*npg >/dev/null 2>&1; do sleep 0.02; done
+    kill -KILL $pid 2>/dev/null
+    wait $pid || true
+    [ ! -e "$1/done.json" ]
+}
+
+same() {
+    cmp noisy-all/reference.ply "$1/reference.ply"
+    cmp noisy-all/frames.jsonl "$1/frames.jsonl"
+    diff -r noisy-all/meshes "$1/meshes"
+}
+
+@test "a run killed in the solving pass resumes to the same bytes, without another fusing pass" {
+    kill_in_solving killed
+    cp -r killed hurt
+    run "$NEUPIG" run noisy/points -o killed "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" != *"frames in the keyframe's pose"* ]]
+    grep -q resumed_frames killed/report.json
+    same killed
+}
+
+@test "a run that starts over and is killed while it gathers leaves the unfinished job as it was" {
+    [ -d hurt ] || skip "needs the job that the test before left"
+    cp -r hurt again
+    "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --align-steps 200 --align-nodes 500 >again.log 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ ! -e again/job/poses.new ]; do sleep 0.02; done
+    kill -KILL $pid
+    wait $pid || true
+    [ -e again/job/poses.new ]
+    "$NEUPIG" run noisy/points -o again "${small[@]}" --quiet
+    grep -q resumed_frames again/report.json
+    same again
+}
+
+@test "damaged or missing poses of an unfinished job are bad input, named; --restart discards them" {
+    [ -d hurt ] || skip "needs the job that the test before left"
+    cp -r hurt missing
+    size=$(stat -c %s hurt/job/poses.bin)
+    head -c "$size" /dev/zero | tr '\0' 'Z' >hurt/job/poses.bin
+    rm missing/job/poses.bin
+    for out in hurt missing; do
+        run "$NEUPIG" run noisy/points -o $out "${small[@]}" --quiet
+        echo "$output"
+        [ "$status" -eq 3 ]
+        [[ "$output" == *"job/poses.bin"* ]]
+    done
+    "$NEUPIG" run noisy/points -o hurt "${small[@]}" --restart --quiet
+    same hurt
+}

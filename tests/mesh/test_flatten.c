@@ -1,0 +1,145 @@
+/* Flatten: what no point saw is drawn tight; what points saw stays where it is. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "mesh/flatten.h"
+
+#define SIDE 31 /* vertices along a side of the sheet */
+#define STEP (2.0 / (SIDE - 1))
+#define HOLE 0.5 /* radius of what is not seen */
+
+typedef struct seen {
+    float points[3 * SIDE * SIDE];
+    size_t count;
+} seen;
+
+static bool is_in_hole(double x, double y)
+{
+    return x * x + y * y < HOLE * HOLE;
+}
+
+static void put_square(npg_mesh *mesh, uint32_t i, uint32_t j)
+{
+    uint32_t a = i * SIDE + j, b = a + 1, c = a + SIDE, d = c + 1;
+    const uint32_t faces[6] = {a, c, b, b, c, d};
+    memcpy(mesh->faces + 6 * ((size_t)i * (SIDE - 1) + j), faces, sizeof faces);
+}
+
+/* A tilted sheet from -1 to 1 with a balloon over its middle; `spare` more vertices and faces at its end. */
+static npg_mesh *bulged(seen *s, size_t spare_verts, size_t spare_faces)
+{
+    npg_mesh *mesh;
+    size_t faces = 2 * (SIDE - 1) * (SIDE - 1);
+    s->count = 0;
+    assert_int_equal(npg_mesh_open(&mesh, SIDE * SIDE + spare_verts, faces + spare_faces), NPG_OK);
+    for (uint32_t v = 0; v < SIDE * SIDE; v++) {
+        double x = (double)(v / SIDE) * STEP - 1, y = (double)(v % SIDE) * STEP - 1, z = 0.1 * x;
+        if (is_in_hole(x, y)) z += 0.6 - 2.4 * (x * x + y * y);
+        const float at[3] = {(float)x, (float)y, (float)z};
+        memcpy(mesh->vert_pos + 3 * (size_t)v, at, sizeof at);
+        if (!is_in_hole(x, y)) memcpy(s->points + 3 * s->count++, at, sizeof at);
+    }
+    for (uint32_t i = 0; i < SIDE - 1; i++)
+        for (uint32_t j = 0; j < SIDE - 1; j++) put_square(mesh, i, j);
+    return mesh;
+}
+
+static void the_balloon_over_a_hole_becomes_flat(void **state)
+{
+    static seen s;
+    npg_mesh *mesh = bulged(&s, 0, 0), *before;
+    size_t moved;
+    (void)state;
+    assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
+    assert_int_equal(npg_mesh_flatten(mesh, &moved, s.points, s.count, 0.5 * STEP), NPG_OK);
+    assert_int_equal(moved, SIDE * SIDE - s.count);
+    for (size_t v = 0; v < mesh->vert_count; v++) {
+        const float *now = mesh->vert_pos + 3 * v, *was = before->vert_pos + 3 * v;
+        if (!is_in_hole((double)was[0], (double)was[1])) assert_memory_equal(now, was, 3 * sizeof(float));
+        assert_true(fabs((double)now[2] - 0.1 * (double)now[0]) < 1e-3); /* in the sheet's plane */
+        assert_true(is_in_hole((double)was[0], (double)was[1]) == is_in_hole((double)now[0], (double)now[1]));
+    }
+    npg_mesh_unref(&before);
+    npg_mesh_unref(&mesh);
+}
+
+static void nothing_moves_where_all_is_seen_or_nothing(void **state)
+{
+    static seen s;
+    const float far[3] = {9, 9, 9};
+    npg_mesh *mesh = bulged(&s, 0, 0), *before;
+    size_t moved = 7;
+    (void)state;
+    assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
+    assert_int_equal(npg_mesh_flatten(mesh, &moved, before->vert_pos, before->vert_count, 1e-6), NPG_OK);
+    assert_int_equal(moved, 0);
+    assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * mesh->vert_count);
+    moved = 7;
+    assert_int_equal(npg_mesh_flatten(mesh, &moved, far, 1, 0.1), NPG_OK);
+    assert_int_equal(moved, 0);
+    assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * mesh->vert_count);
+    npg_mesh_unref(&before);
+    npg_mesh_unref(&mesh);
+}
+
+/* There is nothing to draw it tight between: it would become a point. */
+static void a_piece_that_no_point_saw_keeps_its_shape(void **state)
+{
+    static seen s;
+    static const float corners[12] = {0, 0, 3, 1, 0, 3, 0, 1, 3, 0, 0, 4};
+    static const uint32_t sides[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+    const size_t verts = SIDE * SIDE;
+    npg_mesh *mesh = bulged(&s, 4, 4);
+    size_t moved;
+    (void)state;
+    memcpy(mesh->vert_pos + 3 * verts, corners, sizeof corners);
+    for (size_t i = 0; i < 12; i++) mesh->faces[6 * (SIDE - 1) * (SIDE - 1) + i] = (uint32_t)verts + sides[i];
+    assert_int_equal(npg_mesh_flatten(mesh, &moved, s.points, s.count, 0.5 * STEP), NPG_OK);
+    assert_int_equal(moved, verts - s.count);
+    assert_memory_equal(mesh->vert_pos + 3 * verts, corners, sizeof corners);
+    npg_mesh_unref(&mesh);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
+static npg_status flatten_with_failure(const npg_mesh *bulge, const seen *s, uint64_t n)
+{
+    npg_mesh *mesh;
+    size_t moved;
+    assert_int_equal(npg_mesh_copy(&mesh, bulge), NPG_OK);
+    npg_memory_fail_at(n, false);
+    npg_status status = npg_mesh_flatten(mesh, &moved, s->points, s->count, 0.5 * STEP);
+    npg_memory_fail_at(0, false);
+    npg_mesh_unref(&mesh);
+    return status;
+}
+
+static void memory_that_fails_is_reported(void **state)
+{
+    static seen s;
+    npg_mesh *mesh = bulged(&s, 0, 0);
+    size_t used = npg_memory_used();
+    uint64_t n = 1;
+    (void)state;
+    for (; flatten_with_failure(mesh, &s, n) == NPG_MEMORY; n++) assert_int_equal(npg_memory_used(), used);
+    assert_true(n > 3);
+    assert_int_equal(flatten_with_failure(mesh, &s, n), NPG_OK);
+    npg_mesh_unref(&mesh);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_balloon_over_a_hole_becomes_flat),
+        cmocka_unit_test(nothing_moves_where_all_is_seen_or_nothing),
+        cmocka_unit_test(a_piece_that_no_point_saw_keeps_its_shape),
+        cmocka_unit_test(memory_that_fails_is_reported),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
