@@ -526,6 +526,8 @@ static int64_t steps_of(const npg_warm *w, bool is_cold)
 static npg_status start(npg_warm *w, const npg_window *window)
 {
     if (window->from == 0 && w->first.bytes) NPG_TRY(npg_fit_copy_give(&w->first, w->dense));
+    npg_fit_close(&w->probe); /* a resumed run knows no more than what is handed over */
+    NPG_TRY(open_probe_fit(w));
     return npg_fit_hand_over(w->probe, w->dense);
 }
 
