@@ -484,23 +484,14 @@ static bool should_stop(void *worker)
     return npg_worker_stopping(worker);
 }
 
-/* Frames that start from what the pass before ended with were tried again there. */
-static bool was_recovered(const state *s)
-{
-    for (size_t i = 0; i < s->group_count; i++)
-        if (!s->group[i].is_known) return false;
-    return true;
-}
-
 static npg_status recover_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_recover_frame *frames;
-    npg_recover_result result = {0};
-    npg_status status = NPG_OK;
+    npg_recover_result result;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
     size_t count = list_frames(s, frames);
-    if (!was_recovered(s)) status = npg_recover(s->tracker, &result, frames, count, should_stop, worker);
+    npg_status status = npg_recover(s->tracker, &result, frames, count, should_stop, worker);
     for (size_t i = 0; i < s->group_count && !status; i++)
         s->group[i].tracked = frame_of(frames, count, s->group[i].frame.index)->tracked;
     if (!status) move_sides(s, frames, count);
