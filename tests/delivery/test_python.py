@@ -84,7 +84,7 @@ class Files(unittest.TestCase):
 
     def test_ctrl_c_stops_a_run_in_good_order(self):
         words = ("import neupig, sys\n"
-                 "neupig.run(sys.argv[1], sys.argv[2], epochs=1000000, progress=lambda p: print(p.step, flush=True))\n")
+                 "neupig.run(sys.argv[1], sys.argv[2], align=\"no\", epochs=1000000, progress=lambda p: print(p.step, flush=True))\n")
         child = subprocess.Popen([sys.executable, "-c", words, str(self.capture.points), str(WORK / "stopped")],
                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         child.stdout.readline()

@@ -78,7 +78,7 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 }
 
 @test "a request to stop ends with 75 and nothing that looks done" {
-    "$NEUPIG" run capture/points -o stopped "${small[@]}" --epochs 1000000 --progress json >progress 2>stop.log &
+    "$NEUPIG" run capture/points -o stopped "${small[@]}" --epochs 1000000 --no-align --progress json >progress 2>stop.log &
     pid=$!
     while [ ! -e stopped/frames.partial.jsonl ]; do
         kill -0 $pid
