@@ -1,7 +1,6 @@
 /* Carry back: rotations of the surface, and points through them. */
 #include "fuse/carry_back.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
@@ -130,19 +129,13 @@ static void at_hit(float *out, const npg_carry_back *c, const npg_surface_hit *h
     }
 }
 
-static void make_unitf(float v[3])
-{
-    float length = npg_vec3_lengthf(v);
-    for (int i = 0; i < 3; i++) v[i] = length > 0 ? v[i] / length : 0;
-}
-
 /* Nearly the rotation nearest to a sum of similar ones: its rows made orthonormal (Gram and Schmidt). */
 static void straighten(float m[9])
 {
-    make_unitf(m);
+    npg_vec3_make_unitf(m);
     float along = npg_vec3_dotf(m, m + 3);
     for (int i = 0; i < 3; i++) m[3 + i] -= along * m[i];
-    make_unitf(m + 3);
+    npg_vec3_make_unitf(m + 3);
     m[6] = m[1] * m[5] - m[2] * m[4];
     m[7] = m[2] * m[3] - m[0] * m[5];
     m[8] = m[0] * m[4] - m[1] * m[3];
@@ -162,8 +155,8 @@ static void carry(npg_carried *out, const npg_carry_back *c, const npg_surface_h
     at_hit(turn, c, hit, c->turns, 9);
     at_hit(out->foot, c, hit, c->mesh->vert_pos, 3);
     at_hit(out->facing, c, hit, c->mesh->vert_normals, 3);
-    make_unitf(facing_now);
-    make_unitf(out->facing);
+    npg_vec3_make_unitf(facing_now);
+    npg_vec3_make_unitf(out->facing);
     straighten(turn);
     for (int i = 0; i < 3; i++) away[i] = point[i] - now[i];
     turn_back(out->point, turn, away);
