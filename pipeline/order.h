@@ -11,4 +11,18 @@ static inline int npg_order_int64(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
+/* Ascending float.  Values without an order (NaN) equal all. */
+static inline int npg_order_float(const void *left, const void *right)
+{
+    float a = *(const float *)left, b = *(const float *)right;
+    return (a > b) - (a < b);
+}
+
+/* Ascending double; NaN as above. */
+static inline int npg_order_double(const void *left, const void *right)
+{
+    double a = *(const double *)left, b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
 #endif

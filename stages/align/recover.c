@@ -7,6 +7,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */
 #define LOST        1.4  /* times the Chamfer distance of the best quarter                              */
@@ -54,18 +55,12 @@ static bool is_lost(const recovery *r, const npg_recover_frame *frame)
     return is_known(frame) && frame->tracked.chamfer > LOST * r->level;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void set_level(recovery *r)
 {
     size_t known = 0;
     for (size_t i = 0; i < r->count; i++)
         if (is_known(&r->frames[i])) r->sorted[known++] = r->frames[i].tracked.chamfer;
-    qsort(r->sorted, known, sizeof *r->sorted, by_value);
+    qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
     r->level = fmax(LEVEL_LEAST, known ? r->sorted[known / 4] : 0);
 }
 

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pipeline/order.h"
 #include "pipeline/stage.h"
 
 /* Set by trial, but for NORMAL, on captures whose topology changes and on ones whose fit fails. */
@@ -80,15 +81,9 @@ void npg_alarm_close(npg_alarm **slot)
 
 /* ---- the usual level ---- */
 
-static int by_value(const void *left, const void *right)
-{
-    double a = *(const double *)left, b = *(const double *)right;
-    return a < b ? -1 : a > b;
-}
-
 static double median_of(double *values, size_t count)
 {
-    qsort(values, count, sizeof *values, by_value);
+    qsort(values, count, sizeof *values, npg_order_double);
     return count ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : 0;
 }
 

@@ -100,12 +100,6 @@ static npg_status sample_points(evaluate_state *state, const npg_frame_box *box,
     return NPG_OK;
 }
 
-static int by_size(const void *left, const void *right)
-{
-    float a = *(const float *)left, b = *(const float *)right;
-    return a < b ? -1 : a > b;
-}
-
 /* The value that a share of the sorted values does not pass. */
 static double quantile(const float *sorted, size_t count, double share)
 {
@@ -127,7 +121,7 @@ static npg_status measure_points(evaluate_state *state, npg_figures *figures, si
         sum += sqrt(dist_sq);
         state->dists[i] = (float)sqrt(dist_sq);
     }
-    qsort(state->dists, count, sizeof *state->dists, by_size);
+    qsort(state->dists, count, sizeof *state->dists, npg_order_float);
     figures->point_dist_median = quantile(state->dists, count, 0.5) * per_unit;
     figures->point_dist_p95 = quantile(state->dists, count, 0.95) * per_unit;
     figures->point_dist_mean = sum / (double)count * per_unit;

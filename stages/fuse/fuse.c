@@ -15,6 +15,7 @@
 #include "geometry/mesh_tools.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
+#include "pipeline/order.h"
 
 #define POINTS_MOST 40000 /* of a frame: more add time, and nothing that the cells could hold */
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
@@ -80,18 +81,12 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
     return NPG_OK;
 }
 
-static int by_size(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static npg_status median_dist(double *median, const cloud *c)
 {
     float *dists;
     NPG_TRY(npg_alloc_array(&dists, NPG_FOR_MESH, c->count, sizeof *dists));
     for (size_t i = 0; i < c->count; i++) dists[i] = c->carried[i].dist;
-    qsort(dists, c->count, sizeof *dists, by_size);
+    qsort(dists, c->count, sizeof *dists, npg_order_float);
     *median = (double)dists[c->count / 2];
     npg_release(&dists);
     return NPG_OK;

@@ -10,6 +10,7 @@
 #include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "pipeline/memory.h"
+#include "pipeline/order.h"
 
 #define BATCH       4096
 #define NEAR        8
@@ -40,12 +41,6 @@ static double plane_residual(const float *points, const uint32_t *index, size_t 
     return sum / (double)(k - 3);
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* Residuals of the planes through few and through many neighbours, at `asked` points spread over the
  * cloud. */
 static npg_status measure_residuals(double *near, double *wide, size_t asked, const npg_kdtree *tree,
@@ -65,8 +60,8 @@ static npg_status measure_residuals(double *near, double *wide, size_t asked, co
 /* residual = sigma^2 + c k^2 for k neighbours: the medians at two k give sigma.  Sorts both lists. */
 static double noise_of(double *near, double *wide, size_t count)
 {
-    qsort(near, count, sizeof *near, by_value);
-    qsort(wide, count, sizeof *wide, by_value);
+    qsort(near, count, sizeof *near, npg_order_double);
+    qsort(wide, count, sizeof *wide, npg_order_double);
     double ratio = (double)(WIDE * WIDE) / (NEAR * NEAR);
     double noise = (ratio * near[count / 2] - wide[count / 2]) / (ratio - 1);
     return noise > 0 ? sqrt(noise) : 0;

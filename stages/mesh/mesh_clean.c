@@ -8,6 +8,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "pipeline/order.h"
 
 #define SPACING_NEIGHBOUR 8
 #define SPACING_ASKED     20000 /* points at most that are asked for their neighbours */
@@ -31,17 +32,11 @@ npg_status npg_mesh_point_dist(float *dist, const npg_mesh *mesh, const float *p
     return npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
 }
 
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* Of the distances to k neighbours each the farthest; and of these the median.  Overwrites the list. */
 static float median_farthest(float *dist_sq, size_t count, size_t k)
 {
     for (size_t i = 0; i < count; i++) dist_sq[i] = dist_sq[k * i + k - 1];
-    qsort(dist_sq, count, sizeof *dist_sq, by_value);
+    qsort(dist_sq, count, sizeof *dist_sq, npg_order_float);
     return dist_sq[count / 2];
 }
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "geometry/vec3.h"
+#include "pipeline/order.h"
 
 /* A number beyond this is damage, not a place: as origin it would swallow every other point. */
 #define ORIGIN_MAX 1e15
@@ -32,12 +33,6 @@ void npg_local_of(float local[3], npg_origin *origin, const double world[3])
     for (int a = 0; a < 3; a++) local[a] = (float)(world[a] - (origin->known ? origin->world[a] : 0));
 }
 
-static int by_value(const void *left, const void *right)
-{
-    double a = *(const double *)left, b = *(const double *)right;
-    return a < b ? -1 : a > b;
-}
-
 bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point_count)
 {
     double values[SAMPLES], median[3] = {0}, spread = 0, away = 0;
@@ -47,7 +42,7 @@ bool npg_origin_improve(npg_origin *origin, const float *pos_local, size_t point
         for (size_t i = 0; i < point_count; i += step)
             if (isfinite(pos_local[3 * i + a])) values[count++] = (double)pos_local[3 * i + a];
         if (count < 8) return false; /* too few for deciles; any origin will do */
-        qsort(values, count, sizeof *values, by_value);
+        qsort(values, count, sizeof *values, npg_order_double);
         median[a] = values[count / 2];
         spread = fmax(spread, values[count * 9 / 10] - values[count / 10]); /* outliers aside */
         away = fmax(away, fabs(median[a]));
