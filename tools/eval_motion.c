@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "pipeline/order.h"
 
 void npg_eval_motion_close(npg_eval_motion *motion)
 {
@@ -145,12 +146,6 @@ npg_status npg_eval_motion_add(npg_eval_motion *motion, npg_mesh *mesh)
     return NPG_OK;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Share of all faces of all frames whose area is > 10 x or < 0.1 x its median over time. */
 static npg_status bad_share(double *share, const npg_eval_motion *motion)
 {
@@ -159,7 +154,7 @@ static npg_status bad_share(double *share, const npg_eval_motion *motion)
     NPG_TRY(npg_alloc_array(&areas, NPG_FOR_MESH, frames, sizeof *areas));
     for (size_t f = 0; f < motion->face_count; f++) {
         for (size_t t = 0; t < frames; t++) areas[t] = motion->areas[t * motion->face_count + f];
-        qsort(areas, frames, sizeof *areas, compare_floats);
+        qsort(areas, frames, sizeof *areas, npg_order_float);
         double median = 0.5 * ((double)areas[(frames - 1) / 2] + (double)areas[frames / 2]);
         for (size_t t = 0; t < frames; t++)
             bad += (double)areas[t] > 10 * median || (double)areas[t] < 0.1 * median;

@@ -8,6 +8,7 @@
 #include "geometry/mesh_tools.h"
 #include "optimize/joint_match.h"
 #include "optimize/joint_system.h"
+#include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
 #define THREADS_MAX 8
@@ -131,12 +132,6 @@ static npg_status measure_frames(void *user, size_t part)
     return NPG_OK;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Median over the frames that have points; 0 where none has.  Uses scores as scratch. */
 static double median_spread(npg_joint *j, size_t count)
 {
@@ -144,7 +139,7 @@ static double median_spread(npg_joint *j, size_t count)
     for (size_t t = 0; t < count; t++)
         if (j->frames[t].point_count) j->scores[seen++] = j->spreads[t];
     if (!seen) return 0;
-    qsort(j->scores, seen, sizeof *j->scores, by_value);
+    qsort(j->scores, seen, sizeof *j->scores, npg_order_double);
     return j->scores[seen / 2];
 }
 
@@ -161,18 +156,12 @@ static npg_status weigh_frames(npg_joint *j, size_t count)
     return NPG_OK;
 }
 
-static int by_float(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Uses bend as scratch. */
 static double lambda_median(npg_joint *j)
 {
     size_t w = j->mesh->vert_count;
     memcpy(j->bend, j->lambda, w * sizeof *j->bend);
-    qsort(j->bend, w, sizeof *j->bend, by_float);
+    qsort(j->bend, w, sizeof *j->bend, npg_order_float);
     return (double)j->bend[w / 2];
 }
 

@@ -7,6 +7,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "pipeline/order.h"
 
 #define OPPOSITE -0.2f  /* cosine below which a point's normal speaks against the surface's        */
 #define NORMAL   1.4826 /* standard deviation of a normal distribution, in median absolute values   */
@@ -42,12 +43,6 @@ static npg_status look(npg_joint_matcher *m, size_t *count, const npg_joint_fram
     return npg_surface_closest_near(m->surface, m->hits, m->targets, *count, NULL, NULL, 1);
 }
 
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 npg_status npg_joint_measure(npg_joint_matcher *m, double *spread, const npg_joint_frame *frame)
 {
     size_t count;
@@ -55,7 +50,7 @@ npg_status npg_joint_measure(npg_joint_matcher *m, double *spread, const npg_joi
     NPG_TRY(look(m, &count, frame));
     if (!count) return NPG_OK;
     for (size_t i = 0; i < count; i++) m->dists[i] = sqrtf(m->hits[i].dist_sq);
-    qsort(m->dists, count, sizeof *m->dists, by_value);
+    qsort(m->dists, count, sizeof *m->dists, npg_order_float);
     *spread = NORMAL * (double)m->dists[count / 2];
     return NPG_OK;
 }

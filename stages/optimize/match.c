@@ -9,6 +9,7 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
 #include "geometry/vec3.h"
+#include "pipeline/order.h"
 
 #define OPPOSITE -0.2 /* cosine below which a point's normal speaks against the surface's */
 
@@ -75,15 +76,9 @@ size_t npg_matcher_most(const npg_matcher *m)
     return (size_t)m->settings.points + 2 * m->carry->samples->mesh->vert_count;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static double median_of(float *values, size_t count)
 {
-    qsort(values, count, sizeof *values, by_value);
+    qsort(values, count, sizeof *values, npg_order_float);
     return (double)values[count / 2];
 }
 

@@ -4,19 +4,14 @@
 #include <stdlib.h>
 
 #include "pipeline/clock.h"
+#include "pipeline/order.h"
 
 #define SLICE_S    8e-3               /* of a slice, at least; set by trial */
 #define COPY_BYTES ((size_t)64 << 20) /* of each buffer: more than the caches hold */
 
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 npg_spread npg_spread_of(double *values, size_t count)
 {
-    qsort(values, count, sizeof *values, by_size);
+    qsort(values, count, sizeof *values, npg_order_double);
     return (npg_spread){values[count / 4], values[count / 2], values[count - 1 - count / 4]};
 }
 

@@ -13,6 +13,7 @@
 #include "pipeline/file_facts.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/json_lines.h"
+#include "pipeline/order.h"
 #include "tools/segments/segments.h"
 
 #define NEAR                                                                                                 \
@@ -56,12 +57,6 @@ static npg_status read_frame(npg_mesh **mesh, const npg_segments *s, const npg_s
 
 /* ---- links ---- */
 
-static int by_size(const void *left, const void *right)
-{
-    float a = *(const float *)left, b = *(const float *)right;
-    return a < b ? -1 : a > b;
-}
-
 static npg_status write_rows(npg_file *file, const npg_surface_hit *hits, size_t count)
 {
     NPG_TRY(npg_file_print(file, "vertex,face,weight_0,weight_1,weight_2,distance\n"));
@@ -81,7 +76,7 @@ static void add_figures(json_t *entry, npg_surface_hit *hits, size_t count, doub
     size_t near = 0;
     for (size_t i = 0; i < count; i++) dists[i] = sqrtf(hits[i].dist_sq);
     for (size_t i = 0; i < count; i++) near += (double)dists[i] <= NEAR * diagonal;
-    qsort(dists, count, sizeof *dists, by_size);
+    qsort(dists, count, sizeof *dists, npg_order_float);
     json_object_set_new(entry, "vertices", json_integer((json_int_t)count));
     json_object_set_new(entry, "distance_median", json_real(count ? (double)dists[count / 2] : 0));
     json_object_set_new(entry, "near_share", json_real(count ? (double)near / (double)count : 0));
