@@ -71,6 +71,12 @@ typedef struct npg_facts {
     int64_t resumed_read; /* frames of the plan that need not be read again             */
 } npg_facts;
 
+/* Whether the reference leaves an end of the capture unexplained, on either side of the keyframe. */
+static inline bool npg_facts_has_changed(const npg_facts *facts)
+{
+    return facts->has_changed[0] || facts->has_changed[1];
+}
+
 typedef struct npg_worker npg_worker;
 
 /* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it,

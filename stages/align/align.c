@@ -239,9 +239,8 @@ static npg_status restore_known(npg_worker *worker)
 /* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
 static npg_status drop_if_changed(npg_worker *worker, between *b)
 {
-    const npg_facts *facts = npg_worker_facts(worker);
     char *path;
-    if (!b || !(facts->has_changed[0] || facts->has_changed[1])) return NPG_OK;
+    if (!b || !npg_facts_has_changed(npg_worker_facts(worker))) return NPG_OK;
     npg_poses_close(&b->poses);
     npg_tracker_close(&b->tracker);
     NPG_TRY(poses_path(worker, &path, true));

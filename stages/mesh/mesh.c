@@ -520,8 +520,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, con
  * come, go or open belong to no common surface, and hiding them in one would silence the alarm. */
 static void drop_if_changed(npg_worker *worker, npg_fused **fused)
 {
-    const npg_facts *facts = npg_worker_facts(worker);
-    if (!*fused || !(facts->has_changed[0] || facts->has_changed[1])) return;
+    if (!*fused || !npg_facts_has_changed(npg_worker_facts(worker))) return;
     npg_worker_log(worker, NPG_LOG_INFO, -1,
                    "the keyframe's surface does not explain all frames: the reference is made from it alone");
     npg_fused_close(fused);
