@@ -3,11 +3,9 @@
  * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They
  * wait until their window is complete: then those that were lost are tried again from what is known around
  * them (recover.h). The aligned positions are where the joint fit starts. */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "align/poses.h"
 #include "align/recover.h"
@@ -218,6 +216,12 @@ static npg_status poses_path(const npg_worker *worker, char **path, bool is_new)
     return job ? npg_job_poses_path(job, path, is_new) : NPG_OK;
 }
 
+static npg_status remove_new_poses(const npg_worker *worker)
+{
+    const npg_job *job = npg_job_of(worker);
+    return job ? npg_job_remove_new_poses(job) : NPG_OK;
+}
+
 static npg_status restore_known(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -239,15 +243,10 @@ static npg_status restore_known(npg_worker *worker)
 /* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
 static npg_status drop_if_changed(npg_worker *worker, between *b)
 {
-    char *path;
     if (!b || !npg_facts_has_changed(npg_worker_facts(worker))) return NPG_OK;
     npg_poses_close(&b->poses);
     npg_tracker_close(&b->tracker);
-    NPG_TRY(poses_path(worker, &path, true));
-    npg_status status = NPG_OK;
-    if (path && unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    npg_release(&path);
-    return status;
+    return remove_new_poses(worker);
 }
 
 /* The poses of the pass before, or of the run that is resumed. */
@@ -275,11 +274,9 @@ static npg_status open_found(npg_worker *worker)
     state *s = npg_worker_state(worker);
     char *path;
     if (npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
+    NPG_TRY(remove_new_poses(worker)); /* `known` still reads what had the name before */
     NPG_TRY(poses_path(worker, &path, true));
-    npg_status status = NPG_OK;
-    if (path && unlink(path) && errno != ENOENT) /* `known` still reads what had the name before */
-        status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    if (!status) status = npg_poses_create(&s->found, path, npg_tracker_node_count(s->tracker));
+    npg_status status = npg_poses_create(&s->found, path, npg_tracker_node_count(s->tracker));
     npg_release(&path);
     return status;
 }

@@ -118,6 +118,7 @@ npg_status npg_job_motion_path(const npg_job *job, char **path);
  * another name until the solving pass begins: those of an earlier run belong to its states. */
 npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new);
 npg_status npg_job_keep_poses(const npg_job *job);
+npg_status npg_job_remove_new_poses(const npg_job *job); /* also where there are none */
 
 /* Block of a state: what stage align needs (npg_frame.align_state). */
 #define NPG_BLOCK_ALIGN     "align"

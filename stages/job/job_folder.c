@@ -317,6 +317,11 @@ npg_status npg_job_keep_poses(const npg_job *job)
     return status;
 }
 
+npg_status npg_job_remove_new_poses(const npg_job *job)
+{
+    return remove_file(job, POSES_NEW);
+}
+
 int64_t npg_job_serial(const npg_job *job)
 {
     return job->serial;
