@@ -14,10 +14,10 @@
 
 typedef struct walk {
     size_t vert_count;
-    uint32_t *start, *neighbour; /* V + 1, 2 E                                        */
-    float *length;               /* of half-edges                                     */
-    float *dist;                 /* V, infinity                                       */
-    uint32_t *heap, *where;      /* binary heap of vertices, and each one's place + 1 */
+    npg_mesh_neighbours around; /* owned                                             */
+    float *length;              /* 2 E, of half-edges                                */
+    float *dist;                /* V, infinity                                       */
+    uint32_t *heap, *where;     /* binary heap of vertices, and each one's place + 1 */
     size_t heap_size;
     uint32_t *seen; /* vertices reached by the last walk, nearest first */
     size_t seen_count;
@@ -30,43 +30,33 @@ static float edge_length(const npg_mesh *mesh, uint32_t a, uint32_t b)
                  (p[2] - q[2]) * (p[2] - q[2]));
 }
 
-static void fill_neighbours(walk *w, const npg_mesh *mesh, const uint32_t (*edges)[2], size_t edge_count)
+/* Of the half-edges, in the order of the neighbours. */
+static void measure_edges(walk *w, const npg_mesh *mesh)
 {
-    for (size_t e = 0; e < 2 * edge_count; e++) w->start[edges[e / 2][e % 2] + 1]++;
-    for (size_t v = 0; v < w->vert_count; v++) w->start[v + 1] += w->start[v];
-    for (size_t e = 0; e < edge_count; e++)
-        for (int end = 0; end < 2; end++) {
-            uint32_t at = w->start[edges[e][end]]++;
-            w->neighbour[at] = edges[e][1 - end];
-            w->length[at] = edge_length(mesh, edges[e][0], edges[e][1]);
-        }
-    memmove(w->start + 1, w->start, w->vert_count * sizeof *w->start);
-    w->start[0] = 0;
+    for (size_t v = 0; v < w->vert_count; v++)
+        for (uint32_t k = w->around.start[v]; k < w->around.start[v + 1]; k++)
+            w->length[k] = edge_length(mesh, (uint32_t)v, w->around.of[k]);
 }
 
 static void close_walk(walk *w)
 {
-    void *all[] = {&w->start, &w->neighbour, &w->length, &w->dist, &w->heap, &w->where, &w->seen};
+    void *all[] = {&w->length, &w->dist, &w->heap, &w->where, &w->seen};
+    npg_mesh_neighbours_close(&w->around);
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 
 static npg_status open_walk(walk *w, const npg_mesh *mesh)
 {
-    uint32_t(*edges)[2] = NULL;
-    size_t edge_count = 0, n = w->vert_count = mesh->vert_count;
-    npg_status status = npg_mesh_edges(&edges, &edge_count, mesh->faces, mesh->face_count);
-    if (!status) status = npg_alloc_array(&w->start, NPG_FOR_MESH, n + 2, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&w->neighbour, NPG_FOR_MESH, 2 * edge_count + 1, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&w->length, NPG_FOR_MESH, 2 * edge_count + 1, sizeof(float));
+    size_t n = w->vert_count = mesh->vert_count;
+    npg_status status = npg_mesh_neighbours_open(&w->around, mesh);
+    if (!status)
+        status = npg_alloc_array(&w->length, NPG_FOR_MESH, (size_t)w->around.start[n] + 1, sizeof(float));
     if (!status) status = npg_alloc_array(&w->dist, NPG_FOR_MESH, n, sizeof(float));
     if (!status) status = npg_alloc_array(&w->heap, NPG_FOR_MESH, n, sizeof(uint32_t));
     if (!status) status = npg_alloc_array(&w->where, NPG_FOR_MESH, n, sizeof(uint32_t));
     if (!status) status = npg_alloc_array(&w->seen, NPG_FOR_MESH, n, sizeof(uint32_t));
-    if (!status) {
-        fill_neighbours(w, mesh, (const uint32_t(*)[2])edges, edge_count);
-        for (size_t v = 0; v < n; v++) w->dist[v] = INFINITY;
-    }
-    npg_release(&edges);
+    if (!status) measure_edges(w, mesh);
+    for (size_t v = 0; v < n && !status; v++) w->dist[v] = INFINITY;
     return status;
 }
 
@@ -116,11 +106,12 @@ static void walk_from(walk *w, uint32_t from, float reach)
     while (w->heap_size) {
         uint32_t at = heap_pop(w);
         w->seen[w->seen_count++] = at;
-        for (uint32_t k = w->start[at]; k < w->start[at + 1]; k++) {
+        for (uint32_t k = w->around.start[at]; k < w->around.start[at + 1]; k++) {
+            uint32_t to = w->around.of[k];
             float dist = w->dist[at] + w->length[k];
-            if (dist > reach || dist >= w->dist[w->neighbour[k]]) continue;
-            w->dist[w->neighbour[k]] = dist;
-            heap_up(w, w->neighbour[k]);
+            if (dist > reach || dist >= w->dist[to]) continue;
+            w->dist[to] = dist;
+            heap_up(w, to);
         }
     }
 }

@@ -71,6 +71,30 @@ npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint3
     return status;
 }
 
+npg_status npg_mesh_neighbours_open(npg_mesh_neighbours *out, const npg_mesh *mesh)
+{
+    uint32_t(*edges)[2];
+    size_t count, n = mesh->vert_count;
+    *out = (npg_mesh_neighbours){NULL, NULL};
+    NPG_TRY(npg_mesh_edges(&edges, &count, mesh->faces, mesh->face_count));
+    npg_status status = npg_alloc_array(&out->start, NPG_FOR_MESH, n + 2, sizeof *out->start);
+    if (!status) status = npg_alloc_array(&out->of, NPG_FOR_MESH, 2 * count + 1, sizeof *out->of);
+    /* start[v + 1] is where the next one of v goes: in the end the start of v + 1 */
+    for (size_t e = 0; e < 2 * count && !status; e++) out->start[edges[e / 2][e % 2] + 2]++;
+    for (size_t v = 0; v < n && !status; v++) out->start[v + 2] += out->start[v + 1];
+    for (size_t e = 0; e < 2 * count && !status; e++)
+        out->of[out->start[edges[e / 2][e % 2] + 1]++] = edges[e / 2][1 - e % 2];
+    npg_release(&edges);
+    if (status) npg_mesh_neighbours_close(out);
+    return status;
+}
+
+void npg_mesh_neighbours_close(npg_mesh_neighbours *neighbours)
+{
+    npg_release(&neighbours->start);
+    npg_release(&neighbours->of);
+}
+
 npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count)
 {
     half_edge *halves;

@@ -14,6 +14,14 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
 npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces,
                           size_t face_count);
 
+/* Vertices along the edges of each, in the order of npg_mesh_edges(): those of v are of[start[v]] up to, and
+ * without, of[start[v + 1]]. */
+typedef struct npg_mesh_neighbours {
+    uint32_t *start, *of; /* V + 1, 2 E; owned */
+} npg_mesh_neighbours;
+npg_status npg_mesh_neighbours_open(npg_mesh_neighbours *neighbours, const npg_mesh *mesh);
+void npg_mesh_neighbours_close(npg_mesh_neighbours *neighbours);
+
 /* twin[3 f + k] = the half-edge (numbered so, by its first corner) of the face on the other side of the edge
  * from corner k to the next; UINT32_MAX on a border, or where an edge is not used by two faces in opposite
  * directions.  twin: F x 3. */

@@ -10,34 +10,8 @@
 #define RELAXATION  1.7  /* beyond the mean: successive over-relaxation */
 #define SETTLED     1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
 
-/* Neighbours of the vertices, one list behind the other. */
-typedef struct ring {
-    uint32_t *start, *of; /* V + 1, 2 E; owned */
-} ring;
-
-static npg_status open_ring(ring *r, const npg_mesh *mesh)
-{
-    uint32_t(*edges)[2] = NULL;
-    size_t count = 0, n = mesh->vert_count;
-    npg_status status = npg_mesh_edges(&edges, &count, mesh->faces, mesh->face_count);
-    if (!status) status = npg_alloc_array(&r->start, NPG_FOR_MESH, n + 2, sizeof *r->start);
-    if (!status) status = npg_alloc_array(&r->of, NPG_FOR_MESH, 2 * count + 1, sizeof *r->of);
-    for (size_t e = 0; e < 2 * count && !status; e++) r->start[edges[e / 2][e % 2] + 2]++;
-    for (size_t v = 0; v < n && !status; v++) r->start[v + 2] += r->start[v + 1];
-    for (size_t e = 0; e < 2 * count && !status; e++)
-        r->of[r->start[edges[e / 2][e % 2] + 1]++] = edges[e / 2][1 - e % 2];
-    npg_release(&edges);
-    return status;
-}
-
-static void close_ring(ring *r)
-{
-    npg_release(&r->start);
-    npg_release(&r->of);
-}
-
 /* How far the vertex went. */
-static double relax(npg_mesh *mesh, const ring *r, size_t v)
+static double relax(npg_mesh *mesh, const npg_mesh_neighbours *r, size_t v)
 {
     double mean[3] = {0, 0, 0}, moved = 0;
     size_t count = r->start[v + 1] - r->start[v];
@@ -56,7 +30,7 @@ enum { STAYS, UNSEEN, MOVES };
 
 /* Unseen vertices move where their piece of the mesh has seen ones; without any they would fall into a point.
  * `ends` (V) is for the vertices that are reached. */
-static size_t reach(uint8_t *kind, uint32_t *ends, const ring *r, size_t n)
+static size_t reach(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r, size_t n)
 {
     size_t count = 0, moved = 0;
     for (size_t v = 0; v < n; v++)
@@ -72,7 +46,7 @@ static size_t reach(uint8_t *kind, uint32_t *ends, const ring *r, size_t n)
     return moved;
 }
 
-static void sweep(npg_mesh *mesh, const ring *r, const uint8_t *kind)
+static void sweep(npg_mesh *mesh, const npg_mesh_neighbours *r, const uint8_t *kind)
 {
     double largest = 1;
     for (int i = 0; i < SWEEPS_MOST && largest > SETTLED; i++) {
@@ -100,18 +74,18 @@ static npg_status find_unseen(uint8_t *kind, size_t *unseen, const npg_mesh *mes
 npg_status npg_mesh_flatten(npg_mesh *mesh, size_t *moved, const float *points, size_t point_count,
                             double seen_dist)
 {
-    ring r = {0};
+    npg_mesh_neighbours r = {0};
     uint8_t *kind = NULL;
     uint32_t *ends = NULL;
     size_t n = mesh->vert_count, unseen = 0;
     *moved = 0;
     npg_status status = npg_alloc_array(&kind, NPG_FOR_MESH, n, sizeof *kind);
     if (!status) status = find_unseen(kind, &unseen, mesh, points, point_count, seen_dist);
-    if (!status && unseen) status = open_ring(&r, mesh);
+    if (!status && unseen) status = npg_mesh_neighbours_open(&r, mesh);
     if (!status && unseen) status = npg_alloc_array(&ends, NPG_FOR_MESH, n, sizeof *ends);
     if (!status && unseen) *moved = reach(kind, ends, &r, n);
     if (*moved) sweep(mesh, &r, kind);
-    close_ring(&r);
+    npg_mesh_neighbours_close(&r);
     npg_release(&ends);
     npg_release(&kind);
     return status;
