@@ -77,9 +77,11 @@ struct npg_warm {
 
 /* ---- opening ---- */
 
-static npg_status open_probe_fit(npg_warm *w)
+/* A fresh one, in place of any before it. */
+static npg_status open_probe(npg_warm *w)
 {
     npg_fit_settings probe = w->fit_settings;
+    npg_fit_close(&w->probe);
     probe.confidence = NPG_CONFIDENCE_CONSTANT;
     probe.rate_end = 0.1;
     if (w->settings.distance == NPG_DISTANCE_VERTICES) {
@@ -101,15 +103,14 @@ static npg_status open_matchers(npg_warm *w)
     return NPG_OK;
 }
 
-/* What only windows need that start warm, once the first of them comes. */
-static npg_status open_probe(npg_warm *w)
+/* What only windows need that start warm, once the first of them comes; each opens its probe itself. */
+static npg_status open_samples(npg_warm *w)
 {
     size_t samples = w->sample_target ? w->sample_target : SAMPLES;
-    if (w->probe) return NPG_OK;
+    if (w->carry) return NPG_OK;
     NPG_TRY(npg_carry_open(&w->carry, w->facts->reference, samples, NPG_THIN_SURFACE));
     w->samples = w->carry->samples->mesh->vert_count;
-    NPG_TRY(open_matchers(w));
-    return open_probe_fit(w);
+    return open_matchers(w);
 }
 
 npg_status npg_warm_open(npg_warm **out, npg_device *device, const npg_warm_settings *settings,
@@ -526,8 +527,7 @@ static int64_t steps_of(const npg_warm *w, bool is_cold)
 static npg_status start(npg_warm *w, const npg_window *window)
 {
     if (window->from == 0 && w->first.bytes) NPG_TRY(npg_fit_copy_give(&w->first, w->dense));
-    npg_fit_close(&w->probe); /* a resumed run knows no more than what is handed over */
-    NPG_TRY(open_probe_fit(w));
+    NPG_TRY(open_probe(w)); /* afresh: a resumed run knows no more than what is handed over */
     return npg_fit_hand_over(w->probe, w->dense);
 }
 
@@ -572,7 +572,7 @@ npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *fram
     bool is_first = window->direction == 0, by_vertices = w->settings.distance == NPG_DISTANCE_VERTICES;
     bool is_alone = w->facts->plan.window >= w->facts->plan.frame_count; /* then it is the paper's */
     bool is_cold = by_vertices && (is_alone || !w->settings.is_on);
-    NPG_TRY(is_cold ? NPG_OK : open_probe(w));
+    NPG_TRY(is_cold ? NPG_OK : open_samples(w));
     NPG_TRY(open_window(w, frames));
     w->dense = fit;
     w->watch = watch;
@@ -623,6 +623,7 @@ static npg_status restore_poses(npg_warm *w, const npg_archive *archive)
     size_t poses = 0, known = 0;
     npg_archive_find(archive, "inside.known", &known);
     if (npg_archive_find(archive, "inside.poses", &poses)) {
+        NPG_TRY(open_samples(w));
         NPG_TRY(open_probe(w));
         NPG_TRY(restore_fit(w->probe, archive, "inside.probe"));
         NPG_TRY(npg_alloc(&w->poses, NPG_FOR_FIT, poses));
