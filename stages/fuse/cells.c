@@ -59,12 +59,19 @@ static void close_table(table *t)
     npg_release(&t->place);
 }
 
-/* The cell of the key, made where it is new. */
-static cell *find(table *t, uint64_t key)
+/* The key's place in the table: NONE is there where it is new. */
+static size_t place_of(const table *t, uint64_t key)
 {
     size_t mask = ((size_t)1 << t->bits) - 1;
     size_t at = (size_t)((key * UINT64_C(0x9e3779b97f4a7c15)) >> (64 - t->bits)); /* Fibonacci hashing */
     while (t->place[at] != NONE && t->cells[t->place[at]].key != key) at = (at + 1) & mask;
+    return at;
+}
+
+/* The cell of the key, made where it is new. */
+static cell *find(table *t, uint64_t key)
+{
+    size_t at = place_of(t, key);
     if (t->place[at] == NONE) {
         t->place[at] = (uint32_t)t->count;
         t->cells[t->count++] = (cell){.key = key, .last = -1};
@@ -188,10 +195,11 @@ double npg_cells_side(const npg_cells *cells)
 /* The frames around a cell: those of the cube of votes that it lies in. */
 static int64_t votes_of(const npg_cells *c, const cell *of)
 {
+    const table *votes = &c->votes;
     uint64_t key = of->key;
     for (int side = 1; side < VOTE_CELLS; side *= 2) key = key_of_double(key);
-    table votes = c->votes; /* a copy: looking up a key that is there changes nothing */
-    return find(&votes, key)->frames;
+    uint32_t at = votes->place[place_of(votes, key)];
+    return at == NONE ? 0 : votes->cells[at].frames;
 }
 
 npg_status npg_cells_means(const npg_cells *c, float *points, float *normals, size_t *count,
