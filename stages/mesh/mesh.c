@@ -93,15 +93,15 @@ typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
     const mesh_state *state;
     const npg_frame *frame;
-    const npg_fused *fused; /* points of all frames, a loan; NULL: those of the frame */
-    size_t count;           /* N, of the points used */
-    float *points;          /* N x 3, unit, owned */
-    float *normals;         /* N x 3 or NULL, owned */
-    double seen;            /* what SEEN_SPACINGS and FLAT_SPACINGS are taken of */
-    double spacing;         /* of the points */
-    double diagonal;        /* of the points */
-    double invented;        /* share of the mesh that no point saw, once it is trimmed */
-    npg_mesh *mesh;         /* owned */
+    npg_fused *fused; /* of all frames, a loan whose points and normals are taken; NULL: of the frame */
+    size_t count;     /* N, of the points used */
+    float *points;    /* N x 3, unit, owned */
+    float *normals;   /* N x 3 or NULL, owned */
+    double seen;      /* what SEEN_SPACINGS and FLAT_SPACINGS are taken of */
+    double spacing;   /* of the points */
+    double diagonal;  /* of the points */
+    double invented;  /* share of the mesh that no point saw, once it is trimmed */
+    npg_mesh *mesh;   /* owned */
 } making;
 
 /* ---- report ---- */
@@ -157,15 +157,14 @@ static npg_status take_frame_points(making *m)
     return NPG_OK;
 }
 
-/* Those of all frames are thinned already. */
+/* Those of all frames are thinned already.  `making` owns them from here on; `fused` keeps its figures. */
 static npg_status take_points(making *m)
 {
     if (!m->fused) return take_frame_points(m);
     m->count = m->fused->count;
-    NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
-    memcpy(m->points, m->fused->points, m->count * 3 * sizeof(float));
-    memcpy(m->normals, m->fused->normals, m->count * 3 * sizeof(float));
+    m->points = m->fused->points;
+    m->normals = m->fused->normals;
+    m->fused->points = m->fused->normals = NULL;
     return NPG_OK;
 }
 
@@ -492,7 +491,8 @@ static npg_status measure_reference(making *m)
     return NPG_OK;
 }
 
-static npg_status make_reference(npg_worker *worker, const npg_frame *frame, const npg_fused *fused)
+/* The points and normals of fused (or NULL) are taken from it. */
+static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg_fused *fused)
 {
     making m = {.worker = worker, .state = npg_worker_state(worker), .frame = frame, .fused = fused};
     npg_facts *facts = npg_worker_facts(worker);
