@@ -473,12 +473,17 @@ static npg_status watch_frame(npg_worker *worker, npg_frame *frame)
     return watch_topology(worker, frame);
 }
 
+static npg_status watch_chunk(npg_worker *worker, npg_chunk *chunk)
+{
+    for (size_t i = 0; i < npg_chunk_count(chunk); i++)
+        NPG_TRY(watch_frame(worker, npg_chunk_frame(chunk, i)));
+    return NPG_OK;
+}
+
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
     evaluate_state *state = npg_worker_state(worker);
-    for (size_t i = 0; i < npg_chunk_count(*chunk) && npg_worker_pass(worker) == NPG_PASS_FUSE; i++)
-        NPG_TRY(watch_frame(worker, npg_chunk_frame(*chunk, i)));
-    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return watch_chunk(worker, *chunk);
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit;
