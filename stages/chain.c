@@ -21,36 +21,56 @@ const npg_service *const npg_services[] = {
     &npg_service_job, /* resumes what an earlier run of the same job left */
     NULL};
 
-static const npg_preset_value paper[] = {{"align", "no"},              /* from the reference */
-                                         {"keyframe-choice", "paper"}, /* by score alone */
-                                         {"hold-apart", "no"},         /* the keyframe's points as they are */
-                                         {"smooth", "no"},
-                                         {"unseen", "keep"}, /* as Poisson closed it */
-                                         {"welds", "keep"},  /* nothing is cut */
-                                         {"window", "-1"},   /* all frames at once, up to 60 */
-                                         {"epochs", "250"},  /* of every vertex */
-                                         {"isometry", "100"},
-                                         {"confidence", "cumulative"},
-                                         {"smoothing", "doubled"}, /* as in the published code */
-                                         {"rate-end", "1"},
-                                         {"feature-start", "0"},
-                                         {"deliver", "last"},
-                                         {NULL, NULL}};
+/* clang-format off */
+static const npg_preset_value paper[] = {
+    {"align",           "no"},         /* from the reference */
+    {"keyframe-choice", "paper"},      /* by score alone */
+    {"hold-apart",      "no"},         /* the keyframe's points as they are */
+    {"smooth",          "no"},
+    {"unseen",          "keep"},       /* as Poisson closed it */
+    {"welds",           "keep"},       /* nothing is cut */
+    {"window",          "-1"},         /* all frames at once, up to 60 */
+    {"epochs",          "250"},        /* of every vertex */
+    {"isometry",        "100"},
+    {"confidence",      "cumulative"},
+    {"smoothing",       "doubled"},    /* as in the published code */
+    {"rate-end",        "1"},
+    {"feature-start",   "0"},
+    {"deliver",         "last"},
+    {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
-    {"align", "no"},     {"keyframe-choice", "paper"}, {"hold-apart", "no"},
-    {"smooth", "no"},    {"unseen", "keep"},           {"welds", "keep"},
-    {"window", "-1"},    {"epochs", "1000"}, /* the paper's slower setting; the rest as above */
-    {"isometry", "100"}, {"confidence", "cumulative"}, {"smoothing", "doubled"},
-    {"rate-end", "1"},   {"feature-start", "0"},       {"deliver", "last"},
+    {"align",           "no"},
+    {"keyframe-choice", "paper"},
+    {"hold-apart",      "no"},
+    {"smooth",          "no"},
+    {"unseen",          "keep"},
+    {"welds",           "keep"},
+    {"window",          "-1"},
+    {"epochs",          "1000"},       /* the paper's slower setting; the rest as above */
+    {"isometry",        "100"},
+    {"confidence",      "cumulative"},
+    {"smoothing",       "doubled"},
+    {"rate-end",        "1"},
+    {"feature-start",   "0"},
+    {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {
-    {"align", "no"},         /* grids and decoder alone carry the motion */
-    {"distance", "surface"}, /* of few samples */
-    {"width-1", "256"},      /* a third of the cost, and as good (samples/guide/why_these_defaults.md) */
-    {"width-2", "256"},      {"grid-rate", "0.015"}, /* with few samples larger steps pay */
-    {"mlp-rate", "0.002"},   {"epochs", "60"},       {"rounds", "4"}, {NULL, NULL}};
-static const npg_preset_value best[] = {{"align-nodes", "2400"}, {"align-steps", "20"}, {NULL, NULL}};
-static const npg_preset_value none[] = {{NULL, NULL}};
+    {"align",           "no"},         /* grids and decoder alone carry the motion */
+    {"distance",        "surface"},    /* of few samples */
+    {"width-1",         "256"},        /* a third of the cost, and as good (samples/guide/why_these_defaults.md) */
+    {"width-2",         "256"},
+    {"grid-rate",       "0.015"},      /* with few samples larger steps pay */
+    {"mlp-rate",        "0.002"},
+    {"epochs",          "60"},
+    {"rounds",          "4"},
+    {NULL, NULL}};
+static const npg_preset_value best[] = {
+    {"align-nodes",     "2400"},
+    {"align-steps",     "20"},
+    {NULL, NULL}};
+static const npg_preset_value none[] = {
+    {NULL, NULL}};
+/* clang-format on */
 
 const npg_preset npg_presets[] = {
     {"default", "alignment frame by frame, then a joint fit of windows of frames", none},

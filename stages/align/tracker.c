@@ -519,8 +519,8 @@ void npg_pose_extrapolate(double *next, const double *now, const double *before,
             next[i] = 0;
             for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
         }
-        npg_pose_straighten(
-            next); /* products of products would triple their rounding errors with every frame */
+        /* products of products would triple their rounding errors with every frame */
+        npg_pose_straighten(next);
         for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
     }
 }
