@@ -167,7 +167,6 @@ static npg_status collect(const state *s, npg_fused *fused)
     NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     fused->spacing_unit = npg_cells_side(s->cells);
     fused->key_spacing_unit = s->spacing;
-    fused->frames = s->frames;
     return npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least);
 }
 

@@ -13,7 +13,6 @@ typedef struct npg_fused {
     size_t count;            /* N */
     double spacing_unit;     /* side of the cells that points were averaged over */
     double key_spacing_unit; /* of the keyframe's points                            */
-    int64_t frames;          /* whose points are in it */
 } npg_fused;
 
 /* Written by stage fuse at the end of a fusing pass; stage mesh takes it in the pass that follows. */
