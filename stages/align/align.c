@@ -266,7 +266,8 @@ static npg_status open_known(npg_worker *worker)
         NPG_TRY(restore_known(worker));
     }
     if (!s->known) return NPG_OK;
-    return npg_alloc_array(&s->known_pose, NPG_FOR_FIT, s->map.old_count, NPG_POSE_SIZE * sizeof(double));
+    return npg_alloc_array(&s->known_pose, NPG_FOR_FIT, npg_poses_nodes(s->known),
+                           NPG_POSE_SIZE * sizeof(double));
 }
 
 static npg_status open_found(npg_worker *worker)
@@ -598,10 +599,13 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t points = facts->point_count_max < POINTS_MOST * (size_t)s->samples
                         ? facts->point_count_max
                         : POINTS_MOST * (size_t)s->samples;
+    /* the pose of the pass before, its record, and what an old and a new node have in the map */
+    size_t known = NPG_POSE_SIZE * (sizeof(double) + sizeof(float)) + NPG_GRAPH_BIND * 2 * sizeof(float) +
+                   3 * sizeof(float);
     *chunks_held = (group + chunk - 1) / chunk + 1;
     /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node; per vertex weights and
      * the graph's search for them, positions, normals; the waiting frames' poses and thinned points */
-    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double)) + verts * 320 +
+    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + known) + verts * 320 +
            group * (nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float));
 }
 
