@@ -57,7 +57,7 @@ static const npg_preset_value paper_1000[] = {
 static const npg_preset_value grids[] = {
     {"align",           "no"},         /* grids and decoder alone carry the motion */
     {"distance",        "surface"},    /* of few samples */
-    {"width-1",         "256"},        /* a third of the cost, and as good (samples/guide/why_these_defaults.md) */
+    {"width-1",         "256"},        /* a third of the cost, as good: samples/guide/why_these_defaults.md */
     {"width-2",         "256"},
     {"grid-rate",       "0.015"},      /* with few samples larger steps pay */
     {"mlp-rate",        "0.002"},

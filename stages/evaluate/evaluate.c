@@ -462,8 +462,8 @@ static npg_status init(npg_worker *worker)
     return npg_truth_open(&state->truth, state->truth_folder, npg_worker_settings(worker)->confine);
 }
 
-/* In a fusing pass: whether the reference explains the capture to its ends, so that what all frames saw may be
- * taken together. */
+/* In a fusing pass: whether the reference explains the capture to its ends, so that what all frames saw may
+ * be taken together. */
 static npg_status watch_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);

@@ -516,8 +516,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg
 
 /* ---- the stage ---- */
 
-/* What all frames saw is one body only where the reference so far explains the capture to its ends: parts that
- * come, go or open belong to no common surface, and hiding them in one would silence the alarm. */
+/* What all frames saw is one body only where the reference so far explains the capture to its ends: parts
+ * that come, go or open belong to no common surface, and hiding them in one would silence the alarm. */
 static void drop_if_changed(npg_worker *worker, npg_fused **fused)
 {
     if (!*fused || !npg_facts_has_changed(npg_worker_facts(worker))) return;
