@@ -16,7 +16,7 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     awk '/"mlp_forward"/ { inside = 1 } /"relative"/ { scaled = inside; inside = 0 } /}/ { scaled = 0 }
          scaled && match($0, /[0-9.e+]+,?$/) {
              end = $0 ~ /,$/ ? "," : ""
-             $0 = substr($0, 1, RSTART - 1) 2 * substr($0, RSTART) ".0" end
+             $0 = substr($0, 1, RSTART - 1) sprintf("%.1f", 2 * substr($0, RSTART)) end
          } { print }' now.json >slow.json
     sed 's/"frames": 2/"frames": 3/' now.json >other.json
     run "$NEUPIG" bench --compare now.json now.json
