@@ -49,6 +49,7 @@ struct npg_tracker {
     size_t sample_count;
     double *step; /* K x 6 */
     float *rows;  /* K x 16: the pose at work, for many points */
+    bool is_open; /* the surface has a border */
     double along; /* share of distances along the surface in the fit at work */
     double size;  /* longest side of the reference against that of the box of all frames */
     /* of the frame at work */
@@ -111,6 +112,14 @@ static npg_status open_surface(npg_tracker *t)
                             t->mesh->face_count);
 }
 
+static npg_status find_border(npg_tracker *t)
+{
+    npg_manifold manifold;
+    NPG_TRY(npg_mesh_manifold(&manifold, t->mesh));
+    t->is_open = manifold.border_edges > 0;
+    return NPG_OK;
+}
+
 static npg_status open_system(npg_tracker *t)
 {
     const npg_graph *graph = t->graph;
@@ -136,6 +145,7 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     t->size = size_of(reference);
     npg_status status = open_surface(t);
     size_t w = status ? 0 : t->mesh->vert_count, m = settings->samples;
+    if (!status) status = find_border(t);
     if (!status) status = open_system(t);
     if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, w, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, w, 3 * sizeof(float));
@@ -415,11 +425,15 @@ static npg_status add_terms(void *user, size_t part)
     npg_tracker *t = s->t;
     size_t lent = lent_of(t, LENT_TERMS);
     bool is_lent = part == TO_POINTS;
+    /* Near its end a fit has its parts in place: what still disagrees is a thin part's other side, which must
+     * not keep the points of this one, or a given normal that is wrong.  An open surface lacks other sides,
+     * whose points must not pull at what it has. */
+    const float *normals = s->is_settling && !t->is_open ? NULL : s->normals;
     npg_block_clear(t->system, part);
     add_targets(t, part, &s->tracked[part], is_lent ? 0 : lent, is_lent ? lent : t->target_count, s->pose,
-                s->normals != NULL, s->width);
+                normals != NULL, s->width);
     if (part == TO_SURFACE) return NPG_OK;
-    add_samples(t, s->pose, s->points, s->normals, s->width);
+    add_samples(t, s->pose, s->points, normals, s->width);
     add_edges(t, s->pose, s->stiffness);
     return NPG_OK;
 }

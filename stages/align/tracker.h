@@ -53,7 +53,8 @@ typedef struct npg_tracker_effort {
 } npg_tracker_effort;
 
 /* Improve pose (K x 12) to explain the points (N x 3, unit; normals N x 3 or NULL: points whose normal speaks
- * against the surface's are left out).  effort: NULL for the usual one. */
+ * against the surface's are left out, but for the last steps with a closed one).
+ * effort: NULL for the usual one. */
 npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose, const float *points,
                            const float *normals, size_t point_count, const npg_tracker_effort *effort);
 
