@@ -293,7 +293,7 @@ static npg_status do_passes(npg_run *run)
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
         if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
-        while (run->facts.fuse_left) NPG_TRY(do_pass(run, NPG_PASS_FUSE));
+        for (; run->facts.fuse_left; run->fuse_done++) NPG_TRY(do_pass(run, NPG_PASS_FUSE));
     }
     run->closed_reports = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));

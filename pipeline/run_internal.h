@@ -50,6 +50,7 @@ struct npg_run {
     bool is_partial;
     int64_t warning_count;
     npg_progress progress;     /* the first one: the time left follows from the pace since */
+    int64_t fuse_done;         /* fusing passes walked */
     json_t *report, *warnings; /* owned */
     json_t *closed_reports;    /* of stages: before the solving pass, or as they were closed; owned */
     npg_published published[NPG_FACTS_MAX];

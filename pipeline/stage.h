@@ -190,7 +190,7 @@ void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, cons
 void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
     NPG_PRINTF(4, 5);
 
-/* Tell how far things are; fields the stage does not know are filled by the run. */
+/* Tell how far things are, `share` that of the pass; fields the stage does not know are filled by the run. */
 void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
 
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */

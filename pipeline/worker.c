@@ -233,6 +233,15 @@ npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *
 
 /* ---- progress ---- */
 
+/* The share of the run that is done, from that of the pass: each fusing pass and the solving one, which take
+ * about as long, count alike. */
+static double share_of_run(const npg_run *run, double of_pass)
+{
+    bool is_fusing = run->pass == NPG_PASS_FUSE;
+    int64_t passes = run->fuse_done + (is_fusing ? run->facts.fuse_left : 0) + 1;
+    return ((double)run->fuse_done + of_pass) / (double)passes;
+}
+
 /* Seconds left by the pace since the run's first word of progress; -1 while there is no pace yet.  Called
  * under the lock. */
 static double time_left(npg_run *run, const npg_progress *now)
@@ -250,6 +259,7 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     npg_progress now = *progress;
     now.struct_size = sizeof now;
     now.stage = worker->name;
+    now.share = share_of_run(run, progress->share);
     now.elapsed_s = npg_clock_s() - run->opened_s;
     pthread_mutex_lock(&run->lock);
     now.left_s = time_left(run, &now);

@@ -36,9 +36,9 @@ typedef struct state {
     int64_t usable; /* frames with points, of the measuring pass */
     npg_carry_back *carry;
     npg_cells *cells;
-    double spacing; /* of the keyframe's points */
-    double usual;   /* mean of the frames' median distances */
-    int64_t frames, misaligned, points, strays;
+    double spacing;                                   /* of the keyframe's points */
+    double usual;                                     /* mean of the frames' median distances */
+    int64_t seen, frames, misaligned, points, strays; /* seen: of the pass, whatever came of them */
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -147,6 +147,19 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
                       fmax(FAR_SPACINGS * s->spacing, NEAR_MEDIANS * median));
 }
 
+static void report_progress(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    int64_t frames = npg_worker_facts(worker)->frame_count;
+    npg_progress progress = {.share = (double)++s->seen / (double)frames,
+                             .step = s->seen,
+                             .steps = frames,
+                             .windows = 1,
+                             .frames = frames,
+                             .loss = (double)NAN};
+    npg_worker_progress(worker, &progress);
+}
+
 static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 {
     cloud c = {0};
@@ -201,10 +214,12 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     state *s = npg_worker_state(worker);
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
-        if (npg_worker_pass(worker) == NPG_PASS_MEASURE)
+        if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
             s->usable += !frame->is_skipped;
-        else
+        } else {
             NPG_TRY(gather_frame(worker, frame));
+            report_progress(worker);
+        }
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     return NPG_OK;

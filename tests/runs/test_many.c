@@ -25,6 +25,8 @@ enum { RUNS = 6, WARM_UP = 2, WINDOW = 2, HEAP_GROWTH_KIB = 256, ANONYMOUS_GROWT
 #else
 enum { RUNS = 50, WARM_UP = 10, WINDOW = 10, HEAP_GROWTH_KIB = 128, ANONYMOUS_GROWTH_KIB = 4096 };
 #endif
+/* A library's pool may take in a thread late; one that stays behind in every run is dozens at the end. */
+enum { THREADS_GROWTH = 2 };
 enum { FRAMES = 2, POINTS = 400 };
 
 /* ---- what the process holds ---- */
@@ -141,7 +143,7 @@ static void fifty_captures_leave_nothing_behind_and_give_the_same_bytes(void **s
         early.heap_kib, late.heap_kib, early.anonymous_kib, late.anonymous_kib, early.descriptors,
         late.descriptors, early.threads, late.threads);
     assert_int_equal(early.descriptors, late.descriptors);
-    assert_int_equal(early.threads, late.threads);
+    assert_true(late.threads <= early.threads + THREADS_GROWTH);
     assert_true(late.heap_kib <= early.heap_kib + HEAP_GROWTH_KIB);
     assert_true(late.anonymous_kib <= early.anonymous_kib + ANONYMOUS_GROWTH_KIB);
     close_temp_folder(&folder);
