@@ -32,7 +32,8 @@ typedef struct npg_frame_box {
     double origin[3]; /* world                                     */
     double centre[3]; /* local                                     */
     double scale;     /* unit / local                              */
-    double diagonal;  /* of the bounds, in local (and world) units */
+    double diagonal;  /* of the figure, in local (and world) units: the bounds', until the keyframe stage
+                         sets the median over frames of the diagonal of a frame's own box */
 } npg_frame_box;
 
 /* Make a point the origin, unless it is known already or the point is not finite. */

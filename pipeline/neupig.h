@@ -251,7 +251,7 @@ typedef struct npg_result {
     size_t face_count;      /* F                                                                */
     const double *vertices; /* V x 3, world coordinates                                         */
     const uint32_t *faces;  /* F x 3, the same list in every frame                              */
-    double residual;        /* median distance points -> surface, in diagonals of the frame box */
+    double residual;        /* median distance points -> surface, in diagonals of a frame's box (median) */
     double coverage;        /* share of the surface that has points near it, 0..1               */
 } npg_result;
 

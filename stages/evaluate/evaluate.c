@@ -538,7 +538,7 @@ static const npg_option options[] = {
     /* type        name               place                   default   least  most  shown as or words */
     NPG_ROW_REAL  ("max-residual",    AT(residual_max),       "0.5",    0,     100,  "PERCENT",
         "A frame is good when the median distance of its points to the surface is at most this, "
-        "in per cent of the capture's diagonal"),
+        "in per cent of the figure's diagonal"),
     NPG_ROW_REAL  ("min-coverage",    AT(coverage_min),       "50",     0,     100,  "PERCENT",
         "... and at least this share of the surface that the keyframe saw has points near it, in per cent"),
     NPG_ROW_REAL  ("max-flipped",     AT(flipped_max),        "1",      0,     100,  "PERCENT",

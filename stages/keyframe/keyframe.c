@@ -10,6 +10,7 @@
  * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
  * (likeness.h). */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "keyframe/choose_pass.h"
@@ -17,6 +18,7 @@
 #include "keyframe/look_ahead.h"
 #include "keyframe/shortlist.h"
 #include "pipeline/live_plan.h"
+#include "pipeline/order.h"
 
 #define GRID         512 /* cells per axis */
 #define CELL_WORDS   ((size_t)GRID * GRID * GRID / 64)
@@ -45,6 +47,8 @@ typedef struct keyframe_state {
     npg_choose_pass choosing;
     candidate chosen; /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
+    double *diagonals;    /* of the boxes of the frames so far; owned   */
+    size_t diagonal_count, diagonal_room;
     int64_t usable_count; /* frames that were not skipped               */
     int64_t passed_count; /* frames of the solving pass so far          */
     npg_look_ahead held;  /* a live run's frames until it is their turn */
@@ -58,16 +62,38 @@ static bool is_finite_point(const float *point)
     return isfinite(point[0]) && isfinite(point[1]) && isfinite(point[2]);
 }
 
-static void measure_frame(keyframe_state *state, npg_facts *facts, const npg_frame *frame)
+static npg_status note_diagonal(keyframe_state *state, double diagonal)
 {
+    NPG_TRY(npg_grow(&state->diagonals, &state->diagonal_room, state->diagonal_count + 1,
+                     sizeof *state->diagonals, NPG_FOR_RUN));
+    state->diagonals[state->diagonal_count++] = diagonal;
+    return NPG_OK;
+}
+
+static npg_status measure_frame(keyframe_state *state, npg_facts *facts, const npg_frame *frame)
+{
+    npg_bounds bounds = npg_bounds_empty();
     if (frame->number < facts->number_min) facts->number_min = frame->number;
     if (frame->number > facts->number_max) facts->number_max = frame->number;
     if (frame->point_count > facts->point_count_max) facts->point_count_max = frame->point_count;
-    if (frame->is_skipped) return;
+    if (frame->is_skipped) return NPG_OK;
     state->usable_count++;
     for (size_t i = 0; i < frame->point_count; i++)
         if (is_finite_point(frame->pos_local + 3 * i))
-            npg_bounds_add_points(&facts->bounds_local, frame->pos_local + 3 * i, 1);
+            npg_bounds_add_points(&bounds, frame->pos_local + 3 * i, 1);
+    npg_bounds_add(&facts->bounds_local, &bounds);
+    return bounds.lo[0] <= bounds.hi[0] ? note_diagonal(state, npg_bounds_diagonal(&bounds)) : NPG_OK;
+}
+
+/* A figure that walks through its capture is smaller than the box of its way.  The median, because a few
+ * frames may hold strays far off, or a part of the figure. */
+static void set_diagonal(keyframe_state *state, npg_frame_box *box)
+{
+    size_t count = state->diagonal_count;
+    if (!count) return;
+    qsort(state->diagonals, count, sizeof *state->diagonals, npg_order_double);
+    double median = state->diagonals[count / 2];
+    if (median > 0) box->diagonal = median;
 }
 
 static void report_box(json_t *report, const npg_facts *facts)
@@ -80,7 +106,8 @@ static void report_box(json_t *report, const npg_facts *facts)
     }
     json_object_set_new(report, "box_lo", lo);
     json_object_set_new(report, "box_hi", hi);
-    json_object_set_new(report, "box_diagonal", json_real(box->diagonal));
+    json_object_set_new(report, "box_diagonal", json_real(npg_bounds_diagonal(&facts->bounds_local)));
+    json_object_set_new(report, "figure_diagonal", json_real(box->diagonal));
     json_object_set_new(report, "point_count_max", json_integer((json_int_t)facts->point_count_max));
 }
 
@@ -91,6 +118,7 @@ static npg_status close_measuring(npg_worker *worker)
     if (!state->usable_count)
         return npg_error(NPG_BAD_INPUT, "no frame is left: every frame was skipped or the input has none");
     NPG_TRY(npg_frame_box_set(&facts->box, &facts->origin, &facts->bounds_local));
+    set_diagonal(state, &facts->box);
     report_box(npg_worker_report(worker), facts);
     return NPG_OK;
 }
@@ -332,11 +360,9 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
     int64_t frame_count = npg_look_ahead_frame_count(&state->held);
-    double diagonal = npg_bounds_diagonal(&facts->bounds_local); /* figures don't depend on the margin */
     if (is_open && !state->window) return refuse_one_window(state);
     if (is_open && state->usable_count) widen_box(state, &facts->bounds_local);
     NPG_TRY(close_measuring(worker));
-    facts->box.diagonal = diagonal;
     if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
     for (size_t i = 0; i < state->held.count; i++)
         NPG_TRY(score_frame(worker, frame_count, &state->held.frames[i]));
@@ -362,7 +388,7 @@ static npg_status take_live(npg_worker *worker, npg_frame *frame)
     keyframe_state *state = npg_worker_state(worker);
     size_t limit = (size_t)state->look_ahead;
     if (!state->is_planned && state->held.count < limit) {
-        measure_frame(state, npg_worker_facts(worker), frame);
+        NPG_TRY(measure_frame(state, npg_worker_facts(worker), frame));
         return npg_look_ahead_add(&state->held, frame);
     }
     if (!state->is_planned) NPG_TRY(plan_live(worker, true));
@@ -414,7 +440,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (pass == NPG_PASS_MEASURE)
-            measure_frame(state, facts, frame);
+            NPG_TRY(measure_frame(state, facts, frame));
         else if (pass == NPG_PASS_SCORE)
             NPG_TRY(score_frame(worker, facts->frame_count, frame));
         else
@@ -444,6 +470,7 @@ static void uninit(npg_worker *worker)
     npg_likeness_close(&state->likeness);
     npg_choose_pass_clear(&state->choosing);
     npg_release(&state->cells);
+    npg_release(&state->diagonals);
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
