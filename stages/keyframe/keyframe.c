@@ -47,7 +47,7 @@ typedef struct keyframe_state {
     npg_choose_pass choosing;
     candidate chosen; /* the frame the user named */
     bool is_chosen, is_chosen_skipped;
-    double *diagonals;    /* of the boxes of the frames so far; owned   */
+    double *diagonals; /* of the boxes of the frames so far; owned   */
     size_t diagonal_count, diagonal_room;
     int64_t usable_count; /* frames that were not skipped               */
     int64_t passed_count; /* frames of the solving pass so far          */

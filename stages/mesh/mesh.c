@@ -10,6 +10,7 @@
 #include "ingest/formats/reader.h"
 #include "mesh/denoise.h"
 #include "mesh/flatten.h"
+#include "mesh/follow_normals.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
@@ -101,6 +102,7 @@ typedef struct making { /* what is known while the reference is made */
     double spacing;   /* of the points */
     double diagonal;  /* of the points */
     double invented;  /* share of the mesh that no point saw, once it is trimmed */
+    bool is_noisy;    /* the points were smoothed */
     npg_mesh *mesh;   /* owned */
 } making;
 
@@ -209,6 +211,7 @@ static npg_status smooth(making *m)
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
                    "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    m->fused ? "all frames" : "the keyframe", sigma);
+    m->is_noisy = true;
     return npg_cloud_smooth(m->points, m->normals, n, m->fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
 
@@ -359,10 +362,20 @@ static npg_status flatten(making *m)
     return moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
 }
 
+/* Of clean points the surface is nearer the truth than their normals' means. */
+static npg_status turn_faces(making *m)
+{
+    npg_mending mending;
+    if (!m->is_noisy) return NPG_OK;
+    NPG_TRY(npg_mesh_follow_normals(m->mesh, m->points, m->normals, m->count));
+    return npg_mesh_mend(&m->mesh, &mending);
+}
+
 static npg_status shape(making *m, bool *sound)
 {
     NPG_TRY(trim(m));
     NPG_TRY(decimate(m));
+    NPG_TRY(turn_faces(m));
     NPG_TRY(flatten(m));
     return is_sound(sound, m->mesh);
 }
