@@ -68,6 +68,15 @@ const npg_verb npg_verbs[] = {
      "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  "
      "All tiles share one camera, so that motion shows.",
      npg_render_options, false, npg_verb_render},
+    {"view", "OUT [OTHER] [-o PAGE.html]", 1, 2,
+     "A page with the moving mesh, its time line and where it is wrong",
+     "OUT is the output folder of a run.  "
+     "The page is one HTML file that opens in any browser without a network: the meshes over time, "
+     "coloured by vertex colours, identity, normals, error, stretch, coverage or in how many frames they were seen, "
+     "the points of each frame, and a time line with the error and what the run reports.  "
+     "Of two results the page shows both side by side, in one view and on one time line.  "
+     "With --live the page is served on this machine and follows a run that is at work.",
+     npg_view_options, false, npg_verb_view},
     {"bench", "[REPORT.json]", 0, 1, "Time the kernels and the fit on this machine",
      "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches "
      "of the limit that binds it, which is measured right beside (multiply-adds, or bytes copied); "
