@@ -1,5 +1,5 @@
-/* Server: HTTP/1.1 on 127.0.0.1 alone, for a page that follows a run.  It answers GET, reads no file by itself and
- * writes none; what is asked for goes to one function. */
+/* Server: HTTP/1.1 on 127.0.0.1 alone, for a page that follows a run.  It answers GET, reads no file by
+ * itself and writes none; what is asked for goes to one function. */
 #ifndef NPG_HTTP_SERVER_H
 #define NPG_HTTP_SERVER_H
 

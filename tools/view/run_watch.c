@@ -11,7 +11,7 @@
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 
-#define UNLOCKED_S          2 /* between two looks, so that a run which begins is not taken for one that ended */
+#define UNLOCKED_S          2  /* so that a run which begins is not taken for one that ended */
 #define UNLOCKED_SEGMENTS_S 30 /* between two runs of segments nobody holds a lock */
 
 static bool stat_in(struct stat *info, const char *folder, const char *name)
@@ -49,8 +49,8 @@ static uint64_t traces_of(uint64_t traces, const char *folder)
 
 /* ---- the lock ---- */
 
-/* Whether any process has a lock on this file.  Asked of the system's list: to try the lock oneself could keep a run
- * from it.  Where there is no list it counts as held. */
+/* Whether any process has a lock on this file.  Asked of the system's list: to try the lock oneself could
+ * keep a run from it.  Where there is no list it counts as held. */
 static bool is_locked(ino_t inode)
 {
     FILE *list = fopen("/proc/locks", "re");

@@ -1,15 +1,16 @@
-/* Codec of the page's numbers: what changes little from frame to frame and from vertex to vertex takes little.
+/* Codec of the page's numbers: what changes little from frame to frame and from vertex to vertex takes
+ * little.
  *
  * A block is numbers (int32), made small by prediction, then packed:
  *
- *   predict  what is left of v[i] after the rounded mean of the values at lower vertices that share a face with
- *            it: floor((2 sum + n) / (2 n)), each as often as faces have it; without any, after v[i - 1]
- *   pack     zigzag (0, -1, 1, -2 ... become 0, 1, 2, 3 ...), four planes of bytes (all lowest bytes first, then
- *            all second ones ...), raw DEFLATE
+ *   predict  what is left of v[i] after the rounded mean of the values at lower vertices that share a face
+ *            with it: floor((2 sum + n) / (2 n)), each as often as faces have it; without any, after v[i - 1]
+ *   pack     zigzag (0, -1, 1, -2 ... become 0, 1, 2, 3 ...), four planes of bytes (all lowest bytes first,
+ *            then all second ones ...), raw DEFLATE
  *
- * All of it is integers, so that the page (web/src/codec.js) has the very same numbers back.  On a dancer of 175
- * frames and 9971 vertices this takes 62 % of what meshoptimizer's vertex codec takes of the same differences,
- * and the browser brings the decoder. */
+ * All of it is integers, so that the page (web/src/codec.js) has the very same numbers back.  On a dancer of
+ * 175 frames and 9971 vertices this takes 62 % of what meshoptimizer's vertex codec takes of the same
+ * differences, and the browser brings the decoder. */
 #ifndef NPG_VIEW_CODEC_H
 #define NPG_VIEW_CODEC_H
 
@@ -46,8 +47,8 @@ typedef struct npg_view_grid {
 
 #define NPG_VIEW_GRID_MAX (1 << 24) /* numbers on the grid, from 0 */
 
-/* grid = (p - origin) / step, rounded, within 0 .. NPG_VIEW_GRID_MAX.  p: count x 3, finite; out: 3 x count, the
- * x of all points first. */
+/* grid = (p - origin) / step, rounded, within 0 .. NPG_VIEW_GRID_MAX.  p: count x 3, finite; out: 3 x count,
+ * the x of all points first. */
 void npg_view_round(const npg_view_grid *grid, int32_t *out, const float *points, size_t count);
 
 #endif

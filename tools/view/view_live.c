@@ -40,8 +40,8 @@ static npg_status open_frames(live *l)
     return NPG_OK;
 }
 
-/* Look at the folder again where something in it has changed.  What can't be read just now (a run begins anew) is
- * said, and what was known before stays. */
+/* Look at the folder again where something in it has changed.  What can't be read just now (a run begins
+ * anew) is said, and what was known before stays. */
 static npg_status refresh(live *l)
 {
     npg_view_result now;

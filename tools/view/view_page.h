@@ -4,8 +4,8 @@
 
 #include "tools/view/view_frame.h"
 
-/* The page without data, as the build has bundled it: build/view/page.html, or share/neupig/view/page.html of what is
- * installed. */
+/* The page without data, as the build has bundled it: build/view/page.html, or share/neupig/view/page.html of
+ * what is installed. */
 typedef struct npg_view_template {
     char *text;  /* owned */
     size_t size; /* in bytes */
@@ -32,7 +32,8 @@ typedef struct npg_view_facts {
     char why[512];
 } npg_view_facts;
 
-/* The file appears when it is whole.  Failures as npg_view_result_open(), npg_view_group_block(), NPG_DISK. */
+/* The file appears when it is whole.  Failures as npg_view_result_open(), npg_view_group_block(), NPG_DISK.
+ * */
 npg_status npg_view_page_write(npg_view_facts *facts, const npg_view_order *order);
 
 /* JSON text for inside of a script element: ASCII, without "<", "&" and ">"; to be given to free(), NULL: no

@@ -66,7 +66,8 @@ npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *fra
 
 /* ---- the points ---- */
 
-/* Where the points lie: as the run named them, or by the same name in the input folder, whose path is absolute. */
+/* Where the points lie: as the run named them, or by the same name in the input folder, whose path is
+ * absolute. */
 static npg_status find_source(char **path, const npg_view_frames *frames, const char *source)
 {
     const char *input = json_string_value(json_object_get(frames->part->job, "input"));

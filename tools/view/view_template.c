@@ -12,7 +12,8 @@
 #define MARK "<!--neupig-data-->"
 enum { SIZE_MAX_BYTES = 64 << 20 };
 
-/* Beside this program (a build folder), in the share/ of its installation, or where it was meant to be installed. */
+/* Beside this program (a build folder), in the share/ of its installation, or where it was meant to be
+ * installed. */
 static bool find_template(char path[PATH_MAX])
 {
     static const char *const ways[] = {"", "../share/neupig/"};

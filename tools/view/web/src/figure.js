@@ -53,6 +53,7 @@ export class Figure {
         this.mark.material.depthTest = false;
         this.path = new Line(new BufferGeometry(), new LineBasicMaterial({ color: 0xff2e88, depthTest: false, transparent: true }));
         this.mark.renderOrder = this.path.renderOrder = 2;
+        this.path.frustumCulled = false;
         this.path.visible = this.mark.visible = false;
         this.group.add(this.points, this.path, this.mark);
     }
@@ -74,7 +75,12 @@ export class Figure {
         geometry.setAttribute("position", dynamic(new Float32Array(3 * v), 3));
         geometry.setAttribute("normal", dynamic(new Float32Array(3 * v), 3));
         geometry.setAttribute("share", dynamic(new Float32Array(v), 1));
-        geometry.setAttribute("rest", new BufferAttribute(this.#restShares(part), 3));
+        const { low, high } = boundsOf(part.rest);
+        const longest = Math.max(...high.map((x, a) => x - low[a])) || 1;
+        const span = high.map((x, a) => Math.max((x - low[a]) / longest, 1e-6));
+        const shares = Float32Array.from(part.rest, (x, i) => (x - low[i % 3]) / longest); // what the checker is cut from
+        for (const material of [this.material, this.lineMaterial]) material.uniforms.uSpan.value = span;
+        geometry.setAttribute("rest", new BufferAttribute(shares, 3));
         geometry.setAttribute("tint", new BufferAttribute(part.colours ?? new Uint8Array(3 * v).fill(180), 3, true));
         geometry.boundingSphere = everywhere;
         part.edges ??= edgesOf(part);
@@ -96,13 +102,6 @@ export class Figure {
             this.group.remove(object);
             object.geometry.dispose();
         }
-    }
-
-    /** Places at rest, 0 to 1 along the longest side: what the checker is cut from. */
-    #restShares(part) {
-        const { low, high } = boundsOf(part.rest);
-        const longest = Math.max(...high.map((x, a) => x - low[a])) || 1;
-        return Float32Array.from(part.rest, (x, i) => (x - low[i % 3]) / longest);
     }
 
     /** Show a frame of a store, or nothing (null). */

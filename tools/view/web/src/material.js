@@ -25,6 +25,7 @@ const FRAGMENT = `
 uniform int uMode;
 uniform bool uFlat, uLines;
 uniform float uCells;
+uniform vec3 uSpan;
 uniform vec3 uPlain;
 uniform sampler2D uMap;
 varying vec3 vView, vNormal, vWorldNormal, vRest, vTint;
@@ -33,7 +34,7 @@ varying float vShare;
 vec3 checker() {
     vec3 cell = floor(vRest * uCells);
     float odd = mod(cell.x + cell.y + cell.z, 2.0);
-    vec3 hue = 0.25 + 0.7 * fract(vRest);
+    vec3 hue = 0.25 + 0.7 * clamp(vRest / uSpan, 0.0, 1.0);
     return mix(hue * 0.42, hue, odd);
 }
 
@@ -78,6 +79,7 @@ export function surfaceMaterial() {
             uLines: { value: false },
             uPull: { value: 0 },
             uCells: { value: 12 },
+            uSpan: { value: [1, 1, 1] }, // of the reference's sides, in its longest
             uPlain: { value: [0.72, 0.74, 0.78] },
             uMap: { value: mapTexture("heat") },
         },
