@@ -34,7 +34,10 @@ function take(app, state, showBadge) {
         element("message").textContent = capture.problem || "No frame is solved yet.";
         return;
     }
-    if (!app.stage) return app.begin();
+    if (!app.stage) {
+        app.begin();
+        return app.seek(app.player.last);
+    }
     app.refreshFacts();
     showBadge(capture);
     if (capture.slots.length === before || app.player.isPlaying) return;
