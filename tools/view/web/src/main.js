@@ -196,13 +196,24 @@ class App {
             if (this.#showSlot(this.player.slot)) this.isDue = false;
             else this.player.since = now;
         }
+        this.#hurry(now);
         if (this.isDirty) {
             this.isDirty = false;
+            this.drawnAt = now;
             this.stage.draw();
             this.pictures++;
             if (this.shown && !document.body.dataset.ready) document.body.dataset.ready = Math.round(performance.now());
         }
         requestAnimationFrame((next) => this.#picture(next));
+    }
+
+    /** Where pictures take long, they get fewer pixels as long as something moves. */
+    #hurry(now) {
+        const isMoving = this.player.isPlaying || Boolean(this.stage.isTurning);
+        if (isMoving !== this.wasMoving) this.isDirty = true;
+        this.wasMoving = isMoving;
+        this.stage.setMoving(isMoving);
+        if (isMoving && this.isDirty && this.drawnAt) this.stage.noteTime(now - this.drawnAt);
     }
 
     // ---- the look ----

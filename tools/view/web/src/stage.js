@@ -7,23 +7,38 @@ import { boundsOf, Figure } from "./figure.js";
 
 ColorManagement.enabled = false; // all colours are those of the screen
 
+const SLOW_MS = 45; // between pictures
 const OPENING = 30; // degrees, of the shorter side
 const VIEWS = { front: [0, 0], right: [90, 0], back: [180, 0], left: [-90, 0], top: [0, 90] }; // azimuth, elevation
+
+/** Whether the browser draws in software: asked of a context of its own, as edges are chosen with a context. */
+function isSoftware() {
+    const context = document.createElement("canvas").getContext("webgl2");
+    if (!context) throw new Error("the browser has no WebGL 2");
+    const names = context.getExtension("WEBGL_debug_renderer_info");
+    const name = context.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+    context.getExtension("WEBGL_lose_context")?.loseContext();
+    return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
 
 export class Stage {
     constructor(canvas, count, up, onChange) {
         this.canvas = canvas;
         canvas.width = canvas.clientWidth;
         canvas.height = canvas.clientHeight;
-        this.renderer = new WebGLRenderer({ canvas, antialias: true });
+        // In software smooth edges would take most of the time.
+        this.renderer = new WebGLRenderer({ canvas, antialias: !isSoftware(), powerPreference: "high-performance" });
         this.renderer.outputColorSpace = LinearSRGBColorSpace;
         this.renderer.autoClear = false;
         this.camera = new PerspectiveCamera(OPENING, 1, 0.01, 100);
         this.up = up;
+        this.share = 1; // of the pixels' density, while something moves
         if (up === "z") this.camera.up.set(0, 0, 1);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.enableDamping = false;
         this.controls.addEventListener("change", onChange);
+        this.controls.addEventListener("start", () => (this.isTurning = true));
+        this.controls.addEventListener("end", () => (this.isTurning = false));
         this.panes = Array.from({ length: count }, () => {
             const pane = { scene: new Scene(), figure: new Figure(), grid: null };
             pane.scene.add(pane.figure.group);
@@ -74,10 +89,28 @@ export class Stage {
         return [[0, 0, width, height / 2], [0, height / 2, width, height / 2]]; // from the top
     }
 
+    /** While something moves, fewer pixels where pictures take long; all of them once it rests. */
+    setMoving(isMoving) {
+        if (this.isMoving === isMoving) return;
+        this.isMoving = isMoving;
+        this.slow = 0;
+        this.resize();
+    }
+
+    /** How long the last picture took, while something moves. */
+    noteTime(milliseconds) {
+        if (!this.isMoving || milliseconds > 2000) return;
+        this.slow = milliseconds > SLOW_MS ? (this.slow ?? 0) + 1 : 0;
+        if (this.slow < 4 || this.share <= 0.4) return;
+        this.share *= 0.7;
+        this.slow = 0;
+        this.resize();
+    }
+
     /** To the size that the page gives it; another buffer is dear where there is no GPU. */
     resize() {
         const { clientWidth: width, clientHeight: height } = this.canvas;
-        const ratio = Math.min(window.devicePixelRatio, 2);
+        const ratio = Math.min(window.devicePixelRatio, 2) * (this.isMoving ? this.share : 1);
         const size = `${width} ${height} ${ratio}`;
         if (size === this.size) return;
         this.size = size;
