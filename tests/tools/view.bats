@@ -18,6 +18,7 @@ setup() {
     [[ "$output" == "made/view.html: 20 frames, up to "*" vertices, "*" MB" ]]
     node "$check" made/view.html made | tee said
     grep -q ' 600 points, seen in ' said
+    grep -q '"diagonal":2.29' made/view.html # the figure's own, as all figures are in
     # nothing comes from elsewhere
     run grep -oE '(src|href)="[^"]*"' made/view.html
     [ -z "$output" ]

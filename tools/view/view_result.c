@@ -162,11 +162,12 @@ static void set_lengths(npg_view_part *part)
 {
     const json_t *stages = json_object_get(part->report, "stages");
     const json_t *options = json_object_get(part->done ? part->done : part->job, "options");
-    double box = number_in(json_object_get(stages, "keyframe"), "box_diagonal", 0);
+    const json_t *keyframe = json_object_get(stages, "keyframe");
+    double own = number_in(keyframe, "figure_diagonal", number_in(keyframe, "box_diagonal", 0));
     npg_bounds bounds = npg_bounds_empty();
     if (part->reference)
         npg_bounds_add_points(&bounds, part->reference->vert_pos, part->reference->vert_count);
-    part->diagonal = part->placement.scale * box;
+    part->diagonal = part->placement.scale * own;
     if (!(part->diagonal > 0) && part->reference) part->diagonal = npg_bounds_diagonal(&bounds);
     if (!(part->diagonal > 0) || !isfinite(part->diagonal)) part->diagonal = 1;
     part->cover_share = 0.01 * number_in(options, "cover-distance", 1);

@@ -25,7 +25,7 @@ typedef struct npg_view_part {
     size_t group;                /* frames that are packed together           */
     json_t *report, *done, *job; /* report.json, done.json, job/job.json; owned, NULL: none */
     npg_placement placement;     /* the capture's coordinates to the meshes'  */
-    double diagonal;             /* of the capture, in the meshes' unit       */
+    double diagonal;             /* of the figure, in the meshes' unit      */
     double cover_share;          /* points so near cover the surface, in diagonals */
 } npg_view_part;
 

@@ -44,7 +44,7 @@ lines = [line_of(i) for i in range(count)]
 alarm = {"from_frame": count - 2, "from_index": count - 2, "figure": "far", "value": 0.125, "usual": 0, "bound": 0.02,
          "frame": count - 1, "at": [0, 1, 0], "cause": "12.5 % of the points are far from the surface <b>in one place</b>"}
 report = {"warnings": [{"text": "below the bar: </script><script>document.title = 'broken'</script>"}],
-          "stages": {"keyframe": {"box_diagonal": 2.3}, "evaluate": {"topology": {"forward": alarm, "backward": None}}}}
+          "stages": {"keyframe": {"box_diagonal": 4.6, "figure_diagonal": 2.3}, "evaluate": {"topology": {"forward": alarm, "backward": None}}}}
 options = {"window": "6", "overlap": "2", "max-residual": "0.5", "cover-distance": "1", "fps": "25", "up": "y"}
 done = {"neupig": "0.1.0", "status": "partial", "exit_code": 7, "frames": count, "axes": "xyz", "scale": 1.0, "options": options}
 job = {"input": str(capture / "points"), "options": options, "frames": [{"number": i} for i in range(count)]}
