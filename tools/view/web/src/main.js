@@ -127,6 +127,7 @@ class App {
     }
 
     #showPlaying() {
+        if (!this.player.isPlaying) this.#showFigures(performance.now());
         element("play").classList.toggle("playing", this.player.isPlaying);
         element("play").setAttribute("aria-label", this.player.isPlaying ? "Pause (space)" : "Play (space)");
     }
@@ -188,8 +189,7 @@ class App {
             this.isDue = true;
             this.timeline.seek(this.player.slot);
             this.#count();
-            showFrame(this.capture, this.player.slot);
-            if (this.pick) showVertex(this.pick, this.#placeOfPick());
+            this.#showFigures(now);
         }
         if (!this.player.isPlaying && element("play").classList.contains("playing")) this.#showPlaying();
         if (this.isDue && this.capture.slots.length) {
@@ -205,6 +205,14 @@ class App {
             if (this.shown && !document.body.dataset.ready) document.body.dataset.ready = Math.round(performance.now());
         }
         requestAnimationFrame((next) => this.#picture(next));
+    }
+
+    /** While it plays nobody reads faster than this. */
+    #showFigures(now) {
+        if (this.player.isPlaying && now - (this.toldAt ?? 0) < 150) return;
+        this.toldAt = now;
+        showFrame(this.capture, this.player.slot);
+        if (this.pick) showVertex(this.pick, this.#placeOfPick());
     }
 
     /** Where pictures take long, they get fewer pixels as long as something moves. */

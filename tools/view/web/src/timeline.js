@@ -102,18 +102,22 @@ export class Timeline {
         const slot = this.capture.slots[k];
         this.element.setAttribute("aria-valuenow", k);
         this.element.setAttribute("aria-valuetext", slot ? this.#describe(k).replaceAll("\n", ", ") : "no frame");
-        this.draw();
+        this.#drawHead();
     }
 
+    /** All of it, after a change of frames, theme or size. */
     draw() {
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.width = this.element.clientWidth;
         this.height = this.element.clientHeight;
         this.canvas.width = Math.round(this.width * ratio);
         this.canvas.height = Math.round(this.height * ratio);
-        const c = (this.context = this.canvas.getContext("2d"));
+        this.still = document.createElement("canvas"); // what does not move with the frame
+        this.still.width = this.canvas.width;
+        this.still.height = this.canvas.height;
+        this.text = css("--text");
+        const c = this.still.getContext("2d");
         c.setTransform(ratio, 0, 0, ratio, 0, 0);
-        c.clearRect(0, 0, this.width, this.height);
         c.font = "10.5px system-ui, sans-serif";
         this.floor = Math.round(this.height * CURVE_SHARE);
         this.#axis(c);
@@ -121,6 +125,17 @@ export class Timeline {
         this.capture.results.forEach((_, r) => this.#curve(c, r));
         this.#strips(c);
         this.#events(c);
+        this.#drawHead();
+    }
+
+    /** The still picture, and where the frame is. */
+    #drawHead() {
+        const c = this.canvas.getContext("2d");
+        c.setTransform(1, 0, 0, 1, 0, 0);
+        c.clearRect(0, 0, this.canvas.width, this.canvas.height);
+        if (this.still.width && this.still.height) c.drawImage(this.still, 0, 0);
+        const ratio = this.canvas.width / Math.max(this.width, 1);
+        c.setTransform(ratio, 0, 0, ratio, 0, 0);
         this.#playhead(c);
     }
 
@@ -226,7 +241,7 @@ export class Timeline {
     #playhead(c) {
         if (!this.capture.slots.length) return;
         const x = this.x(this.current);
-        c.strokeStyle = c.fillStyle = css("--text");
+        c.strokeStyle = c.fillStyle = this.text;
         c.lineWidth = 1.5;
         line(c, x, 3, x, this.height);
         c.lineWidth = 1;
