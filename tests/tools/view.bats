@@ -116,6 +116,23 @@ setup() {
     [ ! -e none.html ]
 }
 
+@test "what npm can't fetch is said, and the build goes on; a build that insists fails" {
+    root=$(dirname "$(dirname "$(dirname "$BATS_TEST_FILENAME")")")
+    bundle() { # MODE
+        cmake -DMODE="$1" -DNODE=node -DNPM=false -DSOURCE="$root/tools/view/web" -DWORK="$PWD/work-$1" \
+            -DPAGE="$PWD/page-$1.html" -DSTAMP="$PWD/stamp-$1" -P "$root/tools/view/web/bundle.cmake"
+    }
+    run bundle AUTO
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"neupig view will not work: npm can't fetch"* ]]
+    [ -e stamp-AUTO ]
+    [ ! -e page-AUTO.html ]
+    run bundle ON
+    [ "$status" -ne 0 ]
+    [ ! -e stamp-ON ]
+}
+
 # A run at work: two frames are there, and its lock is held.
 begin_run() { # FOLDER
     python3 "$BATS_TEST_DIRNAME/view/made_result.py" capture "$1" 6

@@ -51,8 +51,8 @@ assert code == 200 and struct.unpack_from("<I", body)[0] == part["vertices"]
 code, body = get(f"/frame-0-{index}")
 assert code == 200 and len(body) > part["vertices"]
 
-for path in ("/frame-0-99", "/frame-1-0", "/part-7", "/part-0x", "/frame-0", "/frame-0-0-0", "/state/", "/report.json",
-             "/job/job.json", "/../done.json", "/frame-0-99999999999999999999", "//", "/part-", "/frame--1-0"):
+for path in ("/frame-0-99", "/frame-1-0", "/part-7", "/part-0x", "/frame-0", "/frame-0-0-0", "/state/",
+             "/report.json", "/job/job.json", "/../done.json", "/frame-0-99999999999999999999", "//", "/part-", "/frame--1-0"):
     expect(404, path)
 for path in ("/%2e%2e/done.json", "/state?x=1", "/\\..", "/\xe9"):
     expect(400, path)

@@ -24,24 +24,41 @@ function expect(condition, text) {
     throw new Error(typeof text === "string" ? text : JSON.stringify(text));
 }
 
-const linesOf = (run) => fs.readFileSync(path.join(run, "frames.jsonl"), "utf8").trim().split("\n").map((line) => JSON.parse(line));
+const linesOf = (run) =>
+    fs
+        .readFileSync(path.join(run, "frames.jsonl"), "utf8")
+        .trim()
+        .split("\n")
+        .map((line) => JSON.parse(line));
 const state = (page, expression) => page.evaluate(expression);
 
 async function figures(page, [run]) {
     const lines = linesOf(run);
-    const curve = await state(page, () => window.neupig.capture.slots.map((slot) => slot.at[0].frame.figures.point_dist_median));
-    expect(String(curve) === String(lines.map((line) => line.figures.point_dist_median)), "the curve is not that of frames.jsonl");
+    const curve = await state(page, () =>
+        window.neupig.capture.slots.map((slot) => slot.at[0].frame.figures.point_dist_median),
+    );
+    expect(
+        String(curve) === String(lines.map((line) => line.figures.point_dist_median)),
+        "the curve is not that of frames.jsonl",
+    );
     const marks = await state(page, () => document.getElementById("marks").textContent);
-    for (const word of ["keyframe", "below the bar", "alarm", "skipped"]) expect(marks.includes(word), `no mark: ${word}`);
+    for (const word of ["keyframe", "below the bar", "alarm", "skipped"])
+        expect(marks.includes(word), `no mark: ${word}`);
     const windows = await state(page, () => window.neupig.timeline.spans[0][0].windows.length);
     expect(windows > 1, `${windows} windows`);
-    expect((await state(page, () => document.getElementById("notes").textContent)).includes("Alarm from frame"), "the alarm is not told");
+    expect(
+        (await state(page, () => document.getElementById("notes").textContent)).includes("Alarm from frame"),
+        "the alarm is not told",
+    );
     for (const line of lines.filter((l) => l.file)) {
         const { positions } = readPly(path.join(run, line.file));
-        const shown = await state(page, `(async () => {
+        const shown = await state(
+            page,
+            `(async () => {
             const frame = await neupig.capture.results[0].stores[0].frame(${line.index});
             return Array.from(frame.positions, (x, i) => x + neupig.capture.origin[i % 3]);
-        })()`);
+        })()`,
+        );
         const worst = shown.reduce((most, x, i) => Math.max(most, Math.abs(x - positions[i])), 0);
         expect(shown.length === positions.length && worst < 2e-5, `frame ${line.number}: off by ${worst}`);
     }
@@ -60,12 +77,25 @@ async function looks(page) {
         seen.set(what, picture);
     }
     await isNew("plain");
-    const modes = await page.locator("#colour option").evaluateAll((all) => all.map((o) => [o.value, o.disabled]));
-    expect(modes.length === 8 && modes.filter(([, isOff]) => isOff).map(([id]) => id).join() === "vertex", modes);
+    const modes = await page
+        .locator("#colour option")
+        .evaluateAll((all) => all.map((o) => [o.value, o.disabled]));
+    expect(
+        modes.length === 8 &&
+            modes
+                .filter(([, isOff]) => isOff)
+                .map(([id]) => id)
+                .join() === "vertex",
+        modes,
+    );
     for (const [id] of modes.filter(([mode, isOff]) => !isOff && mode !== "plain")) {
         await page.selectOption("#colour", id);
         await isNew(id);
-        expect((await page.locator("#legend").isVisible()) === ["error", "stretch", "coverage", "seen"].includes(id), `legend of ${id}`);
+        expect(
+            (await page.locator("#legend").isVisible()) ===
+                ["error", "stretch", "coverage", "seen"].includes(id),
+            `legend of ${id}`,
+        );
     }
     await page.selectOption("#colour", "error");
     await page.selectOption("#range", "0.1");
@@ -137,13 +167,19 @@ async function plays(page) {
     await page.keyboard.press("Shift+ArrowRight");
     expect((await slot()) === 10, "ten on");
     await page.keyboard.press("k");
-    expect(await state(page, () => window.neupig.capture.slots[window.neupig.player.slot].at[0].frame.key), "to the keyframe");
+    expect(
+        await state(page, () => window.neupig.capture.slots[window.neupig.player.slot].at[0].frame.key),
+        "to the keyframe",
+    );
     await page.keyboard.press("w");
     expect((await slot()) === 3, "to the worst frame");
     await page.click("#bad");
     expect((await slot()) === last - 1, "to the next below the bar");
     await shows(page, last - 1);
-    expect((await state(page, () => document.getElementById("message").textContent)) === "no mesh in this frame", "no mesh");
+    expect(
+        (await state(page, () => document.getElementById("message").textContent)) === "no mesh in this frame",
+        "no mesh",
+    );
     const line = await page.locator("#timeline").boundingBox();
     await page.mouse.move(line.x + 100, line.y + 30);
     await page.mouse.down();
@@ -151,9 +187,18 @@ async function plays(page) {
     const middle = await slot();
     await page.mouse.move(line.x + line.width - 2, line.y + 30, { steps: 5 });
     await page.mouse.up();
-    expect(middle > 3 && middle < last && (await slot()) === last, `scrubbed to ${middle}, then ${await slot()}`);
-    expect(Number(await page.locator("#timeline").getAttribute("aria-valuenow")) === last, "the slider's value");
-    expect((await page.locator("#timeline").getAttribute("aria-valuetext")).startsWith(`Frame ${last}`), "the slider's text");
+    expect(
+        middle > 3 && middle < last && (await slot()) === last,
+        `scrubbed to ${middle}, then ${await slot()}`,
+    );
+    expect(
+        Number(await page.locator("#timeline").getAttribute("aria-valuenow")) === last,
+        "the slider's value",
+    );
+    expect(
+        (await page.locator("#timeline").getAttribute("aria-valuetext")).startsWith(`Frame ${last}`),
+        "the slider's text",
+    );
     await page.selectOption("#speed", "4");
     await page.keyboard.press("Home");
     await page.locator("#canvas").focus();
@@ -166,7 +211,10 @@ async function plays(page) {
     expect(await page.locator("#help-dialog").isVisible(), "no help");
     await page.keyboard.press("Escape");
     for (const id of ["first", "back", "play", "next", "last", "theme", "help"])
-        expect(await page.locator(`#${id}`).getAttribute("aria-label"), `${id} has no name for screen readers`);
+        expect(
+            await page.locator(`#${id}`).getAttribute("aria-label"),
+            `${id} has no name for screen readers`,
+        );
 }
 
 async function picture(page, [stored]) {
@@ -192,17 +240,18 @@ async function picture(page, [stored]) {
 async function compareResults(page) {
     const names = await page.locator("#pane-names span").allTextContents();
     expect(names.length === 2 && names[0].startsWith("A: ") && names[1].startsWith("B: "), names);
-    const halves = () => state(page, () => {
-        const app = window.neupig;
-        app.stage.draw();
-        const canvas = document.getElementById("canvas");
-        return [0, 1].map((side) => {
-            const half = document.createElement("canvas");
-            [half.width, half.height] = [canvas.width / 2, canvas.height];
-            half.getContext("2d").drawImage(canvas, (-side * canvas.width) / 2, 0);
-            return half.toDataURL();
+    const halves = () =>
+        state(page, () => {
+            const app = window.neupig;
+            app.stage.draw();
+            const canvas = document.getElementById("canvas");
+            return [0, 1].map((side) => {
+                const half = document.createElement("canvas");
+                [half.width, half.height] = [canvas.width / 2, canvas.height];
+                half.getContext("2d").drawImage(canvas, (-side * canvas.width) / 2, 0);
+                return half.toDataURL();
+            });
         });
-    });
     const before = await halves();
     await state(page, () => window.neupig.seek(5));
     await shows(page, 5);
@@ -214,7 +263,10 @@ async function compareResults(page) {
     const last = await state(page, () => window.neupig.player.last);
     await page.keyboard.press("End");
     await shows(page, last);
-    expect((await page.locator("#message").textContent()) === "B: not in this result", "a frame that only one has");
+    expect(
+        (await page.locator("#message").textContent()) === "B: not in this result",
+        "a frame that only one has",
+    );
 }
 
 async function phone(page) {
@@ -222,7 +274,10 @@ async function phone(page) {
     expect(wide <= 390, `${wide} pixels wide`);
     for (const id of ["canvas", "play", "timeline", "colour"]) {
         const box = await page.locator(`#${id}`).boundingBox();
-        expect(box && box.x >= 0 && box.y >= 0 && box.x < 390 && box.y + box.height <= 845, `${id}: ${JSON.stringify(box)}`);
+        expect(
+            box && box.x >= 0 && box.y >= 0 && box.x < 390 && box.y + box.height <= 845,
+            `${id}: ${JSON.stringify(box)}`,
+        );
     }
     expect((await page.locator("#canvas").boundingBox()).height > 300, "the picture is small");
     const before = await pictureOf(page);
@@ -235,18 +290,29 @@ async function phone(page) {
 
 async function names(page) {
     expect((await state(page, () => document.title)).includes("<img src=x"), "the title");
-    expect((await page.locator("#name").textContent()).includes("<img src=x onerror=alert(1)>"), "the heading");
+    expect(
+        (await page.locator("#name").textContent()).includes("<img src=x onerror=alert(1)>"),
+        "the heading",
+    );
     expect((await page.locator("img, iframe, link, object").count()) === 0, "an element came from a name");
     expect((await page.locator("#notes").textContent()).includes("</script><script>"), "the warning");
     expect((await page.locator("#notes b").count()) === 0, "an element came from the alarm");
 }
 
 async function live(page, [run]) {
-    await page.waitForFunction(() => window.neupig.capture.slots.length === 2 && window.neupig.shown, null, { timeout: 30000 });
-    expect((await page.locator("#progress-text").textContent()) === "solving: 2 of 6 frames", await page.locator("#progress-text").textContent());
+    await page.waitForFunction(() => window.neupig.capture.slots.length === 2 && window.neupig.shown, null, {
+        timeout: 30000,
+    });
+    expect(
+        (await page.locator("#progress-text").textContent()) === "solving: 2 of 6 frames",
+        await page.locator("#progress-text").textContent(),
+    );
     const before = await pictureOf(page);
     const lines = fs.readFileSync(path.join(run, "all.jsonl"), "utf8").trim().split("\n");
-    fs.writeFileSync(path.join(run, "frames.partial.jsonl"), [3, 2, 1, 5].map((i) => `${lines[i]}\n`).join(""));
+    fs.writeFileSync(
+        path.join(run, "frames.partial.jsonl"),
+        [3, 2, 1, 5].map((i) => `${lines[i]}\n`).join(""),
+    );
     await page.waitForFunction(() => window.neupig.capture.slots.length === 4, null, { timeout: 30000 });
     await shows(page, 3); // it was at the last frame, and stays there
     expect((await pictureOf(page)) !== before, "the new frame is not shown");
@@ -264,7 +330,9 @@ try {
     const options = name === "phone" ? { hasTouch: true, isMobile: true } : {};
     const page = await openPage(browser, url, sizes[name], options);
     if (name !== "live") await ready(page);
-    console.log(`${name}: the first picture after ${await state(page, () => document.body.dataset.ready ?? "?")} ms`);
+    console.log(
+        `${name}: the first picture after ${await state(page, () => document.body.dataset.ready ?? "?")} ms`,
+    );
     await tests[name](page, rest);
     expect(!page.faults.length, `the page says: ${page.faults.join("; ")}`);
 } finally {

@@ -1,7 +1,12 @@
 // A browser without a display, drawing in software, and what the tests ask of a page in it.
 import { createRequire } from "node:module";
 
-const DRAWING = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-vsync"];
+const DRAWING = [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-vsync",
+];
 
 /** modules: the folder whose node_modules has playwright-core; program: the browser. */
 export async function openBrowser(modules, program) {
@@ -14,10 +19,14 @@ export async function openBrowser(modules, program) {
 export async function openPage(browser, url, size = { width: 1000, height: 720 }, options = {}) {
     const page = await browser.newPage({ viewport: size, colorScheme: "light", ...options });
     page.faults = [];
-    page.on("console", (message) => ["error", "warning"].includes(message.type()) && page.faults.push(message.text()));
+    page.on(
+        "console",
+        (message) => ["error", "warning"].includes(message.type()) && page.faults.push(message.text()),
+    );
     page.on("pageerror", (error) => page.faults.push(`${error}`));
     page.on("request", (request) => {
-        if (!/^(file|data|blob):|^http:\/\/127\.0\.0\.1:/.test(request.url())) page.faults.push(`asks for ${request.url()}`);
+        if (!/^(file|data|blob):|^http:\/\/127\.0\.0\.1:/.test(request.url()))
+            page.faults.push(`asks for ${request.url()}`);
     });
     await page.goto(url);
     return page;
@@ -29,7 +38,9 @@ export async function ready(page) {
 
 /** Until the slot is on the screen. */
 export async function shows(page, slot) {
-    await page.waitForFunction((k) => window.neupig.shown?.slot === k && !window.neupig.isDirty, slot, { timeout: 30000 });
+    await page.waitForFunction((k) => window.neupig.shown?.slot === k && !window.neupig.isDirty, slot, {
+        timeout: 30000,
+    });
 }
 
 /** The picture as it is drawn now: a data URL of a PNG. */
@@ -56,7 +67,8 @@ export function compare(page, one, other) {
             };
             const [x, y] = [await load(a), await load(b)];
             if (x.width !== y.width || x.height !== y.height) return { mean: 255, share: 1 };
-            let sum = 0, off = 0;
+            let sum = 0,
+                off = 0;
             for (let i = 0; i < x.data.length; i += 4) {
                 const differences = [0, 1, 2].map((c) => Math.abs(x.data[i + c] - y.data[i + c]));
                 sum += differences.reduce((p, q) => p + q);

@@ -6,7 +6,8 @@ import { readGroup, readPart } from "../../../tools/view/web/src/codec.js";
 export function readPage(path) {
     const text = fs.readFileSync(path, "utf8");
     const blocks = new Map();
-    for (const match of text.matchAll(/<script type="([a-z/]+)" id="([a-z0-9-]+)">([^<]*)<\/script>/g)) blocks.set(match[2], match[3]);
+    for (const match of text.matchAll(/<script type="([a-z/]+)" id="([a-z0-9-]+)">([^<]*)<\/script>/g))
+        blocks.set(match[2], match[3]);
     return {
         facts: JSON.parse(blocks.get("facts")),
         block: (id) => new Uint8Array(Buffer.from(blocks.get(id), "base64")),
@@ -24,7 +25,8 @@ export function readPly(path) {
     const sizes = [...vertex.matchAll(/property (\w+)/g)].map((m) => ({ float: 4, uchar: 1 })[m[1]]);
     const stride = sizes.reduce((a, b) => a + b);
     const positions = new Float64Array(3 * count("vertex"));
-    for (let i = 0; i < positions.length; i++) positions[i] = bytes.readFloatLE(end + stride * Math.floor(i / 3) + 4 * (i % 3));
+    for (let i = 0; i < positions.length; i++)
+        positions[i] = bytes.readFloatLE(end + stride * Math.floor(i / 3) + 4 * (i % 3));
     const faces = [];
     for (let f = 0, at = end + stride * count("vertex"); f < count("face"); f++, at += 13)
         for (let k = 0; k < 3; k++) faces.push(bytes.readInt32LE(at + 1 + 4 * k));
@@ -44,7 +46,8 @@ export async function framesOf(page, result, part) {
 /** The longest side of a mesh's box. */
 export function longestOf(positions) {
     const sides = [0, 1, 2].map((a) => {
-        let low = Infinity, high = -Infinity;
+        let low = Infinity,
+            high = -Infinity;
         for (let i = a; i < positions.length; i += 3) {
             low = Math.min(low, positions[i]);
             high = Math.max(high, positions[i]);
@@ -53,4 +56,3 @@ export function longestOf(positions) {
     });
     return Math.max(...sides);
 }
-

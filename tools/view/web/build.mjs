@@ -2,8 +2,8 @@
 //
 //     node build.mjs PAGE.html
 //
-// The page's policy allows this one script, by its checksum, and nothing from elsewhere: text that comes with a result
-// can't be executed, whatever it is called.
+// The page's policy allows this one script, by its checksum, and nothing from elsewhere: text that comes with a
+// result can't be executed, whatever it is called.
 import { createHash } from "node:crypto";
 import { readFile, writeFile } from "node:fs/promises";
 import { build } from "esbuild";

@@ -15,7 +15,11 @@ class Result {
             const source = isLive ? new LiveSource(i, part) : new PageSource(place, i);
             if (isLive) part.group = 1;
             const own = part.origin ?? [0, 0, 0];
-            return new PartStore(source, part, own.map((x, a) => x - origin[a]));
+            return new PartStore(
+                source,
+                part,
+                own.map((x, a) => x - origin[a]),
+            );
         });
         for (const part of facts.parts) if (isLive) part.group = 1;
     }
@@ -55,7 +59,9 @@ export class Capture {
         this.origin = facts.results?.[0]?.parts?.[0]?.origin ?? [0, 0, 0];
         const shown = this.slots.length;
         const before = this.results;
-        this.results = (facts.results ?? []).map((r, i) => new Result(r, i, this.origin, facts.live, before[i]));
+        this.results = (facts.results ?? []).map(
+            (r, i) => new Result(r, i, this.origin, facts.live, before[i]),
+        );
         this.slots = slotsOf(this.results.filter((r) => r.facts.parts.length));
         return shown !== this.slots.length;
     }

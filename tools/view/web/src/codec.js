@@ -23,7 +23,11 @@ async function unpack(bytes, count) {
     const planes = await inflate(bytes);
     if (planes.length !== 4 * count) throw new Error("a block of the page is damaged");
     for (let i = 0; i < count; i++) {
-        const z = planes[i] | (planes[count + i] << 8) | (planes[2 * count + i] << 16) | (planes[3 * count + i] << 24);
+        const z =
+            planes[i] |
+            (planes[count + i] << 8) |
+            (planes[2 * count + i] << 16) |
+            (planes[3 * count + i] << 24);
         out[i] = (z >>> 1) ^ -(z & 1);
     }
     return out;
@@ -94,12 +98,21 @@ export async function readPart(bytes, offset) {
     const faces = new Uint32Array(corners);
     for (let i = 0, corner = 0; i < corners; i++) faces[i] = corner += changes[i];
     const links = linksOf(faces, vertices);
-    const part = { vertices, faces, links, offset, rest: new Float32Array(3 * vertices), colours: null, seen: null };
+    const part = {
+        vertices,
+        faces,
+        links,
+        offset,
+        rest: new Float32Array(3 * vertices),
+        colours: null,
+        seen: null,
+    };
     const row = new Int32Array(vertices);
     const left = await unpack(reader.take(sizes[1]), 3 * vertices);
     for (let a = 0; a < 3; a++) {
         restoreRow(row, left, a * vertices, links);
-        for (let i = 0; i < vertices; i++) part.rest[3 * i + a] = grid.origin[a] + offset[a] + grid.step * row[i];
+        for (let i = 0; i < vertices; i++)
+            part.rest[3 * i + a] = grid.origin[a] + offset[a] + grid.step * row[i];
     }
     if (sizes[2]) {
         const packed = await unpack(reader.take(sizes[2]), 3 * vertices);

@@ -82,7 +82,10 @@ export function edgesOf(part) {
     const ends = [];
     for (let i = 0; i < part.faces.length; i++) {
         const next = i % 3 === 2 ? i - 2 : i + 1;
-        const [low, high] = [Math.min(part.faces[i], part.faces[next]), Math.max(part.faces[i], part.faces[next])];
+        const [low, high] = [
+            Math.min(part.faces[i], part.faces[next]),
+            Math.max(part.faces[i], part.faces[next]),
+        ];
         const key = high * part.vertices + low;
         if (low === high || known.has(key)) continue;
         known.add(key);
@@ -109,13 +112,17 @@ function stretchOf(out, frame, edges) {
     const p = frame.positions;
     out.fill(0);
     for (let e = 0; e < rest.length; e++) {
-        const i = ends[2 * e], j = ends[2 * e + 1];
-        const x = p[3 * i] - p[3 * j], y = p[3 * i + 1] - p[3 * j + 1], z = p[3 * i + 2] - p[3 * j + 2];
+        const i = ends[2 * e],
+            j = ends[2 * e + 1];
+        const x = p[3 * i] - p[3 * j],
+            y = p[3 * i + 1] - p[3 * j + 1],
+            z = p[3 * i + 2] - p[3 * j + 2];
         const change = rest[e] > 0 ? Math.sqrt(x * x + y * y + z * z) / rest[e] - 1 : 0;
         out[i] += change;
         out[j] += change;
     }
-    for (let i = 0; i < out.length; i++) out[i] = 0.5 + (count[i] ? out[i] / count[i] : 0) / (2 * STRETCH_RANGE);
+    for (let i = 0; i < out.length; i++)
+        out[i] = 0.5 + (count[i] ? out[i] / count[i] : 0) / (2 * STRETCH_RANGE);
 }
 
 /** Fill out (V, 0 to 1 along the mode's map) for a frame. */
@@ -145,7 +152,11 @@ export function legendOf(id, range, capture) {
     const texts = {
         error: { title: "Vertex to nearest point, % of the diagonal", low: "0", high: `${range} or more` },
         stretch: { title: "Mean change of a vertex's edges", low: "-50 %", high: "+50 %" },
-        coverage: { title: `A point within ${cover.toPrecision(2)} % of the diagonal`, low: "none", high: "covered" },
+        coverage: {
+            title: `A point within ${cover.toPrecision(2)} % of the diagonal`,
+            low: "none",
+            high: "covered",
+        },
         seen: { title: "Frames that cover the vertex", low: "0", high: `${frames}` },
     };
     return { ...texts[id], map: mode.map };

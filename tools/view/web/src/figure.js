@@ -1,7 +1,18 @@
 // One result in the scene: its surface, its points, and what was picked on it.
 import {
-    BufferAttribute, BufferGeometry, Color, Group, Line, LineBasicMaterial, LineSegments, Mesh, Points, PointsMaterial,
-    Raycaster, Sphere, Vector3,
+    BufferAttribute,
+    BufferGeometry,
+    Color,
+    Group,
+    Line,
+    LineBasicMaterial,
+    LineSegments,
+    Mesh,
+    Points,
+    PointsMaterial,
+    Raycaster,
+    Sphere,
+    Vector3,
 } from "three";
 import { edgesOf, fillShares, modeOf } from "./colours.js";
 import { mapTexture, surfaceMaterial } from "./material.js";
@@ -11,22 +22,37 @@ function fillNormals(out, positions, faces) {
     out.fill(0);
     for (let f = 0; f < faces.length; f += 3) {
         const [a, b, c] = [3 * faces[f], 3 * faces[f + 1], 3 * faces[f + 2]];
-        const ux = positions[b] - positions[a], uy = positions[b + 1] - positions[a + 1], uz = positions[b + 2] - positions[a + 2];
-        const vx = positions[c] - positions[a], vy = positions[c + 1] - positions[a + 1], vz = positions[c + 2] - positions[a + 2];
-        const nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-        out[a] += nx; out[a + 1] += ny; out[a + 2] += nz;
-        out[b] += nx; out[b + 1] += ny; out[b + 2] += nz;
-        out[c] += nx; out[c + 1] += ny; out[c + 2] += nz;
+        const ux = positions[b] - positions[a],
+            uy = positions[b + 1] - positions[a + 1],
+            uz = positions[b + 2] - positions[a + 2];
+        const vx = positions[c] - positions[a],
+            vy = positions[c + 1] - positions[a + 1],
+            vz = positions[c + 2] - positions[a + 2];
+        const nx = uy * vz - uz * vy,
+            ny = uz * vx - ux * vz,
+            nz = ux * vy - uy * vx;
+        out[a] += nx;
+        out[a + 1] += ny;
+        out[a + 2] += nz;
+        out[b] += nx;
+        out[b + 1] += ny;
+        out[b + 2] += nz;
+        out[c] += nx;
+        out[c + 1] += ny;
+        out[c + 2] += nz;
     }
     for (let i = 0; i < out.length; i += 3) {
         const length = Math.hypot(out[i], out[i + 1], out[i + 2]) || 1;
-        out[i] /= length; out[i + 1] /= length; out[i + 2] /= length;
+        out[i] /= length;
+        out[i + 1] /= length;
+        out[i + 2] /= length;
     }
 }
 
 /** Low and high corner of positions. */
 export function boundsOf(positions) {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    const low = [Infinity, Infinity, Infinity],
+        high = [-Infinity, -Infinity, -Infinity];
     for (let i = 0; i < positions.length; i++) {
         const a = i % 3;
         if (positions[i] < low[a]) low[a] = positions[i];
@@ -51,7 +77,10 @@ export class Figure {
         this.points = this.#cloud(0xff9d2e, 2.6);
         this.mark = this.#cloud(0xff2e88, 11);
         this.mark.material.depthTest = false;
-        this.path = new Line(new BufferGeometry(), new LineBasicMaterial({ color: 0xff2e88, depthTest: false, transparent: true }));
+        this.path = new Line(
+            new BufferGeometry(),
+            new LineBasicMaterial({ color: 0xff2e88, depthTest: false, transparent: true }),
+        );
         this.mark.renderOrder = this.path.renderOrder = 2;
         this.path.frustumCulled = false;
         this.path.visible = this.mark.visible = false;
@@ -59,7 +88,10 @@ export class Figure {
     }
 
     #cloud(colour, size) {
-        const cloud = new Points(new BufferGeometry(), new PointsMaterial({ color: colour, size, sizeAttenuation: false }));
+        const cloud = new Points(
+            new BufferGeometry(),
+            new PointsMaterial({ color: colour, size, sizeAttenuation: false }),
+        );
         cloud.frustumCulled = false;
         cloud.visible = false;
         return cloud;
@@ -81,11 +113,15 @@ export class Figure {
         const shares = Float32Array.from(part.rest, (x, i) => (x - low[i % 3]) / longest); // what the checker is cut from
         for (const material of [this.material, this.lineMaterial]) material.uniforms.uSpan.value = span;
         geometry.setAttribute("rest", new BufferAttribute(shares, 3));
-        geometry.setAttribute("tint", new BufferAttribute(part.colours ?? new Uint8Array(3 * v).fill(180), 3, true));
+        geometry.setAttribute(
+            "tint",
+            new BufferAttribute(part.colours ?? new Uint8Array(3 * v).fill(180), 3, true),
+        );
         geometry.boundingSphere = everywhere;
         part.edges ??= edgesOf(part);
         const wires = new BufferGeometry();
-        for (const name of ["position", "normal", "share", "rest", "tint"]) wires.setAttribute(name, geometry.getAttribute(name));
+        for (const name of ["position", "normal", "share", "rest", "tint"])
+            wires.setAttribute(name, geometry.getAttribute(name));
         wires.setIndex(new BufferAttribute(part.edges.ends, 1));
         wires.boundingSphere = everywhere;
         this.#drop();
@@ -111,7 +147,8 @@ export class Figure {
         this.hasMesh = Boolean(frame && hasMesh);
         if (!frame || !this.surface) return;
         const geometry = this.surface.geometry;
-        const position = geometry.getAttribute("position"), normal = geometry.getAttribute("normal");
+        const position = geometry.getAttribute("position"),
+            normal = geometry.getAttribute("normal");
         position.array.set(frame.positions);
         fillNormals(normal.array, frame.positions, store.part.faces);
         position.needsUpdate = normal.needsUpdate = true;
@@ -127,7 +164,8 @@ export class Figure {
 
     /** look: {shading, colour, range, points, plain} */
     dress(look) {
-        const mode = modeOf(look.colour), isWire = look.shading === "wire";
+        const mode = modeOf(look.colour),
+            isWire = look.shading === "wire";
         if (this.frame && this.surface && mode.map) {
             const share = this.surface.geometry.getAttribute("share");
             fillShares(share.array, look.colour, this.frame, this.store, look.range);
@@ -160,7 +198,10 @@ export class Figure {
         const p = this.frame.positions;
         const far = (i) => hit.point.distanceToSquared(new Vector3(p[3 * i], p[3 * i + 1], p[3 * i + 2]));
         const { a, b, c } = hit.face;
-        return { vertex: [a, b, c].reduce((best, i) => (far(i) < far(best) ? i : best)), distance: hit.distance };
+        return {
+            vertex: [a, b, c].reduce((best, i) => (far(i) < far(best) ? i : best)),
+            distance: hit.distance,
+        };
     }
 
     /** Mark a vertex with its way through all frames; null: none. */

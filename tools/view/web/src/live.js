@@ -13,12 +13,14 @@ const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, mill
 const hasEnded = (capture) => ["done", "stopped"].includes(capture.phase);
 
 function showProgress(capture) {
-    const solved = capture.slots.length, { total } = capture;
+    const solved = capture.slots.length,
+        { total } = capture;
     const share = total ? solved / total : 0;
     element("progress").hidden = false;
     element("progress-bar").firstChild.style.width = `${100 * share}%`;
     element("progress-bar").setAttribute("aria-valuenow", Math.round(100 * share));
-    element("progress-text").textContent = `${WORDS[capture.phase] ?? ""}: ${solved}${total ? ` of ${total}` : ""} frames`;
+    element("progress-text").textContent =
+        `${WORDS[capture.phase] ?? ""}: ${solved}${total ? ` of ${total}` : ""} frames`;
 }
 
 /** Take what is new; who looks at the last frame goes on looking at the last. */
@@ -54,7 +56,7 @@ async function fetchAll(capture) {
 
 export async function follow(app, showBadge) {
     const { capture } = app;
-    for (let failures = 0; failures < 5; ) {
+    for (let failures = 0; failures < 5;) {
         try {
             const reply = await fetch("/state");
             if (!reply.ok) throw new Error(`state: ${reply.status}`);

@@ -1,16 +1,16 @@
 // neupig view: the page.  Puts together what is shown, and listens.
 import { Capture } from "./capture.js";
-import { ERROR_RANGES, errorRangeFor, gradientOf, lackOf, legendOf, MODES } from "./colours.js";
-import { KEYS, listenToKeys } from "./keys.js";
+import { errorRangeFor, gradientOf, lackOf, legendOf, MODES } from "./colours.js";
+import { listen, SPEEDS } from "./controls.js";
 import { follow } from "./live.js";
 import { historyOf, showFrame, showResult, showVertex } from "./panel.js";
+import { fillColours, listMarks, namePanes, showBadge } from "./labels.js";
 import { Player } from "./player.js";
 import { Stage } from "./stage.js";
-import { marksOf, Timeline } from "./timeline.js";
+import { Timeline } from "./timeline.js";
 
 const element = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const SHADINGS = ["smooth", "flat", "wire"];
 
 class App {
@@ -27,10 +27,15 @@ class App {
     /** Once there is a result. */
     begin() {
         const { capture } = this;
-        this.stage = new Stage(element("canvas"), capture.results.length, capture.results[0].facts.up, () => (this.isDirty = true));
+        this.stage = new Stage(
+            element("canvas"),
+            capture.results.length,
+            capture.results[0].facts.up,
+            () => (this.isDirty = true),
+        );
         this.player = new Player(capture);
         this.timeline = new Timeline(element("timeline"), capture, (slot) => this.seek(slot));
-        this.#listen();
+        listen(this);
         this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
         new ResizeObserver(() => this.resize()).observe(element("viewport"));
         this.resize();
@@ -49,56 +54,12 @@ class App {
         element("name").title = capture.results.map((result) => result.facts.path).join("\n");
         showResult(capture);
         showBadge(capture);
-        this.#namePanes();
-        this.#fillColours();
-        element("marks").replaceChildren(
-            ...marksOf(capture).map(([colour, word]) => {
-                const mark = document.createElement("span");
-                mark.style.setProperty("--mark", `var(${colour})`);
-                mark.textContent = word;
-                return mark;
-            }),
-        );
+        namePanes(this);
+        fillColours(this);
+        listMarks(capture);
         const frames = capture.slots.flatMap((slot) => slot.at.map((at) => at?.frame)).filter(Boolean);
         element("bad").disabled = !frames.some((frame) => frame.good === false || frame.unexplained);
         this.timeline.update();
-    }
-
-    #namePanes() {
-        const { results } = this.capture;
-        if (results.length < 2) return;
-        const panes = this.stage.layout();
-        const labels = results.map((result, r) => {
-            const label = document.createElement("span");
-            label.textContent = `${"AB"[r]}: ${result.facts.name}`;
-            label.style.left = `${panes[r][0] + 10}px`;
-            label.style.top = `${panes[r][1] + 10}px`;
-            return label;
-        });
-        const rule = document.createElement("i");
-        const [left, top] = panes[1];
-        Object.assign(rule.style, left ? { left: `${left}px`, top: 0, width: "1px", height: "100%" } : { top: `${top}px`, left: 0, height: "1px", width: "100%" });
-        element("pane-names").replaceChildren(...labels, rule);
-    }
-
-    #fillColours() {
-        const select = element("colour");
-        select.replaceChildren(
-            ...MODES.map((mode) => {
-                const option = new Option(mode.label, mode.id);
-                const lack = lackOf(mode.id, this.capture);
-                option.disabled = Boolean(lack);
-                option.title = lack;
-                if (lack) option.textContent += " (none)";
-                return option;
-            }),
-        );
-        select.value = this.look.colour;
-        const lacks = MODES.map((mode) => [mode.label, lackOf(mode.id, this.capture)]).filter(([, lack]) => lack);
-        select.title = ["Colour by (C)", ...lacks.map(([label, lack]) => `${label}: ${lack}`)].join("\n");
-        const noPoints = lackOf("points", this.capture);
-        element("points").disabled = Boolean(noPoints);
-        element("points").title = noPoints || "The frame's points (O)";
     }
 
     // ---- frames ----
@@ -136,7 +97,11 @@ class App {
         const { slots } = this.capture;
         const number = document.createElement("b");
         number.textContent = slots[this.player.slot]?.number ?? "-";
-        element("counter").replaceChildren("frame ", number, ` \u00b7 ${this.player.slot + 1} of ${slots.length}`);
+        element("counter").replaceChildren(
+            "frame ",
+            number,
+            ` \u00b7 ${this.player.slot + 1} of ${slots.length}`,
+        );
     }
 
     /** Bring the frames of the slot to the screen; false while they are not decoded. */
@@ -152,8 +117,15 @@ class App {
         frames.forEach((frame, r) => this.stage.figures[r].show(frame?.store, frame?.data, frame?.hasMesh));
         this.shown = { slot, frames };
         if (isFirst) this.#firstLook();
-        const lacking = frames.map((frame, r) => [r, !frame ? "not in this result" : frame.hasMesh ? "" : "no mesh in this frame"]).filter(([, text]) => text);
-        element("message").textContent = lacking.map(([r, text]) => (capture.results.length > 1 ? `${"AB"[r]}: ${text}` : text)).join(", ");
+        const lacking = frames
+            .map((frame, r) => [
+                r,
+                !frame ? "not in this result" : frame.hasMesh ? "" : "no mesh in this frame",
+            ])
+            .filter(([, text]) => text);
+        element("message").textContent = lacking
+            .map(([r, text]) => (capture.results.length > 1 ? `${"AB"[r]}: ${text}` : text))
+            .join(", ");
         this.#movePick();
         this.dress();
         return true;
@@ -165,12 +137,17 @@ class App {
         element("range").value = this.look.range;
         this.stage.fit([28, 14]);
         this.stage.placeGrid(this.stage.bounds());
-        this.#fillColours();
+        fillColours(this);
     }
 
     dress() {
         const { colour } = this.look;
-        const look = { ...this.look, plain: css("--surface") || "#b9c0cb", ground: css("--ground"), pointColour: colour === "plain" ? "#f08a1d" : css("--text") };
+        const look = {
+            ...this.look,
+            plain: css("--surface") || "#b9c0cb",
+            ground: css("--ground"),
+            pointColour: colour === "plain" ? "#f08a1d" : css("--text"),
+        };
         for (const figure of this.stage.figures) figure.dress(look);
         const legend = legendOf(colour, look.range, this.capture);
         element("legend").hidden = !legend;
@@ -202,7 +179,8 @@ class App {
             this.drawnAt = now;
             this.stage.draw();
             this.pictures++;
-            if (this.shown && !document.body.dataset.ready) document.body.dataset.ready = Math.round(performance.now());
+            if (this.shown && !document.body.dataset.ready)
+                document.body.dataset.ready = Math.round(performance.now());
         }
         requestAnimationFrame((next) => this.#picture(next));
     }
@@ -228,7 +206,8 @@ class App {
 
     setShading(shading) {
         this.look.shading = shading;
-        for (const button of document.querySelectorAll("[data-shading]")) button.setAttribute("aria-pressed", button.dataset.shading === shading);
+        for (const button of document.querySelectorAll("[data-shading]"))
+            button.setAttribute("aria-pressed", button.dataset.shading === shading);
         this.dress();
     }
 
@@ -285,7 +264,7 @@ class App {
     resize() {
         this.stage.resize();
         this.timeline.draw();
-        this.#namePanes();
+        namePanes(this);
         this.isDirty = true;
     }
 
@@ -320,7 +299,9 @@ class App {
 
     #placeOfPick() {
         const at = this.capture.slots[this.player.slot]?.at[this.pick.result];
-        return at && this.capture.storeAt(this.player.slot, this.pick.result) === this.pick.store ? at.place : 0;
+        return at && this.capture.storeAt(this.player.slot, this.pick.result) === this.pick.store
+            ? at.place
+            : 0;
     }
 
     #updatePick() {
@@ -339,7 +320,8 @@ class App {
     // ---- to frames that matter ----
 
     toWorst() {
-        const worst = (slot) => Math.max(-1, ...slot.at.map((at) => at?.frame.figures?.point_dist_median ?? -1));
+        const worst = (slot) =>
+            Math.max(-1, ...slot.at.map((at) => at?.frame.figures?.point_dist_median ?? -1));
         const { slots } = this.capture;
         this.play(false);
         this.seek(slots.reduce((best, slot, k) => (worst(slot) > worst(slots[best]) ? k : best), 0));
@@ -361,39 +343,7 @@ class App {
         if (k >= 0) this.seek(k);
     }
 
-    // ---- listening ----
-
-    #listen() {
-        const on = (id, event, act) => element(id).addEventListener(event, act);
-        const { player } = this;
-        on("play", "click", () => this.play(!player.isPlaying));
-        on("first", "click", () => this.seek(0));
-        on("last", "click", () => this.seek(player.last));
-        on("back", "click", () => this.step(-1));
-        on("next", "click", () => this.step(1));
-        on("loop", "click", () => this.setLoop(!player.isLooping));
-        on("worst", "click", () => this.toWorst());
-        on("bad", "click", () => this.toBad());
-        on("fit", "click", () => this.view(null));
-        on("points", "click", () => this.setPoints(!this.look.points));
-        on("grid", "click", () => this.setGrid(element("grid").getAttribute("aria-pressed") !== "true"));
-        on("theme", "click", () => this.toggleTheme());
-        on("help", "click", () => element("help-dialog").showModal());
-        on("toggle-panel", "click", () => this.setPanel(element("toggle-panel").getAttribute("aria-expanded") !== "true"));
-        on("colour", "change", (event) => this.setColour(event.target.value));
-        on("range", "change", (event) => this.setRange(Number(event.target.value)));
-        on("speed", "change", (event) => this.setSpeed(Number(event.target.value)));
-        for (const button of document.querySelectorAll("[data-shading]")) button.addEventListener("click", () => this.setShading(button.dataset.shading));
-        for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => this.view(button.dataset.view));
-        element("range").replaceChildren(...ERROR_RANGES.map((range) => new Option(`${range} %`, range)));
-        element("speed").replaceChildren(...SPEEDS.map((speed) => new Option(`${speed}\u00d7`, speed)));
-        this.setSpeed(1);
-        this.setShading("smooth");
-        this.#listenToPicks();
-        listenToKeys(this);
-        element("keys").replaceChildren(...KEYS.map(([keys, text]) => keyRow(keys, text)));
-        if (innerWidth <= 720) this.setPanel(false);
-    }
+    // ---- what keys ask for ----
 
     toggleTheme() {
         this.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
@@ -409,43 +359,10 @@ class App {
     }
 
     nextSpeed(by) {
-        this.setSpeed(SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(this.player.speed) + by))]);
+        this.setSpeed(
+            SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(this.player.speed) + by))],
+        );
     }
-
-    /** A press that does not become a drag picks. */
-    #listenToPicks() {
-        const canvas = element("canvas");
-        let start = null;
-        canvas.addEventListener("pointerdown", (event) => (start = event.isPrimary && event.button === 0 ? [event.clientX, event.clientY] : null));
-        canvas.addEventListener("pointerup", (event) => {
-            if (!start || Math.hypot(event.clientX - start[0], event.clientY - start[1]) > 4) return;
-            const box = canvas.getBoundingClientRect();
-            this.pickAt(event.clientX - box.left, event.clientY - box.top);
-        });
-    }
-}
-
-function keyRow(keys, text) {
-    const row = document.createElement("tr");
-    const cell = row.insertCell();
-    for (const key of keys) {
-        const mark = document.createElement("kbd");
-        mark.textContent = key;
-        cell.append(mark, " ");
-    }
-    row.insertCell().textContent = text;
-    return row;
-}
-
-function showBadge(capture) {
-    const badge = element("badge");
-    const frames = capture.results.flatMap((result) => result.facts.parts.flatMap((part) => part.frames));
-    const faults = frames.filter((frame) => frame.good === false || frame.unexplained).length;
-    const hasAlarm = capture.results.some((result) => result.has((part) => Object.values(part.alarm ?? {}).some(Boolean)));
-    badge.hidden = !frames.length || (capture.isLive && !["done", "stopped"].includes(capture.phase));
-    badge.className = `badge ${hasAlarm ? "bad" : faults ? "warn" : "good"}`;
-    const isOpen = capture.results.some((result) => !result.facts.done);
-    badge.textContent = `${isOpen ? "not finished, " : ""}${hasAlarm ? "alarm, " : ""}${faults ? `${faults} frames to look at` : "all frames good"}`;
 }
 
 function fail(error) {
@@ -461,5 +378,5 @@ async function start() {
 }
 
 addEventListener("unhandledrejection", (event) => fail(event.reason));
-if (typeof DecompressionStream === "undefined") fail(new Error("the browser is too old (it has no DecompressionStream)"));
+if (typeof DecompressionStream === "undefined") fail(new Error("the browser is too old"));
 else start().catch(fail);

@@ -4,7 +4,8 @@ import { errorOf } from "./codec.js";
 import { wordsOf } from "./timeline.js";
 
 const element = (id) => document.getElementById(id);
-const percent = (share, digits = 3) => (typeof share === "number" ? `${(100 * share).toPrecision(digits)} %` : "-");
+const percent = (share, digits = 3) =>
+    typeof share === "number" ? `${(100 * share).toPrecision(digits)} %` : "-";
 
 /** Rows of names and values as a table; texts stay texts. */
 function tableOf(rows) {
@@ -23,7 +24,11 @@ function frameRows(frame) {
     const f = frame.figures ?? {};
     const words = wordsOf(frame).map(([, word]) => word);
     const error = errorPercent(frame);
-    const verdict = frame.skipped ? ["skipped", "warn"] : frame.good === false ? ["below the bar", "warn"] : ["good", "good"];
+    const verdict = frame.skipped
+        ? ["skipped", "warn"]
+        : frame.good === false
+          ? ["below the bar", "warn"]
+          : ["good", "good"];
     const rows = [["Verdict", ...verdict]];
     if (words.length) rows.push(["Marks", words.join(", ")]);
     rows.push(["Points", `${frame.points ?? "-"}`]);
@@ -79,8 +84,13 @@ function notesOf(capture) {
         const alarms = result.facts.parts.flatMap((part) => Object.values(part.alarm ?? {})).filter(Boolean);
         const texts = alarms.map((alarm) => `Alarm from frame ${alarm.from_frame}: ${alarm.cause}`);
         for (const warning of result.facts.warnings.flat())
-            texts.push(typeof warning === "string" ? warning : (warning.text ?? warning.message ?? JSON.stringify(warning)));
-        for (const part of result.facts.parts) if (part.no_points) texts.push(`Points not found: ${part.no_points}`);
+            texts.push(
+                typeof warning === "string"
+                    ? warning
+                    : (warning.text ?? warning.message ?? JSON.stringify(warning)),
+            );
+        for (const part of result.facts.parts)
+            if (part.no_points) texts.push(`Points not found: ${part.no_points}`);
         return texts.map((text) => name + text);
     });
 }
@@ -139,11 +149,13 @@ export function showVertex(pick, place) {
     element("vertex-facts").replaceChildren(tableOf(rows));
 }
 
-const textOfError = (error) => (Number.isNaN(error) ? "no points" : error >= 5 ? "5 % or more" : `${error.toPrecision(2)} %`);
+const textOfError = (error) =>
+    Number.isNaN(error) ? "no points" : error >= 5 ? "5 % or more" : `${error.toPrecision(2)} %`;
 
 function lengthOf(way) {
     let sum = 0;
-    for (let i = 3; i < way.length; i += 3) sum += Math.hypot(way[i] - way[i - 3], way[i + 1] - way[i - 2], way[i + 2] - way[i - 1]);
+    for (let i = 3; i < way.length; i += 3)
+        sum += Math.hypot(way[i] - way[i - 3], way[i + 1] - way[i - 2], way[i + 2] - way[i - 1]);
     return sum;
 }
 
@@ -174,5 +186,8 @@ function drawCurve(canvas, errors, place, vertex) {
     c.stroke();
     c.fillStyle = css("--bad");
     c.fillRect(x(place) - 0.75, 4, 1.5, height - 8);
-    canvas.setAttribute("aria-label", `Error of vertex ${vertex} over ${errors.length} frames, at most ${(most / 1.1).toPrecision(2)} per cent of the diagonal`);
+    canvas.setAttribute(
+        "aria-label",
+        `Error of vertex ${vertex} over ${errors.length} frames, at most ${(most / 1.1).toPrecision(2)} per cent of the diagonal`,
+    );
 }

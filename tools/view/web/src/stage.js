@@ -1,6 +1,15 @@
 // The picture: one or two views of the same space, seen by one camera.
 import {
-    Color, ColorManagement, GridHelper, LinearSRGBColorSpace, PerspectiveCamera, Ray, Scene, Vector2, Vector3, WebGLRenderer,
+    Color,
+    ColorManagement,
+    GridHelper,
+    LinearSRGBColorSpace,
+    PerspectiveCamera,
+    Ray,
+    Scene,
+    Vector2,
+    Vector3,
+    WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { boundsOf, Figure } from "./figure.js";
@@ -27,7 +36,11 @@ export class Stage {
         canvas.width = canvas.clientWidth;
         canvas.height = canvas.clientHeight;
         // In software smooth edges would take most of the time.
-        this.renderer = new WebGLRenderer({ canvas, antialias: !isSoftware(), powerPreference: "high-performance" });
+        this.renderer = new WebGLRenderer({
+            canvas,
+            antialias: !isSoftware(),
+            powerPreference: "high-performance",
+        });
         this.renderer.outputColorSpace = LinearSRGBColorSpace;
         this.renderer.autoClear = false;
         this.camera = new PerspectiveCamera(OPENING, 1, 0.01, 100);
@@ -85,8 +98,15 @@ export class Stage {
     layout() {
         const { clientWidth: width, clientHeight: height } = this.canvas;
         if (this.panes.length === 1) return [[0, 0, width, height]];
-        if (width >= height) return [[0, 0, width / 2, height], [width / 2, 0, width / 2, height]];
-        return [[0, 0, width, height / 2], [0, height / 2, width, height / 2]]; // from the top
+        if (width >= height)
+            return [
+                [0, 0, width / 2, height],
+                [width / 2, 0, width / 2, height],
+            ];
+        return [
+            [0, 0, width, height / 2],
+            [0, height / 2, width, height / 2],
+        ]; // from the top
     }
 
     /** While something moves, fewer pixels where pictures take long; all of them once it rests. */
@@ -140,7 +160,9 @@ export class Stage {
 
     /** Bounds of what is shown. */
     bounds() {
-        const all = this.figures.filter((figure) => figure.frame).map((figure) => boundsOf(figure.frame.positions));
+        const all = this.figures
+            .filter((figure) => figure.frame)
+            .map((figure) => boundsOf(figure.frame.positions));
         if (!all.length) return null;
         const pick = (side, choose) => [0, 1, 2].map((a) => choose(...all.map((b) => b[side][a])));
         return { low: pick("low", Math.min), high: pick("high", Math.max) };
@@ -150,11 +172,14 @@ export class Stage {
     fit(view, margin = 0.97) {
         const bounds = this.bounds();
         if (!bounds) return;
-        const low = new Vector3(...bounds.low), high = new Vector3(...bounds.high);
+        const low = new Vector3(...bounds.low),
+            high = new Vector3(...bounds.high);
         const middle = low.clone().add(high).multiplyScalar(0.5);
         const radius = Math.max(low.distanceTo(high) / 2, 1e-9) * margin;
         const distance = radius / Math.sin((OPENING * Math.PI) / 360);
-        const away = view ? this.#direction(...(VIEWS[view] ?? view)) : this.camera.position.clone().sub(this.controls.target).normalize();
+        const away = view
+            ? this.#direction(...(VIEWS[view] ?? view))
+            : this.camera.position.clone().sub(this.controls.target).normalize();
         this.controls.target.copy(middle);
         this.camera.position.copy(middle).addScaledVector(away, distance);
         this.camera.near = distance / 1000;
@@ -172,7 +197,9 @@ export class Stage {
     /** The vertex at a place of the canvas: {result, vertex}, or null. */
     pick(x, y) {
         const panes = this.layout();
-        const i = panes.findIndex(([left, top, w, h]) => x >= left && x < left + w && y >= top && y < top + h);
+        const i = panes.findIndex(
+            ([left, top, w, h]) => x >= left && x < left + w && y >= top && y < top + h,
+        );
         if (i < 0) return null;
         const [left, top, w, h] = panes[i];
         this.#aim(w / Math.max(h, 1));

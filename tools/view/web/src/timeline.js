@@ -8,7 +8,11 @@ const css = (name) => getComputedStyle(document.documentElement).getPropertyValu
 
 /** Where the frames of a result stand on the line, for parts and their windows. */
 function spansOf(capture, r) {
-    const spans = capture.results[r].facts.parts.map(() => ({ first: Infinity, last: -Infinity, windows: [] }));
+    const spans = capture.results[r].facts.parts.map(() => ({
+        first: Infinity,
+        last: -Infinity,
+        windows: [],
+    }));
     const byIndex = spans.map(() => []);
     capture.slots.forEach((slot, k) => {
         const at = slot.at[r];
@@ -19,7 +23,9 @@ function spansOf(capture, r) {
     });
     spans.forEach((span, p) => {
         span.windows = capture.results[r].facts.parts[p].windows
-            .map(([first, last]) => byIndex[p].filter(([index]) => index >= first && index <= last).map(([, k]) => k))
+            .map(([first, last]) =>
+                byIndex[p].filter(([index]) => index >= first && index <= last).map(([, k]) => k),
+            )
             .filter((places) => places.length)
             .map((places) => [places[0], places.at(-1)])
             .sort((a, b) => a[0] - b[0]);
@@ -29,7 +35,9 @@ function spansOf(capture, r) {
 
 /** Numbers of the frames from which a part's alarm counts. */
 function alarmsOf(part) {
-    return ["forward", "backward"].map((way) => part.alarm?.[way]).filter((alarm) => alarm && typeof alarm === "object");
+    return ["forward", "backward"]
+        .map((way) => part.alarm?.[way])
+        .filter((alarm) => alarm && typeof alarm === "object");
 }
 
 export class Timeline {
@@ -50,7 +58,9 @@ export class Timeline {
     update() {
         const { results, slots } = this.capture;
         this.spans = results.map((_, r) => spansOf(this.capture, r));
-        const errors = slots.flatMap((slot) => slot.at.map((at) => errorPercent(at?.frame))).filter((x) => x !== null);
+        const errors = slots
+            .flatMap((slot) => slot.at.map((at) => errorPercent(at?.frame)))
+            .filter((x) => x !== null);
         this.bar = Math.max(0, ...results.flatMap((result) => result.facts.parts.map((part) => part.bar)));
         const worst = Math.max(0, ...errors);
         this.most = Math.max(1.12 * worst, worst > 0.4 * this.bar ? 1.12 * this.bar : 0) || 1;
@@ -101,7 +111,10 @@ export class Timeline {
         this.current = k;
         const slot = this.capture.slots[k];
         this.element.setAttribute("aria-valuenow", k);
-        this.element.setAttribute("aria-valuetext", slot ? this.#describe(k).replaceAll("\n", ", ") : "no frame");
+        this.element.setAttribute(
+            "aria-valuetext",
+            slot ? this.#describe(k).replaceAll("\n", ", ") : "no frame",
+        );
         this.#drawHead();
     }
 
@@ -149,7 +162,8 @@ export class Timeline {
         c.textAlign = "right";
         c.textBaseline = "middle";
         for (const share of [0, 0.5, 1]) {
-            const error = share * this.most, y = Math.round(this.#y(error)) + 0.5;
+            const error = share * this.most,
+                y = Math.round(this.#y(error)) + 0.5;
             line(c, PAD.left, y, this.width - PAD.right, y);
             c.fillText(share ? `${error.toPrecision(2)} %` : "0", PAD.left - 5, y);
         }
@@ -197,7 +211,8 @@ export class Timeline {
 
     /** Windows, one row for each result; segments as blocks below them. */
     #strips(c) {
-        const rows = this.spans.length, top = this.floor + 5;
+        const rows = this.spans.length,
+            top = this.floor + 5;
         const size = Math.max(4, (this.height - top - 12) / rows - 2);
         this.spans.forEach((spans, r) => {
             const y = top + r * (size + 2);
@@ -208,12 +223,22 @@ export class Timeline {
                 span.windows.forEach(([first, last], w) => {
                     c.fillStyle = css(r ? "--curve-b" : "--accent");
                     c.globalAlpha = w % 2 ? 0.55 : 0.28;
-                    c.fillRect(this.x(first), y + (w % 2 ? size / 2 : 0), Math.max(2, this.x(last) - this.x(first)), size / 2 - 0.5);
+                    c.fillRect(
+                        this.x(first),
+                        y + (w % 2 ? size / 2 : 0),
+                        Math.max(2, this.x(last) - this.x(first)),
+                        size / 2 - 0.5,
+                    );
                 });
                 c.globalAlpha = 1;
                 if (spans.length < 2) return;
                 c.strokeStyle = css("--text");
-                c.strokeRect(this.x(span.first) - 0.5, y - 1.5, Math.max(2, this.x(span.last) - this.x(span.first)) + 1, size + 3);
+                c.strokeRect(
+                    this.x(span.first) - 0.5,
+                    y - 1.5,
+                    Math.max(2, this.x(span.last) - this.x(span.first)) + 1,
+                    size + 3,
+                );
                 if (s) line(c, this.x(span.first), PAD.top, this.x(span.first), y);
             });
         });
@@ -288,11 +313,21 @@ export function marksOf(capture) {
     const parts = capture.results.flatMap((result) => result.facts.parts);
     const names = capture.results.length > 1;
     return [
-        ["--accent", names ? `error of A: ${capture.results[0].facts.name}` : "error: median distance of points to the surface", true],
+        [
+            "--accent",
+            names
+                ? `error of A: ${capture.results[0].facts.name}`
+                : "error: median distance of points to the surface",
+            true,
+        ],
         ["--curve-b", names ? `error of B: ${capture.results[1].facts.name}` : "", names],
         ["--good", "keyframe", frames.some((frame) => frame.key)],
         ["--warn", "below the bar", frames.some((frame) => frame.good === false && !frame.skipped)],
-        ["--bad", "alarm, not explained", parts.some((part) => alarmsOf(part).length) || frames.some((frame) => frame.unexplained)],
+        [
+            "--bad",
+            "alarm, not explained",
+            parts.some((part) => alarmsOf(part).length) || frames.some((frame) => frame.unexplained),
+        ],
         ["--quiet", "skipped", frames.some((frame) => frame.skipped)],
     ].filter(([, , is]) => is);
 }
