@@ -1,4 +1,4 @@
-/* Codec of the page's numbers: prediction, planes of bytes, DEFLATE. */
+/* Codec of the page's numbers: prediction, planes of bytes, zlib. */
 #include "tools/view/view_codec.h"
 
 #include <math.h>
@@ -99,7 +99,7 @@ static npg_status deflate_all(npg_bytes *out, uint8_t *bytes, size_t size)
     z_stream stream = {.next_in = bytes, .avail_in = (uInt)size};
     bool is_end = false;
     if (size > UINT32_MAX / 2) return npg_error(NPG_USAGE, "a block of %zu bytes is too large", size);
-    if (deflateInit2(&stream, LEVEL, Z_DEFLATED, -15, 9, Z_FILTERED) != Z_OK)
+    if (deflateInit2(&stream, LEVEL, Z_DEFLATED, 15, 9, Z_FILTERED) != Z_OK)
         return npg_error(NPG_MEMORY, "no memory to compress");
     npg_status status = NPG_OK;
     while (!status && !is_end) status = deflate_some(out, &stream, &is_end);
