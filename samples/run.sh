@@ -31,9 +31,13 @@ echo "== Against the ground truth"
 build/neupig eval "$out/result" "$out/capture/truth"
 
 build/neupig render "$out/result/meshes" -o "$out/result/strip.png" --count 6 --columns 6
+# The page needs what only Node can bundle; without it there is the picture.
+page=$out/result/view.html
+build/neupig view "$out/result" -o "$page" >/dev/null 2>&1 || page=""
 
 echo
 echo "meshes   $out/result/meshes"
 echo "report   $out/result/report.json"
 echo "picture  $out/result/strip.png"
+[ -z "$page" ] || echo "page     $page (open it in a browser)"
 exit "$code"

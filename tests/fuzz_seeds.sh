@@ -62,3 +62,7 @@ block() { # NAME SIZE BYTES: as in pipeline/archive.h
 mkdir -p manifest
 printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
 printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names
+mkdir -p request
+printf 'GET /frame-0-12 HTTP/1.1\r\nUser-Agent: a\r\nHost: 127.0.0.1:8080\r\n\r\n' >request/frame
+printf 'GET / HTTP/1.0\r\nhost:  localhost:8080 \r\n\r\n' >request/old
+printf 'POST /../a%%20b?c HTTP/1.1\r\nHost: a\r\nHost: b\r\nContent-Length: 3\r\n\r\nabc' >request/other

@@ -36,7 +36,8 @@ const npg_verb npg_verbs[] = {
      "--max-memory counts for a run with all it starts; "
      "one that takes more, or longer than --max-time, is asked to stop and then killed.  "
      "Started again, what is done is left alone and what was stopped is resumed.  "
-     "At the end OUT/batch.json and OUT/batch.html report on all captures.  "
+     "At the end OUT/batch.json and OUT/batch.html report on all captures, "
+     "with a page beside each result (OUT/NAME/view.html, see view).  "
      "Exit code 0 when all are done, 7 when all are done but some with frames skipped "
      "or below the quality bar, 1 when one is not done, 75 after a signal.",
      npg_batch_options, true, npg_verb_batch},
@@ -68,6 +69,15 @@ const npg_verb npg_verbs[] = {
      "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  "
      "All tiles share one camera, so that motion shows.",
      npg_render_options, false, npg_verb_render},
+    {"view", "OUT [OTHER] [-o PAGE.html]", 1, 2, "A page with the moving mesh and where it is wrong",
+     "OUT is the output folder of a run.  "
+     "The page is one HTML file that opens in any browser without a network: the meshes over time, "
+     "coloured by vertex colours, identity, normals, error, stretch, coverage "
+     "or in how many frames they were seen, "
+     "the points of each frame, and a time line with the error and what the run reports.  "
+     "Of two results the page shows both side by side, in one view and on one time line.  "
+     "With --live the page is served on this machine and follows a run that is at work.",
+     npg_view_options, false, npg_verb_view},
     {"bench", "[REPORT.json]", 0, 1, "Time the kernels and the fit on this machine",
      "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches "
      "of the limit that binds it, which is measured right beside (multiply-adds, or bytes copied); "

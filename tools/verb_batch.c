@@ -11,7 +11,7 @@
 typedef struct settings {
     const char *config;
     int progress, segments;
-    bool quiet, verbose, dry_run, list, report;
+    bool quiet, verbose, dry_run, list, report, view;
     int64_t jobs, task_index, task_count;
     double max_time_s;
 } settings;
@@ -39,6 +39,8 @@ const npg_option npg_batch_options[] = {
     NPG_ROW_FLAG  ("report",     AT(report),     "no",
         "Only write batch.json and batch.html and print the table of what is there; "
         "the exit code is that of all"),
+    NPG_ROW_FLAG  ("view",       AT(view),       "yes",
+        "Put a page beside each result (OUT/NAME/view.html, as neupig view makes it), linked from batch.html"),
     NPG_ROW_INT   ("task-index", AT(task_index), "0",        0,     1e6,  "I",
         "With several processes or machines: the number of this one, from 0"),
     NPG_ROW_INT   ("task-count", AT(task_count), "1",        1,     1e6,  "N",
@@ -109,6 +111,7 @@ static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settin
                          "option task-index: %lld is not below the task-count of %lld; the first task is 0",
                          (long long)s->task_index, (long long)s->task_count);
     NPG_TRY(npg_batch_open(batch, cli->operands[0], &given));
+    (*batch)->has_views = s->view;
     (*batch)->task_index = (size_t)s->task_index;
     (*batch)->task_count = (size_t)s->task_count;
     return NPG_OK;

@@ -47,6 +47,7 @@ setup() {
     [ "$status" -eq 0 ]
     [ -s "$prefix/share/man/man1/neupig.1" ]
     bash -n "$prefix/share/bash-completion/completions/neupig"
+    [ -s "$prefix/share/neupig/view/page.html" ]
     [ "$(head -n 1 "$prefix/share/zsh/site-functions/_neupig")" = "#compdef neupig" ]
 }
 

@@ -19,7 +19,7 @@ setup() {
 
 @test "it holds command, libraries, header, manual, completion and licence, all below /usr" {
     for file in bin/neupig libexec/neupig/neupig-{devices,poisson} include/neupig.h share/man/man1/neupig.1 \
-        share/bash-completion/completions/neupig share/zsh/vendor-completions/_neupig share/doc/neupig/copyright; do
+        share/neupig/view/page.html share/bash-completion/completions/neupig share/zsh/vendor-completions/_neupig share/doc/neupig/copyright; do
         [ -s "root/usr/$file" ]
     done
     [ "$(ls root)" = usr ]
@@ -33,6 +33,8 @@ setup() {
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     [ -s out/done.json ]
+    root/usr/bin/neupig view out
+    [ -s out/view.html ]
 }
 
 @test "every library that its programs name belongs to a package it depends on" {

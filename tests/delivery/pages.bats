@@ -92,7 +92,7 @@ copy_tree() { # FOLDER
 }
 
 @test "every option that a page names is one of the command or of a script" {
-    for verb in run batch append apply probe eval synth render bench tune doctor man; do "$NEUPIG" help $verb; done >known
+    for verb in run batch append apply probe eval synth render view bench tune doctor man; do "$NEUPIG" help $verb; done >known
     for script in explore plot_explore figures paper_tables; do "$root/tools/$script.py" --help; done >>known
     # of CMake, CTest, pip, bats and others
     echo "--build --target --install --prefix --preset --config --test-dir --output-on-failure --system-site-packages --array" >>known

@@ -37,6 +37,7 @@ typedef struct npg_batch {
     bool is_folder;        /* path is that of a folder of captures, not of a manifest */
     npg_capture *captures; /* owned */
     size_t count, capacity;
+    bool has_views;                /* a page is put beside each result */
     size_t task_index, task_count; /* this process does captures i with i mod task_count == task_index */
 } npg_batch;
 

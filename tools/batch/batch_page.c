@@ -9,6 +9,7 @@
 #include "pipeline/memory.h"
 #include "tools/batch/batch_segments.h"
 #include "tools/batch/batch_verdict.h"
+#include "tools/batch/batch_view.h"
 #include "tools/progress.h"
 
 static const char head[] =
@@ -210,9 +211,10 @@ static npg_status add_worst(npg_file *page, const npg_capture *capture, const np
     return status;
 }
 
-static npg_status write_capture(npg_file *page, const npg_capture *capture, size_t i,
+static npg_status write_capture(npg_file *page, const npg_batch *batch, size_t i,
                                 const npg_capture_figures *f)
 {
+    const npg_capture *capture = &batch->captures[i];
     const npg_verdict *v = &capture->verdict;
     npg_file_print(page, "<section id=\"capture-%zu\">\n<h2>", i);
     npg_page_text(page, capture->name);
@@ -226,6 +228,7 @@ static npg_status write_capture(npg_file *page, const npg_capture *capture, size
         npg_page_text(page, v->message);
     }
     npg_file_print(page, "</p>\n");
+    npg_batch_view_link(page, batch, capture);
     if (f->count) {
         npg_page_chart(page, f);
         write_segments(page, f);
@@ -247,8 +250,7 @@ npg_status npg_batch_page_write(const npg_batch *batch, const npg_capture_figure
     npg_file_write(page, head, sizeof head - 1);
     write_sums(page, batch);
     write_table(page, batch, figures);
-    for (size_t i = 0; i < batch->count && !status; i++)
-        status = write_capture(page, &batch->captures[i], i, &figures[i]);
+    for (size_t i = 0; i < batch->count && !status; i++) status = write_capture(page, batch, i, &figures[i]);
     npg_file_print(page, "<p>neupig %s</p>\n</body>\n</html>\n", npg_version());
     if (!status) return npg_file_commit(&page);
     npg_file_discard(&page);

@@ -2,25 +2,13 @@
 #include <stdio.h>
 
 #include "pipeline/memory.h"
+#include "tools/base64.h"
 #include "tools/batch/batch_page.h"
 #include "tools/render/render_image.h"
 
 enum { HEIGHT = 260, SAMPLES = 2 };
 #define ASPECT      1.2
 #define BALL_RADIUS 0.0035 /* of a cloud's points, in diagonals */
-
-static void write_base64(npg_file *page, const unsigned char *bytes, size_t size)
-{
-    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < size; i += 3) {
-        uint32_t left = (uint32_t)(size - i), three = (uint32_t)bytes[i] << 16;
-        if (left > 1) three |= (uint32_t)bytes[i + 1] << 8;
-        if (left > 2) three |= bytes[i + 2];
-        char four[4] = {digits[three >> 18], digits[three >> 12 & 63],
-                        left > 1 ? digits[three >> 6 & 63] : '=', left > 2 ? digits[three & 63] : '='};
-        npg_file_write(page, four, 4);
-    }
-}
 
 static npg_status draw(npg_image *image, const char *path, const char *reach_of)
 {
@@ -58,7 +46,7 @@ npg_status npg_page_picture(npg_file *page, const char *path, const char *reach_
         npg_file_print(page, "<img width=\"%d\" height=\"%d\" alt=\"", (int)image.width, (int)image.height);
         npg_page_text(page, caption);
         npg_file_print(page, "\" src=\"data:image/png;base64,");
-        write_base64(page, bytes, size);
+        npg_base64_write(page, bytes, size);
         npg_file_print(page, "\"/>");
     }
     npg_file_print(page, "<figcaption>");

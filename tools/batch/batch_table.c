@@ -13,6 +13,7 @@
 #include "tools/batch/batch_page.h"
 #include "tools/batch/batch_segments.h"
 #include "tools/batch/batch_verdict.h"
+#include "tools/batch/batch_view.h"
 #include "tools/progress.h"
 
 /* ---- text ---- */
@@ -110,6 +111,7 @@ static npg_status report(npg_batch *batch, npg_capture_figures *figures, FILE *o
 {
     NPG_TRY(read_figures(figures, batch));
     NPG_TRY(write_json(batch, figures));
+    NPG_TRY(npg_batch_views_write(batch));
     NPG_TRY(npg_batch_page_write(batch, figures));
     if (out) print_table(out, batch, figures);
     return NPG_OK;

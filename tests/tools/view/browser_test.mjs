@@ -1,0 +1,340 @@
+// The page in a real browser.
+//
+//     node browser_test.mjs MODULES BROWSER TEST ARGUMENTS...
+//
+//     figures PAGE RUN        curve and marks are those of frames.jsonl, decoded positions those of the meshes
+//     looks PAGE              each colour mode and shading changes the picture; points, views, fit, themes, a vertex
+//     plays PAGE              play, pause, scrub, step, speed, loop, by buttons, mouse and keys
+//     picture PAGE STORED     a known frame looks as it did (WRITE=1 in the environment stores it)
+//     compare PAGE            two results on one time line
+//     phone PAGE              at the width of a phone
+//     names PAGE              hostile names are shown as text
+//     live URL RUN            follows a run until it ends
+import fs from "node:fs";
+import path from "node:path";
+import { pathToFileURL } from "node:url";
+import { compare, openBrowser, openPage, pictureOf, ready, shows } from "./open_browser.mjs";
+import { readPly } from "./page_file.mjs";
+
+const [modules, program, name, where, ...rest] = process.argv.slice(2);
+const url = where.startsWith("http") ? where : pathToFileURL(path.resolve(where)).href;
+
+function expect(condition, text) {
+    if (condition) return;
+    throw new Error(typeof text === "string" ? text : JSON.stringify(text));
+}
+
+const linesOf = (run) =>
+    fs
+        .readFileSync(path.join(run, "frames.jsonl"), "utf8")
+        .trim()
+        .split("\n")
+        .map((line) => JSON.parse(line));
+const state = (page, expression) => page.evaluate(expression);
+
+async function figures(page, [run]) {
+    const lines = linesOf(run);
+    const curve = await state(page, () =>
+        window.neupig.capture.slots.map((slot) => slot.at[0].frame.figures.point_dist_median),
+    );
+    expect(
+        String(curve) === String(lines.map((line) => line.figures.point_dist_median)),
+        "the curve is not that of frames.jsonl",
+    );
+    const marks = await state(page, () => document.getElementById("marks").textContent);
+    for (const word of ["keyframe", "below the bar", "alarm", "skipped"])
+        expect(marks.includes(word), `no mark: ${word}`);
+    const windows = await state(page, () => window.neupig.timeline.spans[0][0].windows.length);
+    expect(windows > 1, `${windows} windows`);
+    expect(
+        (await state(page, () => document.getElementById("notes").textContent)).includes("Alarm from frame"),
+        "the alarm is not told",
+    );
+    for (const line of lines.filter((l) => l.file)) {
+        const { positions } = readPly(path.join(run, line.file));
+        const shown = await state(
+            page,
+            `(async () => {
+            const frame = await neupig.capture.results[0].stores[0].frame(${line.index});
+            return Array.from(frame.positions, (x, i) => x + neupig.capture.origin[i % 3]);
+        })()`,
+        );
+        const worst = shown.reduce((most, x, i) => Math.max(most, Math.abs(x - positions[i])), 0);
+        expect(shown.length === positions.length && worst < 2e-5, `frame ${line.number}: off by ${worst}`);
+    }
+    await page.locator("#timeline").hover({ position: { x: 200, y: 20 } });
+    const tip = await state(page, () => document.getElementById("tip").textContent);
+    const number = Number(/^Frame (\d+)/.exec(tip)?.[1]);
+    expect(tip.includes(`${(100 * lines[number].figures.point_dist_median).toPrecision(3)} %`), tip);
+}
+
+async function looks(page) {
+    const seen = new Map();
+    async function isNew(what) {
+        const picture = await pictureOf(page);
+        const twin = [...seen].find(([, other]) => other === picture)?.[0];
+        expect(!twin, `${what} looks as ${twin}`);
+        seen.set(what, picture);
+    }
+    await isNew("plain");
+    const modes = await page
+        .locator("#colour option")
+        .evaluateAll((all) => all.map((o) => [o.value, o.disabled]));
+    expect(
+        modes.length === 8 &&
+            modes
+                .filter(([, isOff]) => isOff)
+                .map(([id]) => id)
+                .join() === "vertex",
+        modes,
+    );
+    for (const [id] of modes.filter(([mode, isOff]) => !isOff && mode !== "plain")) {
+        await page.selectOption("#colour", id);
+        await isNew(id);
+        expect(
+            (await page.locator("#legend").isVisible()) ===
+                ["error", "stretch", "coverage", "seen"].includes(id),
+            `legend of ${id}`,
+        );
+    }
+    await page.selectOption("#colour", "error");
+    await page.selectOption("#range", "0.1");
+    await isNew("another range");
+    await page.selectOption("#colour", "plain");
+    for (const shading of ["flat", "wire"]) {
+        await page.click(`[data-shading=${shading}]`);
+        await isNew(shading);
+    }
+    await page.click("[data-shading=smooth]");
+    await page.click("#points");
+    await isNew("points");
+    await page.click("#points");
+    for (const view of ["front", "right", "back", "left", "top"]) {
+        await page.click(`[data-view=${view}]`);
+        await isNew(view);
+    }
+    await page.click("#grid");
+    await isNew("no grid");
+    await page.click("[data-view=front]");
+    const box = await page.locator("#canvas").boundingBox();
+    const middle = [box.x + box.width / 2, box.y + box.height / 2];
+    await page.mouse.click(...middle);
+    await page.waitForFunction(() => window.neupig.pick?.history, null, { timeout: 30000 });
+    const facts = await state(page, () => document.getElementById("vertex-facts").textContent);
+    const vertex = await state(page, () => window.neupig.pick.vertex);
+    expect(facts.includes(`Number${vertex}`) && facts.includes("Error in this frame"), facts);
+    expect(await page.locator("#vertex-curve").isVisible(), "no curve of the vertex");
+    await isNew("a vertex");
+    await page.keyboard.press("Escape");
+    expect((await state(page, () => window.neupig.pick)) === null, "the vertex is still marked");
+    await page.mouse.move(...middle);
+    await page.mouse.down();
+    await page.mouse.move(middle[0] + 80, middle[1] + 30, { steps: 4 });
+    await page.mouse.up();
+    await isNew("orbited");
+    const orbited = await pictureOf(page);
+    await page.mouse.wheel(0, 300);
+    await page.waitForTimeout(100);
+    await isNew("zoomed");
+    await page.keyboard.press("f");
+    expect((await pictureOf(page)) === orbited, "fitting brings the distance back, and the side stays");
+    await page.click("#theme");
+    await isNew("dark");
+}
+
+async function plays(page) {
+    const slot = () => state(page, () => window.neupig.player.slot);
+    const last = await state(page, () => window.neupig.player.last);
+    const first = await pictureOf(page);
+    await page.click("#play");
+    await page.waitForFunction(() => window.neupig.player.slot > 3, null, { timeout: 30000 });
+    await page.click("#play");
+    const paused = await slot();
+    await page.waitForTimeout(300);
+    expect((await slot()) === paused, "it goes on after pause");
+    await shows(page, paused);
+    expect((await pictureOf(page)) !== first, "playing changed nothing");
+    await page.keyboard.press("Home");
+    await shows(page, 0);
+    expect((await pictureOf(page)) === first, "the first frame looks otherwise the second time");
+    await page.click("#back");
+    expect((await slot()) === last, "a step back from the first frame is the last one");
+    await page.keyboard.press("ArrowRight");
+    expect((await slot()) === 0, "a step on from the last frame is the first one");
+    await page.keyboard.press("l");
+    await page.keyboard.press("ArrowLeft");
+    expect((await slot()) === 0, "without the loop it stays at the first frame");
+    await page.keyboard.press("Shift+ArrowRight");
+    expect((await slot()) === 10, "ten on");
+    await page.keyboard.press("k");
+    expect(
+        await state(page, () => window.neupig.capture.slots[window.neupig.player.slot].at[0].frame.key),
+        "to the keyframe",
+    );
+    await page.keyboard.press("w");
+    expect((await slot()) === 3, "to the worst frame");
+    await page.click("#bad");
+    expect((await slot()) === last - 1, "to the next below the bar");
+    await shows(page, last - 1);
+    expect(
+        (await state(page, () => document.getElementById("message").textContent)) === "no mesh in this frame",
+        "no mesh",
+    );
+    const line = await page.locator("#timeline").boundingBox();
+    await page.mouse.move(line.x + 100, line.y + 30);
+    await page.mouse.down();
+    await page.mouse.move(line.x + line.width / 2, line.y + 30, { steps: 5 });
+    const middle = await slot();
+    await page.mouse.move(line.x + line.width - 2, line.y + 30, { steps: 5 });
+    await page.mouse.up();
+    expect(
+        middle > 3 && middle < last && (await slot()) === last,
+        `scrubbed to ${middle}, then ${await slot()}`,
+    );
+    expect(
+        Number(await page.locator("#timeline").getAttribute("aria-valuenow")) === last,
+        "the slider's value",
+    );
+    expect(
+        (await page.locator("#timeline").getAttribute("aria-valuetext")).startsWith(`Frame ${last}`),
+        "the slider's text",
+    );
+    await page.selectOption("#speed", "4");
+    await page.keyboard.press("Home");
+    await page.locator("#canvas").focus();
+    await page.keyboard.press(" ");
+    await page.waitForFunction(() => !window.neupig.player.isPlaying, null, { timeout: 30000 }); // no loop: it ends
+    expect((await slot()) === last, "it ends with the last frame");
+    await page.keyboard.press("-");
+    expect((await state(page, () => window.neupig.player.speed)) === 2, "slower");
+    await page.keyboard.press("?");
+    expect(await page.locator("#help-dialog").isVisible(), "no help");
+    await page.keyboard.press("Escape");
+    for (const id of ["first", "back", "play", "next", "last", "theme", "help"])
+        expect(
+            await page.locator(`#${id}`).getAttribute("aria-label"),
+            `${id} has no name for screen readers`,
+        );
+}
+
+async function picture(page, [stored]) {
+    await state(page, () => {
+        const app = window.neupig;
+        app.setPanel(false);
+        app.setColour("identity");
+        app.seek(7);
+    });
+    await shows(page, 7);
+    await state(page, () => window.neupig.view("front"));
+    const now = await pictureOf(page);
+    if (process.env.WRITE) fs.writeFileSync(stored, Buffer.from(now.split(",")[1], "base64"));
+    const then = `data:image/png;base64,${fs.readFileSync(stored).toString("base64")}`;
+    const difference = await compare(page, now, then);
+    expect(difference.mean < 1.5 && difference.share < 0.01, difference);
+    await state(page, () => window.neupig.seek(0));
+    await shows(page, 0);
+    const other = await compare(page, await pictureOf(page), then);
+    expect(other.share > 0.01, `another frame passes for this one: ${JSON.stringify(other)}`);
+}
+
+async function compareResults(page) {
+    const names = await page.locator("#pane-names span").allTextContents();
+    expect(names.length === 2 && names[0].startsWith("A: ") && names[1].startsWith("B: "), names);
+    const halves = () =>
+        state(page, () => {
+            const app = window.neupig;
+            app.stage.draw();
+            const canvas = document.getElementById("canvas");
+            return [0, 1].map((side) => {
+                const half = document.createElement("canvas");
+                [half.width, half.height] = [canvas.width / 2, canvas.height];
+                half.getContext("2d").drawImage(canvas, (-side * canvas.width) / 2, 0);
+                return half.toDataURL();
+            });
+        });
+    const before = await halves();
+    await state(page, () => window.neupig.seek(5));
+    await shows(page, 5);
+    const after = await halves();
+    expect(before[0] !== after[0] && before[1] !== after[1], "both move");
+    await page.keyboard.press("2");
+    const turned = await halves();
+    expect(turned[0] !== after[0] && turned[1] !== after[1], "both turn");
+    const last = await state(page, () => window.neupig.player.last);
+    await page.keyboard.press("End");
+    await shows(page, last);
+    expect(
+        (await page.locator("#message").textContent()) === "B: not in this result",
+        "a frame that only one has",
+    );
+}
+
+async function phone(page) {
+    const wide = await state(page, () => document.documentElement.scrollWidth);
+    expect(wide <= 390, `${wide} pixels wide`);
+    for (const id of ["canvas", "play", "timeline", "colour"]) {
+        const box = await page.locator(`#${id}`).boundingBox();
+        expect(
+            box && box.x >= 0 && box.y >= 0 && box.x < 390 && box.y + box.height <= 845,
+            `${id}: ${JSON.stringify(box)}`,
+        );
+    }
+    expect((await page.locator("#canvas").boundingBox()).height > 300, "the picture is small");
+    const before = await pictureOf(page);
+    await page.tap("#next");
+    await shows(page, 1);
+    expect((await pictureOf(page)) !== before, "a tap does nothing");
+    await page.tap("#toggle-panel");
+    expect(await page.locator("#frame-facts").isVisible(), "no details");
+}
+
+async function names(page) {
+    expect((await state(page, () => document.title)).includes("<img src=x"), "the title");
+    expect(
+        (await page.locator("#name").textContent()).includes("<img src=x onerror=alert(1)>"),
+        "the heading",
+    );
+    expect((await page.locator("img, iframe, link, object").count()) === 0, "an element came from a name");
+    expect((await page.locator("#notes").textContent()).includes("</script><script>"), "the warning");
+    expect((await page.locator("#notes b").count()) === 0, "an element came from the alarm");
+}
+
+async function live(page, [run]) {
+    await page.waitForFunction(() => window.neupig.capture.slots.length === 2 && window.neupig.shown, null, {
+        timeout: 30000,
+    });
+    expect(
+        (await page.locator("#progress-text").textContent()) === "solving: 2 of 6 frames",
+        await page.locator("#progress-text").textContent(),
+    );
+    const before = await pictureOf(page);
+    const lines = fs.readFileSync(path.join(run, "all.jsonl"), "utf8").trim().split("\n");
+    fs.writeFileSync(
+        path.join(run, "frames.partial.jsonl"),
+        [3, 2, 1, 5].map((i) => `${lines[i]}\n`).join(""),
+    );
+    await page.waitForFunction(() => window.neupig.capture.slots.length === 4, null, { timeout: 30000 });
+    await shows(page, 3); // it was at the last frame, and stays there
+    expect((await pictureOf(page)) !== before, "the new frame is not shown");
+    fs.copyFileSync(path.join(run, "all.jsonl"), path.join(run, "frames.jsonl"));
+    fs.copyFileSync(path.join(run, "done.later"), path.join(run, "done.json"));
+    await page.waitForFunction(() => document.body.dataset.ended === "done", null, { timeout: 30000 });
+    expect((await page.locator("#progress-text").textContent()) === "done: 6 of 6 frames", "the end");
+    console.log("ended");
+}
+
+const tests = { figures, looks, plays, picture, compare: compareResults, phone, names, live };
+const sizes = { picture: { width: 480, height: 480 }, phone: { width: 390, height: 844 } };
+const browser = await openBrowser(modules, program);
+try {
+    const options = name === "phone" ? { hasTouch: true, isMobile: true } : {};
+    const page = await openPage(browser, url, sizes[name], options);
+    if (name !== "live") await ready(page);
+    console.log(
+        `${name}: the first picture after ${await state(page, () => document.body.dataset.ready ?? "?")} ms`,
+    );
+    await tests[name](page, rest);
+    expect(!page.faults.length, `the page says: ${page.faults.join("; ")}`);
+} finally {
+    await browser.close();
+}

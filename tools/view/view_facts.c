@@ -1,0 +1,136 @@
+/* Facts: what a page knows of a result beside meshes and points, as JSON. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "pipeline/json_file.h"
+#include "pipeline/plan.h"
+#include "tools/view/view_result.h"
+
+enum { WARNINGS_MAX = 50 };
+
+static const json_t *options_of(const npg_view_part *part)
+{
+    return json_object_get(part->done ? part->done : part->job, "options");
+}
+
+static const json_t *stage_of(const npg_view_part *part, const char *name)
+{
+    return json_object_get(json_object_get(part->report, "stages"), name);
+}
+
+static double option_number(const npg_view_part *part, const char *name, double otherwise)
+{
+    const char *text = json_string_value(json_object_get(options_of(part), name));
+    return text ? strtod(text, NULL) : otherwise;
+}
+
+/* ---- frames ---- */
+
+static json_t *json_of_frame(const npg_view_frame *frame)
+{
+    static const char *const copied[] = {"key",         "skipped", "held",   "good",
+                                         "unexplained", "points",  "figures"};
+    json_t *out = json_pack("{sI sI sb}", "index", (json_int_t)frame->index, "number",
+                            (json_int_t)frame->number, "mesh", frame->file != NULL);
+    for (size_t i = 0; i < sizeof copied / sizeof *copied && out; i++) {
+        json_t *value = json_object_get(frame->line, copied[i]);
+        if (value) json_object_set(out, copied[i], value);
+    }
+    return out;
+}
+
+static json_t *json_of_frames(const npg_view_part *part)
+{
+    json_t *frames = json_array();
+    for (size_t i = 0; i < part->count; i++) json_array_append_new(frames, json_of_frame(&part->frames[i]));
+    return frames;
+}
+
+/* ---- windows ---- */
+
+/* All frames of the run, those that are not solved yet as well. */
+static int64_t frames_in_all(const npg_view_part *part)
+{
+    int64_t count = part->count ? part->frames[part->count - 1].index + 1 : 0;
+    int64_t listed = (int64_t)json_array_size(json_object_get(part->job, "frames"));
+    int64_t done = (int64_t)json_integer_value(json_object_get(part->done, "frames"));
+    if (listed > count) count = listed;
+    return done > count ? done : count;
+}
+
+static int64_t key_of(const npg_view_part *part)
+{
+    for (size_t i = 0; i < part->count; i++)
+        if (json_is_true(json_object_get(part->frames[i].line, "key"))) return part->frames[i].index;
+    return -1;
+}
+
+/* [[first, last], ...] by index; of frames that were appended the windows are those of one run over all. */
+static json_t *json_of_windows(const npg_view_part *part)
+{
+    json_t *windows = json_array();
+    npg_plan plan = {.frame_count = frames_in_all(part), .key = key_of(part)};
+    plan.window = npg_plan_window_asked((int64_t)option_number(part, "window", 0), plan.frame_count);
+    plan.overlap = (int64_t)option_number(part, "overlap", 0);
+    if (plan.window <= 0 || plan.window > plan.frame_count) plan.window = plan.frame_count;
+    if (plan.overlap >= plan.window) plan.overlap = plan.window - 1;
+    if (plan.key < 0 || plan.frame_count > 1000000 || plan.overlap < 0) return windows;
+    for (int64_t i = 0; i < npg_plan_window_count(&plan); i++) {
+        npg_window window = npg_plan_window(&plan, i);
+        json_array_append_new(windows, json_pack("[II]", (json_int_t)window.first, (json_int_t)window.last));
+    }
+    return windows;
+}
+
+/* ---- parts ---- */
+
+static json_t *json_of_part(const npg_view_part *part)
+{
+    const npg_mesh *mesh = part->reference;
+    json_t *topology = json_object_get(stage_of(part, "evaluate"), "topology");
+    json_t *out = json_pack("{so sI sI sI sI sf sf sf so so}", "label", npg_json_text(part->label),
+                            "vertices", (json_int_t)(mesh ? mesh->vert_count : 0), "faces",
+                            (json_int_t)(mesh ? mesh->face_count : 0), "group", (json_int_t)part->group,
+                            "frame_count", (json_int_t)frames_in_all(part), "diagonal", part->diagonal,
+                            "cover", part->cover_share, "bar", option_number(part, "max-residual", 0.5),
+                            "windows", json_of_windows(part), "frames", json_of_frames(part));
+    if (!out) return NULL;
+    if (part->origin.known)
+        json_object_set_new(
+            out, "origin",
+            json_pack("[fff]", part->origin.world[0], part->origin.world[1], part->origin.world[2]));
+    if (json_is_object(topology)) json_object_set(out, "alarm", topology);
+    return out;
+}
+
+static json_t *json_of_warnings(const npg_view_part *part)
+{
+    size_t i;
+    json_t *out = json_array(), *warning;
+    json_array_foreach(json_object_get(part->report, "warnings"), i, warning)
+    {
+        if (i < WARNINGS_MAX) json_array_append(out, warning);
+    }
+    return out;
+}
+
+json_t *npg_view_result_json(const npg_view_result *result)
+{
+    const npg_view_part *first = &result->parts[0];
+    const json_t *done = first->done;
+    const char *up = json_string_value(json_object_get(options_of(first), "up"));
+    double fps = option_number(first, "fps", 30);
+    json_t *parts = json_array(), *warnings = json_array();
+    for (size_t i = 0; i < result->part_count; i++) {
+        json_array_append_new(parts, json_of_part(&result->parts[i]));
+        json_array_append_new(warnings, json_of_warnings(&result->parts[i]));
+    }
+    json_t *out = json_pack("{so so sb sf ss so so}", "name", npg_json_text(result->name), "path",
+                            npg_json_text(result->path), "done", result->is_done, "fps",
+                            fps > 0 && fps < 1e6 ? fps : 30, "up", up && !strcmp(up, "z") ? "z" : "y",
+                            "parts", parts, "warnings", warnings);
+    const json_t *source = result->segments ? result->segments : done;
+    if (out && json_is_string(json_object_get(source, "status")))
+        json_object_set(out, "status", json_object_get(source, "status"));
+    return out;
+}

@@ -1,0 +1,266 @@
+/* Frame: meshes and points of a result as blocks of bytes for the page. */
+#include "tools/view/view_frame.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "tools/view/view_read.h"
+
+#define GRID_STEPS 65535 /* of the smallest frame's longest side, at least: 16 bits */
+
+npg_status npg_view_frames_open(npg_view_frames *frames, const npg_view_part *part, size_t point_limit)
+{
+    const npg_mesh *mesh = part->reference;
+    *frames = (npg_view_frames){.part = part, .point_limit = point_limit};
+    npg_status status = npg_alloc_array(&frames->vert_pos, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&frames->seen, NPG_FOR_MESH, mesh->vert_count, sizeof(int32_t));
+    if (!status) memcpy(frames->vert_pos, mesh->vert_pos, 3 * mesh->vert_count * sizeof(float));
+    if (!status && mesh->vert_colours) {
+        status = npg_alloc_array(&frames->colours, NPG_FOR_MESH, mesh->vert_count, 3);
+        for (size_t i = 0; i < mesh->vert_count && !status; i++)
+            memcpy(frames->colours + 3 * i, mesh->vert_colours + 4 * i, 3);
+    }
+    if (status) npg_view_frames_close(frames);
+    return status;
+}
+
+void npg_view_frames_close(npg_view_frames *frames)
+{
+    npg_job_motion_close(&frames->motion);
+    npg_release(&frames->vert_pos);
+    npg_release(&frames->points);
+    npg_release(&frames->some);
+    npg_release(&frames->seen);
+    npg_release(&frames->colours);
+}
+
+/* ---- grids ---- */
+
+static npg_view_grid grid_of(const npg_bounds *all, double shortest)
+{
+    double span = npg_bounds_longest(all), step = shortest / GRID_STEPS;
+    npg_view_grid grid = {{all->lo[0], all->lo[1], all->lo[2]}, step};
+    if (grid.step < span / NPG_VIEW_GRID_MAX) grid.step = span / NPG_VIEW_GRID_MAX;
+    if (!(grid.step > 0)) grid.step = 1; /* all in one place */
+    return grid;
+}
+
+static npg_view_grid grid_of_one(const float *points, size_t count)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, points, count);
+    return grid_of(&bounds, npg_bounds_longest(&bounds));
+}
+
+/* ---- what a group is made of ---- */
+
+typedef struct group {
+    npg_view_frames *frames;
+    size_t count, v;
+    float *positions; /* count x V x 3 */
+    int32_t *errors;  /* count x V     */
+    float *points;    /* of all frames */
+    size_t point_total, point_capacity;
+    uint32_t *point_counts; /* count */
+    npg_view_grid grid;
+} group;
+
+static npg_status open_group(group *g)
+{
+    NPG_TRY(npg_alloc_array(&g->positions, NPG_FOR_MESH, g->count * g->v, 3 * sizeof *g->positions));
+    NPG_TRY(npg_alloc_array(&g->errors, NPG_FOR_MESH, g->count * g->v, sizeof *g->errors));
+    return npg_alloc_array(&g->point_counts, NPG_FOR_MESH, g->count, sizeof *g->point_counts);
+}
+
+static void close_group(group *g)
+{
+    npg_release(&g->positions);
+    npg_release(&g->errors);
+    npg_release(&g->points);
+    npg_release(&g->point_counts);
+}
+
+static npg_status gather_frame(group *g, size_t i, const npg_view_frame *frame)
+{
+    npg_view_frames *frames = g->frames;
+    size_t shown;
+    NPG_TRY(npg_view_read_mesh(frames, frame));
+    memcpy(g->positions + 3 * g->v * i, frames->vert_pos, 3 * g->v * sizeof *g->positions);
+    frames->point_count = 0;
+    if (frame->file || frame->source) NPG_TRY(npg_view_read_points(frames, frame));
+    if (frame->file) NPG_TRY(npg_view_measure(frames, g->errors + g->v * i));
+    NPG_TRY(npg_view_choose_points(frames, &shown));
+    NPG_TRY(npg_grow(&g->points, &g->point_capacity, g->point_total + shown, 3 * sizeof *g->points,
+                     NPG_FOR_FRAMES));
+    if (shown) memcpy(g->points + 3 * g->point_total, frames->some, 3 * shown * sizeof *g->points);
+    g->point_total += shown;
+    g->point_counts[i] = (uint32_t)shown;
+    return NPG_OK;
+}
+
+static npg_status gather(group *g, size_t first)
+{
+    npg_bounds all = npg_bounds_empty();
+    double shortest = INFINITY;
+    for (size_t i = 0; i < g->count; i++) {
+        npg_bounds bounds = npg_bounds_empty();
+        NPG_TRY(gather_frame(g, i, &g->frames->part->frames[first + i]));
+        npg_bounds_add_points(&bounds, g->positions + 3 * g->v * i, g->v);
+        shortest = fmin(shortest, npg_bounds_longest(&bounds));
+        npg_bounds_add(&all, &bounds);
+    }
+    g->grid = grid_of(&all, shortest);
+    return NPG_OK;
+}
+
+/* ---- packing ---- */
+
+/* left = change predicted over space; now and before are 3 x V, before may be NULL; change is room for V. */
+static void predict_frame(const npg_view_links *links, int32_t *left, int32_t *change, const int32_t *now,
+                          const int32_t *before)
+{
+    size_t v = links->vert_count;
+    for (size_t a = 0; a < 3; a++) {
+        for (size_t i = 0; i < v; i++) change[i] = now[a * v + i] - (before ? before[a * v + i] : 0);
+        npg_view_predict(links, left + a * v, change);
+    }
+}
+
+/* Frames in turn, of which two are held at a time. */
+static npg_status pack_positions(npg_bytes *out, size_t *size, const npg_view_links *links,
+                                 const npg_view_grid *grid, const float *positions, size_t count)
+{
+    size_t v = links->vert_count;
+    int32_t *rooms, *left = NULL;
+    NPG_TRY(npg_alloc_array(&rooms, NPG_FOR_MESH, 7 * v, sizeof *rooms));
+    npg_status status = npg_alloc_array(&left, NPG_FOR_MESH, 3 * v * count, sizeof *left);
+    for (size_t t = 0; t < count && !status; t++) {
+        int32_t *now = rooms + 3 * v * (t % 2), *before = rooms + 3 * v * (1 - t % 2);
+        npg_view_round(grid, now, positions + 3 * v * t, v);
+        predict_frame(links, left + 3 * v * t, rooms + 6 * v, now, t ? before : NULL);
+    }
+    if (!status) status = npg_view_pack(out, size, left, 3 * v * count);
+    npg_release(&rooms);
+    npg_release(&left);
+    return status;
+}
+
+/* Rows of V values, each predicted by itself. */
+static npg_status pack_rows(npg_bytes *out, size_t *size, const npg_view_links *links, const int32_t *rows,
+                            size_t count)
+{
+    size_t v = links->vert_count;
+    int32_t *left;
+    NPG_TRY(npg_alloc_array(&left, NPG_FOR_MESH, count * v, sizeof *left));
+    for (size_t r = 0; r < count; r++) npg_view_predict(links, left + r * v, rows + r * v);
+    npg_status status = npg_view_pack(out, size, left, count * v);
+    npg_release(&left);
+    return status;
+}
+
+static npg_status pack_points(npg_bytes *out, size_t *size, const group *g)
+{
+    npg_view_grid wide = g->grid;
+    int32_t *values;
+    wide.step *= NPG_VIEW_POINT_STEP;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_FRAMES, g->point_total, 3 * sizeof *values));
+    for (size_t t = 0, at = 0; t < g->count; at += g->point_counts[t++])
+        for (size_t a = 0; a < 3; a++) {
+            int32_t before = 0, *row = values + 3 * at + a * g->point_counts[t];
+            for (size_t i = 0; i < g->point_counts[t]; i++) {
+                double share = ((double)g->points[3 * (at + i) + a] - wide.origin[a]) / wide.step;
+                int32_t now = (int32_t)lrint(fmax(-NPG_VIEW_GRID_MAX, fmin(NPG_VIEW_GRID_MAX, share)));
+                row[i] = now - before;
+                before = now;
+            }
+        }
+    npg_status status = npg_view_pack(out, size, values, 3 * g->point_total);
+    npg_release(&values);
+    return status;
+}
+
+/* ---- blocks ---- */
+
+/* Numbers as they stand in memory: the machines this runs on are little-endian, as are those of browsers. */
+static npg_status add_grid(npg_bytes *out, const npg_view_grid *grid)
+{
+    NPG_TRY(npg_bytes_add(out, grid->origin, sizeof grid->origin));
+    return npg_bytes_add(out, &grid->step, sizeof grid->step);
+}
+
+static void set_sizes(npg_bytes *out, size_t at, const size_t *sizes, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        uint32_t size = (uint32_t)sizes[i];
+        memcpy(out->data + at + 4 * i, &size, 4);
+    }
+}
+
+static npg_status pack_group(npg_bytes *out, const group *g)
+{
+    const npg_view_part *part = g->frames->part;
+    const uint32_t head[4] = {(uint32_t)g->count};
+    size_t sizes[3];
+    NPG_TRY(add_grid(out, &g->grid));
+    size_t at = out->size + 4;
+    NPG_TRY(npg_bytes_add(out, head, sizeof head));
+    NPG_TRY(npg_bytes_add(out, g->point_counts, g->count * sizeof *g->point_counts));
+    NPG_TRY(pack_positions(out, &sizes[0], &part->links, &g->grid, g->positions, g->count));
+    NPG_TRY(pack_rows(out, &sizes[1], &part->links, g->errors, g->count));
+    NPG_TRY(pack_points(out, &sizes[2], g));
+    set_sizes(out, at, sizes, 3);
+    return NPG_OK;
+}
+
+npg_status npg_view_group_block(npg_bytes *out, npg_view_frames *frames, size_t first, size_t count)
+{
+    group g = {.frames = frames, .count = count, .v = frames->part->reference->vert_count};
+    npg_status status = open_group(&g);
+    if (!status) status = gather(&g, first);
+    if (!status) status = pack_group(out, &g);
+    close_group(&g);
+    return status;
+}
+
+static npg_status pack_faces(npg_bytes *out, size_t *size, const npg_mesh *mesh)
+{
+    int32_t *values;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *values));
+    for (size_t i = 0; i < 3 * mesh->face_count; i++)
+        values[i] = (int32_t)(mesh->faces[i] - (i ? mesh->faces[i - 1] : 0));
+    npg_status status = npg_view_pack(out, size, values, 3 * mesh->face_count);
+    npg_release(&values);
+    return status;
+}
+
+static npg_status pack_colours(npg_bytes *out, size_t *size, const npg_view_frames *frames)
+{
+    size_t v = frames->part->reference->vert_count;
+    int32_t *rows;
+    *size = 0;
+    if (!frames->colours) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&rows, NPG_FOR_MESH, v, 3 * sizeof *rows));
+    for (size_t i = 0; i < 3 * v; i++) rows[i % 3 * v + i / 3] = frames->colours[i];
+    npg_status status = pack_rows(out, size, &frames->part->links, rows, 3);
+    npg_release(&rows);
+    return status;
+}
+
+npg_status npg_view_part_block(npg_bytes *out, const npg_view_frames *frames, bool with_counts)
+{
+    const npg_view_part *part = frames->part;
+    const npg_mesh *mesh = part->reference;
+    const uint32_t head[2] = {(uint32_t)mesh->vert_count, (uint32_t)mesh->face_count}, none[4] = {0};
+    const npg_view_grid grid = grid_of_one(mesh->vert_pos, mesh->vert_count);
+    size_t sizes[4] = {0};
+    NPG_TRY(npg_bytes_add(out, head, sizeof head));
+    NPG_TRY(add_grid(out, &grid));
+    size_t at = out->size;
+    NPG_TRY(npg_bytes_add(out, none, sizeof none));
+    NPG_TRY(pack_faces(out, &sizes[0], mesh));
+    NPG_TRY(pack_positions(out, &sizes[1], &part->links, &grid, mesh->vert_pos, 1));
+    NPG_TRY(pack_colours(out, &sizes[2], frames));
+    if (with_counts && frames->with_points) NPG_TRY(pack_rows(out, &sizes[3], &part->links, frames->seen, 1));
+    set_sizes(out, at, sizes, 4);
+    return NPG_OK;
+}

@@ -1,0 +1,151 @@
+/* Page: one HTML file that needs no other, of one result or of two side by side. */
+#include "tools/view/view_page.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pipeline/file.h"
+#include "pipeline/json_file.h"
+#include "tools/base64.h"
+
+/* ---- JSON inside of HTML ---- */
+
+char *npg_view_json_text(const json_t *value)
+{
+    size_t marks = 0;
+    char *text = value ? json_dumps(value, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(17)) : NULL;
+    if (!text) return NULL;
+    for (const char *c = text; *c; c++) marks += *c == '<' || *c == '>' || *c == '&';
+    char *safe = malloc(strlen(text) + 5 * marks + 1), *out = safe;
+    for (const char *c = text; safe && *c; c++) {
+        if (*c == '<' || *c == '>' || *c == '&')
+            out += sprintf(out, "\\u%04x", (unsigned)*c);
+        else
+            *out++ = *c;
+    }
+    if (safe) *out = 0;
+    free(text);
+    return safe;
+}
+
+json_t *npg_view_page_json(bool is_live, json_t *results)
+{
+    return json_pack("{si ss sb so}", "format", 1, "neupig", npg_version(), "live", is_live, "results",
+                     results);
+}
+
+static npg_status write_json(npg_file *file, json_t *results)
+{
+    json_t *page = npg_view_page_json(false, results);
+    char *text = npg_view_json_text(page);
+    json_decref(page);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for the page");
+    npg_file_print(file, "<script type=\"application/json\" id=\"facts\">");
+    npg_file_write(file, text, strlen(text));
+    npg_file_print(file, "</script>\n");
+    free(text);
+    return NPG_OK;
+}
+
+/* ---- blocks ---- */
+
+static void write_block(npg_file *file, npg_bytes *block, const char *id)
+{
+    npg_file_print(file, "<script type=\"text/plain\" id=\"%s\">", id);
+    npg_base64_write(file, block->data, block->size);
+    npg_file_print(file, "</script>\n");
+    block->size = 0;
+}
+
+static npg_status write_groups(npg_file *file, npg_view_frames *frames, const char *part_id)
+{
+    const npg_view_part *part = frames->part;
+    npg_bytes block = {0};
+    npg_status status = NPG_OK;
+    char id[80];
+    for (size_t first = 0; first < part->count && !status; first += part->group) {
+        size_t left = part->count - first;
+        status = npg_view_group_block(&block, frames, first, left < part->group ? left : part->group);
+        snprintf(id, sizeof id, "%s-%zu", part_id, first / part->group);
+        if (!status) write_block(file, &block, id);
+    }
+    if (!status) status = npg_view_part_block(&block, frames, true);
+    if (!status) write_block(file, &block, part_id);
+    npg_release(&block.data);
+    return status;
+}
+
+static void add_facts(npg_view_facts *facts, const npg_view_frames *frames)
+{
+    const npg_view_part *part = frames->part;
+    if (frames->without_points && !facts->without_points) memcpy(facts->why, frames->why, sizeof facts->why);
+    facts->without_points += frames->without_points;
+    facts->frames += part->count;
+    if (part->reference->vert_count > facts->vertices) facts->vertices = part->reference->vert_count;
+}
+
+static npg_status write_part(npg_file *file, npg_view_facts *facts, json_t *json, const npg_view_part *part,
+                             const char *id, size_t point_limit)
+{
+    npg_view_frames frames;
+    NPG_TRY(npg_view_frames_open(&frames, part, point_limit));
+    npg_status status = write_groups(file, &frames, id);
+    add_facts(facts, &frames);
+    json_object_set_new(json, "with_points", json_integer((json_int_t)frames.with_points));
+    if (frames.without_points) json_object_set_new(json, "no_points", npg_json_text(frames.why));
+    npg_view_frames_close(&frames);
+    return status;
+}
+
+static npg_status write_result(npg_file *file, npg_view_facts *facts, json_t *results, size_t place,
+                               const npg_view_order *order)
+{
+    npg_view_result result;
+    NPG_TRY(npg_view_result_open(&result, order->paths[place], order->every, false));
+    json_t *json = npg_view_result_json(&result), *parts = json_object_get(json, "parts");
+    npg_status status = json ? NPG_OK : npg_error(NPG_MEMORY, "no memory for the page");
+    if (!status && order->every > 1)
+        json_object_set_new(json, "every", json_integer((json_int_t)order->every));
+    for (size_t i = 0; i < result.part_count && !status; i++) {
+        char id[48];
+        snprintf(id, sizeof id, "data-%zu-%zu", place, i);
+        status = write_part(file, facts, json_array_get(parts, i), &result.parts[i], id, order->point_limit);
+    }
+    if (!status)
+        json_array_append_new(results, json);
+    else
+        json_decref(json);
+    npg_view_result_close(&result);
+    return status;
+}
+
+static npg_status write_page(npg_file *file, npg_view_facts *facts, const npg_view_template *page,
+                             const npg_view_order *order)
+{
+    json_t *results = json_array();
+    npg_status status = npg_file_write(file, page->text, page->data);
+    for (size_t i = 0; i < order->path_count && !status; i++)
+        status = write_result(file, facts, results, i, order);
+    if (status)
+        json_decref(results);
+    else
+        status = write_json(file, results);
+    if (!status) status = npg_file_write(file, page->text + page->data, page->size - page->data);
+    facts->bytes = npg_file_size(file);
+    return status;
+}
+
+npg_status npg_view_page_write(npg_view_facts *facts, const npg_view_order *order)
+{
+    npg_view_template page;
+    npg_file *file = NULL;
+    *facts = (npg_view_facts){0};
+    NPG_TRY(npg_view_template_open(&page));
+    npg_status status = npg_file_open(&file, order->output);
+    if (!status) status = write_page(file, facts, &page, order);
+    npg_view_template_close(&page);
+    if (!status) return npg_file_commit(&file);
+    npg_file_discard(&file);
+    return status;
+}

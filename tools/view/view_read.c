@@ -1,0 +1,204 @@
+/* Reading of one frame for a page. */
+#include "tools/view/view_read.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "geometry/geometry.h"
+#include "ingest/ingest.h"
+#include "pipeline/file.h"
+
+/* ---- the mesh ---- */
+
+static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const char *path)
+{
+    const npg_mesh *reference = frames->part->reference;
+    size_t v = reference->vert_count;
+    if (mesh->vert_count != v)
+        return npg_error(NPG_BAD_INPUT, "%s has %zu vertices, its reference.ply %zu", path, mesh->vert_count,
+                         v);
+    for (size_t i = 0; i < 3 * v; i++)
+        if (!isfinite(mesh->vert_pos[i]))
+            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    memcpy(frames->vert_pos, mesh->vert_pos, 3 * v * sizeof *frames->vert_pos);
+    if (frames->colours || !mesh->vert_colours) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&frames->colours, NPG_FOR_MESH, v, 3));
+    for (size_t i = 0; i < v; i++) memcpy(frames->colours + 3 * i, mesh->vert_colours + 4 * i, 3);
+    return NPG_OK;
+}
+
+static npg_status mesh_of_windows(npg_view_frames *frames, const npg_view_frame *frame)
+{
+    const npg_view_part *part = frames->part;
+    if (!frames->motion) {
+        npg_status status = npg_job_motion_open(&frames->motion, part->folder, part->reference, "auto");
+        if (status == NPG_END)
+            return npg_error(NPG_BAD_INPUT, "%s/%s is missing, and job/ has no windows to make it from",
+                             part->folder, frame->file);
+        NPG_TRY(npg_error_prefix(status, "%s", part->folder));
+    }
+    return npg_job_motion_pose(frames->motion, frames->vert_pos, (double)frame->index);
+}
+
+npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame)
+{
+    npg_origin origin = frames->part->origin;
+    npg_mesh *mesh = NULL;
+    char *path;
+    if (!frame->file) return NPG_OK;
+    if (!npg_path_stays(frame->file))
+        return npg_error(NPG_BAD_INPUT, "%s: its list of frames names %s, which is not in it",
+                         frames->part->folder, frame->file);
+    NPG_TRY(npg_join_path(&path, frames->part->folder, frame->file));
+    npg_status status;
+    if (access(path, F_OK))
+        status = mesh_of_windows(frames, frame);
+    else
+        status = npg_read_mesh(&mesh, path, &origin);
+    if (mesh && !status) status = take_mesh(frames, mesh, path);
+    npg_mesh_unref(&mesh);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- the points ---- */
+
+/* Where the points lie: as the run named them, or by the same name in the input folder, whose path is
+ * absolute. */
+static npg_status find_source(char **path, const npg_view_frames *frames, const char *source)
+{
+    const char *input = json_string_value(json_object_get(frames->part->job, "input"));
+    const char *slash = strrchr(source, '/');
+    if (access(source, R_OK) == 0 || !input) return npg_copy_text(path, source);
+    return npg_join_path(path, input, slash ? slash + 1 : source);
+}
+
+/* The capture's coordinates to those of the meshes; points that are not finite go. */
+static npg_status place_points(npg_view_frames *frames, const npg_frame *cloud, const npg_origin *of_cloud)
+{
+    const npg_placement *map = &frames->part->placement;
+    const npg_origin *origin = &frames->part->origin;
+    NPG_TRY(npg_grow(&frames->points, &frames->point_capacity, cloud->point_count, 3 * sizeof *frames->points,
+                     NPG_FOR_FRAMES));
+    for (size_t i = 0; i < cloud->point_count; i++) {
+        float *out = frames->points + 3 * frames->point_count;
+        for (int a = 0; a < 3; a++) {
+            int b = map->from[a];
+            double world = of_cloud->world[b] + (double)cloud->pos_local[3 * i + (size_t)b];
+            out[a] = (float)(map->scale * map->sign[a] * (world - map->centre[b]) - origin->world[a]);
+        }
+        frames->point_count += isfinite(out[0]) && isfinite(out[1]) && isfinite(out[2]);
+    }
+    return NPG_OK;
+}
+
+npg_status npg_view_read_points(npg_view_frames *frames, const npg_view_frame *frame)
+{
+    npg_frame cloud = {0};
+    npg_origin origin = {0};
+    char *path = NULL;
+    frames->point_count = 0;
+    npg_status status = frame->source ? find_source(&path, frames, frame->source)
+                                      : npg_error(NPG_BAD_INPUT, "its points came from no file");
+    if (!status) status = npg_read_cloud(&cloud, path, &origin);
+    npg_release(&path);
+    if (!status) status = place_points(frames, &cloud, &origin);
+    npg_frame_clear(&cloud);
+    frames->with_points += frames->point_count > 0;
+    if (frames->point_count || status == NPG_MEMORY) return status;
+    if (!frames->without_points++)
+        snprintf(frames->why, sizeof frames->why, "frame %lld: %s", (long long)frame->number,
+                 status ? npg_error_text() : "the file has no points");
+    return NPG_OK;
+}
+
+/* ---- how far they are from each other ---- */
+
+static void judge_vertices(npg_view_frames *frames, int32_t *errors, const float *dist_sq)
+{
+    const npg_view_part *part = frames->part;
+    double most = NPG_VIEW_ERROR_MAX * part->diagonal, cover = part->cover_share * part->diagonal;
+    for (size_t i = 0; i < part->reference->vert_count; i++) {
+        double dist = sqrt((double)dist_sq[i]), share = dist / most;
+        errors[i] = share < 1 ? (int32_t)lrint(255 * sqrt(share)) : 255;
+        frames->seen[i] += dist <= cover;
+    }
+}
+
+npg_status npg_view_measure(npg_view_frames *frames, int32_t *errors)
+{
+    size_t v = frames->part->reference->vert_count;
+    npg_kdtree *tree = NULL;
+    uint32_t *index = NULL;
+    float *dist_sq = NULL;
+    memset(errors, 0, v * sizeof *errors);
+    if (!frames->point_count) return NPG_OK;
+    npg_status status = npg_alloc_array(&index, NPG_FOR_QUERY, v, sizeof *index);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, v, sizeof *dist_sq);
+    if (!status) status = npg_kdtree_open(&tree, frames->points, frames->point_count);
+    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, frames->vert_pos, v, 1, 0);
+    if (!status) judge_vertices(frames, errors, dist_sq);
+    npg_kdtree_close(&tree);
+    npg_release(&index);
+    npg_release(&dist_sq);
+    return status;
+}
+
+/* ---- the points that are shown ---- */
+
+typedef struct placed {
+    uint64_t code;
+    float at[3];
+} placed;
+
+/* 21 bits apart by two. */
+static uint64_t spread_bits(uint64_t bits)
+{
+    bits = (bits | bits << 32) & 0x1f00000000ffff;
+    bits = (bits | bits << 16) & 0x1f0000ff0000ff;
+    bits = (bits | bits << 8) & 0x100f00f00f00f00f;
+    bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
+    return (bits | bits << 2) & 0x1249249249249249;
+}
+
+static uint64_t code_of(const float *p, const npg_bounds *bounds, double longest)
+{
+    uint64_t code = 0;
+    for (int a = 0; a < 3; a++) {
+        double share = longest > 0 ? ((double)p[a] - bounds->lo[a]) / longest : 0;
+        code |= spread_bits((uint64_t)(share * 0x1fffff)) << a;
+    }
+    return code;
+}
+
+static int by_code(const void *left, const void *right)
+{
+    const placed *a = left, *b = right;
+    return (a->code > b->code) - (a->code < b->code);
+}
+
+npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count)
+{
+    placed *order = NULL;
+    size_t limit = frames->point_limit;
+    npg_bounds bounds = npg_bounds_empty();
+    *count = frames->point_count < limit ? frames->point_count : limit;
+    if (!*count) return NPG_OK;
+    NPG_TRY(
+        npg_grow(&frames->some, &frames->some_capacity, *count, 3 * sizeof *frames->some, NPG_FOR_FRAMES));
+    NPG_TRY(npg_alloc_array(&order, NPG_FOR_FRAMES, *count, sizeof *order));
+    *count = npg_points_spread(frames->some, NULL, *count, frames->points, NULL, frames->point_count);
+    npg_bounds_add_points(&bounds, frames->some, *count);
+    double longest = npg_bounds_longest(&bounds);
+    for (size_t i = 0; i < *count; i++) {
+        const float *p = frames->some + 3 * i;
+        order[i] = (placed){code_of(p, &bounds, longest), {p[0], p[1], p[2]}};
+    }
+    qsort(order, *count, sizeof *order, by_code);
+    for (size_t i = 0; i < *count; i++) memcpy(frames->some + 3 * i, order[i].at, sizeof order[i].at);
+    npg_release(&order);
+    return NPG_OK;
+}

@@ -1,0 +1,271 @@
+/* Result: lists and references of a run, or of its segments. */
+#include "tools/view/view_result.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "ingest/ingest.h"
+#include "pipeline/file.h"
+#include "pipeline/json_file.h"
+#include "pipeline/json_lines.h"
+#include "tools/segments/segments.h"
+
+#define JSON_SIZE_MAX ((size_t)256 << 20)
+enum {
+    GROUP_FRAMES = 16,
+    GROUP_VERTS = 1 << 22
+}; /* more frames a group take less, and longer to jump into */
+
+/* ---- files ---- */
+
+static bool is_in(const char *folder, const char *name)
+{
+    char *path;
+    if (npg_join_path(&path, folder, name)) return false;
+    bool is_there = access(path, F_OK) == 0;
+    npg_release(&path);
+    return is_there;
+}
+
+npg_status npg_view_load_json(json_t **out, const char *folder, const char *name)
+{
+    char *path, *text = NULL;
+    *out = NULL;
+    if (!is_in(folder, name)) return NPG_OK;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    npg_status status = npg_json_read(out, &text, path, JSON_SIZE_MAX);
+    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    npg_release(&path);
+    npg_release(&text);
+    return status;
+}
+
+/* The bytes of a file up to its last whole line: a run may be at work on it. */
+static int64_t whole_lines(const char *path)
+{
+    FILE *file = fopen(path, "re");
+    int64_t size = 0, at = 0;
+    char some[64 << 10];
+    for (size_t got; file && (got = fread(some, 1, sizeof some, file)) > 0; at += (int64_t)got) {
+        const char *last = memrchr(some, '\n', got);
+        if (last) size = at + (last - some) + 1;
+    }
+    if (file) fclose(file);
+    return size;
+}
+
+/* ---- the frames ---- */
+
+typedef struct reading {
+    npg_view_part *part;
+    int64_t every;
+} reading;
+
+static npg_status add_frame(void *user, const json_t *line, const char *text, size_t size)
+{
+    reading *r = user;
+    npg_view_part *part = r->part;
+    const json_t *index = json_object_get(line, "index");
+    (void)text, (void)size;
+    if (json_is_true(json_object_get(line, "shared"))) return NPG_OK; /* another segment has it as its own */
+    if (!json_is_integer(index) || json_integer_value(index) < 0)
+        return npg_error(NPG_BAD_INPUT, "%s: a line of its list of frames has no index", part->folder);
+    if (json_integer_value(index) % r->every && !json_is_true(json_object_get(line, "key"))) return NPG_OK;
+    NPG_TRY(npg_grow(&part->frames, &part->capacity, part->count + 1, sizeof *part->frames, NPG_FOR_FILES));
+    npg_view_frame *frame = &part->frames[part->count++];
+    frame->line = json_incref((json_t *)line);
+    frame->index = (int64_t)json_integer_value(index);
+    frame->number = (int64_t)json_integer_value(json_object_get(line, "number"));
+    frame->file = json_string_value(json_object_get(line, "file"));
+    frame->source = json_string_value(json_object_get(line, "source"));
+    return NPG_OK;
+}
+
+static int by_index(const void *left, const void *right)
+{
+    const npg_view_frame *a = left, *b = right;
+    return (a->index > b->index) - (a->index < b->index);
+}
+
+static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_empty)
+{
+    const char *name = is_in(part->folder, "frames.jsonl") ? "frames.jsonl" : "frames.partial.jsonl";
+    reading r = {part, every};
+    char *path;
+    NPG_TRY(npg_join_path(&path, part->folder, name));
+    int64_t size = whole_lines(path);
+    npg_status status = size ? npg_json_lines_each(path, size, add_frame, &r) : NPG_OK;
+    if (status == NPG_DISK) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    if (!status && !part->count && !may_be_empty)
+        status = npg_error(NPG_BAD_INPUT, "%s: no frame is solved yet", part->folder);
+    if (part->count) qsort(part->frames, part->count, sizeof *part->frames, by_index);
+    for (size_t i = 1; i < part->count && !status; i++)
+        if (part->frames[i].index == part->frames[i - 1].index)
+            status =
+                npg_error(NPG_BAD_INPUT, "%s names frame %lld twice", path, (long long)part->frames[i].index);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- the reference ---- */
+
+static npg_status check_finite(const npg_mesh *mesh, const char *path)
+{
+    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
+        if (!isfinite(mesh->vert_pos[i]))
+            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    return NPG_OK;
+}
+
+static npg_status read_reference(npg_view_part *part, bool may_be_empty)
+{
+    char *path;
+    if (may_be_empty && !is_in(part->folder, "reference.ply")) return NPG_OK;
+    NPG_TRY(npg_join_path(&path, part->folder, "reference.ply"));
+    npg_status status = npg_read_mesh(&part->reference, path, &part->origin);
+    if (!status) status = check_finite(part->reference, path);
+    npg_release(&path);
+    if (!status) status = npg_view_links_open(&part->links, part->reference);
+    if (!status) part->group = GROUP_VERTS / part->reference->vert_count;
+    if (part->group < 1) part->group = 1;
+    if (part->group > GROUP_FRAMES) part->group = GROUP_FRAMES;
+    return status;
+}
+
+/* ---- what the run says of itself ---- */
+
+static double number_in(const json_t *object, const char *key, double otherwise)
+{
+    const json_t *value = json_object_get(object, key);
+    const char *text = json_string_value(value);
+    return json_is_number(value) ? json_number_value(value) : text ? strtod(text, NULL) : otherwise;
+}
+
+static npg_status set_placement(npg_view_part *part)
+{
+    const json_t *axes = json_object_get(part->done, "axes"), *centre = json_object_get(part->done, "centre");
+    const json_t *options = json_object_get(part->job, "options");
+    if (!part->done) axes = json_object_get(options, "axes");
+    NPG_TRY(npg_placement_parse(&part->placement, json_is_string(axes) ? json_string_value(axes) : "xyz"));
+    part->placement.scale = number_in(part->done ? part->done : options, "scale", 1);
+    for (size_t a = 0; a < 3 && centre; a++)
+        part->placement.centre[a] = json_number_value(json_array_get(centre, a));
+    return NPG_OK;
+}
+
+static void set_lengths(npg_view_part *part)
+{
+    const json_t *stages = json_object_get(part->report, "stages");
+    const json_t *options = json_object_get(part->done ? part->done : part->job, "options");
+    const json_t *keyframe = json_object_get(stages, "keyframe");
+    double own = number_in(keyframe, "figure_diagonal", number_in(keyframe, "box_diagonal", 0));
+    npg_bounds bounds = npg_bounds_empty();
+    if (part->reference)
+        npg_bounds_add_points(&bounds, part->reference->vert_pos, part->reference->vert_count);
+    part->diagonal = part->placement.scale * own;
+    if (!(part->diagonal > 0) && part->reference) part->diagonal = npg_bounds_diagonal(&bounds);
+    if (!(part->diagonal > 0) || !isfinite(part->diagonal)) part->diagonal = 1;
+    part->cover_share = 0.01 * number_in(options, "cover-distance", 1);
+}
+
+static npg_status fill_part(npg_view_part *part, int64_t every, bool may_be_empty)
+{
+    NPG_TRY(npg_view_load_json(&part->report, part->folder, "report.json"));
+    NPG_TRY(npg_view_load_json(&part->done, part->folder, "done.json"));
+    NPG_TRY(npg_view_load_json(&part->job, part->folder, "job/job.json"));
+    NPG_TRY(set_placement(part));
+    NPG_TRY(read_frames(part, every, may_be_empty));
+    NPG_TRY(read_reference(part, may_be_empty));
+    set_lengths(part);
+    return NPG_OK;
+}
+
+/* ---- runs and segments ---- */
+
+static npg_status add_part(npg_view_result *result, const char *label)
+{
+    NPG_TRY(npg_grow(&result->parts, &result->capacity, result->part_count + 1, sizeof *result->parts,
+                     NPG_FOR_FILES));
+    npg_view_part *part = &result->parts[result->part_count++];
+    *part = (npg_view_part){.group = 1};
+    NPG_TRY(npg_copy_text(&part->label, label));
+    if (!strcmp(label, ".")) return npg_copy_text(&part->folder, result->path);
+    return npg_join_path(&part->folder, result->path, label);
+}
+
+static npg_status list_parts(npg_view_result *result)
+{
+    npg_segments segments = {.output = result->path};
+    npg_status status = npg_segments_load(&segments);
+    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    for (size_t i = 0; i < segments.count && !status; i++) status = add_part(result, segments.list[i].folder);
+    npg_segments_clear(&segments);
+    if (!status && !result->part_count) status = add_part(result, ".");
+    if (!status) status = npg_view_load_json(&result->segments, result->path, "segments.json");
+    return status;
+}
+
+static npg_status set_name(npg_view_result *result)
+{
+    char *real = realpath(result->path, NULL);
+    const char *slash = real ? strrchr(real, '/') : NULL;
+    npg_status status = npg_copy_text(&result->name, slash && slash[1] ? slash + 1 : result->path);
+    free(real);
+    return status;
+}
+
+static npg_status check_folder(const char *path, bool may_be_empty)
+{
+    static const char *const traces[] = {"frames.jsonl", "frames.partial.jsonl", "segments.json",
+                                         "segments.partial.json"};
+    struct stat info;
+    if (stat(path, &info)) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
+    if (!S_ISDIR(info.st_mode)) return npg_error(NPG_USAGE, "%s is not a folder", path);
+    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
+        if (is_in(path, traces[i])) return NPG_OK;
+    if (is_in(path, "job") && may_be_empty) return NPG_OK;
+    if (is_in(path, "job")) return npg_error(NPG_BAD_INPUT, "%s: no frame is solved yet", path);
+    return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", path);
+}
+
+npg_status npg_view_result_open(npg_view_result *result, const char *path, int64_t every, bool may_be_empty)
+{
+    *result = (npg_view_result){0};
+    npg_status status = check_folder(path, may_be_empty);
+    if (!status) status = npg_copy_text(&result->path, path);
+    if (!status) status = set_name(result);
+    if (!status) status = list_parts(result);
+    for (size_t i = 0; i < result->part_count && !status; i++)
+        status = fill_part(&result->parts[i], every, may_be_empty);
+    result->is_done = !status && is_in(path, "done.json");
+    if (status) npg_view_result_close(result);
+    return status;
+}
+
+static void close_part(npg_view_part *part)
+{
+    for (size_t i = 0; i < part->count; i++) json_decref(part->frames[i].line);
+    npg_release(&part->frames);
+    npg_release(&part->folder);
+    npg_release(&part->label);
+    npg_view_links_close(&part->links);
+    npg_mesh_unref(&part->reference);
+    json_decref(part->report);
+    json_decref(part->done);
+    json_decref(part->job);
+}
+
+void npg_view_result_close(npg_view_result *result)
+{
+    for (size_t i = 0; i < result->part_count; i++) close_part(&result->parts[i]);
+    npg_release(&result->parts);
+    npg_release(&result->path);
+    npg_release(&result->name);
+    json_decref(result->segments);
+    *result = (npg_view_result){0};
+}
