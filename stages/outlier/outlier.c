@@ -39,7 +39,7 @@ typedef struct outlier_state {
 static const npg_option outlier_options[] = {
     /* type        name                  place                  default   least  most  shown as or words */
     NPG_ROW_FLAG  ("outliers",           AT(drop_isolated),     "yes",
-        "Drop isolated points (PCL's statistical filter, repeated until it finds no more)"),
+        "Drop isolated points (the statistical filter that PCL has, too, repeated until it finds no more)"),
     NPG_ROW_INT   ("outlier-neighbours", AT(neighbours),        "12",     2,     200,  NULL,
         "Neighbours whose mean distance tells whether a point is isolated"),
     NPG_ROW_REAL  ("outlier-ratio",      AT(ratio),             "5",      0.5,   100,  NULL,
