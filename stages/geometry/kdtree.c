@@ -422,7 +422,8 @@ INLINE bool find_around(nearest *n, const around *from, const float q[3])
     pool p;
     int64_t sorted[POOL_MAX];
     float guess = GUESS * dist_of(n->keys[n->k - 1]);
-    if (!(guess <= from->reach_sq) || !fill_pool(&p, from, q, guess) || p.count < n->k) return false;
+    if (!(guess <= from->reach_sq) || isinf(guess) || !fill_pool(&p, from, q, guess) || p.count < n->k)
+        return false;
     sort_pool(sorted, &p);
     memcpy(n->keys, sorted, n->k * sizeof *n->keys);
     memcpy(n->last, q, sizeof n->last);
