@@ -13,6 +13,7 @@
 #include "outlier/cleaning.h"
 #include "outlier/isolated.h"
 #include "outlier/normals.h"
+#include "outlier/outliers.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
@@ -387,8 +388,8 @@ static npg_status outlier_flush(npg_worker *worker)
     return NPG_OK;
 }
 
-/* One frame at work: the hash table and the normals; as many as there are threads with PCL's copy and tree;
- * what is remembered of all. */
+/* One frame at work: the hash table and the normals with their trials; as many as there are threads in the
+ * search for isolated points; what is remembered of all. */
 static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -396,7 +397,7 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 120 * thinned * threads + KEPT_RESULTS_MAX; /* bytes per point, rounded up */
+    return 17 * points + 60 * thinned + threads * npg_find_isolated_memory(thinned) + KEPT_RESULTS_MAX;
 }
 
 const npg_stage npg_stage_outlier = {.name = "outlier",
