@@ -180,8 +180,8 @@ void npg_kdtree_leave_out(npg_kdtree *tree, const uint8_t *keep)
 #define INLINE static inline __attribute__((always_inline)) /* into every width of its caller */
 
 /* A half of the tree that is still to be searched, and how far off it is along each axis.  dist_sq is not
- * above that of any point in it, rounding included: it is made by the same operations from parts none of which
- * is larger. */
+ * above that of any point in it, rounding included: it is made by the same operations from parts none of
+ * which is larger. */
 typedef struct branch {
     float x, y, z, dist_sq;
     size_t node;

@@ -1,9 +1,9 @@
 /* k-d tree of N points: exact nearest neighbours on the host.
  *
  * Leaves hold about twelve points side by side, so that a leaf is searched with the processor's wide
- * registers; the points of a leaf are near each other, and so are those of the leaves that follow it, which is
- * the order to ask for all points' neighbours in (npg_kdtree_each).  Distances are (dx^2 + dy^2) + dz^2 in
- * float; every result is exact in them, whatever the points look like. */
+ * registers; the points of a leaf are near each other, and so are those of the leaves that follow it, which
+ * is the order to ask for all points' neighbours in (npg_kdtree_each).  Distances are (dx^2 + dy^2) + dz^2
+ * in float; every result is exact in them, whatever the points look like. */
 #ifndef NPG_KDTREE_H
 #define NPG_KDTREE_H
 

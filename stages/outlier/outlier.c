@@ -2,8 +2,8 @@
  * or mends normals.
  *
  * Cleaning takes part in every pass, so that box and keyframe are those of clean points; it gives the same
- * points each time, and a frame that was kept clean (frame_store.h) is not cleaned again.  Normals are made for
- * the keyframe alone (or all, if asked), and in the choosing pass for the frames that may become it. */
+ * points each time, and a frame that was kept clean (frame_store.h) is not cleaned again.  Normals are made
+ * for the keyframe alone (or all, if asked), and in the choosing pass for the frames that may become it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -9,9 +9,10 @@
 
 /* keep[i] = 0 for the isolated ones of points (N x 3, finite, N > 0), else 1: those whose mean distance to
  * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points.
- * This is asked again of what is left until there are no more (8 rounds at most): far outliers raise mean and
- * deviation and so hide the near ones from the first round.  A round searches only where the one before took a
- * neighbour away.  Uses `threads` threads (0: one per core); the result does not depend on it.  NPG_MEMORY. */
+ * This is asked again of what is left until there are no more (8 rounds at most): far outliers raise mean
+ * and deviation and so hide the near ones from the first round.  A round searches only where the one before
+ * took a neighbour away.  Uses `threads` threads (0: one per core); the result does not depend on it.
+ * NPG_MEMORY. */
 npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t point_count, int neighbours,
                              double ratio, int threads);
 
