@@ -14,7 +14,7 @@
 #define REACH       1.5f /* how far, in distances of a k-th neighbour                         */
 #define GUESS       1.6f /* squared distance of a k-th neighbour, in that of the point before */
 #define POOL_MAX    128  /* points within that                                                */
-#define QUERIES_MIN 512  /* worth a thread; set by trial                          */
+#define QUERIES_MIN 512  /* worth a thread */
 
 typedef struct leaf { /* lanes without a point are infinitely far away, their index is UINT32_MAX */
     float at[3][LANES];

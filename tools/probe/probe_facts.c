@@ -224,9 +224,9 @@ static double network_s(const npg_probe *probe, size_t vertices, size_t epochs, 
     return flop_per_vertex * (double)probe->frames * (double)vertices * (double)epochs / fmax(0.5 * flops, 1);
 }
 
-/* Aligned frames: processor seconds of one core of those that these numbers were taken on, brought to this
- * machine's by its multiply-adds.  Fitted to a clean dancer (17 frames of 5000 points) and a walking figure
- * (24 of 200 000); noise and lost frames, which nothing here can see, make alignment take longer. */
+/* Aligned frames: processor seconds of one core, brought to this machine's by its multiply-adds.  Taken by hand
+ * from one run of a clean dancer (17 frames of 5000 points) on a loaded machine, and tested on no other: noise
+ * and lost frames, which nothing here can see, make alignment take longer. */
 static double aligned_s(const npg_probe *probe, size_t most, double flops)
 {
     const double per_run = 5, per_frame = 0.65, per_point = 4e-6, per_surface_point = 130e-6,
