@@ -25,12 +25,21 @@ static inline void npg_jacobi_rotate(double *m, double *v, int n, int p, int q)
     }
 }
 
+/* Whether what is left beside the diagonal is too small to change a double on it. */
+static inline int npg_jacobi_is_done(const double *m, int n)
+{
+    double beside = 0, along = 0;
+    for (int p = 0; p < n; p++)
+        for (int q = 0; q < n; q++) *(p == q ? &along : &beside) += fabs(m[n * p + q]);
+    return beside <= 1e-19 * along;
+}
+
 /* m (n x n, overwritten) gets its eigenvalues on the diagonal, v the eigenvectors as columns.  Inline, so
- * that a constant n unrolls. */
+ * that a constant n unrolls.  `rounds` sweeps at most: they end where another would change nothing. */
 static inline void npg_jacobi(double *m, double *v, int n, int rounds)
 {
     for (int i = 0; i < n * n; i++) v[i] = i % (n + 1) == 0;
-    for (int round = 0; round < rounds; round++)
+    for (int round = 0; round < rounds && !npg_jacobi_is_done(m, n); round++)
         for (int p = 0; p < n - 1; p++)
             for (int q = p + 1; q < n; q++) npg_jacobi_rotate(m, v, n, p, q);
 }

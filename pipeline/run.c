@@ -6,7 +6,9 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include "pipeline/busy.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 #include "pipeline/run_internal.h"
@@ -196,8 +198,30 @@ static npg_status start_threads(npg_run *run)
     return NPG_OK;
 }
 
+static const char *name_of(npg_pass pass)
+{
+    switch (pass) {
+    case NPG_PASS_MEASURE: return "measure";
+    case NPG_PASS_SCORE: return "score";
+    case NPG_PASS_CHOOSE: return "choose";
+    case NPG_PASS_FUSE: return "fuse";
+    case NPG_PASS_SOLVE: break;
+    }
+    return "solve";
+}
+
+/* How busy the machine was, pass by pass: the list of the report. */
+static void report_pass(npg_run *run, const npg_busy *begun)
+{
+    json_t *passes = json_object_get(run->report, "passes"), *entry = npg_busy_since(begun);
+    json_object_set_new(entry, "pass", json_string(name_of(run->pass)));
+    if (!passes) json_object_set_new(run->report, "passes", passes = json_array());
+    json_array_append_new(passes, entry);
+}
+
 static npg_status do_pass(npg_run *run, npg_pass pass)
 {
+    npg_busy begun = npg_busy_now();
     run->pass = pass;
     atomic_store(&run->ended_count, 0);
     npg_status status = open_worker_states(run);
@@ -207,6 +231,7 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
     if (!status) status = start_threads(run);
     if (status) npg_run_fail(run, "run", status);
     close_pass(run);
+    report_pass(run, &begun);
     return run->first_failure;
 }
 
@@ -261,8 +286,10 @@ static npg_status conclude(npg_run *run)
     json_object_set_new(r, "status", json_string(run->is_partial ? "partial" : "ok"));
     json_object_set_new(r, "warning_count", json_integer((json_int_t)run->warning_count));
     json_object_set_new(r, "exit_code", json_integer(run->is_partial ? 7 : 0));
-    json_object_set_new(r, "wall_s", json_real(npg_clock_s() - run->opened_s));
-    json_object_set_new(r, "process_cpu_s", json_real(npg_clock_process_s()));
+    json_t *busy = npg_busy_since(&run->begun);
+    json_object_set_new(r, "cores", json_integer(sysconf(_SC_NPROCESSORS_ONLN)));
+    json_object_update(r, busy);
+    json_decref(busy);
     json_object_set_new(r, "memory_peak_bytes", json_integer((json_int_t)npg_memory_peak()));
     json_object_set_new(r, "resident_peak_bytes", json_integer(resident_peak()));
     npg_status status = open_worker_states(run);
@@ -460,6 +487,7 @@ npg_status npg_run_open_chain(npg_run **out, const npg_options *options, const n
     pthread_mutex_init(&run->join_lock, NULL);
     sem_init(&run->event, 0, 0);
     run->opened_s = npg_clock_s();
+    run->begun = npg_busy_now();
     run->pushed_number = INT64_MIN;
     npg_status status = fill_run(run, options, hooks, chain);
     if (!status && pthread_create(&run->conductor, NULL, conduct, run))

@@ -6,6 +6,7 @@
 #include <semaphore.h>
 #include <stdatomic.h>
 
+#include "pipeline/busy.h"
 #include "pipeline/custom_stage.h"
 #include "pipeline/ring.h"
 
@@ -43,6 +44,7 @@ struct npg_run {
     npg_hooks hooks;
     npg_facts facts;
     double opened_s;
+    npg_busy begun;
 
     pthread_mutex_t lock; /* guards what follows up to the rings, and calls of the hooks */
     npg_status first_failure;

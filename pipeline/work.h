@@ -14,8 +14,9 @@ typedef struct npg_work {
     npg_status (*call)(void *user);
     void *user;
     double flops, bytes;  /* operations and bytes of one call, at least; flops 0: not counted */
+    double points;        /* of a cloud that one call goes through; 0: not its purpose       */
     double vertex_frames; /* vertices placed in a frame by one call; 0: not its purpose       */
-    bool on_host;         /* in the calling thread, not on the device                         */
+    bool on_host;         /* in threads of the host, not on the device                        */
 } npg_work;
 
 /* Given each piece of work in turn; the work is valid until it returns.  A failure ends the visit. */

@@ -14,7 +14,7 @@
 #include "tools/cli.h"
 
 typedef struct settings {
-    int64_t vertices, points, frames, epochs, repeat, dense;
+    int64_t vertices, points, frames, epochs, repeat, dense, cloud;
     const char *device, *tuning, *only, *output, *compare;
     double tolerance;
     bool json;
@@ -43,6 +43,8 @@ const npg_option npg_bench_options[] = {
         "frames of the window"),
     NPG_ROW_INT ("dense",     AT(dense),     "100000", 0,     1e7,   NULL,
         "vertices of the dense surface that is carried and decoded, 0: none"),
+    NPG_ROW_INT ("cloud",     AT(cloud),     "200000", 0,     1e7,   NULL,
+        "points of the dense cloud that is cleaned and searched, 0: none"),
     NPG_ROW_INT ("epochs",    AT(epochs),    "10",     1,     10000, NULL,
         "epochs of the fit that is timed"),
     NPG_ROW_INT ("repeat",    AT(repeat),    "9",      1,     1000,  NULL,
@@ -94,6 +96,9 @@ static npg_status visit_row(void *user, const npg_bench_row *row)
         json_object_set_new(
             json, "vertex_frames_per_busy_second",
             json_real(row->work.vertex_frames / busy_s / (row->work.on_host ? units_of(b) : 1)));
+    if (row->work.points > 0)
+        json_object_set_new(json, "processor_us_per_point",
+                            json_real(1e6 * busy_s * units_of(b) / row->work.points));
     json_object_set_new(b->kernels, row->work.name, json);
     return NPG_OK;
 }
@@ -152,9 +157,9 @@ static void describe(bench *b, json_t *root)
         json_pack("{s:s, s:s, s:i}", "name", info->name, "platform", info->platform, "units", info->units));
     json_object_set_new(root, "tuning", json_string(npg_device_tuning_source(b->device)));
     json_object_set_new(root, "sizes",
-                        json_pack("{s:I, s:I, s:I, s:I}", "vertices", (json_int_t)b->s.vertices, "points",
-                                  (json_int_t)b->s.points, "frames", (json_int_t)b->s.frames, "dense",
-                                  (json_int_t)b->s.dense));
+                        json_pack("{s:I, s:I, s:I, s:I, s:I}", "vertices", (json_int_t)b->s.vertices,
+                                  "points", (json_int_t)b->s.points, "frames", (json_int_t)b->s.frames,
+                                  "dense", (json_int_t)b->s.dense, "cloud", (json_int_t)b->s.cloud));
     json_object_set(root, "kernels", b->kernels);
 }
 
@@ -166,6 +171,7 @@ static npg_status measure(bench *b, json_t *root)
     describe(b, root);
     NPG_TRY(npg_bench_kernels(&b->meter, &b->body, b->s.only, visit_row, b));
     if (b->s.dense) NPG_TRY(npg_bench_dense(&b->meter, b->s.only, (size_t)b->s.dense, visit_row, b));
+    if (b->s.cloud) NPG_TRY(npg_bench_clouds(&b->meter, b->s.only, (size_t)b->s.cloud, visit_row, b));
     NPG_TRY(bench_fit(b, root));
     if (!json_object_size(b->kernels) && !json_object_get(root, "fit"))
         return npg_error(NPG_USAGE, "option only: no row's name begins with \"%s\"", b->s.only);
@@ -188,6 +194,8 @@ static void print_row(const char *name, const json_t *row)
            100 * number_of(row, "share_of_bound"), json_string_value(json_object_get(row, "bound_by")));
     if (json_object_get(row, "vertex_frames_per_busy_second"))
         printf("%-28s %.3g vertex-frames/s\n", "", number_of(row, "vertex_frames_per_busy_second"));
+    if (json_object_get(row, "processor_us_per_point"))
+        printf("%-28s %.3g us of a processor a point\n", "", number_of(row, "processor_us_per_point"));
 }
 
 static void print_table(const json_t *root)

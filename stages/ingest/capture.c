@@ -1,4 +1,4 @@
-/* Capture: the frames of a capture in files, readable in any order, with a bounded cache of what was read. */
+/* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 #include "ingest/capture.h"
 
 #include "ingest/formats/reader.h"
@@ -15,84 +15,40 @@ static npg_status refuse_gaps(const npg_capture *capture, const char *input)
 }
 
 npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
-                            bool keep_going, size_t cache_limit)
+                            bool keep_going, size_t cache_limit, const char *spill_folder)
 {
     npg_capture *c;
     *out = NULL;
     NPG_TRY(npg_alloc(&c, NPG_FOR_FILES, sizeof *c));
     c->missing = missing;
     c->keep_going = keep_going;
-    c->cache_limit = cache_limit;
     npg_status status = npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE);
     if (!status) status = refuse_gaps(c, input);
     if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
-    if (!status) status = npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached);
+    if (!status) status = npg_frame_store_open(&c->store, c->list->count, cache_limit, spill_folder);
     if (status) npg_capture_close(&c);
     *out = c;
     return status;
-}
-
-static void drop_cached(npg_capture *c, int64_t index)
-{
-    if (c->cached[index]) npg_frame_clear(c->cached[index]);
-    npg_release(&c->cached[index]);
 }
 
 void npg_capture_close(npg_capture **slot)
 {
     npg_capture *c = *slot;
     if (!c) return;
-    for (size_t i = 0; c->cached && i < c->list->count; i++) drop_cached(c, (int64_t)i);
-    npg_release(&c->cached);
+    npg_frame_store_close(&c->store);
     npg_release(&c->is_bad);
     npg_frame_files_close(&c->list);
     npg_release(slot);
 }
 
-/* ---- cache ---- */
-
-static size_t bytes_of(const npg_frame *frame)
-{
-    return frame->point_count * (frame->normals ? 6 : 3) * sizeof(float) + sizeof *frame;
-}
-
-/* What fits stays: the passes walk the capture from end to end, so throwing out the oldest would leave
- * nothing for the next pass.  A copy that finds no memory is left out without harm. */
-static void cache_copy(npg_capture *c, int64_t index, const npg_frame *frame)
-{
-    size_t bytes = bytes_of(frame);
-    if (c->cached[index] || bytes > c->cache_limit - c->cache_bytes) return; /* cache_bytes <= cache_limit */
-    if (npg_alloc(&c->cached[index], NPG_FOR_FRAMES, sizeof **c->cached)) return;
-    if (npg_frame_copy(c->cached[index], frame)) {
-        npg_release(&c->cached[index]);
-        return;
-    }
-    c->cache_bytes += bytes;
-}
-
-static bool take_cached(npg_status *status, npg_capture *c, npg_frame *frame, int64_t index, bool gives_away)
-{
-    npg_frame *cached = c->cached[index];
-    if (!cached) return false;
-    *status = NPG_OK;
-    if (gives_away) {
-        c->cache_bytes -= bytes_of(cached);
-        *frame = *cached;
-        npg_release(&c->cached[index]);
-    } else {
-        *status = npg_frame_copy(frame, cached);
-    }
-    return true;
-}
-
 static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin,
                             bool is_last_use)
 {
-    npg_status status;
-    if (take_cached(&status, c, frame, index, is_last_use)) return status;
+    if (npg_frame_store_get(c->store, frame, index, is_last_use)) return NPG_OK;
     c->reads++;
     NPG_TRY(npg_read_cloud(frame, c->list->slots[index].path, origin));
-    if (!is_last_use) cache_copy(c, index, frame);
+    frame->index = index;
+    if (!is_last_use) npg_frame_store_put(c->store, frame);
     return NPG_OK;
 }
 
@@ -150,6 +106,6 @@ npg_status npg_capture_read(npg_capture *c, npg_frame *frame, int64_t index, npg
     }
     frame->index = index;
     frame->number = c->list->slots[index].number;
-    frame->fields = NPG_FIELD_POINTS;
+    frame->fields = NPG_FIELD_POINTS | (frame->fields & NPG_FIELD_CLEAN);
     return status;
 }

@@ -1,8 +1,9 @@
-/* Capture: the frames of a capture in files, readable in any order, with a bounded cache of what was read. */
+/* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 #ifndef NPG_CAPTURE_H
 #define NPG_CAPTURE_H
 
 #include "ingest/frame_files.h"
+#include "ingest/frame_store.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/options.h"
@@ -19,24 +20,25 @@ typedef struct npg_capture {
     npg_frame_files *list; /* owned */
     npg_missing missing;
     bool keep_going;
-    uint8_t *is_bad;    /* per slot: could not be read; owned                */
-    npg_frame **cached; /* per slot: a copy of what was read, or NULL; owned */
-    size_t cache_bytes, cache_limit;
-    uint64_t reads; /* files parsed so far */
+    uint8_t *is_bad;        /* per slot: could not be read; owned */
+    npg_frame_store *store; /* of what was read; owned            */
+    uint64_t reads;         /* files parsed so far                */
 } npg_capture;
 
 /* The files that the options of a run (input, frames, missing, confine) name as its frames; nothing is read.
  * As npg_frame_files_open() and, with confine, npg_frame_files_confine(). */
 npg_status npg_capture_list(npg_frame_files **list, const npg_options *options);
 
-/* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open. */
+/* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open.  What was
+ * read is kept in cache_limit bytes, and beyond that in spill_folder (frame_store.h). */
 npg_status npg_capture_open(npg_capture **capture, const char *input, const char *selection,
-                            npg_missing missing, bool keep_going, size_t cache_limit);
+                            npg_missing missing, bool keep_going, size_t cache_limit,
+                            const char *spill_folder);
 void npg_capture_close(npg_capture **capture);
 
 /* Frame `index` (0 <= index < list->count) into the empty *frame.  NPG_PARTIAL: with keep_going, a file that
  * can't be used for the first time; the frame is_skipped and npg_error_text() says why.  is_last_use: the
- * cache may give its copy away. */
+ * store may give its copy away.  frame->fields has NPG_FIELD_CLEAN where the store has it clean. */
 npg_status npg_capture_read(npg_capture *capture, npg_frame *frame, int64_t index, npg_origin *origin,
                             bool is_last_use);
 

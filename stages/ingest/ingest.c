@@ -6,6 +6,7 @@
 #include "ingest/capture.h"
 #include "ingest/follow.h"
 #include "ingest/formats/reader.h"
+#include "pipeline/file.h"
 #include "pipeline/stage.h"
 
 /* Frames of one gap in a live source.  Each becomes a frame of the run, so a number that is damaged or a time
@@ -41,8 +42,10 @@ static const npg_option ingest_options[] = {
     NPG_ROW_CHOICE("missing",       AT(missing),         "error",       "error|skip|hold|ignore",
         "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, "
         "hold repeats the points of the frame before it, ignore takes numbers for mere names"),
-    NPG_ROW_INT   ("cache-mib",     AT(cache_mib),       "4",           0,     1048576, "MIB",
-        "Memory for clouds that were read, so that the later passes need not parse files again"),
+    NPG_ROW_INT   ("cache",         AT(cache_mib),       "256",         0,     1048576, "MIB",
+        "Memory for frames that were read and cleaned, so that later passes need not do that again; "
+        "what does not fit goes to a file in OUT/job that has no name, and is gone with the run; "
+        "0: nothing is kept, neither in memory nor on disk"),
     NPG_ROW_TEXT  ("follow-end",    AT(follow_end),      "capture.end", "NAME",
         "Name of the file that ends a folder that is followed, once it is there; empty: none does"),
     NPG_ROW_REAL  ("follow-idle",   AT(follow_idle_s),   "30",          0,     1e9,     "SECONDS",
@@ -105,10 +108,15 @@ static npg_status open_capture(npg_worker *worker)
     state *s = npg_worker_state(worker);
     const npg_settings *settings = npg_worker_settings(worker);
     npg_capture *capture;
+    char *folder = NULL;
     if (npg_worker_kept(worker)) return NPG_OK;
-    NPG_TRY(npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
-                             settings->keep_going, cache_limit(worker)));
+    if (settings->output[0] && s->cache_mib) NPG_TRY(npg_join_path(&folder, settings->output, "job"));
+    npg_status status = npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
+                                         settings->keep_going, cache_limit(worker), folder);
+    npg_release(&folder);
+    NPG_TRY(status);
     npg_worker_keep(worker, capture, release_capture);
+    NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
     if (settings->confine) NPG_TRY(npg_frame_files_confine(capture->list, settings->input));
     npg_facts *facts = npg_worker_facts(worker);
     /* A resumed run has restored it. */
@@ -140,8 +148,10 @@ static void report_capture(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
     json_object_set_new(report, "files_parsed", json_integer((json_int_t)capture->reads));
-    if (npg_worker_pass(worker) != NPG_PASS_SOLVE)
-        json_object_set_new(report, "cache_bytes", json_integer((json_int_t)capture->cache_bytes));
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) return;
+    npg_frame_store_use use = npg_frame_store_used(capture->store);
+    json_object_set_new(report, "cache_bytes", json_integer((json_int_t)use.memory_bytes));
+    json_object_set_new(report, "cache_disk_bytes", json_integer((json_int_t)use.disk_bytes));
 }
 
 static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
@@ -426,8 +436,9 @@ static void uninit(npg_worker *worker)
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const npg_capture *capture = npg_worker_kept(worker);
+    size_t normals = npg_worker_facts(worker)->point_count_max * 3 * sizeof(float); /* of the keyframe, yet */
     *chunks_held = 1;
-    return capture ? capture->cache_bytes : 0;
+    return capture ? npg_frame_store_used(capture->store).memory_bytes + normals : 0;
 }
 
 extern const npg_stage npg_stage_ingest;

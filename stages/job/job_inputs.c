@@ -12,9 +12,9 @@
 #include "pipeline/file.h"
 
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
-static const char *const free_options[] = {"input",  "output",    "ring",        "chunk",       "max-memory",
-                                           "pull",   "cache-mib", "overwrite",   "confine",     "restart",
-                                           "append", "alarm",     "segment-min", "state-every", NULL};
+static const char *const free_options[] = {"input",  "output", "ring",        "chunk",       "max-memory",
+                                           "pull",   "cache",  "overwrite",   "confine",     "restart",
+                                           "append", "alarm",  "segment-min", "state-every", NULL};
 
 static bool is_free(const char *name)
 {

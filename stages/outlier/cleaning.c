@@ -5,13 +5,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "outlier/outliers.h"
 #include "pipeline/frame_box.h"
 
-#define POINTS_MIN      16   /* fewer are no surface; set by trial                       */
-#define FLAT            1e-5 /* thickness over length below which a cloud is a plane     */
-#define ISOLATED_ROUNDS 8    /* of the filter, each on what the one before has left      */
-#define CAP_ROUNDS      16   /* of looking for a side; set by trial, as the rounds above */
+#define POINTS_MIN 16   /* fewer are no surface; set by trial                       */
+#define FLAT       1e-5 /* thickness over length below which a cloud is a plane     */
+#define CAP_ROUNDS 16   /* of looking for a side; set by trial                      */
 
 npg_status npg_clean_finite(npg_frame *frame)
 {
@@ -162,38 +160,6 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     }
     *side = enough;
     return npg_clean_voxels(frame, enough);
-}
-
-/* Drop those of the points left whose keep is 0, and mark them in keep_all, which has an entry for every
- * point of the frame. */
-static size_t compact(float *left, uint8_t *keep_all, size_t count, const uint8_t *keep)
-{
-    size_t at = 0, kept = 0;
-    for (size_t i = 0; i < count; i++) {
-        if (!keep_all[i]) continue;
-        keep_all[i] = keep[at];
-        if (keep[at]) memmove(left + 3 * kept++, left + 3 * at, 3 * sizeof *left);
-        at++;
-    }
-    return kept;
-}
-
-npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, int neighbours, double ratio)
-{
-    float *left = NULL;
-    uint8_t *keep_left;
-    size_t dropped = 1, left_count = count;
-    memset(keep, 1, count);
-    NPG_TRY(npg_alloc(&keep_left, NPG_FOR_FRAMES, count));
-    npg_status status = npg_alloc_array(&left, NPG_FOR_FRAMES, count, 3 * sizeof *left);
-    if (!status) memcpy(left, points, count * 3 * sizeof *left);
-    for (int round = 0; round < ISOLATED_ROUNDS && !status && dropped; round++) {
-        status = npg_outliers_statistical(keep_left, &dropped, left, left_count, neighbours, ratio);
-        if (!status && dropped) left_count = compact(left, keep, count, keep_left);
-    }
-    npg_release(&left);
-    npg_release(&keep_left);
-    return status;
 }
 
 /* ---- is it a body? ---- */

@@ -22,11 +22,6 @@ npg_status npg_clean_voxels(npg_frame *frame, double side);
  * than a surface).  *side is the side of the cells, 0 when there was nothing to do. */
 npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max);
 
-/* keep[i] = 0 for the isolated ones of points (N x 3, N > 0), by PCL's statistical filter, again and again
- * until it finds no more (8 rounds at most): far outliers raise mean and deviation and so hide the near ones
- * from the first round. */
-npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, int neighbours, double ratio);
-
 /* NPG_BAD_INPUT when there are fewer than 16 points, or all lie in one place, on one line or on one plane. */
 npg_status npg_clean_check(const npg_frame *frame);
 

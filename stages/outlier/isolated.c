@@ -4,7 +4,7 @@
 #include <inttypes.h>
 #include <xxhash.h>
 
-#include "outlier/cleaning.h"
+#include "outlier/outliers.h"
 #include "pipeline/parallel.h"
 
 typedef struct known_frame {
@@ -110,11 +110,12 @@ typedef struct searches {
 static npg_status filter_share(void *user, size_t part)
 {
     const searches *s = user;
+    int threads = s->parts > 1 ? 1 : 0; /* one frame is searched by all cores */
     for (size_t i = part; i < s->count; i += s->parts) {
         const search *l = &s->all[i];
         if (l->is_known) continue;
-        npg_status status =
-            npg_find_isolated(l->keep, l->frame->pos_local, l->frame->point_count, s->neighbours, s->ratio);
+        npg_status status = npg_find_isolated(l->keep, l->frame->pos_local, l->frame->point_count,
+                                              s->neighbours, s->ratio, threads);
         if (status) return npg_error_prefix(status, "frame %" PRId64, l->frame->number);
     }
     return NPG_OK;

@@ -10,8 +10,7 @@
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 
-#define BATCH         4096 /* queries at a time: bounds the memory for neighbours */
-#define JACOBI_ROUNDS 12   /* sweeps, more than a 3 x 3 matrix needs */
+#define JACOBI_ROUNDS 12 /* sweeps, more than a 3 x 3 matrix needs */
 
 /* ---- smallest eigenvector of a symmetric 3 x 3 matrix ---- */
 
@@ -40,37 +39,41 @@ void npg_normal_of(float normal[3], const float *points, size_t count)
     smallest_axis(normal, m);
 }
 
-/* From the points with these indices; around: room for k points. */
-static void normal_from(float normal[3], float *around, const float *points, const uint32_t *index, size_t k)
+typedef struct estimate {
+    float *const *normals; /* one list per number of neighbours */
+    const int *neighbours;
+    size_t count;
+    const float *points;
+} estimate;
+
+/* An npg_kdtree_visit: lists are nearest first, so that fewer neighbours are the beginning of more. */
+static void estimate_point(void *user, uint32_t point, const uint32_t *index, const float *dist_sq)
 {
-    size_t count = 0;
-    for (; count < k && index[count] != UINT32_MAX; count++)
-        memcpy(around + 3 * count, points + 3 * (size_t)index[count], 3 * sizeof *around);
-    npg_normal_of(normal, around, count);
+    const estimate *e = user;
+    float around[3 * NPG_KDTREE_NEIGHBOURS];
+    (void)dist_sq;
+    for (size_t i = 0, found = 0; i < e->count; i++) {
+        for (; found < (size_t)e->neighbours[i] && index[found] != UINT32_MAX; found++)
+            memcpy(around + 3 * found, e->points + 3 * (size_t)index[found], 3 * sizeof *around);
+        npg_normal_of(e->normals[i] + 3 * (size_t)point, around, found);
+    }
+}
+
+npg_status npg_normals_estimate_several(float *const *normals, const float *points, size_t n,
+                                        const int *neighbours, size_t count)
+{
+    npg_kdtree *tree = NULL;
+    estimate e = {.normals = normals, .neighbours = neighbours, .count = count, .points = points};
+    NPG_REQUIRE(count && neighbours[0] >= 3 && neighbours[count - 1] <= NPG_KDTREE_NEIGHBOURS);
+    NPG_TRY(npg_kdtree_open(&tree, points, n));
+    npg_status status = npg_kdtree_each(tree, (size_t)neighbours[count - 1], NULL, estimate_point, &e, 0);
+    npg_kdtree_close(&tree);
+    return status;
 }
 
 npg_status npg_normals_estimate(float *normals, const float *points, size_t n, int neighbours)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL, *around = NULL;
-    size_t k = (size_t)neighbours;
-    NPG_REQUIRE(neighbours >= 3);
-    npg_status status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq);
-    if (!status) status = npg_alloc_array(&around, NPG_FOR_FRAMES, k, 3 * sizeof *around);
-    for (size_t first = 0; first < n && !status; first += BATCH) {
-        size_t count = n - first < BATCH ? n - first : BATCH;
-        status = npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0);
-        for (size_t i = 0; i < count && !status; i++)
-            normal_from(normals + 3 * (first + i), around, points, index + k * i, k);
-    }
-    npg_kdtree_close(&tree);
-    npg_release(&index);
-    npg_release(&dist_sq);
-    npg_release(&around);
-    return status;
+    return npg_normals_estimate_several(&normals, points, n, &neighbours, 1);
 }
 
 /* ---- sensor ---- */

@@ -16,6 +16,10 @@ void npg_normal_of(float normal[3], const float *points, size_t point_count);
 /* Unit normals without a side: the direction in which the `neighbours` nearest points spread least. */
 npg_status npg_normals_estimate(float *normals, const float *points, size_t point_count, int neighbours);
 
+/* The same for several numbers of neighbours, ascending, at once: normals[i] are those of neighbours[i]. */
+npg_status npg_normals_estimate_several(float *const *normals, const float *points, size_t point_count,
+                                        const int *neighbours, size_t count);
+
 /* Turn every normal toward the sensor (same coordinates as the points).  *flipped counts the turned ones. */
 void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t point_count,
                              const double sensor[3]);

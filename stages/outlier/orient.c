@@ -17,9 +17,11 @@
 #include "outlier/normals.h"
 #include "outlier/sides.h"
 #include "pipeline/memory.h"
+#include "pipeline/parallel.h"
 
 #define NEIGHBOURS NPG_SIDE_NEIGHBOURS
 /* All set by trial. */
+#define TRIALS         4    /* numbers of neighbours                                               */
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
 #define FOLLOWED       5    /* core points that each other point asks for its side                 */
 #define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
@@ -310,22 +312,35 @@ npg_status npg_normals_orient(float *normals, double *score, const float *points
     return orient(normals, score, points, point_count, false);
 }
 
+typedef struct trials {     /* of the same points with several numbers of neighbours */
+    float *normals[TRIALS]; /* N x 3 each, owned */
+    double score[TRIALS];
+    const float *points;
+    size_t count, parts;
+} trials;
+
+static npg_status orient_share(void *user, size_t part)
+{
+    trials *t = user;
+    for (size_t i = part; i < TRIALS; i += t->parts)
+        NPG_TRY(npg_normals_orient(t->normals[i], &t->score[i], t->points, t->count));
+    return NPG_OK;
+}
+
 npg_status npg_normals_make(float *normals, const float *points, size_t n)
 {
-    static const int neighbours[] = {10, 12, 16, 24}; /* set by trial: see normals.h for what they trade */
-    float *trial;
-    double best = -INFINITY;
+    static const int neighbours[TRIALS] = {10, 12, 16, 24}; /* see normals.h for what they trade */
+    trials t = {.points = points, .count = n, .parts = npg_parallel_parts(TRIALS, 1, TRIALS)};
+    size_t best = 0;
     npg_status status = NPG_OK;
-    NPG_TRY(npg_alloc_array(&trial, NPG_FOR_FRAMES, n, 3 * sizeof *trial));
-    for (size_t i = 0; i < sizeof neighbours / sizeof *neighbours && !status; i++) {
-        double score;
-        status = npg_normals_estimate(trial, points, n, neighbours[i]);
-        if (!status) status = npg_normals_orient(trial, &score, points, n);
-        if (status || !(score > best)) continue;
-        best = score;
-        memcpy(normals, trial, n * 3 * sizeof *normals);
-    }
-    npg_release(&trial);
+    for (size_t i = 0; i < TRIALS && !status; i++)
+        status = npg_alloc_array(&t.normals[i], NPG_FOR_FRAMES, n, 3 * sizeof(float));
+    if (!status) status = npg_normals_estimate_several(t.normals, points, n, neighbours, TRIALS);
+    if (!status) status = npg_parallel(orient_share, &t, t.parts);
+    for (size_t i = 1; i < TRIALS; i++)
+        if (t.score[i] > t.score[best]) best = i;
+    if (!status) memcpy(normals, t.normals[best], n * 3 * sizeof *normals);
+    for (size_t i = 0; i < TRIALS; i++) npg_release(&t.normals[i]);
     return status;
 }
 

@@ -1,17 +1,19 @@
 /* Outlier: drops what is no point of the surface, thins where asked or where a frame is too large, and makes
  * or mends normals.
  *
- * The cheap cleaning takes part in every pass, so that box and keyframe are those of clean points; it gives
- * the same points each time.  Normals are made for the keyframe alone (or all, if asked), and in the choosing
- * pass for the frames that may become it. */
+ * Cleaning takes part in every pass, so that box and keyframe are those of clean points; it gives the same
+ * points each time, and a frame that was kept clean (frame_store.h) is not cleaned again.  Normals are made
+ * for the keyframe alone (or all, if asked), and in the choosing pass for the frames that may become it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "geometry/vec3.h"
+#include "ingest/frame_store.h"
 #include "outlier/cleaning.h"
 #include "outlier/isolated.h"
 #include "outlier/normals.h"
+#include "outlier/outliers.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
@@ -31,6 +33,8 @@ typedef struct outlier_state {
     npg_cleaning sum;
     size_t frames, skipped;
     double normals_s;
+    npg_frame_store *store; /* loan; NULL: nothing is kept */
+    bool keeps;             /* there are later passes      */
 } outlier_state;
 
 #define AT(member) offsetof(outlier_state, member)
@@ -39,7 +43,7 @@ typedef struct outlier_state {
 static const npg_option outlier_options[] = {
     /* type        name                  place                  default   least  most  shown as or words */
     NPG_ROW_FLAG  ("outliers",           AT(drop_isolated),     "yes",
-        "Drop isolated points (PCL's statistical filter, repeated until it finds no more)"),
+        "Drop isolated points (the statistical filter that PCL has, too, repeated until it finds no more)"),
     NPG_ROW_INT   ("outlier-neighbours", AT(neighbours),        "12",     2,     200,  NULL,
         "Neighbours whose mean distance tells whether a point is isolated"),
     NPG_ROW_REAL  ("outlier-ratio",      AT(ratio),             "5",      0.5,   100,  NULL,
@@ -278,19 +282,43 @@ static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status 
     return NPG_OK;
 }
 
+/* Clean already: an earlier pass has put it into the store. */
+static bool is_done(const npg_frame *frame)
+{
+    return frame->is_skipped || (frame->fields & NPG_FIELD_CLEAN);
+}
+
 static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
 {
-    npg_status status = frame->is_skipped ? NPG_OK : clean_points(worker, frame);
+    npg_status status = is_done(frame) ? NPG_OK : clean_points(worker, frame);
     return status ? skip_or_fail(worker, frame, status) : NPG_OK;
+}
+
+/* A held frame is the copy of another one, which is kept under its own number. */
+static npg_status check_and_keep(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    NPG_TRY(npg_clean_check(frame));
+    frame->fields |= NPG_FIELD_CLEAN;
+    if (s->store && s->keeps && !frame->is_held) npg_frame_store_put(s->store, frame);
+    return NPG_OK;
+}
+
+static npg_status find_normals(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    if (s->store && !frame->is_held && npg_frame_store_get_normals(s->store, frame)) return NPG_OK;
+    NPG_TRY(make_or_mend_normals(worker, frame));
+    if (s->store && s->keeps && !frame->is_held) npg_frame_store_put_normals(s->store, frame);
+    return NPG_OK;
 }
 
 static npg_status check_frame_and_normals(npg_worker *worker, npg_frame *frame)
 {
     if (frame->is_skipped) return NPG_OK;
-    npg_status status = npg_clean_check(frame);
-    if (!status && needs_normals(worker, frame)) status = make_or_mend_normals(worker, frame);
+    npg_status status = is_done(frame) ? NPG_OK : check_and_keep(worker, frame);
+    if (!status && needs_normals(worker, frame)) status = find_normals(worker, frame);
     if (status) return skip_or_fail(worker, frame, status);
-    frame->fields |= NPG_FIELD_CLEAN;
     add_counts(npg_worker_state(worker), &frame->cleaning);
     return NPG_OK;
 }
@@ -298,19 +326,33 @@ static npg_status check_frame_and_normals(npg_worker *worker, npg_frame *frame)
 static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
 {
     const outlier_state *s = npg_worker_state(worker);
-    size_t frame_count = npg_chunk_count(chunk);
+    size_t frame_count = npg_chunk_count(chunk), count = 0;
     npg_frame **frames;
     if (!s->drop_isolated) return NPG_OK;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
-    for (size_t i = 0; i < frame_count; i++) frames[i] = npg_chunk_frame(chunk, i);
+    for (size_t i = 0; i < frame_count; i++)
+        if (!is_done(npg_chunk_frame(chunk, i))) frames[count++] = npg_chunk_frame(chunk, i);
     npg_status status =
-        npg_isolated_drop(npg_worker_kept(worker), frames, frame_count, (int)s->neighbours, s->ratio);
+        npg_isolated_drop(npg_worker_kept(worker), frames, count, (int)s->neighbours, s->ratio);
     npg_release(&frames);
     return status;
 }
 
+/* Frames may be kept while a later pass brings them again, unless a custom stage before this one would then
+ * see them twice. */
+static void find_store(npg_worker *worker)
+{
+    outlier_state *s = npg_worker_state(worker);
+    const npg_custom_stage *custom;
+    s->store = npg_worker_fact(worker, &npg_fact_frame_store);
+    s->keeps = npg_worker_pass(worker) != NPG_PASS_SOLVE;
+    for (size_t i = 0; (custom = npg_options_custom_stage(npg_worker_options(worker), i)); i++)
+        if (!strcmp(custom->after, "ingest")) s->store = NULL;
+}
+
 static npg_status outlier_process(npg_worker *worker, npg_chunk **chunk)
 {
+    find_store(worker);
     size_t frame_count = npg_chunk_count(*chunk);
     for (size_t i = 0; i < frame_count; i++) NPG_TRY(clean_frame(worker, npg_chunk_frame(*chunk, i)));
     NPG_TRY(drop_isolated(worker, *chunk));
@@ -341,12 +383,13 @@ static npg_status outlier_flush(npg_worker *worker)
                    {"normals_estimated", s->sum.normals_estimated}};
     for (size_t i = 0; i < sizeof figures / sizeof *figures; i++)
         json_object_set_new(r, figures[i].name, json_integer((json_int_t)figures[i].value));
-    json_object_set_new(r, "normals_s", json_real(s->normals_s));
+    double before_s = json_real_value(json_object_get(r, "normals_s")); /* of the passes before */
+    json_object_set_new(r, "normals_s", json_real(before_s + s->normals_s));
     return NPG_OK;
 }
 
-/* One frame at work: the hash table and the normals; as many as there are threads with PCL's copy and tree;
- * what is remembered of all. */
+/* One frame at work: the hash table and the normals with their trials; as many as there are threads in the
+ * search for isolated points; what is remembered of all. */
 static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -354,7 +397,7 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 120 * thinned * threads + KEPT_RESULTS_MAX; /* bytes per point, rounded up */
+    return 17 * points + 60 * thinned + threads * npg_find_isolated_memory(thinned) + KEPT_RESULTS_MAX;
 }
 
 const npg_stage npg_stage_outlier = {.name = "outlier",

@@ -6,10 +6,11 @@ SMALL=(--vertices 200 --points 100 --frames 2 --repeat 1)
 setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
 
 @test "bench prints a table and writes a report, and compare judges it" {
-    run "$NEUPIG" bench "${SMALL[@]}" --dense 400 --epochs 1 -o now.json
+    run "$NEUPIG" bench "${SMALL[@]}" --dense 400 --cloud 3000 --epochs 1 -o now.json
     [ "$status" -eq 0 ]
     [[ "$output" == *"share of the limit"*"mlp_forward"*"dense_carry"*"vertex-frames/s"*"an epoch"* ]]
-    for word in peak sizes device mlp_backward nearest_and_chamfer share_of_bound seconds_per_epoch; do
+    for word in peak sizes device mlp_backward nearest_and_chamfer share_of_bound seconds_per_epoch \
+        outlier_isolated outlier_normals surface_closest poisson processor_us_per_point; do
         grep -q "\"$word\":" now.json
     done
     # the same report with one kernel that takes twice its time

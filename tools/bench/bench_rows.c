@@ -6,7 +6,9 @@
 
 #include "align/align.h"
 #include "geometry/geometry.h"
+#include "mesh/mesh.h"
 #include "optimize/optimize.h"
+#include "outlier/outlier.h"
 
 typedef struct bench {
     npg_meter *meter;
@@ -75,6 +77,25 @@ npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, 
     if (!status) status = npg_carry_work(body.mesh, time_row, &b);
     if (!status)
         status = npg_decoder_work(meter->device, body.mesh->vert_pos, body.mesh->vert_count, time_row, &b);
+    npg_bench_body_close(&body);
+    return status;
+}
+
+npg_status npg_bench_clouds(npg_meter *meter, const char *only, size_t points, npg_bench_visit *visit,
+                            void *user)
+{
+    enum { BODY_VERTICES = 10000, POISSON_POINTS = 20000 };
+    bench b = {meter, only, visit, user};
+    npg_bench_body body;
+    size_t few = points < POISSON_POINTS ? points : POISSON_POINTS;
+    bool has_poisson = npg_bench_wants(only, "poisson"); /* its normals take a while */
+    NPG_TRY(npg_bench_body_open(&body, BODY_VERTICES, points, 1));
+    npg_status status = npg_outlier_work(body.points[0], points, time_row, &b);
+    if (!status) status = npg_query_work(body.mesh, body.points[0], points, time_row, &b);
+    npg_bench_body_close(&body);
+    if (status || !has_poisson) return status;
+    NPG_TRY(npg_bench_body_open(&body, BODY_VERTICES, few, 1));
+    status = npg_mesh_work(body.points[0], few, time_row, &b);
     npg_bench_body_close(&body);
     return status;
 }

@@ -24,6 +24,11 @@ npg_status npg_bench_kernels(npg_meter *meter, const npg_bench_body *body, const
 npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, npg_bench_visit *visit,
                            void *user);
 
+/* The same for what is done to dense clouds on the host: isolated points, normals, closest points of a
+ * surface, and Poisson (of 20 000 points at most). */
+npg_status npg_bench_clouds(npg_meter *meter, const char *only, size_t points, npg_bench_visit *visit,
+                            void *user);
+
 /* The share of the limit that binds the row: of the multiply-adds, or of the bytes, that the device does in
  * that time; *by_bytes says which. */
 double npg_bench_share(const npg_bench_row *row, bool *by_bytes);

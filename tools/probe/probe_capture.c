@@ -2,6 +2,7 @@
 #include "tools/probe/probe_capture.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "ingest/ingest.h"
 #include "pipeline/plan.h"
@@ -95,10 +96,17 @@ static size_t window_of(const npg_probe *probe, const npg_options *options)
     return (size_t)(window > 0 && window < frames ? window : frames);
 }
 
+static bool is_aligned(const npg_options *options)
+{
+    const char *text = npg_options_get(options, "align");
+    return !text || !strcmp(text, "yes");
+}
+
 void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_options *options)
 {
     /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
     size_t faces = positive_number(options, "faces", 20000), most = npg_probe_counts(probe).most;
     npg_probe_estimate(estimate, probe, (faces < 4 * most ? faces : 4 * most) / 2,
-                       positive_number(options, "epochs", 250), window_of(probe, options));
+                       positive_number(options, "epochs", 250), window_of(probe, options),
+                       is_aligned(options));
 }

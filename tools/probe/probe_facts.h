@@ -47,7 +47,8 @@ typedef struct npg_estimate {
     double flops; /* measured multiply-adds x 2 per second, all cores */
 } npg_estimate;
 
+/* aligned: frames are aligned and fitted on the host, as they are by default; else by the network alone. */
 void npg_probe_estimate(npg_estimate *estimate, const npg_probe *probe, size_t vertices, size_t epochs,
-                        size_t window);
+                        size_t window, bool aligned);
 
 #endif

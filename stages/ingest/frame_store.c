@@ -1,0 +1,276 @@
+/* Frame store: entries in memory or on disk. */
+#include "ingest/frame_store.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#define ROW         (3 * sizeof(float))
+#define FREE_SHARE  4 /* of the disk's free space, one such part may be taken: results need room, too */
+#define NOT_ON_DISK (-1)
+
+typedef struct entry {
+    npg_frame *frame; /* its arrays are NULL where they are on disk; NULL: nothing is kept; owned */
+    float *made;      /* normals made or mended, N x 3; owned                                     */
+    npg_cleaning made_cleaning;
+    off_t points_at, normals_at, made_at; /* places in the file, or NOT_ON_DISK */
+    bool has_made;
+} entry;
+
+struct npg_frame_store {
+    pthread_mutex_t lock;
+    entry *entries; /* owned */
+    size_t count, bytes, byte_max;
+    char *folder; /* owned; NULL: nothing goes to disk (any more) */
+    int file;     /* -1: not made yet */
+    off_t file_bytes, file_max;
+};
+
+static void release_nothing(void *value)
+{
+    (void)value; /* the capture owns it */
+}
+
+const npg_fact_kind npg_fact_frame_store = {"frame_store", "ingest", release_nothing};
+
+npg_status npg_frame_store_open(npg_frame_store **out, size_t frame_count, size_t byte_max,
+                                const char *spill_folder)
+{
+    npg_frame_store *s;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&s, NPG_FOR_FILES, sizeof *s));
+    *s = (npg_frame_store){.count = frame_count, .byte_max = byte_max, .file = -1};
+    pthread_mutex_init(&s->lock, NULL);
+    npg_status status = npg_alloc_array(&s->entries, NPG_FOR_FILES, frame_count, sizeof *s->entries);
+    if (!status && spill_folder) status = npg_copy_text(&s->folder, spill_folder);
+    if (status) npg_frame_store_close(&s);
+    *out = s;
+    return status;
+}
+
+static size_t bytes_of(const entry *e)
+{
+    size_t rows = e->made ? 1 : 0;
+    if (!e->frame) return 0;
+    if (e->frame->pos_local) rows += 1 + (e->frame->normals != NULL);
+    return sizeof *e->frame + rows * e->frame->point_count * ROW;
+}
+
+static void drop(npg_frame_store *s, entry *e)
+{
+    s->bytes -= bytes_of(e);
+    if (e->frame) npg_frame_clear(e->frame);
+    npg_release(&e->frame);
+    npg_release(&e->made);
+    *e = (entry){.points_at = NOT_ON_DISK, .normals_at = NOT_ON_DISK, .made_at = NOT_ON_DISK};
+}
+
+void npg_frame_store_close(npg_frame_store **slot)
+{
+    npg_frame_store *s = slot ? *slot : NULL;
+    if (!s) return;
+    for (size_t i = 0; s->entries && i < s->count; i++) drop(s, &s->entries[i]);
+    if (s->file >= 0) close(s->file);
+    npg_release(&s->entries);
+    npg_release(&s->folder);
+    pthread_mutex_destroy(&s->lock);
+    npg_release(slot);
+}
+
+npg_frame_store_use npg_frame_store_used(npg_frame_store *s)
+{
+    pthread_mutex_lock(&s->lock);
+    npg_frame_store_use use = {s->bytes, (size_t)s->file_bytes};
+    pthread_mutex_unlock(&s->lock);
+    return use;
+}
+
+static entry *find(npg_frame_store *s, int64_t index)
+{
+    return index >= 0 && (size_t)index < s->count ? &s->entries[index] : NULL;
+}
+
+/* ---- disk ---- */
+
+/* A file that has no name: nobody sees it, and it goes with the process that has it open. */
+static int open_nameless(const char *folder)
+{
+    char path[4096];
+    int file = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (file >= 0) return file;
+    if (snprintf(path, sizeof path, "%s/frames.XXXXXX", folder) >= (int)sizeof path) return -1;
+    file = mkostemp(path, O_CLOEXEC); /* file systems that can't */
+    if (file >= 0) unlink(path);
+    return file;
+}
+
+static bool may_write(npg_frame_store *s, off_t size)
+{
+    struct statvfs disk;
+    if (!s->folder) return false;
+    if (s->file < 0) {
+        s->file = open_nameless(s->folder);
+        if (s->file >= 0 && !fstatvfs(s->file, &disk))
+            s->file_max = (off_t)(disk.f_bavail / FREE_SHARE) * (off_t)disk.f_frsize;
+        if (s->file < 0) npg_release(&s->folder);
+    }
+    return s->file >= 0 && size <= s->file_max - s->file_bytes;
+}
+
+/* Where the bytes lie in the file, or NOT_ON_DISK; after a failure nothing more goes there. */
+static off_t write_bytes(npg_frame_store *s, const void *data, size_t size)
+{
+    off_t at = s->file_bytes;
+    if (!may_write(s, (off_t)size)) return NOT_ON_DISK;
+    for (size_t done = 0; done < size;) {
+        ssize_t put = pwrite(s->file, (const char *)data + done, size - done, at + (off_t)done);
+        if (put < 0 && errno == EINTR) continue;
+        if (put <= 0) {
+            npg_release(&s->folder);
+            return NOT_ON_DISK;
+        }
+        done += (size_t)put;
+    }
+    s->file_bytes += (off_t)size;
+    return at;
+}
+
+/* An array of `size` bytes from the file; NULL: it can't be had. */
+static void *read_bytes(const npg_frame_store *s, off_t at, size_t size)
+{
+    char *data;
+    if (npg_alloc(&data, NPG_FOR_FRAMES, size)) return NULL;
+    for (size_t done = 0; done < size;) {
+        ssize_t got = pread(s->file, data + done, size - done, at + (off_t)done);
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0) {
+            npg_release(&data);
+            return NULL;
+        }
+        done += (size_t)got;
+    }
+    return data;
+}
+
+/* The frame without its arrays, which go to disk. */
+static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
+{
+    size_t size = frame->point_count * ROW;
+    if (!(frame->fields & NPG_FIELD_CLEAN) || npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame))
+        return false;
+    *e->frame = *frame;
+    e->frame->pos_local = e->frame->normals = e->frame->vert_unit = NULL;
+    e->frame->align_state = NULL;
+    e->frame->path = NULL;
+    bool is_put = !frame->path || !npg_copy_text(&e->frame->path, frame->path);
+    if (is_put) e->points_at = write_bytes(s, frame->pos_local, size);
+    is_put &= e->points_at != NOT_ON_DISK;
+    if (is_put && frame->normals) e->normals_at = write_bytes(s, frame->normals, size);
+    is_put &= !frame->normals || e->normals_at != NOT_ON_DISK;
+    if (is_put) s->bytes += bytes_of(e);
+    if (!is_put) {
+        npg_frame_clear(e->frame);
+        npg_release(&e->frame);
+    }
+    return is_put;
+}
+
+/* ---- frames ---- */
+
+static bool put_in_memory(npg_frame_store *s, entry *e, const npg_frame *frame)
+{
+    size_t rows = frame->normals ? 2 : 1, bytes = sizeof *frame + rows * frame->point_count * ROW;
+    if (s->bytes > s->byte_max || bytes > s->byte_max - s->bytes) return false;
+    if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return false;
+    if (npg_frame_copy(e->frame, frame)) {
+        npg_release(&e->frame);
+        return false;
+    }
+    s->bytes += bytes_of(e);
+    return true;
+}
+
+void npg_frame_store_put(npg_frame_store *s, const npg_frame *frame)
+{
+    pthread_mutex_lock(&s->lock);
+    entry *e = find(s, frame->index);
+    if (e) {
+        drop(s, e);
+        if (frame->point_count && !put_in_memory(s, e, frame)) put_on_disk(s, e, frame);
+    }
+    pthread_mutex_unlock(&s->lock);
+}
+
+static bool get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
+{
+    size_t size = e->frame->point_count * ROW;
+    if (npg_frame_copy(frame, e->frame)) return false;
+    frame->pos_local = read_bytes(s, e->points_at, size);
+    if (e->normals_at != NOT_ON_DISK) frame->normals = read_bytes(s, e->normals_at, size);
+    if (frame->pos_local && (frame->normals || e->normals_at == NOT_ON_DISK)) return true;
+    npg_frame_clear(frame);
+    return false;
+}
+
+bool npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t index, bool give_away)
+{
+    pthread_mutex_lock(&s->lock);
+    entry *e = find(s, index);
+    bool is_there = e && e->frame;
+    if (is_there && !e->frame->pos_local) {
+        is_there = get_from_disk(s, frame, e);
+    } else if (is_there && give_away) {
+        size_t before = bytes_of(e);
+        *frame = *e->frame;
+        *e->frame =
+            (npg_frame){.point_count = frame->point_count}; /* its made normals may still be asked for */
+        s->bytes -= before - bytes_of(e);
+    } else if (is_there) {
+        is_there = !npg_frame_copy(frame, e->frame);
+    }
+    pthread_mutex_unlock(&s->lock);
+    return is_there;
+}
+
+/* ---- normals ---- */
+
+void npg_frame_store_put_normals(npg_frame_store *s, const npg_frame *frame)
+{
+    size_t size = frame->point_count * ROW;
+    pthread_mutex_lock(&s->lock);
+    entry *e = find(s, frame->index);
+    if (e && e->frame && e->frame->point_count == frame->point_count && !e->has_made) {
+        bool fits = s->bytes <= s->byte_max && size <= s->byte_max - s->bytes;
+        if (fits && !npg_alloc(&e->made, NPG_FOR_FRAMES, size)) {
+            memcpy(e->made, frame->normals, size);
+            s->bytes += size;
+        } else {
+            e->made_at = write_bytes(s, frame->normals, size);
+        }
+        e->made_cleaning = frame->cleaning;
+        e->has_made = e->made || e->made_at != NOT_ON_DISK;
+    }
+    pthread_mutex_unlock(&s->lock);
+}
+
+bool npg_frame_store_get_normals(npg_frame_store *s, npg_frame *frame)
+{
+    size_t size = frame->point_count * ROW;
+    float *normals = NULL;
+    pthread_mutex_lock(&s->lock);
+    const entry *e = find(s, frame->index);
+    bool is_there = e && e->has_made && e->frame->point_count == frame->point_count;
+    if (is_there && !e->made) normals = read_bytes(s, e->made_at, size);
+    if (is_there && e->made && !npg_alloc(&normals, NPG_FOR_FRAMES, size)) memcpy(normals, e->made, size);
+    if (normals) frame->cleaning = e->made_cleaning;
+    pthread_mutex_unlock(&s->lock);
+    if (!normals) return false;
+    npg_release(&frame->normals);
+    frame->normals = normals;
+    return true;
+}
