@@ -60,6 +60,9 @@ typedef struct npg_frame {
     size_t point_count; /* N                                                       */
     float *pos_local;   /* N x 3, owned; world - origin                            */
     float *normals;     /* N x 3, owned, unit length, or NULL                      */
+    uint8_t *colours;   /* N x 4 RGBA, sRGB; alpha 0: not known; owned, or NULL    */
+    uint8_t *sensors;   /* N: index of the sensor that saw it; owned, or NULL      */
+    bool has_sure_normals; /* they face the sensor that saw them: no side is open  */
     npg_cleaning cleaning;
     size_t vert_count; /* V                                                         */
     float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates */
@@ -88,7 +91,7 @@ void npg_frame_clear(npg_frame *frame);
 /* A copy with its own arrays, without align_state. */
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame);
 
-/* Keep the points whose keep[i] is not 0, in order, with their normals. */
+/* Keep the points whose keep[i] is not 0, in order, with all that they carry. */
 void npg_frame_keep(npg_frame *frame, const uint8_t *keep);
 
 #endif

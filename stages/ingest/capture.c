@@ -1,8 +1,6 @@
 /* Capture: the frames of a capture in files, readable in any order, with a bounded cache of what was read. */
 #include "ingest/capture.h"
 
-#include "ingest/formats/reader.h"
-
 static npg_status refuse_gaps(const npg_capture *capture, const char *input)
 {
     char numbers[256];
@@ -14,22 +12,36 @@ static npg_status refuse_gaps(const npg_capture *capture, const char *input)
                      input, list->gap_count, list->count, numbers);
 }
 
-npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
-                            bool keep_going, size_t cache_limit)
+npg_status npg_capture_open_list(npg_capture **out, npg_frame_files **list, const char *input,
+                                 npg_missing missing, bool keep_going, size_t cache_limit)
 {
     npg_capture *c;
     *out = NULL;
-    NPG_TRY(npg_alloc(&c, NPG_FOR_FILES, sizeof *c));
+    npg_status status = npg_alloc(&c, NPG_FOR_FILES, sizeof *c);
+    if (status) {
+        npg_frame_files_close(list);
+        return status;
+    }
+    c->list = *list;
+    *list = NULL;
     c->missing = missing;
     c->keep_going = keep_going;
     c->cache_limit = cache_limit;
-    npg_status status = npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE);
-    if (!status) status = refuse_gaps(c, input);
+    status = refuse_gaps(c, input);
     if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
     if (!status) status = npg_alloc_array(&c->cached, NPG_FOR_FILES, c->list->count, sizeof *c->cached);
     if (status) npg_capture_close(&c);
     *out = c;
     return status;
+}
+
+npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
+                            bool keep_going, size_t cache_limit)
+{
+    npg_frame_files *list;
+    *out = NULL;
+    NPG_TRY(npg_frame_files_open(&list, input, selection, missing != NPG_MISSING_IGNORE));
+    return npg_capture_open_list(out, &list, input, missing, keep_going, cache_limit);
 }
 
 static void drop_cached(npg_capture *c, int64_t index)
@@ -53,7 +65,8 @@ void npg_capture_close(npg_capture **slot)
 
 static size_t bytes_of(const npg_frame *frame)
 {
-    return frame->point_count * (frame->normals ? 6 : 3) * sizeof(float) + sizeof *frame;
+    size_t row = (frame->normals ? 6 : 3) * sizeof(float) + (frame->colours ? 4 : 0) + (frame->sensors ? 1 : 0);
+    return frame->point_count * row + sizeof *frame;
 }
 
 /* What fits stays: the passes walk the capture from end to end, so throwing out the oldest would leave
@@ -91,7 +104,7 @@ static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg
     npg_status status;
     if (take_cached(&status, c, frame, index, is_last_use)) return status;
     c->reads++;
-    NPG_TRY(npg_read_cloud(frame, c->list->slots[index].path, origin));
+    NPG_TRY(npg_frame_files_read(c->list, (size_t)index, frame, origin));
     if (!is_last_use) cache_copy(c, index, frame);
     return NPG_OK;
 }

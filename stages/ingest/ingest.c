@@ -6,6 +6,7 @@
 #include "ingest/capture.h"
 #include "ingest/follow.h"
 #include "ingest/formats/reader.h"
+#include "pipeline/json_file.h"
 #include "pipeline/stage.h"
 
 /* Frames of one gap in a live source.  Each becomes a frame of the run, so a number that is damaged or a time
@@ -17,6 +18,8 @@ typedef struct state {
     double follow_idle_s, follow_settle_s;
     int missing;
     int64_t cache_mib;
+    npg_rig_settings rig;
+    bool align_sensors;
     int64_t next; /* place in the pass's order; live: frames emitted so far */
     /* live */
     npg_selection selection;
@@ -50,6 +53,22 @@ static const npg_option ingest_options[] = {
     NPG_ROW_REAL  ("follow-settle", AT(follow_settle_s), "2",           0,     1e6,     "SECONDS",
         "Seconds without a change after which a file that can't be read, "
         "and that others follow, is given up"),
+    NPG_ROW_CHOICE("sensor-poses",  AT(rig.poses),       "file",        "file|inverse|none",
+        "Poses of a rig's sensors: as its files say (sensor to world), the other way round (world to sensor), "
+        "or none: every sensor stands at the origin, for a body that moves before one sensor"),
+    NPG_ROW_REAL  ("sensor-tolerance", AT(rig.tolerance_s), "0.02",     0,     3600,    "SECONDS",
+        "Images of a rig with time stamps belong together when they are no further apart"),
+    NPG_ROW_FLAG  ("align-sensors", AT(align_sensors),   "no",
+        "Correct the poses of a rig's sensors by the surfaces that more than one of them sees"),
+    NPG_ROW_REAL  ("depth-step",    AT(rig.step_share),  "0.02",        1e-5,  10,      "SHARE",
+        "Neighbouring pixels of a depth image are one surface while their depths differ by less than this share"),
+    NPG_ROW_INT   ("depth-margin",  AT(rig.margin),      "1",           0,     64,      "PIXELS",
+        "Pixels to drop beside depth steps, missing depth and the mask's border: there sensors mix "
+        "the body with what is behind it"),
+    NPG_ROW_REAL  ("depth-near",    AT(rig.near_m),      "0",           0,     1e12,    "LENGTH",
+        "Depths below this are not used, in the rig's unit"),
+    NPG_ROW_REAL  ("depth-far",     AT(rig.far_m),       "0",           0,     1e12,    "LENGTH",
+        "Depths above this are not used, in the rig's unit; 0: no limit"),
     {0}};
 /* clang-format on */
 
@@ -88,16 +107,77 @@ static void report_list(npg_worker *worker, const npg_frame_files *list)
                     list->count, is_held ? "repeat the frame before them" : "are skipped", numbers);
 }
 
-npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
+#define ALIGN_SAMPLE 12 /* frames that the sensors are compared in; more change the correction by less than its
+                           own scatter (set by trial) */
+
+/* Bring the sensors' poses together (option align-sensors). */
+static npg_status correct_rig(npg_worker *worker, npg_rig *rig)
+{
+    npg_rig_offset *offsets;
+    NPG_TRY(npg_alloc_array(&offsets, NPG_FOR_FILES, rig->sensor_count, sizeof *offsets));
+    npg_status status = npg_rig_measure(rig, offsets, ALIGN_SAMPLE);
+    if (!status) npg_rig_correct(rig, offsets);
+    for (size_t i = 1; i < rig->sensor_count && !status; i++) {
+        const npg_rig_offset *o = &offsets[i];
+        if (o->is_known)
+            npg_worker_log(worker, NPG_LOG_INFO, -1, "sensor %s was %.1f mm and %.2f degrees off: corrected",
+                           rig->sensors[i].name, o->dist_mm, o->turn_deg);
+        else
+            npg_worker_warn(worker, false, -1, "sensor %s sees too little of what others see: not corrected",
+                            rig->sensors[i].name);
+    }
+    npg_release(&offsets);
+    return status;
+}
+
+/* What the rig is, and where its sensors have no image. */
+static npg_status report_rig(npg_worker *worker, npg_rig *rig)
+{
+    const state *s = npg_worker_state(worker);
+    json_t *report = npg_worker_report(worker), *sensors = json_array();
+    size_t gaps = 0;
+    for (size_t i = 0; i < rig->sensor_count; i++) {
+        size_t images = 0;
+        for (size_t f = 0; f < rig->frame_count; f++) images += npg_rig_shot_of(rig, f, i) != NULL;
+        gaps += rig->frame_count - images;
+        json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name), "images",
+                                                 (json_int_t)images));
+    }
+    json_object_set_new(report, "rig", json_pack("{ss so}", "layout", rig->layout, "sensors", sensors));
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig (%s) of %zu sensors, %zu frames", rig->path, rig->layout,
+                   rig->sensor_count, rig->frame_count);
+    if (gaps)
+        npg_worker_warn(worker, false, -1, "%zu of %zu images of the rig's sensors are missing", gaps,
+                        rig->frame_count * rig->sensor_count);
+    if (rig->left_out)
+        npg_worker_warn(worker, false, -1, "%zu depth images have no pose within %g s and are left out",
+                        rig->left_out, rig->settings.tolerance_s);
+    return s->align_sensors ? correct_rig(worker, rig) : NPG_OK;
+}
+
+static npg_status list_frames(npg_frame_files **list, const state *s, const npg_settings *settings,
+                              const char *selection)
+{
+    npg_rig_settings rig = s->rig;
+    rig.confine = settings->confine;
+    NPG_TRY(npg_frame_files_open_any(list, settings->input, selection, s->missing != NPG_MISSING_IGNORE, &rig));
+    npg_status status = settings->confine ? npg_frame_files_confine(*list, settings->input) : NPG_OK;
+    if (status) npg_frame_files_close(list);
+    return status;
+}
+
+npg_status npg_capture_select(npg_frame_files **list, const npg_options *options, const char *selection)
 {
     npg_settings settings;
     state s = {0};
     npg_options_fill(options, npg_run_options, &settings);
     npg_options_fill(options, ingest_options, &s);
-    NPG_TRY(npg_frame_files_open(list, settings.input, s.frames, s.missing != NPG_MISSING_IGNORE));
-    npg_status status = settings.confine ? npg_frame_files_confine(*list, settings.input) : NPG_OK;
-    if (status) npg_frame_files_close(list);
-    return status;
+    return list_frames(list, &s, &settings, selection ? selection : s.frames);
+}
+
+npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
+{
+    return npg_capture_select(list, options, NULL);
 }
 
 static npg_status open_capture(npg_worker *worker)
@@ -105,16 +185,17 @@ static npg_status open_capture(npg_worker *worker)
     state *s = npg_worker_state(worker);
     const npg_settings *settings = npg_worker_settings(worker);
     npg_capture *capture;
+    npg_frame_files *list;
     if (npg_worker_kept(worker)) return NPG_OK;
-    NPG_TRY(npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
-                             settings->keep_going, cache_limit(worker)));
+    NPG_TRY(list_frames(&list, s, settings, s->frames));
+    NPG_TRY(npg_capture_open_list(&capture, &list, settings->input, (npg_missing)s->missing,
+                                  settings->keep_going, cache_limit(worker)));
     npg_worker_keep(worker, capture, release_capture);
-    if (settings->confine) NPG_TRY(npg_frame_files_confine(capture->list, settings->input));
     npg_facts *facts = npg_worker_facts(worker);
     /* A resumed run has restored it. */
     if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     report_list(worker, capture->list);
-    return NPG_OK;
+    return capture->list->rig ? report_rig(worker, capture->list->rig) : NPG_OK;
 }
 
 static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index)
