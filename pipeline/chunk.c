@@ -71,6 +71,7 @@ void npg_frame_clear(npg_frame *frame)
     npg_release(&frame->colours);
     npg_release(&frame->sensors);
     npg_release(&frame->vert_unit);
+    npg_release(&frame->vert_colours);
     npg_release(&frame->align_state);
     *frame = (npg_frame){0};
 }
@@ -90,7 +91,7 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     *out = *frame;
     out->path = NULL;
     out->pos_local = out->normals = out->vert_unit = NULL;
-    out->colours = out->sensors = NULL;
+    out->colours = out->sensors = out->vert_colours = NULL;
     out->align_state = NULL; /* belongs to one frame on its way, not to copies */
     out->align_state_size = 0;
     npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
@@ -99,6 +100,7 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     if (!status) status = copy_rows(&out->normals, frame->normals, n, row);
     if (!status) status = copy_rows(&out->colours, frame->colours, n, 4);
     if (!status) status = copy_rows(&out->sensors, frame->sensors, n, 1);
+    if (!status) status = copy_rows(&out->vert_colours, frame->vert_colours, frame->vert_count, 4);
     if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count, row);
     if (status) npg_frame_clear(out);
     return status;

@@ -17,7 +17,7 @@
 enum { NPG_K1, NPG_K2, NPG_P1, NPG_P2, NPG_K3, NPG_K4, NPG_K5, NPG_K6, NPG_DISTORTIONS }; /* OpenCV's order */
 
 typedef struct npg_camera {
-    size_t width, height; /* of the images that the intrinsics are of, pixels */
+    size_t width, height;  /* of the images that the intrinsics are of, pixels */
     double fx, fy, cx, cy; /* pixels */
     double distortion[NPG_DISTORTIONS];
 } npg_camera;

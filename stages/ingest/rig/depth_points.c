@@ -17,8 +17,8 @@
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
 
-#define WINDOW  3  /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
-#define FIT_MIN 8  /* pixels of a window that a normal needs                                             */
+#define WINDOW  3 /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
+#define FIT_MIN 8 /* pixels of a window that a normal needs                                             */
 #define MASK_ON 128
 
 typedef struct grid {
@@ -58,8 +58,8 @@ static npg_status read_images(grid *g, const npg_rig_shot *shot)
     NPG_TRY(npg_image_read(&g->depth, shot->depth, NPG_IMAGE_DEPTH, g->width, g->height));
     if (shot->mask) NPG_TRY(npg_image_read(&g->mask, shot->mask, NPG_IMAGE_MASK, g->width, g->height));
     if (shot->colour)
-        NPG_TRY(npg_image_read(&g->colour, shot->colour, NPG_IMAGE_COLOUR, of_colour->width,
-                               of_colour->height));
+        NPG_TRY(
+            npg_image_read(&g->colour, shot->colour, NPG_IMAGE_COLOUR, of_colour->width, of_colour->height));
     return NPG_OK;
 }
 
@@ -187,7 +187,8 @@ static bool fit_normal(const grid *g, size_t px, size_t py, float normal[3])
 static bool sample(const npg_image *image, const double pixel[2], uint8_t rgb[3])
 {
     double fx = floor(pixel[0]), fy = floor(pixel[1]);
-    if (!(fx >= 0 && fy >= 0 && fx + 1 < (double)image->width && fy + 1 < (double)image->height)) return false;
+    if (!(fx >= 0 && fy >= 0 && fx + 1 < (double)image->width && fy + 1 < (double)image->height))
+        return false;
     const uint8_t *at = image->bytes + 3 * ((size_t)fy * image->width + (size_t)fx);
     const uint8_t *below = at + 3 * image->width;
     double u = pixel[0] - fx, v = pixel[1] - fy;

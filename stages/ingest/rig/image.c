@@ -49,11 +49,10 @@ static npg_status read_bytes(unsigned char **data, size_t *size, const char *pat
     npg_source *source;
     NPG_TRY(npg_source_open_file(&source, path));
     uint64_t left = npg_source_left(source);
-    npg_status status =
-        left > NPG_IMAGE_FILE_MAX
-            ? npg_error(NPG_BAD_INPUT, "%s: no image file, or one of more than %zu MiB", path,
-                        NPG_IMAGE_FILE_MAX >> 20)
-            : npg_source_read(source, data, (size_t)left, size);
+    npg_status status = left > NPG_IMAGE_FILE_MAX
+                            ? npg_error(NPG_BAD_INPUT, "%s: no image file, or one of more than %zu MiB", path,
+                                        NPG_IMAGE_FILE_MAX >> 20)
+                            : npg_source_read(source, data, (size_t)left, size);
     npg_source_close(&source);
     return status;
 }
@@ -73,8 +72,8 @@ static npg_status read_image(npg_image_job job)
 npg_status npg_image_read(npg_image *image, const char *path, npg_image_kind kind, size_t width,
                           size_t height)
 {
-    return read_image((npg_image_job){
-        .path = path, .kind = kind, .width = width, .height = height, .image = image});
+    return read_image(
+        (npg_image_job){.path = path, .kind = kind, .width = width, .height = height, .image = image});
 }
 
 npg_status npg_image_size(size_t *width, size_t *height, const char *path)

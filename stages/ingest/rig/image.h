@@ -8,7 +8,7 @@
 
 #include "pipeline/status.h"
 
-#define NPG_IMAGE_SIDE_MAX 16384             /* pixels; larger sensors than this do not exist */
+#define NPG_IMAGE_SIDE_MAX 16384               /* pixels; larger sensors than this do not exist */
 #define NPG_IMAGE_FILE_MAX ((size_t)256 << 20) /* bytes of a file                              */
 
 typedef enum npg_image_kind {

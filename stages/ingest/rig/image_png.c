@@ -12,8 +12,8 @@ typedef struct decoder {
     const npg_image_job *job;
     png_structp png;
     png_infop info;
-    size_t at; /* bytes taken */
-    npg_status status;  /* why decoding ended, where npg_error() has said it */
+    size_t at;         /* bytes taken */
+    npg_status status; /* why decoding ended, where npg_error() has said it */
     char text[128];
     jmp_buf leave;
 } decoder;

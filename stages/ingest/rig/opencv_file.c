@@ -70,13 +70,13 @@ static const char *find_in_yaml(const char *text, const char *name, const char *
     return NULL;
 }
 
-npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values, size_t most,
-                             size_t *found)
+npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values,
+                             size_t most, size_t *found)
 {
     const char *end;
     *found = 0;
     const char *at = text[strspn(text, " \t\r\n\xef\xbb\xbf")] == '<' ? find_in_xml(text, name, &end)
-                                                                     : find_in_yaml(text, name, &end);
+                                                                      : find_in_yaml(text, name, &end);
     if (!at) return NPG_OK;
     for (;;) {
         while (at < end && (isspace((unsigned char)*at) || *at == ',')) at++;

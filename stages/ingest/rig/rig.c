@@ -299,8 +299,7 @@ npg_status npg_rig_join(npg_rig *rig)
 
 size_t npg_rig_find(const npg_rig *rig, int64_t number)
 {
-    const int64_t *found =
-        bsearch(&number, rig->numbers, rig->frame_count, sizeof *rig->numbers, by_number);
+    const int64_t *found = bsearch(&number, rig->numbers, rig->frame_count, sizeof *rig->numbers, by_number);
     return found ? (size_t)(found - rig->numbers) : SIZE_MAX;
 }
 
@@ -354,14 +353,9 @@ uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame)
         if (!shot) continue;
         double pose[12];
         npg_rig_pose(rig, pose, s, shot);
-        const double numbers[] = {(double)s,
-                                  sensor->scale,
-                                  sensor->near_m,
-                                  sensor->far_m,
-                                  set->near_m,
-                                  set->far_m,
-                                  (double)set->margin,
-                                  (double)sensor->has_colour_camera};
+        const double numbers[] = {
+            (double)s,   sensor->scale, sensor->near_m,      sensor->far_m,
+            set->near_m, set->far_m,    (double)set->margin, (double)sensor->has_colour_camera};
         hash = XXH3_64bits_withSeed(numbers, sizeof numbers, hash);
         hash = XXH3_64bits_withSeed(pose, sizeof pose, hash);
         hash = XXH3_64bits_withSeed(&sensor->camera, sizeof sensor->camera, hash);

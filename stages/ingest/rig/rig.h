@@ -14,21 +14,21 @@
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 
-#define NPG_RIG_SENSORS_MAX 64      /* far above any rig; a sensor's index is a byte           */
-#define NPG_RIG_SHOTS_MAX   4000000 /* images of one sensor: 18 hours at 60 a second           */
+#define NPG_RIG_SENSORS_MAX 64                 /* far above any rig; a sensor's index is a byte           */
+#define NPG_RIG_SHOTS_MAX   4000000            /* images of one sensor: 18 hours at 60 a second           */
 #define NPG_RIG_TEXT_MAX    ((size_t)64 << 20) /* bytes of a calibration or trajectory file    */
 
 /* What to make of the poses in the files (option sensor-poses). */
 typedef enum npg_rig_poses { NPG_POSES_FILE, NPG_POSES_INVERSE, NPG_POSES_NONE } npg_rig_poses;
 
 typedef struct npg_rig_settings {
-    int poses;           /* npg_rig_poses                                                            */
-    double step_share;   /* neighbouring pixels whose depths differ by more than this share of the   */
-                         /* nearer one are not one surface                                           */
-    int64_t margin;      /* pixels that are dropped beside such a step and beside missing depth      */
+    int poses;            /* npg_rig_poses                                                            */
+    double step_share;    /* neighbouring pixels whose depths differ by more than this share of the   */
+                          /* nearer one are not one surface                                           */
+    int64_t margin;       /* pixels that are dropped beside such a step and beside missing depth      */
     double near_m, far_m; /* depths that are used, in the rig's unit; far 0: no limit                */
-    double tolerance_s;  /* images of different sensors belong together within this                  */
-    bool confine;        /* refuse what the rig names outside its folder                             */
+    double tolerance_s;   /* images of different sensors belong together within this                  */
+    bool confine;         /* refuse what the rig names outside its folder                             */
 } npg_rig_settings;
 
 /* Images of one sensor at one time. */
@@ -64,9 +64,9 @@ typedef struct npg_rig {
     npg_rig_sensor *sensors;
     size_t sensor_count, sensor_capacity;
     size_t frame_count;
-    int64_t *numbers;  /* per frame, growing; owned               */
-    int32_t *shot_of;  /* frame_count x sensor_count, -1: a gap   */
-    size_t left_out;   /* images without a pose or without a time */
+    int64_t *numbers; /* per frame, growing; owned               */
+    int32_t *shot_of; /* frame_count x sensor_count, -1: a gap   */
+    size_t left_out;  /* images without a pose or without a time */
 } npg_rig;
 
 /* Whether a path is one: rig.json (any file *.json), or a folder of one of the known layouts that has no
@@ -120,12 +120,12 @@ void npg_depth_points_clear(npg_depth_points *points);
 /* ---- misalignment (rig_align.c) ---- */
 
 typedef struct npg_rig_offset {
-    size_t frames, points; /* frames with an image, points of all frames looked at        */
-    double overlap;        /* share of its points that lie on what other sensors see, 0..1 */
+    size_t frames, points;    /* frames with an image, points of all frames looked at        */
+    double overlap;           /* share of its points that lie on what other sensors see, 0..1 */
     double dist_mm, turn_deg; /* how far off its pose is from the other sensors' surfaces   */
-    double rms;            /* of the distances point to surface after the correction, unit */
-    bool is_known;         /* there was overlap enough to tell                             */
-    double correction[12]; /* world to world: what brings it to the others                 */
+    double rms;               /* of the distances point to surface after the correction, unit */
+    bool is_known;            /* there was overlap enough to tell                             */
+    double correction[12];    /* world to world: what brings it to the others                 */
 } npg_rig_offset;
 
 /* Compare the surfaces that sensors see in `sample` frames spread over the rig, each with those of all
@@ -187,7 +187,7 @@ const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s,
 /* OpenCV's FileStorage, XML or YAML: matrices by name, numbers in rows.  *found is how many numbers there
  * are, 0 where the name is not in the file; more than `most` is NPG_BAD_INPUT. */
 npg_status npg_opencv_open(char **text, const char *path);
-npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values, size_t most,
-                             size_t *found);
+npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values,
+                             size_t most, size_t *found);
 
 #endif

@@ -18,9 +18,9 @@
 #define ROUNDS      40
 #define REACH       0.05 /* of the depth: pairs further apart at the start are none; halved to REACH_END */
 #define REACH_END   0.006
-#define AGREE       0.8   /* cosine of two normals of one surface                          */
-#define OVERLAP_MIN 0.02  /* share of a sensor's points below which its pose can't be told */
-#define STILL       1e-7  /* of the depth: a round that moves less ends the search         */
+#define AGREE       0.8  /* cosine of two normals of one surface                          */
+#define OVERLAP_MIN 0.02 /* share of a sensor's points below which its pose can't be told */
+#define STILL       1e-7 /* of the depth: a round that moves less ends the search         */
 
 /* Points of one sensor in one frame, as its uncorrected pose puts them. */
 typedef struct view {
@@ -33,10 +33,10 @@ typedef struct view {
 typedef struct measuring {
     npg_rig *rig;
     size_t frame_count, sensor_count;
-    view *views;          /* frame_count x sensor_count, owned                */
-    double *corrections;  /* sensor_count x 12, world to world; owned         */
-    double depth;         /* median-like size: mean distance sensor to points */
-    uint32_t *index;      /* SOURCES_MAX, scratch, owned                      */
+    view *views;         /* frame_count x sensor_count, owned                */
+    double *corrections; /* sensor_count x 12, world to world; owned         */
+    double depth;        /* median-like size: mean distance sensor to points */
+    uint32_t *index;     /* SOURCES_MAX, scratch, owned                      */
     float *dist_sq, *queries;
     npg_rig_offset *offsets;
 } measuring;

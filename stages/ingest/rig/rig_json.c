@@ -54,7 +54,8 @@ static npg_status check_keys(const place *p, const json_t *object, const char *c
 }
 
 /* A number, finite; *value stays where the key is missing and may be. */
-static npg_status get_number(const place *p, const json_t *object, const char *key, bool must_be, double *value)
+static npg_status get_number(const place *p, const json_t *object, const char *key, bool must_be,
+                             double *value)
 {
     const json_t *found = json_object_get(object, key);
     if (!found) return must_be ? bad(p, key, "is missing") : NPG_OK;
@@ -150,7 +151,8 @@ static npg_status find_numbered(npg_rig *rig, const place *p, const char *key, c
     char *path;
     *paths = (npg_paths){0};
     if (!strchr(pattern, '%') && !strchr(pattern, '#'))
-        return bad(p, key, "must be a pattern with the frame's number, such as depth_%04d.png, or a list *.txt");
+        return bad(p, key,
+                   "must be a pattern with the frame's number, such as depth_%04d.png, or a list *.txt");
     NPG_TRY(npg_rig_path(rig, &path, pattern, false));
     npg_status status = npg_paths_find(paths, path);
     npg_release(&path);
@@ -267,7 +269,8 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
         return bad(p, "depth", "either all sensors have lists with times, or none");
     rig->is_timed = is_timed;
     if (is_timed && names[2]) return bad(p, "mask", "goes with numbered images, not with lists");
-    if (is_timed && names[1] && !is_list(names[1])) return bad(p, "colour", "must be a list *.txt as depth is");
+    if (is_timed && names[1] && !is_list(names[1]))
+        return bad(p, "colour", "must be a list *.txt as depth is");
     if (is_timed) return npg_rig_load_timed(rig, sensor, names[0], names[1], poses);
     NPG_TRY(load_numbered(rig, sensor, p, names));
     return poses ? read_poses(rig, sensor, p, poses) : NPG_OK;
@@ -276,9 +279,8 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
 static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object, double scale,
                               bool is_opengl)
 {
-    static const char *const keys[] = {"name",          "depth", "colour", "mask",        "camera",
-                                       "colour_camera", "pose",  "poses",  "depth_scale", "near",
-                                       "far",           NULL};
+    static const char *const keys[] = {"name", "depth", "colour",      "mask", "camera", "colour_camera",
+                                       "pose", "poses", "depth_scale", "near", "far",    NULL};
     char number[32];
     const char *name;
     npg_rig_sensor *sensor;
@@ -293,7 +295,8 @@ static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object
     NPG_TRY(get_number(p, object, "near", false, &sensor->near_m));
     NPG_TRY(get_number(p, object, "far", false, &sensor->far_m));
     if (!(sensor->scale > 0)) return bad(p, "depth_scale", "must be more than 0");
-    const json_t *camera = json_object_get(object, "camera"), *other = json_object_get(object, "colour_camera");
+    const json_t *camera = json_object_get(object, "camera"),
+                 *other = json_object_get(object, "colour_camera");
     if (!camera) return bad(p, "camera", "is missing: the intrinsics of the depth image");
     place in = inside(p, "camera"), in_colour = inside(p, "colour_camera");
     NPG_TRY(get_camera(&in, camera, &sensor->camera, false, NULL));
@@ -307,8 +310,8 @@ static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object
 
 static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
 {
-    static const char *const keys[] = {"neupig_rig", "comment",   "depth_scale", "axes",
-                                       "tolerance",  "unit",      "sensors",     NULL};
+    static const char *const keys[] = {"neupig_rig", "comment", "depth_scale", "axes",
+                                       "tolerance",  "unit",    "sensors",     NULL};
     const place top = {.file = file};
     const char *axes, *text;
     double scale = 0.001, version = 0;
@@ -321,7 +324,8 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
     NPG_TRY(get_text(&top, root, "comment", &text));
     NPG_TRY(get_text(&top, root, "unit", &text));
     if (axes && strcmp(axes, "opencv") != 0 && strcmp(axes, "opengl") != 0)
-        return bad(&top, "axes", "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
+        return bad(&top, "axes",
+                   "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
     const json_t *sensors = json_object_get(root, "sensors");
     if (!json_array_size(sensors)) return bad(&top, "sensors", "must be a list of at least one sensor");
     for (size_t s = 0; s < json_array_size(sensors); s++) {
@@ -374,11 +378,7 @@ npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path)
     json_decref(root);
     npg_release(&text);
     NPG_TRY(status);
-    *camera = (npg_camera){.width = (size_t)width,
-                           .height = (size_t)height,
-                           .fx = m[0],
-                           .fy = m[4],
-                           .cx = m[6],
-                           .cy = m[7]};
+    *camera = (npg_camera){
+        .width = (size_t)width, .height = (size_t)height, .fx = m[0], .fy = m[4], .cx = m[6], .cy = m[7]};
     return npg_camera_check(camera, path);
 }

@@ -291,7 +291,8 @@ static npg_status camera_of(npg_camera *camera, const char *text, const char *pa
 /* Intrinsics and pose of one frame. */
 static npg_status read_camera(npg_camera *camera, double pose[12], const char *path)
 {
-    static const char *const rotations[] = {"R", "rotation", NULL}, *const shifts[] = {"t", "T", "translation", NULL};
+    static const char *const rotations[] = {"R", "rotation", NULL}, *const shifts[] = {"t", "T",
+                                                                                       "translation", NULL};
     double r[9], t[3];
     char *text;
     NPG_TRY(npg_opencv_open(&text, path));
@@ -318,8 +319,10 @@ static npg_status add_opencv(const npg_rig *rig, npg_rig_sensor *sensor, const c
     if (shot.number < 0) shot.number = (int64_t)sensor->shot_count;
     NPG_TRY(beside(&file, depth, cameras));
     npg_status status = file ? NPG_OK
-                             : npg_error(NPG_BAD_INPUT, "%s: there is no *_camera.xml or .yml beside it: "
-                                                        "intrinsics missing", depth);
+                             : npg_error(NPG_BAD_INPUT,
+                                         "%s: there is no *_camera.xml or .yml beside it: "
+                                         "intrinsics missing",
+                                         depth);
     if (!status && rig->settings.confine) status = npg_path_confine(file, rig->folder);
     if (!status && !camera.width) status = npg_image_size(&camera.width, &camera.height, depth);
     if (!status) status = read_camera(&camera, shot.pose, file);

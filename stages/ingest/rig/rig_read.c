@@ -47,8 +47,8 @@ static void add_sensor(npg_frame *frame, const reading *r, size_t s, npg_origin 
         npg_pose_apply(world, pose, (const double[3]){(double)p[0], (double)p[1], (double)p[2]});
         npg_local_of(frame->pos_local + 3 * to, origin, world);
         for (size_t a = 0; a < 3; a++)
-            frame->normals[3 * to + a] =
-                (float)(pose[4 * a] * (double)n[0] + pose[4 * a + 1] * (double)n[1] + pose[4 * a + 2] * (double)n[2]);
+            frame->normals[3 * to + a] = (float)(pose[4 * a] * (double)n[0] + pose[4 * a + 1] * (double)n[1] +
+                                                 pose[4 * a + 2] * (double)n[2]);
         if (from->colours) memcpy(frame->colours + 4 * to, from->colours + 4 * i, 4);
         frame->sensors[to] = (uint8_t)s;
     }
