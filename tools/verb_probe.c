@@ -24,7 +24,7 @@ const npg_option npg_probe_options[] = {
         "Print one JSON object instead of text"),
     NPG_ROW_TEXT("rig",  AT(rig),  "",      "PATH",
         "Depth images instead of clouds, the same as giving them as INPUT: also says per sensor how many "
-        "frames and points it has, how much it sees of what others see, and how far its pose is off from theirs"),
+        "frames and points it has, how much it sees of what others see, and how far its surface lies from theirs"),
     {0}};
 /* clang-format on */
 
@@ -32,8 +32,8 @@ typedef struct job {
     settings s;
     const npg_options *options;
     const char *input;
-    npg_frame_files *list;   /* NULL for standard input             */
-    npg_rig_offset *offsets; /* per sensor of a rig; owned, or NULL */
+    npg_frame_files *list; /* NULL for standard input             */
+    npg_rig_view *views;   /* per sensor of a rig; owned, or NULL */
     npg_probe probe;
 } job;
 
@@ -63,26 +63,27 @@ static npg_status read_stream(job *j)
     return status == NPG_END ? NPG_OK : status;
 }
 
-#define SENSOR_SAMPLE 12 /* frames in which sensors are compared, as a run with align-sensors does */
-#define SENSOR_OFF_MM  3 /* a sensor further off than the noise of usual depth cameras needs attention */
+#define SENSOR_SAMPLE 12   /* frames in which sensors are compared */
+#define APART_MOST    0.01 /* metres between what two sensors see: more than the noise of depth cameras */
 
-/* Sensors against each other; one that no other overlaps is left as unknown. */
-static npg_status measure_rig(job *j)
+/* Sensors against each other. */
+static npg_status compare_sensors(job *j)
 {
     npg_rig *rig = j->list->rig;
-    NPG_TRY(npg_alloc_array(&j->offsets, NPG_FOR_FILES, rig->sensor_count, sizeof *j->offsets));
-    npg_status status = npg_rig_measure(rig, j->offsets, SENSOR_SAMPLE);
-    if (status == NPG_BAD_INPUT) { /* an image that reading has told of */
-        npg_release(&j->offsets);
+    NPG_TRY(npg_alloc_array(&j->views, NPG_FOR_FILES, rig->sensor_count, sizeof *j->views));
+    npg_status status = npg_rig_compare(rig, j->views, SENSOR_SAMPLE);
+    if (status == NPG_BAD_INPUT) { /* an image that reading has reported */
+        npg_release(&j->views);
         return NPG_OK;
     }
-    for (size_t s = 1; s < rig->sensor_count && !status; s++) {
-        const npg_rig_offset *o = &j->offsets[s];
-        if (o->is_known && (o->dist_mm > SENSOR_OFF_MM || o->turn_deg > 0.2))
-            npg_probe_warn(&j->probe, "sensor %s is %.0f mm and %.1f degrees off (align-sensors corrects it)",
-                           rig->sensors[s].name, o->dist_mm, o->turn_deg);
-        if (!o->is_known)
-            npg_probe_warn(&j->probe, "sensor %s sees too little of what others see to check its pose",
+    for (size_t s = 0; s < rig->sensor_count && !status; s++) {
+        const npg_rig_view *v = &j->views[s];
+        if (v->apart > APART_MOST)
+            npg_probe_warn(&j->probe,
+                           "sensor %s sees surfaces %.1f mm (rms) beside those that others see: its pose?",
+                           rig->sensors[s].name, 1000 * v->apart);
+        if (rig->sensor_count > 1 && v->frames && v->overlap < 0.02)
+            npg_probe_warn(&j->probe, "sensor %s sees almost nothing that others see: its pose?",
                            rig->sensors[s].name);
     }
     return status;
@@ -94,7 +95,7 @@ static npg_status read_all(job *j)
     npg_status status =
         strcmp(j->input, "-") ? npg_probe_files(&j->probe, &j->list, j->options) : read_stream(j);
     j->probe.read_s = npg_clock_s() - begin_s;
-    if (!status && j->list && j->list->rig) status = measure_rig(j);
+    if (!status && j->list && j->list->rig) status = compare_sensors(j);
     if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
     return status;
 }
@@ -111,31 +112,27 @@ static size_t images_of(const npg_rig *rig, size_t s)
 static void print_sensors(const job *j)
 {
     const npg_rig *rig = j->list ? j->list->rig : NULL;
-    for (size_t s = 0; rig && j->offsets && s < rig->sensor_count; s++) {
-        const npg_rig_offset *o = &j->offsets[s];
+    for (size_t s = 0; rig && j->views && s < rig->sensor_count; s++) {
+        const npg_rig_view *v = &j->views[s];
         printf("sensor    %-12s %zu images, %zu points each", rig->sensors[s].name, images_of(rig, s),
-               o->frames ? o->points / o->frames : 0);
-        if (rig->sensor_count > 1) printf("; overlap %.0f %%", 100 * o->overlap);
-        if (s && o->is_known)
-            printf("; %.1f mm and %.2f degrees off, then %.1f mm rms", o->dist_mm, o->turn_deg, 1000 * o->rms);
-        puts(s && !o->is_known ? "; too little overlap to check its pose" : "");
+               v->frames ? v->points / v->frames : 0);
+        if (rig->sensor_count > 1)
+            printf("; overlap %.0f %%, there %.1f mm (rms) beside the others", 100 * v->overlap,
+                   1000 * v->apart);
+        puts("");
     }
 }
 
 static json_t *json_of_sensors(const job *j)
 {
     json_t *list = json_array();
-    const npg_rig *rig = j->list ? j->list->rig : NULL;
-    for (size_t s = 0; rig && j->offsets && s < rig->sensor_count; s++) {
-        const npg_rig_offset *o = &j->offsets[s];
-        json_t *correction = json_array();
-        for (int i = 0; i < 12; i++) json_array_append_new(correction, json_real(o->correction[i]));
-        json_array_append_new(
-            list, json_pack("{so sI sI sf sb sf sf sf so}", "name", npg_json_text(rig->sensors[s].name), "images",
-                            (json_int_t)images_of(rig, s), "points",
-                            (json_int_t)(o->frames ? o->points / o->frames : 0), "overlap", o->overlap, "is_known",
-                            (int)o->is_known, "off_mm", o->dist_mm, "off_degrees", o->turn_deg, "rms", o->rms,
-                            "correction", correction));
+    const npg_rig *rig = j->list->rig;
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        const npg_rig_view *v = &j->views[s];
+        json_array_append_new(list, json_pack("{so sI sI sf sf}", "name", npg_json_text(rig->sensors[s].name),
+                                              "images", (json_int_t)images_of(rig, s), "points",
+                                              (json_int_t)(v->frames ? v->points / v->frames : 0), "overlap",
+                                              v->overlap, "apart", v->apart));
     }
     return list;
 }
@@ -160,7 +157,7 @@ static void print_json(job *j, const npg_estimate *e)
         "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
         "epochs", (json_int_t)e->epochs, "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes,
         "disk_bytes", e->disk_bytes, "time_s", e->time_s, "per_frame", p->per_frame);
-    if (j->offsets) json_object_set_new(all, "sensors", json_of_sensors(j));
+    if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     puts(text ? text : "{}");
     free(text);
@@ -231,7 +228,7 @@ int npg_verb_probe(int argc, char **argv)
         if (!status) status = npg_options_set(options, "input", j.input);
         if (!status) status = do_probe(&j);
     }
-    npg_release(&j.offsets);
+    npg_release(&j.views);
     npg_frame_files_close(&j.list);
     npg_probe_uninit(&j.probe);
     npg_options_close(&options);

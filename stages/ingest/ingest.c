@@ -19,7 +19,6 @@ typedef struct state {
     int missing;
     int64_t cache_mib;
     npg_rig_settings rig;
-    bool align_sensors;
     int64_t next; /* place in the pass's order; live: frames emitted so far */
     /* live */
     npg_selection selection;
@@ -58,8 +57,6 @@ static const npg_option ingest_options[] = {
         "or none: every sensor stands at the origin, for a body that moves before one sensor"),
     NPG_ROW_REAL  ("sensor-tolerance", AT(rig.tolerance_s), "0.02",     0,     3600,    "SECONDS",
         "Images of a rig with time stamps belong together when they are no further apart"),
-    NPG_ROW_FLAG  ("align-sensors", AT(align_sensors),   "no",
-        "Correct the poses of a rig's sensors by the surfaces that more than one of them sees"),
     NPG_ROW_REAL  ("depth-step",    AT(rig.step_share),  "0.02",        1e-5,  10,      "SHARE",
         "Neighbouring pixels of a depth image are one surface while their depths differ by less than this share"),
     NPG_ROW_INT   ("depth-margin",  AT(rig.margin),      "1",           0,     64,      "PIXELS",
@@ -107,52 +104,27 @@ static void report_list(npg_worker *worker, const npg_frame_files *list)
                     list->count, is_held ? "repeat the frame before them" : "are skipped", numbers);
 }
 
-#define ALIGN_SAMPLE 12 /* frames that the sensors are compared in; more change the correction by less than its
-                           own scatter (set by trial) */
-
-/* Bring the sensors' poses together (option align-sensors). */
-static npg_status correct_rig(npg_worker *worker, npg_rig *rig)
-{
-    npg_rig_offset *offsets;
-    NPG_TRY(npg_alloc_array(&offsets, NPG_FOR_FILES, rig->sensor_count, sizeof *offsets));
-    npg_status status = npg_rig_measure(rig, offsets, ALIGN_SAMPLE);
-    if (!status) npg_rig_correct(rig, offsets);
-    for (size_t i = 1; i < rig->sensor_count && !status; i++) {
-        const npg_rig_offset *o = &offsets[i];
-        if (o->is_known)
-            npg_worker_log(worker, NPG_LOG_INFO, -1, "sensor %s was %.1f mm and %.2f degrees off: corrected",
-                           rig->sensors[i].name, o->dist_mm, o->turn_deg);
-        else
-            npg_worker_warn(worker, false, -1, "sensor %s sees too little of what others see: not corrected",
-                            rig->sensors[i].name);
-    }
-    npg_release(&offsets);
-    return status;
-}
-
 /* What the rig is, and where its sensors have no image. */
-static npg_status report_rig(npg_worker *worker, npg_rig *rig)
+static void report_rig(npg_worker *worker, npg_rig *rig)
 {
-    const state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker), *sensors = json_array();
     size_t gaps = 0;
     for (size_t i = 0; i < rig->sensor_count; i++) {
         size_t images = 0;
         for (size_t f = 0; f < rig->frame_count; f++) images += npg_rig_shot_of(rig, f, i) != NULL;
         gaps += rig->frame_count - images;
-        json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name), "images",
-                                                 (json_int_t)images));
+        json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name),
+                                                 "images", (json_int_t)images));
     }
     json_object_set_new(report, "rig", json_pack("{ss so}", "layout", rig->layout, "sensors", sensors));
-    npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig (%s) of %zu sensors, %zu frames", rig->path, rig->layout,
-                   rig->sensor_count, rig->frame_count);
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig (%s) of %zu sensors, %zu frames", rig->path,
+                   rig->layout, rig->sensor_count, rig->frame_count);
     if (gaps)
         npg_worker_warn(worker, false, -1, "%zu of %zu images of the rig's sensors are missing", gaps,
                         rig->frame_count * rig->sensor_count);
     if (rig->left_out)
         npg_worker_warn(worker, false, -1, "%zu depth images have no pose within %g s and are left out",
                         rig->left_out, rig->settings.tolerance_s);
-    return s->align_sensors ? correct_rig(worker, rig) : NPG_OK;
 }
 
 static npg_status list_frames(npg_frame_files **list, const state *s, const npg_settings *settings,
@@ -160,7 +132,8 @@ static npg_status list_frames(npg_frame_files **list, const state *s, const npg_
 {
     npg_rig_settings rig = s->rig;
     rig.confine = settings->confine;
-    NPG_TRY(npg_frame_files_open_any(list, settings->input, selection, s->missing != NPG_MISSING_IGNORE, &rig));
+    NPG_TRY(
+        npg_frame_files_open_any(list, settings->input, selection, s->missing != NPG_MISSING_IGNORE, &rig));
     npg_status status = settings->confine ? npg_frame_files_confine(*list, settings->input) : NPG_OK;
     if (status) npg_frame_files_close(list);
     return status;
@@ -195,7 +168,8 @@ static npg_status open_capture(npg_worker *worker)
     /* A resumed run has restored it. */
     if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     report_list(worker, capture->list);
-    return capture->list->rig ? report_rig(worker, capture->list->rig) : NPG_OK;
+    if (capture->list->rig) report_rig(worker, capture->list->rig);
+    return NPG_OK;
 }
 
 static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index)

@@ -175,7 +175,6 @@ npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out, const char *na
     npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count];
     *sensor = (npg_rig_sensor){.scale = 0.001};
     npg_pose_identity(sensor->pose);
-    npg_pose_identity(sensor->correction);
     npg_pose_identity(sensor->depth_to_colour);
     NPG_TRY(npg_copy_text(&sensor->name, name));
     rig->sensor_count++;
@@ -340,7 +339,7 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
             pose[4 * r + 1] = -pose[4 * r + 1];
             pose[4 * r + 2] = -pose[4 * r + 2];
         }
-    npg_pose_combine(out, sensor->correction, pose);
+    memcpy(out, pose, sizeof pose);
 }
 
 uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame)

@@ -50,7 +50,6 @@ typedef struct npg_rig_sensor {
     double near_m, far_m;       /* of this sensor; far 0: no limit                     */
     bool is_opengl;             /* its poses are of axes x right, y up, z backward     */
     double pose[12];            /* sensor to world, where it stands still              */
-    double correction[12];      /* world to world, after the pose; identity until npg_rig_correct() */
     npg_rig_shot *shots;        /* in order; owned */
     size_t shot_count, shot_capacity;
     float *rays; /* H x W x 2, NaN where there is none; made at the first use, owned */
@@ -87,7 +86,7 @@ size_t npg_rig_find(const npg_rig *rig, int64_t number);
 /* The shot of a sensor in a frame, NULL for a gap. */
 const npg_rig_shot *npg_rig_shot_of(const npg_rig *rig, size_t frame, size_t sensor);
 
-/* The pose (sensor to world) it is used with: settings, axes and correction applied. */
+/* The pose (sensor to world) it is used with: settings and axes applied. */
 void npg_rig_pose(const npg_rig *rig, double pose[12], size_t sensor, const npg_rig_shot *shot);
 
 /* Call visit for every image of a frame; ends with the first status that is not NPG_OK. */
@@ -117,23 +116,17 @@ npg_status npg_depth_points_read(npg_depth_points *points, npg_rig *rig, size_t 
                                  const npg_rig_shot *shot);
 void npg_depth_points_clear(npg_depth_points *points);
 
-/* ---- misalignment (rig_align.c) ---- */
+/* ---- agreement (rig_overlap.c) ---- */
 
-typedef struct npg_rig_offset {
-    size_t frames, points;    /* frames with an image, points of all frames looked at        */
-    double overlap;           /* share of its points that lie on what other sensors see, 0..1 */
-    double dist_mm, turn_deg; /* how far off its pose is from the other sensors' surfaces   */
-    double rms;               /* of the distances point to surface after the correction, unit */
-    bool is_known;            /* there was overlap enough to tell                             */
-    double correction[12];    /* world to world: what brings it to the others                 */
-} npg_rig_offset;
+typedef struct npg_rig_view {
+    size_t frames, points; /* frames with an image among those looked at, and points in them  */
+    double overlap;        /* share of its points that lie on what other sensors see, 0..1     */
+    double apart;          /* rms distance to their surfaces there, in the rig's unit; 0: none */
+} npg_rig_view;
 
 /* Compare the surfaces that sensors see in `sample` frames spread over the rig, each with those of all
- * others, sensor 0 held (offsets: one per sensor, unit in mm if the rig's unit is the metre). */
-npg_status npg_rig_measure(npg_rig *rig, npg_rig_offset *offsets, size_t sample);
-
-/* Put the corrections into the sensors' poses; those that are not known stay. */
-void npg_rig_correct(npg_rig *rig, const npg_rig_offset *offsets);
+ * others; one entry per sensor.  NPG_BAD_INPUT as npg_rig_read(). */
+npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, size_t sample);
 
 /* ---- between the files of a rig ---- */
 
