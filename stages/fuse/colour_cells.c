@@ -83,7 +83,7 @@ static colour_cell *find(npg_colour_cells *c, uint64_t key)
 }
 
 void npg_colour_cells_add(npg_colour_cells *c, const float point[3], const float facing[3],
-                          const uint8_t rgb[3])
+                          const uint8_t rgb[3], unsigned weight)
 {
     colour_cell *cell = find(c, key_of(c, point, facing));
     if (!cell) return;
@@ -92,7 +92,7 @@ void npg_colour_cells_add(npg_colour_cells *c, const float point[3], const float
         cell->normal[a] += facing[a];
     }
     cell->count++;
-    npg_colour_add(&cell->sums, rgb);
+    for (unsigned k = 0; k < weight; k++) npg_colour_add(&cell->sums, rgb);
 }
 
 size_t npg_colour_cells_count(const npg_colour_cells *c)

@@ -13,9 +13,9 @@ typedef struct npg_colour_cells npg_colour_cells;
 npg_status npg_colour_cells_open(npg_colour_cells **cells, double side, size_t most);
 void npg_colour_cells_close(npg_colour_cells **cells);
 
-/* One sample at a point (units) of a surface that faces `facing` there. */
+/* A sample that counts `weight` times, at a point (units) of a surface that faces `facing` there. */
 void npg_colour_cells_add(npg_colour_cells *cells, const float point[3], const float facing[3],
-                          const uint8_t rgb[3]);
+                          const uint8_t rgb[3], unsigned weight);
 
 size_t npg_colour_cells_count(const npg_colour_cells *cells);
 

@@ -33,6 +33,9 @@
 #define HUES_MOST                                                                                            \
     60000 /* such cubes; at 20 000 faces each vertex has six                                       */
 
+#define HUE_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
+#define HUE_HALF 2.0 /* frames away at which they count half of that                       */
+
 enum { FROM_KEY, FROM_ALL };
 
 typedef struct state {
@@ -102,10 +105,18 @@ static npg_status median_dist(double *median, const cloud *c)
     return NPG_OK;
 }
 
+/* The surface slides along the body, the more the farther a frame is from the keyframe; colours would blur. */
+static unsigned hue_weight(int64_t away)
+{
+    double weight = HUE_KEY / (1 + (double)llabs(away) / HUE_HALF);
+    return weight > 1 ? (unsigned)lrint(weight) : 1;
+}
+
 /* Weights fall with the distance as the tracker's do (Geman and McClure); what is near is averaged where the
  * surface is, so that noise across the surface averages out; what is not, where it is. */
 static npg_status add_points(state *s, const cloud *c, int64_t frame, double near_dist, double far_dist)
 {
+    unsigned weight = hue_weight(frame - s->key);
     for (size_t i = 0; i < c->count; i++) {
         const npg_carried *p = &c->carried[i];
         bool is_near = (double)p->dist <= near_dist;
@@ -116,7 +127,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
         }
         const uint8_t *colour = c->colours ? c->colours + 4 * (i * c->of / c->count) : NULL; /* as spread */
         if (colour && colour[3] && is_near && s->hues)
-            npg_colour_cells_add(s->hues, p->foot, p->facing, colour);
+            npg_colour_cells_add(s->hues, p->foot, p->facing, colour, weight);
         NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,
                               p->point, p->normal, (float)(robust * robust), frame));
     }
@@ -135,6 +146,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     double per_frame = (double)POINTS_A_CELL / (double)facts->frame_count; /* of the points of one frame */
+    s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));

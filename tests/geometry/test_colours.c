@@ -99,9 +99,9 @@ static void cells_take_all_frames_together(void **state)
     assert_int_equal(npg_colour_cells_open(&cells, 0.1, 2), NPG_OK);
     for (int i = 0; i < 9; i++) {
         const uint8_t rgb[3] = {(uint8_t)(i < 7 ? 90 : 240), 1, 2};
-        npg_colour_cells_add(cells, (const float[3]){0.51f, 0.52f, 0.53f}, (const float[3]){0, 0, 1}, rgb);
+        npg_colour_cells_add(cells, (const float[3]){0.51f, 0.52f, 0.53f}, (const float[3]){0, 0, 1}, rgb, 1);
         npg_colour_cells_add(cells, (const float[3]){0.51f, 0.52f, 0.53f}, (const float[3]){0, 0, -1},
-                             (const uint8_t[3]){7, 8, 9});
+                             (const uint8_t[3]){7, 8, 9}, 3);
         npg_colour_cells_add(cells, (const float[3]){-0.5f, 0, 0}, (const float[3]){0, 0, 1},
                              rgb); /* no room */
     }
