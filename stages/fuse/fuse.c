@@ -45,6 +45,7 @@ typedef struct state {
     npg_carry_back *carry;
     npg_cells *cells;
     npg_colour_cells *hues; /* NULL: the points have no colours, or none are wanted */
+    int64_t key;    /* index of the keyframe */
     double spacing;         /* of the keyframe's points */
     double usual;           /* mean of the frames' median distances */
     int64_t seen, frames, misaligned, points, strays; /* seen: of the pass, whatever came of them */
