@@ -257,8 +257,8 @@ typedef struct npg_result {
     const uint32_t *faces;  /* F x 3, the same list in every frame                              */
     double residual;        /* median distance points -> surface, in diagonals of a frame's box (median) */
     double coverage;        /* share of the surface that has points near it, 0..1               */
-    /* V x 4 RGBA, sRGB: of the reference, or with colour = frames as this frame saw them; alpha 255: seen, 254:
-     * lent by neighbours (of the reference) or by the reference (of a frame); NULL without colours */
+    /* V x 4 RGBA, sRGB: of the reference, or with colour = frames as this frame saw them; alpha 255: seen,
+     * 254: lent by neighbours (of the reference) or by the reference (of a frame); NULL without colours */
     const uint8_t *vertex_colours;
 } npg_result;
 

@@ -303,7 +303,7 @@ static npg_status begin_meshes(npg_worker *worker)
     return write_mesh(worker, "reference.ply", reference->vert_pos, NULL, true, NULL);
 }
 
-/* The vertices as this frame saw them (option colour = frames); where it did not see them, as the reference. */
+/* The vertices as this frame saw them (option colour = frames); where it did not, as the reference. */
 static npg_status colour_frame(npg_worker *worker, npg_frame *frame)
 {
     const npg_facts *facts = npg_worker_facts(worker);

@@ -1,7 +1,8 @@
 /* Colour cells: the colours of all frames in the keyframe's pose, one robust mean per cube and side.
  *
  * Cubes of one size over the surface; points that face different octants do not share one, so that both sides
- * of a thin part keep their colours.  Memory is bounded: once `most` cubes are in use, new ones are left out. */
+ * of a thin part keep their colours.  Memory is bounded: once `most` cubes are in use, new ones are left
+ * out. */
 #ifndef NPG_COLOUR_CELLS_H
 #define NPG_COLOUR_CELLS_H
 

@@ -45,7 +45,7 @@ typedef struct state {
     npg_carry_back *carry;
     npg_cells *cells;
     npg_colour_cells *hues; /* NULL: the points have no colours, or none are wanted */
-    int64_t key;    /* index of the keyframe */
+    int64_t key;            /* index of the keyframe */
     double spacing;         /* of the keyframe's points */
     double usual;           /* mean of the frames' median distances */
     int64_t seen, frames, misaligned, points, strays; /* seen: of the pass, whatever came of them */
@@ -106,7 +106,7 @@ static npg_status median_dist(double *median, const cloud *c)
     return NPG_OK;
 }
 
-/* The surface slides along the body, the more the farther a frame is from the keyframe; colours would blur. */
+/* The surface slides along the body, the more the farther a frame is from the keyframe: colours blur. */
 static unsigned hue_weight(int64_t away)
 {
     double weight = HUE_KEY / (1 + (double)llabs(away) / HUE_HALF);

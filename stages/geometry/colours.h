@@ -16,8 +16,8 @@
 #define NPG_COLOUR_KNOTS 17 /* 0, 16, .. 256            */
 
 /* Samples of one place: per channel a histogram over knots.  A sample is shared between its two knots so that
- * their mean is the sample; so means over knots are exact, in 102 bytes however many samples come (beyond four
- * thousand the earlier ones count half). */
+ * their mean is the sample; so means over knots are exact, in 102 bytes however many samples come (beyond
+ * four thousand the earlier ones count half). */
 typedef struct npg_colour_sums {
     uint16_t knots[3][NPG_COLOUR_KNOTS];
 } npg_colour_sums;

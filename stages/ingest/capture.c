@@ -65,7 +65,8 @@ void npg_capture_close(npg_capture **slot)
 
 static size_t bytes_of(const npg_frame *frame)
 {
-    size_t row = (frame->normals ? 6 : 3) * sizeof(float) + (frame->colours ? 4 : 0) + (frame->sensors ? 1 : 0);
+    size_t row =
+        (frame->normals ? 6 : 3) * sizeof(float) + (frame->colours ? 4 : 0) + (frame->sensors ? 1 : 0);
     return frame->point_count * row + sizeof *frame;
 }
 

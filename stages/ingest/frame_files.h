@@ -7,8 +7,8 @@
  *   a shell glob    "scan_*.ply"
  *   a list file     one path per line, relative to the list or to the working folder; # begins a comment
  *   one file        a capture of one frame
- *   a rig           a rig.json, or a folder of depth images with their calibration (rig/rig.h); npg_frame_files_open_any
- *                   alone takes these
+ *   a rig           a rig.json, or a folder of depth images with their calibration (rig/rig.h);
+ *                   npg_frame_files_open_any alone takes these
  * Names sort naturally (f2 before f10), a list file keeps its own order.  A frame's number comes from its
  * name; the step of the numbering is the largest that all numbers share, and what it leaves out is a gap. */
 #ifndef NPG_FRAME_FILES_H
@@ -43,7 +43,7 @@ npg_status npg_frame_files_open_any(npg_frame_files **list, const char *input, c
 npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_frame *frame,
                                 npg_origin *origin);
 
-/* Call visit for each file that the frame `slot` is made of; ends with the first status that is not NPG_OK. */
+/* Call visit for each file that the frame `slot` is made of; ends with the first status but NPG_OK. */
 npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
                                 npg_status (*visit)(void *user, const char *path), void *user);
 

@@ -53,12 +53,13 @@ static const npg_option ingest_options[] = {
         "Seconds without a change after which a file that can't be read, "
         "and that others follow, is given up"),
     NPG_ROW_CHOICE("sensor-poses",  AT(rig.poses),       "file",        "file|inverse|none",
-        "Poses of a rig's sensors: as its files say (sensor to world), the other way round (world to sensor), "
-        "or none: every sensor stands at the origin, for a body that moves before one sensor"),
+        "Poses of a rig's sensors: as its files say (sensor to world), the other way round (world to "
+        "sensor), or none: every sensor stands at the origin, for a body that moves before one sensor"),
     NPG_ROW_REAL  ("sensor-tolerance", AT(rig.tolerance_s), "0.02",     0,     3600,    "SECONDS",
         "Images of a rig with time stamps belong together when they are no further apart"),
     NPG_ROW_REAL  ("depth-step",    AT(rig.step_share),  "0.02",        1e-5,  10,      "SHARE",
-        "Neighbouring pixels of a depth image are one surface while their depths differ by less than this share"),
+        "Neighbouring pixels of a depth image are one surface while their depths differ by less "
+        "than this share"),
     NPG_ROW_INT   ("depth-margin",  AT(rig.margin),      "1",           0,     64,      "PIXELS",
         "Pixels to drop beside depth steps, missing depth and the mask's border: there sensors mix "
         "the body with what is behind it"),

@@ -505,7 +505,7 @@ static npg_status measure_reference(making *m)
     return NPG_OK;
 }
 
-/* Colours of all frames; without a fusing pass those of the keyframe.  A mesh of the user's own keeps its own. */
+/* Colours of all frames; without a fusing pass those of the keyframe.  A user's own mesh keeps its own. */
 static npg_status colour_reference(making *m)
 {
     npg_mesh *mesh = m->mesh;

@@ -102,8 +102,8 @@ static void cells_take_all_frames_together(void **state)
         npg_colour_cells_add(cells, (const float[3]){0.51f, 0.52f, 0.53f}, (const float[3]){0, 0, 1}, rgb, 1);
         npg_colour_cells_add(cells, (const float[3]){0.51f, 0.52f, 0.53f}, (const float[3]){0, 0, -1},
                              (const uint8_t[3]){7, 8, 9}, 3);
-        npg_colour_cells_add(cells, (const float[3]){-0.5f, 0, 0}, (const float[3]){0, 0, 1},
-                             rgb, 1); /* no room */
+        npg_colour_cells_add(cells, (const float[3]){-0.5f, 0, 0}, (const float[3]){0, 0, 1}, rgb,
+                             1); /* no room */
     }
     assert_int_equal(npg_colour_cells_count(cells), 2);
     npg_colour_cells_means(cells, points, normals, colours);

@@ -1,5 +1,5 @@
-/* Fuzz target of trajectories, lists of images with times and OpenCV's camera files, for libFuzzer.  The first
- * byte says which. */
+/* Fuzz target of trajectories, lists of images with times and OpenCV's camera files, for libFuzzer.  The
+ * first byte says which. */
 #include <math.h>
 
 #include "ingest/rig/rig.h"

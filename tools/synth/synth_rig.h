@@ -10,8 +10,8 @@ void npg_synth_colour(uint8_t rgba[4], const double rest[3]);
 /* FOLDER/rig.json and a folder per camera of the ring. */
 npg_status npg_synth_rig_begin(const char *folder, const npg_scan *capture);
 
-/* Images of one frame of every camera: mesh is the body posed, rest the same vertices at rest; noise_m: Gaussian
- * deviation of the depths. */
+/* Images of one frame of every camera: mesh is the body posed, rest the same vertices at rest; noise_m:
+ * Gaussian deviation of the depths. */
 npg_status npg_synth_rig_frame(const char *folder, const npg_scan *capture, const npg_mesh *mesh,
                                const npg_mesh *rest, int64_t frame, double noise_m);
 

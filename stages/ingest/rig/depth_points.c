@@ -1,12 +1,12 @@
 /* Depth points: from a depth image to points with normals and colours, in the sensor's own axes.
  *
- * A pixel is used when its depth is in range, the mask shows it, and no neighbour within the margin is missing
- * or a depth step away: there a sensor mixes the body with what is behind it (flying pixels, silhouette
- * fringe).
+ * A pixel is used when its depth is in range, the mask shows it, and no neighbour within the margin is
+ * missing or a depth step away: there a sensor mixes the body with what is behind it (flying pixels,
+ * silhouette fringe).
  *
  * Normals.  On a plane n X = h the inverse depth is linear in the ray (x, y) of a pixel:
- * 1 / Z = (n_x x + n_y y + n_z) / h.  So n is had from a least-squares fit of 1 / Z over a window of the image,
- * of those pixels that lie on the same surface; it faces the sensor by construction.
+ * 1 / Z = (n_x x + n_y y + n_z) / h.  So n is had from a least-squares fit of 1 / Z over a window of the
+ * image, of those pixels that lie on the same surface; it faces the sensor by construction.
  *
  * Based on: Badino, Huber, Park, Kanade, Fast and accurate computation of surface normals from range images,
  * 2011 (the fit in inverse depth). */

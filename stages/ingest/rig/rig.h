@@ -1,7 +1,7 @@
 /* Rig: depth sensors with their calibration, and which image of which sensor belongs to which frame.
  *
- * Conventions of all layouts, once they are loaded: lengths in one unit (metres, as a rule), camera axes as in
- * camera.h (x right, y down, z ahead), poses from sensor to world.
+ * Conventions of all layouts, once they are loaded: lengths in one unit (metres, as a rule), camera axes as
+ * in camera.h (x right, y down, z ahead), poses from sensor to world.
  *
  * A frame is what all sensors saw at one time.  A sensor whose image is missing then is a gap of that sensor,
  * not of the frame. */
@@ -153,7 +153,8 @@ npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *
  * must be. */
 npg_status npg_rig_path(const npg_rig *rig, char **path, const char *name, bool must_be);
 
-/* intrinsic.json as Open3D writes it: {"width", "height", "intrinsic_matrix": nine numbers, columns first}. */
+/* intrinsic.json as Open3D writes it: {"width", "height", "intrinsic_matrix": nine numbers, columns first}.
+ * NPG_BAD_INPUT. */
 npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path);
 
 /* Where images are timed, or trajectories come in order: files of "time path" lines and of poses. */
