@@ -24,7 +24,7 @@ const npg_option npg_probe_options[] = {
         "Print one JSON object instead of text"),
     NPG_ROW_TEXT("rig",  AT(rig),  "",      "PATH",
         "Depth images instead of clouds, the same as giving them as INPUT: also says per sensor how many "
-        "frames and points it has, how much it sees of what others see, and how far its surface lies from theirs"),
+        "frames and points it has, how much it sees of what others see, and how far it lies from theirs"),
     {0}};
 /* clang-format on */
 

@@ -260,10 +260,10 @@ static void redwood_layout(void **state)
     "<data>\n50. 0. 19.5 0. 50. 14.5 0. 0. 1.</data></intrinsic>\n<R type_id=\"opencv-matrix\">"             \
     "<data>1. 0. 0. 0. 1. 0. 0. 0. 1.</data></R>\n<t type_id=\"opencv-matrix\"><data>5 6. 7e+000</data></t>" \
     "</opencv_storage>\n"
-#define CV_YAML                                                                                               \
-    "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 50., 0.,"   \
-    "\n       19.5, 0., 50., 14.5, 0., 0., 1. ]\nR: !!opencv-matrix\n   data: [ 1., 0., 0., 0., 1., 0., 0., " \
-    "0., 1. ]\nT: !!opencv-matrix\n   data: [ 5., 6., 7. ]\n"
+#define CV_YAML                                                                                              \
+    "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 50.,"      \
+    " 0.,\n      19.5, 0., 50., 14.5, 0., 0., 1. ]\nR: !!opencv-matrix\n   data: [ 1., 0., 0., 0., 1., 0., " \
+    "0., 0., 1. ]\nT: !!opencv-matrix\n   data: [ 5., 6., 7. ]\n"
 
 static void opencv_layout(void **state)
 {
