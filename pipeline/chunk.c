@@ -68,16 +68,21 @@ void npg_frame_clear(npg_frame *frame)
     npg_release(&frame->path);
     npg_release(&frame->pos_local);
     npg_release(&frame->normals);
+    npg_release(&frame->colours);
+    npg_release(&frame->sensors);
     npg_release(&frame->vert_unit);
+    npg_release(&frame->vert_colours);
     npg_release(&frame->align_state);
     *frame = (npg_frame){0};
 }
 
-static npg_status copy_rows(float **out, const float *rows, size_t count)
+static npg_status copy_rows(void *out, const void *rows, size_t count, size_t row_size)
 {
+    void *copy;
     if (!rows) return NPG_OK;
-    NPG_TRY(npg_alloc_array(out, NPG_FOR_FRAMES, count, 3 * sizeof *rows));
-    memcpy(*out, rows, count * 3 * sizeof *rows);
+    NPG_TRY(npg_alloc_array(&copy, NPG_FOR_FRAMES, count, row_size));
+    if (copy) memcpy(copy, rows, count * row_size);
+    memcpy(out, &copy, sizeof copy);
     return NPG_OK;
 }
 
@@ -86,12 +91,17 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     *out = *frame;
     out->path = NULL;
     out->pos_local = out->normals = out->vert_unit = NULL;
+    out->colours = out->sensors = out->vert_colours = NULL;
     out->align_state = NULL; /* belongs to one frame on its way, not to copies */
     out->align_state_size = 0;
     npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
-    if (!status) status = copy_rows(&out->pos_local, frame->pos_local, frame->point_count);
-    if (!status) status = copy_rows(&out->normals, frame->normals, frame->point_count);
-    if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count);
+    size_t n = frame->point_count, row = 3 * sizeof(float);
+    if (!status) status = copy_rows(&out->pos_local, frame->pos_local, n, row);
+    if (!status) status = copy_rows(&out->normals, frame->normals, n, row);
+    if (!status) status = copy_rows(&out->colours, frame->colours, n, 4);
+    if (!status) status = copy_rows(&out->sensors, frame->sensors, n, 1);
+    if (!status) status = copy_rows(&out->vert_colours, frame->vert_colours, frame->vert_count, 4);
+    if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count, row);
     if (status) npg_frame_clear(out);
     return status;
 }
@@ -103,6 +113,8 @@ void npg_frame_keep(npg_frame *frame, const uint8_t *keep)
         if (!keep[i]) continue;
         memmove(frame->pos_local + 3 * kept, frame->pos_local + 3 * i, 3 * sizeof(float));
         if (frame->normals) memmove(frame->normals + 3 * kept, frame->normals + 3 * i, 3 * sizeof(float));
+        if (frame->colours) memmove(frame->colours + 4 * kept, frame->colours + 4 * i, 4);
+        if (frame->sensors) frame->sensors[kept] = frame->sensors[i];
         kept++;
     }
     frame->point_count = kept;

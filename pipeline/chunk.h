@@ -56,13 +56,17 @@ typedef struct npg_frame {
     char *path;      /* where it came from, for messages; owned, may be NULL                   */
     uint32_t fields; /* NPG_FIELD_* of this frame                                              */
     bool is_key, is_skipped, is_held;
-    bool is_shared;     /* belongs to a neighbouring segment: measured, not judged */
-    size_t point_count; /* N                                                       */
-    float *pos_local;   /* N x 3, owned; world - origin                            */
-    float *normals;     /* N x 3, owned, unit length, or NULL                      */
+    bool is_shared;        /* belongs to a neighbouring segment: measured, not judged */
+    size_t point_count;    /* N                                                       */
+    float *pos_local;      /* N x 3, owned; world - origin                            */
+    float *normals;        /* N x 3, owned, unit length, or NULL                      */
+    uint8_t *colours;      /* N x 4 RGBA, sRGB; alpha 0: not known; owned, or NULL    */
+    uint8_t *sensors;      /* N: index of the sensor that saw it; owned, or NULL      */
+    bool has_sure_normals; /* they face the sensor that saw them: no side is open  */
     npg_cleaning cleaning;
-    size_t vert_count; /* V                                                         */
-    float *vert_unit;  /* V x 3, owned; the deformed reference, in unit coordinates */
+    size_t vert_count;     /* V                                                         */
+    float *vert_unit;      /* V x 3, owned; the deformed reference, in unit coordinates */
+    uint8_t *vert_colours; /* V x 4, owned: as this frame saw them, or NULL */
     npg_figures figures;
     void *align_state;       /* owned; on the last frame that a window waits for: what resumes stage align */
     size_t align_state_size; /* after it; NULL on all others                                               */
@@ -88,7 +92,7 @@ void npg_frame_clear(npg_frame *frame);
 /* A copy with its own arrays, without align_state. */
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame);
 
-/* Keep the points whose keep[i] is not 0, in order, with their normals. */
+/* Keep the points whose keep[i] is not 0, in order, with all that they carry. */
 void npg_frame_keep(npg_frame *frame, const uint8_t *keep);
 
 #endif

@@ -25,6 +25,7 @@ static npg_status show_points(npg_frame_view *view, npg_worker *worker, npg_fram
     view->point_count = frame->point_count;
     view->points = frame->pos_local;
     view->normals = frame->normals;
+    view->colours = frame->colours;
     memcpy(view->points_origin, npg_worker_facts(worker)->origin.world, sizeof view->points_origin);
     NPG_TRY(npg_grow(&s->keep, &s->keep_capacity, frame->point_count, 1, NPG_FOR_FRAMES));
     if (frame->point_count) memset(s->keep, 1, frame->point_count);
@@ -35,6 +36,7 @@ static npg_status show_points(npg_frame_view *view, npg_worker *worker, npg_fram
 static void show_vertices(npg_frame_view *view, const npg_facts *facts, npg_frame *frame)
 {
     view->vertex_count = frame->vert_count;
+    view->vertex_colours = frame->vert_colours ? frame->vert_colours : facts->reference->vert_colours;
     view->vertices = frame->vert_unit;
     view->face_count = facts->reference->face_count;
     view->faces = facts->reference->faces;

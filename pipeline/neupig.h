@@ -170,6 +170,9 @@ typedef struct npg_frame_view {
     const uint32_t *faces;           /* F x 3, the same in every frame; NULL before align */
     double vertices_origin[3], vertices_unit;
     double residual, coverage; /* as in npg_result; NaN before evaluate */
+    uint8_t *colours;          /* N x 4 RGBA, sRGB, alpha 0: not known; NULL where the points have none */
+    const uint8_t
+        *vertex_colours; /* V x 4 RGBA, sRGB: those of the reference; NULL without, or before align */
 } npg_frame_view;
 
 typedef struct npg_custom_stage {
@@ -237,10 +240,11 @@ typedef struct npg_run npg_run;
 /* A cloud handed in by npg_run_push(): N points, world coordinates. */
 typedef struct npg_cloud {
     size_t struct_size;
-    int64_t number;       /* the frame's number; numbers must grow */
-    size_t point_count;   /* N                                     */
-    const double *points; /* N x 3, any unit; copied               */
-    const float *normals; /* N x 3 or NULL; copied                 */
+    int64_t number;         /* the frame's number; numbers must grow */
+    size_t point_count;     /* N                                     */
+    const double *points;   /* N x 3, any unit; copied               */
+    const float *normals;   /* N x 3 or NULL; copied                 */
+    const uint8_t *colours; /* N x 4 RGBA or NULL: sRGB, alpha 0 where not known; copied */
 } npg_cloud;
 
 /* One frame of the moving mesh, got by npg_run_pull(). */
@@ -253,6 +257,9 @@ typedef struct npg_result {
     const uint32_t *faces;  /* F x 3, the same list in every frame                              */
     double residual;        /* median distance points -> surface, in diagonals of a frame's box (median) */
     double coverage;        /* share of the surface that has points near it, 0..1               */
+    /* V x 4 RGBA, sRGB: of the reference, or with colour = frames as this frame saw them; alpha 255: seen,
+     * 254: lent by neighbours (of the reference) or by the reference (of a frame); NULL without colours */
+    const uint8_t *vertex_colours;
 } npg_result;
 
 /* Check the options, build the chain and start the run's threads.  hooks may be NULL.

@@ -20,7 +20,8 @@
 const npg_option npg_run_options[] = {
     /* type        name          place               default    least  most          shown as or words */
     NPG_ROW_TEXT  ("input",      AT(input),          "",        "PATH",
-        "Folder, pattern (frame_%04d.ply), list file, or - for standard input; empty: frames are pushed"),
+        "Folder, pattern (frame_%04d.ply), list file, a rig of depth sensors (rig.json, or a folder of depth "
+        "images), or - for standard input; empty: frames are pushed"),
     NPG_ROW_TEXT  ("follow",     AT(follow),         "",        "DIR",
         "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): "
         "its files are frames as they are complete; takes the place of the input"),
@@ -28,6 +29,9 @@ const npg_option npg_run_options[] = {
         "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one"),
     NPG_ROW_TEXT  ("output",     AT(output),         "",        "DIR",
         "Folder for the results; empty: results are only pulled"),
+    NPG_ROW_CHOICE("colour",     AT(colour),         "reference", "reference|frames|no",
+        "Colours of points that have any: one per vertex, the robust mean of all frames that saw it "
+        "(reference), as each frame saw it (frames), or none"),
     NPG_ROW_CHOICE("preset",     AT(preset),         "default", "default|best|paper|paper-1000|grids",
         "A named set of option values"),
     NPG_ROW_CHOICE("quality",    AT(quality),        "usual",   "usual|best",
@@ -580,6 +584,10 @@ static npg_status frame_of_cloud(npg_frame *frame, npg_run *run, const npg_cloud
         NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
         memcpy(frame->normals, cloud->normals, n * 3 * sizeof(float));
     }
+    if (cloud->colours && n) {
+        NPG_TRY(npg_alloc_array(&frame->colours, NPG_FOR_FRAMES, n, 4));
+        memcpy(frame->colours, cloud->colours, 4 * n);
+    }
     frame->point_count = n;
     frame->number = cloud->number;
     frame->fields = NPG_FIELD_POINTS;
@@ -640,12 +648,21 @@ static npg_status open_result(npg_result **out, const npg_run *run, const npg_fr
         npg_release(&result);
         return status;
     }
+    const uint8_t *seen = frame->vert_colours ? frame->vert_colours : reference->vert_colours;
+    uint8_t *colours = NULL;
+    if (seen && npg_alloc_array(&colours, NPG_FOR_FRAMES, frame->vert_count, 4)) {
+        npg_release(&faces);
+        npg_release(&vertices);
+        npg_release(&result);
+        return NPG_MEMORY;
+    }
+    if (seen) memcpy(colours, seen, 4 * frame->vert_count);
     npg_box_unit_to_world(&run->facts.box, vertices, frame->vert_unit, frame->vert_count);
     memcpy(faces, reference->faces, reference->face_count * 3 * sizeof(uint32_t));
     *result =
-        (npg_result){sizeof *result,         frame->index, frame->number, frame->vert_count,
-                     reference->face_count,  vertices,     faces,         frame->figures.point_dist_median,
-                     frame->figures.coverage};
+        (npg_result){sizeof *result,          frame->index, frame->number, frame->vert_count,
+                     reference->face_count,   vertices,     faces,         frame->figures.point_dist_median,
+                     frame->figures.coverage, colours};
     *out = result;
     return NPG_OK;
 }
@@ -673,5 +690,6 @@ void npg_result_close(npg_result **slot)
     if (!slot || !*slot) return;
     npg_release(&(*slot)->vertices);
     npg_release(&(*slot)->faces);
+    npg_release(&(*slot)->vertex_colours);
     npg_release(slot);
 }

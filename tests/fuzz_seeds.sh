@@ -4,7 +4,7 @@
 #   tests/fuzz_seeds.sh DIR
 set -euo pipefail
 folder=$1
-for name in ply obj xyz npy pcd config archive; do mkdir -p "$folder/$name"; done
+for name in ply obj xyz npy pcd config archive rig trajectory image; do mkdir -p "$folder/$name"; done
 cd "$folder"
 
 xyz='property float x\nproperty float y\nproperty float z\n'
@@ -66,3 +66,27 @@ mkdir -p request
 printf 'GET /frame-0-12 HTTP/1.1\r\nUser-Agent: a\r\nHost: 127.0.0.1:8080\r\n\r\n' >request/frame
 printf 'GET / HTTP/1.0\r\nhost:  localhost:8080 \r\n\r\n' >request/old
 printf 'POST /../a%%20b?c HTTP/1.1\r\nHost: a\r\nHost: b\r\nContent-Length: 3\r\n\r\nabc' >request/other
+
+camera='"camera": {"width": 4, "height": 3, "fx": 5, "fy": 5, "cx": 1.5, "cy": 1, "distortion": [0.1, 0, 0, 0]}'
+pose='"pose": [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]'
+printf '{"neupig_rig": 1, "axes": "opengl", "sensors": [{"name": "a", "depth": "d_%%04d.png", "mask": "m_####.jpg", %s, %s}]}' "$camera" "$pose" >rig/numbered
+printf '{"neupig_rig": 1, "tolerance": 0.1, "sensors": [{"depth": "depth.txt", "poses": "a.log", %s, "near": 1}]}' "$camera" >rig/timed
+printf '{"neupig_rig": 1, "sensors": [{"depth": "d_%%d.png", %s, "colour": "c", "colour_camera": {"from_depth": []}}]}' "$camera" >rig/colour
+printf '\0%s' $'0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n' >trajectory/log
+printf '\1# images\n1.5 depth/1.png\n2e0 depth/2.png\n' >trajectory/list
+printf '\2<?xml?><opencv_storage><intrinsic><data>\n5. 0 1e0</data></intrinsic><R><data>1 0</data></R></opencv_storage>' >trajectory/xml
+printf '\2%%YAML:1.0\nK: !!opencv-matrix\n  data: [ 5., 0.,\n 1 ]\nt:\n  data: [1]\n' >trajectory/yaml
+image() { # FILE KIND BASE64...: kind 0 depth, 1 mask, 2 colour; 24 x 24 pixels
+    local file=$1 kind=$2
+    shift 2
+    { printf "\\$kind" && printf '%s' "$@" | base64 -d; } >image/"$file"
+}
+image depth 0 'iVBORw0KGgoAAAANSUhEUgAAABgAAAAYEAAAAACVjL5nAAAABGdBTUEAAYagMeiWXwAAACBjSFJNAAB6JgAAgIQAAPoAAACA' \
+    '6AAAdTAAAOpgAAA6mAAAF3CculE8AAAAH0lEQVQ4jWNkfsGAChjx85kYSASjGkY1jGoY1UAaAACxxQEdYOsCFgAAAABJRU5E' \
+    'rkJggg=='
+image colour 2 'iVBORw0KGgoAAAANSUhEUgAAABgAAAAYCAIAAABvFaqvAAAAAXNSR0IArs4c6QAAACNJREFUOI1jZMABAkgUZ8JlEKlg1KBR' \
+    'g0YNGjVo1KBRg8gHANs0ANDkkJomAAAAAElFTkSuQmCC'
+image jpeg 1 '/9j/4AAQSkZJRgABAQAAAQABAAD/2wBDABsSFBcUERsXFhceHBsgKEIrKCUlKFE6PTBCYFVlZF9VXVtqeJmBanGQc1tdhbWG' \
+    'kJ6jq62rZ4C8ybqmx5moq6T/wAALCAAYABgBAREA/8QAFwAAAwEAAAAAAAAAAAAAAAAAAAIDBf/EACsQAAADBAgGAwAAAAAA' \
+    'AAAAAAECIQARQVEDEhMiMTJC4UNSYbHB8CNigf/aAAgBAQAAPwDBMBaxkJmpNAyTaUWCgWsVCZqPQMl3nBkSzwK+z5Rfm79f' \
+    'LUMN817VScV8PViwUb5b2qj4roerBkf8WPD5/tLx+tQwGrmQ+al0BJd5QYKBq5UPmotASTacWRbHAzrLlB2ft18N/9k='

@@ -52,7 +52,7 @@ const npg_verb npg_verbs[] = {
      "where JOB/meshes is gone the frames themselves come from there, too.  "
      "Exit code 7 when points lie far from the reference.",
      npg_apply_options, false, npg_verb_apply},
-    {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
+    {"probe", "INPUT", 0, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
      "Reads every frame of INPUT and says what is in it, what a run would trip over, "
      "and what it would cost in memory, disk and time.  Exit code 7 when something needs attention.",
      npg_probe_options, true, npg_verb_probe},

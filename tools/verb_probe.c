@@ -6,20 +6,25 @@
 
 #include "ingest/ingest.h"
 #include "pipeline/clock.h"
+#include "pipeline/json_file.h"
 #include "tools/cli.h"
 #include "tools/probe/probe_capture.h"
 
 typedef struct settings {
     bool json;
+    const char *rig;
 } settings;
 
 #define AT(member) offsetof(settings, member)
 
 /* clang-format off */
 const npg_option npg_probe_options[] = {
-    /* type      name    place     default */
+    /* type      name    place     default  shown as */
     NPG_ROW_FLAG("json", AT(json), "no",
         "Print one JSON object instead of text"),
+    NPG_ROW_TEXT("rig",  AT(rig),  "",      "PATH",
+        "Depth images instead of clouds, the same as giving them as INPUT: also says per sensor how many "
+        "frames and points it has, how much it sees of what others see, and how far it lies from theirs"),
     {0}};
 /* clang-format on */
 
@@ -27,7 +32,8 @@ typedef struct job {
     settings s;
     const npg_options *options;
     const char *input;
-    npg_frame_files *list; /* NULL for standard input */
+    npg_frame_files *list; /* NULL for standard input             */
+    npg_rig_view *views;   /* per sensor of a rig; owned, or NULL */
     npg_probe probe;
 } job;
 
@@ -57,17 +63,79 @@ static npg_status read_stream(job *j)
     return status == NPG_END ? NPG_OK : status;
 }
 
+#define SENSOR_SAMPLE 12   /* frames in which sensors are compared */
+#define APART_MOST    0.01 /* metres between what two sensors see: more than the noise of depth cameras */
+
+/* Sensors against each other. */
+static npg_status compare_sensors(job *j)
+{
+    npg_rig *rig = j->list->rig;
+    NPG_TRY(npg_alloc_array(&j->views, NPG_FOR_FILES, rig->sensor_count, sizeof *j->views));
+    npg_status status = npg_rig_compare(rig, j->views, SENSOR_SAMPLE);
+    if (status == NPG_BAD_INPUT) { /* an image that reading has reported */
+        npg_release(&j->views);
+        return NPG_OK;
+    }
+    for (size_t s = 0; s < rig->sensor_count && !status; s++) {
+        const npg_rig_view *v = &j->views[s];
+        if (v->apart > APART_MOST)
+            npg_probe_warn(&j->probe,
+                           "sensor %s sees surfaces %.1f mm (rms) beside those that others see: its pose?",
+                           rig->sensors[s].name, 1000 * v->apart);
+        if (rig->sensor_count > 1 && v->frames && v->overlap < 0.02)
+            npg_probe_warn(&j->probe, "sensor %s sees almost nothing that others see: its pose?",
+                           rig->sensors[s].name);
+    }
+    return status;
+}
+
 static npg_status read_all(job *j)
 {
     double begin_s = npg_clock_s();
     npg_status status =
-        strcmp(j->input, "-") ? npg_probe_files(&j->probe, &j->list, j->input, j->options) : read_stream(j);
+        strcmp(j->input, "-") ? npg_probe_files(&j->probe, &j->list, j->options) : read_stream(j);
     j->probe.read_s = npg_clock_s() - begin_s;
+    if (!status && j->list && j->list->rig) status = compare_sensors(j);
     if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
     return status;
 }
 
 /* ---- output ---- */
+
+static size_t images_of(const npg_rig *rig, size_t s)
+{
+    size_t count = 0;
+    for (size_t f = 0; f < rig->frame_count; f++) count += npg_rig_shot_of(rig, f, s) != NULL;
+    return count;
+}
+
+static void print_sensors(const job *j)
+{
+    const npg_rig *rig = j->list ? j->list->rig : NULL;
+    for (size_t s = 0; rig && j->views && s < rig->sensor_count; s++) {
+        const npg_rig_view *v = &j->views[s];
+        printf("sensor    %-12s %zu images, %zu points each", rig->sensors[s].name, images_of(rig, s),
+               v->frames ? v->points / v->frames : 0);
+        if (rig->sensor_count > 1)
+            printf("; overlap %.0f %%, there %.1f mm (rms) beside the others", 100 * v->overlap,
+                   1000 * v->apart);
+        puts("");
+    }
+}
+
+static json_t *json_of_sensors(const job *j)
+{
+    json_t *list = json_array();
+    const npg_rig *rig = j->list->rig;
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        const npg_rig_view *v = &j->views[s];
+        json_array_append_new(list, json_pack("{so sI sI sf sf}", "name", npg_json_text(rig->sensors[s].name),
+                                              "images", (json_int_t)images_of(rig, s), "points",
+                                              (json_int_t)(v->frames ? v->points / v->frames : 0), "overlap",
+                                              v->overlap, "apart", v->apart));
+    }
+    return list;
+}
 
 static void print_json(job *j, const npg_estimate *e)
 {
@@ -89,6 +157,7 @@ static void print_json(job *j, const npg_estimate *e)
         "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
         "epochs", (json_int_t)e->epochs, "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes,
         "disk_bytes", e->disk_bytes, "time_s", e->time_s, "per_frame", p->per_frame);
+    if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     puts(text ? text : "{}");
     free(text);
@@ -118,6 +187,7 @@ static void print_text(job *j, const npg_estimate *e)
            "(%zu vertices, %zu epochs, windows of %zu frames; within a factor of two)\n",
            e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->epochs,
            e->window < p->frames ? e->window : p->frames);
+    print_sensors(j);
     json_array_foreach(p->attention, i, value) printf("attention %s\n", json_string_value(value));
 }
 
@@ -152,9 +222,13 @@ int npg_verb_probe(int argc, char **argv)
     if (!status) status = npg_cli_parse(&cli, argv[0], &j.s, options, argc, argv);
     if (!status) {
         j.options = options;
-        j.input = cli.operands[0];
-        status = do_probe(&j);
+        j.input = cli.operand_count ? cli.operands[0] : j.s.rig;
+        if (!j.input[0] || (cli.operand_count && j.s.rig[0]))
+            status = npg_error(NPG_USAGE, "needs one INPUT; usage: neupig probe %s", cli.verb->operands);
+        if (!status) status = npg_options_set(options, "input", j.input);
+        if (!status) status = do_probe(&j);
     }
+    npg_release(&j.views);
     npg_frame_files_close(&j.list);
     npg_probe_uninit(&j.probe);
     npg_options_close(&options);

@@ -10,13 +10,15 @@
 #include "tools/cli.h"
 #include "tools/synth/synth_body.h"
 #include "tools/synth/synth_points.h"
+#include "tools/synth/synth_rig.h"
 
 typedef struct settings {
     const char *output;
     int body, format;
-    int64_t frames, change, points, holes, cameras, width, seed;
+    int64_t frames, change, points, holes, cameras, width, height, seed;
     double cell, cycles, travel, noise, outliers;
-    bool vary, normals;
+    bool vary, normals, rig;
+    double depth_noise_mm;
 } settings;
 
 #define AT(member) offsetof(settings, member)
@@ -56,6 +58,13 @@ const npg_option npg_synth_options[] = {
         "See the body through a ring of this many depth cameras; 0: its whole surface"),
     NPG_ROW_INT   ("width",    AT(width),    "256",    16,    4096,         "PIXELS",
         "Width and height of a camera's picture, pixels"),
+    NPG_ROW_INT   ("height",   AT(height),   "0",      0,     4096,         "PIXELS",
+        "Its height, pixels; 0: as its width"),
+    NPG_ROW_FLAG  ("rig",      AT(rig),      "no",
+        "Write what the cameras see as a rig, DIR/rig with rig.json, depth and colour images of a textured "
+        "body, instead of points; the truth has the colours"),
+    NPG_ROW_REAL  ("depth-noise", AT(depth_noise_mm), "0", 0, 1000,         "MM",
+        "Gaussian noise of a rig's depths, deviation in millimetres"),
     NPG_ROW_CHOICE("format",   AT(format),   "ply",    "ply|obj",
         "Of the files"),
     NPG_ROW_INT   ("seed",     AT(seed),     "0",      0,     4294967295.0, NULL,
@@ -73,6 +82,7 @@ static npg_status write_arrays(const char *folder, const char *kind, int64_t fra
     npg_mesh_view view = {.vert_count = count, .vert_world = world, .vert_normals = normals};
     if (mesh) {
         view.faces = mesh->faces;
+        view.vert_colours = mesh->vert_colours;
         view.face_count = mesh->face_count;
     }
     snprintf(path, sizeof path, "%s/%s/frame_%04lld.%s", folder, kind, (long long)frame,
@@ -84,7 +94,7 @@ static npg_status write_arrays(const char *folder, const char *kind, int64_t fra
 
 static npg_status make_folders(const settings *s)
 {
-    static const char *const kinds[] = {"points", "truth"};
+    const char *const kinds[] = {s->rig ? "rig" : "points", "truth"};
     for (int i = 0; i < 2; i++) {
         char *path;
         NPG_TRY(npg_join_path(&path, s->output, kinds[i]));
@@ -104,6 +114,7 @@ static npg_scan capture_of(const settings *s, const npg_mesh *first)
                         .holes = s->holes,
                         .cameras = s->cameras,
                         .width = s->width,
+                        .height = s->height,
                         .seed = (uint64_t)s->seed};
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, first->vert_pos, first->vert_count);
@@ -124,11 +135,24 @@ static void close_figure(figure *f)
     npg_body_close(&f->body);
 }
 
+/* The texture at the vertices of a body at rest. */
+static npg_status paint(npg_mesh *mesh)
+{
+    NPG_TRY(npg_alloc_array(&mesh->vert_colours, NPG_FOR_MESH, mesh->vert_count, 4));
+    for (size_t i = 0; i < mesh->vert_count; i++) {
+        const float *p = mesh->vert_pos + 3 * i;
+        npg_synth_colour(mesh->vert_colours + 4 * i,
+                         (const double[3]){(double)p[0], (double)p[1], (double)p[2]});
+    }
+    return NPG_OK;
+}
+
 static npg_status open_figure(figure *f, const settings *s, bool is_changed)
 {
     close_figure(f);
     NPG_TRY(npg_body_open(&f->body, s->body, is_changed, s->cell));
     NPG_TRY(npg_mesh_copy(&f->mesh, npg_body_rest(f->body)));
+    if (s->rig) NPG_TRY(paint(f->mesh));
     if (f->mesh->vert_normals) return NPG_OK;
     return npg_alloc_array(&f->mesh->vert_normals, NPG_FOR_MESH, f->mesh->vert_count, 3 * sizeof(float));
 }
@@ -138,6 +162,26 @@ static int64_t change_of(const settings *s)
 {
     if (!npg_body_changes(s->body)) return s->frames;
     return s->change < 0 ? s->frames / 2 : s->change;
+}
+
+static npg_status write_points(const settings *s, const npg_scan *capture, const npg_mesh *mesh,
+                               npg_scanned *points, int64_t t)
+{
+    NPG_TRY(npg_scan_frame(points, capture, mesh, (uint64_t)t));
+    return write_arrays(s->output, "points", t, s, points->pos, s->normals ? points->normals : NULL,
+                        points->count, NULL);
+}
+
+static npg_status write_images(const settings *s, const npg_scan *capture, const figure *f, int64_t t)
+{
+    char *folder;
+    NPG_TRY(npg_join_path(&folder, s->output, "rig"));
+    npg_status status = t ? NPG_OK : npg_synth_rig_begin(folder, capture);
+    if (!status)
+        status = npg_synth_rig_frame(folder, capture, f->mesh, npg_body_rest(f->body), t,
+                                     0.001 * s->depth_noise_mm);
+    npg_release(&folder);
+    return status;
 }
 
 static npg_status make_frames(const settings *s, figure *f, npg_scanned *points, size_t *total)
@@ -152,9 +196,7 @@ static npg_status make_frames(const settings *s, figure *f, npg_scanned *points,
         npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
                                 mesh->face_count);
         if (t == 0) capture = capture_of(s, mesh);
-        NPG_TRY(npg_scan_frame(points, &capture, mesh, (uint64_t)t));
-        NPG_TRY(write_arrays(s->output, "points", t, s, points->pos, s->normals ? points->normals : NULL,
-                             points->count, NULL));
+        NPG_TRY(s->rig ? write_images(s, &capture, f, t) : write_points(s, &capture, mesh, points, t));
         NPG_TRY(write_arrays(s->output, "truth", t, s, mesh->vert_pos, mesh->vert_normals, mesh->vert_count,
                              mesh));
         *total += points->count;
@@ -168,9 +210,15 @@ static npg_status make_capture(const settings *s)
     npg_scanned points = {0};
     size_t total = 0;
     if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
+    if (s->rig && !s->cameras) return npg_error(NPG_USAGE, "a rig needs cameras: --cameras 4, say");
     npg_status status = make_folders(s);
     if (!status) status = make_frames(s, &f, &points, &total);
-    if (!status)
+    if (!status && s->rig)
+        printf("%lld frames of %lld cameras, truth of %zu vertices and %zu faces\n"
+               "rig     %s/rig/rig.json\ntruth   %s/truth\n",
+               (long long)s->frames, (long long)s->cameras, f.mesh->vert_count, f.mesh->face_count, s->output,
+               s->output);
+    if (!status && !s->rig)
         printf("%lld frames, %.0f points each, truth of %zu vertices and %zu faces\n"
                "points  %s/points\ntruth   %s/truth\n",
                (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count,

@@ -8,6 +8,7 @@
 #include "export/forms/forms.h"
 #include "export/forms/placement.h"
 #include "export/forms/writer.h"
+#include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "job/frame_log.h"
@@ -204,6 +205,7 @@ static uint64_t bytes_of_meshes(const npg_worker *worker)
     uint64_t verts = npg_worker_verts_at_most(worker), per_vert = is_obj ? 30 : 12;
     if (facts->frame_count < 0 || npg_worker_settings(worker)->reference[0]) return 0;
     if (state->with_normals) per_vert *= 2;
+    if (npg_worker_settings(worker)->colour != NPG_COLOUR_NO) per_vert += 4; /* if there are any */
     npg_form_facts of_forms = form_facts(worker);
     return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (is_obj ? 20 : 13)) +
            npg_forms_bytes(&state->choice, &of_forms);
@@ -258,8 +260,8 @@ static npg_status resume_folder(npg_worker *worker)
     return npg_job_write(job, keeps_grids(state));
 }
 
-static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit, bool with_normals,
-                             const char *like)
+static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit,
+                             const uint8_t *vert_colours, bool with_normals, const char *like)
 {
     export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
@@ -276,7 +278,7 @@ static npg_status write_mesh(npg_worker *worker, const char *file, const float *
                           .vert_world = state->vert_world,
                           .vert_normals = with_normals ? state->vert_normals : NULL,
                           .faces = state->faces,
-                          .vert_colours = reference->vert_colours,
+                          .vert_colours = vert_colours ? vert_colours : reference->vert_colours,
                           .vert_uvs = reference->vert_uvs,
                           .turns_faces = state->map.is_mirror};
     NPG_TRY(npg_join_path(&path, output_of(worker), file));
@@ -298,7 +300,36 @@ static npg_status begin_meshes(npg_worker *worker)
     NPG_TRY(npg_alloc_array(&state->vert_normals, NPG_FOR_FILES, v, 3 * sizeof *state->vert_normals));
     NPG_TRY(npg_alloc_array(&state->faces, NPG_FOR_FILES, f, 3 * sizeof *state->faces));
     npg_place_faces(&state->map, state->faces, reference->faces, f);
-    return write_mesh(worker, "reference.ply", reference->vert_pos, true, NULL);
+    return write_mesh(worker, "reference.ply", reference->vert_pos, NULL, true, NULL);
+}
+
+/* The vertices as this frame saw them (option colour = frames); where it did not, as the reference. */
+static npg_status colour_frame(npg_worker *worker, npg_frame *frame)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_mesh *reference = facts->reference;
+    if (npg_worker_settings(worker)->colour != NPG_COLOUR_FRAMES || !frame->vert_unit) return NPG_OK;
+    if (!reference->vert_colours || frame->vert_count != reference->vert_count) return NPG_OK;
+    size_t v = frame->vert_count, n = frame->colours ? frame->point_count : 0;
+    float *normals = NULL, *points = NULL;
+    npg_release(&frame->vert_colours);
+    npg_status status = npg_alloc_array(&frame->vert_colours, NPG_FOR_FRAMES, v, 4);
+    if (!status) status = npg_alloc_array(&normals, NPG_FOR_FILES, v, 3 * sizeof *normals);
+    if (!status) status = npg_alloc_array(&points, NPG_FOR_FILES, n, 3 * sizeof *points);
+    if (!status && n) {
+        npg_mesh_vertex_normals(normals, frame->vert_unit, v, reference->faces, reference->face_count);
+        npg_box_local_to_unit(&facts->box, points, frame->pos_local, n);
+        const npg_coloured cloud = {points, frame->normals, frame->colours, n};
+        status = npg_colour_vertices(frame->vert_colours, frame->vert_unit, normals, v, &cloud, 0);
+    }
+    for (size_t i = 0; i < v && !status; i++) {
+        if (frame->vert_colours[4 * i + 3]) continue;
+        memcpy(frame->vert_colours + 4 * i, reference->vert_colours + 4 * i, 3);
+        frame->vert_colours[4 * i + 3] = NPG_COLOUR_LENT;
+    }
+    npg_release(&normals);
+    npg_release(&points);
+    return status;
 }
 
 static npg_status list_frame(npg_worker *worker, const npg_frame *frame, const char *file)
@@ -325,7 +356,7 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
                          (long long)frame->number, frame->vert_count, reference ? reference->vert_count : 0);
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_mesh_name(file + strlen(file), &state->names, number_of(state, frame));
-    NPG_TRY(write_mesh(worker, file, frame->vert_unit, state->with_normals,
+    NPG_TRY(write_mesh(worker, file, frame->vert_unit, frame->vert_colours, state->with_normals,
                        state->choice.is_obj ? state->like : NULL));
     state->mesh_count++;
     return list_frame(worker, frame, file);
@@ -370,6 +401,8 @@ static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, flo
     facts->corner_uvs = *corners;
     facts->faces = state->faces;
     facts->colours = reference->vert_colours;
+    facts->has_pose_colours =
+        reference->vert_colours && npg_worker_settings(worker)->colour == NPG_COLOUR_FRAMES;
     facts->uvs = reference->vert_uvs;
     return NPG_OK;
 }
@@ -476,10 +509,11 @@ static npg_status init(npg_worker *worker)
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
-    if (!output_of(worker)[0]) return NPG_OK;
     bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
-        const npg_frame *frame = npg_chunk_frame(*chunk, i);
+        npg_frame *frame = npg_chunk_frame(*chunk, i);
+        if (is_solving) NPG_TRY(colour_frame(worker, frame));
+        if (!output_of(worker)[0]) continue;
         NPG_TRY(is_solving ? export_frame(worker, frame) : note_number(worker, frame));
     }
     return NPG_OK;

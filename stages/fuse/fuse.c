@@ -12,6 +12,7 @@
 
 #include "fuse/carry_back.h"
 #include "fuse/cells.h"
+#include "fuse/colour_cells.h"
 #include "geometry/mesh_tools.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
@@ -28,6 +29,13 @@
 #define FRAMES_SHARE    0.05 /* of all frames must have seen a place, ...                              */
 #define FRAMES_AT_LEAST 2    /* ... and so many                                                        */
 
+#define HUE_SIDE 1 /* side of a cube that colours are averaged over, in spacings of the keyframe's points */
+#define HUES_MOST                                                                                            \
+    60000 /* such cubes; at 20 000 faces each vertex has six                                       */
+
+#define HUE_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
+#define HUE_HALF 2.0 /* frames away at which they count half of that                       */
+
 enum { FROM_KEY, FROM_ALL };
 
 typedef struct state {
@@ -36,8 +44,10 @@ typedef struct state {
     int64_t usable; /* frames with points, of the measuring pass */
     npg_carry_back *carry;
     npg_cells *cells;
-    double spacing;                                   /* of the keyframe's points */
-    double usual;                                     /* mean of the frames' median distances */
+    npg_colour_cells *hues; /* NULL: the points have no colours, or none are wanted */
+    int64_t key;            /* index of the keyframe */
+    double spacing;         /* of the keyframe's points */
+    double usual;           /* mean of the frames' median distances */
     int64_t seen, frames, misaligned, points, strays; /* seen: of the pass, whatever came of them */
 } state;
 
@@ -60,6 +70,8 @@ typedef struct cloud {
     float *points, *normals; /* unit; owned */
     npg_carried *carried;
     size_t count;
+    const uint8_t *colours; /* of the frame, a loan, or NULL ... */
+    size_t of;              /* ... and how many points it has    */
 } cloud;
 
 static void close_cloud(cloud *c)
@@ -77,6 +89,8 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
     NPG_TRY(npg_alloc_array(&c->carried, NPG_FOR_MESH, most, sizeof *c->carried));
     c->count =
         npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
+    c->colours = npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? NULL : frame->colours;
+    c->of = frame->point_count;
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, c->points, c->count);
     return NPG_OK;
 }
@@ -92,10 +106,18 @@ static npg_status median_dist(double *median, const cloud *c)
     return NPG_OK;
 }
 
+/* The surface slides along the body, the more the farther a frame is from the keyframe: colours blur. */
+static unsigned hue_weight(int64_t away)
+{
+    double weight = HUE_KEY / (1 + (double)llabs(away) / HUE_HALF);
+    return weight > 1 ? (unsigned)lrint(weight) : 1;
+}
+
 /* Weights fall with the distance as the tracker's do (Geman and McClure); what is near is averaged where the
  * surface is, so that noise across the surface averages out; what is not, where it is. */
 static npg_status add_points(state *s, const cloud *c, int64_t frame, double near_dist, double far_dist)
 {
+    unsigned weight = hue_weight(frame - s->key);
     for (size_t i = 0; i < c->count; i++) {
         const npg_carried *p = &c->carried[i];
         bool is_near = (double)p->dist <= near_dist;
@@ -104,6 +126,9 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
             s->strays++;
             continue;
         }
+        const uint8_t *colour = c->colours ? c->colours + 4 * (i * c->of / c->count) : NULL; /* as spread */
+        if (colour && colour[3] && is_near && s->hues)
+            npg_colour_cells_add(s->hues, p->foot, p->facing, colour, weight);
         NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,
                               p->point, p->normal, (float)(robust * robust), frame));
     }
@@ -122,6 +147,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     double per_frame = (double)POINTS_A_CELL / (double)facts->frame_count; /* of the points of one frame */
+    s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));
@@ -134,6 +160,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     double median;
     NPG_TRY(open_cloud(c, worker, frame));
     if (!s->carry) NPG_TRY(open_gathering(worker, c));
+    if (c->colours && !s->hues) NPG_TRY(npg_colour_cells_open(&s->hues, HUE_SIDE * s->spacing, HUES_MOST));
     NPG_TRY(npg_carry_back_move(s->carry, frame->vert_unit));
     NPG_TRY(npg_carry_back_points(s->carry, c->carried, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c));
@@ -183,12 +210,25 @@ static npg_status collect(const state *s, npg_fused *fused)
     return npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least);
 }
 
+static npg_status collect_hues(const state *s, npg_fused *fused)
+{
+    size_t count = s->hues ? npg_colour_cells_count(s->hues) : 0;
+    if (!count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&fused->hue_points, NPG_FOR_MESH, count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fused->hue_normals, NPG_FOR_MESH, count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fused->hues, NPG_FOR_MESH, count, 4));
+    npg_colour_cells_means(s->hues, fused->hue_points, fused->hue_normals, fused->hues);
+    fused->hue_count = count;
+    return NPG_OK;
+}
+
 static npg_status publish(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     npg_fused *fused;
     NPG_TRY(npg_alloc(&fused, NPG_FOR_MESH, sizeof *fused));
     npg_status status = collect(s, fused);
+    if (!status) status = collect_hues(s, fused);
     if (status) {
         npg_fused_close(&fused);
         return status;
@@ -242,6 +282,7 @@ static void uninit(npg_worker *worker)
     state *s = npg_worker_state(worker);
     npg_carry_back_close(&s->carry);
     npg_cells_close(&s->cells);
+    npg_colour_cells_close(&s->hues);
 }
 
 /* Files are walked again, live sources are not; without alignment nothing is known to carry points by. */
@@ -257,7 +298,9 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const npg_facts *facts = npg_worker_facts(worker);
     size_t points = facts->point_count_max < POINTS_MOST ? facts->point_count_max : POINTS_MOST;
     *chunks_held = 1;
-    return npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
+    size_t hues =
+        npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(HUES_MOST);
+    return hues + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
 }
 

@@ -1,8 +1,6 @@
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 #include "ingest/capture.h"
 
-#include "ingest/formats/reader.h"
-
 static npg_status refuse_gaps(const npg_capture *capture, const char *input)
 {
     char numbers[256];
@@ -14,21 +12,36 @@ static npg_status refuse_gaps(const npg_capture *capture, const char *input)
                      input, list->gap_count, list->count, numbers);
 }
 
-npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
-                            bool keep_going, size_t cache_limit, const char *spill_folder)
+npg_status npg_capture_open_list(npg_capture **out, npg_frame_files **list, const char *input,
+                                 npg_missing missing, bool keep_going, size_t cache_limit,
+                                 const char *spill_folder)
 {
     npg_capture *c;
     *out = NULL;
-    NPG_TRY(npg_alloc(&c, NPG_FOR_FILES, sizeof *c));
+    npg_status status = npg_alloc(&c, NPG_FOR_FILES, sizeof *c);
+    if (status) {
+        npg_frame_files_close(list);
+        return status;
+    }
+    c->list = *list;
+    *list = NULL;
     c->missing = missing;
     c->keep_going = keep_going;
-    npg_status status = npg_frame_files_open(&c->list, input, selection, missing != NPG_MISSING_IGNORE);
-    if (!status) status = refuse_gaps(c, input);
+    status = refuse_gaps(c, input);
     if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
     if (!status) status = npg_frame_store_open(&c->store, c->list->count, cache_limit, spill_folder);
     if (status) npg_capture_close(&c);
     *out = c;
     return status;
+}
+
+npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
+                            bool keep_going, size_t cache_limit, const char *spill_folder)
+{
+    npg_frame_files *list;
+    *out = NULL;
+    NPG_TRY(npg_frame_files_open(&list, input, selection, missing != NPG_MISSING_IGNORE));
+    return npg_capture_open_list(out, &list, input, missing, keep_going, cache_limit, spill_folder);
 }
 
 void npg_capture_close(npg_capture **slot)
@@ -46,7 +59,7 @@ static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg
 {
     if (npg_frame_store_get(c->store, frame, index, is_last_use)) return NPG_OK;
     c->reads++;
-    NPG_TRY(npg_read_cloud(frame, c->list->slots[index].path, origin));
+    NPG_TRY(npg_frame_files_read(c->list, (size_t)index, frame, origin));
     frame->index = index;
     if (!is_last_use) npg_frame_store_put(c->store, frame);
     return NPG_OK;

@@ -4,6 +4,7 @@
 
 #include "ingest/frame_files.h"
 #include "ingest/frame_store.h"
+#include "ingest/input_list.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/options.h"
@@ -25,12 +26,14 @@ typedef struct npg_capture {
     uint64_t reads;         /* files parsed so far                */
 } npg_capture;
 
-/* The files that the options of a run (input, frames, missing, confine) name as its frames; nothing is read.
- * As npg_frame_files_open() and, with confine, npg_frame_files_confine(). */
-npg_status npg_capture_list(npg_frame_files **list, const npg_options *options);
+/* Over a list that is at hand; takes it.  NPG_BAD_INPUT with the numbers of the gaps under
+ * NPG_MISSING_ERROR; input is for messages.  What was read is kept in cache_limit bytes, and beyond that in
+ * spill_folder (frame_store.h). */
+npg_status npg_capture_open_list(npg_capture **capture, npg_frame_files **list, const char *input,
+                                 npg_missing missing, bool keep_going, size_t cache_limit,
+                                 const char *spill_folder);
 
-/* NPG_BAD_INPUT with the numbers of the gaps under NPG_MISSING_ERROR; else as npg_frame_files_open.  What was
- * read is kept in cache_limit bytes, and beyond that in spill_folder (frame_store.h). */
+/* Over the list of an input that is no rig. */
 npg_status npg_capture_open(npg_capture **capture, const char *input, const char *selection,
                             npg_missing missing, bool keep_going, size_t cache_limit,
                             const char *spill_folder);

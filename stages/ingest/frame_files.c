@@ -5,6 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "ingest/formats/reader.h"
 #include "ingest/frame_inputs.h"
 #include "ingest/frame_names.h"
 #include "pipeline/file.h"
@@ -96,10 +97,26 @@ static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
                             !paths->is_listed);
 }
 
+/* The frames of a rig as if each were a file of its own: its first depth image. */
+static npg_status find_in_rig(npg_paths *paths, const npg_rig *rig)
+{
+    size_t count = rig->frame_count;
+    NPG_TRY(npg_grow(&paths->paths, &paths->capacity, count, sizeof *paths->paths, NPG_FOR_FILES));
+    NPG_TRY(npg_grow(&paths->numbers, &paths->number_capacity, count, sizeof *paths->numbers, NPG_FOR_FILES));
+    for (size_t f = 0; f < count; f++) {
+        const npg_rig_shot *shot = NULL;
+        for (size_t s = 0; s < rig->sensor_count && !shot; s++) shot = npg_rig_shot_of(rig, f, s);
+        NPG_TRY(npg_copy_text(&paths->paths[f], shot->depth));
+        paths->numbers[f] = rig->numbers[f];
+        paths->count++;
+    }
+    return NPG_OK;
+}
+
 static npg_status fill(npg_frame_files *list, npg_paths *paths, const char *input,
                        const npg_selection *selection, bool finds_gaps)
 {
-    NPG_TRY(npg_paths_find(paths, input));
+    NPG_TRY(list->rig ? find_in_rig(paths, list->rig) : npg_paths_find(paths, input));
     NPG_TRY(number_frames(list, paths));
     list->left_out = paths->left_out;
     NPG_TRY(fill_slots(list, paths, paths->numbers, selection, finds_gaps && list->is_numbered));
@@ -110,7 +127,8 @@ static npg_status fill(npg_frame_files *list, npg_paths *paths, const char *inpu
     return NPG_OK;
 }
 
-npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const char *text, bool finds_gaps)
+static npg_status open_list(npg_frame_files **out, const char *input, const char *text, bool finds_gaps,
+                            const npg_rig_settings *rig)
 {
     npg_frame_files *list;
     npg_selection selection;
@@ -119,13 +137,51 @@ npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const 
     NPG_TRY(npg_selection_parse(&selection, text));
     npg_status status = npg_alloc(&list, NPG_FOR_FILES, sizeof *list);
     if (!status) {
-        status = fill(list, &paths, input, &selection, finds_gaps);
+        if (rig) status = npg_rig_open(&list->rig, input, rig);
+        if (!status) status = fill(list, &paths, input, &selection, finds_gaps);
         if (status) npg_frame_files_close(&list);
         *out = list;
     }
     npg_paths_clear(&paths);
     npg_selection_clear(&selection);
     return status;
+}
+
+npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const char *text, bool finds_gaps)
+{
+    return open_list(out, input, text, finds_gaps, NULL);
+}
+
+npg_status npg_frame_files_open_any(npg_frame_files **out, const char *input, const char *text,
+                                    bool finds_gaps, const npg_rig_settings *settings)
+{
+    return open_list(out, input, text, finds_gaps, npg_rig_is(input) ? settings : NULL);
+}
+
+npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_frame *frame,
+                                npg_origin *origin)
+{
+    const npg_frame_slot *at = &list->slots[slot];
+    if (!list->rig) return npg_read_cloud(frame, at->path, origin);
+    NPG_TRY(npg_rig_read(list->rig, frame, npg_rig_find(list->rig, at->number), origin));
+    npg_status status = npg_copy_text(&frame->path, at->path);
+    frame->cleaning.read = frame->point_count;
+    frame->fields = NPG_FIELD_POINTS;
+    if (status) npg_frame_clear(frame);
+    return status;
+}
+
+npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
+                                npg_status (*visit)(void *user, const char *path), void *user)
+{
+    const npg_frame_slot *at = &list->slots[slot];
+    if (!list->rig) return visit(user, at->path);
+    return npg_rig_each_image(list->rig, npg_rig_find(list->rig, at->number), visit, user);
+}
+
+static npg_status confine_to(void *user, const char *path)
+{
+    return npg_path_confine(path, user);
 }
 
 npg_status npg_frame_files_confine(const npg_frame_files *list, const char *input)
@@ -138,10 +194,10 @@ npg_status npg_frame_files_confine(const npg_frame_files *list, const char *inpu
         char *slash = strrchr(folder, '/');
         folder[!slash ? 0 : slash == folder ? 1 : slash - folder] = 0;
     }
-    const char *place = folder[0] ? folder : ".";
+    char here[] = ".", *place = folder[0] ? folder : here;
     npg_status status = NPG_OK;
     for (size_t i = 0; i < list->count && !status; i++)
-        if (list->slots[i].path) status = npg_path_confine(list->slots[i].path, place);
+        if (list->slots[i].path) status = npg_frame_files_each(list, i, confine_to, place);
     npg_release(&folder);
     return status;
 }
@@ -151,6 +207,7 @@ void npg_frame_files_close(npg_frame_files **slot)
     if (!*slot) return;
     for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->slots[i].path);
     npg_release(&(*slot)->slots);
+    npg_rig_close(&(*slot)->rig);
     npg_release(slot);
 }
 

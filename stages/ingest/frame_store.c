@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #define ROW         (3 * sizeof(float))
+#define COLOUR      4 /* bytes of a point's colour; of its sensor's index it is one */
 #define FREE_SHARE  4 /* of the disk's free space, one such part may be taken: results need room, too */
 #define NOT_ON_DISK (-1)
 
@@ -18,7 +19,7 @@ typedef struct entry {
     npg_frame *frame; /* its arrays are NULL where they are on disk; NULL: nothing is kept; owned */
     float *made;      /* normals made or mended, N x 3; owned                                     */
     npg_cleaning made_cleaning;
-    off_t points_at, normals_at, made_at; /* places in the file, or NOT_ON_DISK */
+    off_t points_at, normals_at, colours_at, sensors_at, made_at; /* places in the file, or NOT_ON_DISK */
     bool has_made;
 } entry;
 
@@ -53,12 +54,17 @@ npg_status npg_frame_store_open(npg_frame_store **out, size_t frame_count, size_
     return status;
 }
 
+/* Of a point, in the arrays that the frame has. */
+static size_t point_bytes(const npg_frame *frame)
+{
+    return (frame->pos_local ? ROW : 0) + (frame->normals ? ROW : 0) + (frame->colours ? COLOUR : 0) +
+           (frame->sensors ? 1 : 0);
+}
+
 static size_t bytes_of(const entry *e)
 {
-    size_t rows = e->made ? 1 : 0;
     if (!e->frame) return 0;
-    if (e->frame->pos_local) rows += 1 + (e->frame->normals != NULL);
-    return sizeof *e->frame + rows * e->frame->point_count * ROW;
+    return sizeof *e->frame + e->frame->point_count * (point_bytes(e->frame) + (e->made ? ROW : 0));
 }
 
 static void drop(npg_frame_store *s, entry *e)
@@ -67,7 +73,11 @@ static void drop(npg_frame_store *s, entry *e)
     if (e->frame) npg_frame_clear(e->frame);
     npg_release(&e->frame);
     npg_release(&e->made);
-    *e = (entry){.points_at = NOT_ON_DISK, .normals_at = NOT_ON_DISK, .made_at = NOT_ON_DISK};
+    *e = (entry){.points_at = NOT_ON_DISK,
+                 .normals_at = NOT_ON_DISK,
+                 .colours_at = NOT_ON_DISK,
+                 .sensors_at = NOT_ON_DISK,
+                 .made_at = NOT_ON_DISK};
 }
 
 void npg_frame_store_close(npg_frame_store **slot)
@@ -157,21 +167,29 @@ static void *read_bytes(const npg_frame_store *s, off_t at, size_t size)
     return data;
 }
 
+/* An array of the frame into the file, where it has one; false: it found no place there. */
+static bool put_array(npg_frame_store *s, off_t *at, const void *array, size_t size)
+{
+    if (array) *at = write_bytes(s, array, size);
+    return !array || *at != NOT_ON_DISK;
+}
+
 /* The frame without its arrays, which go to disk. */
 static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
 {
-    size_t size = frame->point_count * ROW;
+    size_t count = frame->point_count;
     if (!(frame->fields & NPG_FIELD_CLEAN) || npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame))
         return false;
     *e->frame = *frame;
     e->frame->pos_local = e->frame->normals = e->frame->vert_unit = NULL;
+    e->frame->colours = e->frame->sensors = e->frame->vert_colours = NULL;
     e->frame->align_state = NULL;
     e->frame->path = NULL;
     bool is_put = !frame->path || !npg_copy_text(&e->frame->path, frame->path);
-    if (is_put) e->points_at = write_bytes(s, frame->pos_local, size);
-    is_put &= e->points_at != NOT_ON_DISK;
-    if (is_put && frame->normals) e->normals_at = write_bytes(s, frame->normals, size);
-    is_put &= !frame->normals || e->normals_at != NOT_ON_DISK;
+    is_put = is_put && put_array(s, &e->points_at, frame->pos_local, count * ROW) &&
+             put_array(s, &e->normals_at, frame->normals, count * ROW) &&
+             put_array(s, &e->colours_at, frame->colours, count * COLOUR) &&
+             put_array(s, &e->sensors_at, frame->sensors, count);
     if (is_put) s->bytes += bytes_of(e);
     if (!is_put) {
         npg_frame_clear(e->frame);
@@ -184,7 +202,7 @@ static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
 
 static bool put_in_memory(npg_frame_store *s, entry *e, const npg_frame *frame)
 {
-    size_t rows = frame->normals ? 2 : 1, bytes = sizeof *frame + rows * frame->point_count * ROW;
+    size_t bytes = sizeof *frame + frame->point_count * point_bytes(frame);
     if (s->bytes > s->byte_max || bytes > s->byte_max - s->bytes) return false;
     if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return false;
     if (npg_frame_copy(e->frame, frame)) {
@@ -208,13 +226,16 @@ void npg_frame_store_put(npg_frame_store *s, const npg_frame *frame)
 
 static bool get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
 {
-    size_t size = e->frame->point_count * ROW;
+    size_t count = e->frame->point_count;
     if (npg_frame_copy(frame, e->frame)) return false;
-    frame->pos_local = read_bytes(s, e->points_at, size);
-    if (e->normals_at != NOT_ON_DISK) frame->normals = read_bytes(s, e->normals_at, size);
-    if (frame->pos_local && (frame->normals || e->normals_at == NOT_ON_DISK)) return true;
-    npg_frame_clear(frame);
-    return false;
+    bool has_all = (frame->pos_local = read_bytes(s, e->points_at, count * ROW));
+    if (e->normals_at != NOT_ON_DISK)
+        has_all &= !!(frame->normals = read_bytes(s, e->normals_at, count * ROW));
+    if (e->colours_at != NOT_ON_DISK)
+        has_all &= !!(frame->colours = read_bytes(s, e->colours_at, count * COLOUR));
+    if (e->sensors_at != NOT_ON_DISK) has_all &= !!(frame->sensors = read_bytes(s, e->sensors_at, count));
+    if (!has_all) npg_frame_clear(frame);
+    return has_all;
 }
 
 bool npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t index, bool give_away)

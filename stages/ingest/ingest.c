@@ -7,6 +7,7 @@
 #include "ingest/follow.h"
 #include "ingest/formats/reader.h"
 #include "pipeline/file.h"
+#include "pipeline/json_file.h"
 #include "pipeline/stage.h"
 
 /* Frames of one gap in a live source.  Each becomes a frame of the run, so a number that is damaged or a time
@@ -18,6 +19,7 @@ typedef struct state {
     double follow_idle_s, follow_settle_s;
     int missing;
     int64_t cache_mib;
+    npg_rig_settings rig;
     int64_t next; /* place in the pass's order; live: frames emitted so far */
     /* live */
     npg_selection selection;
@@ -53,6 +55,21 @@ static const npg_option ingest_options[] = {
     NPG_ROW_REAL  ("follow-settle", AT(follow_settle_s), "2",           0,     1e6,     "SECONDS",
         "Seconds without a change after which a file that can't be read, "
         "and that others follow, is given up"),
+    NPG_ROW_CHOICE("sensor-poses",  AT(rig.poses),       "file",        "file|inverse|none",
+        "Poses of a rig's sensors: as its files say (sensor to world), the other way round (world to "
+        "sensor), or none: every sensor stands at the origin, for a body that moves before one sensor"),
+    NPG_ROW_REAL  ("sensor-tolerance", AT(rig.tolerance_s), "0.02",     0,     3600,    "SECONDS",
+        "Images of a rig with time stamps belong together when they are no further apart"),
+    NPG_ROW_REAL  ("depth-step",    AT(rig.step_share),  "0.02",        1e-5,  10,      "SHARE",
+        "Neighbouring pixels of a depth image are one surface while their depths differ by less "
+        "than this share"),
+    NPG_ROW_INT   ("depth-margin",  AT(rig.margin),      "1",           0,     64,      "PIXELS",
+        "Pixels to drop beside depth steps, missing depth and the mask's border: there sensors mix "
+        "the body with what is behind it"),
+    NPG_ROW_REAL  ("depth-near",    AT(rig.near_m),      "0",           0,     1e12,    "LENGTH",
+        "Depths below this are not used, in the rig's unit"),
+    NPG_ROW_REAL  ("depth-far",     AT(rig.far_m),       "0",           0,     1e12,    "LENGTH",
+        "Depths above this are not used, in the rig's unit; 0: no limit"),
     {0}};
 /* clang-format on */
 
@@ -91,16 +108,53 @@ static void report_list(npg_worker *worker, const npg_frame_files *list)
                     list->count, is_held ? "repeat the frame before them" : "are skipped", numbers);
 }
 
-npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
+/* What the rig is, and where its sensors have no image. */
+static void report_rig(npg_worker *worker, npg_rig *rig)
+{
+    json_t *report = npg_worker_report(worker), *sensors = json_array();
+    size_t gaps = 0;
+    for (size_t i = 0; i < rig->sensor_count; i++) {
+        size_t images = 0;
+        for (size_t f = 0; f < rig->frame_count; f++) images += npg_rig_shot_of(rig, f, i) != NULL;
+        gaps += rig->frame_count - images;
+        json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name),
+                                                 "images", (json_int_t)images));
+    }
+    json_object_set_new(report, "rig", json_pack("{ss so}", "layout", rig->layout, "sensors", sensors));
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig (%s) of %zu sensors, %zu frames", rig->path,
+                   rig->layout, rig->sensor_count, rig->frame_count);
+    if (gaps)
+        npg_worker_warn(worker, false, -1, "%zu of %zu images of the rig's sensors are missing", gaps,
+                        rig->frame_count * rig->sensor_count);
+    if (rig->left_out)
+        npg_worker_warn(worker, false, -1, "%zu depth images have no pose within %g s and are left out",
+                        rig->left_out, rig->settings.tolerance_s);
+}
+
+static npg_status list_frames(npg_frame_files **list, const state *s, const npg_settings *settings,
+                              const char *selection)
+{
+    npg_rig_settings rig = s->rig;
+    rig.confine = settings->confine;
+    NPG_TRY(
+        npg_frame_files_open_any(list, settings->input, selection, s->missing != NPG_MISSING_IGNORE, &rig));
+    npg_status status = settings->confine ? npg_frame_files_confine(*list, settings->input) : NPG_OK;
+    if (status) npg_frame_files_close(list);
+    return status;
+}
+
+npg_status npg_capture_select(npg_frame_files **list, const npg_options *options, const char *selection)
 {
     npg_settings settings;
     state s = {0};
     npg_options_fill(options, npg_run_options, &settings);
     npg_options_fill(options, ingest_options, &s);
-    NPG_TRY(npg_frame_files_open(list, settings.input, s.frames, s.missing != NPG_MISSING_IGNORE));
-    npg_status status = settings.confine ? npg_frame_files_confine(*list, settings.input) : NPG_OK;
-    if (status) npg_frame_files_close(list);
-    return status;
+    return list_frames(list, &s, &settings, selection ? selection : s.frames);
+}
+
+npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
+{
+    return npg_capture_select(list, options, NULL);
 }
 
 static npg_status open_capture(npg_worker *worker)
@@ -108,20 +162,23 @@ static npg_status open_capture(npg_worker *worker)
     state *s = npg_worker_state(worker);
     const npg_settings *settings = npg_worker_settings(worker);
     npg_capture *capture;
+    npg_frame_files *list;
     char *folder = NULL;
     if (npg_worker_kept(worker)) return NPG_OK;
     if (settings->output[0] && s->cache_mib) NPG_TRY(npg_join_path(&folder, settings->output, "job"));
-    npg_status status = npg_capture_open(&capture, settings->input, s->frames, (npg_missing)s->missing,
-                                         settings->keep_going, cache_limit(worker), folder);
+    npg_status status = list_frames(&list, s, settings, s->frames);
+    if (!status)
+        status = npg_capture_open_list(&capture, &list, settings->input, (npg_missing)s->missing,
+                                       settings->keep_going, cache_limit(worker), folder);
     npg_release(&folder);
     NPG_TRY(status);
     npg_worker_keep(worker, capture, release_capture);
     NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
-    if (settings->confine) NPG_TRY(npg_frame_files_confine(capture->list, settings->input));
     npg_facts *facts = npg_worker_facts(worker);
     /* A resumed run has restored it. */
     if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     report_list(worker, capture->list);
+    if (capture->list->rig) report_rig(worker, capture->list->rig);
     return NPG_OK;
 }
 

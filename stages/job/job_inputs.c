@@ -63,13 +63,47 @@ static npg_status describe_file(json_t *entry, const char *path)
     return NPG_OK;
 }
 
+/* One frame of several files: their names, sizes and checksums in one. */
+typedef struct file_sum {
+    json_int_t bytes;
+    uint64_t hash;
+} file_sum;
+
+static npg_status add_file(void *user, const char *path)
+{
+    file_sum *sum = user;
+    struct stat info;
+    uint64_t hash;
+    if (stat(path, &info)) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
+    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
+    if (status) return status == NPG_DISK ? NPG_BAD_INPUT : status;
+    sum->bytes += (json_int_t)info.st_size;
+    sum->hash = (sum->hash ^ hash) * 0x9e3779b97f4a7c15u; /* the order counts */
+    return NPG_OK;
+}
+
+/* The images of a frame, and the calibration that it is made with. */
+static npg_status describe_rig_frame(json_t *entry, const npg_frame_files *list, size_t i)
+{
+    const char *path = list->slots[i].path, *slash = strrchr(path, '/');
+    file_sum sum = {.hash = npg_rig_frame_hash(list->rig, npg_rig_find(list->rig, list->slots[i].number))};
+    char text[17];
+    NPG_TRY(npg_frame_files_each(list, i, add_file, &sum));
+    snprintf(text, sizeof text, "%016llx", (unsigned long long)sum.hash);
+    json_object_set_new(entry, "name", npg_json_text(slash ? slash + 1 : path));
+    json_object_set_new(entry, "bytes", json_integer(sum.bytes));
+    json_object_set_new(entry, "xxh3", json_string(text));
+    return NPG_OK;
+}
+
 static npg_status describe_frames(json_t *frames, const npg_frame_files *list)
 {
     for (size_t i = 0; i < list->count; i++) {
         json_t *entry = json_pack("{sI}", "number", (json_int_t)list->slots[i].number);
         json_array_append_new(frames, entry);
         if (!list->slots[i].path) continue;
-        npg_status status = describe_file(entry, list->slots[i].path);
+        npg_status status =
+            list->rig ? describe_rig_frame(entry, list, i) : describe_file(entry, list->slots[i].path);
         /* what can't be read is for ingest to refuse or skip; here it only must not pass for one that can */
         if (status && status != NPG_BAD_INPUT) return status;
     }

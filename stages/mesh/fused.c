@@ -14,5 +14,8 @@ void npg_fused_close(npg_fused **slot)
     if (!slot || !*slot) return;
     npg_release(&(*slot)->points);
     npg_release(&(*slot)->normals);
+    npg_release(&(*slot)->hue_points);
+    npg_release(&(*slot)->hue_normals);
+    npg_release(&(*slot)->hues);
     npg_release(slot);
 }

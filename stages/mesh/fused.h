@@ -13,6 +13,10 @@ typedef struct npg_fused {
     size_t count;            /* N */
     double spacing_unit;     /* side of the cells that points were averaged over */
     double key_spacing_unit; /* of the keyframe's points                            */
+    /* Their colours, where they have any: points of their own, M x 3, M x 3 and M x 4; owned, or NULL. */
+    float *hue_points, *hue_normals;
+    uint8_t *hues;
+    size_t hue_count; /* M */
 } npg_fused;
 
 /* Written by stage fuse at the end of a fusing pass; stage mesh takes it in the pass that follows. */

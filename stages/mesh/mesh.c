@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "align/sights.h"
+#include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "mesh/denoise.h"
@@ -504,6 +505,37 @@ static npg_status measure_reference(making *m)
     return NPG_OK;
 }
 
+/* Colours of all frames; without a fusing pass those of the keyframe.  A user's own mesh keeps its own. */
+static npg_status colour_reference(making *m)
+{
+    npg_mesh *mesh = m->mesh;
+    const npg_frame *frame = m->frame;
+    bool is_fused = m->fused && m->fused->hues;
+    float *points = NULL;
+    if (mesh->vert_colours || npg_worker_settings(m->worker)->colour == NPG_COLOUR_NO) return NPG_OK;
+    if (!is_fused && !frame->colours) return NPG_OK;
+    npg_coloured cloud = {.count = is_fused ? m->fused->hue_count : frame->point_count,
+                          .points = is_fused ? m->fused->hue_points : NULL,
+                          .normals = is_fused ? m->fused->hue_normals : frame->normals,
+                          .colours = is_fused ? m->fused->hues : frame->colours};
+    NPG_TRY(npg_alloc_array(&mesh->vert_colours, NPG_FOR_MESH, mesh->vert_count, 4));
+    npg_status status =
+        is_fused ? NPG_OK : npg_alloc_array(&points, NPG_FOR_MESH, cloud.count, 3 * sizeof(float));
+    if (!status && !is_fused) {
+        npg_box_local_to_unit(&npg_worker_facts(m->worker)->box, points, frame->pos_local, cloud.count);
+        cloud.points = points;
+    }
+    if (!status)
+        status = npg_colour_vertices(mesh->vert_colours, mesh->vert_pos, mesh->vert_normals, mesh->vert_count,
+                                     &cloud, SEEN_SPACINGS * m->seen);
+    npg_release(&points);
+    NPG_TRY(status);
+    size_t seen = 0;
+    for (size_t i = 0; i < mesh->vert_count; i++) seen += mesh->vert_colours[4 * i + 3] != 0;
+    note_count(m, "vertices_coloured", seen);
+    return npg_colour_fill(mesh->vert_colours, mesh);
+}
+
 /* The points and normals of fused (or NULL) are taken from it. */
 static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg_fused *fused)
 {
@@ -516,6 +548,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg
     if (!status) status = is_given ? read_reference(&m) : make(&m);
     if (!status && !is_given) status = cut_welds(&m);
     if (!status) status = measure_reference(&m);
+    if (!status) status = colour_reference(&m);
     note(&m, "seconds", npg_clock_s() - since);
     npg_release(&m.points);
     npg_release(&m.normals);

@@ -10,7 +10,7 @@
 typedef struct saved_frame {
     int64_t index, number;
     uint64_t fields, point_count, vert_count;
-    uint8_t is_key, is_skipped, is_held, has_normals, has_aligned, unused[3];
+    uint8_t is_key, is_skipped, is_held, has_normals, has_aligned, has_colours, has_sure_normals, unused;
     npg_cleaning cleaning;
 } saved_frame;
 
@@ -48,11 +48,15 @@ static npg_status put_frame(npg_archive_writer *out, const npg_held *held, size_
                          .is_held = f->is_held,
                          .has_normals = f->normals != NULL,
                          .has_aligned = f->vert_unit != NULL,
+                         .has_colours = f->colours != NULL,
+                         .has_sure_normals = f->has_sure_normals,
                          .cleaning = f->cleaning};
     block_name(name, "frame", f->index);
     NPG_TRY(npg_archive_put(out, name, &saved, sizeof saved));
     NPG_TRY(put_array(out, "points", f->index, f->pos_local, f->point_count));
     NPG_TRY(put_array(out, "normals", f->index, f->normals, f->point_count));
+    block_name(name, "colours", f->index);
+    if (f->colours) NPG_TRY(npg_archive_put(out, name, f->colours, 4 * f->point_count));
     NPG_TRY(put_array(out, "aligned", f->index, f->vert_unit, vert_count));
     NPG_TRY(put_array(out, "solved", f->index, held->solved, vert_count));
     block_name(name, "path", f->index);
@@ -199,6 +203,17 @@ static npg_status get_array(const npg_archive *in, const char *what, int64_t ind
     return npg_archive_get(in, name, *values, count * 3 * sizeof(float));
 }
 
+static npg_status get_colours(npg_frame *f, const npg_archive *in)
+{
+    char name[NPG_BLOCK_NAME];
+    size_t size;
+    block_name(name, "colours", f->index);
+    if (!npg_archive_find(in, name, &size) || size / 4 != f->point_count)
+        return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu points", name, f->point_count);
+    NPG_TRY(npg_alloc_array(&f->colours, NPG_FOR_FRAMES, f->point_count, 4));
+    return npg_archive_get(in, name, f->colours, 4 * f->point_count);
+}
+
 static npg_status get_frame(npg_held *held, const npg_archive *in, int64_t index, size_t vert_count)
 {
     char name[NPG_BLOCK_NAME];
@@ -215,11 +230,13 @@ static npg_status get_frame(npg_held *held, const npg_archive *in, int64_t index
                      .is_key = saved.is_key,
                      .is_skipped = saved.is_skipped,
                      .is_held = saved.is_held,
+                     .has_sure_normals = saved.has_sure_normals,
                      .point_count = saved.point_count,
                      .cleaning = saved.cleaning};
     if (saved.point_count) NPG_TRY(get_array(in, "points", index, &f->pos_local, f->point_count));
     if (saved.has_normals && f->point_count)
         NPG_TRY(get_array(in, "normals", index, &f->normals, f->point_count));
+    if (saved.has_colours && f->point_count) NPG_TRY(get_colours(f, in));
     if (saved.has_aligned) NPG_TRY(get_array(in, "aligned", index, &f->vert_unit, vert_count));
     if (saved.has_aligned) f->vert_count = vert_count;
     NPG_TRY(get_array(in, "solved", index, &held->solved, vert_count));

@@ -203,6 +203,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     NPG_TRY(status);
     frame->cleaning.normals_given = n - bad;
     frame->cleaning.normals_estimated = bad;
+    if (frame->has_sure_normals && s->sensor_kind == SENSOR_AUTO) return NPG_OK;
     NPG_TRY(find_sensor(worker, frame, sensor, &has_sensor));
     if (has_sensor) {
         npg_normals_face_sensor(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n,
@@ -278,6 +279,8 @@ static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status 
     frame->point_count = 0;
     npg_release(&frame->pos_local);
     npg_release(&frame->normals);
+    npg_release(&frame->colours);
+    npg_release(&frame->sensors);
     s->skipped++;
     return NPG_OK;
 }

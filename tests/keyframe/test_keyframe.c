@@ -256,7 +256,7 @@ static npg_status push_scene(npg_run *run, const scene *s, int64_t frame_count)
         status = fill_points(&frame, count, false);
         double *points = calloc(3 * count, sizeof *points);
         for (size_t i = 0; i < 3 * count && !status; i++) points[i] = (double)frame.pos_local[i];
-        npg_cloud cloud = {sizeof cloud, s->first_number + t, count, points, NULL};
+        npg_cloud cloud = {sizeof cloud, s->first_number + t, count, points, NULL, NULL};
         if (!status) status = npg_run_push(run, &cloud);
         free(points);
         npg_frame_clear(&frame);

@@ -59,7 +59,9 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_frame_view, vertices_unit, 144),
                                  AT(npg_frame_view, residual, 152),
                                  AT(npg_frame_view, coverage, 160),
-                                 SIZE(npg_frame_view, 168),
+                                 AT(npg_frame_view, colours, 168),
+                                 AT(npg_frame_view, vertex_colours, 176),
+                                 SIZE(npg_frame_view, 184),
                                  AT(npg_custom_stage, name, 8),
                                  AT(npg_custom_stage, after, 16),
                                  AT(npg_custom_stage, user, 24),
@@ -91,7 +93,8 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_cloud, point_count, 16),
                                  AT(npg_cloud, points, 24),
                                  AT(npg_cloud, normals, 32),
-                                 SIZE(npg_cloud, 40),
+                                 AT(npg_cloud, colours, 40),
+                                 SIZE(npg_cloud, 48),
                                  AT(npg_result, index, 8),
                                  AT(npg_result, number, 16),
                                  AT(npg_result, vertex_count, 24),
@@ -100,7 +103,8 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_result, faces, 48),
                                  AT(npg_result, residual, 56),
                                  AT(npg_result, coverage, 64),
-                                 SIZE(npg_result, 72),
+                                 AT(npg_result, vertex_colours, 72),
+                                 SIZE(npg_result, 80),
                                  AT(npg_surface_hit, face, 0),
                                  AT(npg_surface_hit, weights, 4),
                                  AT(npg_surface_hit, dist_sq, 16),
@@ -146,8 +150,8 @@ static void structs_of_a_later_version_are_taken_and_shorter_ones_refused(void *
     struct {
         npg_cloud cloud;
         double members_to_come[8];
-    } later = {{sizeof later, 7, 1, points, NULL}, {1, 2, 3}};
-    npg_cloud shorter = {offsetof(npg_cloud, normals), 8, 1, points, NULL};
+    } later = {{sizeof later, 7, 1, points, NULL, NULL}, {1, 2, 3}};
+    npg_cloud shorter = {offsetof(npg_cloud, normals), 8, 1, points, NULL, NULL};
     npg_run *run = open_pushed();
     (void)state;
     assert_int_equal(npg_run_push(run, &later.cloud), NPG_OK);

@@ -55,7 +55,7 @@ static npg_status push_all(npg_run *run)
     static double points[3 * POINTS];
     static float normals[3 * POINTS];
     for (int64_t t = 0; t < FRAMES; t++) {
-        npg_cloud cloud = {sizeof cloud, 10 + t, POINTS, points, normals};
+        npg_cloud cloud = {sizeof cloud, 10 + t, POINTS, points, normals, NULL};
         make_ball(points, normals, t);
         npg_status status = npg_run_push(run, &cloud);
         if (status) return status;

@@ -251,7 +251,7 @@ static npg_status push_triangle(npg_run *run, int64_t number)
     const double at = 5e6 + 0.001 * (double)number;
     const double points[9] = {at, 0, 0, at + 1, 0, 0, at, 1, 0.5};
     const float normals[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1};
-    npg_cloud cloud = {sizeof cloud, number, 3, points, normals};
+    npg_cloud cloud = {sizeof cloud, number, 3, points, normals, NULL};
     return npg_run_push(run, &cloud);
 }
 

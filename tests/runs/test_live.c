@@ -155,7 +155,7 @@ static npg_status push_frame(npg_run *run, int64_t number, double leap)
     double points[3 * POINTS];
     for (int i = 0; i < 3 * POINTS; i++)
         points[i] = sin(7.0 * i) + 0.001 * (double)number + (i % 3 ? 0 : leap);
-    npg_cloud cloud = {sizeof cloud, number, POINTS, points, NULL};
+    npg_cloud cloud = {sizeof cloud, number, POINTS, points, NULL, NULL};
     return npg_run_push(run, &cloud);
 }
 

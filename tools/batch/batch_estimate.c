@@ -37,7 +37,7 @@ static npg_status probe_capture(probed *p, const npg_capture *capture)
         snprintf(p->cause, sizeof p->cause, "%s", capture->refusal);
         return NPG_OK;
     }
-    npg_status status = npg_probe_files(&p->probe, &p->list, capture->input, capture->options);
+    npg_status status = npg_probe_files(&p->probe, &p->list, capture->options);
     if (status == NPG_MEMORY) return status;
     if (status) {
         snprintf(p->cause, sizeof p->cause, "%s", npg_error_text());

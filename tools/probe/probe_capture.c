@@ -25,22 +25,24 @@ npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame
     return status;
 }
 
-npg_status npg_probe_files(npg_probe *probe, npg_frame_files **out, const char *input,
-                           const npg_options *options)
+static npg_status add_bytes(void *user, const char *path)
 {
-    const char *selection = npg_options_get(options, "frames");
-    npg_settings settings;
-    npg_options_fill(options, npg_run_options, &settings);
-    NPG_TRY(npg_frame_files_open(out, input, selection ? selection : "", true));
-    if (settings.confine) NPG_TRY(npg_frame_files_confine(*out, input));
+    npg_probe *probe = user;
+    probe->bytes += npg_file_bytes(path);
+    return NPG_OK;
+}
+
+npg_status npg_probe_files(npg_probe *probe, npg_frame_files **out, const npg_options *options)
+{
+    NPG_TRY(npg_capture_list(out, options));
     const npg_frame_files *list = *out;
     for (size_t i = 0; i < list->count; i++) {
         const npg_frame_slot *slot = &list->slots[i];
         npg_frame frame = {0};
         if (!slot->path) continue;
-        const char *format = npg_reader_for(slot->path);
-        probe->bytes += npg_file_bytes(slot->path);
-        npg_status status = npg_read_cloud(&frame, slot->path, &probe->origin);
+        const char *format = list->rig ? list->rig->layout : npg_reader_for(slot->path);
+        NPG_TRY(npg_frame_files_each(list, i, add_bytes, probe));
+        npg_status status = npg_frame_files_read(list, i, &frame, &probe->origin);
         NPG_TRY(npg_probe_count(probe, status, &frame, format ? format : "unknown", slot->number));
     }
     if (list->gap_count) {

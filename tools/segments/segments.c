@@ -33,10 +33,10 @@ static int64_t option_number(const npg_options *options, const char *name)
 
 /* ---- the frames of a segment, as --frames has them ---- */
 
-static npg_status count_all(int64_t *count, const npg_options *options, bool finds_gaps)
+static npg_status count_all(int64_t *count, const npg_options *options)
 {
     npg_frame_files *all;
-    NPG_TRY(npg_frame_files_open(&all, npg_options_get(options, "input"), "", finds_gaps));
+    NPG_TRY(npg_capture_select(&all, options, ""));
     *count = (int64_t)all->count;
     npg_frame_files_close(&all);
     return NPG_OK;
@@ -46,9 +46,8 @@ static npg_status slice_text(char **text, const npg_selection *slice, const npg_
                              int64_t first, int64_t last)
 {
     int64_t step = slice->is_slice ? slice->step : 1, begin = slice->has_first ? slice->first : 0, count;
-    bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
     if (begin < 0) {
-        NPG_TRY(count_all(&count, options, finds_gaps));
+        NPG_TRY(count_all(&count, options));
         begin = begin + count < 0 ? 0 : begin + count;
     }
     NPG_TRY(npg_alloc(text, NPG_FOR_RUN, 80));
@@ -271,8 +270,7 @@ static npg_status run_all(npg_segments *s, const npg_options *options, npg_repor
 {
     json_t *overlaps = NULL;
     bool is_partial = false;
-    bool finds_gaps = strcmp(npg_options_get(options, "missing"), "ignore") != 0;
-    NPG_TRY(npg_frame_files_open(&s->frames, npg_options_get(options, "input"), s->selection, finds_gaps));
+    NPG_TRY(npg_capture_select(&s->frames, options, s->selection));
     NPG_TRY(load_or_begin(s, options));
     NPG_TRY(refuse_link(s, options, "links"));
     NPG_TRY(solve_all(s, options, reporter));

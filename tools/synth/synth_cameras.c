@@ -5,28 +5,22 @@
 
 #include "geometry/geometry.h"
 #include "pipeline/random.h"
-#include "tools/synth/synth_points.h"
+#include "tools/synth/synth_camera.h"
 
 #define PI 3.14159265358979323846
 
-typedef struct camera {
-    double eye[3], right[3], up[3], ahead[3];
-    double focal; /* pixels */
-    int64_t width;
-} camera;
-
-typedef struct picture {
-    double *depth;  /* along `ahead`; infinity where nothing is seen */
-    uint32_t *face; /* the face seen */
-} picture;
+typedef npg_synth_camera camera;
+typedef npg_synth_picture picture;
 
 /* The i-th of a ring at half the diagonal's height above the middle, turned to the middle. */
-static camera camera_of_ring(const npg_scan *capture, int64_t i)
+camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i)
 {
     /* Far enough that the whole body is in the picture; at two heights, so that tops of limbs are seen. */
     const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
     double angle = 2 * PI * (double)i / (double)capture->cameras;
-    camera c = {.width = capture->width, .focal = 0.95 * (double)capture->width};
+    int64_t height = capture->height ? capture->height : capture->width;
+    int64_t side = height < capture->width ? height : capture->width;
+    camera c = {.width = capture->width, .height = height, .focal = 0.95 * (double)side};
     double ahead[3] = {-sin(angle), -lift, -cos(angle)}, length = npg_vec3_length(ahead);
     for (int k = 0; k < 3; k++) {
         c.ahead[k] = ahead[k] / length;
@@ -44,7 +38,7 @@ static void project(double out[3], const camera *c, const float *p)
     double from_eye[3] = {(double)p[0] - c->eye[0], (double)p[1] - c->eye[1], (double)p[2] - c->eye[2]};
     out[2] = npg_vec3_dot(from_eye, c->ahead);
     out[0] = 0.5 * (double)c->width + c->focal * npg_vec3_dot(from_eye, c->right) / out[2];
-    out[1] = 0.5 * (double)c->width + c->focal * npg_vec3_dot(from_eye, c->up) / out[2];
+    out[1] = 0.5 * (double)c->height + c->focal * npg_vec3_dot(from_eye, c->up) / out[2];
 }
 
 static double cross_2d(const double a[3], const double b[3], double x, double y)
@@ -64,7 +58,8 @@ static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint3
     if (area == 0) return;
     for (int k = 0; k < 2; k++) {
         lo[k] = fmax(ceil(fmin(fmin(v[0][k], v[1][k]), v[2][k]) - 0.5), 0);
-        hi[k] = fmin(floor(fmax(fmax(v[0][k], v[1][k]), v[2][k]) - 0.5), (double)(c->width - 1));
+        hi[k] = fmin(floor(fmax(fmax(v[0][k], v[1][k]), v[2][k]) - 0.5),
+                     (double)((k ? c->height : c->width) - 1));
     }
     for (int64_t y = (int64_t)lo[1]; y <= (int64_t)hi[1]; y++)
         for (int64_t x = (int64_t)lo[0]; x <= (int64_t)hi[0]; x++) {
@@ -79,22 +74,52 @@ static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint3
         }
 }
 
+npg_status npg_synth_picture_open(picture *out, const camera *c)
+{
+    size_t pixels = (size_t)(c->width * c->height);
+    NPG_TRY(npg_alloc_array(&out->depth, NPG_FOR_FRAMES, pixels, sizeof *out->depth));
+    return npg_alloc_array(&out->face, NPG_FOR_FRAMES, pixels, sizeof *out->face);
+}
+
+void npg_synth_picture_close(picture *p)
+{
+    npg_release(&p->depth);
+    npg_release(&p->face);
+}
+
+void npg_synth_draw(picture *out, const camera *c, const npg_mesh *mesh)
+{
+    for (int64_t p = 0; p < c->width * c->height; p++) out->depth[p] = INFINITY;
+    for (size_t f = 0; f < mesh->face_count; f++) draw_face(out, c, mesh, (uint32_t)f);
+}
+
+void npg_synth_unproject(double pos[3], const camera *c, int64_t at, double depth)
+{
+    double x = ((double)(at % c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
+    double y = ((double)(at / c->width) + 0.5 - 0.5 * (double)c->height) / c->focal;
+    for (int k = 0; k < 3; k++) pos[k] = c->eye[k] + depth * (c->ahead[k] + x * c->right[k] + y * c->up[k]);
+}
+
+bool npg_synth_is_front(double normal[3], const camera *c, const npg_mesh *mesh, uint32_t face,
+                        const double pos[3])
+{
+    double facing = 0;
+    npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * (size_t)face);
+    for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
+    return facing > 0;
+}
+
 /* The surface point behind every pixel that sees a front side, with noise along its ray. */
 static npg_status add_seen_points(npg_scanned *points, const picture *seen, const camera *c,
                                   const npg_mesh *mesh, double noise, npg_random *random)
 {
-    for (int64_t at = 0; at < c->width * c->width; at++) {
+    for (int64_t at = 0; at < c->width * c->height; at++) {
         double depth = seen->depth[at], pos[3], normal[3];
         if (isinf(depth)) continue;
         if (noise > 0) depth += noise * npg_random_gauss(random);
-        double x = ((double)(at % c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
-        double y = ((double)(at / c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
-        for (int k = 0; k < 3; k++)
-            pos[k] = c->eye[k] + depth * (c->ahead[k] + x * c->right[k] + y * c->up[k]);
-        npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * (size_t)seen->face[at]);
-        double facing = 0;
-        for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
-        if (facing > 0) NPG_TRY(npg_scanned_add(points, pos, normal));
+        npg_synth_unproject(pos, c, at, depth);
+        if (npg_synth_is_front(normal, c, mesh, seen->face[at], pos))
+            NPG_TRY(npg_scanned_add(points, pos, normal));
     }
     return NPG_OK;
 }
@@ -102,17 +127,14 @@ static npg_status add_seen_points(npg_scanned *points, const picture *seen, cons
 npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame)
 {
     picture seen = {0};
-    size_t pixels = (size_t)(capture->width * capture->width);
     npg_random random = npg_random_stream(capture->seed, frame, NPG_FOR_CAMERAS);
-    npg_status status = npg_alloc_array(&seen.depth, NPG_FOR_FRAMES, pixels, sizeof *seen.depth);
-    if (!status) status = npg_alloc_array(&seen.face, NPG_FOR_FRAMES, pixels, sizeof *seen.face);
+    camera first = npg_synth_camera_of_ring(capture, 0);
+    npg_status status = npg_synth_picture_open(&seen, &first);
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
-        camera c = camera_of_ring(capture, i);
-        for (size_t p = 0; p < pixels; p++) seen.depth[p] = INFINITY;
-        for (size_t f = 0; f < mesh->face_count; f++) draw_face(&seen, &c, mesh, (uint32_t)f);
+        camera c = npg_synth_camera_of_ring(capture, i);
+        npg_synth_draw(&seen, &c, mesh);
         status = add_seen_points(points, &seen, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
     }
-    npg_release(&seen.depth);
-    npg_release(&seen.face);
+    npg_synth_picture_close(&seen);
     return status;
 }

@@ -11,7 +11,8 @@ typedef struct npg_scan {
     double outliers; /* % of the points replaced by uniform ones in 1.2 x the frame's box */
     int64_t holes;   /* balls of 6 % of the diagonal cut out of every frame               */
     int64_t cameras; /* 0: the whole surface; else a ring of that many depth cameras      */
-    int64_t width;   /* of a camera's picture, pixels; height is the same                 */
+    int64_t width;   /* of a camera's picture, pixels ...                                 */
+    int64_t height;  /* ... and its height; 0: the same                                   */
     uint64_t seed;
     double diagonal;  /* of the first frame's box */
     double centre[3]; /* what the cameras look at */

@@ -42,6 +42,7 @@ typedef struct npg_form_facts {
     const char *like;                /* OBJ file whose lines an OBJ keeps, or NULL           */
     bool turns_faces;                /* and its faces are to be turned over                  */
     bool has_normals;                /* poses have normals                                   */
+    bool has_pose_colours;           /* poses have colours of their own                      */
     int64_t pose_count;              /* T, meshes there are; -1: not known yet               */
     int64_t first_index, last_index; /* of the poses                                         */
     double fps;
@@ -56,9 +57,10 @@ typedef struct npg_form_facts {
 } npg_form_facts;
 
 typedef struct npg_pose {
-    int64_t index, number; /* of the frame                */
-    const float *pos;      /* V x 3                       */
-    const float *normals;  /* V x 3 or NULL (has_normals) */
+    int64_t index, number;  /* of the frame                */
+    const float *pos;       /* V x 3                       */
+    const float *normals;   /* V x 3 or NULL (has_normals) */
+    const uint8_t *colours; /* V x 4 or NULL (has_pose_colours) */
 } npg_pose;
 
 /* A form.  state is zeroed before open; close is called after open in any case and removes

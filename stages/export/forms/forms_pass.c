@@ -159,7 +159,8 @@ static npg_status each_line(const npg_form_facts *facts, npg_json_line_visit *vi
 
 static npg_status pass_pose(forms_pass *p, int64_t index, int64_t number, bool fixed_rate_only)
 {
-    const npg_pose pose = {index, number, p->mesh->vert_pos, p->mesh->vert_normals};
+    const npg_pose pose = {index, number, p->mesh->vert_pos, p->mesh->vert_normals,
+                           p->facts->has_pose_colours ? p->mesh->vert_colours : NULL};
     for (int i = 0; npg_forms[i]; i++)
         if (p->states[i] && (!fixed_rate_only || npg_forms[i]->has_fixed_rate))
             NPG_TRY(npg_forms[i]->pose(p->states[i], &pose));
@@ -176,7 +177,8 @@ static npg_status read_pose(forms_pass *p, const char *file)
     npg_mesh_unref(&p->mesh);
     npg_status status = npg_read_mesh(&p->mesh, path, &zero);
     if (!status && (p->mesh->vert_count != facts->vert_count || p->mesh->face_count != facts->face_count ||
-                    (facts->has_normals && !p->mesh->vert_normals)))
+                    (facts->has_normals && !p->mesh->vert_normals) ||
+                    (facts->has_pose_colours && !p->mesh->vert_colours)))
         status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written: %zu vertices and %zu faces",
                            path, p->mesh->vert_count, p->mesh->face_count);
     for (size_t i = 0; !status && i < 3 * facts->vert_count; i++)

@@ -11,6 +11,7 @@
  *     metres_per_unit   () float64
  *     up                () one letter
  *     colours           (V, 4) uint8         where the reference has them
+ *     frame_colours     (T, V, 4) uint8      with colours of each frame: alpha 255 where it saw the vertex
  *     uvs               (V, 2) float32       where the reference has them
  *     corner_uvs        (F, 3, 2) float32    where the reference has them
  */
@@ -35,6 +36,7 @@ enum {
     COLOURS,
     UVS,
     CORNER_UVS,
+    FRAME_COLOURS,
     VERTICES, /* last: it is written straight through */
     ARRAYS
 };
@@ -71,6 +73,7 @@ static array describe(int which, const npg_form_facts *facts)
     case UNIT: return (array){"metres_per_unit", "<f8", 8, {0}, 0};
     case UP: return (array){"up", "<U1", 4, {0}, 0};
     case COLOURS: return (array){"colours", "|u1", 1, {v, 4}, 2};
+    case FRAME_COLOURS: return (array){"frame_colours", "|u1", 1, {t, v, 4}, 3};
     case UVS: return (array){"uvs", "<f4", 4, {v, 2}, 2};
     case CORNER_UVS: return (array){"corner_uvs", "<f4", 4, {f, 3, 2}, 3};
     default: return (array){"vertices", "<f4", 4, {t, v, 3}, 3};
@@ -79,10 +82,11 @@ static array describe(int which, const npg_form_facts *facts)
 
 static bool is_there(int which, const npg_form_facts *facts)
 {
-    return which == COLOURS      ? facts->colours != NULL
-           : which == UVS        ? facts->uvs != NULL
-           : which == CORNER_UVS ? facts->corner_uvs != NULL
-                                 : true;
+    return which == COLOURS         ? facts->colours != NULL
+           : which == FRAME_COLOURS ? facts->has_pose_colours
+           : which == UVS           ? facts->uvs != NULL
+           : which == CORNER_UVS    ? facts->corner_uvs != NULL
+                                    : true;
 }
 
 static uint64_t data_bytes(const array *a)
@@ -207,6 +211,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     NPG_TRY(put(s, INDEX, &pose->index, 8, 1));
     NPG_TRY(put(s, NUMBER, &pose->number, 8, 1));
     NPG_TRY(put(s, TIME, &time, 8, 1));
+    if (facts->has_pose_colours) NPG_TRY(put(s, FRAME_COLOURS, pose->colours, 1, 4 * facts->vert_count));
     return put(s, VERTICES, pose->pos, 4, 3 * facts->vert_count);
 }
 

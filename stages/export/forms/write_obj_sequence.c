@@ -12,7 +12,7 @@ typedef struct obj_state {
 } obj_state;
 
 npg_status npg_write_obj_pose(const char *path, const npg_form_facts *facts, const float *pos,
-                              const float *normals)
+                              const float *normals, const uint8_t *colours)
 {
     double *world;
     NPG_TRY(npg_alloc_array(&world, NPG_FOR_FILES, facts->vert_count, 3 * sizeof *world));
@@ -22,7 +22,7 @@ npg_status npg_write_obj_pose(const char *path, const npg_form_facts *facts, con
                           .vert_world = world,
                           .vert_normals = normals,
                           .faces = facts->faces,
-                          .vert_colours = facts->colours,
+                          .vert_colours = colours ? colours : facts->colours,
                           .vert_uvs = facts->uvs,
                           .turns_faces = facts->turns_faces};
     npg_status status =
@@ -55,7 +55,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     char file[NPG_MESH_NAME_SIZE + 8] = "obj/", *path;
     npg_mesh_name(file + 4, &s->names, pose->number);
     NPG_TRY(npg_join_path(&path, s->facts->output, file));
-    npg_status status = npg_write_obj_pose(path, s->facts, pose->pos, pose->normals);
+    npg_status status = npg_write_obj_pose(path, s->facts, pose->pos, pose->normals, pose->colours);
     npg_release(&path);
     return status ? status : npg_form_made(s->facts->log, "obj", file, pose->index, 1);
 }

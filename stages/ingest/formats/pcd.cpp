@@ -43,6 +43,25 @@ double value_of(const std::uint8_t *row, const Field &field)
     }
 }
 
+// "rgb" or "rgba": 0xAARRGGBB in four bytes, whatever type the header gives them.
+const Field *find_colour(const pcl::PCLPointCloud2 &cloud)
+{
+    const Field *field = find(cloud, "rgb");
+    if (!field) field = find(cloud, "rgba");
+    bool has_four = field && (field->datatype == Field::FLOAT32 || field->datatype == Field::UINT32 ||
+                              field->datatype == Field::INT32);
+    return has_four && field->count <= 1 ? field : nullptr;
+}
+
+void colour_of(std::uint8_t rgba[4], const std::uint8_t *row, const Field *field)
+{
+    std::uint32_t bits;
+    if (!field) return;
+    std::memcpy(&bits, row + field->offset, sizeof bits);
+    for (int c = 0; c < 3; c++) rgba[c] = std::uint8_t(bits >> (16 - 8 * c));
+    rgba[3] = 255;
+}
+
 npg_status hand_over(const pcl::PCLPointCloud2 &cloud, const char *path, size_t expected,
                      const npg_pcd_sink *sink)
 {
@@ -56,12 +75,15 @@ npg_status hand_over(const pcl::PCLPointCloud2 &cloud, const char *path, size_t 
         return npg_error(NPG_BAD_INPUT, "%s: PCL read %zu points where the header has %zu", path, count,
                          expected);
     bool has_normals = fields[3] && fields[4] && fields[5];
-    NPG_TRY(sink->begin(sink->user, count, has_normals));
+    const Field *colour = find_colour(cloud);
+    NPG_TRY(sink->begin(sink->user, count, has_normals, colour != nullptr));
     for (size_t i = 0; i < count; i++) {
         double values[6] = {0, 0, 0, 0, 0, 0};
         const std::uint8_t *row = cloud.data.data() + i * cloud.point_step;
         for (int c = 0; c < (has_normals ? 6 : 3); c++) values[c] = value_of(row, *fields[c]);
-        sink->add(sink->user, values, values + 3);
+        std::uint8_t rgba[4] = {0, 0, 0, 0};
+        colour_of(rgba, row, colour);
+        sink->add(sink->user, values, values + 3, rgba);
     }
     return NPG_OK;
 }

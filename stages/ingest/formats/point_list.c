@@ -22,6 +22,8 @@ npg_status npg_points_reserve(npg_point_list *list, size_t more)
         NPG_TRY(npg_grow(&frame->pos_local, &list->pos_capacity, need, row, NPG_FOR_FRAMES));
     if (list->has_normals && need > list->normal_capacity)
         NPG_TRY(npg_grow(&frame->normals, &list->normal_capacity, need, row, NPG_FOR_FRAMES));
+    if (list->has_colours && need > list->colour_capacity)
+        NPG_TRY(npg_grow(&frame->colours, &list->colour_capacity, need, 4, NPG_FOR_FRAMES));
     return NPG_OK;
 }
 

@@ -8,8 +8,8 @@
 typedef struct npg_point_list {
     npg_frame *frame;   /* loan; its arrays grow */
     npg_origin *origin; /* loan */
-    size_t pos_capacity, normal_capacity;
-    bool has_normals;
+    size_t pos_capacity, normal_capacity, colour_capacity;
+    bool has_normals, has_colours;
 } npg_point_list;
 
 /* Room for `more` further points beyond those that are there.  NPG_MEMORY. */
@@ -18,6 +18,13 @@ npg_status npg_points_reserve(npg_point_list *list, size_t more);
 /* Add one point, world coordinates; normal (any length) is used when has_normals.  A normal without a
  * direction (zero or not finite) becomes (0, 0, 0).  Room must have been reserved. */
 void npg_points_add(npg_point_list *list, const double world[3], const double normal[3]);
+
+/* The colour of the point that npg_points_add() added last; with has_colours every point has one. */
+static inline void npg_points_colour(npg_point_list *list, const uint8_t rgba[4])
+{
+    uint8_t *to = list->frame->colours + 4 * (list->frame->point_count - 1);
+    for (int c = 0; c < 4; c++) to[c] = rgba[c];
+}
 
 /* world -> local, one point; the first finite one becomes the origin. */
 void npg_local_of(float local[3], npg_origin *origin, const double world[3]);

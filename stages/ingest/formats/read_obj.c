@@ -116,7 +116,7 @@ static npg_status add_position(reader *r, const char *at, const char *end)
     int count;
     NPG_TRY(parse_values(r, values, 3, 8, &count, at, end));
     /* x y z [w] r g b, an extension of the format; the first vertex settles whether it is used. */
-    if (b->vert_count == 0) b->has_colours = r->wants_faces && count >= 6;
+    if (b->vert_count == 0) b->has_colours = count >= 6;
     if (b->vert_count == b->pos_capacity || !b->vert_count)
         NPG_TRY(npg_builder_reserve(b, b->vert_count < r->total[POSITION] ? r->total[POSITION] : 1,
                                     b->face_count < r->triangles ? r->triangles : 0));
@@ -324,8 +324,10 @@ npg_status npg_obj_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     if (!status) {
         frame->pos_local = r.builder.vert_pos;
         frame->normals = r.builder.vert_normals;
+        frame->colours = r.builder.vert_colours;
         frame->point_count = r.builder.vert_count;
         r.builder.vert_pos = r.builder.vert_normals = NULL;
+        r.builder.vert_colours = NULL;
     }
     clear_reader(&r);
     return status;

@@ -283,16 +283,19 @@ static npg_status check_body(const pcd_header *h, npg_source *source)
 
 /* ---- the whole ---- */
 
-static npg_status begin_points(void *user, size_t point_count, bool has_normals)
+static npg_status begin_points(void *user, size_t point_count, bool has_normals, bool has_colours)
 {
     npg_point_list *points = user;
     points->has_normals = has_normals;
+    points->has_colours = has_colours;
     return npg_points_reserve(points, point_count);
 }
 
-static void add_point(void *user, const double world[3], const double normal[3])
+static void add_point(void *user, const double world[3], const double normal[3], const uint8_t rgba[4])
 {
-    npg_points_add(user, world, normal);
+    npg_point_list *points = user;
+    npg_points_add(points, world, normal);
+    if (points->has_colours) npg_points_colour(points, rgba);
 }
 
 npg_status npg_pcd_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin)

@@ -116,6 +116,11 @@ static void add_vertex(reader *r, const double slots[SLOTS])
     npg_mesh_builder *b = r->builder;
     if (!b) {
         npg_points_add(&r->points, slots + X, slots + NX);
+        if (!r->points.has_colours) return;
+        uint8_t rgba[4];
+        for (int c = 0; c < 4; c++)
+            rgba[c] = r->in_slot[RED + c] ? colour_byte(r, RED + c, slots[RED + c]) : 255;
+        npg_points_colour(&r->points, rgba);
         return;
     }
     size_t at = npg_builder_vertex(b, slots + X);
@@ -151,9 +156,10 @@ static void decode_rows(reader *r, const unsigned char *rows, size_t count)
 {
     npg_ply_format format = r->header->format;
     int used[SLOTS], used_count = 0;
-    /* Of a cloud only positions and normals are of interest, the first slots. */
-    for (int slot = 0; slot < (r->builder ? SLOTS : NZ + 1); slot++)
-        if (r->in_slot[slot]) used[used_count++] = slot;
+    /* Of a cloud only positions, normals and colours are of interest. */
+    for (int slot = 0; slot < SLOTS; slot++)
+        if (r->in_slot[slot] && (r->builder || slot <= NZ || (slot >= RED && slot <= ALPHA)))
+            used[used_count++] = slot;
     double slots[SLOTS] = {0};
     for (size_t i = 0; i < count; i++, rows += r->vertex->row_size) {
         for (int k = 0; k < used_count; k++) {
@@ -416,6 +422,7 @@ npg_status npg_ply_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
     npg_status status = npg_ply_header_read(r.header, source);
     if (!status) status = find_vertex_element(&r);
     r.points.has_normals = has_slots(&r, NX, NZ);
+    r.points.has_colours = has_slots(&r, RED, BLUE);
     if (!status) status = read_body(&r);
     npg_release(&r.header);
     return status;

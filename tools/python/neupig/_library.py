@@ -64,7 +64,7 @@ class FrameViewStruct(Structure):
                 ("keep", POINTER(c_ubyte)), ("points_origin", c_double * 3), ("vertex_count", c_size_t),
                 ("face_count", c_size_t), ("vertices", POINTER(c_float)), ("faces", POINTER(c_uint32)),
                 ("vertices_origin", c_double * 3), ("vertices_unit", c_double), ("residual", c_double),
-                ("coverage", c_double)]
+                ("coverage", c_double), ("colours", POINTER(c_ubyte)), ("vertex_colours", POINTER(c_ubyte))]
 
 
 FrameFunction = CFUNCTYPE(c_int, c_void_p, POINTER(FrameViewStruct))
@@ -96,13 +96,13 @@ class HooksStruct(Structure):
 
 class CloudStruct(Structure):
     _fields_ = [("struct_size", c_size_t), ("number", c_int64), ("point_count", c_size_t),
-                ("points", POINTER(c_double)), ("normals", POINTER(c_float))]
+                ("points", POINTER(c_double)), ("normals", POINTER(c_float)), ("colours", POINTER(c_ubyte))]
 
 
 class ResultStruct(Structure):
     _fields_ = [("struct_size", c_size_t), ("index", c_int64), ("number", c_int64), ("vertex_count", c_size_t),
                 ("face_count", c_size_t), ("vertices", POINTER(c_double)), ("faces", POINTER(c_uint32)),
-                ("residual", c_double), ("coverage", c_double)]
+                ("residual", c_double), ("coverage", c_double), ("vertex_colours", POINTER(c_ubyte))]
 
 
 class HitStruct(Structure):

@@ -9,7 +9,7 @@ import os
 import pathlib
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from ctypes import POINTER, byref, c_double, c_float, c_void_p, sizeof
+from ctypes import POINTER, byref, c_double, c_float, c_ubyte, c_void_p, sizeof
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, Union
 
@@ -54,6 +54,7 @@ class Frame:
     faces: npt.NDArray[np.uint32]  #: F x 3, the same in every frame
     residual: float  #: median distance points -> surface, in diagonals of the box
     coverage: float  #: share of the surface that has points near it
+    colours: npt.NDArray[np.uint8] | None = None  #: V x 4 RGBA, sRGB; None where the points have no colours
 
 
 class Motion(NamedTuple):
@@ -64,6 +65,7 @@ class Motion(NamedTuple):
     faces: npt.NDArray[np.uint32]  #: F x 3
     residuals: npt.NDArray[np.float64]  #: T
     coverages: npt.NDArray[np.float64]  #: T
+    colours: npt.NDArray[np.uint8] | None = None  #: V x 4 of the reference; with colour="frames" T x V x 4
 
 
 class Outcome(NamedTuple):
@@ -98,10 +100,16 @@ class FrameView:
         self.vertices_unit: float = view.vertices_unit
         self.residual: float = view.residual
         self.coverage: float = view.coverage
+        self.colours: npt.NDArray[np.uint8] | None = _colours(view.colours, n)
+        self.vertex_colours: npt.NDArray[np.uint8] | None = _colours(view.vertex_colours, v)
 
 
 def _view(pointer: Any, count: int) -> npt.NDArray[np.float32]:
     return np.ctypeslib.as_array(pointer, (count, 3)) if count else np.zeros((0, 3), np.float32)
+
+
+def _colours(pointer: Any, count: int) -> npt.NDArray[np.uint8] | None:
+    return np.ctypeslib.as_array(pointer, (count, 4)) if pointer and count else None
 
 
 class Stage(NamedTuple):
@@ -114,6 +122,15 @@ class Stage(NamedTuple):
     name: str
     after: str
     frame: Callable[[FrameView], None]
+
+
+def _rgba(colours: npt.ArrayLike, count: int) -> npt.NDArray[np.uint8]:
+    given = np.asarray(colours)
+    if given.dtype != np.uint8 or given.ndim != 2 or given.shape[0] != count or given.shape[1] not in (3, 4):
+        raise Error(Status.USAGE, f"colours must be {count} x 3 or x 4 bytes, not {given.shape} of {given.dtype}")
+    rgba = np.full((count, 4), 255, np.uint8)
+    rgba[:, :given.shape[1]] = given
+    return rgba
 
 
 class Run(Closing):
@@ -215,16 +232,19 @@ class Run(Closing):
 
     # ---- frames in, meshes out ----
 
-    def push(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None, *, number: int) -> None:
-        """Give the run its next frame: N x 3 points in the world, N x 3 normals.  Waits while the run is busy.  Numbers
-        must grow.  Copies."""
+    def push(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None,
+             colours: npt.ArrayLike | None = None, *, number: int) -> None:
+        """Give the run its next frame: N x 3 points in the world, N x 3 normals, N x 3 or N x 4 colours (bytes, sRGB;
+        alpha 0: not known).  Waits while the run is busy.  Numbers must grow.  Copies."""
         p = np.ascontiguousarray(points, np.float64)
         n = None if normals is None else np.ascontiguousarray(normals, np.float32)
         if p.ndim != 2 or p.shape[1] != 3 or (n is not None and n.shape != p.shape):
             raise Error(Status.USAGE, f"points must be N x 3 and normals the same, not {p.shape}"
                                       + ("" if n is None else f" and {n.shape}"))
+        c = None if colours is None else _rgba(colours, len(p))
         cloud = native.CloudStruct(sizeof(native.CloudStruct), number, len(p), p.ctypes.data_as(POINTER(c_double)),
-                                   None if n is None else n.ctypes.data_as(POINTER(c_float)))
+                                   None if n is None else n.ctypes.data_as(POINTER(c_float)),
+                                   None if c is None else c.ctypes.data_as(POINTER(c_ubyte)))
         handle = self._open()
         self._patiently(lambda: self._check(lib.npg_run_push(handle, byref(cloud))))
 
@@ -244,7 +264,8 @@ class Run(Closing):
         r = result.contents
         try:
             return Frame(r.index, r.number, np.ctypeslib.as_array(r.vertices, (r.vertex_count, 3)).copy(),
-                         np.ctypeslib.as_array(r.faces, (r.face_count, 3)).copy(), r.residual, r.coverage)
+                         np.ctypeslib.as_array(r.faces, (r.face_count, 3)).copy(), r.residual, r.coverage,
+                         None if (c := _colours(r.vertex_colours, r.vertex_count)) is None else c.copy())
         finally:
             lib.npg_result_close(byref(result))
 
@@ -306,14 +327,15 @@ def append(output: Path, *, input: Path | None = None,
     return _wait_for_files(Run(options=options(), progress=progress, stages=stages, append=True), output)
 
 
-Cloud = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike]]
+Cloud = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike],
+              tuple[npt.ArrayLike, Union[npt.ArrayLike, None], npt.ArrayLike]]
 
 
 def _push_all(run: Run, frames: Iterable[Cloud], failures: list[BaseException]) -> None:
     try:
         for number, frame in enumerate(frames):
             if isinstance(frame, tuple):
-                run.push(frame[0], frame[1], number=number)
+                run.push(*frame, number=number)
             else:
                 run.push(frame, number=number)
         run.finish()
@@ -324,7 +346,8 @@ def _push_all(run: Run, frames: Iterable[Cloud], failures: list[BaseException]) 
 
 def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None] | None = None,
                 stages: Sequence[Stage] = (), **options: object) -> Motion:
-    """Arrays in, a moving mesh out.  ``frames`` gives N x 3 points, or (points, normals), in time order; it is read on a
+    """Arrays in, a moving mesh out.  ``frames`` gives N x 3 points, (points, normals) or (points, normals or None,
+    colours), in time order; it is read on a
     thread of its own, as fast as the run can take it.  The keyframe is chosen inside the look-ahead, as for a live
     source: name a better one with ``keyframe=NUMBER``.  When the run fails this returns once ``frames`` has given its next
     frame."""
@@ -346,5 +369,8 @@ def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None]
         raise failures[0]
     if not meshes:
         raise Error(Status.BAD_INPUT, "no frame got a mesh")
+    colours = meshes[0].colours
+    if colours is not None and any(not np.array_equal(m.colours, colours) for m in meshes):
+        colours = np.stack([m.colours for m in meshes])
     return Motion(np.array([m.number for m in meshes], np.int64), np.stack([m.vertices for m in meshes]),
-                  meshes[0].faces, np.array([m.residual for m in meshes]), np.array([m.coverage for m in meshes]))
+                  meshes[0].faces, np.array([m.residual for m in meshes]), np.array([m.coverage for m in meshes]), colours)

@@ -1,0 +1,282 @@
+/* Depth points: from a depth image to points with normals and colours, in the sensor's own axes.
+ *
+ * A pixel is used when its depth is in range, the mask shows it, and no neighbour within the margin is
+ * missing or a depth step away: there a sensor mixes the body with what is behind it (flying pixels,
+ * silhouette fringe).
+ *
+ * Normals.  On a plane n X = h the inverse depth is linear in the ray (x, y) of a pixel:
+ * 1 / Z = (n_x x + n_y y + n_z) / h.  So n is had from a least-squares fit of 1 / Z over a window of the
+ * image, of those pixels that lie on the same surface; it faces the sensor by construction.
+ *
+ * Based on: Badino, Huber, Park, Kanade, Fast and accurate computation of surface normals from range images,
+ * 2011 (the fit in inverse depth). */
+#include <math.h>
+#include <string.h>
+
+#include "ingest/rig/image.h"
+#include "ingest/rig/rig.h"
+#include "pipeline/memory.h"
+
+#define WINDOW  3 /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
+#define FIT_MIN 8 /* pixels of a window that a normal needs                                             */
+#define MASK_ON 128
+
+typedef struct grid {
+    const npg_rig *rig;
+    const npg_rig_sensor *sensor;
+    npg_image depth, mask, colour;
+    size_t width, height;
+    float *z;      /* H x W: depth, 0 where the pixel can't be used; owned */
+    uint8_t *keep; /* H x W: not near a step; owned                        */
+} grid;
+
+static void clear_grid(grid *g)
+{
+    npg_image_clear(&g->depth);
+    npg_image_clear(&g->mask);
+    npg_image_clear(&g->colour);
+    npg_release(&g->z);
+    npg_release(&g->keep);
+}
+
+void npg_depth_points_clear(npg_depth_points *points)
+{
+    npg_release(&points->pos);
+    npg_release(&points->normals);
+    npg_release(&points->colours);
+    *points = (npg_depth_points){0};
+}
+
+/* ---- images ---- */
+
+static npg_status read_images(grid *g, const npg_rig_shot *shot)
+{
+    const npg_camera *camera = &g->sensor->camera;
+    const npg_camera *of_colour = g->sensor->has_colour_camera ? &g->sensor->colour_camera : camera;
+    g->width = camera->width;
+    g->height = camera->height;
+    NPG_TRY(npg_image_read(&g->depth, shot->depth, NPG_IMAGE_DEPTH, g->width, g->height));
+    if (shot->mask) NPG_TRY(npg_image_read(&g->mask, shot->mask, NPG_IMAGE_MASK, g->width, g->height));
+    if (shot->colour)
+        NPG_TRY(
+            npg_image_read(&g->colour, shot->colour, NPG_IMAGE_COLOUR, of_colour->width, of_colour->height));
+    return NPG_OK;
+}
+
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static void fill_depths(grid *g)
+{
+    const npg_rig_settings *set = &g->rig->settings;
+    double near_m = larger(g->sensor->near_m, set->near_m), far_m = g->sensor->far_m;
+    if (set->far_m > 0 && (far_m <= 0 || set->far_m < far_m)) far_m = set->far_m;
+    for (size_t i = 0; i < g->width * g->height; i++) {
+        double z = g->depth.depth[i] * g->sensor->scale;
+        bool is_in = z > 0 && z >= near_m && (far_m <= 0 || z <= far_m) && !isnan(g->sensor->rays[2 * i]);
+        if (g->mask.bytes) is_in = is_in && g->mask.bytes[i] >= MASK_ON;
+        g->z[i] = is_in ? (float)z : 0;
+    }
+}
+
+/* Whether two depths, both there, may be of one surface. */
+static bool is_same_surface(float a, float b, float step_share)
+{
+    return fabsf(a - b) <= step_share * (a < b ? a : b);
+}
+
+/* Pixels with all neighbours of the 3 x 3 there and on the same surface. */
+static void find_inner(const grid *g, uint8_t *inner)
+{
+    float step = (float)g->rig->settings.step_share;
+    size_t w = g->width;
+    memset(inner, 0, w * g->height);
+    for (size_t y = 1; y + 1 < g->height; y++)
+        for (size_t x = 1; x + 1 < w; x++) {
+            const float *at = g->z + y * w + x;
+            bool is_inner = *at > 0;
+            for (int dy = -1; dy <= 1 && is_inner; dy++)
+                for (int dx = -1; dx <= 1 && is_inner; dx++) {
+                    float other = at[dy * (ptrdiff_t)w + dx];
+                    is_inner = other > 0 && is_same_surface(*at, other, step);
+                }
+            inner[y * w + x] = is_inner;
+        }
+}
+
+/* Take off one more ring of pixels beside those that are not kept. */
+static void erode(uint8_t *keep, const uint8_t *before, size_t w, size_t h)
+{
+    memset(keep, 0, w * h);
+    for (size_t y = 1; y + 1 < h; y++)
+        for (size_t x = 1; x + 1 < w; x++) {
+            const uint8_t *at = before + y * w + x;
+            keep[y * w + x] = at[0] & at[-1] & at[1] & *(at - w) & at[w];
+        }
+}
+
+static npg_status mark_kept(grid *g)
+{
+    size_t pixels = g->width * g->height;
+    uint8_t *other;
+    if (!g->rig->settings.margin) {
+        for (size_t i = 0; i < pixels; i++) g->keep[i] = g->z[i] > 0;
+        return NPG_OK;
+    }
+    find_inner(g, g->keep);
+    if (g->rig->settings.margin == 1) return NPG_OK;
+    NPG_TRY(npg_alloc(&other, NPG_FOR_FRAMES, pixels));
+    for (int64_t ring = 1; ring < g->rig->settings.margin; ring++) {
+        memcpy(other, g->keep, pixels);
+        erode(g->keep, other, g->width, g->height);
+    }
+    npg_release(&other);
+    return NPG_OK;
+}
+
+/* ---- normals ---- */
+
+/* Sums of a window: of 1, x, y, xx, xy, yy and of d, x d, y d, with d = 1 / Z, all relative to the middle. */
+static int sum_window(const grid *g, size_t px, size_t py, double s[9])
+{
+    size_t w = g->width, at = py * w + px;
+    size_t x0 = px > WINDOW ? px - WINDOW : 0, x1 = px + WINDOW < w ? px + WINDOW : w - 1;
+    size_t y0 = py > WINDOW ? py - WINDOW : 0, y1 = py + WINDOW < g->height ? py + WINDOW : g->height - 1;
+    const float *rays = g->sensor->rays;
+    float z = g->z[at], cx = rays[2 * at], cy = rays[2 * at + 1], middle = 1 / z, sums[9] = {0};
+    float step = WINDOW * (float)g->rig->settings.step_share; /* a slanted surface over the window */
+    int count = 0;
+    for (size_t y = y0; y <= y1; y++)
+        for (size_t x = x0; x <= x1; x++) {
+            size_t i = y * w + x;
+            if (!g->keep[i] || !is_same_surface(z, g->z[i], step)) continue;
+            float u = rays[2 * i] - cx, v = rays[2 * i + 1] - cy, d = 1 / g->z[i] - middle;
+            const float terms[9] = {1, u, v, u * u, u * v, v * v, d, u * d, v * d};
+            for (int k = 0; k < 9; k++) sums[k] += terms[k];
+            count++;
+        }
+    for (int k = 0; k < 9; k++) s[k] = (double)sums[k];
+    return count;
+}
+
+/* The plane d = a u + b v + c through a window; its normal, turned to the sensor. */
+static bool fit_normal(const grid *g, size_t px, size_t py, float normal[3])
+{
+    double s[9], n = 0;
+    size_t at = py * g->width + px;
+    int count = sum_window(g, px, py, s);
+    if (count < FIT_MIN) return false;
+    double uu = s[3] - s[1] * s[1] / s[0], uv = s[4] - s[1] * s[2] / s[0], vv = s[5] - s[2] * s[2] / s[0];
+    double ud = s[7] - s[1] * s[6] / s[0], vd = s[8] - s[2] * s[6] / s[0], det = uu * vv - uv * uv;
+    if (!(det > 1e-6 * uu * vv)) return false; /* the pixels lie on a line */
+    double a = (vv * ud - uv * vd) / det, b = (uu * vd - uv * ud) / det;
+    double c = (s[6] - a * s[1] - b * s[2]) / s[0] + 1 / (double)g->z[at];
+    /* back from rays relative to the middle's */
+    c -= a * (double)g->sensor->rays[2 * at] + b * (double)g->sensor->rays[2 * at + 1];
+    const double out[3] = {-a, -b, -c};
+    for (int k = 0; k < 3; k++) n += out[k] * out[k];
+    for (int k = 0; k < 3; k++) normal[k] = (float)(out[k] / sqrt(n));
+    return n > 0 && isfinite(n);
+}
+
+/* ---- colours ---- */
+
+/* The colour image between four pixels; false outside. */
+static bool sample(const npg_image *image, const double pixel[2], uint8_t rgb[3])
+{
+    double fx = floor(pixel[0]), fy = floor(pixel[1]);
+    if (!(fx >= 0 && fy >= 0 && fx + 1 < (double)image->width && fy + 1 < (double)image->height))
+        return false;
+    const uint8_t *at = image->bytes + 3 * ((size_t)fy * image->width + (size_t)fx);
+    const uint8_t *below = at + 3 * image->width;
+    double u = pixel[0] - fx, v = pixel[1] - fy;
+    for (int c = 0; c < 3; c++) {
+        double top = at[c] * (1 - u) + at[c + 3] * u, bottom = below[c] * (1 - u) + below[c + 3] * u;
+        rgb[c] = (uint8_t)(top * (1 - v) + bottom * v + 0.5);
+    }
+    return true;
+}
+
+static void take_colour(const grid *g, size_t at, const float pos[3], uint8_t rgba[4])
+{
+    double in_colour[3], pixel[2];
+    rgba[0] = rgba[1] = rgba[2] = rgba[3] = 0;
+    if (!g->colour.bytes) return;
+    if (!g->sensor->has_colour_camera) {
+        memcpy(rgba, g->colour.bytes + 3 * at, 3);
+        rgba[3] = 255;
+        return;
+    }
+    npg_pose_apply(in_colour, g->sensor->depth_to_colour,
+                   (const double[3]){(double)pos[0], (double)pos[1], (double)pos[2]});
+    if (npg_camera_project(&g->sensor->colour_camera, pixel, in_colour) && sample(&g->colour, pixel, rgba))
+        rgba[3] = 255;
+}
+
+/* ---- the points ---- */
+
+static npg_status reserve(npg_depth_points *points, const grid *g)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < g->width * g->height; i++) kept += g->keep[i];
+    NPG_TRY(npg_alloc_array(&points->pos, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&points->normals, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
+    points->has_colours = g->colour.bytes != NULL;
+    return points->has_colours ? npg_alloc_array(&points->colours, NPG_FOR_FRAMES, kept, 4) : NPG_OK;
+}
+
+static void add_points(npg_depth_points *points, const grid *g)
+{
+    const float *rays = g->sensor->rays;
+    for (size_t y = 0; y < g->height; y++)
+        for (size_t x = 0; x < g->width; x++) {
+            size_t at = y * g->width + x, n = points->count;
+            float *pos = points->pos + 3 * n;
+            if (!g->keep[at] || !fit_normal(g, x, y, points->normals + 3 * n)) continue;
+            pos[0] = rays[2 * at] * g->z[at];
+            pos[1] = rays[2 * at + 1] * g->z[at];
+            pos[2] = g->z[at];
+            if (points->colours) take_colour(g, at, pos, points->colours + 4 * n);
+            points->count++;
+        }
+}
+
+static npg_status make_rays(npg_rig_sensor *sensor)
+{
+    const npg_camera *c = &sensor->camera;
+    if (sensor->rays) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&sensor->rays, NPG_FOR_FILES, c->width * c->height, 2 * sizeof(float)));
+    for (size_t i = 0; i < c->width * c->height; i++) {
+        const double pixel[2] = {(double)(i % c->width), (double)(i / c->width)};
+        double ray[2];
+        bool is_good = npg_camera_ray(c, ray, pixel);
+        for (size_t a = 0; a < 2; a++) sensor->rays[2 * i + a] = is_good ? (float)ray[a] : NAN;
+    }
+    return NPG_OK;
+}
+
+static npg_status make_points(npg_depth_points *points, grid *g, const npg_rig_shot *shot)
+{
+    NPG_TRY(read_images(g, shot));
+    size_t pixels = g->width * g->height;
+    NPG_TRY(npg_alloc_array(&g->z, NPG_FOR_FRAMES, pixels, sizeof *g->z));
+    NPG_TRY(npg_alloc(&g->keep, NPG_FOR_FRAMES, pixels));
+    fill_depths(g);
+    NPG_TRY(mark_kept(g));
+    NPG_TRY(reserve(points, g));
+    add_points(points, g);
+    return NPG_OK;
+}
+
+npg_status npg_depth_points_read(npg_depth_points *points, npg_rig *rig, size_t s, const npg_rig_shot *shot)
+{
+    grid g = {.rig = rig, .sensor = &rig->sensors[s]};
+    *points = (npg_depth_points){0};
+    npg_status status = make_rays(&rig->sensors[s]);
+    if (!status) status = make_points(points, &g, shot);
+    clear_grid(&g);
+    if (status) npg_depth_points_clear(points);
+    return status;
+}

@@ -1,0 +1,365 @@
+/* Rig: which layout a path is, its frames, and the pose of every shot. */
+#include "ingest/rig/rig.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
+
+/* ---- which layout ---- */
+
+static bool is_in(const char *folder, const char *name)
+{
+    char path[4096];
+    struct stat info;
+    int length = snprintf(path, sizeof path, "%s/%s", folder, name);
+    return length > 0 && (size_t)length < sizeof path && !stat(path, &info);
+}
+
+static bool ends_with(const char *name, const char *ending)
+{
+    size_t length = strlen(name), size = strlen(ending);
+    return length >= size && !strcmp(name + length - size, ending);
+}
+
+/* A file NNNN_camera.xml, .yml or .yaml lies in the folder. */
+static bool has_camera_files(const char *folder)
+{
+    bool found = false;
+    DIR *listing = opendir(folder);
+    if (!listing) return false;
+    for (struct dirent *entry; !found && (entry = readdir(listing));)
+        found = ends_with(entry->d_name, "_camera.xml") || ends_with(entry->d_name, "_camera.yml") ||
+                ends_with(entry->d_name, "_camera.yaml");
+    closedir(listing);
+    return found;
+}
+
+typedef npg_status load_fn(npg_rig *rig);
+
+static load_fn *layout_of(const char *path, const char **name)
+{
+    struct stat info;
+    bool is_folder = !stat(path, &info) && S_ISDIR(info.st_mode);
+    static const struct {
+        const char *name;
+        load_fn *load;
+    } layouts[] = {{"rig.json", npg_rig_load_json},
+                   {"tum", npg_rig_load_tum},
+                   {"redwood", npg_rig_load_redwood},
+                   {"opencv", npg_rig_load_opencv}};
+    int at = -1;
+    if (!is_folder)
+        at = ends_with(path, ".json") ? 0 : -1;
+    else if (is_in(path, "rig.json"))
+        at = 0;
+    else if (is_in(path, "depth.txt"))
+        at = 1;
+    else if (is_in(path, "depth") && (is_in(path, "intrinsic.json") || is_in(path, "camera_intrinsic.json")))
+        at = 2;
+    else if (has_camera_files(path))
+        at = 3;
+    *name = at < 0 ? NULL : layouts[at].name;
+    return at < 0 ? NULL : layouts[at].load;
+}
+
+bool npg_rig_is(const char *path)
+{
+    const char *name;
+    return layout_of(path, &name) != NULL;
+}
+
+/* ---- open and close ---- */
+
+npg_rig_settings npg_rig_defaults(void)
+{
+    return (npg_rig_settings){.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
+}
+
+/* The folder that names start from: the path itself, or the one its file lies in. */
+static npg_status find_folder(npg_rig *rig)
+{
+    struct stat info;
+    NPG_TRY(npg_copy_text(&rig->folder, rig->path));
+    if (!stat(rig->path, &info) && S_ISDIR(info.st_mode)) return NPG_OK;
+    char *slash = strrchr(rig->folder, '/');
+    if (slash) {
+        slash[slash == rig->folder] = 0;
+        return NPG_OK;
+    }
+    npg_release(&rig->folder);
+    return npg_copy_text(&rig->folder, ".");
+}
+
+static npg_status load(npg_rig *rig, const char *path)
+{
+    load_fn *read = layout_of(path, &rig->layout);
+    if (!read)
+        return npg_error(NPG_BAD_INPUT,
+                         "%s: no rig: neither a rig.json, nor a folder with depth.txt (TUM), "
+                         "depth/ and intrinsic.json (Redwood), or *_camera.xml (OpenCV)",
+                         path);
+    NPG_TRY(npg_copy_text(&rig->path, path));
+    NPG_TRY(find_folder(rig));
+    NPG_TRY(read(rig));
+    return npg_rig_join(rig);
+}
+
+npg_status npg_rig_open(npg_rig **out, const char *path, const npg_rig_settings *settings)
+{
+    npg_rig *rig;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&rig, NPG_FOR_FILES, sizeof *rig));
+    rig->settings = *settings;
+    npg_status status = load(rig, path);
+    if (status) npg_rig_close(&rig);
+    *out = rig;
+    return status;
+}
+
+static void clear_sensor(npg_rig_sensor *sensor)
+{
+    for (size_t i = 0; i < sensor->shot_count; i++) {
+        npg_release(&sensor->shots[i].depth);
+        npg_release(&sensor->shots[i].colour);
+        npg_release(&sensor->shots[i].mask);
+    }
+    npg_release(&sensor->shots);
+    npg_release(&sensor->name);
+    npg_release(&sensor->rays);
+}
+
+void npg_rig_close(npg_rig **slot)
+{
+    npg_rig *rig = *slot;
+    if (!rig) return;
+    for (size_t s = 0; s < rig->sensor_count; s++) clear_sensor(&rig->sensors[s]);
+    npg_release(&rig->sensors);
+    npg_release(&rig->numbers);
+    npg_release(&rig->shot_of);
+    npg_release(&rig->path);
+    npg_release(&rig->folder);
+    npg_release(slot);
+}
+
+npg_status npg_rig_path(const npg_rig *rig, char **path, const char *name, bool must_be)
+{
+    struct stat info;
+    *path = NULL;
+    if (name[0] == '/')
+        NPG_TRY(npg_copy_text(path, name));
+    else
+        NPG_TRY(npg_join_path(path, rig->folder, name));
+    npg_status status = NPG_OK;
+    if (must_be && stat(*path, &info)) status = npg_error_errno(NPG_BAD_INPUT, "can't read %s", *path);
+    if (!status && rig->settings.confine && !stat(*path, &info))
+        status = npg_path_confine(*path, rig->folder);
+    if (status) npg_release(path);
+    return status;
+}
+
+/* ---- sensors and shots ---- */
+
+npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out, const char *name)
+{
+    if (rig->sensor_count >= NPG_RIG_SENSORS_MAX)
+        return npg_error(NPG_BAD_INPUT, "%s: more than %d sensors", rig->path, NPG_RIG_SENSORS_MAX);
+    NPG_TRY(npg_grow(&rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1, sizeof *rig->sensors,
+                     NPG_FOR_FILES));
+    npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count];
+    *sensor = (npg_rig_sensor){.scale = 0.001};
+    npg_pose_identity(sensor->pose);
+    npg_pose_identity(sensor->depth_to_colour);
+    NPG_TRY(npg_copy_text(&sensor->name, name));
+    rig->sensor_count++;
+    *out = sensor;
+    return NPG_OK;
+}
+
+npg_status npg_rig_add_shot(npg_rig_sensor *sensor, const npg_rig_shot *shot)
+{
+    if (sensor->shot_count >= NPG_RIG_SHOTS_MAX)
+        return npg_error(NPG_BAD_INPUT, "sensor %s: more than %d images", sensor->name, NPG_RIG_SHOTS_MAX);
+    NPG_TRY(npg_grow(&sensor->shots, &sensor->shot_capacity, sensor->shot_count + 1, sizeof *sensor->shots,
+                     NPG_FOR_FILES));
+    npg_rig_shot *added = &sensor->shots[sensor->shot_count];
+    *added = *shot;
+    added->depth = added->colour = added->mask = NULL;
+    sensor->shot_count++;
+    NPG_TRY(npg_copy_text(&added->depth, shot->depth));
+    if (shot->colour) NPG_TRY(npg_copy_text(&added->colour, shot->colour));
+    return shot->mask ? npg_copy_text(&added->mask, shot->mask) : NPG_OK;
+}
+
+/* ---- frames ---- */
+
+static int by_number(const void *a, const void *b)
+{
+    int64_t left = *(const int64_t *)a, right = *(const int64_t *)b;
+    return left < right ? -1 : left > right;
+}
+
+static npg_status list_numbers(npg_rig *rig)
+{
+    size_t all = 0, count = 0;
+    for (size_t s = 0; s < rig->sensor_count; s++) all += rig->sensors[s].shot_count;
+    NPG_TRY(npg_alloc_array(&rig->numbers, NPG_FOR_FILES, all + 1, sizeof *rig->numbers));
+    for (size_t s = 0; s < rig->sensor_count; s++)
+        for (size_t i = 0; i < rig->sensors[s].shot_count; i++)
+            rig->numbers[count++] = rig->sensors[s].shots[i].number;
+    if (count) qsort(rig->numbers, count, sizeof *rig->numbers, by_number);
+    for (size_t i = 0; i < count; i++)
+        if (!rig->frame_count || rig->numbers[i] != rig->numbers[rig->frame_count - 1])
+            rig->numbers[rig->frame_count++] = rig->numbers[i];
+    return NPG_OK;
+}
+
+/* The times of the first sensor are those of the frames, numbered from 0. */
+static npg_status list_times(npg_rig *rig)
+{
+    rig->frame_count = rig->sensors[0].shot_count;
+    NPG_TRY(npg_alloc_array(&rig->numbers, NPG_FOR_FILES, rig->frame_count + 1, sizeof *rig->numbers));
+    for (size_t f = 0; f < rig->frame_count; f++) {
+        rig->numbers[f] = (int64_t)f;
+        rig->sensors[0].shots[f].number = (int64_t)f;
+    }
+    return NPG_OK;
+}
+
+/* The nearest shot in time; shots are in the order of time. */
+static int32_t nearest_shot(const npg_rig_sensor *sensor, double time_s, double tolerance_s)
+{
+    size_t lo = 0, hi = sensor->shot_count;
+    while (lo < hi) {
+        size_t middle = (lo + hi) / 2;
+        if (sensor->shots[middle].time_s < time_s)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    int32_t best = -1;
+    double least = tolerance_s;
+    for (size_t i = lo ? lo - 1 : 0; i < sensor->shot_count && i <= lo; i++) {
+        double off = fabs(sensor->shots[i].time_s - time_s);
+        if (off > least) continue;
+        least = off;
+        best = (int32_t)i;
+    }
+    return best;
+}
+
+static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
+{
+    size_t lo = 0, hi = sensor->shot_count;
+    while (lo < hi) {
+        size_t middle = (lo + hi) / 2;
+        if (sensor->shots[middle].number < number)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo < sensor->shot_count && sensor->shots[lo].number == number ? (int32_t)lo : -1;
+}
+
+static npg_status check_order(const npg_rig *rig)
+{
+    for (size_t s = 0; s < rig->sensor_count; s++)
+        for (size_t i = 1; i < rig->sensors[s].shot_count; i++) {
+            const npg_rig_shot *a = &rig->sensors[s].shots[i - 1], *b = a + 1;
+            if (rig->is_timed ? b->time_s > a->time_s : b->number > a->number) continue;
+            return npg_error(NPG_BAD_INPUT, "%s: sensor %s: %s does not come after %s", rig->path,
+                             rig->sensors[s].name, b->depth, a->depth);
+        }
+    return NPG_OK;
+}
+
+npg_status npg_rig_join(npg_rig *rig)
+{
+    if (!rig->sensor_count) return npg_error(NPG_BAD_INPUT, "%s: there is no sensor", rig->path);
+    NPG_TRY(check_order(rig));
+    NPG_TRY(rig->is_timed ? list_times(rig) : list_numbers(rig));
+    if (!rig->frame_count) return npg_error(NPG_BAD_INPUT, "%s: there is no depth image", rig->path);
+    NPG_TRY(npg_alloc_array(&rig->shot_of, NPG_FOR_FILES, rig->frame_count * rig->sensor_count,
+                            sizeof *rig->shot_of));
+    for (size_t f = 0; f < rig->frame_count; f++)
+        for (size_t s = 0; s < rig->sensor_count; s++)
+            rig->shot_of[f * rig->sensor_count + s] =
+                rig->is_timed ? nearest_shot(&rig->sensors[s], rig->sensors[0].shots[f].time_s,
+                                             s ? rig->settings.tolerance_s : 0)
+                              : numbered_shot(&rig->sensors[s], rig->numbers[f]);
+    return NPG_OK;
+}
+
+size_t npg_rig_find(const npg_rig *rig, int64_t number)
+{
+    const int64_t *found = bsearch(&number, rig->numbers, rig->frame_count, sizeof *rig->numbers, by_number);
+    return found ? (size_t)(found - rig->numbers) : SIZE_MAX;
+}
+
+const npg_rig_shot *npg_rig_shot_of(const npg_rig *rig, size_t frame, size_t sensor)
+{
+    int32_t at = rig->shot_of[frame * rig->sensor_count + sensor];
+    return at < 0 ? NULL : &rig->sensors[sensor].shots[at];
+}
+
+npg_status npg_rig_each_image(const npg_rig *rig, size_t frame,
+                              npg_status (*visit)(void *user, const char *path), void *user)
+{
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        const npg_rig_shot *shot = npg_rig_shot_of(rig, frame, s);
+        if (!shot) continue;
+        const char *const paths[] = {shot->depth, shot->colour, shot->mask};
+        for (size_t i = 0; i < sizeof paths / sizeof *paths; i++)
+            if (paths[i]) NPG_TRY(visit(user, paths[i]));
+    }
+    return NPG_OK;
+}
+
+/* ---- poses ---- */
+
+void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_shot *shot)
+{
+    const npg_rig_sensor *sensor = &rig->sensors[s];
+    double pose[12], other[12];
+    memcpy(pose, shot && shot->has_pose ? shot->pose : sensor->pose, sizeof pose);
+    if (rig->settings.poses == NPG_POSES_NONE) npg_pose_identity(pose);
+    if (rig->settings.poses == NPG_POSES_INVERSE) {
+        npg_pose_invert(other, pose);
+        memcpy(pose, other, sizeof pose);
+    }
+    /* From OpenCV's axes to OpenGL's before the pose: y and z change sign. */
+    if (sensor->is_opengl && rig->settings.poses != NPG_POSES_NONE)
+        for (size_t r = 0; r < 3; r++) {
+            pose[4 * r + 1] = -pose[4 * r + 1];
+            pose[4 * r + 2] = -pose[4 * r + 2];
+        }
+    memcpy(out, pose, sizeof pose);
+}
+
+uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame)
+{
+    const npg_rig_settings *set = &rig->settings;
+    XXH64_hash_t hash = XXH3_64bits(&set->step_share, sizeof set->step_share);
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        const npg_rig_sensor *sensor = &rig->sensors[s];
+        const npg_rig_shot *shot = npg_rig_shot_of(rig, frame, s);
+        if (!shot) continue;
+        double pose[12];
+        npg_rig_pose(rig, pose, s, shot);
+        const double numbers[] = {
+            (double)s,   sensor->scale, sensor->near_m,      sensor->far_m,
+            set->near_m, set->far_m,    (double)set->margin, (double)sensor->has_colour_camera};
+        hash = XXH3_64bits_withSeed(numbers, sizeof numbers, hash);
+        hash = XXH3_64bits_withSeed(pose, sizeof pose, hash);
+        hash = XXH3_64bits_withSeed(&sensor->camera, sizeof sensor->camera, hash);
+        hash = XXH3_64bits_withSeed(&sensor->colour_camera, sizeof sensor->colour_camera, hash);
+        hash = XXH3_64bits_withSeed(sensor->depth_to_colour, sizeof sensor->depth_to_colour, hash);
+    }
+    return hash;
+}

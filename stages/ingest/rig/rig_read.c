@@ -1,0 +1,68 @@
+/* One frame of a rig: the points of all its sensors in one cloud, in world coordinates. */
+#include <math.h>
+#include <string.h>
+
+#include "ingest/formats/point_list.h"
+#include "ingest/rig/rig.h"
+#include "pipeline/memory.h"
+#include "pipeline/parallel.h"
+
+typedef struct reading {
+    npg_rig *rig;
+    size_t frame;
+    npg_depth_points of[NPG_RIG_SENSORS_MAX];
+} reading;
+
+static npg_status read_sensor(void *user, size_t s)
+{
+    reading *r = user;
+    const npg_rig_shot *shot = npg_rig_shot_of(r->rig, r->frame, s);
+    return shot ? npg_depth_points_read(&r->of[s], r->rig, s, shot) : NPG_OK;
+}
+
+static npg_status reserve(npg_frame *frame, const reading *r)
+{
+    size_t count = 0;
+    bool has_colours = false;
+    for (size_t s = 0; s < r->rig->sensor_count; s++) {
+        count += r->of[s].count;
+        has_colours = has_colours || r->of[s].has_colours;
+    }
+    NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc(&frame->sensors, NPG_FOR_FRAMES, count));
+    return has_colours ? npg_alloc_array(&frame->colours, NPG_FOR_FRAMES, count, 4) : NPG_OK;
+}
+
+/* The sensor's points to the world: the one origin of the capture is settled by its first point. */
+static void add_sensor(npg_frame *frame, const reading *r, size_t s, npg_origin *origin)
+{
+    const npg_depth_points *from = &r->of[s];
+    double pose[12];
+    npg_rig_pose(r->rig, pose, s, npg_rig_shot_of(r->rig, r->frame, s));
+    for (size_t i = 0; i < from->count; i++) {
+        size_t to = frame->point_count++;
+        const float *p = from->pos + 3 * i, *n = from->normals + 3 * i;
+        double world[3];
+        npg_pose_apply(world, pose, (const double[3]){(double)p[0], (double)p[1], (double)p[2]});
+        npg_local_of(frame->pos_local + 3 * to, origin, world);
+        for (size_t a = 0; a < 3; a++)
+            frame->normals[3 * to + a] = (float)(pose[4 * a] * (double)n[0] + pose[4 * a + 1] * (double)n[1] +
+                                                 pose[4 * a + 2] * (double)n[2]);
+        if (from->colours) memcpy(frame->colours + 4 * to, from->colours + 4 * i, 4);
+        frame->sensors[to] = (uint8_t)s;
+    }
+}
+
+npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *origin)
+{
+    reading r = {.rig = rig, .frame = at};
+    npg_status status = npg_parallel(read_sensor, &r, rig->sensor_count);
+    if (!status) status = reserve(frame, &r);
+    for (size_t s = 0; s < rig->sensor_count && !status; s++)
+        if (r.of[s].count) add_sensor(frame, &r, s, origin);
+    for (size_t s = 0; s < rig->sensor_count; s++) npg_depth_points_clear(&r.of[s]);
+    frame->has_sure_normals = true;
+    if (status) npg_frame_clear(frame);
+    return status;
+}

@@ -1,0 +1,45 @@
+/* Fuzz target of trajectories, lists of images with times and OpenCV's camera files, for libFuzzer.  The
+ * first byte says which. */
+#include <math.h>
+
+#include "ingest/rig/rig.h"
+#include "tests/support/fuzz_target.h"
+
+static void read_list(const char *path, bool is_trajectory)
+{
+    npg_stamped_list list;
+    npg_status status = is_trajectory ? npg_read_trajectory(&list, path) : npg_read_image_list(&list, path);
+    expect(status == NPG_OK || status == NPG_BAD_INPUT, "list");
+    for (size_t i = 0; is_trajectory && i < list.count; i++)
+        for (int k = 0; k < 12; k++) expect(isfinite(list.items[i].pose[k]), "a pose that is not finite");
+    npg_stamped_clear(&list);
+}
+
+static void read_camera(const char *path)
+{
+    static const char *const names[] = {"intrinsic", "K", "R", "t"};
+    char *text;
+    npg_status status = npg_opencv_open(&text, path);
+    expect(status == NPG_OK || status == NPG_BAD_INPUT, "camera file");
+    for (size_t i = 0; !status && i < sizeof names / sizeof *names; i++) {
+        double values[9];
+        size_t found;
+        npg_status of_one = npg_opencv_matrix(text, path, names[i], values, 9, &found);
+        expect(of_one == NPG_OK || of_one == NPG_BAD_INPUT, "matrix");
+        expect(found <= 9, "too many numbers");
+    }
+    npg_release(&text);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    int fd;
+    if (!size) return 0;
+    const char *path = fuzz_file(&fd, "a.log", data + 1, size - 1);
+    fuzz_bound(20 * size); /* a line of eight digits becomes an entry of 128 bytes */
+    if (data[0] % 3 == 0) read_list(path, true);
+    if (data[0] % 3 == 1) read_list(path, false);
+    if (data[0] % 3 == 2) read_camera(path);
+    fuzz_end();
+    return 0;
+}

@@ -1,0 +1,171 @@
+# Rigs, the whole way: depth and colour images -> points -> a coloured moving mesh, against the truth of a synthetic body.
+# A real recording is used where NEUPIG_TEST_DATA names a folder that holds kinect-rig/ (OpenCV files per frame).
+
+small=(--faces 2000 --poisson-depth 6 --align-nodes 80 --align-steps 6 --quiet --max-residual 100 --max-flipped 100 --max-stretched 100)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.1 --width 240 --height 180 --cell 0.04 --depth-noise 2 \
+        -o capture >synth.log
+    "$NEUPIG" run --rig capture/rig/rig.json -o out --export ply,glb,usda,npz,obj --truth capture/truth "${small[@]}"
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+has_colours() {
+    head -c 400 "$1" | grep -aq "property uchar red"
+}
+
+# The value of a key of a stage's report.
+report() {
+    python3 -c 'import json, sys; print(eval("json.load(open(sys.argv[1]))" + sys.argv[2]))' "$1/report.json" "$2"
+}
+
+numpy() {
+    /usr/bin/python3 -c 'import numpy' 2>/dev/null || skip "needs python3-numpy"
+}
+
+@test "the images of four sensors become a mesh close to the truth" {
+    [ "$(report out '["stages"]["ingest"]["rig"]["layout"]')" = rig.json ]
+    cd_mean=$(report out '["stages"]["evaluate"]["figures"]["truth_cd"]["mean"]')
+    echo "CD $cd_mean"
+    awk -v cd="$cd_mean" 'BEGIN { exit !(cd < 4) }'
+}
+
+@test "every vertex has the colour that the body has there" {
+    numpy
+    run /usr/bin/python3 "$BATS_TEST_DIRNAME/colour_error.py" out capture/truth
+    echo "$output"
+    [ "$status" -eq 0 ]
+    # a mesh of 1000 vertices over a texture that turns every 40 cm; the large rig of the guide has less
+    awk -v e="${output##* }" 'BEGIN { exit !(e < 9) }'
+}
+
+@test "colours are in every form" {
+    numpy
+    has_colours out/reference.ply
+    for mesh in out/meshes/*.ply; do has_colours "$mesh"; done
+    grep -q displayColor out/motion.usda
+    grep -aq COLOR_0 out/motion.glb
+    awk '$1 == "v" { exit NF != 7 }' out/obj/frame_0000.obj
+    /usr/bin/python3 -c '
+import numpy
+m = numpy.load("out/motion.npz")
+assert m["colours"].shape == (m["reference"].shape[0], 4) and m["colours"][:, :3].std() > 20, m["colours"]
+assert (m["colours"][:, 3] >= 254).all() and "frame_colours" not in m'
+    "$NEUPIG" render out/reference.ply --colour vertex --height 64 -o coloured.png
+    "$NEUPIG" render out/reference.ply --height 64 -o plain.png
+    ! cmp -s coloured.png plain.png
+}
+
+@test "each frame's own colours, or none" {
+    numpy
+    "$NEUPIG" run capture/rig -o own --frames 0:2 --colour frames --export ply,npz,obj "${small[@]}"
+    "$NEUPIG" run capture/rig -o none --frames 0:2 --colour no --export npz "${small[@]}"
+    /usr/bin/python3 -c '
+import numpy
+m, n = numpy.load("own/motion.npz"), numpy.load("none/motion.npz")
+c = m["frame_colours"]
+assert c.shape == m["vertices"].shape[:2] + (4,) and (c[0] != c[1]).any()
+assert (c[..., 3] == 255).mean() > 0.5
+assert "colours" not in n'
+    ! has_colours none/reference.ply
+    ! cmp -s <(grep '^v ' own/obj/frame_0000.obj | cut -d' ' -f5-) <(grep '^v ' own/obj/frame_0001.obj | cut -d' ' -f5-)
+}
+
+@test "a run that is killed and resumed gives the same coloured bytes" {
+    options=(capture/rig --colour frames --window 2 --overlap 1 --reference-from all "${small[@]}")
+    "$NEUPIG" run "${options[@]}" -o whole
+    rm -rf killed
+    "$NEUPIG" run "${options[@]}" -o killed &
+    pid=$!
+    while kill -0 $pid 2>/dev/null && [ -z "$(ls killed/job/window_*npg 2>/dev/null)" ]; do sleep 0.02; done
+    kill -KILL $pid 2>/dev/null || true
+    wait $pid || true
+    "$NEUPIG" run "${options[@]}" -o killed
+    cmp whole/reference.ply killed/reference.ply
+    diff -r whole/meshes killed/meshes
+}
+
+@test "a changed calibration is not the same job" {
+    cp -r capture/rig changed
+    "$NEUPIG" run changed -o job --frames 0:2 "${small[@]}"
+    sed -i '0,/"fx": [0-9.]*/s//"fx": 230.0/' changed/rig.json
+    run "$NEUPIG" run changed -o job --frames 0:2 "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"is not the one it was"* ]]
+}
+
+@test "colours come with clouds, too, and parts of a capture keep theirs" {
+    mkdir -p clouds
+    for n in 0 1 2; do cp "capture/truth/frame_000$n.ply" clouds; done
+    "$NEUPIG" run clouds -o of_clouds "${small[@]}"
+    has_colours of_clouds/reference.ply
+    has_colours of_clouds/meshes/frame_0001.ply
+}
+
+@test "probe says what each sensor sees, and that one is off" {
+    run "$NEUPIG" probe --rig capture/rig/rig.json
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [ "$(grep -c '^sensor ' <<<"$output")" -eq 4 ]
+    cp capture/rig/rig.json capture/rig/off.json
+    python3 - capture/rig/off.json <<'P'
+import json, sys
+rig = json.load(open(sys.argv[1]))
+rig["sensors"][2]["pose"][3] += 0.02
+rig["sensors"][2]["pose"][7] += 0.02
+json.dump(rig, open(sys.argv[1], "w"))
+P
+    run "$NEUPIG" probe capture/rig/off.json
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [[ "$output" == *"attention sensor camera2 sees surfaces"* ]]
+    "$NEUPIG" probe capture/rig --json | python3 -c '
+import json, sys
+sensors = json.load(sys.stdin)["sensors"]
+assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.05 and s["apart"] < 0.01 for s in sensors), sensors'
+}
+
+@test "bad rigs end with exit code 3, the file and the place" {
+    cp -r capture/rig bad
+    sed -i '0,/"fx"/s//"focal"/' bad/rig.json
+    run "$NEUPIG" run --rig bad -o out_bad "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"bad/rig.json: sensors[0].camera.focal: unknown key"* ]]
+    cp capture/rig/rig.json bad/rig.json
+    head -c 2000 capture/rig/camera1/depth_0003.png >bad/camera1/depth_0003.png
+    run "$NEUPIG" run --rig bad -o out_bad "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"camera1/depth_0003.png: byte"* ]]
+    cp capture/rig/camera1/colour_0003.png bad/camera1/depth_0003.png
+    run "$NEUPIG" run --rig bad -o out_bad "${small[@]}"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"depth_0003.png: a 8-bit RGB PNG; a depth image must be 16-bit grey"* ]]
+    run "$NEUPIG" run --rig bad capture/rig -o out_bad
+    [ "$status" -eq 2 ]
+}
+
+@test "a confined rig may not lead out of its folder" {
+    cp -r capture/rig led
+    cp led/camera0/depth_0002.png outside.png
+    ln -sf ../../outside.png led/camera0/depth_0002.png
+    run "$NEUPIG" run --rig led --confine -o out_led "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"depth_0002.png"* ]]
+}
+
+@test "a real recording: OpenCV files per frame" {
+    data=${NEUPIG_TEST_DATA:-}/kinect-rig
+    [ -d "$data" ] || skip "NEUPIG_TEST_DATA names no folder with kinect-rig"
+    run "$NEUPIG" run --rig "$data" --sensor-poses none --frames 0:4 -o kinect --faces 2000 --quiet
+    echo "$output"
+    [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
+    has_colours kinect/reference.ply
+}
