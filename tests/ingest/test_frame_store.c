@@ -26,6 +26,11 @@ static void make_frame(npg_frame *frame, int64_t index, uint32_t fields, bool ha
     if (!has_normals) return;
     assert_int_equal(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, POINTS, 3 * sizeof(float)), NPG_OK);
     for (size_t i = 0; i < 3 * POINTS; i++) frame->normals[i] = -coordinate(index, i);
+    /* those of a rig carry these, too */
+    assert_int_equal(npg_alloc_array(&frame->colours, NPG_FOR_FRAMES, POINTS, 4), NPG_OK);
+    assert_int_equal(npg_alloc_array(&frame->sensors, NPG_FOR_FRAMES, POINTS, 1), NPG_OK);
+    for (size_t i = 0; i < 4 * POINTS; i++) frame->colours[i] = (uint8_t)(index + (int64_t)i);
+    for (size_t i = 0; i < POINTS; i++) frame->sensors[i] = (uint8_t)(index + (int64_t)i % 3);
 }
 
 static void put(npg_frame_store *store, int64_t index, uint32_t fields, bool has_normals)
@@ -49,6 +54,13 @@ static void expect(npg_frame_store *store, int64_t index, bool has_normals, bool
     for (size_t i = 0; i < 3 * POINTS; i++) {
         assert_true(frame.pos_local[i] == coordinate(index, i));
         if (has_normals) assert_true(frame.normals[i] == -coordinate(index, i));
+    }
+    assert_int_equal(frame.colours != NULL, has_normals);
+    assert_int_equal(frame.sensors != NULL, has_normals);
+    for (size_t i = 0; i < POINTS && has_normals; i++) {
+        for (size_t c = 4 * i; c < 4 * i + 4; c++)
+            assert_int_equal(frame.colours[c], (uint8_t)(index + (int64_t)c));
+        assert_int_equal(frame.sensors[i], (uint8_t)(index + (int64_t)i % 3));
     }
     npg_frame_clear(&frame);
 }

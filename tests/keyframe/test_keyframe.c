@@ -22,6 +22,7 @@ typedef struct scene {
     bool skipped[FRAMES];
     int64_t first_number;
     bool with_bad_points;
+    float stride; /* along x, from frame to frame */
     /* seen */
     int64_t order[FRAMES], seen_count, key, key_count;
     npg_plan plan;
@@ -62,7 +63,10 @@ static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *
     if (!facts->origin.known) facts->origin.known = true;
     frame->number = s->first_number + index;
     frame->is_skipped = s->skipped[index];
-    return frame->is_skipped ? NPG_OK : fill_points(frame, s->point_counts[index], s->with_bad_points);
+    if (frame->is_skipped) return NPG_OK;
+    NPG_TRY(fill_points(frame, s->point_counts[index], s->with_bad_points));
+    for (size_t i = 0; i < frame->point_count; i++) frame->pos_local[3 * i] += s->stride * (float)index;
+    return NPG_OK;
 }
 
 static npg_status see(npg_worker *worker, npg_frame *frame, void *user)
@@ -99,6 +103,19 @@ static npg_status run_scene(scene *s, const char *const (*more)[2], char text[10
 }
 
 /* ---- from files ---- */
+
+static void the_figures_size_is_that_of_a_frame_not_of_its_way(void **state)
+{
+    (void)state;
+    for (int far = 0; far < 2; far++) {
+        scene s = scene_of(20);
+        s.stride = far ? 40 : 0;
+        s.skipped[3] = true;
+        assert_int_equal(run_scene(&s, NULL, NULL), NPG_OK);
+        assert_true(fabs(s.box.diagonal - 5 * sqrt(3)) < 1e-4);                      /* from -3 to 2 */
+        assert_true(fabs(s.box.scale - 1.9 / (5 + 40 * (FRAMES - 1) * far)) < 1e-6); /* of all frames */
+    }
+}
 
 static void equal_frames_give_the_middle(void **state)
 {
@@ -342,6 +359,7 @@ static void no_memory_is_said(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_figures_size_is_that_of_a_frame_not_of_its_way),
         cmocka_unit_test(equal_frames_give_the_middle),
         cmocka_unit_test(every_frame_comes_once_in_the_plans_order),
         cmocka_unit_test(the_score_is_the_methods),
