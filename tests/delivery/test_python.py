@@ -170,7 +170,7 @@ class Failures(unittest.TestCase):
 
     def test_they_carry_status_and_words(self):
         self.check(neupig.Status.BAD_INPUT, "nowhere", lambda: neupig.run("/nowhere", WORK / "x"))
-        self.check(neupig.Status.USAGE, "no option colour", lambda: neupig.run("/nowhere", WORK / "x", colour=1))
+        self.check(neupig.Status.USAGE, "no option flavour", lambda: neupig.run("/nowhere", WORK / "x", flavour=1))
         self.check(neupig.Status.USAGE, "epochs", lambda: neupig.run("/nowhere", WORK / "x", epochs="many"))
         self.check(neupig.Status.BAD_INPUT, "nowhere", lambda: neupig.eval("/nowhere", "/nowhere"))
         self.check(neupig.Status.USAGE, "holds no job", lambda: neupig.append(WORK / "x"))
