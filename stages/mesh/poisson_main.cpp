@@ -1,5 +1,5 @@
 // neupig-poisson: screened Poisson reconstruction in a process of its own (PCL), because it may crash, eat
-// all memory or call exit() on bad input.  One thread: more threads give another mesh in every run. Based on:
+// all memory or call exit() on bad input.  Based on:
 // M. Kazhdan, H. Hoppe, Screened Poisson Surface Reconstruction, 2013.
 #include <pcl/point_types.h>
 #include <pcl/surface/poisson.h>
@@ -7,16 +7,25 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <new>
+#include <stdexcept>
 #include <vector>
 
 #include "mesh/poisson_wire.h"
 
 namespace
 {
+
+// Two threads on every machine, never more: the sum of two parts is the same in either order, that of three
+// is not, and the same points are to give the same bits.
+constexpr int thread_count = 2;
 
 bool read_all(int fd, void *data, size_t size)
 {
@@ -78,23 +87,62 @@ pcl::PointCloud<pcl::PointNormal>::Ptr read_cloud(const npg_poisson_request &req
     return cloud;
 }
 
-bool write_mesh(int fd, const pcl::PointCloud<pcl::PointNormal> &points,
-                const std::vector<pcl::Vertices> &polygons)
+using Position = std::array<float, 3>;
+using Face = std::array<uint32_t, 3>;
+
+struct Mesh {
+    std::vector<Position> positions;
+    std::vector<Face> faces;
+};
+
+Mesh triangles(const pcl::PointCloud<pcl::PointNormal> &points, const std::vector<pcl::Vertices> &polygons)
 {
-    npg_poisson_reply reply = {};
-    std::vector<float> positions;
-    std::vector<uint32_t> faces;
-    for (const auto &p : points) positions.insert(positions.end(), {p.x, p.y, p.z});
+    Mesh mesh;
+    for (const auto &p : points) {
+        if (!std::isfinite(p.x + p.y + p.z)) throw std::runtime_error("a vertex is not finite");
+        mesh.positions.push_back(
+            {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f}); // -0 becomes 0: equal means equal bits
+    }
     for (const auto &polygon : polygons)
         for (size_t k = 2; k < polygon.vertices.size(); k++)
-            faces.insert(faces.end(), {uint32_t(polygon.vertices[0]), uint32_t(polygon.vertices[k - 1]),
-                                       uint32_t(polygon.vertices[k])});
+            mesh.faces.push_back({uint32_t(polygon.vertices[0]), uint32_t(polygon.vertices[k - 1]),
+                                  uint32_t(polygon.vertices[k])});
+    return mesh;
+}
+
+// PCL's threads add vertices and faces as they find them, in another order in every run: both are sorted
+// here.  Vertices at the same place become one, since nothing could tell them apart; a face that loses a
+// corner by that goes.
+Mesh in_order(const Mesh &found)
+{
+    Mesh mesh;
+    mesh.positions = found.positions;
+    std::sort(mesh.positions.begin(), mesh.positions.end());
+    mesh.positions.erase(std::unique(mesh.positions.begin(), mesh.positions.end()), mesh.positions.end());
+    std::vector<uint32_t> place;
+    for (const Position &p : found.positions)
+        place.push_back(uint32_t(std::lower_bound(mesh.positions.begin(), mesh.positions.end(), p) -
+                                 mesh.positions.begin()));
+    for (const Face &f : found.faces) {
+        Face face = {place.at(f[0]), place.at(f[1]), place.at(f[2])};
+        if (face[0] == face[1] || face[1] == face[2] || face[2] == face[0]) continue;
+        std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+        mesh.faces.push_back(face);
+    }
+    std::sort(mesh.faces.begin(), mesh.faces.end());
+    return mesh;
+}
+
+bool write_mesh(int fd, const Mesh &mesh)
+{
+    npg_poisson_reply reply = {};
     std::memcpy(reply.magic, NPG_POISSON_ANSWER, sizeof reply.magic);
-    reply.vert_count = points.size();
-    reply.face_count = faces.size() / 3;
+    reply.vert_count = mesh.positions.size();
+    reply.face_count = mesh.faces.size();
     return write_all(fd, &reply, sizeof reply) &&
-           write_all(fd, positions.data(), positions.size() * sizeof(float)) &&
-           write_all(fd, faces.data(), faces.size() * sizeof(uint32_t)) && write_all(fd, NPG_POISSON_END, 8);
+           write_all(fd, mesh.positions.data(), mesh.positions.size() * sizeof(Position)) &&
+           write_all(fd, mesh.faces.data(), mesh.faces.size() * sizeof(Face)) &&
+           write_all(fd, NPG_POISSON_END, 8);
 }
 
 int reconstruct(int out)
@@ -117,12 +165,12 @@ int reconstruct(int out)
     poisson.setSamplesPerNode(1.5f);
     poisson.setScale(1.1f);
     poisson.setManifold(true);
-    poisson.setThreads(1);
+    poisson.setThreads(thread_count);
     poisson.setInputCloud(cloud);
     pcl::PointCloud<pcl::PointNormal> points;
     std::vector<pcl::Vertices> polygons;
     poisson.reconstruct(points, polygons);
-    return write_mesh(out, points, polygons) ? 0 : 1;
+    return write_mesh(out, in_order(triangles(points, polygons))) ? 0 : 1;
 }
 
 int guarded(int out)
@@ -138,10 +186,21 @@ int guarded(int out)
     }
 }
 
+// A thread that waits for the other one sleeps: where the cores are shared with other work, spinning costs
+// more than the second thread gains.  The OpenMP runtime reads this when it is loaded, so the program starts
+// once more.
+void wait_asleep(char **argv)
+{
+    const char *name = "OMP_WAIT_POLICY";
+    if (std::getenv(name) || setenv(name, "passive", 1)) return;
+    execv("/proc/self/exe", argv);
+}
+
 } // namespace
 
-int main()
+int main(int, char **argv)
 {
+    wait_asleep(argv);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     // What libraries print must not get between the bytes of the answer.
     int out = dup(STDOUT_FILENO);
