@@ -4,12 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "fuse/cell_key.h"
 #include "pipeline/memory.h"
 
-#define FULL        0.6 /* of the table's places, at most */
-#define VOTE_CELLS  4   /* sides of the cubes over which frames are counted, in cells */
-#define NONE        UINT32_MAX
-#define COORDS_BITS 20 /* of a key; the unit box in cells of 1e-5 fits */
+#define VOTE_CELLS  4 /* sides of the cubes over which frames are counted, in cells */
 #define SIDE_LEAST  1e-5
 #define CELLS_LEAST 65 /* cubes on both sides of 0 never become one: 8 of them, facing 8 octants, and room */
 
@@ -23,7 +21,7 @@ typedef struct cell {
 
 typedef struct table {
     cell *cells;     /* in the order in which they were met; owned */
-    uint32_t *place; /* 2^bits places of the table: which cell, or NONE; owned */
+    uint32_t *place; /* 2^bits places of the table: which cell, or NPG_CELL_NONE; owned */
     size_t count, most;
     int bits;
 } table;
@@ -35,18 +33,11 @@ struct npg_cells {
 
 /* ---- a table ---- */
 
-static int bits_for(size_t most)
-{
-    int bits = 4;
-    while ((double)((size_t)1 << bits) * FULL < (double)most + 1) bits++;
-    return bits;
-}
-
 static npg_status open_table(table *t, size_t most)
 {
-    size_t places = (size_t)1 << bits_for(most);
+    size_t places = (size_t)1 << npg_cell_table_bits(most);
     t->most = most;
-    t->bits = bits_for(most);
+    t->bits = npg_cell_table_bits(most);
     NPG_TRY(npg_alloc_array(&t->cells, NPG_FOR_MESH, most + 1, sizeof *t->cells));
     NPG_TRY(npg_alloc_array(&t->place, NPG_FOR_MESH, places, sizeof *t->place));
     memset(t->place, 0xff, places * sizeof *t->place);
@@ -59,12 +50,12 @@ static void close_table(table *t)
     npg_release(&t->place);
 }
 
-/* The key's place in the table: NONE is there where it is new. */
+/* The key's place in the table: NPG_CELL_NONE is there where it is new. */
 static size_t place_of(const table *t, uint64_t key)
 {
     size_t mask = ((size_t)1 << t->bits) - 1;
-    size_t at = (size_t)((key * UINT64_C(0x9e3779b97f4a7c15)) >> (64 - t->bits)); /* Fibonacci hashing */
-    while (t->place[at] != NONE && t->cells[t->place[at]].key != key) at = (at + 1) & mask;
+    size_t at = npg_cell_place(key, t->bits);
+    while (t->place[at] != NPG_CELL_NONE && t->cells[t->place[at]].key != key) at = (at + 1) & mask;
     return at;
 }
 
@@ -72,37 +63,22 @@ static size_t place_of(const table *t, uint64_t key)
 static cell *find(table *t, uint64_t key)
 {
     size_t at = place_of(t, key);
-    if (t->place[at] == NONE) {
+    if (t->place[at] == NPG_CELL_NONE) {
         t->place[at] = (uint32_t)t->count;
         t->cells[t->count++] = (cell){.key = key, .last = -1};
     }
     return &t->cells[t->place[at]];
 }
 
-/* ---- keys: three coordinates in cells, and the octant that the surface faces ---- */
-
-static uint64_t coordinate(double x, double side)
-{
-    double at = floor(x / side) + (double)(1 << (COORDS_BITS - 1));
-    return (uint64_t)fmin(fmax(at, 0), (double)((1 << COORDS_BITS) - 1));
-}
-
-static uint64_t key_of(const float at[3], const float facing[3], double side)
-{
-    uint64_t key = 0;
-    for (int a = 0; a < 3; a++) key = key << COORDS_BITS | coordinate((double)at[a], side);
-    for (int a = 0; a < 3; a++) key = key << 1 | (facing[a] < 0);
-    return key;
-}
-
 /* The key of the cube of twice the side around a cell. */
 static uint64_t key_of_double(uint64_t key)
 {
-    const uint64_t mask = (UINT64_C(1) << COORDS_BITS) - 1, middle = UINT64_C(1) << (COORDS_BITS - 1);
+    const uint64_t mask = (UINT64_C(1) << NPG_CELL_COORDS_BITS) - 1, middle = UINT64_C(1)
+                                                                              << (NPG_CELL_COORDS_BITS - 1);
     uint64_t out = 0;
     for (int a = 2; a >= 0; a--) {
-        uint64_t at = key >> (3 + a * COORDS_BITS) & mask; /* counted from -middle */
-        out = out << COORDS_BITS | ((at + middle) >> 1);
+        uint64_t at = key >> (3 + a * NPG_CELL_COORDS_BITS) & mask; /* counted from -middle */
+        out = out << NPG_CELL_COORDS_BITS | ((at + middle) >> 1);
     }
     return out << 3 | (key & 7);
 }
@@ -153,8 +129,8 @@ npg_status npg_cells_add(npg_cells *c, const float at[3], const float facing[3],
         NPG_TRY(grow(&c->votes));
         c->side *= 2;
     }
-    add(find(&c->fine, key_of(at, facing, c->side)), point, normal, weight);
-    count_frame(find(&c->votes, key_of(at, facing, VOTE_CELLS * c->side)), frame);
+    add(find(&c->fine, npg_cell_key(at, facing, c->side)), point, normal, weight);
+    count_frame(find(&c->votes, npg_cell_key(at, facing, VOTE_CELLS * c->side)), frame);
     return NPG_OK;
 }
 
@@ -199,7 +175,7 @@ static int64_t votes_of(const npg_cells *c, const cell *of)
     uint64_t key = of->key;
     for (int side = 1; side < VOTE_CELLS; side *= 2) key = key_of_double(key);
     uint32_t at = votes->place[place_of(votes, key)];
-    return at == NONE ? 0 : votes->cells[at].frames;
+    return at == NPG_CELL_NONE ? 0 : votes->cells[at].frames;
 }
 
 npg_status npg_cells_means(const npg_cells *c, float *points, float *normals, size_t *count,
@@ -224,5 +200,5 @@ size_t npg_cells_memory(size_t most)
 {
     if (most < CELLS_LEAST) most = CELLS_LEAST;
     /* two tables, each twice while it grows */
-    return 4 * ((most + 1) * sizeof(cell) + ((size_t)1 << bits_for(most)) * sizeof(uint32_t));
+    return 4 * ((most + 1) * sizeof(cell) + ((size_t)1 << npg_cell_table_bits(most)) * sizeof(uint32_t));
 }

@@ -4,11 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "fuse/cell_key.h"
 #include "geometry/colours.h"
 #include "geometry/vec3.h"
-
-#define NONE        UINT32_MAX
-#define COORDS_BITS 20 /* of a key */
 
 typedef struct colour_cell {
     uint64_t key;
@@ -19,28 +17,21 @@ typedef struct colour_cell {
 
 struct npg_colour_cells {
     colour_cell *cells; /* capacity of them; owned */
-    uint32_t *place;    /* 2^bits: which cell, or NONE; owned */
+    uint32_t *place;    /* 2^bits: which cell, or NPG_CELL_NONE; owned */
     size_t count, capacity, most;
     int bits;
     double side;
 };
 
-static int bits_for(size_t most)
-{
-    int bits = 4;
-    while (((size_t)1 << bits) < 2 * most) bits++;
-    return bits;
-}
-
 npg_status npg_colour_cells_open(npg_colour_cells **out, double side, size_t most)
 {
     npg_colour_cells *c;
     *out = NULL;
-    NPG_REQUIRE(side > 0 && most > 0 && most < NONE / 2);
+    NPG_REQUIRE(side > 0 && most > 0 && most < NPG_CELL_NONE / 2);
     NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
     c->side = fmax(side, 4e-6); /* the unit box fits the bits of a key */
     c->most = most;
-    c->bits = bits_for(most);
+    c->bits = npg_cell_table_bits(most);
     size_t places = (size_t)1 << c->bits;
     npg_status status = npg_alloc_array(&c->place, NPG_FOR_MESH, places, sizeof *c->place);
     if (!status) memset(c->place, 0xff, places * sizeof *c->place);
@@ -57,24 +48,13 @@ void npg_colour_cells_close(npg_colour_cells **slot)
     npg_release(slot);
 }
 
-static uint64_t key_of(const npg_colour_cells *c, const float point[3], const float facing[3])
-{
-    uint64_t key = 0;
-    for (int a = 0; a < 3; a++) {
-        double at = floor((double)point[a] / c->side) + (double)(1 << (COORDS_BITS - 1));
-        key = key << COORDS_BITS | ((uint64_t)fmin(fmax(at, 0), (1 << COORDS_BITS) - 1));
-    }
-    for (int a = 0; a < 3; a++) key = key << 1 | (facing[a] < 0);
-    return key;
-}
-
 /* The cube of a key, NULL where it is new and there is no room. */
 static colour_cell *find(npg_colour_cells *c, uint64_t key)
 {
     size_t mask = ((size_t)1 << c->bits) - 1;
-    size_t at = (size_t)((key * UINT64_C(0x9e3779b97f4a7c15)) >> (64 - c->bits)); /* Fibonacci hashing */
-    while (c->place[at] != NONE && c->cells[c->place[at]].key != key) at = (at + 1) & mask;
-    if (c->place[at] != NONE) return &c->cells[c->place[at]];
+    size_t at = npg_cell_place(key, c->bits);
+    while (c->place[at] != NPG_CELL_NONE && c->cells[c->place[at]].key != key) at = (at + 1) & mask;
+    if (c->place[at] != NPG_CELL_NONE) return &c->cells[c->place[at]];
     if (c->count >= c->most) return NULL;
     if (npg_grow(&c->cells, &c->capacity, c->count + 1, sizeof *c->cells, NPG_FOR_MESH)) return NULL;
     c->place[at] = (uint32_t)c->count;
@@ -85,7 +65,7 @@ static colour_cell *find(npg_colour_cells *c, uint64_t key)
 void npg_colour_cells_add(npg_colour_cells *c, const float point[3], const float facing[3],
                           const uint8_t rgb[3], unsigned weight)
 {
-    colour_cell *cell = find(c, key_of(c, point, facing));
+    colour_cell *cell = find(c, npg_cell_key(point, facing, c->side));
     if (!cell) return;
     for (int a = 0; a < 3; a++) {
         cell->point[a] += point[a];
@@ -117,5 +97,5 @@ void npg_colour_cells_means(const npg_colour_cells *c, float *points, float *nor
 size_t npg_colour_cells_memory(size_t most)
 {
     return (2 * most + most / 2) * sizeof(colour_cell) + /* twice while it grows */
-           ((size_t)1 << bits_for(most)) * sizeof(uint32_t);
+           ((size_t)1 << npg_cell_table_bits(most)) * sizeof(uint32_t);
 }

@@ -5,9 +5,11 @@ small=(--epochs 10 --faces 800 --poisson-depth 5 --window 5 --overlap 2 --align-
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 -o noisy >synth.log
+    for seed in "" 1 2; do
+        "$NEUPIG" synth --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 --seed "${seed:-0}" -o noisy$seed >synth.log
+    done
     "$NEUPIG" synth --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
-    for capture in noisy parts; do
+    for capture in noisy noisy1 noisy2 parts; do
         for from in key all; do
             "$NEUPIG" run $capture/points -o $capture-$from --reference-from $from "${small[@]}" >$capture-$from.log 2>&1
         done
@@ -32,13 +34,18 @@ fusing_passes() {
     grep -c "frames in the keyframe's pose" "$1" || true
 }
 
+# Fails unless CD, the mean over captures, is better with the reference from all frames by a factor: better FACTOR CAPTURE...
+better() {
+    local factor=$1 capture
+    shift
+    for capture in "$@"; do
+        echo "$capture $(figure CD "$capture" key) $(figure CD "$capture" all)"
+    done | awk -v factor="$factor" '{ print; key += $2; all += $3 } END { exit !(all > 0 && all < factor * key) }'
+}
+
 @test "frames that are noisy, or see parts only, are followed better with a reference from all of them" {
-    for capture in noisy parts; do
-        key=$(figure CD $capture key)
-        all=$(figure CD $capture all)
-        echo "$capture: CD $key from the keyframe, $all from all frames"
-        awk -v key="$key" -v all="$all" 'BEGIN { exit !(all > 0 && all < 0.97 * key) }'
-    done
+    better 0.9 noisy noisy1 noisy2 # one of them alone depends on how the surface happens to be decimated
+    better 0.97 parts
 }
 
 @test "the report says what was gathered" {
