@@ -34,6 +34,15 @@ npg_status npg_join_path(char **out, const char *folder, const char *name)
     return NPG_OK;
 }
 
+bool npg_is_in_folder(const char *folder, const char *name)
+{
+    char *path;
+    if (npg_join_path(&path, folder, name)) return false;
+    bool is_there = access(path, F_OK) == 0;
+    npg_release(&path);
+    return is_there;
+}
+
 /* The folder part of a path, "." where there is none. */
 static npg_status folder_of(char **out, const char *path)
 {

@@ -84,7 +84,7 @@ void npg_run_fail(npg_run *run, const char *stage, npg_status status)
 void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t frame, const char *message)
 {
     if (!run->hooks.log) return;
-    npg_log_record record = {sizeof record, level, npg_clock_s() - run->opened_s, stage, frame, message};
+    npg_log_record record = {sizeof record, level, npg_clock_s() - run->begun.wall_s, stage, frame, message};
     pthread_mutex_lock(&run->lock);
     run->hooks.log(run->hooks.user, &record);
     pthread_mutex_unlock(&run->lock);
@@ -490,7 +490,6 @@ npg_status npg_run_open_chain(npg_run **out, const npg_options *options, const n
     pthread_mutex_init(&run->lock, NULL);
     pthread_mutex_init(&run->join_lock, NULL);
     sem_init(&run->event, 0, 0);
-    run->opened_s = npg_clock_s();
     run->begun = npg_busy_now();
     run->pushed_number = INT64_MIN;
     npg_status status = fill_run(run, options, hooks, chain);

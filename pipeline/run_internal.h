@@ -43,8 +43,7 @@ struct npg_run {
     npg_settings settings;
     npg_hooks hooks;
     npg_facts facts;
-    double opened_s;
-    npg_busy begun;
+    npg_busy begun; /* when it was opened */
 
     pthread_mutex_t lock; /* guards what follows up to the rings, and calls of the hooks */
     npg_status first_failure;

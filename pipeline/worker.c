@@ -260,7 +260,7 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     now.struct_size = sizeof now;
     now.stage = worker->name;
     now.share = share_of_run(run, progress->share);
-    now.elapsed_s = npg_clock_s() - run->opened_s;
+    now.elapsed_s = npg_clock_s() - run->begun.wall_s;
     pthread_mutex_lock(&run->lock);
     now.left_s = time_left(run, &now);
     run->hooks.progress(run->hooks.user, &now);

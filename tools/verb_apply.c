@@ -2,7 +2,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <jansson.h>
-#include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -101,12 +100,6 @@ static npg_status path_of(char path[PATH_SIZE], const char *folder, const char *
     return npg_error(NPG_USAGE, "%s: the name is too long", folder);
 }
 
-static bool is_in(const char *folder, const char *name)
-{
-    char path[PATH_SIZE];
-    return path_of(path, folder, name) == NPG_OK && access(path, F_OK) == 0;
-}
-
 static npg_status check_job(applying *a)
 {
     char path[PATH_SIZE];
@@ -114,11 +107,12 @@ static npg_status check_job(applying *a)
     static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
                                          "job/job.json"};
     bool is_job = false;
-    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++) is_job = is_job || is_in(a->job, traces[i]);
+    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
+        is_job = is_job || npg_is_in_folder(a->job, traces[i]);
     if (!is_job) return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", a->job);
-    if (!is_in(a->job, "done.json") || !is_in(a->job, "frames.jsonl"))
+    if (!npg_is_in_folder(a->job, "done.json") || !npg_is_in_folder(a->job, "frames.jsonl"))
         return npg_error(NPG_BAD_INPUT, "%s: the run is not finished (there is no %s); run it again first",
-                         a->job, is_in(a->job, "done.json") ? "frames.jsonl" : "done.json");
+                         a->job, npg_is_in_folder(a->job, "done.json") ? "frames.jsonl" : "done.json");
     NPG_TRY(path_of(path, a->job, "done.json"));
     json_error_t error;
     int fd;
@@ -139,7 +133,7 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     const char *file = json_string_value(json_object_get(frame, "file"));
     (void)line, (void)size;
     if (!file) return NPG_OK;
-    if (npg_path_stays(file) && !is_in(a->job, file)) a->lost_count++;
+    if (npg_path_stays(file) && !npg_is_in_folder(a->job, file)) a->lost_count++;
     if (a->frame_count && index <= a->last_index)
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl: frame %lld is not after the one before it", a->job,
                          (long long)index);
@@ -194,9 +188,7 @@ static npg_status open_job(applying *a)
 static npg_status copy_positions(const applying *a, float *vert_pos, const npg_mesh *mesh, const char *path)
 {
     const npg_mesh *reference = a->reference;
-    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
-        if (!isfinite(mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    NPG_TRY(npg_mesh_require_finite(mesh, path));
     if (mesh->vert_count != reference->vert_count || mesh->face_count != reference->face_count)
         return npg_error(NPG_BAD_INPUT, "%s has %zu vertices and %zu faces, %s/reference.ply %zu and %zu",
                          path, mesh->vert_count, mesh->face_count, a->job, reference->vert_count,
@@ -215,7 +207,7 @@ static npg_status read_moment(const applying *a, moment *m, const char *file)
     if (!npg_path_stays(file))
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names %s, which is not in the job", a->job, file);
     NPG_TRY(npg_alloc_array(&m->vert_pos, NPG_FOR_MESH, a->reference->vert_count, 3 * sizeof *m->vert_pos));
-    if (!is_in(a->job, file) && a->motion)
+    if (!npg_is_in_folder(a->job, file) && a->motion)
         return npg_job_motion_pose(a->motion, m->vert_pos, (double)m->index);
     NPG_TRY(path_of(path, a->job, file));
     NPG_TRY(npg_read_mesh(&mesh, path, &origin));
@@ -257,9 +249,7 @@ static npg_status open_carried(applying *a)
     NPG_TRY(npg_read_shape(&a->carried, a->s.mesh, &a->origin));
     const npg_mesh *mesh = a->carried;
     size_t v = mesh->vert_count;
-    for (size_t i = 0; i < 3 * v; i++)
-        if (!isfinite(mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", a->s.mesh, i / 3);
+    NPG_TRY(npg_mesh_require_finite(mesh, a->s.mesh));
     a->turns_normals = mesh->vert_normals != NULL;
     NPG_TRY(npg_alloc_array(&a->pos, NPG_FOR_MESH, v, 3 * sizeof *a->pos));
     NPG_TRY(npg_alloc_array(&a->between, NPG_FOR_MESH, a->reference->vert_count, 3 * sizeof *a->between));
@@ -323,7 +313,7 @@ static npg_status open_output(applying *a)
     char path[PATH_SIZE];
     choose_names(a);
     NPG_TRY(npg_folder_probe(a->s.output));
-    if (is_in(a->s.output, "frames.jsonl") || is_in(a->s.output, "job"))
+    if (npg_is_in_folder(a->s.output, "frames.jsonl") || npg_is_in_folder(a->s.output, "job"))
         return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", a->s.output);
     NPG_TRY(path_of(path, a->s.output, "done.json"));
     if (!a->s.overwrite) NPG_TRY(clear_files(a));

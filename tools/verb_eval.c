@@ -63,14 +63,6 @@ static npg_status read_truth(npg_mesh **mesh, const char *path, evaluation *e)
     return e->s.points_only ? npg_read_points(mesh, path, &e->origin) : npg_read_mesh(mesh, path, &e->origin);
 }
 
-static npg_status check_finite(const npg_mesh *mesh, const char *path)
-{
-    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
-        if (!isfinite(mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
-    return NPG_OK;
-}
-
 static npg_status list_side(npg_listing *listing, const char *folder, const char *subfolders,
                             const char *endings)
 {
@@ -192,8 +184,8 @@ static npg_status eval_all(evaluation *e)
         npg_mesh *predicted = NULL, *truth = NULL;
         npg_status status = read_truth(&truth, e->truth.paths[t], e);
         if (!status) status = npg_read_mesh(&predicted, e->predicted.paths[t], &e->origin);
-        if (!status) status = check_finite(predicted, e->predicted.paths[t]);
-        if (!status) status = check_finite(truth, e->truth.paths[t]);
+        if (!status) status = npg_mesh_require_finite(predicted, e->predicted.paths[t]);
+        if (!status) status = npg_mesh_require_finite(truth, e->truth.paths[t]);
         if (!status) status = eval_frame(e, t, predicted, truth);
         npg_mesh_unref(&predicted);
         npg_mesh_unref(&truth);

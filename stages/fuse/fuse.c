@@ -126,7 +126,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
             s->strays++;
             continue;
         }
-        const uint8_t *colour = c->colours ? c->colours + 4 * (i * c->of / c->count) : NULL; /* as spread */
+        const uint8_t *colour = c->colours ? c->colours + 4 * npg_spread_index(i, c->count, c->of) : NULL;
         if (colour && colour[3] && is_near && s->hues)
             npg_colour_cells_add(s->hues, p->foot, p->facing, colour, weight);
         NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,

@@ -305,12 +305,20 @@ void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_
         for (size_t a = 0; a < 3; a++) out[3 * i + a] = rows[3 * (size_t)which[i] + a];
 }
 
+npg_status npg_mesh_require_finite(const npg_mesh *mesh, const char *path)
+{
+    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
+        if (!isfinite(mesh->vert_pos[i]))
+            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    return NPG_OK;
+}
+
 size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
                          const float *normals, size_t point_count)
 {
     size_t count = point_count < most ? point_count : most;
     for (size_t i = 0; i < count; i++) {
-        size_t from = i * point_count / count;
+        size_t from = npg_spread_index(i, count, point_count);
         memcpy(out + 3 * i, points + 3 * from, 3 * sizeof(float));
         if (normals) memcpy(out_normals + 3 * i, normals + 3 * from, 3 * sizeof(float));
     }

@@ -44,6 +44,9 @@ typedef struct npg_manifold {
 } npg_manifold;
 npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh);
 
+/* NPG_BAD_INPUT, naming the file and the first vertex whose position is not finite. */
+npg_status npg_mesh_require_finite(const npg_mesh *mesh, const char *path);
+
 /* Handles of all components together, by Euler:
  * (2 components - vertices + edges - faces - border loops) / 2. */
 npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
@@ -54,6 +57,12 @@ npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
 
 /* out (count x 3) = the rows of rows (x 3) that which[] names. */
 void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count);
+
+/* Which of n things is the i-th of `count` that are spread evenly over them. */
+static inline size_t npg_spread_index(size_t i, size_t count, size_t n)
+{
+    return i * n / count;
+}
 
 /* Copy at most `most` of the points (N x 3), evenly by their order, and of their normals where there are any.
  * Returns how many. */

@@ -470,9 +470,7 @@ static npg_status read_reference(making *m)
     const char *path = npg_worker_settings(m->worker)->reference;
     npg_facts *facts = npg_worker_facts(m->worker);
     NPG_TRY(npg_read_mesh(&m->mesh, path, &facts->origin));
-    for (size_t i = 0; i < 3 * m->mesh->vert_count; i++)
-        if (!isfinite(m->mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    NPG_TRY(npg_mesh_require_finite(m->mesh, path));
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
     NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->points, m->count, SEEN_SPACINGS * m->seen));

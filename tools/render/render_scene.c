@@ -73,10 +73,7 @@ static npg_status read_any(npg_mesh **mesh, bool *faces, const char *path, npg_o
     NPG_TRY(npg_file_has_faces(faces, path));
     if (!*faces) return read_cloud(mesh, path, origin);
     NPG_TRY(npg_read_mesh(mesh, path, origin));
-    npg_status status = NPG_OK;
-    for (size_t v = 0; v < (*mesh)->vert_count && !status; v++)
-        if (!is_finite((*mesh)->vert_pos + 3 * v))
-            status = npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, v);
+    npg_status status = npg_mesh_require_finite(*mesh, path);
     if (status) npg_mesh_unref(mesh);
     return status;
 }

@@ -98,17 +98,11 @@ static locks look_at_all(const char *path)
 
 /* ---- phases ---- */
 
-static bool is_in(const char *folder, const char *name)
-{
-    struct stat info;
-    return stat_in(&info, folder, name);
-}
-
 static npg_run_phase phase_of(npg_run_watch *watch, const char *path, const locks *l)
 {
-    bool has_segments = is_in(path, "segments.partial.json");
+    bool has_segments = npg_is_in_folder(path, "segments.partial.json");
     double now_s = npg_clock_s();
-    if (is_in(path, "done.json") && !has_segments) return NPG_RUN_DONE;
+    if (npg_is_in_folder(path, "done.json") && !has_segments) return NPG_RUN_DONE;
     if (l->held || !l->any)
         watch->unlocked_s = 0;
     else if (watch->unlocked_s <= 0)
@@ -116,8 +110,8 @@ static npg_run_phase phase_of(npg_run_watch *watch, const char *path, const lock
     else if (now_s - watch->unlocked_s > (has_segments ? UNLOCKED_SEGMENTS_S : UNLOCKED_S))
         return NPG_RUN_STOPPED;
     if (has_segments) return NPG_RUN_SOLVING;
-    if (is_in(path, "frames.jsonl")) return NPG_RUN_WRITING;
-    return is_in(path, "frames.partial.jsonl") ? NPG_RUN_SOLVING : NPG_RUN_PREPARING;
+    if (npg_is_in_folder(path, "frames.jsonl")) return NPG_RUN_WRITING;
+    return npg_is_in_folder(path, "frames.partial.jsonl") ? NPG_RUN_SOLVING : NPG_RUN_PREPARING;
 }
 
 bool npg_run_watch_look(npg_run_watch *watch, const char *path)

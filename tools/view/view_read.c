@@ -20,9 +20,7 @@ static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const
     if (mesh->vert_count != v)
         return npg_error(NPG_BAD_INPUT, "%s has %zu vertices, its reference.ply %zu", path, mesh->vert_count,
                          v);
-    for (size_t i = 0; i < 3 * v; i++)
-        if (!isfinite(mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    NPG_TRY(npg_mesh_require_finite(mesh, path));
     memcpy(frames->vert_pos, mesh->vert_pos, 3 * v * sizeof *frames->vert_pos);
     if (frames->colours || !mesh->vert_colours) return NPG_OK;
     NPG_TRY(npg_alloc_array(&frames->colours, NPG_FOR_MESH, v, 3));
@@ -79,17 +77,15 @@ static npg_status find_source(char **path, const npg_view_frames *frames, const 
 /* The capture's coordinates to those of the meshes; points that are not finite go. */
 static npg_status place_points(npg_view_frames *frames, const npg_frame *cloud, const npg_origin *of_cloud)
 {
-    const npg_placement *map = &frames->part->placement;
     const npg_origin *origin = &frames->part->origin;
     NPG_TRY(npg_grow(&frames->points, &frames->point_capacity, cloud->point_count, 3 * sizeof *frames->points,
                      NPG_FOR_FRAMES));
     for (size_t i = 0; i < cloud->point_count; i++) {
         float *out = frames->points + 3 * frames->point_count;
-        for (int a = 0; a < 3; a++) {
-            int b = map->from[a];
-            double world = of_cloud->world[b] + (double)cloud->pos_local[3 * i + (size_t)b];
-            out[a] = (float)(map->scale * map->sign[a] * (world - map->centre[b]) - origin->world[a]);
-        }
+        double at[3];
+        for (size_t a = 0; a < 3; a++) at[a] = of_cloud->world[a] + (double)cloud->pos_local[3 * i + a];
+        npg_place_point(&frames->part->placement, at, at);
+        for (size_t a = 0; a < 3; a++) out[a] = (float)(at[a] - origin->world[a]);
         frames->point_count += isfinite(out[0]) && isfinite(out[1]) && isfinite(out[2]);
     }
     return NPG_OK;

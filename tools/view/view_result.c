@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
+#include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
@@ -23,20 +23,11 @@ enum {
 
 /* ---- files ---- */
 
-static bool is_in(const char *folder, const char *name)
-{
-    char *path;
-    if (npg_join_path(&path, folder, name)) return false;
-    bool is_there = access(path, F_OK) == 0;
-    npg_release(&path);
-    return is_there;
-}
-
 npg_status npg_view_load_json(json_t **out, const char *folder, const char *name)
 {
     char *path, *text = NULL;
     *out = NULL;
-    if (!is_in(folder, name)) return NPG_OK;
+    if (!npg_is_in_folder(folder, name)) return NPG_OK;
     NPG_TRY(npg_join_path(&path, folder, name));
     npg_status status = npg_json_read(out, &text, path, JSON_SIZE_MAX);
     if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
@@ -94,7 +85,8 @@ static int by_index(const void *left, const void *right)
 
 static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_empty)
 {
-    const char *name = is_in(part->folder, "frames.jsonl") ? "frames.jsonl" : "frames.partial.jsonl";
+    const char *name =
+        npg_is_in_folder(part->folder, "frames.jsonl") ? "frames.jsonl" : "frames.partial.jsonl";
     reading r = {part, every};
     char *path;
     NPG_TRY(npg_join_path(&path, part->folder, name));
@@ -114,21 +106,13 @@ static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_em
 
 /* ---- the reference ---- */
 
-static npg_status check_finite(const npg_mesh *mesh, const char *path)
-{
-    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
-        if (!isfinite(mesh->vert_pos[i]))
-            return npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
-    return NPG_OK;
-}
-
 static npg_status read_reference(npg_view_part *part, bool may_be_empty)
 {
     char *path;
-    if (may_be_empty && !is_in(part->folder, "reference.ply")) return NPG_OK;
+    if (may_be_empty && !npg_is_in_folder(part->folder, "reference.ply")) return NPG_OK;
     NPG_TRY(npg_join_path(&path, part->folder, "reference.ply"));
     npg_status status = npg_read_mesh(&part->reference, path, &part->origin);
-    if (!status) status = check_finite(part->reference, path);
+    if (!status) status = npg_mesh_require_finite(part->reference, path);
     npg_release(&path);
     if (!status) status = npg_view_links_open(&part->links, part->reference);
     if (!status) part->group = GROUP_VERTS / part->reference->vert_count;
@@ -227,9 +211,9 @@ static npg_status check_folder(const char *path, bool may_be_empty)
     if (stat(path, &info)) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
     if (!S_ISDIR(info.st_mode)) return npg_error(NPG_USAGE, "%s is not a folder", path);
     for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
-        if (is_in(path, traces[i])) return NPG_OK;
-    if (is_in(path, "job") && may_be_empty) return NPG_OK;
-    if (is_in(path, "job")) return npg_error(NPG_BAD_INPUT, "%s: no frame is solved yet", path);
+        if (npg_is_in_folder(path, traces[i])) return NPG_OK;
+    if (npg_is_in_folder(path, "job") && may_be_empty) return NPG_OK;
+    if (npg_is_in_folder(path, "job")) return npg_error(NPG_BAD_INPUT, "%s: no frame is solved yet", path);
     return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", path);
 }
 
@@ -242,7 +226,7 @@ npg_status npg_view_result_open(npg_view_result *result, const char *path, int64
     if (!status) status = list_parts(result);
     for (size_t i = 0; i < result->part_count && !status; i++)
         status = fill_part(&result->parts[i], every, may_be_empty);
-    result->is_done = !status && is_in(path, "done.json");
+    result->is_done = !status && npg_is_in_folder(path, "done.json");
     if (status) npg_view_result_close(result);
     return status;
 }

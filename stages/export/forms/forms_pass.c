@@ -2,7 +2,6 @@
 #include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +9,7 @@
 #include <unistd.h>
 
 #include "export/forms/forms.h"
+#include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
@@ -181,9 +181,7 @@ static npg_status read_pose(forms_pass *p, const char *file)
                     (facts->has_pose_colours && !p->mesh->vert_colours)))
         status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written: %zu vertices and %zu faces",
                            path, p->mesh->vert_count, p->mesh->face_count);
-    for (size_t i = 0; !status && i < 3 * facts->vert_count; i++)
-        if (!isfinite(p->mesh->vert_pos[i]))
-            status = npg_error(NPG_BAD_INPUT, "%s: vertex %zu is not finite", path, i / 3);
+    if (!status) status = npg_mesh_require_finite(p->mesh, path);
     npg_release(&path);
     return status;
 }

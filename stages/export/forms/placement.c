@@ -25,15 +25,18 @@ npg_status npg_placement_parse(npg_placement *map, const char *axes)
     return NPG_OK;
 }
 
+void npg_place_point(const npg_placement *map, double out[3], const double world[3])
+{
+    double from_centre[3];
+    for (int a = 0; a < 3; a++) from_centre[a] = world[a] - map->centre[a];
+    for (int a = 0; a < 3; a++) out[a] = map->scale * map->sign[a] * from_centre[map->from[a]];
+}
+
 void npg_place_points(const npg_placement *map, double *out, const npg_frame_box *box, const float *unit,
                       size_t count)
 {
     npg_box_unit_to_world(box, out, unit, count);
-    for (size_t i = 0; i < count; i++) {
-        double *p = out + 3 * i, q[3];
-        for (int a = 0; a < 3; a++) q[a] = p[a] - map->centre[a];
-        for (int a = 0; a < 3; a++) p[a] = map->scale * map->sign[a] * q[map->from[a]];
-    }
+    for (size_t i = 0; i < count; i++) npg_place_point(map, out + 3 * i, out + 3 * i);
 }
 
 void npg_place_normals(const npg_placement *map, float *out, const float *normals, size_t count)

@@ -18,6 +18,9 @@ typedef struct npg_placement {
 /* axes: which axis becomes x, y and z, with signs ("xz-y"); scale 1, centre 0.  NPG_USAGE. */
 npg_status npg_placement_parse(npg_placement *placement, const char *axes);
 
+/* One point in world coordinates to written ones; out may be the input. */
+void npg_place_point(const npg_placement *placement, double out[3], const double world[3]);
+
 /* Unit coordinates (N x 3) to written ones. */
 void npg_place_points(const npg_placement *placement, double *out, const npg_frame_box *box,
                       const float *unit, size_t count);
