@@ -25,7 +25,7 @@
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
 #define FOLLOWED       5    /* core points that each other point asks for its side                 */
 #define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
-#define MEND_ROUNDS    6    /* of those, each with the winding number computed anew                */
+#define MEND_ROUNDS    6    /* of those, each followed by the winding number of what it gave         */
 #define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
 #define MISFIT_WEIGHT  4.0  /* of the winding number's misfit beside the neighbours' agreement     */
 #define WINDING_WEIGHT 0.6  /* of the winding number beside the neighbours' vote, of single points */
@@ -128,32 +128,48 @@ static double vote(const npg_sided_cloud *c, uint32_t i)
     return (weight > 0 ? sum / weight : 0) + WINDING_WEIGHT * fmax(-1, fmin(1, winding));
 }
 
-/* Turn single points that their surroundings vote against, until none is left. */
-static size_t turn_points(npg_sided_cloud *c)
+/* Turn single points that their surroundings vote against, until none is left; was_turned: which in all. */
+static void turn_points(npg_sided_cloud *c, uint8_t *was_turned)
 {
-    size_t all = 0;
+    memset(was_turned, 0, c->count);
     for (int round = 0; round < POINT_ROUNDS; round++) {
         size_t turned = 0;
         double bar = round < 3 ? -0.5 : round < 6 ? -0.25 : 0; /* the clear cases first; set by trial */
         for (uint32_t i = 0; i < c->count; i++)
             if (vote(c, i) < bar) {
                 turn_normal(c, i);
+                was_turned[i] ^= 1;
                 turned++;
             }
-        all += turned;
         if (!turned && bar >= 0) break;
     }
-    return all;
+}
+
+static size_t list_turned(uint32_t *list, const uint8_t *was_turned, size_t n)
+{
+    size_t count = 0;
+    for (uint32_t i = 0; i < n; i++)
+        if (was_turned[i]) list[count++] = i;
+    return count;
 }
 
 /* Single points against their surroundings, and the sign of the whole. */
 static npg_status settle_points(npg_sided_cloud *c)
 {
-    for (int round = 0; round < MEND_ROUNDS; round++) {
-        NPG_TRY(npg_sided_winding(c));
-        if (!turn_points(c)) break;
+    uint8_t *was_turned = NULL;
+    uint32_t *list = NULL;
+    size_t count = 1;
+    npg_status status = npg_sided_winding(c);
+    if (!status) status = npg_alloc(&was_turned, NPG_FOR_FRAMES, c->count);
+    if (!status) status = npg_alloc_array(&list, NPG_FOR_FRAMES, c->count, sizeof *list);
+    for (int round = 0; round < MEND_ROUNDS && count && !status; round++) {
+        turn_points(c, was_turned);
+        count = list_turned(list, was_turned, c->count);
+        if (count) status = npg_sided_rewind(c, list, count);
     }
-    return face_out(c);
+    npg_release(&was_turned);
+    npg_release(&list);
+    return status ? status : face_out(c);
 }
 
 /* Sides from directions alone. */
@@ -186,6 +202,7 @@ static npg_status find_doubts(uint8_t *in_doubt, float *given, npg_sided_cloud *
     for (size_t i = 0; i < n; i++)
         in_doubt[i] = memcmp(given + 3 * i, c->normals + 3 * i, 3 * sizeof *given) != 0;
     memcpy(c->normals, given, n * 3 * sizeof *given);
+    c->is_wound = false;
     return NPG_OK;
 }
 

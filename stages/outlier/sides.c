@@ -69,11 +69,24 @@ NPG_WIDE static float sum_panel(const panel *p, const float *at, float soft_sq)
 npg_status npg_sided_winding(npg_sided_cloud *c)
 {
     panel all;
+    if (c->is_wound) return NPG_OK;
     NPG_TRY(open_panel(&all, c->count));
     fill_panel(&all, c, NULL, c->count);
     for (size_t i = 0; i < c->count; i++)
         c->winding[i] = sum_panel(&all, c->points + 3 * i, c->soft_sq) / FULL_ANGLE;
     npg_release(&all.x);
+    c->is_wound = true;
+    return NPG_OK;
+}
+
+npg_status npg_sided_rewind(npg_sided_cloud *c, const uint32_t *turned, size_t count)
+{
+    panel some;
+    NPG_TRY(open_panel(&some, count));
+    fill_panel(&some, c, turned, count);
+    for (size_t i = 0; i < c->count; i++)
+        c->winding[i] += 2 * sum_panel(&some, c->points + 3 * i, c->soft_sq) / FULL_ANGLE;
+    npg_release(&some.x);
     return NPG_OK;
 }
 
@@ -136,6 +149,7 @@ npg_status npg_sided_grow_tree(npg_sided_cloud *c)
         root_of(&f, k, &turned);
         if (turned) turn_normal(c, k);
     }
+    c->is_wound = false;
     close_forest(&f);
     return status;
 }

@@ -22,6 +22,7 @@ typedef struct npg_sided_cloud { /* the points that are oriented together */
     float *normals;
     uint32_t *index;       /* count x NPG_SIDE_NEIGHBOURS, itself among them */
     float *area, *winding; /* count */
+    bool is_wound;         /* winding is that of the normals as they are */
     float soft_sq;         /* squared length below which the winding number is softened */
     npg_link *links;       /* link_count, owned */
     size_t link_count;
@@ -55,8 +56,12 @@ static inline double winding_misfit(float winding)
 
 /* The winding number at every point:
  * w(p_i) = 1/4pi sum_j A_j (p_j - p_i) . n_j / (|p_j - p_i|^2 + soft^2)^(3/2): about +1/2 on a closed surface
- * that faces out, -1/2 on one that faces in.  NPG_MEMORY. */
+ * that faces out, -1/2 on one that faces in.  All pairs of points are summed, and only where c->is_wound says
+ * that it has to be.  NPG_MEMORY. */
 npg_status npg_sided_winding(npg_sided_cloud *c);
+
+/* The same after these points (ascending) were turned, from what it was before.  NPG_MEMORY. */
+npg_status npg_sided_rewind(npg_sided_cloud *c, const uint32_t *turned, size_t count);
 
 /* Sides by the spanning tree of c->links, the surest links first. */
 npg_status npg_sided_grow_tree(npg_sided_cloud *c);
