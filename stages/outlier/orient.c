@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "outlier/sides.h"
@@ -254,15 +255,11 @@ static npg_status orient_core(npg_sided_cloud *c, bool from_given, double *score
 
 /* ---- large clouds: a core is oriented, the rest follows ---- */
 
-/* Evenly spread by index: clouds come in scan or random order, and either is spread over the surface. */
-static void take_core(float *points, float *normals, uint32_t *from, size_t core_count,
-                      const float *all_points, const float *all_normals, size_t n)
+/* CORE_MAX of n points, spread by index: clouds come in scan or random order, and either is spread over the
+ * surface. */
+static void list_core(uint32_t *from, size_t n)
 {
-    for (size_t i = 0; i < core_count; i++) {
-        from[i] = (uint32_t)((uint64_t)n * i / core_count);
-        memcpy(points + 3 * i, all_points + 3 * (size_t)from[i], 3 * sizeof *points);
-        memcpy(normals + 3 * i, all_normals + 3 * (size_t)from[i], 3 * sizeof *normals);
-    }
+    for (size_t i = 0; i < CORE_MAX; i++) from[i] = (uint32_t)npg_spread_index(i, CORE_MAX, n);
 }
 
 /* Turn a normal to the side that the core points around it agree on. */
@@ -313,7 +310,9 @@ static npg_status orient(float *normals, double *score, const float *points, siz
     npg_status status = npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from);
-    if (!status) take_core(core_points, core_normals, from, CORE_MAX, points, normals, n);
+    if (!status) list_core(from, n);
+    if (!status) npg_rows_gather(core_points, points, from, CORE_MAX);
+    if (!status) npg_rows_gather(core_normals, normals, from, CORE_MAX);
     npg_sided_cloud core = {.count = CORE_MAX, .points = core_points, .normals = core_normals};
     if (!status) status = orient_core(&core, from_given, score);
     if (!status) status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
@@ -329,12 +328,29 @@ npg_status npg_normals_orient(float *normals, double *score, const float *points
     return orient(normals, score, points, point_count, false);
 }
 
+/* ---- several numbers of neighbours ---- */
+
+static const int trial_neighbours[TRIALS] = {10, 12, 16, 24}; /* see normals.h for what they trade */
+
 typedef struct trials {     /* of the same points with several numbers of neighbours */
-    float *normals[TRIALS]; /* N x 3 each, owned */
+    float *normals[TRIALS]; /* count x 3 each, owned */
     double score[TRIALS];
-    const float *points;
+    const float *points; /* count x 3 */
     size_t count, parts;
 } trials;
+
+static npg_status open_trials(trials *t, const float *points, size_t count)
+{
+    *t = (trials){.points = points, .count = count, .parts = npg_parallel_parts(TRIALS, 1, TRIALS)};
+    for (size_t i = 0; i < TRIALS; i++)
+        NPG_TRY(npg_alloc_array(&t->normals[i], NPG_FOR_FRAMES, count, 3 * sizeof(float)));
+    return NPG_OK;
+}
+
+static void close_trials(trials *t)
+{
+    for (size_t i = 0; i < TRIALS; i++) npg_release(&t->normals[i]);
+}
 
 static npg_status orient_share(void *user, size_t part)
 {
@@ -344,21 +360,54 @@ static npg_status orient_share(void *user, size_t part)
     return NPG_OK;
 }
 
+/* Orient all and say which has the best score. */
+static npg_status run_trials(trials *t, size_t *best)
+{
+    NPG_TRY(npg_parallel(orient_share, t, t->parts));
+    *best = 0;
+    for (size_t i = 1; i < TRIALS; i++)
+        if (t->score[i] > t->score[*best]) *best = i;
+    return NPG_OK;
+}
+
+static npg_status make_small(float *normals, const float *points, size_t n)
+{
+    trials t;
+    size_t best;
+    npg_status status = open_trials(&t, points, n);
+    if (!status) status = npg_normals_estimate_several(t.normals, points, n, trial_neighbours, TRIALS);
+    if (!status) status = run_trials(&t, &best);
+    if (!status) memcpy(normals, t.normals[best], n * 3 * sizeof *normals);
+    close_trials(&t);
+    return status;
+}
+
+/* The core decides on the number of neighbours, and all others are estimated with that one alone. */
+static npg_status make_large(float *normals, const float *points, size_t n)
+{
+    trials t = {.count = 0};
+    float *core = NULL;
+    uint32_t *from = NULL;
+    size_t best;
+    npg_status status = npg_alloc_array(&core, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof *core);
+    if (!status) status = npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from);
+    if (!status) list_core(from, n);
+    if (!status) npg_rows_gather(core, points, from, CORE_MAX);
+    if (!status) status = open_trials(&t, core, CORE_MAX);
+    if (!status)
+        status = npg_normals_estimate_at(t.normals, from, CORE_MAX, points, n, trial_neighbours, TRIALS);
+    if (!status) status = run_trials(&t, &best);
+    if (!status) status = npg_normals_estimate(normals, points, n, trial_neighbours[best]);
+    if (!status) status = follow_core(normals, points, n, core, t.normals[best], CORE_MAX);
+    close_trials(&t);
+    npg_release(&core);
+    npg_release(&from);
+    return status;
+}
+
 npg_status npg_normals_make(float *normals, const float *points, size_t n)
 {
-    static const int neighbours[TRIALS] = {10, 12, 16, 24}; /* see normals.h for what they trade */
-    trials t = {.points = points, .count = n, .parts = npg_parallel_parts(TRIALS, 1, TRIALS)};
-    size_t best = 0;
-    npg_status status = NPG_OK;
-    for (size_t i = 0; i < TRIALS && !status; i++)
-        status = npg_alloc_array(&t.normals[i], NPG_FOR_FRAMES, n, 3 * sizeof(float));
-    if (!status) status = npg_normals_estimate_several(t.normals, points, n, neighbours, TRIALS);
-    if (!status) status = npg_parallel(orient_share, &t, t.parts);
-    for (size_t i = 1; i < TRIALS; i++)
-        if (t.score[i] > t.score[best]) best = i;
-    if (!status) memcpy(normals, t.normals[best], n * 3 * sizeof *normals);
-    for (size_t i = 0; i < TRIALS; i++) npg_release(&t.normals[i]);
-    return status;
+    return n > CORE_MAX ? make_large(normals, points, n) : make_small(normals, points, n);
 }
 
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t n)
