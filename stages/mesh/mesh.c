@@ -21,7 +21,8 @@
 #include "pipeline/stage.h"
 
 #define POINTS_MAX        80000
-#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
+#define START_POINTS      30000 /* of a surface that only carries the frames of a fusing pass */
+#define NOISE_MIN         0.03  /* in spacings; clean clouds have 0 */
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
@@ -148,11 +149,12 @@ static npg_status take_frame_points(making *m)
 {
     const npg_frame *frame = m->frame;
     size_t n = frame->point_count;
-    m->count = n < POINTS_MAX ? n : POINTS_MAX;
+    size_t most = npg_worker_pass(m->worker) == NPG_PASS_FUSE ? START_POINTS : POINTS_MAX;
+    m->count = n < most ? n : most;
     NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
     for (size_t i = 0; i < m->count; i++) {
-        size_t from = (size_t)((uint64_t)n * i / m->count);
+        size_t from = npg_spread_index(i, m->count, n);
         memcpy(m->points + 3 * i, frame->pos_local + 3 * from, 3 * sizeof(float));
         if (m->normals) memcpy(m->normals + 3 * i, frame->normals + 3 * from, 3 * sizeof(float));
     }
