@@ -172,6 +172,7 @@ static npg_status measure(bench *b, json_t *root)
     NPG_TRY(npg_bench_kernels(&b->meter, &b->body, b->s.only, visit_row, b));
     if (b->s.dense) NPG_TRY(npg_bench_dense(&b->meter, b->s.only, (size_t)b->s.dense, visit_row, b));
     if (b->s.cloud) NPG_TRY(npg_bench_clouds(&b->meter, b->s.only, (size_t)b->s.cloud, visit_row, b));
+    NPG_TRY(npg_bench_frame(&b->meter, b->s.only, visit_row, b));
     NPG_TRY(bench_fit(b, root));
     if (!json_object_size(b->kernels) && !json_object_get(root, "fit"))
         return npg_error(NPG_USAGE, "option only: no row's name begins with \"%s\"", b->s.only);

@@ -1,6 +1,7 @@
-/* Align as work to be timed: posing a dense surface. */
+/* Align as work to be timed: posing a dense surface, and aligning a frame. */
 #include "align/align.h"
 #include "align/graph.h"
+#include "align/tracker.h"
 
 enum { NODES = 1000 }; /* of the graph; how many there are makes no difference to the cost of a vertex */
 
@@ -46,5 +47,51 @@ npg_status npg_align_work(const npg_mesh *mesh, npg_work_visit *visit, void *use
     npg_release(&d.pose);
     npg_release(&d.rows);
     npg_release(&d.verts);
+    return status;
+}
+
+/* ---- a frame ---- */
+
+/* The options' defaults. */
+static const npg_tracker_settings usual = {
+    .nodes = 1600, .samples = 5000, .steps = 12, .stiffness = 0.006, .along = 0.001};
+
+typedef struct aligning {
+    npg_tracker *tracker;
+    double *pose;        /* K x 12 */
+    const float *points; /* loan */
+    size_t point_count;
+} aligning;
+
+static npg_status align_frame(void *user)
+{
+    aligning *a = user;
+    npg_tracked tracked;
+    npg_pose_rest(a->pose, npg_tracker_node_count(a->tracker));
+    return npg_tracker_fit(a->tracker, &tracked, a->pose, a->points, NULL, a->point_count, NULL);
+}
+
+npg_status npg_align_frame_work(npg_mesh *reference, const float *points, size_t point_count,
+                                npg_work_visit *visit, void *user)
+{
+    aligning a = {.points = points, .point_count = point_count};
+    const double N = (double)point_count, S = (double)usual.samples;
+    const double unknowns = NPG_GRAPH_BIND * NPG_POSE_SIZE;
+    /* In each step every point and every sample adds a row of the nodes that carry it to the normal equations,
+     * whose half is kept; their solution is not counted, it depends on the graph. */
+    npg_work work = {.name = "align_frame",
+                     .call = align_frame,
+                     .user = &a,
+                     .flops = usual.steps * (N + S) * unknowns * (unknowns + 1),
+                     .bytes = N * 12,
+                     .points = N,
+                     .on_host = true};
+    npg_status status = npg_tracker_open(&a.tracker, reference, &usual);
+    if (!status)
+        status = npg_alloc_array(&a.pose, NPG_FOR_RUN, npg_tracker_node_count(a.tracker),
+                                 NPG_POSE_SIZE * sizeof *a.pose);
+    if (!status) status = visit(user, &work);
+    npg_tracker_close(&a.tracker);
+    npg_release(&a.pose);
     return status;
 }

@@ -10,7 +10,7 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     [ "$status" -eq 0 ]
     [[ "$output" == *"share of the limit"*"mlp_forward"*"dense_carry"*"vertex-frames/s"*"an epoch"* ]]
     for word in peak sizes device mlp_backward nearest_and_chamfer share_of_bound seconds_per_epoch \
-        outlier_isolated outlier_normals surface_closest poisson processor_us_per_point; do
+        outlier_isolated outlier_normals surface_closest poisson align_frame export_ply processor_us_per_point; do
         grep -q "\"$word\":" now.json
     done
     # the same report with one kernel that takes twice its time

@@ -2,13 +2,18 @@
 #include "tools/bench/bench_rows.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "align/align.h"
+#include "export/export.h"
 #include "geometry/geometry.h"
 #include "mesh/mesh.h"
 #include "optimize/optimize.h"
 #include "outlier/outlier.h"
+#include "pipeline/file.h"
+#include "pipeline/memory.h"
 
 typedef struct bench {
     npg_meter *meter;
@@ -96,6 +101,44 @@ npg_status npg_bench_clouds(npg_meter *meter, const char *only, size_t points, n
     if (status || !has_poisson) return status;
     NPG_TRY(npg_bench_body_open(&body, BODY_VERTICES, few, 1));
     status = npg_mesh_work(body.points[0], few, time_row, &b);
+    npg_bench_body_close(&body);
+    return status;
+}
+
+/* An empty folder for temporary files.  NPG_DISK. */
+static npg_status make_folder(char **out)
+{
+    const char *parent = getenv("TMPDIR");
+    NPG_TRY(npg_join_path(out, parent && *parent ? parent : "/tmp", "neupig-bench-XXXXXX"));
+    if (mkdtemp(*out)) return NPG_OK;
+    npg_status status = npg_error_errno(NPG_DISK, "can't make %s", *out);
+    npg_release(out);
+    return status;
+}
+
+static npg_status time_export(bench *b, const npg_mesh *mesh)
+{
+    char *folder, *path = NULL;
+    NPG_TRY(make_folder(&folder));
+    npg_status status = npg_join_path(&path, folder, "frame.ply");
+    if (!status) status = npg_export_work(mesh, path, time_row, b);
+    if (path) unlink(path);
+    rmdir(folder);
+    npg_release(&path);
+    npg_release(&folder);
+    return status;
+}
+
+npg_status npg_bench_frame(npg_meter *meter, const char *only, npg_bench_visit *visit, void *user)
+{
+    enum { VERTICES = 10000, POINTS = 5000, FRAMES = 17, NEXT = 9 }; /* the body is at rest in frame 8 */
+    bench b = {meter, only, visit, user};
+    npg_bench_body body;
+    NPG_TRY(npg_bench_body_open(&body, VERTICES, POINTS, FRAMES));
+    npg_status status = NPG_OK;
+    if (npg_bench_wants(only, "align_frame"))
+        status = npg_align_frame_work(body.mesh, body.points[NEXT], POINTS, time_row, &b);
+    if (!status && npg_bench_wants(only, "export_ply")) status = time_export(&b, body.mesh);
     npg_bench_body_close(&body);
     return status;
 }
