@@ -16,7 +16,7 @@
 #define SWEEPS      5    /* at most                                                                     */
 #define ALIKE       3    /* frames whose points look alike that are started from                        */
 #define LOOK_POINTS 500  /* of a frame, for that                                                        */
-#define VAIN_MOST   4    /* lost frames in a row that no start improves: the reference does not fit     */
+#define VAIN_MOST   4    /* lost frames in a row that no start finds: the reference does not fit        */
 #define STARTS_MOST (ALIKE + 4)
 
 /* The usual fit begins ten times as stiff as it ends, and its weight is 0.08 wide.  A lost frame has moved
@@ -156,15 +156,13 @@ static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *
     return NPG_OK;
 }
 
-static npg_status recover_frame(bool *is_better, recovery *r, size_t i, int sweep)
+static npg_status recover_frame(recovery *r, size_t i, int sweep)
 {
     npg_recover_frame *frame = &r->frames[i];
-    double before = frame->tracked.chamfer;
     start starts[STARTS_MOST];
     size_t count;
     NPG_TRY(find_starts(starts, &count, r, i, sweep));
     for (size_t k = 0; k < count && is_lost(r, frame); k++) NPG_TRY(try_start(r, frame, &starts[k]));
-    *is_better = frame->tracked.chamfer < before;
     return NPG_OK;
 }
 
@@ -191,15 +189,15 @@ static size_t list_lost(recovery *r)
     return count;
 }
 
-static npg_status sweep_once(bool *is_better, recovery *r, size_t lost_count, int sweep)
+static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int sweep)
 {
     int vain = 0;
-    *is_better = false;
+    *is_found = false;
     for (size_t k = 0; k < lost_count && vain < VAIN_MOST; k++) {
-        bool is_this;
-        NPG_TRY(recover_frame(&is_this, r, r->lost[k], sweep));
+        NPG_TRY(recover_frame(r, r->lost[k], sweep));
+        bool is_this = !is_lost(r, &r->frames[r->lost[k]]);
         vain = is_this ? 0 : vain + 1;
-        *is_better |= is_this;
+        *is_found |= is_this;
     }
     return NPG_OK;
 }
@@ -225,12 +223,12 @@ static npg_status open_recovery(recovery *r)
 
 static npg_status run_sweeps(recovery *r)
 {
-    bool is_better = true;
-    for (int sweep = 0; sweep < SWEEPS && is_better; sweep++) {
+    bool is_found = true;
+    for (int sweep = 0; sweep < SWEEPS && is_found; sweep++) {
         set_level(r);
         size_t lost = list_lost(r);
         if (!sweep) r->result->lost = (int64_t)lost;
-        NPG_TRY(sweep_once(&is_better, r, lost, sweep));
+        NPG_TRY(sweep_once(&is_found, r, lost, sweep));
     }
     set_level(r);
     r->result->found = r->result->lost - (int64_t)list_lost(r);

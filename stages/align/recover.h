@@ -9,7 +9,7 @@
  *     3  the poses of the frame before it and of the one after it
  *
  * and the pose that explains its points best stays.  What is found helps the frames around it, so this is
- * repeated until nothing changes.  A frame is lost when its Chamfer distance is well above that of the
+ * repeated until none is found.  A frame is lost when its Chamfer distance is well above that of the
  * window's best quarter.  Not in the paper. */
 #ifndef NPG_RECOVER_H
 #define NPG_RECOVER_H
