@@ -127,7 +127,55 @@ P
     "$NEUPIG" probe capture/rig --json | python3 -c '
 import json, sys
 sensors = json.load(sys.stdin)["sensors"]
-assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.05 and s["apart"] < 0.01 for s in sensors), sensors'
+assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.02 and s["apart"] < 0.01 for s in sensors), sensors'
+}
+
+@test "a sensor that stands wrong is found, and the run corrects it" {
+    numpy
+    "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.3 --width 640 --height 480 --cell 0.04 --depth-noise 2 \
+        -o wide >synth.log
+    run "$NEUPIG" probe --rig wide/rig
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [ "$(grep -c '^pose .* aligned: ' <<<"$output")" -eq 3 ]
+    # 12 mm, and 0.7 degrees about an axis of no coordinate
+    /usr/bin/python3 - wide/rig <<'P'
+import json, sys
+import numpy as np
+rig = json.load(open(sys.argv[1] + "/rig.json"))
+pose = np.array(rig["sensors"][2]["pose"]).reshape(4, 4)
+w = np.radians(0.7) * np.array([2, 6, -3]) / 7
+cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+turn = np.eye(3) + np.sin(np.radians(0.7)) / np.radians(0.7) * cross + 0.5 * cross @ cross
+pose[:3, :3] = np.linalg.svd(turn)[0] @ np.linalg.svd(turn)[2] @ pose[:3, :3]
+pose[:3, 3] += 0.012 * np.array([-6, 2, 3]) / 7
+rig["sensors"][2]["pose"] = pose.ravel().tolist()
+json.dump(rig, open(sys.argv[1] + "/off.json", "w"))
+P
+    run "$NEUPIG" probe --rig wide/rig/off.json
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [ "$(grep -c '^attention' <<<"$output")" -eq 1 ]
+    [[ "$output" == *"attention sensor camera2: its pose is off by 1"*"--align-sensors corrects it"* ]]
+    run "$NEUPIG" probe --rig wide/rig/off.json --align-sensors
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *", corrected; then"* ]]
+    "$NEUPIG" probe --rig wide/rig/off.json --align-sensors --json | python3 -c '
+import json, sys
+before = [s["before"] for s in json.load(sys.stdin)["sensors"]]
+assert [s["pose"] == "off" for s in before] == [False, False, True, False], before
+assert abs(before[2]["shift"] - 0.012) < 0.002 and abs(before[2]["turn_deg"] - 0.7) < 0.2, before
+assert len(before[2]["correction"]) == 16'
+    for poses in rig.json off.json; do
+        "$NEUPIG" run --rig wide/rig/$poses --align-sensors -o "wide_$poses" --truth wide/truth "${small[@]}"
+    done
+    "$NEUPIG" run --rig wide/rig/off.json -o wide_wrong --truth wide/truth "${small[@]}"
+    [ "$(report wide_off.json '["stages"]["ingest"]["rig"]["sensors"][2]["pose"]')" = off ]
+    for out in wide_rig.json wide_off.json wide_wrong; do
+        report $out '["stages"]["evaluate"]["figures"]["truth_cd"]["mean"]'
+    done | tee cds
+    awk '{ cd[NR] = $1 } END { exit !(cd[2] < 1.15 * cd[1] && cd[3] > 1.3 * cd[2]) }' cds
 }
 
 @test "bad rigs end with exit code 3, the file and the place" {

@@ -44,6 +44,7 @@ void npg_depth_points_clear(npg_depth_points *points)
     npg_release(&points->pos);
     npg_release(&points->normals);
     npg_release(&points->colours);
+    npg_release(&points->pixels);
     *points = (npg_depth_points){0};
 }
 
@@ -223,6 +224,7 @@ static npg_status reserve(npg_depth_points *points, const grid *g)
     for (size_t i = 0; i < g->width * g->height; i++) kept += g->keep[i];
     NPG_TRY(npg_alloc_array(&points->pos, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&points->normals, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&points->pixels, NPG_FOR_FRAMES, kept, sizeof *points->pixels));
     points->has_colours = g->colour.bytes != NULL;
     return points->has_colours ? npg_alloc_array(&points->colours, NPG_FOR_FRAMES, kept, 4) : NPG_OK;
 }
@@ -238,6 +240,7 @@ static void add_points(npg_depth_points *points, const grid *g)
             pos[0] = rays[2 * at] * g->z[at];
             pos[1] = rays[2 * at + 1] * g->z[at];
             pos[2] = g->z[at];
+            points->pixels[n] = (uint32_t)at;
             if (points->colours) take_colour(g, at, pos, points->colours + 4 * n);
             points->count++;
         }

@@ -145,6 +145,7 @@ void npg_rig_close(npg_rig **slot)
     npg_release(&rig->shot_of);
     npg_release(&rig->path);
     npg_release(&rig->folder);
+    npg_release(&rig->unit);
     npg_release(slot);
 }
 
@@ -339,7 +340,25 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
             pose[4 * r + 1] = -pose[4 * r + 1];
             pose[4 * r + 2] = -pose[4 * r + 2];
         }
-    memcpy(out, pose, sizeof pose);
+    if (sensor->is_corrected)
+        npg_pose_combine(out, sensor->correction, pose);
+    else
+        memcpy(out, pose, sizeof pose);
+}
+
+void npg_rig_correct(npg_rig *rig, const npg_rig_view *views)
+{
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        npg_rig_sensor *sensor = &rig->sensors[s];
+        double before[12];
+        if (views[s].verdict != NPG_RIG_OFF) continue;
+        memcpy(before, sensor->correction, sizeof before);
+        if (sensor->is_corrected)
+            npg_pose_combine(sensor->correction, views[s].correction, before);
+        else
+            memcpy(sensor->correction, views[s].correction, sizeof before);
+        sensor->is_corrected = true;
+    }
 }
 
 uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame)

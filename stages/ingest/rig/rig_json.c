@@ -323,6 +323,7 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
     NPG_TRY(get_text(&top, root, "axes", &axes));
     NPG_TRY(get_text(&top, root, "comment", &text));
     NPG_TRY(get_text(&top, root, "unit", &text));
+    if (text) NPG_TRY(npg_copy_text(&rig->unit, text));
     if (axes && strcmp(axes, "opencv") != 0 && strcmp(axes, "opengl") != 0)
         return bad(&top, "axes",
                    "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
