@@ -62,7 +62,7 @@ assert (m["colours"][:, 3] >= 254).all() and "frame_colours" not in m'
 
 @test "each frame's own colours, or none" {
     numpy
-    "$NEUPIG" run capture/rig -o own --frames 0:2 --colour frames --export ply,npz,obj "${small[@]}"
+    "$NEUPIG" run capture/rig -o own --frames 0:2 --colour frames --export ply,npz,obj,usda "${small[@]}"
     "$NEUPIG" run capture/rig -o none --frames 0:2 --colour no --export npz "${small[@]}"
     /usr/bin/python3 -c '
 import numpy
@@ -71,6 +71,21 @@ c = m["frame_colours"]
 assert c.shape == m["vertices"].shape[:2] + (4,) and (c[0] != c[1]).any()
 assert (c[..., 3] == 255).mean() > 0.5
 assert "colours" not in n'
+    # USD has them as samples, in linear light
+    python3 - own <<'P'
+import re, struct, sys
+text = open(sys.argv[1] + "/motion.usda").read()
+samples = text.split("primvars:displayColor.timeSamples = {")[1].split("}")[0]
+for frame in (0, 1):
+    head, body = open(f"{sys.argv[1]}/meshes/frame_000{frame}.ply", "rb").read().split(b"end_header\n", 1)
+    fields = re.findall(rb"property (float|uchar) (\w+)", head.split(b"element face")[0])
+    form = "<" + "".join({b"float": "f", b"uchar": "B"}[kind] for kind, _ in fields)
+    red = [name for _, name in fields].index(b"red")
+    colour = struct.unpack_from(form, body)[red:red + 3]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (byte / 255 for byte in colour)]
+    first = re.search(rf"\n +{frame}: \[\(([^)]*)\)", samples).group(1).split(",")
+    assert all(abs(float(a) - b) < 1e-5 for a, b in zip(first, linear)), (frame, first, linear)
+P
     ! has_colours none/reference.ply
     ! cmp -s <(grep '^v ' own/obj/frame_0000.obj | cut -d' ' -f5-) <(grep '^v ' own/obj/frame_0001.obj | cut -d' ' -f5-)
 }
