@@ -70,8 +70,9 @@ static const npg_option ingest_options[] = {
         "Neighbouring pixels of a depth image are one surface while their depths differ by less "
         "than this share"),
     NPG_ROW_INT   ("depth-margin",  AT(rig.margin),      "1",           0,     64,      "PIXELS",
-        "Pixels to drop beside depth steps, missing depth and the mask's border: there sensors mix "
-        "the body with what is behind it"),
+        "Pixels beside depth steps, missing depth and the mask's border, where sensors mix the body with "
+        "what is behind it: they are dropped, but for those beside the others that continue their surface; "
+        "0: all are used"),
     NPG_ROW_REAL  ("depth-near",    AT(rig.near_m),      "0",           0,     1e12,    "LENGTH",
         "Depths below this are not used, in the rig's unit"),
     NPG_ROW_REAL  ("depth-far",     AT(rig.far_m),       "0",           0,     1e12,    "LENGTH",

@@ -25,7 +25,8 @@ typedef struct npg_rig_settings {
     int poses;            /* npg_rig_poses                                                            */
     double step_share;    /* neighbouring pixels whose depths differ by more than this share of the   */
                           /* nearer one are not one surface                                           */
-    int64_t margin;       /* pixels that are dropped beside such a step and beside missing depth      */
+    int64_t margin;       /* pixels beside such a step and beside missing depth that are dropped      */
+                          /* unless they continue the surface; 0: none                                */
     double near_m, far_m; /* depths that are used, in the rig's unit; far 0: no limit                */
     double tolerance_s;   /* images of different sensors belong together within this                  */
     bool confine;         /* refuse what the rig names outside its folder                             */
