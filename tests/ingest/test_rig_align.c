@@ -258,7 +258,7 @@ static void memory_runs_out(void **state)
     (void)state;
     static const size_t frames[FRAMES] = {0, 1, 2, 3};
     npg_rig_settings usual = npg_rig_defaults();
-    for (uint64_t n = 1; n < 400; n += 7) {
+    for (uint64_t n = 1; n < 1000; n += 1 + n / 2) {
         npg_rig_view views[4];
         npg_rig *rig;
         assert_int_equal(npg_rig_open(&rig, in_folder(&folder, "ring"), &usual), NPG_OK);
