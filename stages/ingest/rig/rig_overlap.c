@@ -72,7 +72,7 @@ static double difference(const npg_rig_sights *s, const npg_correction *a, const
 static size_t most_agreed(const npg_rig_sights *s, const npg_correction *corrections)
 {
     size_t best = 0;
-    double least = INFINITY;
+    double least = HUGE_VAL;
     for (size_t k = 0; k < s->sensor_count; k++) {
         double sum = 0;
         for (size_t o = 0; o < s->sensor_count; o++) sum += difference(s, &corrections[k], &corrections[o]);
@@ -105,7 +105,7 @@ static npg_rig_verdict judge(const npg_rig_sights *s, const npg_correction *c)
 
 static void tell(npg_rig_view *view, const npg_correction *c)
 {
-    double known = view->overlap > 0 ? 1 : (double)INFINITY; /* else the deviations are the prior's */
+    double known = view->overlap > 0 ? 1 : HUGE_VAL; /* else the deviations are the prior's */
     view->shift = c->shift;
     view->turn_deg = c->turn * 180 / M_PI;
     view->shift_sd = known * c->shift_sd;
@@ -121,7 +121,7 @@ typedef struct aligning {
 
 static void start(npg_correction *c)
 {
-    *c = (npg_correction){.shift_sd = INFINITY, .turn_sd = INFINITY};
+    *c = (npg_correction){.shift_sd = HUGE_VAL, .turn_sd = HUGE_VAL};
     npg_pose_identity(c->pose);
 }
 
