@@ -129,7 +129,7 @@ void npg_depth_points_clear(npg_depth_points *points);
 typedef enum npg_rig_verdict {
     NPG_RIG_ALONE,   /* there is no other sensor                                    */
     NPG_RIG_FIXED,   /* the others are measured against it: most agree with it      */
-    NPG_RIG_ALIGNED, /* within 0.0008 of the depth (2 mm at 2.5 m) and 0.2 degrees  */
+    NPG_RIG_ALIGNED, /* within 0.001 of the depth (2.5 mm at 2.5 m) and 0.2 degrees */
     NPG_RIG_OFF,     /* beyond that, and beyond three deviations                    */
     NPG_RIG_UNKNOWN  /* what they see together does not determine it                */
 } npg_rig_verdict;

@@ -9,7 +9,7 @@
 
 #define SIGHTS_MAX  256    /* read at once: a rig of many sensors is measured in fewer frames   */
 #define SOURCES_MAX 1500   /* points of a sight that are looked up in the others for the overlap */
-#define SAME_SHIFT  0.0008 /* of the depth: 2 mm at 2.5 m, to which depth cameras are calibrated */
+#define SAME_SHIFT  0.001  /* of the depth: 2.5 mm at 2.5 m, about what rigs are calibrated to      */
 #define SAME_TURN   0.0035 /* radians: 0.2 degrees                                              */
 #define SURE        3      /* deviations that a correction must be larger than                  */
 #define SD_SHIFT    0.002  /* of the depth: with a deviation above this nothing can be said     */
