@@ -24,7 +24,8 @@ const npg_option npg_probe_options[] = {
         "Print one JSON object instead of text"),
     NPG_ROW_TEXT("rig",  AT(rig),  "",      "PATH",
         "Depth images instead of clouds, the same as giving them as INPUT: also says per sensor how many "
-        "frames and points it has, how much it sees of what others see, and how far it lies from theirs"),
+        "frames and points it has, how much it sees of what others see, how far it lies from theirs, and "
+        "how far its pose is off (with --align-sensors: was off, and what is left)"),
     {0}};
 /* clang-format on */
 
@@ -34,6 +35,7 @@ typedef struct job {
     const char *input;
     npg_frame_files *list; /* NULL for standard input             */
     npg_rig_view *views;   /* per sensor of a rig; owned, or NULL */
+    npg_rig_view *before;  /* the same before option align-sensors; owned, or NULL */
     npg_probe probe;
 } job;
 
@@ -50,6 +52,7 @@ static npg_status read_stream(job *j)
 {
     npg_stream *stream;
     npg_status status = NPG_OK;
+    double begin_s = npg_clock_s();
     NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input"));
     for (int64_t number = 0; !status; number++) {
         npg_frame frame = {0};
@@ -60,42 +63,69 @@ static npg_status read_stream(job *j)
         if (broken) break;
     }
     npg_stream_close(&stream);
+    j->probe.read_s = npg_clock_s() - begin_s;
     return status == NPG_END ? NPG_OK : status;
 }
 
-#define SENSOR_SAMPLE 12   /* frames in which sensors are compared */
-#define APART_MOST    0.01 /* metres between what two sensors see: more than the noise of depth cameras */
+#define APART_MOST    0.004 /* of the depth, between what two sensors see: 1 cm at 2.5 m, more than noise */
+#define OVERLAP_LEAST 0.02
 
-/* Sensors against each other. */
-static npg_status compare_sensors(job *j)
+/* Sensors against each other; with option align-sensors what they are then read with. */
+static npg_status compare_sensors(job *j, npg_rig_view **views)
 {
-    npg_rig *rig = j->list->rig;
-    NPG_TRY(npg_alloc_array(&j->views, NPG_FOR_FILES, rig->sensor_count, sizeof *j->views));
-    npg_status status = npg_rig_compare(rig, j->views, SENSOR_SAMPLE);
-    if (status == NPG_BAD_INPUT) { /* an image that reading has reported */
-        npg_release(&j->views);
-        return NPG_OK;
-    }
-    for (size_t s = 0; s < rig->sensor_count && !status; s++) {
-        const npg_rig_view *v = &j->views[s];
-        if (v->apart > APART_MOST)
-            npg_probe_warn(&j->probe,
-                           "sensor %s sees surfaces %.1f mm (rms) beside those that others see: its pose?",
-                           rig->sensors[s].name, 1000 * v->apart);
-        if (rig->sensor_count > 1 && v->frames && v->overlap < 0.02)
-            npg_probe_warn(&j->probe, "sensor %s sees almost nothing that others see: its pose?",
-                           rig->sensors[s].name);
-    }
+    NPG_TRY(npg_alloc_array(views, NPG_FOR_FILES, j->list->rig->sensor_count, sizeof **views));
+    return npg_frame_files_compare(j->list, *views);
+}
+
+static npg_status align_sensors(job *j)
+{
+    if (!j->list->rig || !option_on(j->options, "align-sensors")) return NPG_OK;
+    NPG_TRY(compare_sensors(j, &j->before));
+    npg_rig_correct(j->list->rig, j->before);
+    return NPG_OK;
+}
+
+static void warn_of_sensor(job *j, size_t s, bool is_any_off)
+{
+    const npg_rig *rig = j->list->rig;
+    const npg_rig_view *v = &j->views[s];
+    const char *name = rig->sensors[s].name;
+    char text[160];
+    npg_rig_describe_pose(text, sizeof text, rig, v);
+    if (v->verdict == NPG_RIG_OFF)
+        npg_probe_warn(&j->probe, "sensor %s: its pose is %s; --align-sensors corrects it", name, text);
+    npg_rig_describe_length(text, sizeof text, rig, v->apart);
+    if (!is_any_off && v->apart > APART_MOST * v->depth)
+        npg_probe_warn(&j->probe, "sensor %s sees surfaces %s beside those that others see: its pose?", name,
+                       text);
+    if (rig->sensor_count > 1 && v->frames && v->overlap < OVERLAP_LEAST)
+        npg_probe_warn(&j->probe, "sensor %s sees almost nothing that others see: its pose?", name);
+}
+
+/* A sensor that is off makes the others seem apart from it, too: then only that one is named. */
+static void warn_of_sensors(job *j)
+{
+    bool is_any_off = false;
+    size_t count = j->list->rig->sensor_count;
+    for (size_t s = 0; s < count; s++) is_any_off = is_any_off || j->views[s].verdict == NPG_RIG_OFF;
+    for (size_t s = 0; s < count; s++) warn_of_sensor(j, s, is_any_off);
+}
+
+static npg_status read_files(job *j)
+{
+    NPG_TRY(npg_capture_list(&j->list, j->options));
+    NPG_TRY(align_sensors(j));
+    double begin_s = npg_clock_s();
+    npg_status status = npg_probe_files(&j->probe, j->list);
+    j->probe.read_s = npg_clock_s() - begin_s;
+    if (!status && j->list->rig) status = compare_sensors(j, &j->views);
+    if (!status && j->list->rig) warn_of_sensors(j);
     return status;
 }
 
 static npg_status read_all(job *j)
 {
-    double begin_s = npg_clock_s();
-    npg_status status =
-        strcmp(j->input, "-") ? npg_probe_files(&j->probe, &j->list, j->options) : read_stream(j);
-    j->probe.read_s = npg_clock_s() - begin_s;
-    if (!status && j->list && j->list->rig) status = compare_sensors(j);
+    npg_status status = strcmp(j->input, "-") ? read_files(j) : read_stream(j);
     if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
     return status;
 }
@@ -109,6 +139,18 @@ static size_t images_of(const npg_rig *rig, size_t s)
     return count;
 }
 
+static void print_pose(const job *j, size_t s)
+{
+    const npg_rig *rig = j->list->rig;
+    char text[160];
+    if (j->before && j->before[s].verdict == NPG_RIG_OFF) {
+        npg_rig_describe_pose(text, sizeof text, rig, &j->before[s]);
+        printf("pose      %-12s %s, corrected; then\n", rig->sensors[s].name, text);
+    }
+    npg_rig_describe_pose(text, sizeof text, rig, &j->views[s]);
+    printf("pose      %-12s %s\n", rig->sensors[s].name, text);
+}
+
 static void print_sensors(const job *j)
 {
     const npg_rig *rig = j->list ? j->list->rig : NULL;
@@ -116,11 +158,14 @@ static void print_sensors(const job *j)
         const npg_rig_view *v = &j->views[s];
         printf("sensor    %-12s %zu images, %zu points each", rig->sensors[s].name, images_of(rig, s),
                v->frames ? v->points / v->frames : 0);
+        char text[160];
+        npg_rig_describe_length(text, sizeof text, rig, v->apart);
         if (rig->sensor_count > 1)
-            printf("; overlap %.0f %%, there %.1f mm (rms) beside the others", 100 * v->overlap,
-                   1000 * v->apart);
+            printf("; overlap %.0f %%, there %s beside the others", 100 * v->overlap, text);
         puts("");
     }
+    for (size_t s = 0; rig && j->views && rig->sensor_count > 1 && s < rig->sensor_count; s++)
+        print_pose(j, s);
 }
 
 static json_t *json_of_sensors(const job *j)
@@ -129,10 +174,17 @@ static json_t *json_of_sensors(const job *j)
     const npg_rig *rig = j->list->rig;
     for (size_t s = 0; s < rig->sensor_count; s++) {
         const npg_rig_view *v = &j->views[s];
-        json_array_append_new(list, json_pack("{so sI sI sf sf}", "name", npg_json_text(rig->sensors[s].name),
-                                              "images", (json_int_t)images_of(rig, s), "points",
-                                              (json_int_t)(v->frames ? v->points / v->frames : 0), "overlap",
-                                              v->overlap, "apart", v->apart));
+        json_t *one = json_pack("{so sI sI sf sf}", "name", npg_json_text(rig->sensors[s].name), "images",
+                                (json_int_t)images_of(rig, s), "points",
+                                (json_int_t)(v->frames ? v->points / v->frames : 0), "overlap", v->overlap,
+                                "apart", v->apart);
+        npg_rig_report_pose(one, v);
+        if (j->before) {
+            json_t *before = json_object();
+            npg_rig_report_pose(before, &j->before[s]);
+            json_object_set_new(one, "before", before);
+        }
+        json_array_append_new(list, one);
     }
     return list;
 }
@@ -229,6 +281,7 @@ int npg_verb_probe(int argc, char **argv)
         if (!status) status = do_probe(&j);
     }
     npg_release(&j.views);
+    npg_release(&j.before);
     npg_frame_files_close(&j.list);
     npg_probe_uninit(&j.probe);
     npg_options_close(&options);

@@ -417,6 +417,10 @@ static npg_status write_forms(npg_worker *worker)
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_form_facts facts = form_facts(worker);
     npg_status status = place_reference(worker, &facts, &rest, &corners);
+    if (!status && facts.has_pose_colours && npg_forms_name(state->exports, "glb"))
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "motion.glb has the reference's colours: morph targets of colours are an option of "
+                       "glTF that few programs read");
     if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
     npg_release(&rest);
     npg_release(&corners);

@@ -171,6 +171,17 @@ npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_fr
     return status;
 }
 
+npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view *views)
+{
+    size_t *frames, count = 0;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FILES, list->count, sizeof *frames));
+    for (size_t i = 0; i < list->count; i++)
+        if (list->slots[i].path) frames[count++] = npg_rig_find(list->rig, list->slots[i].number);
+    npg_status status = npg_rig_compare(list->rig, views, frames, count);
+    npg_release(&frames);
+    return status;
+}
+
 npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
                                 npg_status (*visit)(void *user, const char *path), void *user)
 {

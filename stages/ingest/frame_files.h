@@ -43,6 +43,9 @@ npg_status npg_frame_files_open_any(npg_frame_files **list, const char *input, c
 npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_frame *frame,
                                 npg_origin *origin);
 
+/* npg_rig_compare() over the slots that have a path, of a list that has a rig. */
+npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view *views);
+
 /* Call visit for each file that the frame `slot` is made of; ends with the first status but NPG_OK. */
 npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
                                 npg_status (*visit)(void *user, const char *path), void *user);

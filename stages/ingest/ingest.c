@@ -6,6 +6,7 @@
 #include "ingest/capture.h"
 #include "ingest/follow.h"
 #include "ingest/formats/reader.h"
+#include "ingest/rig/rig_report.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/stage.h"
@@ -19,6 +20,7 @@ typedef struct state {
     double follow_idle_s, follow_settle_s;
     int missing;
     int64_t cache_mib;
+    bool align_sensors;
     npg_rig_settings rig;
     int64_t next; /* place in the pass's order; live: frames emitted so far */
     /* live */
@@ -60,12 +62,17 @@ static const npg_option ingest_options[] = {
         "sensor), or none: every sensor stands at the origin, for a body that moves before one sensor"),
     NPG_ROW_REAL  ("sensor-tolerance", AT(rig.tolerance_s), "0.02",     0,     3600,    "SECONDS",
         "Images of a rig with time stamps belong together when they are no further apart"),
+    NPG_ROW_FLAG  ("align-sensors", AT(align_sensors),   "no",
+        "Correct the poses of a rig's sensors that are off, by what they see together with the others in "
+        "these frames; one correction for each sensor, the same in all frames. What the surfaces do not "
+        "determine stays as it is"),
     NPG_ROW_REAL  ("depth-step",    AT(rig.step_share),  "0.02",        1e-5,  10,      "SHARE",
         "Neighbouring pixels of a depth image are one surface while their depths differ by less "
         "than this share"),
     NPG_ROW_INT   ("depth-margin",  AT(rig.margin),      "1",           0,     64,      "PIXELS",
-        "Pixels to drop beside depth steps, missing depth and the mask's border: there sensors mix "
-        "the body with what is behind it"),
+        "Pixels beside depth steps, missing depth and the mask's border, where sensors mix the body with "
+        "what is behind it: they are dropped, but for those beside the others that continue their surface; "
+        "0: all are used"),
     NPG_ROW_REAL  ("depth-near",    AT(rig.near_m),      "0",           0,     1e12,    "LENGTH",
         "Depths below this are not used, in the rig's unit"),
     NPG_ROW_REAL  ("depth-far",     AT(rig.far_m),       "0",           0,     1e12,    "LENGTH",
@@ -131,6 +138,29 @@ static void report_rig(npg_worker *worker, npg_rig *rig)
                         rig->left_out, rig->settings.tolerance_s);
 }
 
+static void report_sensor(npg_worker *worker, const npg_rig *rig, const npg_rig_view *view, size_t i)
+{
+    char text[160];
+    json_t *of_rig = json_object_get(npg_worker_report(worker), "rig");
+    npg_rig_report_pose(json_array_get(json_object_get(of_rig, "sensors"), i), view);
+    npg_rig_describe_pose(text, sizeof text, rig, view);
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "sensor %s: pose %s%s", rig->sensors[i].name, text,
+                   view->verdict == NPG_RIG_OFF ? ", corrected" : "");
+}
+
+/* Option align-sensors. */
+static npg_status align_sensors(npg_worker *worker, const npg_frame_files *list)
+{
+    npg_rig_view *views;
+    npg_rig *rig = list->rig;
+    NPG_TRY(npg_alloc_array(&views, NPG_FOR_FILES, rig->sensor_count, sizeof *views));
+    npg_status status = npg_frame_files_compare(list, views);
+    if (!status) npg_rig_correct(rig, views);
+    for (size_t i = 0; i < rig->sensor_count && !status; i++) report_sensor(worker, rig, &views[i], i);
+    npg_release(&views);
+    return status;
+}
+
 static npg_status list_frames(npg_frame_files **list, const state *s, const npg_settings *settings,
                               const char *selection)
 {
@@ -179,7 +209,7 @@ static npg_status open_capture(npg_worker *worker)
     if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
     report_list(worker, capture->list);
     if (capture->list->rig) report_rig(worker, capture->list->rig);
-    return NPG_OK;
+    return capture->list->rig && s->align_sensors ? align_sensors(worker, capture->list) : NPG_OK;
 }
 
 static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index)

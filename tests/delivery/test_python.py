@@ -116,6 +116,34 @@ class Arrays(unittest.TestCase):
             self.assertEqual(numbers, [10, 11, 12, 13])
             self.assertIn(run.wait(), (neupig.Status.OK, neupig.Status.PARTIAL))
 
+    def test_colours_go_in_and_come_out(self):
+        def painted(frame):  # red above, green below; blue says the frame
+            points, normals = ball(frame)
+            above = points[:, 2] > 120
+            return points, normals, np.stack([200 * above, 200 * ~above, np.full(len(points), 40 * frame)], 1).astype(np.uint8)
+
+        seen = []
+
+        def watch(frame):
+            seen.append(int(frame.colours[:, 2].max()))
+
+        stage = neupig.Stage("watch", "evaluate", watch)
+        motion = neupig.reconstruct((painted(t) for t in range(3)), stages=[stage], colour="frames", **SMALL)
+        self.assertEqual(motion.colours.shape, motion.vertices.shape[:2] + (4,))
+        self.assertEqual(sorted(seen), [0, 40, 80])
+        for t in range(3):
+            height = motion.vertices[t][:, 2] - 120
+            self.assertGreater(motion.colours[t][height > 0.3, 0].min(), 150)
+            self.assertGreater(motion.colours[t][height < -0.3, 1].min(), 150)
+            self.assertEqual(np.median(motion.colours[t][:, 2]), 40 * t)
+        one = neupig.reconstruct((painted(t) for t in range(2)), **SMALL)
+        self.assertEqual(one.colours.shape, (one.vertices.shape[1], 4))
+        self.assertIsNone(neupig.reconstruct((painted(t) for t in range(2)), colour="no", **SMALL).colours)
+        with neupig.Run(pull=True, **SMALL) as run:
+            with self.assertRaises(neupig.Error) as caught:
+                run.push(*ball(0), np.zeros((900, 2), np.uint8), number=0)
+            self.assertIs(caught.exception.status, neupig.Status.USAGE)
+
     def test_a_stage_of_ones_own_sees_and_drops_points(self):
         seen = []
 

@@ -312,6 +312,46 @@ static void colours_and_seams_come_along(void **state)
     free(obj);
 }
 
+static void colours_of_frames_come_along(void **state)
+{
+    const char *out = make_run("hues", 2, -1);
+    npg_form_facts facts = facts_of(out);
+    npg_form_watch watch = {0};
+    (void)state;
+    for (int64_t t = 0; t < 2; t++) { /* the meshes again, with colours: in the second one all are grey */
+        char path[600];
+        float pos[3 * V];
+        double world[3 * V];
+        uint8_t grey[4 * V];
+        memset(grey, 188, sizeof grey);
+        pose_at(pos, t);
+        for (int i = 0; i < 3 * V; i++) world[i] = (double)pos[i];
+        npg_mesh_view view = {.vert_count = V,
+                              .face_count = F,
+                              .vert_world = world,
+                              .faces = faces,
+                              .vert_colours = t ? grey : colours};
+        snprintf(path, sizeof path, "%s/meshes/frame_%04d.ply", out, (int)t + 10);
+        assert_int_equal(npg_write_ply(path, &view), NPG_OK);
+    }
+    facts.colours = colours;
+    facts.has_pose_colours = true;
+    assert_int_equal(write_list("usda,npz", &facts, &watch), NPG_OK);
+    char *usda = text_of_file(in_folder(&folder, "hues/motion.usda"));
+    const char *samples = strstr(usda, "        color3f[] primvars:displayColor.timeSamples = {\n");
+    assert_non_null(strstr(usda, "        color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0)"));
+    assert_non_null(samples);
+    const char *first = strstr(samples, "            0: [(1.00000, 0.00000, 0.00000), (0.00000, 1.00000, "),
+               *second = strstr(samples, "            1: [(0.50289, 0.50289, 0.50289), (0.50289, ");
+    const char *end =
+        strstr(samples, "        }\n        point3f[] points.timeSamples = {\n            0: [");
+    assert_true(first && second && end && samples < first && first < second && second < end);
+    int tuples = 0;
+    for (const char *at = first; at < end; at++) tuples += *at == '(';
+    assert_int_equal(tuples, 2 * V);
+    free(usda);
+}
+
 static void level_sets_close_openings(void **state)
 {
     const char *out = make_run("volume", 1, -1);
@@ -665,6 +705,7 @@ int main(void)
         cmocka_unit_test(what_a_form_can_not_hold_is_refused),
         cmocka_unit_test(point_caches_repeat_what_is_missing),
         cmocka_unit_test(a_long_capture_becomes_several_glb),
+        cmocka_unit_test(colours_of_frames_come_along),
         cmocka_unit_test(colours_and_seams_come_along),
         cmocka_unit_test(level_sets_close_openings),
         cmocka_unit_test(large_archives_get_zip64),

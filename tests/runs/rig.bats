@@ -62,7 +62,7 @@ assert (m["colours"][:, 3] >= 254).all() and "frame_colours" not in m'
 
 @test "each frame's own colours, or none" {
     numpy
-    "$NEUPIG" run capture/rig -o own --frames 0:2 --colour frames --export ply,npz,obj "${small[@]}"
+    "$NEUPIG" run capture/rig -o own --frames 0:2 --colour frames --export ply,npz,obj,usda "${small[@]}"
     "$NEUPIG" run capture/rig -o none --frames 0:2 --colour no --export npz "${small[@]}"
     /usr/bin/python3 -c '
 import numpy
@@ -71,6 +71,21 @@ c = m["frame_colours"]
 assert c.shape == m["vertices"].shape[:2] + (4,) and (c[0] != c[1]).any()
 assert (c[..., 3] == 255).mean() > 0.5
 assert "colours" not in n'
+    # USD has them as samples, in linear light
+    python3 - own <<'P'
+import re, struct, sys
+text = open(sys.argv[1] + "/motion.usda").read()
+samples = text.split("primvars:displayColor.timeSamples = {")[1].split("}")[0]
+for frame in (0, 1):
+    head, body = open(f"{sys.argv[1]}/meshes/frame_000{frame}.ply", "rb").read().split(b"end_header\n", 1)
+    fields = re.findall(rb"property (float|uchar) (\w+)", head.split(b"element face")[0])
+    form = "<" + "".join({b"float": "f", b"uchar": "B"}[kind] for kind, _ in fields)
+    red = [name for _, name in fields].index(b"red")
+    colour = struct.unpack_from(form, body)[red:red + 3]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (byte / 255 for byte in colour)]
+    first = re.search(rf"\n +{frame}: \[\(([^)]*)\)", samples).group(1).split(",")
+    assert all(abs(float(a) - b) < 1e-5 for a, b in zip(first, linear)), (frame, first, linear)
+P
     ! has_colours none/reference.ply
     ! cmp -s <(grep '^v ' own/obj/frame_0000.obj | cut -d' ' -f5-) <(grep '^v ' own/obj/frame_0001.obj | cut -d' ' -f5-)
 }
@@ -127,7 +142,56 @@ P
     "$NEUPIG" probe capture/rig --json | python3 -c '
 import json, sys
 sensors = json.load(sys.stdin)["sensors"]
-assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.05 and s["apart"] < 0.01 for s in sensors), sensors'
+assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.02 and s["apart"] < 0.01 for s in sensors), sensors'
+}
+
+@test "a sensor that stands wrong is found, and the run corrects it" {
+    numpy
+    "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.1 --width 640 --height 480 --cell 0.03 --depth-noise 2 \
+        -o wide >synth.log
+    run "$NEUPIG" probe --rig wide/rig
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [ "$(grep -c '^pose .* aligned: ' <<<"$output")" -eq 3 ]
+    # 12 mm, and 0.7 degrees about an axis of no coordinate
+    /usr/bin/python3 - wide/rig <<'P'
+import json, sys
+import numpy as np
+rig = json.load(open(sys.argv[1] + "/rig.json"))
+pose = np.array(rig["sensors"][2]["pose"]).reshape(4, 4)
+w = np.radians(0.7) * np.array([2, 6, -3]) / 7
+cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+turn = np.eye(3) + np.sin(np.radians(0.7)) / np.radians(0.7) * cross + 0.5 * cross @ cross
+pose[:3, :3] = np.linalg.svd(turn)[0] @ np.linalg.svd(turn)[2] @ pose[:3, :3]
+pose[:3, 3] += 0.012 * np.array([6, -2, -3]) / 7
+rig["sensors"][2]["pose"] = pose.ravel().tolist()
+json.dump(rig, open(sys.argv[1] + "/off.json", "w"))
+P
+    run "$NEUPIG" probe --rig wide/rig/off.json
+    echo "$output"
+    [ "$status" -eq 7 ]
+    [ "$(grep -c '^attention' <<<"$output")" -eq 1 ]
+    [[ "$output" == *"attention sensor camera2: its pose is off by 1"*"--align-sensors corrects it"* ]]
+    run "$NEUPIG" probe --rig wide/rig/off.json --align-sensors
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *", corrected; then"* ]]
+    "$NEUPIG" probe --rig wide/rig/off.json --align-sensors --json | python3 -c '
+import json, sys
+before = [s["before"] for s in json.load(sys.stdin)["sensors"]]
+assert [s["pose"] == "off" for s in before] == [False, False, True, False], before
+assert abs(before[2]["shift"] - 0.012) < 0.002 and abs(before[2]["turn_deg"] - 0.7) < 0.2, before
+assert len(before[2]["correction"]) == 16'
+    fine=(--frames 0:2 --truth wide/truth "${small[@]}" --faces 8000 --poisson-depth 8 --align-nodes 150)
+    for poses in rig.json off.json; do
+        "$NEUPIG" run --rig wide/rig/$poses --align-sensors -o "wide_$poses" "${fine[@]}"
+    done
+    "$NEUPIG" run --rig wide/rig/off.json -o wide_wrong "${fine[@]}"
+    [ "$(report wide_off.json '["stages"]["ingest"]["rig"]["sensors"][2]["pose"]')" = off ]
+    for out in wide_rig.json wide_off.json wide_wrong; do
+        report $out '["stages"]["evaluate"]["figures"]["truth_cd"]["mean"]'
+    done | tee cds
+    awk '{ cd[NR] = $1 } END { exit !(cd[2] < 1.15 * cd[1] && cd[3] > 1.5 * cd[2]) }' cds
 }
 
 @test "bad rigs end with exit code 3, the file and the place" {

@@ -212,6 +212,39 @@ END
     done
 }
 
+@test "each segment has the colours of the points in its frames" {
+    mkdir painted
+    python3 - <<'END'
+import glob, os, struct
+for path in glob.glob("two/points/*.ply"): # blue, and red by the frame: the second segment's frames are redder
+    head, body = open(path, "rb").read().split(b"end_header\n", 1)
+    colour = bytes((10 * int(path[-8:-4]), 0, 200))
+    rows = (body[i:i + 24] + colour for i in range(0, len(body), 24))
+    properties = b"".join(b"property uchar %s\n" % name for name in (b"red", b"green", b"blue"))
+    open("painted/" + os.path.basename(path), "wb").write(head + properties + b"end_header\n" + b"".join(rows))
+END
+    "$NEUPIG" run painted -o hues "${small[@]}" --segments auto --keyframe 3
+    second=$(basename "$(ls -d hues/segment_* | tail -1)")
+    [ "$second" != segment_0000 ]
+    python3 - segment_0000 "$second" <<'END'
+import re, struct, sys
+reds = []
+for segment in sys.argv[1:]:
+    head, body = open(f"hues/{segment}/reference.ply", "rb").read().split(b"end_header\n", 1)
+    fields = re.findall(rb"property (float|double|uchar) (\w+)", head.split(b"element face")[0])
+    row = "<" + "".join({b"float": "f", b"double": "d", b"uchar": "B"}[kind] for kind, _ in fields)
+    red = [name for _, name in fields].index(b"red")
+    count = int(re.search(rb"element vertex (\d+)", head).group(1))
+    rows = [struct.unpack_from(row, body, i * struct.calcsize(row))[red:red + 4] for i in range(count)]
+    assert all(abs(r[2] - 200) <= 1 and r[1] <= 1 and r[3] >= 254 for r in rows), rows[:5]
+    reds.append(sorted(r[0] for r in rows)[count // 2])
+assert reds[0] < 70 < reds[1], reds
+END
+    for segment in hues/segment_*; do
+        for mesh in "$segment"/meshes/*.ply; do head -c 500 "$mesh" | grep -aq "property uchar red"; done
+    done
+}
+
 @test "killed in the first run, at the cut or in a segment it goes on to the same" {
     second=$(basename "$(ls -d whole/segment_* | tail -1)")
     for sign in job segments.partial.json "$second/job"; do

@@ -37,7 +37,8 @@ static npg_status probe_capture(probed *p, const npg_capture *capture)
         snprintf(p->cause, sizeof p->cause, "%s", capture->refusal);
         return NPG_OK;
     }
-    npg_status status = npg_probe_files(&p->probe, &p->list, capture->options);
+    npg_status status = npg_capture_list(&p->list, capture->options);
+    if (!status) status = npg_probe_files(&p->probe, p->list);
     if (status == NPG_MEMORY) return status;
     if (status) {
         snprintf(p->cause, sizeof p->cause, "%s", npg_error_text());

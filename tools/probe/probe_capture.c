@@ -32,10 +32,8 @@ static npg_status add_bytes(void *user, const char *path)
     return NPG_OK;
 }
 
-npg_status npg_probe_files(npg_probe *probe, npg_frame_files **out, const npg_options *options)
+npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
 {
-    NPG_TRY(npg_capture_list(out, options));
-    const npg_frame_files *list = *out;
     for (size_t i = 0; i < list->count; i++) {
         const npg_frame_slot *slot = &list->slots[i];
         npg_frame frame = {0};

@@ -10,9 +10,8 @@
 npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
                            int64_t number);
 
-/* Read all frames of the input that the options of a run name ("input", "frames", those of rigs).  *list is
- * to be closed by the caller, also after a failure. */
-npg_status npg_probe_files(npg_probe *probe, npg_frame_files **list, const npg_options *options);
+/* Read all frames of a list. */
+npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list);
 
 /* Add what only shows when all frames have been read. */
 void npg_probe_warn_of_all(npg_probe *probe);

@@ -3,11 +3,13 @@
  *     /capture          Xform, the default prim
  *     /capture/surface  Mesh: points.timeSamples and extent.timeSamples with the frame's index as the time
  *                       code, faces once, no subdivision, primvars:displayColor and primvars:st where the
- *                       reference has colours and UVs
+ *                       reference has colours and UVs; primvars:displayColor.timeSamples where frames have
+ *                       colours of their own
  *
  * timeCodesPerSecond is the rate of the capture, metersPerUnit and upAxis as the options say.  Floats have
- * nine digits and so come back as they were.  Samples of the extent stand before those of the points, each
- * with a fixed number of bytes, and are filled in as poses come. */
+ * nine digits and so come back as they were; colours of frames have five behind the point, which tells all
+ * bytes of sRGB apart.  Samples of extent and colours stand before those of the points, each with a fixed
+ * number of bytes, and are filled in as poses come. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -18,12 +20,16 @@
 #include "ingest/formats/number.h"
 #include "pipeline/file.h"
 
-#define EXTENT_SIZE 144 /* bytes of one sample of the extent, padded with blanks */
+#define EXTENT_SIZE 144 /* bytes of one sample of the extent, padded with blanks          */
+#define COLOUR_SIZE 29  /* of one colour of a frame: "(0.12345, 0.12345, 0.12345), "       */
+#define LEAD_SIZE   40  /* before and behind a frame's colours: indent, time, "[", and "]," */
 
 typedef struct usda_state {
     const npg_form_facts *facts;
     npg_file *file;
-    uint64_t extent_at; /* of the next sample */
+    uint64_t extent_at; /* of the next sample              */
+    uint64_t colour_at; /* the same, of the frames' colours */
+    char *colour_text;  /* one sample of them, owned        */
 } usda_state;
 
 /* ---- text ---- */
@@ -112,12 +118,33 @@ static void print_extent(usda_state *s)
     npg_file_print(s->file, "        }\n");
 }
 
+/* Bytes of one frame's colours; 0 without any. */
+static size_t colours_size(const npg_form_facts *facts)
+{
+    return facts->has_pose_colours ? facts->vert_count * COLOUR_SIZE + LEAD_SIZE : 0;
+}
+
+/* Room for the colours of all frames. */
+static npg_status print_colour_samples(usda_state *s)
+{
+    size_t size = colours_size(s->facts);
+    if (!size) return NPG_OK;
+    NPG_TRY(npg_alloc(&s->colour_text, NPG_FOR_FILES, size + 1));
+    memset(s->colour_text, ' ', size);
+    s->colour_text[size - 1] = '\n';
+    npg_file_print(s->file, "        color3f[] primvars:displayColor.timeSamples = {\n");
+    s->colour_at = npg_file_size(s->file);
+    for (int64_t i = 0; i < s->facts->pose_count; i++) npg_file_write(s->file, s->colour_text, size);
+    return npg_file_print(s->file, "        }\n");
+}
+
 /* ---- the form ---- */
 
 /* Three numbers of about ten characters a vertex, with what parts them. */
 static uint64_t bytes(const npg_form_facts *facts)
 {
-    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * (facts->vert_count * 36 + EXTENT_SIZE);
+    uint64_t pose = facts->vert_count * 36 + EXTENT_SIZE + colours_size(facts);
+    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * pose;
 }
 
 static npg_status check_usda(const npg_form_facts *facts)
@@ -146,6 +173,7 @@ static npg_status open_usda(void *state, const npg_form_facts *facts)
     if (facts->colours) print_colours(s->file, facts);
     if (facts->uvs) print_uvs(s->file, facts);
     print_extent(s);
+    NPG_TRY(print_colour_samples(s));
     return npg_file_print(s->file, "        point3f[] points.timeSamples = {\n");
 }
 
@@ -166,10 +194,41 @@ static npg_status write_extent(usda_state *s, const npg_pose *pose)
     return NPG_OK;
 }
 
+/* A number from 0 to 1 with five digits behind the point, whatever the locale says. */
+static char *put_share(char *at, float share)
+{
+    int value = (int)lrintf(100000 * share);
+    *at++ = (char)('0' + value / 100000);
+    *at++ = '.';
+    for (int unit = 10000; unit; unit /= 10) *at++ = (char)('0' + value / unit % 10);
+    return at;
+}
+
+static npg_status write_colours(usda_state *s, const npg_pose *pose)
+{
+    size_t size = colours_size(s->facts), verts = s->facts->vert_count;
+    if (!size) return NPG_OK;
+    char *at = s->colour_text;
+    at += snprintf(at, LEAD_SIZE, "            %lld: [", (long long)pose->index);
+    for (size_t i = 0; i < verts; i++) {
+        for (size_t c = 0; c < 3; c++) {
+            memcpy(at, c ? ", " : "(", 2);
+            at = put_share(at + (c ? 2 : 1), npg_srgb_to_linear(pose->colours[4 * i + c]));
+        }
+        const char *end = i + 1 < verts ? "), " : ")],";
+        memcpy(at, end, 3);
+        at += 3;
+    }
+    NPG_TRY(npg_file_patch(s->file, s->colour_at, s->colour_text, (size_t)(at - s->colour_text)));
+    s->colour_at += size;
+    return NPG_OK;
+}
+
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
     usda_state *s = state;
     NPG_TRY(write_extent(s, pose));
+    NPG_TRY(write_colours(s, pose));
     npg_file_print(s->file, "            %lld: ", (long long)pose->index);
     print_tuples(s->file, pose->pos, s->facts->vert_count, 3);
     return npg_file_print(s->file, ",\n");
@@ -185,7 +244,9 @@ static npg_status finish_usda(void *state)
 
 static void close_usda(void *state)
 {
-    npg_file_discard(&((usda_state *)state)->file);
+    usda_state *s = state;
+    npg_file_discard(&s->file);
+    npg_release(&s->colour_text);
 }
 
 const npg_form npg_form_usda = {.name = "usda",

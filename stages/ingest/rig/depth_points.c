@@ -2,7 +2,9 @@
  *
  * A pixel is used when its depth is in range, the mask shows it, and no neighbour within the margin is
  * missing or a depth step away: there a sensor mixes the body with what is behind it (flying pixels,
- * silhouette fringe).
+ * silhouette fringe).  Of the margin, pixels beside used ones are used, too, where they continue the surface:
+ * their depth is what the plane through the used ones around them says.  A mixed pixel lies somewhere between
+ * the body and what is behind it, and does not.
  *
  * Normals.  On a plane n X = h the inverse depth is linear in the ray (x, y) of a pixel:
  * 1 / Z = (n_x x + n_y y + n_z) / h.  So n is had from a least-squares fit of 1 / Z over a window of the
@@ -17,9 +19,13 @@
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
 
-#define WINDOW  3 /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
-#define FIT_MIN 8 /* pixels of a window that a normal needs                                             */
-#define MASK_ON 128
+#define WINDOW    3 /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
+#define FIT_MIN   8 /* pixels of a window that a plane needs                                               */
+#define MASK_ON   128
+#define INNER     1    /* of keep: a pixel outside of the margin; planes are fitted to these         */
+#define EDGE      2    /* of keep: in the margin, but it continues the surface                       */
+#define BESIDE    2    /* inner pixels beside one of the margin, of eight, that make it a candidate  */
+#define CONTINUES 0.25 /* of a depth step: how far from the plane it may lie                         */
 
 typedef struct grid {
     const npg_rig *rig;
@@ -27,7 +33,7 @@ typedef struct grid {
     npg_image depth, mask, colour;
     size_t width, height;
     float *z;      /* H x W: depth, 0 where the pixel can't be used; owned */
-    uint8_t *keep; /* H x W: not near a step; owned                        */
+    uint8_t *keep; /* H x W: INNER or EDGE where the pixel is used; owned  */
 } grid;
 
 static void clear_grid(grid *g)
@@ -44,6 +50,7 @@ void npg_depth_points_clear(npg_depth_points *points)
     npg_release(&points->pos);
     npg_release(&points->normals);
     npg_release(&points->colours);
+    npg_release(&points->pixels);
     *points = (npg_depth_points){0};
 }
 
@@ -117,7 +124,7 @@ static void erode(uint8_t *keep, const uint8_t *before, size_t w, size_t h)
         }
 }
 
-static npg_status mark_kept(grid *g)
+static npg_status mark_inner(grid *g)
 {
     size_t pixels = g->width * g->height;
     uint8_t *other;
@@ -151,7 +158,7 @@ static int sum_window(const grid *g, size_t px, size_t py, double s[9])
     for (size_t y = y0; y <= y1; y++)
         for (size_t x = x0; x <= x1; x++) {
             size_t i = y * w + x;
-            if (!g->keep[i] || !is_same_surface(z, g->z[i], step)) continue;
+            if (g->keep[i] != INNER || !is_same_surface(z, g->z[i], step)) continue;
             float u = rays[2 * i] - cx, v = rays[2 * i + 1] - cy, d = 1 / g->z[i] - middle;
             const float terms[9] = {1, u, v, u * u, u * v, v * v, d, u * d, v * d};
             for (int k = 0; k < 9; k++) sums[k] += terms[k];
@@ -161,24 +168,63 @@ static int sum_window(const grid *g, size_t px, size_t py, double s[9])
     return count;
 }
 
-/* The plane d = a u + b v + c through a window; its normal, turned to the sensor. */
-static bool fit_normal(const grid *g, size_t px, size_t py, float normal[3])
+/* The plane d = a u + b v + c through a window, relative to its middle. */
+static bool fit_plane(const grid *g, size_t px, size_t py, double abc[3])
 {
-    double s[9], n = 0;
-    size_t at = py * g->width + px;
+    double s[9];
     int count = sum_window(g, px, py, s);
     if (count < FIT_MIN) return false;
     double uu = s[3] - s[1] * s[1] / s[0], uv = s[4] - s[1] * s[2] / s[0], vv = s[5] - s[2] * s[2] / s[0];
     double ud = s[7] - s[1] * s[6] / s[0], vd = s[8] - s[2] * s[6] / s[0], det = uu * vv - uv * uv;
     if (!(det > 1e-6 * uu * vv)) return false; /* the pixels lie on a line */
-    double a = (vv * ud - uv * vd) / det, b = (uu * vd - uv * ud) / det;
-    double c = (s[6] - a * s[1] - b * s[2]) / s[0] + 1 / (double)g->z[at];
-    /* back from rays relative to the middle's */
-    c -= a * (double)g->sensor->rays[2 * at] + b * (double)g->sensor->rays[2 * at + 1];
-    const double out[3] = {-a, -b, -c};
+    abc[0] = (vv * ud - uv * vd) / det;
+    abc[1] = (uu * vd - uv * ud) / det;
+    abc[2] = (s[6] - abc[0] * s[1] - abc[1] * s[2]) / s[0];
+    return true;
+}
+
+/* Its normal, turned to the sensor. */
+static bool fit_normal(const grid *g, size_t px, size_t py, float normal[3])
+{
+    double abc[3], n = 0;
+    size_t at = py * g->width + px;
+    if (!fit_plane(g, px, py, abc)) return false;
+    /* back from rays and depth relative to the middle's */
+    double c = abc[2] + 1 / (double)g->z[at];
+    c -= abc[0] * (double)g->sensor->rays[2 * at] + abc[1] * (double)g->sensor->rays[2 * at + 1];
+    const double out[3] = {-abc[0], -abc[1], -c};
     for (int k = 0; k < 3; k++) n += out[k] * out[k];
     for (int k = 0; k < 3; k++) normal[k] = (float)(out[k] / sqrt(n));
     return n > 0 && isfinite(n);
+}
+
+/* ---- the margin ---- */
+
+static int inner_beside(const grid *g, size_t x, size_t y)
+{
+    size_t at = y * g->width + x;
+    float step = (float)g->rig->settings.step_share;
+    int count = 0;
+    for (int dy = -1; dy <= 1; dy++)
+        for (int dx = -1; dx <= 1; dx++) {
+            size_t other = at + (size_t)(dy * (ptrdiff_t)g->width + dx);
+            count += g->keep[other] == INNER && is_same_surface(g->z[at], g->z[other], step);
+        }
+    return count;
+}
+
+/* Pixels of the margin that continue the surface beside them. */
+static void add_edges(grid *g)
+{
+    double most = CONTINUES * g->rig->settings.step_share;
+    for (size_t y = 1; y + 1 < g->height; y++)
+        for (size_t x = 1; x + 1 < g->width; x++) {
+            size_t at = y * g->width + x;
+            double abc[3];
+            if (g->keep[at] || !(g->z[at] > 0) || inner_beside(g, x, y) < BESIDE) continue;
+            /* 1 / Z is off by abc[2], so Z by Z Z abc[2] */
+            if (fit_plane(g, x, y, abc) && fabs(abc[2]) * (double)g->z[at] <= most) g->keep[at] = EDGE;
+        }
 }
 
 /* ---- colours ---- */
@@ -220,9 +266,10 @@ static void take_colour(const grid *g, size_t at, const float pos[3], uint8_t rg
 static npg_status reserve(npg_depth_points *points, const grid *g)
 {
     size_t kept = 0;
-    for (size_t i = 0; i < g->width * g->height; i++) kept += g->keep[i];
+    for (size_t i = 0; i < g->width * g->height; i++) kept += g->keep[i] != 0;
     NPG_TRY(npg_alloc_array(&points->pos, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&points->normals, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&points->pixels, NPG_FOR_FRAMES, kept, sizeof *points->pixels));
     points->has_colours = g->colour.bytes != NULL;
     return points->has_colours ? npg_alloc_array(&points->colours, NPG_FOR_FRAMES, kept, 4) : NPG_OK;
 }
@@ -238,6 +285,7 @@ static void add_points(npg_depth_points *points, const grid *g)
             pos[0] = rays[2 * at] * g->z[at];
             pos[1] = rays[2 * at + 1] * g->z[at];
             pos[2] = g->z[at];
+            points->pixels[n] = (uint32_t)at;
             if (points->colours) take_colour(g, at, pos, points->colours + 4 * n);
             points->count++;
         }
@@ -264,7 +312,8 @@ static npg_status make_points(npg_depth_points *points, grid *g, const npg_rig_s
     NPG_TRY(npg_alloc_array(&g->z, NPG_FOR_FRAMES, pixels, sizeof *g->z));
     NPG_TRY(npg_alloc(&g->keep, NPG_FOR_FRAMES, pixels));
     fill_depths(g);
-    NPG_TRY(mark_kept(g));
+    NPG_TRY(mark_inner(g));
+    add_edges(g);
     NPG_TRY(reserve(points, g));
     add_points(points, g);
     return NPG_OK;

@@ -11,21 +11,27 @@
 
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
+#include "pipeline/order.h"
 
 /* ---- which layout ---- */
+
+bool npg_rig_ends_with(const char *name, const char *ending)
+{
+    size_t length = strlen(name), size = strlen(ending);
+    return length >= size && !strcmp(name + length - size, ending);
+}
+
+bool npg_rig_is_there(const char *path)
+{
+    struct stat info;
+    return !stat(path, &info);
+}
 
 static bool is_in(const char *folder, const char *name)
 {
     char path[4096];
-    struct stat info;
     int length = snprintf(path, sizeof path, "%s/%s", folder, name);
-    return length > 0 && (size_t)length < sizeof path && !stat(path, &info);
-}
-
-static bool ends_with(const char *name, const char *ending)
-{
-    size_t length = strlen(name), size = strlen(ending);
-    return length >= size && !strcmp(name + length - size, ending);
+    return length > 0 && (size_t)length < sizeof path && npg_rig_is_there(path);
 }
 
 /* A file NNNN_camera.xml, .yml or .yaml lies in the folder. */
@@ -35,8 +41,9 @@ static bool has_camera_files(const char *folder)
     DIR *listing = opendir(folder);
     if (!listing) return false;
     for (struct dirent *entry; !found && (entry = readdir(listing));)
-        found = ends_with(entry->d_name, "_camera.xml") || ends_with(entry->d_name, "_camera.yml") ||
-                ends_with(entry->d_name, "_camera.yaml");
+        found = npg_rig_ends_with(entry->d_name, "_camera.xml") ||
+                npg_rig_ends_with(entry->d_name, "_camera.yml") ||
+                npg_rig_ends_with(entry->d_name, "_camera.yaml");
     closedir(listing);
     return found;
 }
@@ -56,7 +63,7 @@ static load_fn *layout_of(const char *path, const char **name)
                    {"opencv", npg_rig_load_opencv}};
     int at = -1;
     if (!is_folder)
-        at = ends_with(path, ".json") ? 0 : -1;
+        at = npg_rig_ends_with(path, ".json") ? 0 : -1;
     else if (is_in(path, "rig.json"))
         at = 0;
     else if (is_in(path, "depth.txt"))
@@ -145,6 +152,7 @@ void npg_rig_close(npg_rig **slot)
     npg_release(&rig->shot_of);
     npg_release(&rig->path);
     npg_release(&rig->folder);
+    npg_release(&rig->unit);
     npg_release(slot);
 }
 
@@ -199,12 +207,6 @@ npg_status npg_rig_add_shot(npg_rig_sensor *sensor, const npg_rig_shot *shot)
 
 /* ---- frames ---- */
 
-static int by_number(const void *a, const void *b)
-{
-    int64_t left = *(const int64_t *)a, right = *(const int64_t *)b;
-    return left < right ? -1 : left > right;
-}
-
 static npg_status list_numbers(npg_rig *rig)
 {
     size_t all = 0, count = 0;
@@ -213,7 +215,7 @@ static npg_status list_numbers(npg_rig *rig)
     for (size_t s = 0; s < rig->sensor_count; s++)
         for (size_t i = 0; i < rig->sensors[s].shot_count; i++)
             rig->numbers[count++] = rig->sensors[s].shots[i].number;
-    if (count) qsort(rig->numbers, count, sizeof *rig->numbers, by_number);
+    if (count) qsort(rig->numbers, count, sizeof *rig->numbers, npg_order_int64);
     for (size_t i = 0; i < count; i++)
         if (!rig->frame_count || rig->numbers[i] != rig->numbers[rig->frame_count - 1])
             rig->numbers[rig->frame_count++] = rig->numbers[i];
@@ -232,17 +234,24 @@ static npg_status list_times(npg_rig *rig)
     return NPG_OK;
 }
 
-/* The nearest shot in time; shots are in the order of time. */
-static int32_t nearest_shot(const npg_rig_sensor *sensor, double time_s, double tolerance_s)
+/* The first shot that is not before a time, or with is_timed false a number; shots are in that order. */
+static size_t first_from(const npg_rig_sensor *sensor, bool is_timed, double time_s, int64_t number)
 {
     size_t lo = 0, hi = sensor->shot_count;
     while (lo < hi) {
         size_t middle = (lo + hi) / 2;
-        if (sensor->shots[middle].time_s < time_s)
+        const npg_rig_shot *shot = &sensor->shots[middle];
+        if (is_timed ? shot->time_s < time_s : shot->number < number)
             lo = middle + 1;
         else
             hi = middle;
     }
+    return lo;
+}
+
+static int32_t nearest_shot(const npg_rig_sensor *sensor, double time_s, double tolerance_s)
+{
+    size_t lo = first_from(sensor, true, time_s, 0);
     int32_t best = -1;
     double least = tolerance_s;
     for (size_t i = lo ? lo - 1 : 0; i < sensor->shot_count && i <= lo; i++) {
@@ -256,14 +265,7 @@ static int32_t nearest_shot(const npg_rig_sensor *sensor, double time_s, double 
 
 static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
 {
-    size_t lo = 0, hi = sensor->shot_count;
-    while (lo < hi) {
-        size_t middle = (lo + hi) / 2;
-        if (sensor->shots[middle].number < number)
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
+    size_t lo = first_from(sensor, false, 0, number);
     return lo < sensor->shot_count && sensor->shots[lo].number == number ? (int32_t)lo : -1;
 }
 
@@ -298,7 +300,8 @@ npg_status npg_rig_join(npg_rig *rig)
 
 size_t npg_rig_find(const npg_rig *rig, int64_t number)
 {
-    const int64_t *found = bsearch(&number, rig->numbers, rig->frame_count, sizeof *rig->numbers, by_number);
+    const int64_t *found =
+        bsearch(&number, rig->numbers, rig->frame_count, sizeof *rig->numbers, npg_order_int64);
     return found ? (size_t)(found - rig->numbers) : SIZE_MAX;
 }
 
@@ -339,7 +342,25 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
             pose[4 * r + 1] = -pose[4 * r + 1];
             pose[4 * r + 2] = -pose[4 * r + 2];
         }
-    memcpy(out, pose, sizeof pose);
+    if (sensor->is_corrected)
+        npg_pose_combine(out, sensor->correction, pose);
+    else
+        memcpy(out, pose, sizeof pose);
+}
+
+void npg_rig_correct(npg_rig *rig, const npg_rig_view *views)
+{
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        npg_rig_sensor *sensor = &rig->sensors[s];
+        double before[12];
+        if (views[s].verdict != NPG_RIG_OFF) continue;
+        memcpy(before, sensor->correction, sizeof before);
+        if (sensor->is_corrected)
+            npg_pose_combine(sensor->correction, views[s].correction, before);
+        else
+            memcpy(sensor->correction, views[s].correction, sizeof before);
+        sensor->is_corrected = true;
+    }
 }
 
 uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame)

@@ -25,7 +25,8 @@ typedef struct npg_rig_settings {
     int poses;            /* npg_rig_poses                                                            */
     double step_share;    /* neighbouring pixels whose depths differ by more than this share of the   */
                           /* nearer one are not one surface                                           */
-    int64_t margin;       /* pixels that are dropped beside such a step and beside missing depth      */
+    int64_t margin;       /* pixels beside such a step and beside missing depth that are dropped      */
+                          /* unless they continue the surface; 0: none                                */
     double near_m, far_m; /* depths that are used, in the rig's unit; far 0: no limit                */
     double tolerance_s;   /* images of different sensors belong together within this                  */
     bool confine;         /* refuse what the rig names outside its folder                             */
@@ -50,7 +51,9 @@ typedef struct npg_rig_sensor {
     double near_m, far_m;       /* of this sensor; far 0: no limit                     */
     bool is_opengl;             /* its poses are of axes x right, y up, z backward     */
     double pose[12];            /* sensor to world, where it stands still              */
-    npg_rig_shot *shots;        /* in order; owned */
+    bool is_corrected;
+    double correction[12]; /* world to world, after the pose; of npg_rig_correct() */
+    npg_rig_shot *shots;   /* in order; owned */
     size_t shot_count, shot_capacity;
     float *rays; /* H x W x 2, NaN where there is none; made at the first use, owned */
 } npg_rig_sensor;
@@ -58,6 +61,7 @@ typedef struct npg_rig_sensor {
 typedef struct npg_rig {
     char *path, *folder; /* as given; the folder that its names start from; owned */
     const char *layout;  /* "rig.json", "redwood", "tum", "opencv"                */
+    char *unit;          /* of lengths, as rig.json names it; owned, NULL: "m"    */
     npg_rig_settings settings;
     bool is_timed; /* frames are matched by time, else by number */
     npg_rig_sensor *sensors;
@@ -86,7 +90,7 @@ size_t npg_rig_find(const npg_rig *rig, int64_t number);
 /* The shot of a sensor in a frame, NULL for a gap. */
 const npg_rig_shot *npg_rig_shot_of(const npg_rig *rig, size_t frame, size_t sensor);
 
-/* The pose (sensor to world) it is used with: settings and axes applied. */
+/* The pose (sensor to world) it is used with: settings, axes and correction applied. */
 void npg_rig_pose(const npg_rig *rig, double pose[12], size_t sensor, const npg_rig_shot *shot);
 
 /* Call visit for every image of a frame; ends with the first status that is not NPG_OK. */
@@ -109,6 +113,7 @@ typedef struct npg_depth_points {
     size_t count, capacity;
     float *pos, *normals; /* N x 3 each, owned                      */
     uint8_t *colours;     /* N x 4, sRGB, alpha 0: not seen; owned  */
+    uint32_t *pixels;     /* N, y x width + x, growing; owned       */
     bool has_colours;
 } npg_depth_points;
 
@@ -118,15 +123,35 @@ void npg_depth_points_clear(npg_depth_points *points);
 
 /* ---- agreement (rig_overlap.c) ---- */
 
+#define NPG_RIG_COMPARED 24 /* frames at most in which sensors are compared */
+
+/* A sensor's pose, by what it sees together with the others. */
+typedef enum npg_rig_verdict {
+    NPG_RIG_ALONE,   /* there is no other sensor                                    */
+    NPG_RIG_FIXED,   /* the others are measured against it: most agree with it      */
+    NPG_RIG_ALIGNED, /* within 0.001 of the depth (2.5 mm at 2.5 m) and 0.2 degrees */
+    NPG_RIG_OFF,     /* beyond that, and beyond three deviations                    */
+    NPG_RIG_UNKNOWN  /* what they see together does not determine it                */
+} npg_rig_verdict;
+
 typedef struct npg_rig_view {
     size_t frames, points; /* frames with an image among those looked at, and points in them  */
+    double depth;          /* mean depth of all sensors' points, in the rig's unit             */
     double overlap;        /* share of its points that lie on what other sensors see, 0..1     */
-    double apart;          /* rms distance to their surfaces there, in the rig's unit; 0: none */
+    double apart;          /* distance to their surfaces there, standard deviation by the      */
+                           /* median, in the rig's unit; 0: none                               */
+    npg_rig_verdict verdict;
+    double shift, turn_deg;       /* how far the pose is off: position, in the rig's unit; rotation */
+    double shift_sd, turn_sd_deg; /* their standard deviations, infinite where nothing is known     */
+    double correction[12];        /* x' = correction x, in the world; none unless it is OFF         */
 } npg_rig_view;
 
-/* Compare the surfaces that sensors see in `sample` frames spread over the rig, each with those of all
- * others; one entry per sensor.  NPG_BAD_INPUT as npg_rig_read(). */
-npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, size_t sample);
+/* Compare the surfaces that sensors see in up to NPG_RIG_COMPARED of the given frames (places in the rig),
+ * spread over them; one entry per sensor.  Images that can't be read count as missing.  NPG_MEMORY. */
+npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, const size_t *frames, size_t count);
+
+/* From now on use the corrections: npg_rig_pose() includes them. */
+void npg_rig_correct(npg_rig *rig, const npg_rig_view *views);
 
 /* ---- between the files of a rig ---- */
 
@@ -148,6 +173,11 @@ npg_status npg_rig_load_opencv(npg_rig *rig);
  * none (NULL); colours are those nearest in time.  Images without a pose are left out and counted. */
 npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *depth, const char *colour,
                               const char *poses);
+
+bool npg_rig_ends_with(const char *name, const char *ending);
+
+/* Something lies at the path. */
+bool npg_rig_is_there(const char *path);
 
 /* "<rig's folder>/<name>", refused under confine where it leads out; NPG_BAD_INPUT where it is not there and
  * must be. */

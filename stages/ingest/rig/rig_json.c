@@ -201,11 +201,10 @@ static npg_status read_poses(npg_rig *rig, npg_rig_sensor *sensor, const place *
 {
     char *path;
     npg_stamped_list poses = {0};
-    const char *dot = strrchr(name, '.');
     NPG_TRY(npg_rig_path(rig, &path, name, true));
     npg_status status = npg_read_trajectory(&poses, path);
     npg_release(&path);
-    if (!status) status = give_poses(sensor, p, &poses, dot && !strcmp(dot, ".log"));
+    if (!status) status = give_poses(sensor, p, &poses, npg_rig_ends_with(name, ".log"));
     npg_stamped_clear(&poses);
     return status;
 }
@@ -250,8 +249,7 @@ static npg_status load_numbered(npg_rig *rig, npg_rig_sensor *sensor, const plac
 
 static bool is_list(const char *name)
 {
-    size_t length = strlen(name);
-    return length > 4 && !strcmp(name + length - 4, ".txt");
+    return npg_rig_ends_with(name, ".txt");
 }
 
 /* ---- sensors ---- */
@@ -323,6 +321,7 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
     NPG_TRY(get_text(&top, root, "axes", &axes));
     NPG_TRY(get_text(&top, root, "comment", &text));
     NPG_TRY(get_text(&top, root, "unit", &text));
+    if (text) NPG_TRY(npg_copy_text(&rig->unit, text));
     if (axes && strcmp(axes, "opencv") != 0 && strcmp(axes, "opengl") != 0)
         return bad(&top, "axes",
                    "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
@@ -348,9 +347,8 @@ npg_status npg_rig_load_json(npg_rig *rig)
 {
     json_t *root;
     char *text, *file;
-    size_t length = strlen(rig->path);
-    bool is_file = length > 5 && !strcmp(rig->path + length - 5, ".json");
-    NPG_TRY(is_file ? npg_copy_text(&file, rig->path) : npg_join_path(&file, rig->path, "rig.json"));
+    NPG_TRY(npg_rig_ends_with(rig->path, ".json") ? npg_copy_text(&file, rig->path)
+                                                  : npg_join_path(&file, rig->path, "rig.json"));
     npg_status status = read_json(&root, &text, file);
     if (!status) status = load_root(rig, file, root);
     if (!status || root) json_decref(root);

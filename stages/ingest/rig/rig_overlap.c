@@ -1,235 +1,197 @@
-/* How well the sensors of a rig agree: the share of what one sees that others see, too, and how far their
- * surfaces lie apart there.
- *
- * In each of a few frames every sensor's points are matched with the mean of the nearest points of each other
- * sensor; the distance is taken along the normals of both, which a curved surface does not bias (symmetric
- * point to plane).
- *
- * Based on: Rusinkiewicz, A symmetric objective function for ICP, 2019. */
+/* How well the sensors of a rig agree: the share of what one sees that others see, too, how far their
+ * surfaces lie apart there, and which sensors' poses are off. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
 #include "geometry/vec3.h"
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_align.h"
 #include "pipeline/memory.h"
 
-#define TARGETS_MAX 8000 /* points of a sensor and frame that others are matched with                       */
-#define SOURCES_MAX                                                                                          \
-    1500              /* points of a sensor and frame that are matched                                    */
-#define NEAREST 8     /* points whose mean is the other half of a pair: one alone is chosen by its noise  */
-#define REACH   0.025 /* of the depth: surfaces further apart are different ones, or a sensor is far off  */
-#define BESIDE                                                                                               \
-    1.5           /* spacings that a pair may lie apart along the surface: where the other sensor's view ends,
-                             the nearest point is not the same place                                     */
-#define AGREE 0.8 /* cosine of two normals of one surface */
+#define SIGHTS_MAX  256    /* read at once: a rig of many sensors is measured in fewer frames   */
+#define SOURCES_MAX 1500   /* points of a sight that are looked up in the others for the overlap */
+#define SAME_SHIFT  0.001  /* of the depth: 2.5 mm at 2.5 m, about what rigs are calibrated to      */
+#define SAME_TURN   0.0035 /* radians: 0.2 degrees                                              */
+#define SURE        3      /* deviations that a correction must be larger than                  */
+#define SD_SHIFT    0.002  /* of the depth: with a deviation above this nothing can be said     */
+#define SD_TURN     0.0026 /* radians: 0.15 degrees                                             */
 
-/* Points of one sensor in one frame, in the world. */
-typedef struct view {
-    float *points, *normals; /* N x 3, owned */
-    double spacing;          /* of the points */
-    npg_kdtree *tree;
-    size_t count;
-} view;
-
-typedef struct measuring {
-    npg_rig *rig;
-    size_t frame_count, sensor_count;
-    view *views;     /* frame_count x sensor_count, owned                */
-    double depth;    /* median-like size: mean distance sensor to points */
-    uint32_t *index; /* SOURCES_MAX, scratch, owned                      */
-    float *dist_sq, *queries;
-    npg_rig_view *views_of;
-} measuring;
-
-static view *view_of(const measuring *m, size_t f, size_t s)
-{
-    return &m->views[f * m->sensor_count + s];
-}
-
-static void close_measuring(measuring *m)
-{
-    for (size_t i = 0; m->views && i < m->frame_count * m->sensor_count; i++) {
-        npg_kdtree_close(&m->views[i].tree);
-        npg_release(&m->views[i].points);
-        npg_release(&m->views[i].normals);
-    }
-    npg_release(&m->views);
-    npg_release(&m->index);
-    npg_release(&m->dist_sq);
-    npg_release(&m->queries);
-}
-
-/* ---- what the sensors see ---- */
-
-static void turn(double out[3], const double pose[12], const double v[3])
-{
-    for (size_t r = 0; r < 3; r++) out[r] = npg_vec3_dot(pose + 4 * r, v);
-}
-
-/* Mean distance of a few points to their neighbours. */
-static npg_status measure_spacing(view *v)
-{
-    enum { SAMPLE = 256 };
-    float queries[3 * SAMPLE] = {0}, dist_sq[2 * SAMPLE];
-    uint32_t index[2 * SAMPLE];
-    size_t count = v->count < SAMPLE ? v->count : SAMPLE;
-    for (size_t i = 0; i < count; i++)
-        memcpy(queries + 3 * i, v->points + 3 * (i * v->count / count), 3 * sizeof(float));
-    NPG_TRY(npg_kdtree_nearest(v->tree, index, dist_sq, queries, count, 2, 0));
-    for (size_t i = 0; i < count; i++)
-        if (isfinite(dist_sq[2 * i + 1])) v->spacing += sqrt((double)dist_sq[2 * i + 1]) / (double)count;
-    return NPG_OK;
-}
-
-static npg_status fill_view(view *v, const npg_depth_points *points, const double pose[12])
-{
-    size_t step = points->count / TARGETS_MAX + 1;
-    size_t count = (points->count + step - 1) / step;
-    NPG_TRY(npg_alloc_array(&v->points, NPG_FOR_FILES, count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&v->normals, NPG_FOR_FILES, count, 3 * sizeof(float)));
-    for (size_t i = 0; i < points->count; i += step) {
-        double p[3], n[3], world[3], facing[3];
-        for (size_t a = 0; a < 3; a++) {
-            p[a] = (double)points->pos[3 * i + a];
-            n[a] = (double)points->normals[3 * i + a];
-        }
-        npg_pose_apply(world, pose, p);
-        turn(facing, pose, n);
-        for (size_t a = 0; a < 3; a++) {
-            v->points[3 * v->count + a] = (float)world[a];
-            v->normals[3 * v->count + a] = (float)facing[a];
-        }
-        v->count++;
-    }
-    if (!v->count) return NPG_OK;
-    NPG_TRY(npg_kdtree_open(&v->tree, v->points, v->count));
-    return measure_spacing(v);
-}
-
-static npg_status see(measuring *m, size_t at, size_t frame, size_t s)
-{
-    const npg_rig_shot *shot = npg_rig_shot_of(m->rig, frame, s);
-    npg_depth_points points;
-    double pose[12];
-    if (!shot) return NPG_OK;
-    NPG_TRY(npg_depth_points_read(&points, m->rig, s, shot));
-    npg_rig_pose(m->rig, pose, s, shot);
-    npg_status status = fill_view(view_of(m, at, s), &points, pose);
-    m->views_of[s].frames++;
-    m->views_of[s].points += points.count;
-    for (size_t i = 0; i < points.count; i++) m->depth += (double)points.pos[3 * i + 2];
-    npg_depth_points_clear(&points);
-    return status;
-}
-
-static npg_status see_all(measuring *m)
-{
-    size_t points = 0;
-    for (size_t f = 0; f < m->frame_count; f++)
-        for (size_t s = 0; s < m->sensor_count; s++)
-            NPG_TRY(see(m, f, f * m->rig->frame_count / m->frame_count, s));
-    for (size_t s = 0; s < m->sensor_count; s++) points += m->views_of[s].points;
-    if (points) m->depth /= (double)points;
-    return NPG_OK;
-}
-
-/* ---- pairs ---- */
-
-/* Means of the nearest points and their normals. */
-static bool mean_nearest(double point[3], double normal[3], const view *with, const uint32_t *index)
-{
-    for (size_t a = 0; a < 3; a++) point[a] = normal[a] = 0;
-    for (size_t k = 0; k < NEAREST; k++) {
-        if (index[k] == UINT32_MAX) return false;
-        for (size_t a = 0; a < 3; a++) {
-            point[a] += (double)with->points[3 * (size_t)index[k] + a] / NEAREST;
-            normal[a] += (double)with->normals[3 * (size_t)index[k] + a];
-        }
-    }
-    return npg_vec3_make_unit(normal);
-}
-
-/* Distance of point i to the surface that another sensor sees there; false where it sees none. */
-static bool dist_to(double *dist, const view *of, size_t i, const view *with, const uint32_t *index,
-                    double reach)
-{
-    double own[3], n[3], q[3], d[3];
-    for (size_t a = 0; a < 3; a++) own[a] = (double)of->normals[3 * i + a];
-    if (!mean_nearest(q, n, with, index) || npg_vec3_dot(own, n) < AGREE) return false;
-    for (size_t a = 0; a < 3; a++) {
-        n[a] += own[a];
-        d[a] = (double)of->points[3 * i + a] - q[a];
-    }
-    npg_vec3_make_unit(n);
-    double along = npg_vec3_dot(n, d), beside = BESIDE * with->spacing;
-    *dist = fabs(along);
-    return *dist <= reach && npg_vec3_dot(d, d) - along * along <= beside * beside;
-}
+/* ---- overlap ---- */
 
 typedef struct sums {
-    double square;
-    size_t pairs, seen, asked;
+    npg_rig_bins apart;
+    size_t seen, asked;
 } sums;
 
-static npg_status pair_views(measuring *m, sums *out, uint8_t *is_seen, const view *of, const view *with)
+static void look_up(sums *all, const npg_rig_sights *s, size_t f, size_t sensor, size_t i)
 {
-    size_t step = of->count / SOURCES_MAX + 1, count = 0;
-    for (size_t i = 0; i < of->count; i += step, count++)
-        memcpy(m->queries + 3 * count, of->points + 3 * i, 3 * sizeof(float));
-    NPG_TRY(npg_kdtree_nearest(with->tree, m->index, m->dist_sq, m->queries, count, NEAREST, 0));
+    const npg_rig_sight *of = npg_rig_sights_of(s, f, sensor);
+    bool is_seen = false;
+    for (size_t o = 0; o < s->sensor_count; o++) {
+        npg_rig_sight_pair pair;
+        const npg_rig_sight *with = npg_rig_sights_of(s, f, o);
+        if (o == sensor || !with->count) continue;
+        if (!npg_rig_sight_match(&pair, of, i, of->pose, with, &s->rig->sensors[o].camera, with->pose,
+                                 NPG_ALIGN_REACH * s->depth))
+            continue;
+        npg_rig_bins_add(&all->apart, fabs(pair.off));
+        is_seen = true;
+    }
+    all->seen += is_seen;
+    all->asked++;
+}
+
+static void compare_sensor(npg_rig_view *view, const npg_rig_sights *s, size_t sensor)
+{
+    sums all = {.apart.reach = NPG_ALIGN_REACH * s->depth};
+    for (size_t f = 0; f < s->frame_count; f++) {
+        const npg_rig_sight *of = npg_rig_sights_of(s, f, sensor);
+        for (size_t i = 0; i < of->count; i += of->count / SOURCES_MAX + 1) look_up(&all, s, f, sensor, i);
+        view->frames += of->is_there;
+        view->points += of->point_count;
+    }
+    view->overlap = all.asked ? (double)all.seen / (double)all.asked : 0;
+    view->apart = npg_rig_bins_deviation(&all.apart);
+}
+
+/* ---- which poses are off ---- */
+
+/* How far two corrections differ: what the sensors see moves by, where the points are. */
+static double difference(const npg_rig_sights *s, const npg_correction *a, const npg_correction *b)
+{
+    double back[12], between[12], to[3];
+    npg_pose_invert(back, a->pose);
+    npg_pose_combine(between, back, b->pose);
+    npg_pose_apply(to, between, s->centre);
+    npg_vec3_sub(to, to, s->centre);
+    double cosine = fmin(fmax(0.5 * (between[0] + between[5] + between[10] - 1), -1), 1);
+    return npg_vec3_length(to) + acos(cosine) * s->depth;
+}
+
+/* Sensors are measured against each other, so one must be right: the one that most agree with (the least sum
+ * of differences), the first of equals. */
+static size_t most_agreed(const npg_rig_sights *s, const npg_correction *corrections)
+{
+    size_t best = 0;
+    double least = HUGE_VAL;
+    for (size_t k = 0; k < s->sensor_count; k++) {
+        double sum = 0;
+        for (size_t o = 0; o < s->sensor_count; o++) sum += difference(s, &corrections[k], &corrections[o]);
+        if (sum >= least * (1 - 1e-9)) continue;
+        least = sum;
+        best = k;
+    }
+    return best;
+}
+
+/* All corrections as seen from sensor `fixed`, whose own becomes none. */
+static void fix(npg_correction *corrections, size_t count, size_t fixed)
+{
+    double back[12], pose[12];
+    npg_pose_invert(back, corrections[fixed].pose);
     for (size_t k = 0; k < count; k++) {
-        double dist;
-        if (!dist_to(&dist, of, k * step, with, m->index + NEAREST * k, REACH * m->depth)) continue;
-        out->square += dist * dist;
-        out->pairs++;
-        is_seen[k] = 1;
+        npg_pose_combine(pose, back, corrections[k].pose);
+        memcpy(corrections[k].pose, pose, sizeof pose);
+    }
+    npg_pose_identity(corrections[fixed].pose);
+}
+
+static npg_rig_verdict judge(const npg_rig_sights *s, const npg_correction *c)
+{
+    if (!(c->shift_sd <= SD_SHIFT * s->depth && c->turn_sd <= SD_TURN)) return NPG_RIG_UNKNOWN;
+    bool is_shifted = c->shift > fmax(SAME_SHIFT * s->depth, SURE * c->shift_sd);
+    bool is_turned = c->turn > fmax(SAME_TURN, SURE * c->turn_sd);
+    return is_shifted || is_turned ? NPG_RIG_OFF : NPG_RIG_ALIGNED;
+}
+
+static void tell(npg_rig_view *view, const npg_correction *c)
+{
+    double known = view->overlap > 0 ? 1 : HUGE_VAL; /* else the deviations are the prior's */
+    view->shift = c->shift;
+    view->turn_deg = c->turn * 180 / M_PI;
+    view->shift_sd = known * c->shift_sd;
+    view->turn_sd_deg = known * c->turn_sd * 180 / M_PI;
+}
+
+typedef struct aligning {
+    const npg_rig_sights *sights;
+    npg_rig_view *views;
+    npg_correction of[NPG_RIG_SENSORS_MAX];
+    bool is_free[NPG_RIG_SENSORS_MAX];
+} aligning;
+
+static void start(npg_correction *c)
+{
+    *c = (npg_correction){.shift_sd = HUGE_VAL, .turn_sd = HUGE_VAL};
+    npg_pose_identity(c->pose);
+}
+
+/* Solve for all sensors but one, and judge them. */
+static npg_status find_off(aligning *a)
+{
+    const npg_rig_sights *s = a->sights;
+    for (size_t k = 0; k < s->sensor_count; k++) {
+        start(&a->of[k]);
+        a->is_free[k] = k > 0;
+    }
+    NPG_TRY(npg_rig_solve(a->of, s, a->is_free));
+    size_t fixed = most_agreed(s, a->of);
+    if (fixed) {
+        fix(a->of, s->sensor_count, fixed);
+        a->is_free[0] = true;
+        a->is_free[fixed] = false;
+        NPG_TRY(npg_rig_solve(a->of, s, a->is_free));
+    }
+    for (size_t k = 0; k < s->sensor_count; k++) {
+        a->views[k].verdict = k == fixed ? NPG_RIG_FIXED : judge(s, &a->of[k]);
+        if (k != fixed) tell(&a->views[k], &a->of[k]);
     }
     return NPG_OK;
 }
 
-static npg_status compare_sensor(measuring *m, size_t s)
+/* The corrections of those that are off, all others as the files have them: what is right stays as it is, and
+ * helps to determine what is not. */
+static npg_status correct(aligning *a)
 {
-    uint8_t is_seen[SOURCES_MAX + 1];
-    sums all = {.pairs = 0};
-    for (size_t f = 0; f < m->frame_count; f++) {
-        const view *of = view_of(m, f, s);
-        memset(is_seen, 0, sizeof is_seen);
-        for (size_t o = 0; o < m->sensor_count && of->count; o++)
-            if (o != s && view_of(m, f, o)->count)
-                NPG_TRY(pair_views(m, &all, is_seen, of, view_of(m, f, o)));
-        size_t step = of->count / SOURCES_MAX + 1;
-        for (size_t k = 0; k * step < of->count; k++) all.seen += is_seen[k];
-        all.asked += of->count ? (of->count + step - 1) / step : 0;
+    const npg_rig_sights *s = a->sights;
+    bool is_any = false;
+    for (size_t k = 0; k < s->sensor_count; k++) {
+        a->is_free[k] = a->views[k].verdict == NPG_RIG_OFF;
+        is_any = is_any || a->is_free[k];
+        if (!a->is_free[k]) start(&a->of[k]);
     }
-    m->views_of[s].overlap = all.asked ? (double)all.seen / (double)all.asked : 0;
-    m->views_of[s].apart = all.pairs ? sqrt(all.square / (double)all.pairs) : 0;
+    if (is_any) NPG_TRY(npg_rig_solve(a->of, s, a->is_free));
+    for (size_t k = 0; k < s->sensor_count; k++) {
+        memcpy(a->views[k].correction, a->of[k].pose, sizeof a->of[k].pose);
+        if (a->is_free[k]) tell(&a->views[k], &a->of[k]);
+    }
     return NPG_OK;
+}
+
+static npg_status align(npg_rig_view *views, const npg_rig_sights *sights)
+{
+    aligning a = {.sights = sights, .views = views};
+    NPG_TRY(find_off(&a));
+    return correct(&a);
 }
 
 /* ---- the answer ---- */
 
-static npg_status compare(measuring *m)
+npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, const size_t *frames, size_t count)
 {
-    size_t views = m->frame_count * m->sensor_count;
-    NPG_TRY(npg_alloc_array(&m->views, NPG_FOR_FILES, views, sizeof *m->views));
-    NPG_TRY(npg_alloc_array(&m->index, NPG_FOR_FILES, SOURCES_MAX + 1, NEAREST * sizeof *m->index));
-    NPG_TRY(npg_alloc_array(&m->dist_sq, NPG_FOR_FILES, SOURCES_MAX + 1, NEAREST * sizeof *m->dist_sq));
-    NPG_TRY(npg_alloc_array(&m->queries, NPG_FOR_FILES, SOURCES_MAX + 1, 3 * sizeof *m->queries));
-    NPG_TRY(see_all(m));
-    for (size_t s = 0; s < m->sensor_count; s++) NPG_TRY(compare_sensor(m, s));
-    return NPG_OK;
-}
-
-npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views_of, size_t sample)
-{
-    measuring m = {.rig = rig,
-                   .frame_count = sample < rig->frame_count ? sample : rig->frame_count,
-                   .sensor_count = rig->sensor_count,
-                   .views_of = views_of};
-    memset(views_of, 0, rig->sensor_count * sizeof *views_of);
-    npg_status status = compare(&m);
-    close_measuring(&m);
+    npg_rig_sights sights;
+    size_t most = SIGHTS_MAX / rig->sensor_count;
+    memset(views, 0, rig->sensor_count * sizeof *views);
+    for (size_t k = 0; k < rig->sensor_count; k++) npg_pose_identity(views[k].correction);
+    size_t chosen[NPG_RIG_COMPARED];
+    if (most > NPG_RIG_COMPARED) most = NPG_RIG_COMPARED;
+    if (most > count) most = count;
+    for (size_t i = 0; i < most; i++) chosen[i] = frames[i * count / most];
+    NPG_TRY(npg_rig_sights_open(&sights, rig, chosen, most));
+    for (size_t k = 0; k < rig->sensor_count; k++) {
+        views[k].depth = sights.depth;
+        compare_sensor(&views[k], &sights, k);
+    }
+    npg_status status = rig->sensor_count > 1 ? align(views, &sights) : NPG_OK;
+    npg_rig_sights_close(&sights);
     return status;
 }

@@ -140,8 +140,7 @@ npg_status npg_read_image_list(npg_stamped_list *list, const char *path)
 
 npg_status npg_read_trajectory(npg_stamped_list *list, const char *path)
 {
-    const char *dot = strrchr(path, '.');
-    return read_list(list, path, dot && !strcmp(dot, ".log") ? read_blocks : read_quaternions);
+    return read_list(list, path, npg_rig_ends_with(path, ".log") ? read_blocks : read_quaternions);
 }
 
 const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s, double tolerance_s)
