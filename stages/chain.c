@@ -36,6 +36,7 @@ static const npg_preset_value paper[] = {
     {"smoothing",       "doubled"},    /* as in the published code */
     {"rate-end",        "1"},
     {"feature-start",   "0"},
+    {"time-span",       "1"},
     {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
@@ -52,6 +53,7 @@ static const npg_preset_value paper_1000[] = {
     {"smoothing",       "doubled"},
     {"rate-end",        "1"},
     {"feature-start",   "0"},
+    {"time-span",       "1"},
     {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {

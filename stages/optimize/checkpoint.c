@@ -100,6 +100,7 @@ static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, cons
     NPG_TRY(npg_archive_put(out, "progress", &progress, sizeof progress));
     if (hand->is_aligned) NPG_TRY(put_alignment(out, hand, &facts->plan));
     if (hand->usual > 0) NPG_TRY(npg_archive_put(out, "usual", &hand->usual, sizeof hand->usual));
+    if (hand->lost_count) NPG_TRY(npg_archive_put(out, "lost", &hand->lost_count, sizeof hand->lost_count));
     return put_frames(out, hand, facts->reference->vert_count);
 }
 
@@ -278,6 +279,8 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     size_t size;
     if (npg_archive_find(in, "usual", &size))
         NPG_TRY(npg_archive_get(in, "usual", &hand->usual, sizeof hand->usual));
+    if (npg_archive_find(in, "lost", &size))
+        NPG_TRY(npg_archive_get(in, "lost", &hand->lost_count, sizeof hand->lost_count));
     npg_job_exported(job, &hand->emitted, &log_bytes);
     return get_frames(hand, in, first_index, facts->reference->vert_count);
 }

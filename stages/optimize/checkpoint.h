@@ -14,8 +14,9 @@ typedef struct npg_hand {
     int64_t emitted;   /* frames passed on before it closed              */
     double last_chamfer, last_isometry;
     bool is_aligned;
-    npg_warm *warm; /* of windows without alignment, or NULL; a loan */
-    double usual;   /* Chamfer distance that those came to, or 0     */
+    npg_warm *warm;     /* of windows without alignment, or NULL; a loan */
+    double usual;       /* Chamfer distance that those came to, or 0     */
+    int64_t lost_count; /* of them, those that a warm start did not bring there */
 } npg_hand;
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until

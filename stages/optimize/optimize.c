@@ -55,6 +55,9 @@ static const npg_option options[] = {
         "what the decoder is told about time"),
     NPG_ROW_INT   ("time-frequencies", FIT(frequencies),      "4",          1,     16,   "M",
         "frequencies of the time code; it has twice as many values"),
+    NPG_ROW_REAL  ("time-span",        FIT(time_span),        "0.8",        0.01,  1,    NULL,
+        "share of the time code's length that a window goes through: the codes of its ends are nearly alike; "
+        "1 as in the paper"),
     NPG_ROW_CHOICE("encoding",         FIT(encoding),         "grid",       "grid|single|hash",
         "features: a hierarchy of grids, its finest grid alone, or a hash table"),
     NPG_ROW_INT   ("grid-levels",      FIT(grid_levels),      "8",          1,     16,   "L",
@@ -405,7 +408,7 @@ static npg_hand hand_of(state *s, int64_t window_at)
     return (npg_hand){s->held,          s->held_count, s->held_capacity,
                       window_at,        s->emitted,    s->last_chamfer,
                       s->last_isometry, s->is_aligned, npg_window_warm(s->solver),
-                      s->usual_chamfer};
+                      s->usual_chamfer, s->lost_count};
 }
 
 static npg_status save_state(npg_worker *worker)
@@ -445,6 +448,7 @@ static npg_status resume(npg_worker *worker)
     s->last_chamfer = hand.last_chamfer;
     s->last_isometry = hand.last_isometry;
     s->usual_chamfer = hand.usual;
+    s->lost_count = hand.lost_count;
     if (!status) status = open_solver(worker, hand.is_aligned);
     if (!status && !hand.is_aligned)
         status = npg_checkpoint_restore_fit(worker, npg_window_fit(s->solver), npg_window_warm(s->solver));

@@ -24,7 +24,8 @@ static npg_record_facts facts_of(const npg_record_source *from)
                               .width_1 = s->width_1,
                               .width_2 = s->width_2,
                               .seed = from->seed,
-                              .slope = s->slope};
+                              .slope = s->slope,
+                              .time_span = s->time_span};
 }
 
 static npg_status put_features(npg_archive_writer *out, npg_fit *fit, size_t vert_count)

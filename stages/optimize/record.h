@@ -28,7 +28,7 @@ typedef struct npg_record_facts {                        /* no padding: the same
     int64_t is_aligned, vert_count;
     int64_t rotation, time_kind, frequencies, width_1, width_2;
     uint64_t seed; /* of the time code */
-    double slope;
+    double slope, time_span;
 } npg_record_facts;
 
 /* What a record is of; all loans. */

@@ -83,7 +83,8 @@ static bool are_sane(const npg_record_facts *f)
     const npg_plan *plan = &f->time_plan;
     bool has_time = plan->frame_count > 0 && plan->frame_count < INT32_MAX && plan->window > 0 &&
                     plan->window < INT32_MAX && plan->key >= 0 && plan->key < INT32_MAX &&
-                    plan->first_count >= 0 && plan->first_count < INT32_MAX;
+                    plan->first_count >= 0 && plan->first_count < INT32_MAX && f->time_span > 0 &&
+                    f->time_span <= 1;
     return has_order && has_sizes && has_shape && has_time && f->time_kind >= NPG_TIME_FOURIER &&
            f->time_kind <= NPG_TIME_LEARNED && f->rotation >= NPG_ROTATION_QUATERNION &&
            f->rotation <= NPG_ROTATION_EXPONENTIAL;
@@ -315,7 +316,7 @@ static npg_status decode(npg_replay *r, const npg_archive *in, const record *of,
     NPG_TRY(status);
     if (!saved || found != count * sizeof *saved) return bad(of->serial, "its time code has another size");
     if (count) memcpy(parts, saved, found);
-    double time = npg_window_time(&of->facts.time_plan, index);
+    double time = npg_window_time(&of->facts.time_plan, of->facts.time_span, index);
     npg_time_code_fill(r->time_code, r->codes, &time, 1);
     NPG_TRY(npg_buffer_write(&m->params, 0, params, npg_mlp_param_count(&m->shape) * sizeof(float)));
     NPG_TRY(npg_buffer_write(&m->z, 0, features, r->verts * row_size));

@@ -366,15 +366,6 @@ static npg_status open_frame(npg_warm *w, size_t place, size_t last, int step)
     return keep(w, PHASE_OPEN, 0);
 }
 
-/* From a known frame to the end of the window, one way (step 1 or -1). */
-static npg_status open_way(npg_warm *w, size_t last, int step)
-{
-    for (size_t place = last + (size_t)step; place < w->in->count && !w->is_known[place];
-         place += (size_t)step)
-        NPG_TRY(open_frame(w, place, place - (size_t)step, step));
-    return NPG_OK;
-}
-
 /* Solved frames are known, and the keyframe: it is the reference. */
 static void find_known(npg_warm *w)
 {
@@ -389,14 +380,29 @@ static void find_known(npg_warm *w)
     }
 }
 
+static bool was_known(const npg_warm *w, size_t place)
+{
+    return w->in->solved[place] || w->in->frames[place].index == w->facts->plan.key;
+}
+
+/* Outward both ways by turns: the field forgets what was opened long ago.  Whose turn it is follows from what
+ * is known, so that a resumed run takes the same turns. */
 static npg_status open_new(npg_warm *w)
 {
-    size_t first = 0, last = w->in->count - 1;
+    size_t first = 0, last = w->in->count - 1, before = 0, after = 0;
     while (first < w->in->count && !w->is_known[first]) first++;
     while (last > first && !w->is_known[last]) last--;
     if (first == w->in->count) return npg_error(NPG_FAILED, "no frame of the window is known");
-    NPG_TRY(open_way(w, last, 1));
-    return open_way(w, first, -1);
+    while (!was_known(w, first + before)) before++;
+    while (!was_known(w, last - after)) after++;
+    while (first > 0 || last + 1 < w->in->count) {
+        bool is_after = last + 1 < w->in->count && (first == 0 || after <= before);
+        NPG_TRY(is_after ? open_frame(w, last + 1, last, 1) : open_frame(w, first - 1, first, -1));
+        *(is_after ? &after : &before) += 1;
+        last += is_after;
+        first -= !is_after;
+    }
+    return NPG_OK;
 }
 
 /* ---- all frames together ---- */
@@ -418,19 +424,26 @@ static npg_status begin_dense(npg_warm *w, bool is_pulled, bool is_handed_over)
     return npg_fit_begin(w->dense, w->in->frames, w->in->count, w->facts->plan.key);
 }
 
-static npg_status fit_surface(npg_warm *w, some all)
+/* Where the field has all frames now, from which they are matched next. */
+static npg_status read_field(npg_warm *w, some all)
 {
     size_t size = 3 * w->carry->vert_count;
+    if (!w->wide) NPG_TRY(npg_alloc_array(&w->wide, NPG_FOR_FIT, w->in->count, size * sizeof(float)));
+    NPG_TRY(decode(w));
+    for (size_t i = 0; i < all.count; i++) NPG_TRY(npg_fit_vertices(w->dense, w->wide + i * size, i));
+    return read_poses(w, all, 0);
+}
+
+/* First matched from the poses that frames were opened to, not from what the field remembers of those. */
+static npg_status fit_surface(npg_warm *w, some all)
+{
     int64_t epochs = w->fit_settings.epochs;
-    NPG_TRY(npg_alloc_array(&w->wide, NPG_FOR_FIT, w->in->count, size * sizeof(float)));
     NPG_TRY(begin_dense(w, true, true));
     widen(w, LAST_WIDTH);
     for (int64_t round = w->is_resumed ? w->at.count : 0; round < w->rounds; round++) {
         if (!w->is_resumed) NPG_TRY(keep(w, PHASE_SURFACE, round));
         w->is_resumed = false;
-        NPG_TRY(decode(w));
-        for (size_t i = 0; i < all.count; i++) NPG_TRY(npg_fit_vertices(w->dense, w->wide + i * size, i));
-        NPG_TRY(read_poses(w, all, 0));
+        if (round) NPG_TRY(read_field(w, all));
         NPG_TRY(set_pulls(w, all, 0, true));
         npg_fit_set_epochs(w->probe, epochs);
         NPG_TRY(npg_fit_run(w->probe, round * epochs / w->rounds, (round + 1) * epochs / w->rounds,

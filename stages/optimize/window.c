@@ -99,11 +99,11 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
     return NPG_OK;
 }
 
-double npg_window_time(const npg_plan *plan, double index)
+double npg_window_time(const npg_plan *plan, double span, double index)
 {
     npg_window first = npg_plan_key_window(plan);
     int64_t length = first.last - first.first;
-    return length ? (index - (double)first.first) / (double)length : 0;
+    return length ? span * (index - (double)first.first) / (double)length : 0;
 }
 
 static npg_status open_frames(npg_window_solver *s, npg_held *const *held)
@@ -113,10 +113,11 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held)
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, s->count * verts, 3 * sizeof(float)));
     for (size_t i = 0; i < s->count; i++) {
         const npg_frame *frame = &held[i]->frame;
-        s->frames[i] = (npg_fit_frame){.index = frame->index,
-                                       .time = npg_window_time(&s->facts->plan, (double)frame->index),
-                                       .points = s->points + 3 * s->point_start[i],
-                                       .count = frame->point_count};
+        s->frames[i] = (npg_fit_frame){
+            .index = frame->index,
+            .time = npg_window_time(&s->facts->plan, s->settings.fit.time_span, (double)frame->index),
+            .points = s->points + 3 * s->point_start[i],
+            .count = frame->point_count};
     }
     return NPG_OK;
 }

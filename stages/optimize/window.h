@@ -51,9 +51,9 @@ const npg_joint_result *npg_window_result(const npg_window_solver *solver);
 npg_warm *npg_window_warm(npg_window_solver *solver);
 
 /* What the time code is a function of: the absolute frame with a fixed period,
- * the length of the first window, so that frames which two windows share mean the same to both.
- * Moments between frames have times, too. */
-double npg_window_time(const npg_plan *plan, double index);
+ * the length of the first window, so that frames which two windows share mean the same to both.  That window
+ * goes from 0 to span.  Moments between frames have times, too. */
+double npg_window_time(const npg_plan *plan, double span, double index);
 
 /* How much a window says of a frame, or of a moment between two, against what the windows before it have
  * said: 1 where it is the first to solve, less the farther into the overlap, 0 on the first frame outside. */

@@ -77,3 +77,24 @@ check_killed() {
     run "$NEUPIG" run capture/points -o hurt "${small[@]}" "${joint[@]}" --epochs 5000 --restart=no --max-memory 1
     [[ "$output" == *inside.npg* ]]
 }
+
+@test "windows that a warm start lost are counted over all that a run was broken off" {
+    "$NEUPIG" synth --body bar --frames 11 --points 500 -o lost-capture >lost.log
+    "$NEUPIG" synth --body bar --frames 11 --points 500 --noise 4 -o noisy-capture >>lost.log
+    cp noisy-capture/points/*000[567].ply lost-capture/points/
+    mv capture whole-capture
+    mv lost-capture capture
+    "$NEUPIG" run capture/points -o lost-whole "${small[@]}" "${warm[@]}" --keyframe 2 >>lost.log
+    grep -q '"windows_lost": [1-9]' lost-whole/report.json
+    "$NEUPIG" run capture/points -o lost "${small[@]}" "${warm[@]}" --keyframe 2 >>lost.log 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ ! -e lost/job/window_000001.npg ]; do :; done
+    kill -KILL $pid 2>/dev/null || true
+    wait $pid || true
+    [ ! -e lost/done.json ]
+    "$NEUPIG" run capture/points -o lost "${small[@]}" "${warm[@]}" --keyframe 2
+    grep -q resumed_frames lost/report.json
+    [ "$(grep windows_lost lost/report.json)" = "$(grep windows_lost lost-whole/report.json)" ]
+    mv capture lost-capture
+    mv whole-capture capture
+}
