@@ -194,9 +194,20 @@ static npg_status gather_quadrics(void *user, size_t part)
     return NPG_OK;
 }
 
+static double points_of(const npg_joint *j, size_t count)
+{
+    size_t sum = 0, frames = 0;
+    for (size_t t = 0; t < count; t++) {
+        sum += j->frames[t].point_count;
+        frames += j->frames[t].point_count > 0;
+    }
+    return fmax(1, (double)sum) / fmax(1, (double)frames);
+}
+
 static npg_status smooth(npg_joint *j, size_t count)
 {
-    const npg_time_frames f = {count, j->mesh->vert_count, j->positions, j->shares, j->is_known};
+    const npg_time_frames f = {count,     j->mesh->vert_count, j->positions,
+                               j->shares, j->is_known,         points_of(j, count)};
     frame_work r = {j, count};
     NPG_TRY(weigh_frames(j, count));
     NPG_TRY(npg_parallel(match_frames, &r, j->threads));

@@ -8,7 +8,7 @@
  * surface chooses lambda for each vertex: still parts are smoothed far, fast ones hardly, clean captures
  * hardly at all.  Motion that is too fast for the frames can't be predicted with any lambda, so the points
  * have the last word: no lambda that moves the surface away from them by more than a fit to their noise had
- * brought it nearer.
+ * brought it nearer.  A fit to few points follows each of them, and had brought it nearer by more.
  *
  * Based on: Paul Eilers, A perfect smoother, 2003. */
 #ifndef NPG_TIME_SMOOTH_H
@@ -26,6 +26,7 @@ typedef struct npg_time_frames {
     float *positions;               /* T x W x 3 */
     const float *shares;            /* T: 0 for a frame that says nothing, 1 for an ordinary one     */
     const bool *is_known;           /* T: already smooth, so left out of the judgement               */
+    double points;                  /* of a frame that has some, in the mean                         */
 } npg_time_frames;
 
 /* What a frame's points say of a vertex' way d from where the frame has it: the mean square of their
