@@ -63,6 +63,7 @@ static const npg_preset_value grids[] = {
     {"width-2",         "256"},
     {"grid-rate",       "0.015"},      /* with few samples larger steps pay */
     {"mlp-rate",        "0.002"},
+    {"window",          "12"},         /* new frames are opened from fitted ones */
     {"epochs",          "200"},        /* of the few samples: a tenth of the cost */
     {"rounds",          "8"},
     {NULL, NULL}};

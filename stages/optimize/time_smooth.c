@@ -12,6 +12,7 @@
 #define FARTHER      4 /* times the mean square of the points' distances: more is motion smoothed away */
 #define FEW          1600 /* points a frame that its pose was fitted to: twice as far, with half of them 9 times */
 #define FEWEST       10   /* times, at most */
+#define FRAMES_LEAST 12   /* for that: fewer frames do not say how the motion goes */
 #define FLOOR        1e-5 /* units: distances below do not matter */
 #define POOL_ROUNDS  30   /* steps of averaging over neighbours: about five edges wide */
 
@@ -220,7 +221,8 @@ static void choose(float *lambda, const choice *c)
 {
     size_t w = c->frames->vert_count;
     double *log_of = c->errors, *sums = c->errors + w; /* once all of a vertex' errors are seen */
-    double farther = FARTHER * fmin(FEWEST, 1 + pow(FEW / c->frames->points, 3));
+    double farther = FARTHER;
+    if (c->frames->frame_count >= FRAMES_LEAST) farther *= fmin(FEWEST, 1 + pow(FEW / c->frames->points, 3));
     for (size_t v = 0; v < w; v++) {
         int best = 0;
         for (int step = 1; step < LADDER && c->fars[(size_t)step * w + v] <= farther * c->here[v]; step++)
