@@ -14,6 +14,7 @@
 #include "fuse/cells.h"
 #include "fuse/colour_cells.h"
 #include "geometry/mesh_tools.h"
+#include "mesh/denoise.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "pipeline/order.h"
@@ -46,7 +47,7 @@ typedef struct state {
     npg_cells *cells;
     npg_colour_cells *hues; /* NULL: the points have no colours, or none are wanted */
     int64_t key;            /* index of the keyframe */
-    double spacing;         /* of the keyframe's points */
+    double spacing, noise;  /* of the keyframe's points */
     double usual;           /* mean of the frames' median distances */
     int64_t seen, frames, misaligned, points, strays; /* seen: of the pass, whatever came of them */
 } state;
@@ -149,6 +150,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     double per_frame = (double)POINTS_A_CELL / (double)facts->frame_count; /* of the points of one frame */
     s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
+    NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->count));
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));
     return npg_carry_back_open(&s->carry, facts->reference);
@@ -207,6 +209,7 @@ static npg_status collect(const state *s, npg_fused *fused)
     NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     fused->spacing_unit = npg_cells_side(s->cells);
     fused->key_spacing_unit = s->spacing;
+    fused->key_noise_unit = s->noise;
     return npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least);
 }
 

@@ -13,6 +13,7 @@ typedef struct npg_fused {
     size_t count;            /* N */
     double spacing_unit;     /* side of the cells that points were averaged over */
     double key_spacing_unit; /* of the keyframe's points                            */
+    double key_noise_unit;   /* of the same, across the surface                     */
     /* Their colours, where they have any: points of their own, M x 3, M x 3 and M x 4; owned, or NULL. */
     float *hue_points, *hue_normals;
     uint8_t *hues;

@@ -23,6 +23,7 @@
 #define POINTS_MAX        80000
 #define START_POINTS      30000 /* of a surface that only carries the frames of a fusing pass */
 #define NOISE_MIN         0.03  /* in spacings; clean clouds have 0 */
+#define FOLLOW_NOISE      0.08  /* of a frame's points, in spacings; curvature of few points is below */
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
@@ -104,7 +105,7 @@ typedef struct making { /* what is known while the reference is made */
     double spacing;   /* of the points */
     double diagonal;  /* of the points */
     double invented;  /* share of the mesh that no point saw, once it is trimmed */
-    bool is_noisy;    /* the points were smoothed */
+    bool is_rough;    /* the points were smoothed, and a frame's are noisy beyond doubt */
     npg_mesh *mesh;   /* owned */
 } making;
 
@@ -214,7 +215,8 @@ static npg_status smooth(making *m)
     npg_worker_log(m->worker, NPG_LOG_INFO, m->frame->number,
                    "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    m->fused ? "all frames" : "the keyframe", sigma);
-    m->is_noisy = true;
+    m->is_rough = m->fused ? m->fused->key_noise_unit > FOLLOW_NOISE * m->fused->key_spacing_unit
+                           : sigma > FOLLOW_NOISE * m->spacing;
     return npg_cloud_smooth(m->points, m->normals, n, m->fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
 
@@ -365,11 +367,11 @@ static npg_status flatten(making *m)
     return moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
 }
 
-/* Of clean points the surface is nearer the truth than their normals' means. */
+/* Of clean points the surface is nearer the truth than their normals' means, and of few points, too. */
 static npg_status turn_faces(making *m)
 {
     npg_mending mending;
-    if (!m->is_noisy) return NPG_OK;
+    if (!m->is_rough) return NPG_OK;
     NPG_TRY(npg_mesh_follow_normals(m->mesh, m->points, m->normals, m->count));
     return npg_mesh_mend(&m->mesh, &mending);
 }
