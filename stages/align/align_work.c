@@ -77,8 +77,8 @@ npg_status npg_align_frame_work(npg_mesh *reference, const float *points, size_t
     aligning a = {.points = points, .point_count = point_count};
     const double N = (double)point_count, S = (double)usual.samples;
     const double unknowns = NPG_GRAPH_BIND * NPG_POSE_SIZE;
-    /* In each step every point and every sample adds a row of the nodes that carry it to the normal equations,
-     * whose half is kept; their solution is not counted, it depends on the graph. */
+    /* In each step every point and every sample adds a row of the nodes that carry it to the normal
+     * equations, whose half is kept; their solution is not counted, it depends on the graph. */
     npg_work work = {.name = "align_frame",
                      .call = align_frame,
                      .user = &a,

@@ -1,7 +1,7 @@
 /* Door of the export room: what tools use of it.
  *
- * writer.h: one mesh into a file (neupig apply, synth).  placement.h: the capture's coordinates to those of the
- * written files (neupig view). */
+ * writer.h: one mesh into a file (neupig apply, synth).  placement.h: the capture's coordinates to those of
+ * the written files (neupig view). */
 #ifndef NPG_EXPORT_H
 #define NPG_EXPORT_H
 
@@ -29,8 +29,8 @@ npg_status npg_folder_probe(const char *output);
  * its other files and the mesh files (<word>_<digits>.ply or .obj).  Files that no run makes stay. */
 npg_status npg_folder_clear(const char *output);
 
-/* "export_ply": a mesh written as the stage writes that of each frame, to this path, which is there afterwards.
- * The mesh is a loan during the call.  NPG_MEMORY, NPG_DISK, and the visit's failures. */
+/* "export_ply": a mesh written as the stage writes that of each frame, to this path, which is there
+ * afterwards.  The mesh is a loan during the call.  NPG_MEMORY, NPG_DISK, and the visit's failures. */
 npg_status npg_export_work(const npg_mesh *mesh, const char *path, npg_work_visit *visit, void *user);
 
 #endif

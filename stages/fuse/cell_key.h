@@ -1,5 +1,5 @@
-/* Cell keys: in which cube of space a point of a surface lies and which octant it faces, as 63 bits, and where
- * such a key is looked for first in an open-addressed table of 2^bits places. */
+/* Cell keys: in which cube of space a point of a surface lies and which octant it faces, as 63 bits, and
+ * where such a key is looked for first in an open-addressed table of 2^bits places. */
 #ifndef NPG_CELL_KEY_H
 #define NPG_CELL_KEY_H
 

@@ -20,7 +20,7 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t poin
 npg_status npg_normals_estimate_several(float *const *normals, const float *points, size_t point_count,
                                         const int *neighbours, size_t count);
 
-/* The same at `at_count` of the points alone, whose neighbours are any of the N: at_count x 3 normals each. */
+/* The same at `at_count` of the points alone, with neighbours among all N: at_count x 3 normals each. */
 npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, size_t at_count,
                                    const float *points, size_t point_count, const int *neighbours,
                                    size_t count);

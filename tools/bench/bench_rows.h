@@ -29,8 +29,8 @@ npg_status npg_bench_dense(npg_meter *meter, const char *only, size_t vertices, 
 npg_status npg_bench_clouds(npg_meter *meter, const char *only, size_t points, npg_bench_visit *visit,
                             void *user);
 
-/* The same for one frame of the usual size: aligned from its neighbour's pose, and its mesh written into a file
- * in the folder for temporary files.  NPG_DISK, too. */
+/* The same for one frame of the usual size: aligned from its neighbour's pose, and its mesh written into a
+ * file in the folder for temporary files.  NPG_DISK, too. */
 npg_status npg_bench_frame(npg_meter *meter, const char *only, npg_bench_visit *visit, void *user);
 
 /* The share of the limit that binds the row: of the multiply-adds, or of the bytes, that the device does in
