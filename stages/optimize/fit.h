@@ -46,8 +46,7 @@ typedef struct npg_fit_settings {
     int64_t epochs;
     int rotation, time_code, encoding, confidence, catch_up, smoothing, deliver /* enums of these names */;
     int64_t frequencies;
-    double
-        time_span; /* times of a window go from 0 to this: the code of 1 is nearly that of 0; paper: 1 */
+    double time_span; /* times of a window go from 0 to this: the code of 1 is nearly that of 0; paper: 1 */
     int64_t grid_base, grid_step, grid_levels, normal_nodes;
     int64_t position_channels, normal_channels; /* |z_p| and |z_n|, together NPG_LATENT_CHANNELS at most */
     bool normal_grid;

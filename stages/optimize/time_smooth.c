@@ -9,7 +9,7 @@
 #define LADDER       20   /* lambdas that are tried */
 #define LADDER_FIRST -5.5 /* decimal logarithms     */
 #define LADDER_STEP  0.5
-#define FARTHER      4 /* times the mean square of the points' distances: more is motion smoothed away */
+#define FARTHER      4    /* times the mean square of the points' distances: more is motion smoothed away */
 #define FEW          1600 /* points a frame that its pose was fitted to: twice as far, half of them 9 times */
 #define FEWEST       10   /* times, at most */
 #define FRAMES_LEAST 12   /* for that: fewer frames do not say how the motion goes */
