@@ -34,11 +34,16 @@ npg_status npg_join_path(char **out, const char *folder, const char *name)
     return NPG_OK;
 }
 
+bool npg_is_there(const char *path)
+{
+    return access(path, F_OK) == 0;
+}
+
 bool npg_is_in_folder(const char *folder, const char *name)
 {
     char *path;
     if (npg_join_path(&path, folder, name)) return false;
-    bool is_there = access(path, F_OK) == 0;
+    bool is_there = npg_is_there(path);
     npg_release(&path);
     return is_there;
 }

@@ -55,7 +55,9 @@ npg_status npg_make_folder(const char *path);
 /* "<folder>/<name>", to be given to npg_release(). */
 npg_status npg_join_path(char **out, const char *folder, const char *name);
 
-/* Whether the folder has something of that name; false, too, where that can't be found out. */
+/* Whether something lies at the path, or in the folder under that name; false, too, where that can't be found
+ * out. */
+bool npg_is_there(const char *path);
 bool npg_is_in_folder(const char *folder, const char *name);
 
 #endif

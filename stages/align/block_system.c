@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/cholesky.h"
 #include "geometry/vec3.h"
 #include "pipeline/parallel.h"
 
@@ -197,38 +198,15 @@ static void set_cell(float *cell, const double *block, bool transposed)
         for (int i = 0; i < 6; i++) cell[LANES * j + i] = (float)block[transposed ? 6 * j + i : 6 * i + j];
 }
 
-/* a (positive) = l l^T, lower triangle. */
-static void factorise(double *l, const double *a)
-{
-    memset(l, 0, 36 * sizeof *l);
-    for (int j = 0; j < 6; j++)
-        for (int i = j; i < 6; i++) {
-            double sum = a[6 * i + j];
-            for (int k = 0; k < j; k++) sum -= l[6 * i + k] * l[6 * j + k];
-            l[6 * i + j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / l[6 * j + j];
-        }
-}
-
-static void solve_factor(double *x, const double *l)
-{
-    for (int i = 0; i < 6; i++) {
-        for (int k = 0; k < i; k++) x[i] -= l[6 * i + k] * x[k];
-        x[i] /= l[6 * i + i];
-    }
-    for (int i = 5; i >= 0; i--) {
-        for (int k = i + 1; k < 6; k++) x[i] -= l[6 * k + i] * x[k];
-        x[i] /= l[6 * i + i];
-    }
-}
-
 static void invert(double *inverse, const double *a)
 {
     double l[36];
-    factorise(l, a);
+    memcpy(l, a, sizeof l);
+    npg_cholesky_factor(l, 6, 1e-12);
     for (int row = 0; row < 6; row++) {
         double *x = inverse + 6 * row; /* symmetric: a row is a column */
         for (int i = 0; i < 6; i++) x[i] = i == row;
-        solve_factor(x, l);
+        npg_cholesky_solve(l, 6, x);
     }
 }
 

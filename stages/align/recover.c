@@ -195,9 +195,9 @@ static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int
     *is_found = false;
     for (size_t k = 0; k < lost_count && vain < VAIN_MOST; k++) {
         NPG_TRY(recover_frame(r, r->lost[k], sweep));
-        bool is_this = !is_lost(r, &r->frames[r->lost[k]]);
-        vain = is_this ? 0 : vain + 1;
-        *is_found |= is_this;
+        bool is_this_found = !is_lost(r, &r->frames[r->lost[k]]);
+        vain = is_this_found ? 0 : vain + 1;
+        *is_found |= is_this_found;
     }
     return NPG_OK;
 }

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/mesh_tools.h"
+
 #define FLIPPED_MOST                                                                                         \
     0.1 /* share of given normals on the wrong side, beyond which those of other frames are not used */
 
@@ -14,11 +16,8 @@ static npg_status copy_points(npg_sight *sight, const npg_frame *frame, const np
     size_t count = frame->point_count < NPG_SIGHT_POINTS ? frame->point_count : NPG_SIGHT_POINTS;
     NPG_TRY(npg_alloc_array(&sight->points, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&sight->normals, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
-    for (size_t i = 0; i < count; i++) {
-        size_t from = i * frame->point_count / count;
-        memcpy(sight->points + 3 * i, frame->pos_local + 3 * from, 3 * sizeof(float));
-        if (frame->normals) memcpy(sight->normals + 3 * i, frame->normals + 3 * from, 3 * sizeof(float));
-    }
+    npg_points_spread(sight->points, sight->normals, count, frame->pos_local, frame->normals,
+                      frame->point_count);
     npg_box_local_to_unit(box, sight->points, sight->points, count);
     sight->point_count = count;
     return NPG_OK;

@@ -52,12 +52,6 @@ static bool is_folder(const char *path)
     return !stat(path, &info) && S_ISDIR(info.st_mode);
 }
 
-static bool exists(const char *path)
-{
-    struct stat info;
-    return !stat(path, &info);
-}
-
 /* ---- a folder ---- */
 
 /* Names in a folder that do not begin with a dot: the sub-folders, or the files with a known ending. */
@@ -301,10 +295,10 @@ static npg_status resolve(char **out, const char *list_path, const char *line)
         npg_status status = npg_join_path(out, folder, line);
         npg_release(&folder);
         if (status) return status;
-        if (exists(*out)) return NPG_OK;
+        if (npg_is_there(*out)) return NPG_OK;
         npg_release(out);
     }
-    return exists(line) ? npg_copy_text(out, line) : NPG_OK;
+    return npg_is_there(line) ? npg_copy_text(out, line) : NPG_OK;
 }
 
 /* The next line that says something, as text of its own; NPG_END. */
@@ -402,9 +396,9 @@ static npg_status find_matches(npg_paths *out, const char *input)
 npg_status npg_paths_find(npg_paths *out, const char *input)
 {
     *out = (npg_paths){0};
-    npg_status status = is_folder(input) ? find_in_folder(out, input)
-                        : exists(input)  ? find_file(out, input)
-                                         : find_matches(out, input);
+    npg_status status = is_folder(input)      ? find_in_folder(out, input)
+                        : npg_is_there(input) ? find_file(out, input)
+                                              : find_matches(out, input);
     if (status) npg_paths_clear(out);
     return status;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
 #include "pipeline/memory.h"
 
 #define POINTS_MOST 5000
@@ -24,11 +25,6 @@ bool npg_points_face(const float *p, const float *n, const float *q, const float
     }
     length = sqrtf(length);
     return cosine < AGAINST && along_n > ACROSS * length && along_m < -ACROSS * length;
-}
-
-static void thin(float *out, const float *in, size_t kept, size_t count)
-{
-    for (size_t i = 0; i < kept; i++) memcpy(out + 3 * i, in + 3 * (i * count / kept), 3 * sizeof(float));
 }
 
 /* How many points face one of their neighbours. */
@@ -59,8 +55,7 @@ npg_status npg_cloud_contact(double *share, const float *points, const float *no
     if (!status) status = npg_alloc_array(&n, NPG_FOR_QUERY, count, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(float));
     if (!status) status = npg_alloc_array(&near, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(uint32_t));
-    if (!status) thin(p, points, count, point_count);
-    if (!status) thin(n, normals, count, point_count);
+    if (!status) npg_points_spread(p, n, count, points, normals, point_count);
     if (!status) status = npg_kdtree_open(&tree, p, count);
     if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, p, count, NEIGHBOURS, 0);
     if (!status) *share = (double)count_facing(p, n, near, count) / (double)count;

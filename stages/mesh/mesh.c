@@ -154,11 +154,7 @@ static npg_status take_frame_points(making *m)
     m->count = n < most ? n : most;
     NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
-    for (size_t i = 0; i < m->count; i++) {
-        size_t from = npg_spread_index(i, m->count, n);
-        memcpy(m->points + 3 * i, frame->pos_local + 3 * from, 3 * sizeof(float));
-        if (m->normals) memcpy(m->normals + 3 * i, frame->normals + 3 * from, 3 * sizeof(float));
-    }
+    npg_points_spread(m->points, m->normals, m->count, frame->pos_local, frame->normals, n);
     npg_box_local_to_unit(&npg_worker_facts(m->worker)->box, m->points, m->points, m->count);
     return NPG_OK;
 }

@@ -366,23 +366,22 @@ static npg_status open_frame(npg_warm *w, size_t place, size_t last, int step)
     return keep(w, PHASE_OPEN, 0);
 }
 
-/* Solved frames are known, and the keyframe: it is the reference. */
-static void find_known(npg_warm *w)
-{
-    for (size_t i = 0; i < w->in->count; i++) {
-        bool is_key = w->in->frames[i].index == w->facts->plan.key;
-        w->is_known[i] = is_key || w->in->solved[i];
-        if (!w->carry) continue; /* nothing is brought near */
-        if (w->in->solved[i])
-            npg_carry_gather(w->carry, pose_of(w, i), w->in->solved[i]);
-        else if (is_key)
-            memcpy(pose_of(w, i), w->carry->samples->mesh->vert_pos, 3 * w->samples * sizeof(float));
-    }
-}
-
+/* Solved frames are known from the beginning, and the keyframe: it is the reference. */
 static bool was_known(const npg_warm *w, size_t place)
 {
     return w->in->solved[place] || w->in->frames[place].index == w->facts->plan.key;
+}
+
+static void find_known(npg_warm *w)
+{
+    for (size_t i = 0; i < w->in->count; i++) {
+        w->is_known[i] = was_known(w, i);
+        if (!w->carry) continue; /* nothing is brought near */
+        if (w->in->solved[i])
+            npg_carry_gather(w->carry, pose_of(w, i), w->in->solved[i]);
+        else if (w->is_known[i])
+            memcpy(pose_of(w, i), w->carry->samples->mesh->vert_pos, 3 * w->samples * sizeof(float));
+    }
 }
 
 /* Outward both ways by turns: the field forgets what was opened long ago.  Whose turn it is follows from what

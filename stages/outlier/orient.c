@@ -26,7 +26,7 @@
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
 #define FOLLOWED       5    /* core points that each other point asks for its side                 */
 #define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
-#define MEND_ROUNDS    6    /* of those, each followed by the winding number of what it gave         */
+#define MEND_ROUNDS    6    /* of those, each followed by the winding number of what it gave       */
 #define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
 #define MISFIT_WEIGHT  4.0  /* of the winding number's misfit beside the neighbours' agreement     */
 #define WINDING_WEIGHT 0.6  /* of the winding number beside the neighbours' vote, of single points */

@@ -21,19 +21,6 @@ bool npg_rig_ends_with(const char *name, const char *ending)
     return length >= size && !strcmp(name + length - size, ending);
 }
 
-bool npg_rig_is_there(const char *path)
-{
-    struct stat info;
-    return !stat(path, &info);
-}
-
-static bool is_in(const char *folder, const char *name)
-{
-    char path[4096];
-    int length = snprintf(path, sizeof path, "%s/%s", folder, name);
-    return length > 0 && (size_t)length < sizeof path && npg_rig_is_there(path);
-}
-
 /* A file NNNN_camera.xml, .yml or .yaml lies in the folder. */
 static bool has_camera_files(const char *folder)
 {
@@ -64,11 +51,12 @@ static load_fn *layout_of(const char *path, const char **name)
     int at = -1;
     if (!is_folder)
         at = npg_rig_ends_with(path, ".json") ? 0 : -1;
-    else if (is_in(path, "rig.json"))
+    else if (npg_is_in_folder(path, "rig.json"))
         at = 0;
-    else if (is_in(path, "depth.txt"))
+    else if (npg_is_in_folder(path, "depth.txt"))
         at = 1;
-    else if (is_in(path, "depth") && (is_in(path, "intrinsic.json") || is_in(path, "camera_intrinsic.json")))
+    else if (npg_is_in_folder(path, "depth") &&
+             (npg_is_in_folder(path, "intrinsic.json") || npg_is_in_folder(path, "camera_intrinsic.json")))
         at = 2;
     else if (has_camera_files(path))
         at = 3;

@@ -176,9 +176,6 @@ npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *
 
 bool npg_rig_ends_with(const char *name, const char *ending);
 
-/* Something lies at the path. */
-bool npg_rig_is_there(const char *path);
-
 /* "<rig's folder>/<name>", refused under confine where it leads out; NPG_BAD_INPUT where it is not there and
  * must be. */
 npg_status npg_rig_path(const npg_rig *rig, char **path, const char *name, bool must_be);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/cholesky.h"
 #include "geometry/vec3.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
@@ -172,29 +173,6 @@ static npg_status sum_all(solving *s)
 
 /* ---- one step ---- */
 
-/* matrix = L L' in its lower half; the prior makes it positive definite. */
-static void factor(double *m, size_t n)
-{
-    for (size_t j = 0; j < n; j++)
-        for (size_t i = j; i < n; i++) {
-            double sum = m[i * n + j];
-            for (size_t k = 0; k < j; k++) sum -= m[i * n + k] * m[j * n + k];
-            m[i * n + j] = i == j ? sqrt(fmax(sum, 1e-300)) : sum / m[j * n + j];
-        }
-}
-
-static void solve_with(const double *l, size_t n, double *x)
-{
-    for (size_t i = 0; i < n; i++) {
-        for (size_t k = 0; k < i; k++) x[i] -= l[i * n + k] * x[k];
-        x[i] /= l[i * n + i];
-    }
-    for (size_t i = n; i-- > 0;) {
-        for (size_t k = i + 1; k < n; k++) x[i] -= l[k * n + i] * x[k];
-        x[i] /= l[i * n + i];
-    }
-}
-
 /* Turn (as a vector of radians) and shift (of the centre) of a correction. */
 static void parts_of(double out[6], const npg_correction *c, const double centre[3])
 {
@@ -242,9 +220,9 @@ static double step(solving *s)
     size_t n = s->unknowns;
     double largest = 0, turned = 0;
     add_prior(s);
-    factor(s->matrix, n);
+    npg_cholesky_factor(s->matrix, n, 1e-300); /* the prior makes it positive definite */
     for (size_t i = 0; i < n; i++) s->gradient[i] = -s->gradient[i];
-    solve_with(s->matrix, n, s->gradient);
+    npg_cholesky_solve(s->matrix, n, s->gradient);
     for (size_t i = 0; i < n; i++) {
         bool is_turn = i % 6 < 3;
         largest = fmax(largest, fabs(s->gradient[i]) / (is_turn ? 1 : s->sights->depth));
@@ -278,7 +256,7 @@ static double variance(solving *s)
     size_t n = s->unknowns, frames = s->sights->frame_count;
     double model = 0, spread = 0, *solved = s->rows + n;
     memcpy(solved, s->rows, n * sizeof *solved);
-    solve_with(s->matrix, n, solved);
+    npg_cholesky_solve(s->matrix, n, solved);
     for (size_t i = 0; i < n; i++) model += s->rows[i] * solved[i];
     for (size_t f = 0; f < frames; f++) {
         double one = 0;

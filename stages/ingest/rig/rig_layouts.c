@@ -149,7 +149,7 @@ static npg_status find_intrinsic(const npg_rig *rig, npg_camera *camera, bool *f
     for (size_t i = 0; i < 2 && !*found; i++) {
         char *path;
         NPG_TRY(npg_rig_path(rig, &path, usual[i], false));
-        *found = npg_rig_is_there(path);
+        *found = npg_is_there(path);
         npg_status status = *found ? npg_rig_read_intrinsic(camera, path) : NPG_OK;
         npg_release(&path);
         NPG_TRY(status);
@@ -172,8 +172,8 @@ npg_status npg_rig_load_tum(npg_rig *rig)
     npg_status status = npg_rig_path(rig, &colours, "rgb.txt", false);
     if (!status) status = npg_rig_path(rig, &poses, "groundtruth.txt", false);
     if (!status)
-        status = npg_rig_load_timed(rig, sensor, "depth.txt", npg_rig_is_there(colours) ? "rgb.txt" : NULL,
-                                    npg_rig_is_there(poses) ? "groundtruth.txt" : NULL);
+        status = npg_rig_load_timed(rig, sensor, "depth.txt", npg_is_there(colours) ? "rgb.txt" : NULL,
+                                    npg_is_there(poses) ? "groundtruth.txt" : NULL);
     npg_release(&colours);
     npg_release(&poses);
     return status;
@@ -186,7 +186,7 @@ static npg_status read_log(const npg_rig *rig, npg_stamped_list *poses, size_t i
 {
     char *path;
     NPG_TRY(npg_rig_path(rig, &path, "trajectory.log", false));
-    npg_status status = npg_rig_is_there(path) ? npg_read_trajectory(poses, path) : NPG_OK;
+    npg_status status = npg_is_there(path) ? npg_read_trajectory(poses, path) : NPG_OK;
     if (!status && poses->count && poses->count != image_count)
         status = npg_error(NPG_BAD_INPUT, "%s: %zu poses, but %zu depth images: images out of step", path,
                            poses->count, image_count);
@@ -228,7 +228,7 @@ npg_status npg_rig_load_redwood(npg_rig *rig)
     npg_release(&folder);
     for (size_t i = 0; i < sizeof colour_folders / sizeof *colour_folders && !status && !colour.count; i++) {
         status = npg_rig_path(rig, &folder, colour_folders[i], false);
-        if (!status && npg_rig_is_there(folder)) status = list_names(&colour, folder, any);
+        if (!status && npg_is_there(folder)) status = list_names(&colour, folder, any);
         npg_release(&folder);
     }
     if (!status) status = add_redwood(rig, sensor, &depth, &colour);
@@ -248,7 +248,7 @@ static npg_status beside(char **path, const char *depth, const char *const *endi
         NPG_TRY(npg_alloc(path, NPG_FOR_FILES, stem + strlen(*endings) + 1));
         memcpy(*path, depth, stem);
         strcpy(*path + stem, *endings);
-        if (!npg_rig_is_there(*path)) npg_release(path);
+        if (!npg_is_there(*path)) npg_release(path);
     }
     return NPG_OK;
 }

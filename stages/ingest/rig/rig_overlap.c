@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
 #include "ingest/rig/rig_align.h"
 #include "pipeline/memory.h"
@@ -185,7 +186,7 @@ npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, const size_t *fram
     size_t chosen[NPG_RIG_COMPARED];
     if (most > NPG_RIG_COMPARED) most = NPG_RIG_COMPARED;
     if (most > count) most = count;
-    for (size_t i = 0; i < most; i++) chosen[i] = frames[i * count / most];
+    for (size_t i = 0; i < most; i++) chosen[i] = frames[npg_spread_index(i, most, count)];
     NPG_TRY(npg_rig_sights_open(&sights, rig, chosen, most));
     for (size_t k = 0; k < rig->sensor_count; k++) {
         views[k].depth = sights.depth;
