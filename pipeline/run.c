@@ -230,6 +230,7 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
     atomic_store(&run->ended_count, 0);
     npg_status status = open_worker_states(run);
     bool is_heavy = pass == NPG_PASS_FUSE || (pass == NPG_PASS_SOLVE && !run->facts.is_live);
+    if (!status) npg_timeline_begin_pass(run);
     if (!status && is_heavy) npg_run_announce_memory(run);
     if (!status) status = open_rings(run);
     if (!status) status = start_threads(run);

@@ -16,6 +16,8 @@
 #define NPG_LATCHES_MAX  4
 #define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */
 
+#define NPG_TIMED_PASSES 3 /* CHOOSE, FUSE, SOLVE */
+
 /* One stage at work, or a service that begins. */
 struct npg_worker {
     npg_run *run;
@@ -27,6 +29,8 @@ struct npg_worker {
     npg_ring *in, *out; /* loans; in is NULL for the first, out for the last without pull */
     pthread_t thread;
     bool started;
+    double expected_s[NPG_TIMED_PASSES],
+        done;             /* of its work in each pass; share done in this one; under lock */
     double wall_s, cpu_s; /* of the passes so far: of the thread's life, and of its processor time */
     json_t *report;       /* loan from the run's report */
     void *kept;           /* owned for the run's whole life, see npg_worker_keep */
@@ -51,7 +55,9 @@ struct npg_run {
     bool is_partial;
     int64_t warning_count;
     npg_progress progress;     /* the first one: the time left follows from the pace since */
+    double share;              /* the last one told: it never goes back */
     int64_t fuse_done;         /* fusing passes walked */
+    int64_t fuse_walks;        /* and to be walked, as it was when this pass began */
     json_t *report, *warnings; /* owned */
     json_t *closed_reports;    /* of stages: before the solving pass, or as they were closed; owned */
     npg_published published[NPG_FACTS_MAX];
@@ -82,6 +88,16 @@ struct npg_run {
     npg_chunk *pulled; /* the chunk whose frames are being pulled */
     size_t pulled_at;
 };
+
+/* ---- the time left (timeline.c) ---- */
+
+/* Before a pass, whose states are there and whose threads are not: what its stages expect in it and in the
+ * passes to come. */
+void npg_timeline_begin_pass(npg_run *run);
+
+/* The share of the run that is done when the worker has done `share` of its work in this pass, and the seconds
+ * left, -1 while there is no pace yet.  Under the lock. */
+void npg_timeline_advance(npg_worker *worker, npg_progress *progress);
 
 /* npg_run_open() with another chain in place of npg_chain. */
 npg_status npg_run_open_chain(npg_run **run, const npg_options *options, const npg_hooks *hooks,

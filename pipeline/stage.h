@@ -49,6 +49,7 @@ typedef struct npg_facts {
     int64_t skipped_count;       /* frames left out under --missing skip or --keep-going */
     /* keyframe */
     size_t point_count_max;         /* of all frames, as read */
+    bool has_normals;               /* all frames with points, as read */
     int64_t number_min, number_max; /* of all frames          */
     npg_bounds bounds_local;        /* of all usable points   */
     npg_frame_box box;
@@ -115,6 +116,10 @@ typedef struct npg_stage {
      * Called from the thread that writes the state, while this stage has seen the frames that are written
      * and no other.  May be NULL. */
     npg_status (*save)(const npg_worker *worker, npg_archive_writer *out);
+    /* Processor seconds that the stage expects to take in a pass (CHOOSE, FUSE or SOLVE), on whatever machine:
+     * the run's progress is the share of these that is done, and only their ratios matter.  Read from options
+     * and facts, before the pass.  NULL: not worth counting. */
+    double (*expects)(const npg_worker *worker, npg_pass pass);
     /* After all stages ended well: the last word (files that must come last).  May be NULL. */
     npg_status (*conclude)(npg_worker *worker);
 } npg_stage;
@@ -190,8 +195,13 @@ void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, cons
 void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
     NPG_PRINTF(4, 5);
 
-/* Tell how far things are, `share` that of the pass; fields the stage does not know are filled by the run. */
+/* Report how far things are: `share` is that of the stage's work in this pass, which the run turns into the
+ * whole run's by what all stages expect to take; in a run where none expects anything, of the whole run.
+ * Fields the stage does not know are filled by the run. */
 void npg_worker_progress(npg_worker *worker, const npg_progress *progress);
+
+/* The same of a stage that goes through things one by one: `step` of `steps` are done. */
+void npg_worker_step(npg_worker *worker, double share, int64_t step, int64_t steps);
 
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
 json_t *npg_worker_report(npg_worker *worker);

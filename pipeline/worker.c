@@ -233,25 +233,6 @@ npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *
 
 /* ---- progress ---- */
 
-/* The share of the run that is done, from that of the pass: each fusing pass and the solving one, which take
- * about as long, count alike. */
-static double share_of_run(const npg_run *run, double of_pass)
-{
-    bool is_fusing = run->pass == NPG_PASS_FUSE;
-    int64_t passes = run->fuse_done + (is_fusing ? run->facts.fuse_left : 0) + 1;
-    return ((double)run->fuse_done + of_pass) / (double)passes;
-}
-
-/* Seconds left by the pace since the run's first word of progress; -1 while there is no pace yet.  Called
- * under the lock. */
-static double time_left(npg_run *run, const npg_progress *now)
-{
-    const npg_progress *first = &run->progress;
-    if (!first->struct_size) run->progress = *now;
-    double done = now->share - first->share, taken_s = now->elapsed_s - first->elapsed_s;
-    return done > 0 && taken_s > 0 ? (1 - now->share) * taken_s / done : -1;
-}
-
 void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
 {
     npg_run *run = worker->run;
@@ -259,12 +240,22 @@ void npg_worker_progress(npg_worker *worker, const npg_progress *progress)
     npg_progress now = *progress;
     now.struct_size = sizeof now;
     now.stage = worker->name;
-    now.share = share_of_run(run, progress->share);
     now.elapsed_s = npg_clock_s() - run->begun.wall_s;
     pthread_mutex_lock(&run->lock);
-    now.left_s = time_left(run, &now);
+    npg_timeline_advance(worker, &now);
     run->hooks.progress(run->hooks.user, &now);
     pthread_mutex_unlock(&run->lock);
+}
+
+void npg_worker_step(npg_worker *worker, double share, int64_t step, int64_t steps)
+{
+    const npg_progress progress = {.share = share,
+                                   .step = step,
+                                   .steps = steps,
+                                   .windows = 1,
+                                   .frames = worker->run->facts.frame_count,
+                                   .loss = (double)NAN};
+    npg_worker_progress(worker, &progress);
 }
 
 void npg_worker_announce_memory(npg_worker *worker)

@@ -200,15 +200,16 @@ static void print_json(job *j, const npg_estimate *e)
                                       origin[2] + hi[2], "diagonal", npg_bounds_diagonal(&p->bounds))
                           : json_null();
     json_t *all = json_pack(
-        "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:O,s:{s:I,s:I,s:I,s:f,s:f,s:f},s:O}",
+        "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:f,s:O,s:{s:I,s:I,s:I,s:f,s:f,s:f},s:O}",
         "input", j->input, "frames", (json_int_t)p->frames, "gaps",
         (json_int_t)(j->list ? j->list->gap_count : 0), "unreadable", (json_int_t)p->unreadable, "formats",
         p->formats, "points", "least", (json_int_t)counts.least, "median", (json_int_t)counts.median, "most",
         (json_int_t)counts.most, "total", (json_int_t)p->point_total, "not_finite", (json_int_t)p->not_finite,
         "frames_with_normals", (json_int_t)p->with_normals, "box", box, "bytes", (json_int_t)p->bytes,
-        "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
-        "epochs", (json_int_t)e->epochs, "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes,
-        "disk_bytes", e->disk_bytes, "time_s", e->time_s, "per_frame", p->per_frame);
+        "read_s", p->read_s, "step", npg_probe_step(p), "attention", p->attention, "estimate", "vertices",
+        (json_int_t)e->basis.vertices, "epochs", (json_int_t)e->basis.epochs, "window",
+        (json_int_t)e->basis.window, "memory_bytes", e->memory_bytes, "disk_bytes", e->disk_bytes, "time_s",
+        e->time_s, "per_frame", p->per_frame);
     if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     puts(text ? text : "{}");
@@ -235,10 +236,13 @@ static void print_text(job *j, const npg_estimate *e)
                o[2] + lo[2], o[0] + hi[0], o[1] + hi[1], o[2] + hi[2], npg_bounds_diagonal(&p->bounds));
     }
     printf("files     %.1f MiB, read in %.2f s\n", (double)p->bytes / 0x1p20, p->read_s);
+    if (p->motion.pairs)
+        printf("motion    limbs move by %.2g %% of the figure from frame to frame (90th percentile)\n",
+               100 * npg_probe_step(p));
     printf("estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s "
-           "(%zu vertices, %zu epochs, windows of %zu frames; within a factor of two)\n",
-           e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->epochs,
-           e->window < p->frames ? e->window : p->frames);
+           "(%zu vertices, %zu epochs, windows of %zu frames; usually within a third)\n",
+           e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->basis.vertices, e->basis.epochs,
+           e->basis.window < p->frames ? e->basis.window : p->frames);
     print_sensors(j);
     json_array_foreach(p->attention, i, value) printf("attention %s\n", json_string_value(value));
 }

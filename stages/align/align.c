@@ -11,6 +11,7 @@
 #include "align/recover.h"
 #include "geometry/mesh_tools.h"
 #include "job/job.h"
+#include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
 
 #define POINTS_MOST 4  /* times the samples: points of a frame that are kept for the alignment */
@@ -546,6 +547,18 @@ static npg_status close_group(npg_worker *worker, bool with_state)
     return NPG_OK;
 }
 
+/* Frames that are followed, and those that are passed on: between the two, lost ones are searched. */
+#define FOLLOWED_COUNTS 0.8
+static void report_progress(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    double frames = (double)npg_worker_facts(worker)->frame_count, followed = (double)s->read;
+    double passed_on = followed - (double)s->group_count;
+    if (frames > 0)
+        npg_worker_step(worker, (FOLLOWED_COUNTS * followed + (1 - FOLLOWED_COUNTS) * passed_on) / frames,
+                        s->read, (int64_t)frames);
+}
+
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
     state *s = npg_worker_state(worker);
@@ -559,6 +572,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         int64_t number = frame->number;
         NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)number));
         s->read++;
+        report_progress(worker);
         bool is_window = closes_window(s, &facts->plan);
         if (is_window || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, is_window));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
@@ -572,6 +586,7 @@ static npg_status flush(npg_worker *worker)
     state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
     NPG_TRY(close_group(worker, false));
+    report_progress(worker);
     NPG_TRY(leave_found(worker));
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
@@ -580,6 +595,15 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "frames_lost", json_integer(s->sum.lost));
     json_object_set_new(report, "frames_found_again", json_integer(s->sum.found));
     return NPG_OK;
+}
+
+/* What is done to an aligned frame beside it is counted here, too. */
+static double expects(const npg_worker *worker, npg_pass pass)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    return pass == NPG_PASS_CHOOSE
+               ? 0
+               : npg_cost_pass_s((double)facts->frame_count, (double)facts->point_count_max, 0);
 }
 
 static bool takes_part(const npg_worker *worker)
@@ -624,4 +648,5 @@ const npg_stage npg_stage_align = {
     .uninit = uninit,
     .memory = memory,
     .save = save,
+    .expects = expects,
 };

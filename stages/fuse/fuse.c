@@ -49,7 +49,7 @@ typedef struct state {
     int64_t key;            /* index of the keyframe */
     double spacing, noise;  /* of the keyframe's points */
     double usual;           /* mean of the frames' median distances */
-    int64_t seen, frames, misaligned, points, strays; /* seen: of the pass, whatever came of them */
+    int64_t frames, misaligned, points, strays;
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -176,19 +176,6 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
                       fmax(FAR_SPACINGS * s->spacing, NEAR_MEDIANS * median));
 }
 
-static void report_progress(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    int64_t frames = npg_worker_facts(worker)->frame_count;
-    npg_progress progress = {.share = (double)++s->seen / (double)frames,
-                             .step = s->seen,
-                             .steps = frames,
-                             .windows = 1,
-                             .frames = frames,
-                             .loss = (double)NAN};
-    npg_worker_progress(worker, &progress);
-}
-
 static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 {
     cloud c = {0};
@@ -261,7 +248,6 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
             s->usable += !frame->is_skipped;
         } else {
             NPG_TRY(gather_frame(worker, frame));
-            report_progress(worker);
         }
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }

@@ -17,6 +17,7 @@
 #include "keyframe/likeness.h"
 #include "keyframe/look_ahead.h"
 #include "keyframe/shortlist.h"
+#include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
 #include "pipeline/order.h"
 
@@ -76,6 +77,7 @@ static npg_status measure_frame(keyframe_state *state, npg_facts *facts, const n
     if (frame->number < facts->number_min) facts->number_min = frame->number;
     if (frame->number > facts->number_max) facts->number_max = frame->number;
     if (frame->point_count > facts->point_count_max) facts->point_count_max = frame->point_count;
+    if (frame->point_count && !frame->normals) facts->has_normals = false;
     if (frame->is_skipped) return NPG_OK;
     state->usable_count++;
     for (size_t i = 0; i < frame->point_count; i++)
@@ -423,6 +425,7 @@ static npg_status init(npg_worker *worker)
     if (pass == NPG_PASS_MEASURE || (pass == NPG_PASS_SOLVE && facts->is_live)) {
         facts->bounds_local = npg_bounds_empty();
         facts->point_count_max = 0;
+        facts->has_normals = true;
         facts->number_min = INT64_MAX;
         facts->number_max = INT64_MIN;
     }
@@ -456,7 +459,10 @@ static npg_status flush(npg_worker *worker)
     switch (npg_worker_pass(worker)) {
     case NPG_PASS_MEASURE: return close_measuring(worker);
     case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
-    case NPG_PASS_CHOOSE: return close_choosing(worker);
+    case NPG_PASS_CHOOSE:
+        NPG_TRY(close_choosing(worker));
+        npg_worker_step(worker, 1, 1, 1);
+        return NPG_OK;
     case NPG_PASS_FUSE:
     case NPG_PASS_SOLVE: break;
     }
@@ -512,6 +518,14 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
+/* The candidates' normals, which the stage before makes, are counted here. */
+static double expects(const npg_worker *worker, npg_pass pass)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (pass != NPG_PASS_CHOOSE || !facts->choice.count) return 0;
+    return npg_cost_choice_s((double)facts->point_count_max, facts->has_normals);
+}
+
 extern const npg_stage npg_stage_keyframe;
 const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .help = "Find the capture's box and choose the keyframe",
@@ -525,4 +539,5 @@ const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .process = process,
                                       .flush = flush,
                                       .uninit = uninit,
-                                      .memory = memory};
+                                      .memory = memory,
+                                      .expects = expects};

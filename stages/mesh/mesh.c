@@ -18,12 +18,12 @@
 #include "mesh/vdb.h"
 #include "mesh/weld.h"
 #include "pipeline/clock.h"
+#include "pipeline/cost.h"
 #include "pipeline/stage.h"
 
 #define POINTS_MAX        80000
-#define START_POINTS      30000 /* of a surface that only carries the frames of a fusing pass */
-#define NOISE_MIN         0.03  /* in spacings; clean clouds have 0 */
-#define FOLLOW_NOISE      0.08  /* of a frame's points, in spacings; curvature of few points is below */
+#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
+#define FOLLOW_NOISE      0.08 /* of a frame's points, in spacings; curvature of few points is below */
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define SEEN_SPACINGS     2.0  /* a place is seen when a point is nearer than this many spacings */
@@ -150,7 +150,7 @@ static npg_status take_frame_points(making *m)
 {
     const npg_frame *frame = m->frame;
     size_t n = frame->point_count;
-    size_t most = npg_worker_pass(m->worker) == NPG_PASS_FUSE ? START_POINTS : POINTS_MAX;
+    size_t most = npg_worker_pass(m->worker) == NPG_PASS_FUSE ? NPG_COST_START_POINTS : POINTS_MAX;
     m->count = n < most ? n : most;
     NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
@@ -593,6 +593,7 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
         NPG_TRY(make_of_pass(worker, frame));
+        npg_worker_step(worker, 1, 1, 1);
         is_there = true;
     }
     if (!is_there) return npg_error(NPG_FAILED, "the keyframe does not come first");
@@ -625,6 +626,16 @@ static size_t verts_at_most(const npg_worker *worker)
     return faces / 2 + 2;
 }
 
+static double mesh_expects(const npg_worker *worker, npg_pass pass)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    double points = (double)facts->point_count_max;
+    bool from_all = pass == NPG_PASS_SOLVE && (facts->fuse_left || npg_worker_fact(worker, &npg_fact_fused));
+    if (pass == NPG_PASS_CHOOSE || facts->own_verts) return 0;
+    return npg_cost_surface_s(from_all ? fmin(points * (double)facts->frame_count, NPG_COST_FUSED_POINTS)
+                                       : fmin(points, NPG_COST_START_POINTS));
+}
+
 const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
@@ -634,4 +645,5 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,
                                   .memory = mesh_memory,
-                                  .verts_at_most = verts_at_most};
+                                  .verts_at_most = verts_at_most,
+                                  .expects = mesh_expects};

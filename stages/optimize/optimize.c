@@ -12,6 +12,7 @@
 #include "optimize/record.h"
 #include "optimize/window.h"
 #include "pipeline/clock.h"
+#include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
 
 typedef struct state {
@@ -532,6 +533,21 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
                              npg_worker_verts_at_most(worker), frames, facts->point_count_max);
 }
 
+/* Of aligned frames the end of the way alone; else nearly all that there is to do. */
+static double expects(const npg_worker *worker, npg_pass pass)
+{
+    const state *s = npg_worker_state(worker);
+    const double joint_s_per_frame = 0.08, cores = 2;
+    double frames = (double)npg_worker_facts(worker)->frame_count;
+    if (pass != NPG_PASS_SOLVE) return 0;
+    if (npg_worker_has_field(worker, NPG_FIELD_POSE)) return joint_s_per_frame * frames;
+    bool by_samples = s->window_settings.warm.distance == NPG_DISTANCE_SURFACE && s->window_settings.samples;
+    double vertices = (double)npg_worker_verts_at_most(worker);
+    if (by_samples) vertices = fmin(vertices, (double)s->window_settings.samples);
+    return cores * npg_cost_network_s(frames, vertices, (double)s->window_settings.fit.epochs,
+                                      cores * NPG_COST_CORE_FLOPS);
+}
+
 const npg_stage npg_stage_optimize = {
     .name = "optimize",
     .help = "fits the motion of the reference to all frames, window by window",
@@ -545,4 +561,5 @@ const npg_stage npg_stage_optimize = {
     .flush = flush,
     .uninit = uninit,
     .memory = memory,
+    .expects = expects,
 };

@@ -524,6 +524,86 @@ static void hooks_hear_the_stages(void **state)
     assert_string_equal(h.last, "sink:frame 0");
 }
 
+/* ---- the time left ---- */
+
+static double expect_one(const npg_worker *worker, npg_pass pass)
+{
+    (void)worker;
+    return pass == NPG_PASS_SOLVE;
+}
+
+static double expect_three(const npg_worker *worker, npg_pass pass)
+{
+    return 3 * expect_one(worker, pass);
+}
+
+static npg_status report_all(npg_worker *worker, npg_chunk **chunk)
+{
+    (void)chunk;
+    npg_worker_step(worker, 1, 1, 1);
+    return NPG_OK;
+}
+
+static npg_status report_half(npg_worker *worker, npg_chunk **chunk)
+{
+    (void)chunk;
+    npg_worker_step(worker, 0.5, 1, 2);
+    npg_worker_step(worker, 0.25, 1, 4); /* goes back */
+    return NPG_OK;
+}
+
+static const npg_stage early = {
+    .name = "early", .help = "", .passes = NPG_PASS_SOLVE, .process = report_all, .expects = expect_one};
+static const npg_stage late = {
+    .name = "late", .help = "", .passes = NPG_PASS_SOLVE, .process = report_half, .expects = expect_three};
+static const npg_stage *const timed_chain[] = {&test_source, &early, &late, &test_sink, NULL};
+
+static npg_status measure_one(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
+{
+    (void)frame;
+    (void)index;
+    (void)user;
+    facts->point_count_max = 1; /* the capture has been measured */
+    return NPG_OK;
+}
+
+typedef struct timed {
+    double shares[8], left_s[8];
+    size_t count;
+} timed;
+
+static void hear_time(void *user, const npg_progress *progress)
+{
+    timed *t = user;
+    if (t->count == 8) return;
+    t->shares[t->count] = progress->share;
+    t->left_s[t->count++] = progress->left_s;
+}
+
+static void the_share_counts_stages_by_what_they_expect(void **state)
+{
+    (void)state;
+    const double shares[] = {0.25, 0.625, 0.625};
+    timed t = {.count = 0};
+    npg_hooks hooks = {sizeof hooks, &t, NULL, hear_time};
+    npg_options *options;
+    npg_run *run;
+    script.frame_count = 1;
+    script.make = measure_one;
+    assert_int_equal(npg_options_open_chain(&options, timed_chain), NPG_OK);
+    npg_options_set(options, "input", "any");
+    npg_options_set(options, "output", "any");
+    assert_int_equal(npg_run_open_chain(&run, options, &hooks, timed_chain), NPG_OK);
+    assert_int_equal(npg_run_wait(run), NPG_OK);
+    npg_run_close(&run);
+    npg_options_close(&options);
+    assert_int_equal(t.count, 3);
+    for (size_t i = 0; i < 3; i++) {
+        assert_float_equal(t.shares[i], shares[i], 1e-9);
+        assert_true(t.left_s[i] >= 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -538,6 +618,7 @@ int main(void)
         cmocka_unit_test_setup(stop_wakes_a_run_that_waits_for_frames, set_up),
         cmocka_unit_test_setup(stop_is_seen_between_chunks, set_up),
         cmocka_unit_test_setup(close_at_any_moment_frees_everything, set_up),
+        cmocka_unit_test_setup(the_share_counts_stages_by_what_they_expect, set_up),
         cmocka_unit_test_setup(several_threads_may_wait, set_up),
         cmocka_unit_test_setup(every_allocation_may_fail, set_up),
         cmocka_unit_test_setup(every_allocation_of_a_live_run_may_fail, set_up),

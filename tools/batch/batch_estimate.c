@@ -118,7 +118,7 @@ static void print_sums(const npg_batch *batch, const sums *s)
     printf("\n%zu captures, %zu frames, %zu gaps; memory at most %.0f MiB each, disk %.0f MiB in all",
            s->captures, s->frames, s->gaps, s->memory_bytes / 0x1p20, s->disk_bytes / 0x1p20);
     if (room >= 0) printf(" (%.0f MiB are free)", room / 0x1p20);
-    printf(", time %s one after the other; within a factor of two\n", time);
+    printf(", time %s one after the other; usually within a third\n", time);
     if (room >= 0 && room < s->disk_bytes) printf("attention: the disk has too little room\n");
 }
 

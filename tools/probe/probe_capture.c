@@ -102,11 +102,21 @@ static bool is_aligned(const npg_options *options)
     return !text || !strcmp(text, "yes");
 }
 
+static bool is_fused(const npg_options *options)
+{
+    const char *text = npg_options_get(options, "reference-from"),
+               *given = npg_options_get(options, "reference");
+    return (!text || !strcmp(text, "all")) && !(given && *given);
+}
+
 void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_options *options)
 {
     /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
     size_t faces = positive_number(options, "faces", 20000), most = npg_probe_counts(probe).most;
-    npg_probe_estimate(estimate, probe, (faces < 4 * most ? faces : 4 * most) / 2,
-                       positive_number(options, "epochs", 250), window_of(probe, options),
-                       is_aligned(options));
+    npg_cost_basis basis = {.vertices = (faces < 4 * most ? faces : 4 * most) / 2,
+                            .epochs = positive_number(options, "epochs", 250),
+                            .window = window_of(probe, options),
+                            .aligned = is_aligned(options),
+                            .fused = is_fused(options)};
+    npg_probe_estimate(estimate, probe, &basis);
 }

@@ -3,7 +3,7 @@
 #define NPG_PROBE_CAPTURE_H
 
 #include "ingest/ingest.h"
-#include "tools/probe/probe_facts.h"
+#include "tools/probe/probe_cost.h"
 
 /* Count a frame that was read with `status`, and clear it.  Bad data goes into the list; any other failure
  * is returned. */

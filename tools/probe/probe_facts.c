@@ -2,14 +2,10 @@
 #include "tools/probe/probe_facts.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
-
-#include "pipeline/clock.h"
 
 void npg_probe_init(npg_probe *probe)
 {
@@ -23,6 +19,7 @@ void npg_probe_init(npg_probe *probe)
 void npg_probe_uninit(npg_probe *probe)
 {
     npg_release(&probe->counts);
+    npg_probe_motion_uninit(&probe->motion);
     json_decref(probe->formats);
     json_decref(probe->attention);
     json_decref(probe->per_frame);
@@ -111,6 +108,7 @@ npg_status npg_probe_add(npg_probe *probe, const npg_frame *frame, const char *f
     json_int_t seen = json_integer_value(json_object_get(probe->formats, format));
     json_object_set_new(probe->formats, format, json_integer(seen + 1));
     warn_of_frame(probe, &facts, frame, number);
+    NPG_TRY(npg_probe_motion_add(&probe->motion, frame));
     json_array_append_new(probe->per_frame,
                           json_pack("{s:I,s:I,s:I,s:b}", "number", (json_int_t)number, "points",
                                     (json_int_t)frame->point_count, "not_finite",
@@ -143,118 +141,7 @@ npg_probe_spread npg_probe_counts(npg_probe *probe)
     return (npg_probe_spread){probe->counts[0], probe->counts[count / 2], probe->counts[count - 1]};
 }
 
-/* ---- what a run would take ---- */
-
-enum { LANES = 128, BURST = 20000 };
-
-/* A burst of multiply-adds with enough independent sums that the widest registers are filled. */
-#define MULTIPLY_ADDS                                                                                        \
-    for (int burst = 0; burst < BURST; burst++)                                                              \
-        for (int i = 0; i < LANES; i++) sums[i] = __builtin_fmaf(sums[i], 0.9999f, 0.25f);
-
-#ifdef __x86_64__
-__attribute__((target("avx512f"))) static void burst_avx512(float *restrict sums)
+double npg_probe_step(const npg_probe *probe)
 {
-    MULTIPLY_ADDS
-}
-__attribute__((target("avx2,fma"))) static void burst_avx2(float *restrict sums)
-{
-    MULTIPLY_ADDS
-}
-#endif
-static void burst_plain(float *restrict sums)
-{
-    for (int burst = 0; burst < BURST; burst++)
-        for (int i = 0; i < LANES; i++) sums[i] = sums[i] * 0.9999f + 0.25f;
-}
-
-static void do_burst(float *sums)
-{
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx512f")) {
-        burst_avx512(sums);
-        return;
-    }
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        burst_avx2(sums);
-        return;
-    }
-#endif
-    burst_plain(sums);
-}
-
-/* Multiply-adds of one thread for about 30 ms of its processor time. */
-static void *multiply_add(void *flops)
-{
-    float sums[LANES];
-    double begin_s = npg_clock_thread_s(), elapsed_s = 0, count = 0;
-    for (int i = 0; i < LANES; i++) sums[i] = (float)i;
-    while (elapsed_s < 0.03) {
-        do_burst(sums);
-        count += 2.0 * LANES * BURST;
-        elapsed_s = npg_clock_thread_s() - begin_s;
-    }
-    volatile float keep = 0;
-    for (int i = 0; i < LANES; i++) keep = keep + sums[i];
-    *(double *)flops = count / elapsed_s;
-    return NULL;
-}
-
-static double measure_flops(void)
-{
-    enum { THREADS_MAX = 256 };
-    pthread_t threads[THREADS_MAX];
-    double flops[THREADS_MAX], sum = 0;
-    long cores = sysconf(_SC_NPROCESSORS_ONLN), started = 0;
-    for (; started < cores && started < THREADS_MAX; started++)
-        if (pthread_create(&threads[started], NULL, multiply_add, &flops[started])) break;
-    for (long i = 0; i < started; i++) {
-        pthread_join(threads[i], NULL);
-        sum += flops[i];
-    }
-    return sum;
-}
-
-/* The network costs 1.72 MFLOP for a vertex, a frame and an epoch, forward and backward, and is nearly all
- * there is to do; kernels reach about as much of a wide machine's peak as this measurement without wide
- * registers does. */
-static double network_s(const npg_probe *probe, size_t vertices, size_t epochs, double flops)
-{
-    const double flop_per_vertex = 1.72e6;
-    return flop_per_vertex * (double)probe->frames * (double)vertices * (double)epochs / fmax(0.5 * flops, 1);
-}
-
-/* Aligned frames: processor seconds of one core, brought to this machine's by its multiply-adds.  Taken by hand
- * from one run of a clean dancer (17 frames of 5000 points) on a loaded machine, and tested on no other: noise
- * and lost frames, which nothing here can see, make alignment take longer. */
-static double aligned_s(const npg_probe *probe, size_t most, double flops)
-{
-    const double per_run = 5, per_frame = 0.65, per_point = 4e-6, per_surface_point = 130e-6,
-                 core_flops = 130e9;
-    double points = (double)probe->point_total, cores = (double)sysconf(_SC_NPROCESSORS_ONLN);
-    double surfaces =
-        fmin((double)most, 40000) + fmin(points, 50000); /* the keyframe's, and that of all frames */
-    double work_s =
-        per_run + per_frame * (double)probe->frames + per_point * points + per_surface_point * surfaces;
-    double busy = fmin(fmax(cores, 1), 2) * 0.75; /* cores that there is work for, on the average */
-    return work_s * core_flops / fmax(flops / fmax(cores, 1), 1) / busy;
-}
-
-void npg_probe_estimate(npg_estimate *e, const npg_probe *probe, size_t vertices, size_t epochs,
-                        size_t window, bool aligned)
-{
-    /* Set so that the estimates fit within a factor of two, as the verb says of them. */
-    const double fit_bytes_per_vertex = 2400, fixed_bytes = 320e6, decoder_bytes = 1.4e6;
-    double frames = (double)probe->frames, in_window = fmin(frames, (double)window);
-    size_t most = 0;
-    for (size_t i = 0; i + probe->unreadable < probe->frames; i++)
-        if (probe->counts[i] > most) most = probe->counts[i];
-    *e = (npg_estimate){.vertices = vertices, .epochs = epochs, .window = window, .flops = measure_flops()};
-    e->time_s = aligned ? probe->read_s + aligned_s(probe, most, e->flops)
-                        : 3 * probe->read_s + network_s(probe, vertices, epochs, e->flops);
-    e->memory_bytes = fixed_bytes +
-                      in_window * ((double)vertices * fit_bytes_per_vertex + 48 * (double)most) +
-                      40 * 24 * (double)most;
-    /* a mesh, and in job/ the alignment, of every frame; the decoder of every window */
-    e->disk_bytes = frames * (double)vertices * (24 + 2 * 13 + 12) + frames / in_window * decoder_bytes;
+    return probe->motion.pairs ? probe->motion.sum / (double)probe->motion.pairs : 0;
 }

@@ -6,6 +6,7 @@
 
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
+#include "tools/probe/probe_motion.h"
 
 typedef struct npg_probe {
     size_t frames, unreadable, with_normals;
@@ -19,6 +20,7 @@ typedef struct npg_probe {
     double read_s;
     json_t *formats, *attention, *per_frame; /* owned */
     char first_fault[1024];
+    npg_probe_motion motion;
 } npg_probe;
 
 void npg_probe_init(npg_probe *probe);
@@ -39,16 +41,7 @@ typedef struct npg_probe_spread {
 
 npg_probe_spread npg_probe_counts(npg_probe *probe);
 
-/* ---- what a run would take ---- */
-
-typedef struct npg_estimate {
-    size_t vertices, epochs, window; /* assumed */
-    double memory_bytes, disk_bytes, time_s;
-    double flops; /* measured multiply-adds x 2 per second, all cores */
-} npg_estimate;
-
-/* aligned: frames are aligned and fitted on the host, as they are by default; else by the network alone. */
-void npg_probe_estimate(npg_estimate *estimate, const npg_probe *probe, size_t vertices, size_t epochs,
-                        size_t window, bool aligned);
+/* How far limbs go from frame to frame, in diagonals of the figure (probe_motion.h); 0 where nothing tells. */
+double npg_probe_step(const npg_probe *probe);
 
 #endif

@@ -1,0 +1,45 @@
+/* Cost: what the parts of a run take in processor seconds, on a machine whose core makes NPG_COST_CORE_FLOPS
+ * multiply-adds x 2 a second.  One model for two uses: the share of a run that is done, where only ratios matter
+ * (timeline.c), and the estimate before it.  Fitted to the runs in samples/guide/tuning.md. */
+#ifndef NPG_COST_H
+#define NPG_COST_H
+
+#include <math.h>
+#include <stdbool.h>
+
+#define NPG_COST_CORE_FLOPS 120e9
+
+#define NPG_COST_START_POINTS 30000 /* of a surface that only carries the frames of a fusing pass     */
+#define NPG_COST_FUSED_POINTS 45000 /* fused points of a capture, as a rule; 34 000 to 62 000 were seen */
+#define NPG_COST_FRAME_POINTS 40000 /* of a frame, that fusion has to do with at most                 */
+#define NPG_COST_CANDIDATES   4     /* for the keyframe                                               */
+#define NPG_COST_EASY_STEP    0.02  /* of the figure's diagonal: a limb that moves more is searched   */
+
+/* The choice of the keyframe: drafts of the candidates' surfaces, and their normals where they have none. */
+static inline double npg_cost_choice_s(double points, bool has_normals)
+{
+    return 3 + (has_normals ? 0 : 38e-6 * NPG_COST_CANDIDATES * points);
+}
+
+/* A surface of so many points: Poisson, and the drafts before it, at the depth that is the default. */
+static inline double npg_cost_surface_s(double points)
+{
+    return 5 + 0.3e-3 * points;
+}
+
+/* One pass that follows frames of so many points each, with all that is done to a frame beside it: reading,
+ * fusion, fit and figures.  step: how far limbs move, in diagonals; 0 where nobody knows. */
+static inline double npg_cost_pass_s(double frames, double points, double step)
+{
+    double searching = 1 + 2.3 * fmax(0, step / NPG_COST_EASY_STEP - 1);
+    return 0.5 * frames * (0.62 * searching + 36e-6 * fmin(points, NPG_COST_FRAME_POINTS));
+}
+
+/* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and backward, of which kernels make
+ * about half as many as the registers could, at `flops` a second. */
+static inline double npg_cost_network_s(double frames, double vertices, double epochs, double flops)
+{
+    return 1.72e6 * frames * vertices * epochs / (0.5 * fmax(flops, 2));
+}
+
+#endif
