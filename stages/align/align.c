@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "align/follow_log.h"
 #include "align/poses.h"
 #include "align/recover.h"
 #include "geometry/mesh_tools.h"
@@ -26,6 +27,7 @@
 typedef struct between {
     npg_tracker *tracker; /* of the reference that the poses are of */
     npg_poses *poses;
+    int64_t passes; /* fusing passes so far */
 } between;
 
 /* A frame that waits for its window. */
@@ -55,9 +57,11 @@ typedef struct state {
     npg_pose_map map;
     double *known_pose; /* of its nodes; owned */
     npg_poses *found;   /* of a fusing pass, for the next one; owned                             */
-    side sides[2];      /* forward, backward: of the frames that are passed on */
-    side ways[2];       /* the same with those that wait                       */
-    waiting *group;     /* in order of arrival; owned, with what they own */
+    npg_follow_log
+        *log;      /* of a fusing pass with a job folder: what is found, and what an earlier run had; owned */
+    side sides[2]; /* forward, backward: of the frames that are passed on */
+    side ways[2];  /* the same with those that wait                       */
+    waiting *group; /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
@@ -101,6 +105,7 @@ static void uninit(npg_worker *worker)
     npg_tracker_close(&s->tracker);
     npg_poses_close(&s->known);
     npg_poses_close(&s->found);
+    npg_follow_log_close(&s->log);
     npg_pose_map_close(&s->map);
     npg_release(&s->known_pose);
     for (int i = 0; i < 2; i++) {
@@ -131,24 +136,33 @@ static void strip(side *plain, const side *from)
     plain->before_tracked = from->before_tracked;
 }
 
+static size_t state_bytes(const state *s)
+{
+    return 2 * (sizeof(side) + 2 * pose_bytes(s)) + sizeof s->sum;
+}
+
+static void pack_state(const state *s, unsigned char *to)
+{
+    size_t bytes = pose_bytes(s);
+    for (int i = 0; i < 2; i++, to += sizeof(side) + 2 * bytes) {
+        side plain;
+        strip(&plain, &s->sides[i]);
+        memcpy(to, &plain, sizeof plain);
+        memcpy(to + sizeof plain, s->sides[i].now, bytes);
+        memcpy(to + sizeof plain + bytes, s->sides[i].before, bytes);
+    }
+    memcpy(to, &s->sum, sizeof s->sum);
+}
+
 /* The last frame that a window waits for takes it along: it comes to the stage that writes the state just
  * when the window can be solved. */
 static npg_status attach_state(const state *s, npg_frame *frame)
 {
-    size_t bytes = pose_bytes(s), at = 0, size = 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum;
     unsigned char *all;
-    NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, size));
-    for (int i = 0; i < 2; i++) {
-        side plain;
-        strip(&plain, &s->sides[i]);
-        memcpy(all + at, &plain, sizeof plain);
-        memcpy(all + at + sizeof plain, s->sides[i].now, bytes);
-        memcpy(all + at + sizeof plain + bytes, s->sides[i].before, bytes);
-        at += sizeof plain + 2 * bytes;
-    }
-    memcpy(all + at, &s->sum, sizeof s->sum);
+    NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, state_bytes(s)));
+    pack_state(s, all);
     frame->align_state = all;
-    frame->align_state_size = size;
+    frame->align_state_size = state_bytes(s);
     return NPG_OK;
 }
 
@@ -162,25 +176,30 @@ static void copy_side(const state *s, side *to, const side *from)
     *to = copy;
 }
 
+static void unpack_state(state *s, const unsigned char *from)
+{
+    size_t bytes = pose_bytes(s);
+    for (int i = 0; i < 2; i++, from += sizeof(side) + 2 * bytes) {
+        side plain;
+        memcpy(&plain, from, sizeof plain);
+        plain.now = s->sides[i].now;
+        plain.before = s->sides[i].before;
+        memcpy(plain.now, from + sizeof plain, bytes);
+        memcpy(plain.before, from + sizeof plain + bytes, bytes);
+        s->sides[i] = plain;
+        copy_side(s, &s->ways[i], &s->sides[i]);
+    }
+    memcpy(&s->sum, from, sizeof s->sum);
+}
+
 static npg_status restore_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    size_t bytes = pose_bytes(s), size, at = 0;
+    size_t size;
     const unsigned char *all = npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN, &size);
-    if (!all || size != 2 * (sizeof(side) + 2 * bytes) + sizeof s->sum)
+    if (!all || size != state_bytes(s))
         return npg_error(NPG_BAD_INPUT, "the state to resume from has no poses for this reference");
-    for (int i = 0; i < 2; i++) {
-        side plain;
-        memcpy(&plain, all + at, sizeof plain);
-        plain.now = s->sides[i].now;
-        plain.before = s->sides[i].before;
-        memcpy(plain.now, all + at + sizeof plain, bytes);
-        memcpy(plain.before, all + at + sizeof plain + bytes, bytes);
-        s->sides[i] = plain;
-        copy_side(s, &s->ways[i], &s->sides[i]);
-        at += sizeof plain + 2 * bytes;
-    }
-    memcpy(&s->sum, all + at, sizeof s->sum);
+    unpack_state(s, all);
     return NPG_OK;
 }
 
@@ -271,6 +290,26 @@ static npg_status open_known(npg_worker *worker)
                            NPG_POSE_SIZE * sizeof(double));
 }
 
+/* What an earlier run of the same job followed before it was killed is read back. */
+static npg_status open_log(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const between *b = npg_worker_kept(worker);
+    const npg_job *job = npg_job_of(worker);
+    if (!job) return NPG_OK;
+    const npg_follow_key key = {npg_job_key(job), npg_worker_facts(worker)->reference,
+                                npg_tracker_node_count(s->tracker), state_bytes(s)};
+    char *path;
+    int64_t groups;
+    NPG_TRY(npg_job_followed_path(job, &path, b ? b->passes : 0));
+    npg_status status = npg_follow_log_open(&s->log, &groups, path, &key);
+    npg_release(&path);
+    if (!status && groups)
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "%lld groups of frames that an earlier run followed are read back", (long long)groups);
+    return status;
+}
+
 static npg_status open_found(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -280,7 +319,7 @@ static npg_status open_found(npg_worker *worker)
     NPG_TRY(poses_path(worker, &path, true));
     npg_status status = npg_poses_create(&s->found, path, npg_tracker_node_count(s->tracker));
     npg_release(&path);
-    return status;
+    return status ? status : open_log(worker);
 }
 
 static npg_status leave_found(npg_worker *worker)
@@ -295,6 +334,7 @@ static npg_status leave_found(npg_worker *worker)
     }
     b->tracker = s->tracker;
     b->poses = s->found;
+    b->passes++;
     s->tracker = NULL;
     s->found = NULL;
     return NPG_OK;
@@ -395,6 +435,11 @@ static npg_status fit_pose(npg_worker *worker, waiting *w, side *at)
     return NPG_OK;
 }
 
+static bool is_read_back(const state *s)
+{
+    return s->log && npg_follow_log_has_group(s->log);
+}
+
 /* Takes the frame's content. */
 static npg_status align_frame(npg_worker *worker, npg_frame *frame)
 {
@@ -405,6 +450,7 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     *w = (waiting){.frame = *frame};
     memset(frame, 0, sizeof *frame);
     NPG_TRY(npg_alloc(&w->pose, NPG_FOR_FIT, pose_bytes(s)));
+    if (is_read_back(s)) return npg_follow_log_read(s->log, w->frame.index, w->pose);
     NPG_TRY(take_points(worker, w));
     side *at = &s->ways[w->frame.index < facts->plan.key];
     bool is_key = w->frame.index == facts->plan.key;
@@ -532,13 +578,44 @@ static npg_status pass_on(npg_worker *worker, waiting *w)
     return status;
 }
 
+/* As recover_group() left it in an earlier run. */
+static npg_status read_back_group(state *s)
+{
+    const void *packed;
+    NPG_TRY(npg_follow_log_end_group(s->log, &packed));
+    unpack_state(s, packed);
+    return NPG_OK;
+}
+
+static npg_status log_group(state *s)
+{
+    unsigned char *packed;
+    if (!s->log) return NPG_OK;
+    NPG_TRY(npg_alloc(&packed, NPG_FOR_FIT, state_bytes(s)));
+    pack_state(s, packed);
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < s->group_count && !status; i++)
+        status = npg_follow_log_add(s->log, s->group[i].frame.index, s->group[i].pose);
+    if (!status) status = npg_follow_log_commit_group(s->log, packed);
+    npg_release(&packed);
+    return status;
+}
+
+static npg_status follow_group(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    if (is_read_back(s)) return read_back_group(s);
+    NPG_TRY(recover_group(worker));
+    for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
+    return log_group(s);
+}
+
 /* with_state: the group ends a window. */
 static npg_status close_group(npg_worker *worker, bool with_state)
 {
     state *s = npg_worker_state(worker);
     if (!s->group_count) return NPG_OK;
-    NPG_TRY(recover_group(worker));
-    for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
+    NPG_TRY(follow_group(worker));
     if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE)
         NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
     for (size_t i = 0; i < s->group_count; i++) NPG_TRY(pass_on(worker, &s->group[i]));
@@ -628,9 +705,10 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
                    3 * sizeof(float);
     *chunks_held = (group + chunk - 1) / chunk + 1;
     /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node; per vertex weights and
-     * the graph's search for them, positions, normals; the waiting frames' poses and thinned points */
+     * the graph's search for them, positions, normals; the waiting frames' poses, once more for the log, and
+     * thinned points */
     return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + known) + verts * 320 +
-           group * (nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float));
+           group * (2 * nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float));
 }
 
 extern const npg_stage npg_stage_align;

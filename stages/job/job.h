@@ -19,6 +19,9 @@
  *     OUT/job/poses.bin            where the last fusing pass brought the reference so far, frame by frame
  *                                  (align/poses.h): where the solving pass starts
  *
+ *     OUT/job/followed_0.bin       what the first fusing pass found so far (align/follow_log.h); removed when there
+ *                                  is a state to resume from
+ *
  * The two newest windows stay, and the one that later frames start from (neupig append);
  * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the
  * checksum of its grids and of the frame log, so that a damaged one is noticed and the one before it used.
@@ -119,6 +122,13 @@ npg_status npg_job_motion_path(const npg_job *job, char **path);
 npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new);
 npg_status npg_job_keep_poses(const npg_job *job);
 npg_status npg_job_remove_new_poses(const npg_job *job); /* also where there are none */
+
+/* Where stage align keeps what it found in a fusing pass, the first being 0 (align/follow_log.h); to
+ * npg_release().  They go when there is a state to resume from. */
+npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass);
+
+/* Of options and input: what of an earlier run has the same key is of the same job. */
+uint64_t npg_job_key(const npg_job *job);
 
 /* Block of a state: what stage align needs (npg_frame.align_state). */
 #define NPG_BLOCK_ALIGN     "align"

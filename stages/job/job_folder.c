@@ -11,6 +11,7 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <xxhash.h>
 
 #include "job/frame_log.h"
 #include "pipeline/file.h"
@@ -20,11 +21,13 @@
 #define INSIDE_NAME "inside.npg"
 #define POSES_NAME  "poses.bin"
 #define POSES_NEW   "poses.new"
+#define FOLLOWED    "followed_%lld.bin"
 
 struct npg_job {
     char *output, *folder; /* owned */
     int lock_fd;
     json_t *then, *now;   /* owned; what an earlier run was made of, and this one; NULL once written */
+    uint64_t key;         /* hash of `now` */
     int64_t frame_count;  /* of the input, gaps included */
     npg_archive *archive; /* owned */
     char *grids_path;     /* of the archive, owned */
@@ -94,13 +97,19 @@ static npg_status remove_state(npg_job *job, const char *name, int64_t serial)
     return remove_file(job, name);
 }
 
-static npg_status remove_motions(npg_job *job)
+static bool is_followed(const char *name)
+{
+    return !strncmp(name, "followed_", 9);
+}
+
+/* Remove the files of the folder that are of a kind. */
+static npg_status remove_kind(npg_job *job, bool (*is_it)(const char *name))
 {
     npg_status status = NPG_OK;
     DIR *listing = opendir(job->folder);
     if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
     for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (is_motion(entry->d_name)) status = remove_file(job, entry->d_name);
+        if (is_it(entry->d_name)) status = remove_file(job, entry->d_name);
     closedir(listing);
     return status;
 }
@@ -306,6 +315,18 @@ npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new)
     return npg_join_path(path, job->folder, is_new ? POSES_NEW : POSES_NAME);
 }
 
+npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass)
+{
+    char name[64];
+    snprintf(name, sizeof name, FOLLOWED, (long long)pass);
+    return npg_join_path(path, job->folder, name);
+}
+
+uint64_t npg_job_key(const npg_job *job)
+{
+    return job->key;
+}
+
 npg_status npg_job_keep_poses(const npg_job *job)
 {
     char *from, *to = NULL;
@@ -407,6 +428,15 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     return NPG_OK;
 }
 
+static npg_status hash_description(uint64_t *hash, const json_t *description)
+{
+    char *text = json_dumps(description, JSON_COMPACT | JSON_SORT_KEYS);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for the job's description");
+    *hash = XXH3_64bits(text, strlen(text));
+    free(text);
+    return NPG_OK;
+}
+
 static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, bool restart, bool append)
 {
     job->lock_fd = -1;
@@ -417,10 +447,12 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
     job->frame_count = (int64_t)json_array_size(json_object_get(job->now, "frames"));
+    NPG_TRY(hash_description(&job->key, job->now));
     if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
     NPG_TRY(npg_make_folder(job->folder));
     NPG_TRY(take_lock(job));
     *start = NPG_JOB_FRESH;
+    if (restart) NPG_TRY(remove_kind(job, is_followed));
     if (!restart) NPG_TRY(look_around(job, start, worker, append));
     job->forgets = *start == NPG_JOB_FRESH;
     return NPG_OK;
@@ -486,7 +518,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
     if (job->forgets) {
         NPG_TRY(remove_file(job, "job.json"));
         NPG_TRY(each_state(job, remove_state));
-        NPG_TRY(remove_motions(job));
+        NPG_TRY(remove_kind(job, is_motion));
         NPG_TRY(remove_file(job, INSIDE_NAME));
         NPG_TRY(remove_file(job, POSES_NAME));
         job->serial = job->forward_serial = -1;
@@ -527,6 +559,7 @@ npg_status npg_job_commit(npg_job *job, bool is_forward_end)
     job->serial++;
     if (is_forward_end) job->forward_serial = job->serial;
     NPG_TRY(remove_file(job, INSIDE_NAME));
+    NPG_TRY(remove_kind(job, is_followed));
     return each_state(job, remove_old);
 }
 

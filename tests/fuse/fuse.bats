@@ -103,6 +103,58 @@ same() {
     same killed
 }
 
+# Kill a run into $1 in its fusing pass, once file $2 of its job holds a group; further options follow.
+kill_in_fusing() {
+    local out=$1 log=$2
+    shift 2
+    rm -rf "$out"
+    "$NEUPIG" run noisy/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ "$(stat -c %s "$out/job/$log" 2>/dev/null || echo 0)" -lt 1000 ]; do sleep 0.02; done
+    kill -KILL $pid 2>/dev/null
+    wait $pid || true
+    [ -s "$out/job/$log" ]
+    ! ls "$out"/job/window*npg 2>/dev/null
+}
+
+@test "a run killed in a fusing pass does not follow the same frames again, and ends with the same bytes" {
+    kill_in_fusing followed followed_0.bin
+    cp -r followed torn
+    cp -r followed spoilt
+    truncate -s -100 torn/job/followed_0.bin # of the last group
+    printf 'XXXX' | dd of=spoilt/job/followed_0.bin bs=1 seek=300 conv=notrunc status=none # of the first one
+    for out in followed torn spoilt; do
+        run "$NEUPIG" run noisy/points -o $out "${small[@]}"
+        echo "$output"
+        [ "$status" -eq 0 ]
+        [ $out != followed ] || [[ "$output" == *"groups of frames that an earlier run followed are read back"* ]]
+        [ $out != spoilt ] || [[ "$output" != *"are read back"* ]]
+        same $out
+        [ ! -e $out/job/followed_0.bin ]
+    done
+}
+
+@test "what another job followed is not taken, nor after --restart" {
+    kill_in_fusing other followed_0.bin
+    cp -r other anew
+    run "$NEUPIG" run noisy/points -o other "${small[@]}" --align-samples 300
+    [ "$status" -eq 0 ]
+    [[ "$output" != *"are read back"* ]]
+    run "$NEUPIG" run noisy/points -o anew "${small[@]}" --restart
+    [[ "$output" != *"are read back"* ]]
+    same anew
+}
+
+@test "killed in the second of two fusing passes, both are read back" {
+    "$NEUPIG" run noisy/points -o two "${small[@]}" --frames 0:8 --reference-rounds 2 --quiet
+    kill_in_fusing second followed_1.bin --frames 0:8 --reference-rounds 2
+    run "$NEUPIG" run noisy/points -o second "${small[@]}" --frames 0:8 --reference-rounds 2
+    [ "$(grep -c "are read back" <<<"$output")" -eq 2 ]
+    cmp two/reference.ply second/reference.ply
+    cmp two/frames.jsonl second/frames.jsonl
+    diff -r two/meshes second/meshes
+}
+
 @test "a run that starts over and is killed while it gathers leaves the unfinished job as it was" {
     [ -d hurt ] || skip "needs the job that the test before left"
     cp -r hurt again
