@@ -89,6 +89,67 @@ int64_t npg_live_frame(const npg_plan *plan, int64_t i)
     return i < key.first ? key.first - 1 - i : key.last + 1 + (i - key.first);
 }
 
+/* The inverse of npg_plan_frame(). */
+static int64_t plan_place(const npg_plan *plan, int64_t index)
+{
+    npg_window key = npg_plan_key_window(plan);
+    if (plan->appended_at) return index - plan->appended_at;
+    if (index >= plan->key && index <= key.last) return index - plan->key;
+    if (index < plan->key && index >= key.first) return key.last - index;
+    return index > key.last ? index - key.first : plan->frame_count - 1 - index;
+}
+
+int64_t npg_live_place(const npg_plan *plan, int64_t index)
+{
+    if (!npg_plan_is_open(plan)) return plan_place(plan, index);
+    npg_window key = key_window(plan, -1);
+    if (index > key.last) return index;
+    if (index >= plan->key) return index - plan->key;
+    return key.last - index;
+}
+
+/* Frames of window 0 that a source ends before. */
+static int64_t missing_count(const npg_plan *plan, int64_t total)
+{
+    return npg_plan_is_open(plan) && total >= 0 ? max_of(key_window(plan, -1).last - (total - 1), 0) : 0;
+}
+
+int64_t npg_live_next_place(const npg_plan *plan, int64_t read, int64_t total)
+{
+    return read > total - plan->key ? read + missing_count(plan, total) : read;
+}
+
+bool npg_live_is_read(const npg_plan *plan, int64_t index, int64_t read, int64_t total)
+{
+    return npg_live_place(plan, index) < npg_live_next_place(plan, read, total);
+}
+
+int64_t npg_live_read_before(const npg_plan *plan, int64_t i, int64_t total)
+{
+    if (!npg_plan_is_open(plan)) return npg_plan_read_before(plan, i);
+    npg_window window = npg_live_window(plan, i, total), key = key_window(plan, total);
+    return window.direction > 0 ? window.new_last + 1 : key.last + 1 - window.new_first;
+}
+
+int64_t npg_live_last_until(const npg_plan *plan, int64_t i, int64_t total)
+{
+    npg_window window = npg_live_window(plan, i, total), key = npg_live_window(plan, 0, total);
+    if (plan->appended_at || window.direction > 0) return window.new_last;
+    if (npg_plan_is_open(plan) || window.direction == 0) return key.last;
+    return plan->frame_count - 1;
+}
+
+/* Those are windows 1 of either side: the first that do not are followed by none. */
+bool npg_live_is_first_needed_after(const npg_plan *plan, int64_t i, int64_t total)
+{
+    int64_t count = npg_live_window_count(plan, total);
+    if (plan->appended_at) return false;
+    if (npg_plan_is_open(plan)) count = min_of(count, backward_count(plan, total) + 2);
+    for (int64_t w = max_of(i + 1, 1); w < count; w++)
+        if (npg_live_window(plan, w, total).from == 0) return true;
+    return false;
+}
+
 static bool holds(const npg_plan *plan, int64_t index, int64_t i, int64_t total)
 {
     npg_window window = npg_live_window(plan, i, total);

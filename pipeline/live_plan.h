@@ -39,6 +39,25 @@ npg_window npg_live_window(const npg_plan *plan, int64_t i, int64_t total);
  * frames.  Under an open plan every i >= 0 has one; those beyond the end never come. */
 int64_t npg_live_frame(const npg_plan *plan, int64_t i);
 
+/* Its inverse: the place of a frame in that order. */
+int64_t npg_live_place(const npg_plan *plan, int64_t index);
+
+/* How many frames have come when window i can be solved. */
+int64_t npg_live_read_before(const npg_plan *plan, int64_t i, int64_t total);
+
+/* The place in the order that follows `read` frames: those that lie behind the end of the source never came.
+ * The frame before it is the last that came. */
+int64_t npg_live_next_place(const npg_plan *plan, int64_t read, int64_t total);
+
+/* Whether the frame is one of the first `read` that came. */
+bool npg_live_is_read(const npg_plan *plan, int64_t index, int64_t read, int64_t total);
+
+/* The frame latest in time of windows 0 to i. */
+int64_t npg_live_last_until(const npg_plan *plan, int64_t i, int64_t total);
+
+/* Whether a window after window i starts from window 0. */
+bool npg_live_is_first_needed_after(const npg_plan *plan, int64_t i, int64_t total);
+
 /* Whether a window after window i holds the frame: until then it must be kept. */
 bool npg_live_is_needed_after(const npg_plan *plan, int64_t index, int64_t i, int64_t total);
 

@@ -270,6 +270,14 @@ NPG_API npg_status npg_run_open(npg_run **run, const npg_options *options, const
  * NPG_USAGE when the run reads files or the number does not grow; the run's failure once it has failed. */
 NPG_API npg_status npg_run_push(npg_run *run, const npg_cloud *cloud);
 
+/* Which frame to push first.  A run that resumes an earlier one with pushed frames (same options and output,
+ * without pull) has kept those it solved: *number gets the number of the first that it needs.  Frames with
+ * smaller numbers may be left out; pushed again they are compared with what came before (another frame under
+ * such a number fails the run with NPG_USAGE) and not solved again.  INT64_MIN: nothing was kept, push from
+ * the first on.  Waits until the run has looked at its output folder; any thread, at any time before the run
+ * is closed.  NPG_USAGE when the run reads its frames itself; the run's failure once it has failed. */
+NPG_API npg_status npg_run_wanted_number(npg_run *run, int64_t *number);
+
 /* Say that no more frames will be pushed. */
 NPG_API npg_status npg_run_finish(npg_run *run);
 

@@ -320,7 +320,9 @@ static npg_status begin(npg_run *run)
 static npg_status do_passes(npg_run *run)
 {
     npg_status begun = begin(run);
+    if (begun == NPG_END) npg_latch_abort(run->begun_latch); /* nobody waits for passes that never come */
     if (begun) return begun == NPG_END ? NPG_OK : begun;
+    npg_latch_raise(run->begun_latch, 1);
     if (!run->facts.is_live && !run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
@@ -466,7 +468,10 @@ static npg_status fill_run(npg_run *run, const npg_options *options, const npg_h
     run->report = json_object();
     run->warnings = json_array();
     json_object_set(run->report, "warnings", run->warnings);
+    NPG_TRY(npg_latch_open(&run->begun_latch, 0));
+    run->latches[run->latch_count++] = run->begun_latch;
     run->facts.frame_count = -1;
+    run->facts.wanted_number = INT64_MIN;
     run->facts.bounds_local = npg_bounds_empty();
     NPG_TRY(open_source(run));
     if (!run->settings.output[0] && !run->settings.pull)
@@ -610,6 +615,7 @@ npg_status npg_run_push(npg_run *run, const npg_cloud *given)
     NPG_TRY(npg_struct_take(&cloud, sizeof cloud, given, NPG_SIZE_UP_TO(npg_cloud, normals), "the cloud"));
     NPG_REQUIRE(cloud.points || !cloud.point_count);
     if (!run->feed) return refuse_push(run);
+    if (npg_latch_wait(run->begun_latch, 1)) return why_closed(run); /* facts may be restored until then */
     if (cloud.number <= run->pushed_number)
         return npg_error(NPG_USAGE, "frame %lld was pushed after frame %lld", (long long)cloud.number,
                          (long long)run->pushed_number);
@@ -623,6 +629,16 @@ npg_status npg_run_push(npg_run *run, const npg_cloud *given)
     npg_frame_clear(&frame);
     npg_chunk_unref(&chunk);
     return status == NPG_ABORTED ? why_closed(run) : status;
+}
+
+npg_status npg_run_wanted_number(npg_run *run, int64_t *number)
+{
+    NPG_REQUIRE(run && number);
+    *number = INT64_MIN;
+    if (!run->feed) return refuse_push(run);
+    if (npg_latch_wait(run->begun_latch, 1)) return why_closed(run);
+    *number = run->facts.wanted_number;
+    return NPG_OK;
 }
 
 npg_status npg_run_finish(npg_run *run)

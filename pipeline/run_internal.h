@@ -72,6 +72,7 @@ struct npg_run {
     npg_worker services[NPG_SERVICES_MAX];
     size_t service_count;
     npg_custom custom[NPG_CUSTOM_STAGES_MAX]; /* what some of the workers' stages point to */
+    npg_latch *begun_latch;                   /* 1: the services have begun; one of: */
     npg_latch *latches[NPG_LATCHES_MAX];      /* owned, for the run's whole life; only under lock */
     size_t latch_count;
     npg_ring *

@@ -46,7 +46,7 @@ typedef struct npg_facts {
     bool is_live;                /* frames can't be read a second time                   */
     npg_origin origin;           /* world; a point of the first frame                    */
     _Atomic int64_t frame_count; /* T, gaps included; -1 while a live source is open     */
-    int64_t skipped_count;       /* frames left out under --missing skip or --keep-going */
+    int64_t skipped_count;       /* frames left out under --missing skip or --keep-going; live: at the end */
     /* keyframe */
     size_t point_count_max;         /* of all frames, as read */
     bool has_normals;               /* all frames with points, as read */
@@ -55,6 +55,7 @@ typedef struct npg_facts {
     npg_frame_box box;
     npg_plan plan;                       /* its key is the one by score until the choosing pass has ended   */
     int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture                  */
+    int64_t planned_from;                /* live: the plan is made from the frames before this index        */
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
     /* fuse */
@@ -68,8 +69,9 @@ typedef struct npg_facts {
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
     /* the service job, before the first pass */
-    bool is_resumed;      /* all facts above are known; only the solving pass is walked */
-    int64_t resumed_read; /* frames of the plan that need not be read again             */
+    bool is_resumed;       /* all facts above are known; only the solving pass is walked */
+    int64_t resumed_read;  /* frames of the plan that need not be read again             */
+    int64_t wanted_number; /* pushed frames: those with smaller numbers need not come again; else INT64_MIN */
 } npg_facts;
 
 /* Whether the reference leaves an end of the capture unexplained, on either side of the keyframe. */
@@ -113,8 +115,8 @@ typedef struct npg_stage {
      * and facts alone, from any thread. */
     size_t (*verts_at_most)(const npg_worker *worker);
     /* Add to a state on disk what this stage must find there when the run is resumed.
-     * Called from the thread that writes the state, while this stage has seen the frames that are written
-     * and no other.  May be NULL. */
+     * Called from the thread that writes the state, while a stage behind that has seen the frames that are
+     * written and no other; one before it may be at work on later ones.  May be NULL. */
     npg_status (*save)(const npg_worker *worker, npg_archive_writer *out);
     /* Processor seconds that the stage expects to take in a pass (CHOOSE, FUSE or SOLVE), on whatever machine:
      * the run's progress is the share of these that is done, and only their ratios matter.  Read from options
@@ -206,7 +208,8 @@ void npg_worker_step(npg_worker *worker, double share, int64_t step, int64_t ste
 /* This stage's object in the report; only this stage's thread may change it while a pass goes on. */
 json_t *npg_worker_report(npg_worker *worker);
 
-/* This stage will not change its report again in this pass: states on disk have it from now on. */
+/* What this stage's report has now belongs to states on disk; what it adds later in this pass a resumed run
+ * adds again. */
 void npg_worker_close_report(npg_worker *worker);
 
 /* What a resumed run must report again of what came before: warnings, whether the run is partial, and the

@@ -610,7 +610,7 @@ static npg_status follow_group(npg_worker *worker)
     return log_group(s);
 }
 
-/* with_state: the group ends a window. */
+/* with_state: the group ends a window, or may. */
 static npg_status close_group(npg_worker *worker, bool with_state)
 {
     state *s = npg_worker_state(worker);
@@ -651,7 +651,9 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         s->read++;
         report_progress(worker);
         bool is_window = closes_window(s, &facts->plan);
-        if (is_window || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, is_window));
+        /* where an open source will end, and with it the last window, is not known */
+        bool with_state = is_window || npg_plan_is_open(&facts->plan);
+        if (is_window || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     npg_chunk_unref(chunk);
@@ -662,7 +664,7 @@ static npg_status flush(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     json_t *report = npg_worker_report(worker);
-    NPG_TRY(close_group(worker, false));
+    NPG_TRY(close_group(worker, npg_plan_is_open(&npg_worker_facts(worker)->plan)));
     report_progress(worker);
     NPG_TRY(leave_found(worker));
     if (!s->sum.frames) return NPG_OK;

@@ -231,7 +231,9 @@ static npg_status prepare_folder(npg_worker *worker)
     export_state *state = npg_worker_state(worker);
     const char *output = output_of(worker);
     char *meshes;
-    if (npg_worker_facts(worker)->is_live && !state->overwrite)
+    npg_job *job = npg_job_of(worker);
+    bool discards = state->overwrite || (job && npg_job_is_restart(job));
+    if (npg_worker_facts(worker)->is_live && !discards)
         NPG_TRY(npg_folder_check(output, &state->names, NULL, 0));
     NPG_TRY(check_forms(worker));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
@@ -241,7 +243,6 @@ static npg_status prepare_folder(npg_worker *worker)
     npg_release(&meshes);
     NPG_TRY(status);
     NPG_TRY(npg_frame_log_open(&state->list, output));
-    npg_job *job = npg_job_of(worker);
     return job ? npg_job_write(job, keeps_grids(state)) : NPG_OK;
 }
 

@@ -107,6 +107,34 @@ size_t npg_follow_late_count(const npg_follow *follow)
 {
     return follow->late_count;
 }
+size_t npg_follow_digits(const npg_follow *follow)
+{
+    return follow->number_place;
+}
+
+npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place)
+{
+    const char *dot = strrchr(place->last, '.');
+    NPG_TRY(npg_copy_text(&follow->last, place->last));
+    if (!follow->pattern && dot) strncpy(follow->ending, dot, sizeof follow->ending - 1);
+    follow->number_place = place->digits;
+    follow->number = place->number;
+    follow->step = place->step;
+    follow->taken_count = place->taken_count;
+    return NPG_OK;
+}
+
+npg_status npg_follow_path(const npg_follow *follow, char **path, const char *name)
+{
+    NPG_TRY(npg_join_path(path, follow->folder, name));
+    npg_status status = NPG_OK;
+    if (strchr(name, '/'))
+        status = npg_error(NPG_BAD_INPUT, "%s: not a file of this folder", *path);
+    else if (follow->settings.confine && npg_is_there(*path))
+        status = npg_path_confine(*path, follow->folder);
+    if (status) npg_release(path);
+    return status;
+}
 
 /* ---- scanning the folder ---- */
 
@@ -241,6 +269,13 @@ static npg_status scan_folder(npg_follow *follow)
     size_t late = passed > follow->taken_count ? passed - follow->taken_count : 0;
     if (late > follow->late_count) follow->late_count = late;
     follow->is_ended |= is_end;
+    return NPG_OK;
+}
+
+npg_status npg_follow_count_new(npg_follow *follow, size_t *count)
+{
+    NPG_TRY(scan_folder(follow));
+    *count = waiting_count(follow);
     return NPG_OK;
 }
 

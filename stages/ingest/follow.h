@@ -33,6 +33,27 @@ typedef struct npg_follow npg_follow;
 npg_status npg_follow_open(npg_follow **follow, const npg_follow_settings *settings);
 void npg_follow_close(npg_follow **follow);
 
+/* Where an earlier run was: the next frame is one behind these in natural order. */
+typedef struct npg_follow_place {
+    const char *last; /* name of the file that was taken last                     */
+    size_t digits;    /* npg_follow_digits() of the run                           */
+    int64_t number;   /* of the last file, and by what the numbers grew until it  */
+    int64_t step;
+    size_t taken_count; /* files taken                                              */
+} npg_follow_place;
+
+/* Before the first frame.  NPG_MEMORY. */
+npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place);
+
+/* Path of a file of the folder, to npg_release(); with confine, NPG_BAD_INPUT for one that leads out of it. */
+npg_status npg_follow_path(const npg_follow *follow, char **path, const char *name);
+
+/* Files that are there now and were not taken. */
+npg_status npg_follow_count_new(npg_follow *follow, size_t *count);
+
+/* Which run of digits in the names is the number, counted from the end. */
+size_t npg_follow_digits(const npg_follow *follow);
+
 /* The next frame into the empty *frame, with its number, waiting for it.  NPG_PARTIAL: its file is broken:
  * the frame has number and path but no points, and npg_error_text() says why.  NPG_END, NPG_STOPPED;
  * NPG_BAD_INPUT when the numbers in the names don't grow. */

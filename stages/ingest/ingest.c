@@ -1,19 +1,11 @@
 /* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
  * from standard input, from a folder that grows, or from those that are pushed. */
-#include <string.h>
-#include <unistd.h>
-
 #include "ingest/capture.h"
-#include "ingest/follow.h"
-#include "ingest/formats/reader.h"
+#include "ingest/live_source.h"
 #include "ingest/rig/rig_report.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/stage.h"
-
-/* Frames of one gap in a live source.  Each becomes a frame of the run, so a number that is damaged or a time
- * stamp must not make millions; set far above what a capture loses. */
-#define GAP_MAX 100000
 
 typedef struct state {
     const char *frames, *follow_end;
@@ -22,17 +14,8 @@ typedef struct state {
     int64_t cache_mib;
     bool align_sensors;
     npg_rig_settings rig;
-    int64_t next; /* place in the pass's order; live: frames emitted so far */
-    /* live */
-    npg_selection selection;
-    npg_stream *stream; /* standard input                                  */
-    npg_follow *follow; /* a folder that grows; neither: frames are pushed */
-    npg_chunk *pushed;  /* the pushed chunk under way                      */
-    size_t pushed_at;
-    int64_t seen;                /* frames that came or are missing, chosen or not        */
-    npg_frame waiting, previous; /* the frame behind a gap; a copy of the one before it   */
-    int64_t gap_left, step;      /* missing frames before the waiting one; their distance */
-    bool is_waiting;
+    int64_t next; /* place in the pass's order; of files */
+    npg_live_source live;
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -267,228 +250,6 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
     return NPG_END;
 }
 
-/* ---- standard input, a folder that grows, pushed frames ---- */
-
-static bool wants_stop(void *user)
-{
-    return npg_worker_stopping(user);
-}
-
-static npg_status open_follow(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    const npg_follow_settings settings = {.where = npg_worker_settings(worker)->follow,
-                                          .confine = npg_worker_settings(worker)->confine,
-                                          .end_name = s->follow_end,
-                                          .idle_s = s->follow_idle_s,
-                                          .settle_s = s->follow_settle_s,
-                                          .finds_gaps = s->missing != NPG_MISSING_IGNORE,
-                                          .stopping = wants_stop,
-                                          .user = worker};
-    if (!s->follow_end[0] && !(s->follow_idle_s > 0))
-        return npg_error(NPG_USAGE, "options follow-end and follow-idle: nothing would ever end this run");
-    return npg_follow_open(&s->follow, &settings);
-}
-
-static npg_status open_live(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    const npg_settings *settings = npg_worker_settings(worker);
-    if (!settings->input[0] && !settings->follow[0]) {
-        if (!s->frames[strspn(s->frames, " ")]) return NPG_OK;
-        return npg_error(NPG_USAGE,
-                         "option frames: pushed frames are not selected; push those that are wanted");
-    }
-    NPG_TRY(npg_selection_parse(&s->selection, s->frames));
-    if (npg_selection_needs_count(&s->selection))
-        return npg_error(NPG_USAGE, "option frames: \"%s\": a live source can't be counted from its end",
-                         s->frames);
-    if (settings->follow[0]) return open_follow(worker);
-    NPG_TRY(npg_stream_open(&s->stream, STDIN_FILENO, "standard input"));
-    npg_stream_set_stop(s->stream, wants_stop, worker);
-    return NPG_OK;
-}
-
-/* The next frame that was pushed, its arrays moved out of the chunk. */
-static npg_status next_pushed(npg_worker *worker, npg_frame *frame)
-{
-    state *s = npg_worker_state(worker);
-    while (!s->pushed || s->pushed_at == npg_chunk_count(s->pushed)) {
-        npg_chunk_unref(&s->pushed);
-        s->pushed_at = 0;
-        NPG_TRY(npg_worker_feed(worker, &s->pushed));
-    }
-    npg_frame *first = npg_chunk_frame(s->pushed, s->pushed_at++);
-    *frame = *first;
-    *first = (npg_frame){0};
-    return NPG_OK;
-}
-
-static npg_status next_followed(npg_worker *worker, npg_frame *frame)
-{
-    state *s = npg_worker_state(worker);
-    npg_status status = npg_follow_next(s->follow, frame, &npg_worker_facts(worker)->origin);
-    if (status != NPG_PARTIAL) return status;
-    if (!npg_worker_settings(worker)->keep_going) {
-        npg_frame_clear(frame);
-        return NPG_BAD_INPUT; /* the text is the reader's */
-    }
-    npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
-    npg_worker_facts(worker)->skipped_count++;
-    frame->is_skipped = true;
-    frame->fields = NPG_FIELD_POINTS;
-    return NPG_OK;
-}
-
-/* After a damaged frame nobody knows where the next one begins on a pipe: with keep-going the stream ends
- * there, and what came before is finished. */
-static npg_status next_streamed(npg_worker *worker, npg_frame *frame)
-{
-    state *s = npg_worker_state(worker);
-    npg_status status = npg_stream_next(s->stream, frame, &npg_worker_facts(worker)->origin);
-    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going || !s->next) return status;
-    npg_worker_warn(worker, true, s->seen, "the stream is taken to end here: %s", npg_error_text());
-    return NPG_END;
-}
-
-static npg_status next_live(npg_worker *worker, npg_frame *frame)
-{
-    state *s = npg_worker_state(worker);
-    NPG_TRY(s->stream   ? next_streamed(worker, frame)
-            : s->follow ? next_followed(worker, frame)
-                        : next_pushed(worker, frame));
-    frame->cleaning.read = frame->point_count;
-    return NPG_OK;
-}
-
-static npg_status refuse_gap(const state *s, int64_t gap, int64_t number)
-{
-    if (gap > GAP_MAX)
-        return npg_error(NPG_BAD_INPUT, "frame %lld comes %lld numbers after the one before it",
-                         (long long)number, (long long)gap + 1);
-    return npg_error(NPG_BAD_INPUT,
-                     "%lld frames are missing between %lld and %lld "
-                     "(option missing: skip or hold goes on, "
-                     "ignore takes the frames as they follow each other)",
-                     (long long)gap, (long long)s->previous.number, (long long)number);
-}
-
-/* How many frames are missing before this one.  Numbers may jump: in a folder as in any capture of files; of
- * pushed frames only skip and hold ask for those that lie between; a pipe has no numbers of its own. */
-static npg_status count_gap(npg_worker *worker, const npg_frame *frame)
-{
-    state *s = npg_worker_state(worker);
-    int64_t step = s->follow ? npg_follow_step(s->follow) : 1;
-    bool fills = s->missing == NPG_MISSING_SKIP || s->missing == NPG_MISSING_HOLD;
-    bool is_checked = s->follow ? s->missing != NPG_MISSING_IGNORE : fills && !s->stream;
-    s->gap_left = 0;
-    if (!s->seen || !is_checked) return NPG_OK;
-    /* A smaller step than so far shows that frames were missing before; they are behind us. */
-    if (s->step && step != s->step) {
-        if (!fills)
-            return npg_error(
-                NPG_BAD_INPUT,
-                "frame %lld: the numbers grew by %lld before and now by %lld: frames are missing",
-                (long long)frame->number, (long long)s->step, (long long)step);
-        npg_worker_warn(worker, true, frame->number,
-                        "the numbers grew by %lld before and now by %lld: frames before it are missing",
-                        (long long)s->step, (long long)step);
-    }
-    s->step = step;
-    int64_t gap = (frame->number - s->previous.number) / step - 1;
-    if (gap > GAP_MAX || (gap > 0 && !fills)) return refuse_gap(s, gap, frame->number);
-    s->gap_left = gap;
-    return NPG_OK;
-}
-
-static npg_status keep_previous(state *s, const npg_frame *frame)
-{
-    npg_frame_clear(&s->previous);
-    if (s->missing == NPG_MISSING_HOLD && !s->stream) return npg_frame_copy(&s->previous, frame);
-    s->previous.number = frame->number;
-    return NPG_OK;
-}
-
-static npg_status fill_gap(npg_worker *worker, npg_chunk *chunk)
-{
-    state *s = npg_worker_state(worker);
-    npg_frame frame = {.fields = NPG_FIELD_POINTS};
-    s->gap_left--;
-    int64_t number = s->previous.number += s->step;
-    bool is_held = s->missing == NPG_MISSING_HOLD;
-    if (!npg_selection_takes(&s->selection, s->seen++, number, -1)) return NPG_OK;
-    if (is_held) NPG_TRY(npg_frame_copy(&frame, &s->previous));
-    frame.number = number;
-    frame.index = s->next++;
-    frame.is_key = false;
-    frame.is_held = is_held;
-    frame.is_skipped = !is_held || s->previous.is_skipped;
-    npg_worker_facts(worker)->skipped_count += frame.is_skipped;
-    npg_worker_warn(worker, !is_held, number, "the frame is missing and %s",
-                    is_held ? "repeats the frame before it" : "is skipped");
-    npg_chunk_add(chunk, &frame);
-    return NPG_OK;
-}
-
-static const char *source_name(const npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    return s->stream   ? "standard input"
-           : s->follow ? npg_worker_settings(worker)->follow
-                       : "the pushing program";
-}
-
-static npg_status end_live(npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
-    json_t *report = npg_worker_report(worker);
-    size_t late_count = s->follow ? npg_follow_late_count(s->follow) : 0;
-    if (!s->next) return npg_error(NPG_BAD_INPUT, "%s: no frame came", source_name(worker));
-    if (facts->skipped_count == s->next)
-        return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used", source_name(worker),
-                         (long long)s->next);
-    if (late_count)
-        npg_worker_warn(worker, true, -1, "%zu files came after a later one had been taken and are left out",
-                        late_count);
-    facts->frame_count = s->next;
-    json_object_set_new(report, "frames", json_integer((json_int_t)s->next));
-    json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
-    return NPG_END;
-}
-
-/* One frame per chunk, so that nothing waits for frames that may come much later.  The chunk stays empty for
- * a frame that is not chosen. */
-static npg_status step_live(npg_worker *worker, npg_chunk *chunk)
-{
-    state *s = npg_worker_state(worker);
-    if (!s->is_waiting) {
-        npg_status status = next_live(worker, &s->waiting);
-        if (status) return status == NPG_END ? end_live(worker) : status;
-        s->is_waiting = true;
-        NPG_TRY(count_gap(worker, &s->waiting));
-    }
-    if (s->gap_left > 0) return fill_gap(worker, chunk);
-    s->is_waiting = false;
-    NPG_TRY(keep_previous(s, &s->waiting));
-    if (!npg_selection_takes(&s->selection, s->seen++, s->waiting.number, -1)) {
-        npg_frame_clear(&s->waiting);
-        return NPG_OK;
-    }
-    s->waiting.index = s->next++;
-    npg_chunk_add(chunk, &s->waiting);
-    return NPG_OK;
-}
-
-static npg_status next_from_live(npg_worker *worker, npg_chunk *chunk)
-{
-    while (!npg_chunk_count(chunk)) {
-        if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
-        NPG_TRY(step_live(worker, chunk));
-    }
-    return NPG_OK;
-}
-
 /* ---- the stage ---- */
 
 static npg_status init(npg_worker *worker)
@@ -496,15 +257,21 @@ static npg_status init(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     state *s = npg_worker_state(worker);
     if (npg_worker_pass(worker) == NPG_PASS_SOLVE) s->next = facts->resumed_read;
-    return facts->is_live ? open_live(worker) : open_capture(worker);
+    const npg_live_settings of_live = {.frames = s->frames,
+                                       .follow_end = s->follow_end,
+                                       .follow_idle_s = s->follow_idle_s,
+                                       .follow_settle_s = s->follow_settle_s,
+                                       .missing = (npg_missing)s->missing};
+    return facts->is_live ? npg_live_source_open(&s->live, worker, &of_live) : open_capture(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
+    state *s = npg_worker_state(worker);
     bool is_live = npg_worker_facts(worker)->is_live;
     size_t frames = is_live ? 1 : (size_t)npg_worker_settings(worker)->chunk_frames;
     NPG_TRY(npg_chunk_open(chunk, frames));
-    npg_status status = is_live ? next_from_live(worker, *chunk) : next_from_files(worker, *chunk);
+    npg_status status = is_live ? npg_live_source_next(&s->live, *chunk) : next_from_files(worker, *chunk);
     if (status) npg_chunk_unref(chunk);
     return status;
 }
@@ -512,12 +279,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    npg_selection_clear(&s->selection);
-    npg_stream_close(&s->stream);
-    npg_follow_close(&s->follow);
-    npg_chunk_unref(&s->pushed);
-    npg_frame_clear(&s->waiting);
-    npg_frame_clear(&s->previous);
+    npg_live_source_close(&s->live);
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)

@@ -3,6 +3,7 @@
 #include "job/job.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -44,14 +45,14 @@ npg_job *npg_job_of(const npg_worker *worker)
 static void report_place(npg_worker *worker, npg_job *job)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    int64_t count, bytes;
+    int64_t count, bytes, solved = facts->plan.appended_at + facts->resumed_read;
+    char of_all[32] = "";
     npg_job_exported(job, &count, &bytes);
+    if (facts->frame_count >= 0) snprintf(of_all, sizeof of_all, "of %lld ", (long long)facts->frame_count);
     npg_worker_log(worker, NPG_LOG_INFO, -1,
-                   "resumes an earlier run: %lld of %lld frames are solved and %lld written",
-                   (long long)(facts->plan.appended_at + facts->resumed_read), (long long)facts->frame_count,
-                   (long long)count);
-    json_object_set_new(npg_worker_report(worker), "resumed_frames",
-                        json_integer((json_int_t)(facts->plan.appended_at + facts->resumed_read)));
+                   "resumes an earlier run: %lld %sframes are solved and %lld written", (long long)solved,
+                   of_all, (long long)count);
+    json_object_set_new(npg_worker_report(worker), "resumed_frames", json_integer((json_int_t)solved));
 }
 
 /* Where a capture was one joint window, the frames that follow get windows as long, or as the options say. */
@@ -96,20 +97,26 @@ static npg_status begin_append(npg_worker *worker, npg_job *job)
 static npg_status begin(npg_worker *worker)
 {
     const job_state *state = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
     const npg_settings *settings = npg_worker_settings(worker);
+    const bool is_live = npg_worker_facts(worker)->is_live;
     npg_job_start start;
     npg_job *job;
-    if (facts->is_live || !settings->output[0] || settings->pull) return NPG_OK;
+    if (!settings->output[0] || settings->pull) return NPG_OK;
+    if (is_live && state->append)
+        return npg_error(NPG_USAGE, "frames can be appended to a job of files, not to one of a live source");
     NPG_TRY(npg_job_open(&job, &start, worker, state->restart, state->append));
     NPG_TRY(npg_worker_publish(worker, &job_fact, job));
     switch (start) {
-    case NPG_JOB_FRESH: return NPG_OK;
+    case NPG_JOB_FRESH: return is_live ? npg_job_begin_inputs(worker, job) : NPG_OK;
     case NPG_JOB_DONE:
+        if (is_live) NPG_TRY(npg_job_check_inputs(worker, job));
         npg_worker_log(worker, NPG_LOG_INFO, -1, "%s is done already: nothing is left to do",
                        settings->output);
         return NPG_END;
-    case NPG_JOB_RESUME: NPG_TRY(npg_job_restore_facts(worker, job)); break;
+    case NPG_JOB_RESUME:
+        NPG_TRY(npg_job_restore_facts(worker, job));
+        if (is_live) NPG_TRY(npg_job_resume_inputs(worker, job));
+        break;
     case NPG_JOB_APPEND: NPG_TRY(begin_append(worker, job)); break;
     }
     report_place(worker, job);

@@ -5,6 +5,7 @@
  *                                  process
  *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
  *                                  sizes, times and checksums
+ *     OUT/job/inputs.jsonl         the inputs of a live run, frame by frame as they came (ingest/input_log.h)
  *     OUT/job/window_000012.npg    state after the 12th solved window: an archive (pipeline/archive.h) with
  *                                  the facts of the capture, the reference mesh in unit coordinates, what
  *                                  stages need to be resumed, the optimiser, and the frames that the next
@@ -38,7 +39,7 @@
 
 typedef struct npg_job npg_job;
 
-/* The job of the worker's run; NULL where nothing is kept on disk (live, pulled from, or no output).
+/* The job of the worker's run; NULL where nothing is kept on disk (pulled from, or no output).
  * Written by the service job before the first pass. */
 npg_job *npg_job_of(const npg_worker *worker);
 
@@ -56,6 +57,9 @@ typedef enum npg_job_start {
  * options or the version are others than those that what is there was made of; the text says which. */
 npg_status npg_job_open(npg_job **job, npg_job_start *start, npg_worker *worker, bool restart, bool append);
 void npg_job_close(npg_job **job);
+
+/* Whether this run discards what is there (option restart). */
+bool npg_job_is_restart(const npg_job *job);
 
 /* Frames of the input, gaps included. */
 int64_t npg_job_frame_count(const npg_job *job);
@@ -94,6 +98,7 @@ npg_status npg_job_wait_exported(npg_job *job, int64_t count, int64_t *log_bytes
 typedef struct npg_job_moment {
     int64_t emitted;     /* frames that have been passed on to evaluate and export */
     int64_t read;        /* frames of the plan that need not be read again         */
+    int64_t last;        /* index of the last of them in time, -1 for none         */
     bool is_forward_end; /* later frames start from this state (neupig append)     */
 } npg_job_moment;
 
@@ -145,7 +150,30 @@ npg_status npg_job_inside_path(const npg_job *job, char **path);
 int64_t npg_job_serial(const npg_job *job);         /* of the newest window's state, -1 while there is none */
 int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 
+/* ---- the inputs of a live run (job_live.c) ---- */
+
+#define NPG_BLOCK_INPUTS "inputs" /* npg_input_place */
+
+/* Of a fresh run: begin the log of its inputs.  Its file has another name until the job is written. */
+npg_status npg_job_begin_inputs(npg_worker *worker, npg_job *job);
+
+/* Of a resumed one, whose facts are restored: which of the frames that came need not come again.  NPG_USAGE
+ * where a followed folder has other files than then, with the words of npg_job_differs(). */
+npg_status npg_job_resume_inputs(npg_worker *worker, npg_job *job);
+
+/* Of one that is done: NPG_USAGE where the folder has other files than then, or more. */
+npg_status npg_job_check_inputs(npg_worker *worker, npg_job *job);
+
+/* The job is not the one that lies there: npg_error_text() with what to do about it.  NPG_USAGE. */
+npg_status npg_job_differs(const npg_job *job);
+
+npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new);
+
 /* ---- what the results are made of (job_inputs.c) ---- */
+
+/* Where frames come from.  Words of job.json. */
+typedef enum npg_job_source { NPG_JOB_FILES, NPG_JOB_FOLLOW, NPG_JOB_STREAM, NPG_JOB_PUSH } npg_job_source;
+npg_job_source npg_job_source_of(const npg_settings *settings);
 
 /* A new JSON object.  */
 npg_status npg_job_describe(json_t **description, const npg_options *options);

@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "ingest/input_log.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
 
@@ -22,6 +23,8 @@
 #define POSES_NAME  "poses.bin"
 #define POSES_NEW   "poses.new"
 #define FOLLOWED    "followed_%lld.bin"
+#define INPUTS_NAME "inputs.jsonl"
+#define INPUTS_NEW  "inputs.new"
 
 struct npg_job {
     char *output, *folder; /* owned */
@@ -35,6 +38,8 @@ struct npg_job {
     int64_t forward_serial;
     bool keeps_grids; /* of all windows, for the form vdb */
     bool forgets;     /* older states go when the job is written */
+    bool is_restart;
+    npg_job_source source;
 
     npg_latch *exported;  /* the run's: frames on disk, -1 until job.json is written */
     pthread_mutex_t lock; /* guards what follows */
@@ -193,7 +198,7 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
     NPG_TRY(read_json(&done, job->output, "done.json"));
     if (!done) return NPG_OK;
     size_t frames = json_array_size(json_object_get(job->then, "frames"));
-    *is_done = json_integer_value(json_object_get(done, "frames")) == (json_int_t)frames;
+    *is_done = job->source || json_integer_value(json_object_get(done, "frames")) == (json_int_t)frames;
     *was_partial = json_integer_value(json_object_get(done, "exit_code")) == 7;
     npg_status status = *is_done ? check_listed(job, json_object_get(done, "files")) : NPG_OK;
     json_decref(done);
@@ -211,6 +216,22 @@ static npg_status check_log(const npg_job *job, const npg_archive *archive)
     if (planned < (int64_t)json_array_size(json_object_get(job->then, "frames"))) return NPG_OK;
     NPG_TRY(npg_archive_get(archive, "log", &log, sizeof log));
     return npg_frame_log_check(job->output, log.bytes, log.hash);
+}
+
+/* Of a live source. */
+static npg_status check_inputs(const npg_job *job, const npg_archive *archive)
+{
+    npg_input_place place;
+    uint64_t hash;
+    char *path;
+    if (!job->source) return NPG_OK;
+    NPG_TRY(npg_archive_get(archive, NPG_BLOCK_INPUTS, &place, sizeof place));
+    NPG_TRY(npg_job_inputs_path(job, &path, false));
+    npg_status status = npg_hash_file(&hash, path, (uint64_t)place.bytes);
+    if (!status && hash != place.hash)
+        status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
+    npg_release(&path);
+    return status;
 }
 
 /* A state of aligned frames has none. */
@@ -235,6 +256,7 @@ static npg_status open_state(npg_job *job, int64_t serial, bool with_log)
     if (!status) status = npg_error_prefix(check_grids(archive, grids), "%s", path);
     if (!status) status = npg_archive_get(archive, "forward", &job->forward_serial, sizeof(int64_t));
     if (!status && with_log) status = npg_error_prefix(check_log(job, archive), "%s", path);
+    if (!status && with_log) status = npg_error_prefix(check_inputs(job, archive), "%s", path);
     npg_release(&path);
     if (status) {
         npg_archive_close(&archive);
@@ -290,6 +312,7 @@ static npg_status open_inside(npg_job *job, npg_worker *worker, bool with_log)
     if (!status) status = npg_archive_get(archive, "after", &after, sizeof after);
     if (!status && after != (job->archive ? job->serial : -1)) status = NPG_END;
     if (!status && with_log) status = npg_error_prefix(check_log(job, archive), "%s", path);
+    if (!status && with_log) status = npg_error_prefix(check_inputs(job, archive), "%s", path);
     if (!status) status = npg_archive_get(archive, "forward", &job->forward_serial, sizeof(int64_t));
     npg_release(&path);
     if (status) {
@@ -343,9 +366,32 @@ npg_status npg_job_remove_new_poses(const npg_job *job)
     return remove_file(job, POSES_NEW);
 }
 
+npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new)
+{
+    return npg_join_path(path, job->folder, is_new ? INPUTS_NEW : INPUTS_NAME);
+}
+
+/* The log is open: what is added to it goes on under the new name. */
+static npg_status keep_inputs(const npg_job *job)
+{
+    char *from, *to = NULL;
+    if (!job->source) return remove_file(job, INPUTS_NAME);
+    NPG_TRY(npg_job_inputs_path(job, &from, true));
+    npg_status status = npg_job_inputs_path(job, &to, false);
+    if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
+    npg_release(&from);
+    npg_release(&to);
+    return status;
+}
+
 int64_t npg_job_serial(const npg_job *job)
 {
     return job->serial;
+}
+
+bool npg_job_is_restart(const npg_job *job)
+{
+    return job->is_restart;
 }
 
 int64_t npg_job_frame_count(const npg_job *job)
@@ -372,7 +418,7 @@ npg_status npg_job_open_forward(npg_job *job)
 
 /* ---- opening ---- */
 
-static npg_status differs(const npg_job *job)
+npg_status npg_job_differs(const npg_job *job)
 {
     char text[1024];
     snprintf(text, sizeof text, "%s", npg_error_text());
@@ -388,7 +434,7 @@ static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *w
 {
     int64_t added, planned;
     npg_status status = npg_job_compare(&added, job->then, job->now);
-    if (status == NPG_USAGE) return differs(job);
+    if (status == NPG_USAGE) return npg_job_differs(job);
     NPG_TRY(status);
     *start = is_done ? NPG_JOB_DONE : NPG_JOB_RESUME;
     if (added && is_done && !append)
@@ -417,8 +463,10 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     npg_status status = read_json(&job->then, job->folder, "job.json");
     if (!status && !job->then) return NPG_OK;
     if (!status) status = look_for_end(job, &is_done, &was_partial);
-    if (status == NPG_USAGE) return differs(job);
+    if (status == NPG_USAGE) return npg_job_differs(job);
     NPG_TRY(status);
+    /* a stream, or frames that are pushed, may be others: stage export has the word on what is there */
+    if (is_done && job->source > NPG_JOB_FOLLOW) return NPG_OK;
     NPG_TRY(open_newest(job, worker, !is_done));
     if (!is_done) NPG_TRY(open_inside(job, worker, true));
     if (!job->archive && !is_done) return NPG_OK;
@@ -441,6 +489,8 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
 {
     job->lock_fd = -1;
     job->serial = job->forward_serial = -1;
+    job->is_restart = restart;
+    job->source = npg_job_source_of(npg_worker_settings(worker));
     pthread_mutex_init(&job->lock, NULL);
     NPG_TRY(npg_worker_open_latch(worker, &job->exported, -1));
     NPG_TRY(npg_copy_text(&job->output, npg_worker_settings(worker)->output));
@@ -477,6 +527,7 @@ void npg_job_close(npg_job **slot)
     npg_release(&job->grids_path);
     json_decref(job->then);
     json_decref(job->now);
+    if (job->source && job->folder && !job->is_written) remove_file(job, INPUTS_NEW);
     if (job->lock_fd >= 0) close(job->lock_fd);
     npg_release(&job->folder);
     npg_release(&job->output);
@@ -521,6 +572,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
         NPG_TRY(remove_kind(job, is_motion));
         NPG_TRY(remove_file(job, INSIDE_NAME));
         NPG_TRY(remove_file(job, POSES_NAME));
+        NPG_TRY(keep_inputs(job));
         job->serial = job->forward_serial = -1;
         NPG_TRY(write_description(job));
     }

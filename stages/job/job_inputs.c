@@ -12,16 +12,27 @@
 #include "pipeline/file.h"
 
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
-static const char *const free_options[] = {"input",  "output", "ring",        "chunk",       "max-memory",
-                                           "pull",   "cache",  "overwrite",   "confine",     "restart",
-                                           "append", "alarm",  "segment-min", "state-every", NULL};
+static const char *const free_options[] = {
+    "input",   "output",  "ring",   "chunk", "max-memory",  "pull",        "cache",  "overwrite",
+    "confine", "restart", "append", "alarm", "segment-min", "state-every", "follow", NULL};
+/* Of a live source: what ends it.  Kept for npg_options_load_job(), not compared. */
+static const char *const end_options[] = {"follow-end", "follow-idle", NULL};
 
-static bool is_free(const char *name)
+static bool is_one_of(const char *const *names, const char *name)
 {
-    for (const char *const *free_name = free_options; *free_name; free_name++)
-        if (!strcmp(name, *free_name)) return true;
+    for (; *names; names++)
+        if (!strcmp(name, *names)) return true;
     return false;
 }
+
+npg_job_source npg_job_source_of(const npg_settings *settings)
+{
+    if (settings->follow[0]) return NPG_JOB_FOLLOW;
+    if (!settings->input[0]) return NPG_JOB_PUSH;
+    return strcmp(settings->input, "-") != 0 ? NPG_JOB_FILES : NPG_JOB_STREAM;
+}
+
+static const char *const source_words[] = {"files", "follow", "stream", "push"};
 
 /* ---- describing ---- */
 
@@ -30,7 +41,7 @@ static json_t *describe_options(const npg_options *options)
     json_t *values = json_object();
     npg_option_info info = {.struct_size = sizeof info};
     for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
-        if (!is_free(info.name))
+        if (!is_one_of(free_options, info.name))
             json_object_set_new(values, info.name, npg_json_text(npg_options_get(options, info.name)));
     return values;
 }
@@ -119,21 +130,32 @@ static json_t *absolute(const char *path)
     return npg_json_text(joined);
 }
 
-npg_status npg_job_describe(json_t **out, const npg_options *options)
+/* The frames of a live source are not known yet: they are in the log of inputs. */
+static npg_status describe_capture(json_t *frames, const npg_options *options, npg_job_source source)
 {
     npg_frame_files *list;
+    if (source) return NPG_OK;
+    NPG_TRY(npg_capture_list(&list, options));
+    npg_status status = describe_frames(frames, list);
+    npg_frame_files_close(&list);
+    return status;
+}
+
+npg_status npg_job_describe(json_t **out, const npg_options *options)
+{
     npg_settings settings;
     *out = NULL;
     npg_options_fill(options, npg_run_options, &settings);
-    NPG_TRY(npg_capture_list(&list, options));
+    npg_job_source source = npg_job_source_of(&settings);
+    const char *input = source == NPG_JOB_FOLLOW ? settings.follow : settings.input;
     json_t *frames = json_array(), *mesh = json_object();
-    npg_status status = describe_frames(frames, list);
-    npg_frame_files_close(&list);
+    npg_status status = describe_capture(frames, options, source);
     if (!status && settings.reference[0]) status = describe_file(mesh, settings.reference);
-    json_t *description =
-        json_pack("{ss so so so so so}", "neupig", npg_version(), "input", absolute(settings.input),
-                  "options", describe_options(options), "custom_stages", describe_custom_stages(options),
-                  "reference", mesh, "frames", frames);
+    json_t *description = json_pack("{ss so so so so so}", "neupig", npg_version(), "input",
+                                    source > NPG_JOB_FOLLOW ? npg_json_text(input) : absolute(input),
+                                    "options", describe_options(options), "custom_stages",
+                                    describe_custom_stages(options), "reference", mesh, "frames", frames);
+    if (source) json_object_set_new(description, "source", json_string(source_words[source]));
     if (!status && !description) status = npg_error(NPG_MEMORY, "no memory for the list of inputs");
     if (status) json_decref(description);
     if (!status) *out = description;
@@ -148,6 +170,12 @@ static const char *text_of(const json_t *object, const char *key)
     return text ? text : "";
 }
 
+static const char *source_of(const json_t *description)
+{
+    const char *source = text_of(description, "source");
+    return source[0] ? source : source_words[NPG_JOB_FILES];
+}
+
 static npg_status compare_options(const json_t *then, const json_t *now)
 {
     const char *name;
@@ -155,6 +183,7 @@ static npg_status compare_options(const json_t *then, const json_t *now)
     json_object_foreach((json_t *)now, name, value)
     {
         const char *was = text_of(then, name), *is = text_of(now, name);
+        if (is_one_of(end_options, name)) continue;
         if (!json_object_get(then, name))
             return npg_error(NPG_USAGE, "option %s is new and is \"%s\"", name, is);
         if (strcmp(was, is) != 0)
@@ -197,6 +226,10 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
     if (strcmp(text_of(then, "neupig"), text_of(now, "neupig")) != 0)
         return npg_error(NPG_USAGE, "it was begun by neupig %s, and this is %s", text_of(then, "neupig"),
                          text_of(now, "neupig"));
+    if (strcmp(text_of(then, "source"), text_of(now, "source")) != 0)
+        return npg_error(NPG_USAGE,
+                         "its frames come from another kind of source (%s) than they came from (%s)",
+                         source_of(now), source_of(then));
     NPG_TRY(compare_options(json_object_get(then, "options"), json_object_get(now, "options")));
     const json_t *own_then = json_object_get(then, "custom_stages"),
                  *own_now = json_object_get(now, "custom_stages");
@@ -211,12 +244,16 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
 
 static npg_status set_from(npg_options *options, const json_t *job, const char *path)
 {
-    const char *name, *input = json_string_value(json_object_get(job, "input"));
+    const char *name, *input = json_string_value(json_object_get(job, "input")), *source = source_of(job);
     json_t *value;
+    bool is_followed = !strcmp(source, source_words[NPG_JOB_FOLLOW]);
     if (!input) return npg_error(NPG_USAGE, "%s names no input", path);
+    if (!is_followed && strcmp(source, source_words[NPG_JOB_FILES]) != 0)
+        return npg_error(NPG_USAGE, "%s: its frames came from a live source (%s) and can't be read again",
+                         path, source);
     json_object_foreach(json_object_get(job, "options"), name, value)
         NPG_TRY(npg_options_set(options, name, json_string_value(value) ? json_string_value(value) : ""));
-    return npg_options_set(options, "input", input);
+    return npg_options_set(options, is_followed ? "follow" : "input", input);
 }
 
 npg_status npg_options_load_job(npg_options *options, const char *folder)

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ingest/input_log.h"
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "job/state_mesh.h"
@@ -23,7 +24,13 @@ static npg_status put_facts(npg_archive_writer *out, npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_facts plain;
-    memcpy(&plain, facts, sizeof plain); /* with its padding: the same bytes every time */
+    size_t tail = offsetof(npg_facts, point_count_max);
+    memset(&plain, 0, sizeof plain);
+    /* with its padding: the same bytes every time */
+    memcpy(&plain, facts, offsetof(npg_facts, frame_count));
+    memcpy((char *)&plain + tail, (const char *)facts + tail, sizeof plain - tail);
+    plain.frame_count = facts->frame_count; /* stage ingest may be about to write it, and skipped_count */
+    if (!facts->is_live) plain.skipped_count = facts->skipped_count;
     plain.reference = NULL;
     plain.is_resumed = false;
     plain.resumed_read = 0;
@@ -42,10 +49,28 @@ static npg_status put_log(npg_archive_writer *out, const npg_worker *worker, int
     return npg_archive_put(out, "log", &log, sizeof log);
 }
 
+/* So does the log of a live source: what the plan was made from, and what is solved. */
+static npg_status put_inputs(npg_archive_writer *out, const npg_worker *worker, int64_t last)
+{
+    npg_input_log *log = npg_worker_fact(worker, &npg_fact_input_log);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_input_place place;
+    char *path;
+    if (!log) return NPG_OK;
+    if (last < facts->planned_from - 1) last = facts->planned_from - 1;
+    npg_input_log_place(log, last, &place);
+    NPG_TRY(npg_input_log_sync(log));
+    NPG_TRY(npg_job_inputs_path(npg_job_of(worker), &path, false));
+    npg_status status = npg_hash_file(&place.hash, path, (uint64_t)place.bytes);
+    npg_release(&path);
+    return status ? status : npg_archive_put(out, NPG_BLOCK_INPUTS, &place, sizeof place);
+}
+
 static npg_status put_all(npg_archive_writer *out, npg_worker *worker, const npg_job_moment *moment,
                           int64_t forward)
 {
     NPG_TRY(put_log(out, worker, moment->emitted));
+    NPG_TRY(put_inputs(out, worker, moment->last));
     NPG_TRY(npg_archive_put(out, "forward", &forward, sizeof forward));
     NPG_TRY(npg_archive_put(out, "read", &moment->read, sizeof moment->read));
     NPG_TRY(put_facts(out, worker));

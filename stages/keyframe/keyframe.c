@@ -10,9 +10,11 @@
  * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
  * (likeness.h). */
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "job/job.h"
 #include "keyframe/choose_pass.h"
 #include "keyframe/likeness.h"
 #include "keyframe/look_ahead.h"
@@ -54,6 +56,7 @@ typedef struct keyframe_state {
     int64_t passed_count; /* frames of the solving pass so far          */
     npg_look_ahead held;  /* a live run's frames until it is their turn */
     bool is_planned;      /* live: the key is known                     */
+    pthread_mutex_t lock; /* of what a state on disk has of `held`      */
 } keyframe_state;
 
 /* ---- measuring ---- */
@@ -366,6 +369,7 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     if (is_open && state->usable_count) widen_box(state, &facts->bounds_local);
     NPG_TRY(close_measuring(worker));
     if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
+    facts->planned_from = frame_count;
     for (size_t i = 0; i < state->held.count; i++)
         NPG_TRY(score_frame(worker, frame_count, &state->held.frames[i]));
     npg_status status = set_plan(worker, frame_count);
@@ -380,6 +384,19 @@ static npg_status plan_live(npg_worker *worker, bool is_open)
     json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
     state->is_planned = true;
     npg_release(&state->cells);
+    npg_worker_close_report(worker);
+    npg_worker_announce_memory(worker);
+    return NPG_OK;
+}
+
+/* An earlier run has made the plan: the frames that it solved don't come again. */
+static npg_status resume_live(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    state->is_planned = true;
+    state->held.next = npg_live_next_place(&facts->plan, facts->resumed_read, facts->frame_count);
+    NPG_TRY(npg_look_ahead_restore(&state->held, npg_job_archive(npg_job_of(worker)), facts));
     npg_worker_announce_memory(worker);
     return NPG_OK;
 }
@@ -394,7 +411,8 @@ static npg_status take_live(npg_worker *worker, npg_frame *frame)
         return npg_look_ahead_add(&state->held, frame);
     }
     if (!state->is_planned) NPG_TRY(plan_live(worker, true));
-    npg_look_ahead_watch(worker, &state->held, frame);
+    if (frame->index >= npg_worker_facts(worker)->planned_from)
+        NPG_TRY(npg_look_ahead_watch(worker, &state->held, frame));
     NPG_TRY(npg_look_ahead_add(&state->held, frame));
     return npg_look_ahead_release(worker, &state->held,
                                   limit + (size_t)npg_plan_window_asked(state->window, INT64_MAX), false);
@@ -422,6 +440,9 @@ static npg_status init(npg_worker *worker)
     if (window && state->overlap >= window)
         return npg_error(NPG_USAGE, "option overlap: %lld frames don't fit in windows of %lld",
                          (long long)state->overlap, (long long)window);
+    state->held.lock = &state->lock;
+    pthread_mutex_init(&state->lock, NULL);
+    if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed) return resume_live(worker);
     if (pass == NPG_PASS_MEASURE || (pass == NPG_PASS_SOLVE && facts->is_live)) {
         facts->bounds_local = npg_bounds_empty();
         facts->point_count_max = 0;
@@ -477,6 +498,14 @@ static void uninit(npg_worker *worker)
     npg_choose_pass_clear(&state->choosing);
     npg_release(&state->cells);
     npg_release(&state->diagonals);
+    if (state->held.lock) pthread_mutex_destroy(&state->lock);
+}
+
+/* Of a state on disk: the plan and the box are facts. */
+static npg_status save(const npg_worker *worker, npg_archive_writer *out)
+{
+    const keyframe_state *state = npg_worker_state(worker);
+    return npg_worker_facts(worker)->is_live ? npg_look_ahead_save(&state->held, out) : NPG_OK;
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
@@ -540,4 +569,5 @@ const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .flush = flush,
                                       .uninit = uninit,
                                       .memory = memory,
-                                      .expects = expects};
+                                      .expects = expects,
+                                      .save = save};

@@ -77,34 +77,72 @@ static double share_outside(const npg_frame_box *box, const npg_frame *frame)
     return far > 1 ? ((double)far - 1) / (2 * NPG_UNIT_EXTENT) : 0;
 }
 
-void npg_look_ahead_watch(npg_worker *worker, npg_look_ahead *held, const npg_frame *frame)
+static npg_status add_outside(npg_look_ahead *held, const npg_outside *frame)
+{
+    pthread_mutex_lock(held->lock);
+    npg_status status = npg_grow(&held->outside, &held->outside_capacity, held->outside_count + 1,
+                                 sizeof *held->outside, NPG_FOR_RUN);
+    if (!status) held->outside[held->outside_count++] = *frame;
+    pthread_mutex_unlock(held->lock);
+    return status;
+}
+
+npg_status npg_look_ahead_watch(npg_worker *worker, npg_look_ahead *held, const npg_frame *frame)
 {
     double share = frame->is_skipped ? 0 : share_outside(&npg_worker_facts(worker)->box, frame);
-    if (!(share > 0)) return;
-    if (held->outside_count++ < TOLD_EACH)
+    const npg_outside found = {frame->index, frame->number, share};
+    if (!(share > 0)) return NPG_OK;
+    if (held->outside_count < TOLD_EACH)
         npg_worker_warn(worker, false, frame->number,
                         "leaves the box that the look-ahead gave by %.1f %% of its longest side",
                         100 * share);
-    if (share > held->worst_share) {
-        held->worst_share = share;
-        held->worst_number = frame->number;
-    }
+    return add_outside(held, &found);
 }
 
 void npg_look_ahead_tell_outside(npg_worker *worker, const npg_look_ahead *held)
 {
+    npg_outside worst = {0};
     json_object_set_new(npg_worker_report(worker), "outside_box",
                         json_integer((json_int_t)held->outside_count));
+    for (size_t i = 0; i < held->outside_count; i++)
+        if (held->outside[i].share > worst.share) worst = held->outside[i];
     if (held->outside_count)
-        npg_worker_warn(worker, false, held->worst_number,
-                        "%lld frames leave the box that the look-ahead gave; "
+        npg_worker_warn(worker, false, worst.number,
+                        "%zu frames leave the box that the look-ahead gave; "
                         "this one by most, %.1f %% of its longest side (option box-margin leaves more room)",
-                        (long long)held->outside_count, 100 * held->worst_share);
+                        held->outside_count, 100 * worst.share);
+}
+
+/* ---- states on disk ---- */
+
+#define BLOCK_OUTSIDE "outside"
+
+npg_status npg_look_ahead_save(const npg_look_ahead *held, npg_archive_writer *out)
+{
+    pthread_mutex_lock(held->lock);
+    size_t size = held->outside_count * sizeof *held->outside;
+    npg_status status = size ? npg_archive_put(out, BLOCK_OUTSIDE, held->outside, size) : NPG_OK;
+    pthread_mutex_unlock(held->lock);
+    return status;
+}
+
+npg_status npg_look_ahead_restore(npg_look_ahead *held, const npg_archive *in, const npg_facts *facts)
+{
+    size_t size;
+    const npg_outside *saved = npg_archive_find(in, BLOCK_OUTSIDE, &size);
+    for (size_t i = 0; saved && i < size / sizeof *saved; i++) {
+        npg_outside one;
+        memcpy(&one, saved + i, sizeof one);
+        if (npg_live_is_read(&facts->plan, one.index, facts->resumed_read, facts->frame_count))
+            NPG_TRY(add_outside(held, &one));
+    }
+    return NPG_OK;
 }
 
 void npg_look_ahead_clear(npg_look_ahead *held)
 {
     for (size_t i = 0; i < held->count; i++) npg_frame_clear(&held->frames[i]);
     npg_release(&held->frames);
+    npg_release(&held->outside);
     *held = (npg_look_ahead){0};
 }

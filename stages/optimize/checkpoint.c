@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "optimize/fit_state.h"
+#include "pipeline/live_plan.h"
 
 /* A held frame but for its arrays. */
 typedef struct saved_frame {
@@ -15,7 +16,7 @@ typedef struct saved_frame {
 } saved_frame;
 
 typedef struct saved_progress {
-    int64_t window_at, is_aligned;
+    int64_t window_at, is_aligned, total;
     double last_chamfer, last_isometry;
 } saved_progress;
 
@@ -84,7 +85,8 @@ static npg_status put_frames(npg_archive_writer *out, const npg_hand *hand, size
 /* What the coarse alignment needs after `read` frames came with the last of them. */
 static npg_status put_alignment(npg_archive_writer *out, const npg_hand *hand, const npg_plan *plan)
 {
-    int64_t read = npg_plan_read_before(plan, hand->window_at), last = npg_plan_frame(plan, read - 1);
+    int64_t read = npg_live_read_before(plan, hand->window_at, hand->total);
+    int64_t last = npg_live_frame(plan, npg_live_next_place(plan, read, hand->total) - 1);
     for (size_t i = 0; i < hand->held_count; i++) {
         const npg_frame *frame = &hand->held[i].frame;
         if (frame->index == last && frame->align_state)
@@ -95,7 +97,7 @@ static npg_status put_alignment(npg_archive_writer *out, const npg_hand *hand, c
 
 static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, const npg_hand *hand)
 {
-    const saved_progress progress = {hand->window_at, hand->is_aligned, hand->last_chamfer,
+    const saved_progress progress = {hand->window_at, hand->is_aligned, hand->total, hand->last_chamfer,
                                      hand->last_isometry};
     NPG_TRY(npg_archive_put(out, "progress", &progress, sizeof progress));
     if (hand->is_aligned) NPG_TRY(put_alignment(out, hand, &facts->plan));
@@ -106,7 +108,7 @@ static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, cons
 
 static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
 {
-    npg_window window = npg_plan_window(&facts->plan, hand->window_at);
+    npg_window window = npg_live_window(&facts->plan, hand->window_at, hand->total);
     npg_vdb_place place = {.unit_per_world = facts->box.scale,
                            .frame_first = window.first,
                            .frame_last = window.last,
@@ -115,18 +117,10 @@ static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
     return place;
 }
 
-/* A later window starts from the first one. */
-static bool is_first_needed(const npg_plan *plan, int64_t window_at)
-{
-    if (plan->appended_at) return false;
-    for (int64_t i = window_at + 1; i < npg_plan_window_count(plan); i++)
-        if (i > 0 && npg_plan_window(plan, i).from == 0) return true;
-    return false;
-}
-
 static npg_status put_first(npg_archive_writer *out, const npg_facts *facts, const npg_hand *hand)
 {
-    if (!hand->warm || !is_first_needed(&facts->plan, hand->window_at)) return NPG_OK;
+    bool is_needed = npg_live_is_first_needed_after(&facts->plan, hand->window_at, hand->total);
+    if (!hand->warm || !is_needed) return NPG_OK;
     return npg_fit_copy_save(npg_warm_first(hand->warm), out, "first");
 }
 
@@ -148,12 +142,20 @@ static npg_status write_state(void *user, npg_archive_writer *out, const char *g
     return npg_fit_save(s->fit, out, grids_path, &place);
 }
 
+static npg_job_moment moment_of(const npg_plan *plan, const npg_hand *hand)
+{
+    npg_job_moment moment = {.emitted = hand->emitted, .last = -1};
+    if (hand->window_at < 0) return moment;
+    moment.read = npg_live_read_before(plan, hand->window_at, hand->total);
+    moment.last = npg_live_last_until(plan, hand->window_at, hand->total);
+    return moment;
+}
+
 npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit)
 {
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    const npg_job_moment moment = {.emitted = hand->emitted,
-                                   .read = npg_plan_read_before(plan, hand->window_at),
-                                   .is_forward_end = npg_plan_is_last_forward(plan, hand->window_at)};
+    npg_job_moment moment = moment_of(plan, hand);
+    moment.is_forward_end = !npg_plan_is_open(plan) && npg_plan_is_last_forward(plan, hand->window_at);
     saving s = {worker, hand, fit};
     return npg_job_save_state(worker, &moment, write_state, &s);
 }
@@ -170,10 +172,7 @@ static npg_status write_inside(void *user, npg_archive_writer *out, const char *
 
 npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
 {
-    const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    const npg_job_moment moment = {.emitted = hand->emitted,
-                                   .read = hand->window_at >= 0 ? npg_plan_read_before(plan, hand->window_at)
-                                                                : 0};
+    const npg_job_moment moment = moment_of(&npg_worker_facts(worker)->plan, hand);
     saving s = {worker, hand, NULL};
     return npg_job_save_inside(worker, &moment, write_inside, &s);
 }
@@ -274,6 +273,7 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     if (is_appending) first_index = npg_plan_window(&facts->plan, 0).first;
     hand->window_at = is_appending ? -1 : progress.window_at;
     hand->is_aligned = progress.is_aligned != 0;
+    hand->total = progress.total;
     hand->last_chamfer = progress.last_chamfer;
     hand->last_isometry = progress.last_isometry;
     size_t size;

@@ -17,6 +17,7 @@ typedef struct npg_hand {
     npg_warm *warm;     /* of windows without alignment, or NULL; a loan */
     double usual;       /* Chamfer distance that those came to, or 0     */
     int64_t lost_count; /* of them, those that a warm start did not bring there */
+    int64_t total;      /* frames of the capture, -1 until a live source has ended */
 } npg_hand;
 
 /* Write the state after window hand->window_at was solved and before its frames are passed on.  Waits until

@@ -409,7 +409,7 @@ static npg_hand hand_of(state *s, int64_t window_at)
     return (npg_hand){s->held,          s->held_count, s->held_capacity,
                       window_at,        s->emitted,    s->last_chamfer,
                       s->last_isometry, s->is_aligned, npg_window_warm(s->solver),
-                      s->usual_chamfer, s->lost_count};
+                      s->usual_chamfer, s->lost_count, s->total};
 }
 
 static npg_status save_state(npg_worker *worker)
@@ -450,6 +450,7 @@ static npg_status resume(npg_worker *worker)
     s->last_isometry = hand.last_isometry;
     s->usual_chamfer = hand.usual;
     s->lost_count = hand.lost_count;
+    s->total = hand.total;
     if (!status) status = open_solver(worker, hand.is_aligned);
     if (!status && !hand.is_aligned)
         status = npg_checkpoint_restore_fit(worker, npg_window_fit(s->solver), npg_window_warm(s->solver));
