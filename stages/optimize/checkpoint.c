@@ -17,7 +17,7 @@ typedef struct saved_frame {
 
 typedef struct saved_progress {
     int64_t window_at, is_aligned, total;
-    double last_chamfer, last_isometry;
+    double last_chamfer, last_isometry, noise;
 } saved_progress;
 
 static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t index)
@@ -97,8 +97,8 @@ static npg_status put_alignment(npg_archive_writer *out, const npg_hand *hand, c
 
 static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, const npg_hand *hand)
 {
-    const saved_progress progress = {hand->window_at, hand->is_aligned, hand->total, hand->last_chamfer,
-                                     hand->last_isometry};
+    const saved_progress progress = {hand->window_at,    hand->is_aligned,    hand->total,
+                                     hand->last_chamfer, hand->last_isometry, hand->noise};
     NPG_TRY(npg_archive_put(out, "progress", &progress, sizeof progress));
     if (hand->is_aligned) NPG_TRY(put_alignment(out, hand, &facts->plan));
     if (hand->usual > 0) NPG_TRY(npg_archive_put(out, "usual", &hand->usual, sizeof hand->usual));
@@ -274,6 +274,7 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     hand->window_at = is_appending ? -1 : progress.window_at;
     hand->is_aligned = progress.is_aligned != 0;
     hand->total = progress.total;
+    hand->noise = progress.noise;
     hand->last_chamfer = progress.last_chamfer;
     hand->last_isometry = progress.last_isometry;
     size_t size;

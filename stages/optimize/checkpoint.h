@@ -17,6 +17,7 @@ typedef struct npg_hand {
     npg_warm *warm;     /* of windows without alignment, or NULL; a loan */
     double usual;       /* Chamfer distance that those came to, or 0     */
     int64_t lost_count; /* of them, those that a warm start did not bring there */
+    double noise;       /* of aligned frames: npg_joint_result's            */
     int64_t total;      /* frames of the capture, -1 until a live source has ended */
 } npg_hand;
 

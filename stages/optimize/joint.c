@@ -90,6 +90,11 @@ npg_status npg_joint_open(npg_joint **out, npg_mesh *surface, const npg_joint_se
     return status;
 }
 
+void npg_joint_set_noise(npg_joint *j, double noise)
+{
+    j->noise = noise;
+}
+
 /* ---- a window ---- */
 
 static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_t count)

@@ -58,8 +58,12 @@ void npg_joint_close(npg_joint **joint);
  * is left of the first residual (1 .. 0).  Anything but NPG_OK ends the solve with that status. */
 typedef npg_status npg_joint_watch(void *user, int64_t step, int64_t most, double residual);
 
+/* The noise that the window before came to (npg_joint_result): the next one first matches within it.  A solve
+ * sets it; a resumed run starts with that of its state. */
+void npg_joint_set_noise(npg_joint *joint, double noise);
+
 /* Move the frames' surfaces, in order of time; those are left alone where it fails or there are no steps.
- * Equal input gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY, NPG_DIVERGED, the
+ * Equal input (that noise, too) gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY, NPG_DIVERGED, the
  * watch's. */
 npg_status npg_joint_solve(npg_joint *joint, npg_joint_result *result, const npg_joint_frame *frames,
                            size_t frame_count, npg_joint_watch *watch, void *user);

@@ -61,6 +61,11 @@ npg_status npg_joint_window_open(npg_joint_window **out, const npg_mesh *referen
     return status;
 }
 
+void npg_joint_window_set_noise(npg_joint_window *window, double noise)
+{
+    npg_joint_set_noise(window->joint, noise);
+}
+
 /* What solving takes: the thinned surfaces before and after. */
 static npg_status fill_frames(npg_joint_window *window, npg_joint_frame *frames, npg_held *const *held,
                               size_t count, const npg_joint_points *points)

@@ -34,6 +34,9 @@ npg_status npg_joint_window_solve(npg_joint_window *window, npg_joint_result *re
                                   const npg_window *at, const npg_joint_points *points, npg_fit_watch *watch,
                                   void *user);
 
+/* npg_joint_set_noise(). */
+void npg_joint_window_set_noise(npg_joint_window *window, double noise);
+
 /* Bytes that it takes at most. */
 size_t npg_joint_window_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames);
 

@@ -406,10 +406,12 @@ static npg_status save_record(npg_worker *worker)
 
 static npg_hand hand_of(state *s, int64_t window_at)
 {
+    const npg_joint_result *joint = npg_window_result(s->solver);
     return (npg_hand){s->held,          s->held_count, s->held_capacity,
                       window_at,        s->emitted,    s->last_chamfer,
                       s->last_isometry, s->is_aligned, npg_window_warm(s->solver),
-                      s->usual_chamfer, s->lost_count, s->total};
+                      s->usual_chamfer, s->lost_count, joint ? joint->noise : 0,
+                      s->total};
 }
 
 static npg_status save_state(npg_worker *worker)
@@ -455,6 +457,7 @@ static npg_status resume(npg_worker *worker)
     if (!status && !hand.is_aligned)
         status = npg_checkpoint_restore_fit(worker, npg_window_fit(s->solver), npg_window_warm(s->solver));
     if (status) return npg_error_prefix(status, "the state to resume from");
+    npg_window_set_noise(s->solver, hand.noise);
     s->window_at = hand.window_at;
     if (s->window_at >= 0) NPG_TRY(emit_done(worker));
     if (++s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);

@@ -26,6 +26,13 @@ const npg_joint_result *npg_window_result(const npg_window_solver *solver)
     return solver->joint ? &solver->result : NULL;
 }
 
+void npg_window_set_noise(npg_window_solver *solver, double noise)
+{
+    if (!solver->joint) return;
+    solver->result.noise = noise;
+    npg_joint_window_set_noise(solver->joint, noise);
+}
+
 npg_fit *npg_window_fit(npg_window_solver *solver)
 {
     return solver->fit;

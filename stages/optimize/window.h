@@ -47,6 +47,9 @@ npg_fit *npg_window_fit(npg_window_solver *solver);
 /* How the last window of aligned frames went; NULL without alignment.  A loan. */
 const npg_joint_result *npg_window_result(const npg_window_solver *solver);
 
+/* Of a resumed run: the noise of that window, as its state has it.  Nothing without alignment. */
+void npg_window_set_noise(npg_window_solver *solver, double noise);
+
 /* Windows without alignment (warm_start.h); NULL for aligned frames.  A loan. */
 npg_warm *npg_window_warm(npg_window_solver *solver);
 

@@ -1,0 +1,244 @@
+# Live runs that are killed (-9) and started again: a folder that is followed, standard input.  Pushed frames:
+# test_push_resume.c.
+
+small=(--epochs 2 --width-1 32 --width-2 32 --faces 300 --poisson-depth 6 --quiet --max-residual 100
+       --min-coverage 0 --max-stretched 100 --max-flipped 100 --align-nodes 40 --align-steps 6 --grid-levels 3)
+open=(--window 6 --overlap 2 --look-ahead 10 --follow-idle 0)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 22 --points 400 -o capture >synth.log
+    cat capture/points/*.ply >stream
+    cp -r capture/points all
+    : >all/capture.end
+    "$NEUPIG" run --follow all -o whole "${small[@]}" "${open[@]}" >whole.log
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+newest() {
+    ls "$1/job" 2>/dev/null | sed -n 's/^window_0*\([0-9][0-9]*\)\.npg$/\1/p' | sort -n | tail -1
+}
+
+# Kill the run of process $3 into $1 once it has written state $2 (from 0 on).
+kill_at_state() {
+    local at
+    while kill -0 "$3" 2>/dev/null; do
+        at=$(newest "$1")
+        [ -z "$at" ] || [ "$at" -lt "$2" ] || break
+        sleep 0.02
+    done
+    kill -KILL "$3" 2>/dev/null || true
+    wait "$3" || true
+    [ ! -e "$1/done.json" ]
+}
+
+# What the run into $2 has must be that of $1, byte by byte, but for the folder that the frames lay in.
+same() {
+    cmp "$1/reference.ply" "$2/reference.ply"
+    for run in "$1" "$2"; do sed 's/"source":"[^"]*"//' "$run/frames.jsonl" >"$run.frames"; done
+    cmp "$1.frames" "$2.frames"
+    diff -r "$1/meshes" "$2/meshes"
+    for record in "$1"/job/motion_*; do cmp "$record" "$2/job/$(basename "$record")"; done
+    cmp "$1/job/inputs.jsonl" "$2/job/inputs.jsonl"
+}
+
+# A run over folder $1, left alone, and one that is killed at the states $2; then their options.
+check_killed() {
+    local folder=$1 states=$2 wanted=0 status=0
+    shift 2
+    rm -rf left killed
+    "$NEUPIG" run --follow "$folder" -o left "${small[@]}" "$@" >left.log 2>&1 || wanted=$?
+    for state in $states; do
+        "$NEUPIG" run --follow "$folder" -o killed "${small[@]}" "$@" >killed.log 2>&1 &
+        kill_at_state killed "$state" $!
+    done
+    "$NEUPIG" run --follow "$folder" -o killed "${small[@]}" "$@" >killed.log 2>&1 || status=$?
+    cat killed.log
+    [ "$status" -eq "$wanted" ]
+    grep -q '"resumed_frames": [1-9]' killed/report.json
+    same left killed
+}
+
+@test "a folder that grows while the run is killed three times gives the same bytes" {
+    mkdir grows
+    local fed=0 run
+    for step in "12 0" "17 1" "20 3"; do
+        set -- $step
+        for file in $(ls capture/points | head -"$1" | tail -n +$((fed + 1))); do cp "capture/points/$file" grows; done
+        fed=$1
+        "$NEUPIG" run --follow grows -o grown "${small[@]}" "${open[@]}" >grown.log 2>&1 &
+        kill_at_state grown "$2" $!
+        mkdir -p before && cp -n grown/meshes/*.ply before/ 2>/dev/null || true
+    done
+    [ "$(ls before | wc -l)" -ge 4 ]
+    cp capture/points/*.ply grows
+    : >grows/capture.end
+    run "$NEUPIG" run --follow grows -o grown "${small[@]}" "${open[@]}" --no-quiet
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"resumes an earlier run: "*" frames are solved and "*" written"* ]]
+    same whole grown
+    for mesh in before/*; do cmp "$mesh" "grown/meshes/$(basename "$mesh")"; done
+}
+
+@test "windows before the keyframe, a source that ends inside the first window or inside the look-ahead" {
+    check_killed all "0 2" --window 6 --overlap 3 --look-ahead 18 --keyframe 13
+    check_killed all "0" --window 14 --overlap 3 --look-ahead 19 --keyframe 16
+    check_killed all "0 1" --window 6 --overlap 3 --look-ahead 40
+}
+
+@test "gaps, a file that can't be read, and a selection" {
+    mkdir gaps
+    cp all/* gaps
+    rm gaps/frame_000[47].ply gaps/frame_0013.ply gaps/frame_0016.ply
+    head -c 2000 all/frame_0011.ply >gaps/frame_0011.ply
+    touch gaps/capture.end
+    for missing in hold skip; do
+        check_killed gaps "0 2" "${open[@]}" --follow-settle 0 --keep-going --missing $missing
+    done
+    check_killed gaps "0" "${open[@]}" --follow-settle 0 --keep-going --missing skip --frames 1::2 --window 4
+}
+
+@test "without alignment it is killed inside a window" {
+    local free=(--align=no --deliver last --samples 100 --state-every 0 --epochs 20)
+    rm -rf left killed
+    "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
+    for place in 1 2; do
+        "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}" >killed.log 2>&1 &
+        local pid=$!
+        # in the first window, then in the second
+        until [ -e killed/job/inside.npg ] && [ "$(newest killed)" = "${next:-}" ]; do
+            kill -0 $pid
+            sleep 0.01
+        done
+        kill -KILL $pid
+        wait $pid || true
+        local next=0
+    done
+    "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}"
+    grep -q '"resumed_frames": [1-9]' killed/report.json
+    same left killed
+}
+
+@test "a stream that begins again is compared and goes on; another one is refused" {
+    "$NEUPIG" run - -o streamed "${small[@]}" "${open[@]}" <stream >streamed.log 2>&1 &
+    kill_at_state streamed 1 $!
+    cp -r streamed other
+    "$NEUPIG" run - -o streamed "${small[@]}" "${open[@]}" <stream
+    grep -q '"resumed_frames": [1-9]' streamed/report.json
+    diff -r whole/meshes streamed/meshes
+    run "$NEUPIG" run - -o other "${small[@]}" "${open[@]}" < <(cat $(ls capture/points/*.ply | tail -n +2))
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"other holds another job: frame 0 of standard input is not the one it was"*--restart* ]]
+    run "$NEUPIG" run - -o other "${small[@]}" "${open[@]}" < <(cat capture/points/frame_000[0-3].ply)
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"frame 4 of standard input does not come any more"* ]]
+    run "$NEUPIG" run --follow all -o other "${small[@]}" "${open[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"another kind of source (follow)"*"(stream)"* ]]
+    "$NEUPIG" run - -o other "${small[@]}" "${open[@]}" --restart <stream
+    diff -r whole/meshes other/meshes
+    # one that is done is as it always was
+    run "$NEUPIG" run - -o other "${small[@]}" "${open[@]}" <stream
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"set overwrite"* ]]
+    "$NEUPIG" run - -o other "${small[@]}" "${open[@]}" --overwrite <stream
+}
+
+@test "a changed option or file is named; a file that is gone matters where it is needed" {
+    local far=(--window 6 --overlap 3 --look-ahead 18 --keyframe 13 --follow-idle 0) # frame 0 is solved in window 4
+    "$NEUPIG" run --follow all -o far "${small[@]}" "${far[@]}" >far.log
+    cp -r capture/points changing
+    "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" >change.log 2>&1 &
+    kill_at_state change 0 $!
+    [ "$(newest change)" -lt 4 ]
+    : >changing/capture.end
+    run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" --epochs 3
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'option epochs was "2" and is "3"'*--restart* ]]
+    for number in 0 12; do # one is not solved yet, the other is
+        file=frame_$(printf %04d $number).ply
+        mv changing/"$file" kept
+        cp changing/frame_0003.ply changing/"$file"
+        run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}"
+        echo "$output"
+        [ "$status" -eq 2 ]
+        [[ "$output" == *"the input $file is not the one it was (frame $number)"*--restart* ]]
+        mv kept changing/"$file"
+    done
+    mv changing/frame_0000.ply kept
+    run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"the input frame_0000.ply is missing (frame 0)"* ]]
+    mv kept changing/frame_0000.ply
+    rm changing/frame_0012.ply
+    touch changing/*
+    mv changing moved # the same files elsewhere, and another end
+    run "$NEUPIG" run --follow moved -o change "${small[@]}" "${far[@]}" --follow-idle 9
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"1 files of frames that are solved are gone"* ]]
+    same far change
+}
+
+@test "a followed folder that is done says so, and when files came since" {
+    cp -r all later
+    cp -r whole finished
+    run "$NEUPIG" run --follow later -o finished "${small[@]}" "${open[@]}" --no-quiet
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"done already"* ]]
+    cp all/frame_0021.ply later/frame_0022.ply
+    run "$NEUPIG" run --follow later -o finished "${small[@]}" "${open[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"is done, but 1 files came since"*--restart* ]]
+    cp all/frame_0004.ply later/frame_0003.ply
+    run "$NEUPIG" run --follow later -o finished "${small[@]}" "${open[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"frame_0003.ply is not the one it was"* ]]
+    run "$NEUPIG" append finished
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"not to one of a live source"* ]]
+}
+
+@test "append brings a followed folder that was broken off to its end" {
+    "$NEUPIG" run --follow all -o ended "${small[@]}" "${open[@]}" >ended.log 2>&1 &
+    kill_at_state ended 1 $!
+    run "$NEUPIG" append ended -q
+    [ "$status" -eq 2 ]
+    same whole ended
+}
+
+@test "a damaged log of inputs is said, and the job starts over" {
+    "$NEUPIG" run --follow all -o hurt "${small[@]}" "${open[@]}" >hurt.log 2>&1 &
+    kill_at_state hurt 0 $!
+    sed -i '2s/"bytes":/"bytes":1/' hurt/job/inputs.jsonl
+    rm -rf hurt/meshes
+    run "$NEUPIG" run --follow all -o hurt "${small[@]}" "${open[@]}"
+    echo "$output"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"inputs.jsonl was changed since it was written"*"starts over"* ]]
+    same whole hurt
+}
+
+@test "a full disk ends with 5, and the run goes on when there is room" {
+    unshare -rm true 2>/dev/null || skip "no file systems can be mounted here"
+    mkdir -p disk
+    NEUPIG=$NEUPIG size=$(du -sk whole | cut -f1) unshare -rm bash -ec '
+        mount -t tmpfs -o size=$((3 * size / 4))k none disk
+        status=0
+        "$NEUPIG" run --follow all -o disk/full "$@" 2>disk.log || status=$?
+        cat disk.log
+        [ $status -eq 5 ]
+        grep -q "No space left" disk.log
+        ls disk/full/job/window*.npg
+        mount -o remount,size=100m disk
+        "$NEUPIG" run --follow all -o disk/full "$@"
+        grep -q resumed_frames disk/full/report.json
+        diff -r whole/meshes disk/full/meshes' bash "${small[@]}" "${open[@]}"
+}
