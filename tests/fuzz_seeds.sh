@@ -4,7 +4,7 @@
 #   tests/fuzz_seeds.sh DIR
 set -euo pipefail
 folder=$1
-for name in ply obj xyz npy pcd config archive rig trajectory image; do mkdir -p "$folder/$name"; done
+for name in ply obj xyz npy pcd config archive inputs rig trajectory image; do mkdir -p "$folder/$name"; done
 cd "$folder"
 
 xyz='property float x\nproperty float y\nproperty float z\n'
@@ -59,6 +59,8 @@ block() { # NAME SIZE BYTES: as in pipeline/archive.h
     block end 8 '\0\0\0\0\0\0\0\0'
 } >archive/reference
 { printf 'NPGARCH1' && block text 7 'seven b' && block end 8 '\0\0\0\0\0\0\0\0'; } >archive/small
+printf '{"number":7,"index":0,"name":"a_07.ply","digits":0,"bytes":80,"xxh3":"00ff00ff00ff00ff"}\n{"number":8,"index":1,"missing":true,"held":true}\n{"number":9,"name":[97,255],"digits":1,"skipped":true}\n' >inputs/folder
+printf '{"number":-1,"index":0,"bytes":500,"xxh3":"1"}\n' >inputs/pushed
 mkdir -p manifest
 printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
 printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names

@@ -8,7 +8,7 @@
 typedef struct npg_job_motion npg_job_motion;
 
 /* job: the run's output folder; reference: its reference.ply, whose coordinates poses then have; device: as
- * npg_device_open().  NPG_END where the run has left no windows (live runs), NPG_BAD_INPUT where they are
+ * npg_device_open().  NPG_END where the run has left no windows (pulled from), NPG_BAD_INPUT where they are
  * damaged or not of this reference, NPG_DEVICE. */
 npg_status npg_job_motion_open(npg_job_motion **motion, const char *job, const npg_mesh *reference,
                                const char *device);

@@ -429,7 +429,7 @@ static npg_status write_forms(npg_worker *worker)
         npg_worker_warn(
             worker, false, -1,
             "vdb has no latent grids: only a run without alignment has any, and keeps them in a job folder "
-            "(not live or pulled from)");
+            "(not pulled from)");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, "

@@ -58,6 +58,7 @@ static npg_status get_name(char **name, const json_t *value)
     if (!count) return NPG_OK;
     NPG_TRY(npg_alloc(name, NPG_FOR_FILES, count + 1));
     for (size_t i = 0; i < count; i++) (*name)[i] = (char)json_integer_value(json_array_get(value, i));
+    (*name)[count] = 0;
     return NPG_OK;
 }
 

@@ -116,6 +116,24 @@ class Arrays(unittest.TestCase):
             self.assertEqual(numbers, [10, 11, 12, 13])
             self.assertIn(run.wait(), (neupig.Status.OK, neupig.Status.PARTIAL))
 
+    def test_pushed_frames_are_kept(self):
+        options = dict(SMALL, window=3, overlap=1, look_ahead=4)
+        output = WORK / "pushed"
+        with neupig.Run(output=output, **options) as run:
+            self.assertIsNone(run.wanted_number())
+            for t in range(9):
+                run.push(*ball(t), number=10 + t)
+            while not any((output / "job").glob("window_*.npg")):
+                time.sleep(0.02)
+        with neupig.Run(output=output, **options) as run:
+            wanted = run.wanted_number()
+            self.assertGreaterEqual(wanted, 10)
+            for t in range(wanted - 10, 9):
+                run.push(*ball(t), number=10 + t)
+            run.finish()
+            self.assertIn(run.wait(), (neupig.Status.OK, neupig.Status.PARTIAL))
+        self.assertEqual(len(list((output / "meshes").iterdir())), 9)
+
     def test_colours_go_in_and_come_out(self):
         def painted(frame):  # red above, green below; blue says the frame
             points, normals = ball(frame)

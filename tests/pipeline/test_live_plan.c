@@ -18,6 +18,7 @@ typedef struct solver { /* what a stage does that solves windows as their frames
     int64_t window_at;
     int is_held[FRAMES_MAX], is_solved[FRAMES_MAX];
     int64_t held_count, held_max;
+    int64_t came[FRAMES_MAX], came_count; /* in order of arrival */
 } solver;
 
 static int is_complete(const solver *s, const npg_window *window)
@@ -53,12 +54,30 @@ static void let_go(solver *s, int64_t solved_window)
         }
 }
 
+/* What a state on disk says of the windows so far: the frames that came for them, and no other. */
+static void check_state(const solver *s)
+{
+    int64_t read = npg_live_read_before(&s->plan, s->window_at, s->total), last = -1, count = 0;
+    int64_t place = npg_live_next_place(&s->plan, read, s->total);
+    for (int64_t t = 0; t < FRAMES_MAX && (s->total < 0 || t < s->total); t++) {
+        assert_int_equal(npg_live_is_read(&s->plan, t, read, s->total), s->is_solved[t]);
+        if (s->is_solved[t]) last = t;
+        count += s->is_solved[t];
+    }
+    assert_int_equal(read, count);
+    assert_int_equal(npg_live_last_until(&s->plan, s->window_at, s->total), last);
+    assert_int_equal(npg_live_frame(&s->plan, place - 1), s->came[read - 1]);
+    if (read < s->came_count && s->total < 0)
+        assert_int_equal(npg_live_frame(&s->plan, place), s->came[read]);
+}
+
 static void solve_what_is_complete(solver *s)
 {
     while (s->window_at < npg_live_window_count(&s->plan, s->total)) {
         npg_window window = npg_live_window(&s->plan, s->window_at, s->total);
         if (!is_complete(s, &window)) return;
         solve(s, &window);
+        check_state(s);
         let_go(s, s->window_at++);
     }
 }
@@ -67,6 +86,7 @@ static void take(solver *s, int64_t index)
 {
     assert_false(s->is_held[index] || s->is_solved[index]);
     s->is_held[index] = 1;
+    s->came[s->came_count++] = index;
     if (++s->held_count > s->held_max) s->held_max = s->held_count;
     solve_what_is_complete(s);
 }
@@ -79,6 +99,7 @@ static void check(npg_plan plan, int64_t total)
     for (int64_t i = 0; came < total; i++) {
         int64_t index = npg_live_frame(&plan, i);
         assert_true(index >= 0 && (i || index == plan.key));
+        assert_int_equal(npg_live_place(&plan, index), i);
         if (index >= total) continue;
         take(&s, index);
         came++;
@@ -113,8 +134,10 @@ static void ordinary_plans_are_as_they_were(void **state)
     (void)state;
     npg_plan plan = {.frame_count = 50, .key = 20, .window = 12, .overlap = 4};
     assert_int_equal(npg_live_window_count(&plan, -1), npg_plan_window_count(&plan));
-    for (int64_t i = 0; i < plan.frame_count; i++)
+    for (int64_t i = 0; i < plan.frame_count; i++) {
         assert_int_equal(npg_live_frame(&plan, i), npg_plan_frame(&plan, i));
+        assert_int_equal(npg_live_place(&plan, npg_plan_frame(&plan, i)), i);
+    }
     for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
         npg_window a = npg_live_window(&plan, w, -1), b = npg_plan_window(&plan, w);
         assert_true(a.first == b.first && a.last == b.last && a.from == b.from);

@@ -128,6 +128,7 @@ _FUNCTIONS = {
     "npg_options_add_stage": (c_int, [c_void_p, POINTER(CustomStageStruct)]),
     "npg_run_open": (c_int, [_SLOT, c_void_p, POINTER(HooksStruct)]),
     "npg_run_push": (c_int, [c_void_p, POINTER(CloudStruct)]),
+    "npg_run_wanted_number": (c_int, [c_void_p, POINTER(c_int64)]),
     "npg_run_finish": (c_int, [c_void_p]),
     "npg_run_pull": (c_int, [c_void_p, POINTER(POINTER(ResultStruct))]),
     "npg_result_close": (None, [POINTER(POINTER(ResultStruct))]),

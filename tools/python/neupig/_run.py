@@ -9,7 +9,7 @@ import os
 import pathlib
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from ctypes import POINTER, byref, c_double, c_float, c_ubyte, c_void_p, sizeof
+from ctypes import POINTER, byref, c_double, c_float, c_int64, c_ubyte, c_void_p, sizeof
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, Union
 
@@ -247,6 +247,14 @@ class Run(Closing):
                                    None if c is None else c.ctypes.data_as(POINTER(c_ubyte)))
         handle = self._open()
         self._patiently(lambda: self._check(lib.npg_run_push(handle, byref(cloud))))
+
+    def wanted_number(self) -> int | None:
+        """The number of the first frame that a run with ``output`` and without ``pull`` wants pushed: those with smaller
+        numbers were solved by an earlier run of the same job that was broken off.  None: nothing was kept, push all."""
+        number = c_int64()
+        handle = self._open()
+        self._patiently(lambda: self._check(lib.npg_run_wanted_number(handle, byref(number))))
+        return None if number.value == -(1 << 63) else number.value
 
     def finish(self) -> None:
         """Say that no more frames will be pushed."""
