@@ -236,12 +236,15 @@ static void runs_that_are_not_there(void **state)
     npg_run *run = NULL;
     npg_result *result = NULL;
     npg_cloud cloud = {.struct_size = sizeof cloud, .number = 1, .point_count = 1};
+    int64_t number;
     (void)state;
     assert_int_equal(npg_run_open(NULL, NULL, NULL), NPG_USAGE);
     assert_int_equal(npg_run_open(&run, NULL, NULL), NPG_USAGE); /* neither output nor pull */
     run = open_pushed();
     assert_int_equal(npg_run_push(run, NULL), NPG_USAGE);
     assert_int_equal(npg_run_push(run, &cloud), NPG_USAGE); /* a point, but no points */
+    assert_int_equal(npg_run_wanted_number(NULL, &number), NPG_USAGE);
+    assert_int_equal(npg_run_wanted_number(run, NULL), NPG_USAGE);
     assert_int_equal(npg_run_pull(run, NULL), NPG_USAGE);
     npg_run_close(&run);
     assert_null(run);
@@ -249,6 +252,7 @@ static void runs_that_are_not_there(void **state)
     npg_run_close(NULL);
     npg_run_stop(run);
     assert_int_equal(npg_run_push(run, &cloud), NPG_USAGE);
+    assert_int_equal(npg_run_wanted_number(run, &number), NPG_USAGE);
     assert_int_equal(npg_run_finish(run), NPG_USAGE);
     assert_int_equal(npg_run_pull(run, &result), NPG_USAGE);
     assert_int_equal(npg_run_wait(run), NPG_USAGE);
