@@ -162,9 +162,10 @@ static npg_status open_motion(applying *a)
                          "%s: %zu of %zu meshes are missing, and job/ has no windows to make them from",
                          a->job, a->lost_count, a->frame_count);
     if (status == NPG_END && a->s.between == BY_WINDOWS)
-        return npg_error(NPG_BAD_INPUT,
-                         "%s: job/ has no windows (runs that are pulled from leave none); --between curve does without",
-                         a->job);
+        return npg_error(
+            NPG_BAD_INPUT,
+            "%s: job/ has no windows (runs that are pulled from leave none); --between curve does without",
+            a->job);
     if (a->lost_count)
         fprintf(
             stderr,
