@@ -45,7 +45,7 @@ typedef struct npg_follow_place {
 /* Before the first frame.  NPG_MEMORY. */
 npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place);
 
-/* Path of a file of the folder, to npg_release(); with confine, NPG_BAD_INPUT for one that leads out of it. */
+/* Path of a file of the folder, to npg_release().  With confine, NPG_BAD_INPUT for one that leads out. */
 npg_status npg_follow_path(const npg_follow *follow, char **path, const char *name);
 
 /* Files that are there now and were not taken. */

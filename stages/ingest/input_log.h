@@ -2,8 +2,8 @@
  *
  *     OUT/job/inputs.jsonl     one line (JSON) for every frame that came or is missing, in order of arrival
  *
- * A live source has no list of inputs before it ends; this is the list so far.  A state on disk names how much
- * of it belongs to it (npg_input_log_place), with a checksum.
+ * A live source has no list of inputs before it ends; this is the list so far.  A state on disk names how
+ * much of it belongs to it (npg_input_log_place), with a checksum.
  *
  * Threads: stage ingest adds lines; npg_input_log_place() and npg_input_log_sync() from any thread. */
 #ifndef NPG_INPUT_LOG_H
@@ -49,8 +49,8 @@ void npg_input_log_close(npg_input_log **log);
 /* What was there when the log was resumed; in order of arrival. */
 npg_input_entry *npg_input_log_entries(const npg_input_log *log, size_t *count);
 
-/* Whether the frame of entry i must be had once more: it is not solved, or (holds: option missing = hold) frames
- * that are missing behind it repeat its points. */
+/* Whether the frame of entry i must be had once more: it is not solved, or (holds: option missing = hold)
+ * frames that are missing behind it repeat its points. */
 bool npg_input_log_needs(const npg_input_log *log, size_t i, bool holds);
 
 /* Give these back once they are replayed. */

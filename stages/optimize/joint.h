@@ -63,8 +63,8 @@ typedef npg_status npg_joint_watch(void *user, int64_t step, int64_t most, doubl
 void npg_joint_set_noise(npg_joint *joint, double noise);
 
 /* Move the frames' surfaces, in order of time; those are left alone where it fails or there are no steps.
- * Equal input (that noise, too) gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY, NPG_DIVERGED, the
- * watch's. */
+ * Equal input (that noise, too) gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY,
+ * NPG_DIVERGED, the watch's. */
 npg_status npg_joint_solve(npg_joint *joint, npg_joint_result *result, const npg_joint_frame *frames,
                            size_t frame_count, npg_joint_watch *watch, void *user);
 

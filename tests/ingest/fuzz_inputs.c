@@ -1,5 +1,5 @@
-/* Fuzz target of the input log of a live run, for libFuzzer: lines that are no such lines are refused, indices
- * count from 0 on, names have an end. */
+/* Fuzz target of the input log of a live run, for libFuzzer: lines that are no such lines are refused,
+ * indices count from 0 on, names have an end. */
 #include <string.h>
 
 #include "ingest/input_log.h"

@@ -1,5 +1,5 @@
-/* Pushed frames: a program that is killed (-9) asks the next run which frame to push first, and its meshes are
- * those of a program that was left alone. */
+/* Pushed frames: a program that is killed (-9) asks the next run which frame to push first, and its meshes
+ * are those of a program that was left alone. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
