@@ -241,8 +241,9 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
         return false;
     }
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
+    if (facts->is_live) return true; /* the plan is about to be made behind this stage */
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
-    return s->normals_for == FOR_ALL || frame->is_key || facts->is_live || is_planned_key;
+    return s->normals_for == FOR_ALL || frame->is_key || is_planned_key;
 }
 
 /* ---- the stage ---- */
