@@ -40,16 +40,15 @@ typedef struct npg_misfit {
 typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
     double vertex_dist_mean;                                   /* surface vertices -> nearest point */
-    double coverage; /* share of the surface area with points near it, 0..1 */
-    /* Share of the area that no point supports, of this frame or of those that the reference was made from
-     * (npg_mesh.vert_unseen), and the middle of its largest part, in world coordinates; NaN without that mask;
-     * NaN where there is none. */
-    double unsupported_share, unsupported_at[3];
+    double coverage;        /* share of the surface area with points near it, 0..1 */
     double flipped_share;   /* faces turned over against their neighbourhood's rotation, share of all */
     double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, share of all */
     double edge_change;     /* mean |length / reference length - 1| */
     double chamfer;         /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5 */
     double truth_cd, truth_nc, truth_f, truth_corr; /* against a ground truth; NaN without */
+    /* Share of the area that no points are near, of this frame or of those that the reference was made from
+     * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
+    double unsupported_share, unsupported_at[3];
     npg_misfit misfits[NPG_MISFITS];
     bool good; /* the frame is above the quality bar */
 } npg_figures;

@@ -352,8 +352,7 @@ static const char *fault_of(const evaluate_state *state, const npg_figures *f, d
     if (!(*value <= *bound)) return "share of stretched faces, in %,";
     *value = 100 * f->unsupported_share;
     *bound = state->unsupported_max;
-    if (*value > *bound)
-        return unsupported_fault; /* NaN: the reference is the user's, and he vouches for it */
+    if (*value > *bound) return unsupported_fault; /* NaN: the mesh was given, not made of points */
     return NULL;
 }
 

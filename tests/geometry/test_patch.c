@@ -1,4 +1,4 @@
-/* Patch: the largest part of what is marked on a sphere; and the mask of unseen vertices goes with its mesh. */
+/* Patch: the largest part of what is marked on a sphere; the mask of unseen vertices goes with its mesh. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
