@@ -34,6 +34,7 @@ void npg_mesh_unref(npg_mesh **slot)
     npg_release(&mesh->vert_normals);
     npg_release(&mesh->faces);
     npg_release(&mesh->vert_colours);
+    npg_release(&mesh->vert_unseen);
     npg_release(&mesh->vert_uvs);
     npg_release(&mesh->corner_uvs);
     npg_release(&mesh);
@@ -56,6 +57,7 @@ npg_status npg_mesh_copy(npg_mesh **out, const npg_mesh *mesh)
     memcpy(copy->faces, mesh->faces, mesh->face_count * 3 * sizeof(uint32_t));
     npg_status status = copy_bytes(&copy->vert_normals, mesh->vert_normals, v, 3 * sizeof(float));
     if (!status) status = copy_bytes(&copy->vert_colours, mesh->vert_colours, v, 4);
+    if (!status) status = copy_bytes(&copy->vert_unseen, mesh->vert_unseen, v, 1);
     if (!status) status = copy_bytes(&copy->vert_uvs, mesh->vert_uvs, v, 2 * sizeof(float));
     if (!status)
         status = copy_bytes(&copy->corner_uvs, mesh->corner_uvs, mesh->face_count, 6 * sizeof(float));

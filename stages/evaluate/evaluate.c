@@ -11,6 +11,8 @@
 #include "evaluate/misfit.h"
 #include "evaluate/topology.h"
 #include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
+#include "geometry/patch.h"
 #include "geometry/thin.h"
 #include "job/frame_log.h"
 #include "job/job.h"
@@ -38,6 +40,7 @@ static const struct {
     {"point_dist_p95",    offsetof(npg_figures, point_dist_p95),    false},
     {"vertex_dist_mean",  offsetof(npg_figures, vertex_dist_mean),  false},
     {"coverage",          offsetof(npg_figures, coverage),          true},
+    {"unsupported_share", offsetof(npg_figures, unsupported_share), false},
     {"flipped_share",     offsetof(npg_figures, flipped_share),     false},
     {"stretched_share",   offsetof(npg_figures, stretched_share),   false},
     {"edge_change",       offsetof(npg_figures, edge_change),       false},
@@ -51,7 +54,7 @@ enum { SUMMED = sizeof summed / sizeof *summed };
 
 typedef struct evaluate_state {
     /* options; the shares in per cent */
-    double residual_max, coverage_min, flipped_max, stretched_max, cover_dist;
+    double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max, cover_dist;
     int64_t point_limit;
     const char *truth_folder;
     npg_topology_settings watch;
@@ -72,6 +75,7 @@ typedef struct evaluate_state {
     float *vert_unit;      /* W x 3; owned */
     uint32_t *nearest;     /* W; owned */
     double *vert_areas;    /* W; owned */
+    uint8_t *unsupported;  /* W; owned */
     size_t points_capacity, dists_capacity, hits_capacity;
     aggregate sums[SUMMED];
     int64_t *bad; /* numbers of the frames below the bar; owned */
@@ -152,6 +156,25 @@ static void place_misfits(npg_figures *figures, const npg_frame_box *box)
     }
 }
 
+/* Vertices that no point of the reference's supports, and none of this frame within `radius` (in units). */
+static npg_status measure_unsupported(evaluate_state *state, npg_figures *figures, const npg_frame_box *box,
+                                      double radius, double whole)
+{
+    const npg_mesh *mesh = state->thin->mesh;
+    npg_patch patch;
+    double sum = 0;
+    if (!mesh->vert_unseen) return NPG_OK;
+    for (size_t i = 0; i < mesh->vert_count; i++) {
+        state->unsupported[i] = mesh->vert_unseen[i] && (double)state->dists[i] > radius * radius;
+        if (state->unsupported[i]) sum += state->vert_areas[i];
+    }
+    figures->unsupported_share = whole > 0 ? sum / whole : 0;
+    if (!(sum > 0)) return NPG_OK;
+    NPG_TRY(npg_patch_largest(&patch, state->unsupported, state->vert_unit, state->vert_areas, mesh));
+    npg_box_unit_to_world(box, figures->unsupported_at, patch.at, 1);
+    return NPG_OK;
+}
+
 /* After measure_points() of the same frame. */
 static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_facts *facts,
                                    size_t point_count, double per_unit, double *mean_sq)
@@ -178,6 +201,7 @@ static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, 
     figures->coverage = whole > 0 ? covered / whole : 0;
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
+    NPG_TRY(measure_unsupported(state, figures, &facts->box, radius, whole));
     npg_misfit_frame frame = {.points = state->points,
                               .hits = state->hits,
                               .point_count = point_count,
@@ -203,6 +227,7 @@ static npg_status open_for_reference(evaluate_state *state, const npg_mesh *refe
     NPG_TRY(npg_alloc_array(&state->vert_unit, NPG_FOR_QUERY, w, 3 * sizeof *state->vert_unit));
     NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, w, sizeof *state->nearest));
     NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, w, sizeof *state->vert_areas));
+    NPG_TRY(npg_alloc(&state->unsupported, NPG_FOR_QUERY, w));
     return npg_surface_open(&state->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
 }
 
@@ -224,6 +249,7 @@ static npg_figures no_figures(void)
     for (size_t i = 0; i < SUMMED; i++) *(double *)((char *)&figures + summed[i].offset) = (double)NAN;
     for (int i = 0; i < NPG_MISFITS; i++)
         figures.misfits[i] = (npg_misfit){(double)NAN, {(double)NAN, (double)NAN, (double)NAN}};
+    for (int a = 0; a < 3; a++) figures.unsupported_at[a] = (double)NAN;
     figures.good = false;
     return figures;
 }
@@ -306,6 +332,8 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 
 /* ---- the verdict ---- */
 
+static const char unsupported_fault[] = "share of the surface that no points support, in %,";
+
 /* What is wrong with a frame, NULL when it is above the bar.  A comparison with NaN fails, as it should. */
 static const char *fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share,
                             double *value, double *bound)
@@ -322,6 +350,9 @@ static const char *fault_of(const evaluate_state *state, const npg_figures *f, d
     *value = 100 * f->stretched_share;
     *bound = state->stretched_max;
     if (!(*value <= *bound)) return "share of stretched faces, in %,";
+    *value = 100 * f->unsupported_share;
+    *bound = state->unsupported_max;
+    if (*value > *bound) return unsupported_fault; /* NaN: the mesh was given, not made of points */
     return NULL;
 }
 
@@ -349,6 +380,18 @@ static npg_status note_bad(evaluate_state *state, int64_t number)
     return NPG_OK;
 }
 
+/* A warning of its own for each of the first ones. */
+static void warn_of_bad(npg_worker *worker, const npg_frame *frame, const char *fault, double value,
+                        double bound)
+{
+    const double *at = frame->figures.unsupported_at;
+    char place[128] = "";
+    if (fault == unsupported_fault)
+        snprintf(place, sizeof place, ", the largest part around (%.4g, %.4g, %.4g)", at[0], at[1], at[2]);
+    npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g%s", fault, value,
+                    bound, place);
+}
+
 static npg_status judge_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
@@ -361,9 +404,7 @@ static npg_status judge_frame(npg_worker *worker, npg_frame *frame)
     state->good_count += frame->figures.good;
     if (frame->is_skipped || !fault) return NPG_OK;
     NPG_TRY(note_bad(state, frame->number));
-    if (state->bad_count <= WARNINGS_MAX)
-        npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g", fault, value,
-                        bound);
+    if (state->bad_count <= WARNINGS_MAX) warn_of_bad(worker, frame, fault, value, bound);
     return NPG_OK;
 }
 
@@ -513,6 +554,7 @@ static void uninit(npg_worker *worker)
     npg_release(&state->vert_unit);
     npg_release(&state->nearest);
     npg_release(&state->vert_areas);
+    npg_release(&state->unsupported);
     npg_release(&state->bad);
     npg_release(&state->tied_vert_unit);
 }
@@ -528,7 +570,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     *chunks_held = 1;
     return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
            points * 120 +                          /* misfits: were all points far, with their links */
-           720 * npg_worker_verts_at_most(worker); /* bytes per vertex, rounded up */
+           760 * npg_worker_verts_at_most(worker); /* bytes per vertex, rounded up */
 }
 
 #define AT(member) offsetof(evaluate_state, member)
@@ -545,6 +587,9 @@ static const npg_option options[] = {
         "... and at most this share of its faces is turned over, in per cent"),
     NPG_ROW_REAL  ("max-stretched",   AT(stretched_max),      "5",      0,     100,  "PERCENT",
         "... and at most this share of its faces grew or shrank tenfold, in per cent"),
+    NPG_ROW_REAL  ("max-unsupported", AT(unsupported_max),    "10",     0,     100,  "PERCENT",
+        "... and at most this share of its surface has no points near it, "
+        "neither of the frames that the reference was made from nor of its own, in per cent"),
     NPG_ROW_REAL  ("cover-distance",  AT(cover_dist),         "1",      0,     100,  "PERCENT",
         "How near a point must be to cover the surface, in per cent of the diagonal"),
     NPG_ROW_INT   ("evaluate-points", AT(point_limit),        "100000", 0,     1e12, NULL,

@@ -120,16 +120,3 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
     figures->stretched_share = (double)stretched / face_count;
     figures->edge_change = edge_change(shape, vert_unit);
 }
-
-double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count, const uint32_t *faces,
-                        size_t face_count)
-{
-    double sum = 0, normal[3];
-    for (size_t i = 0; i < vert_count; i++) areas[i] = 0;
-    for (size_t f = 0; f < face_count; f++) {
-        double area = npg_face_normal(normal, vert_pos, faces + 3 * f);
-        for (size_t k = 0; k < 3; k++) areas[faces[3 * f + k]] += area / 3;
-        sum += area;
-    }
-    return sum;
-}

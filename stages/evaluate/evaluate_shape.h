@@ -20,8 +20,4 @@ void npg_shape_close(npg_shape **shape);
  * that in the reference.  edge_change is the mean of |length / reference length - 1|. */
 void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float *vert_unit);
 
-/* A third of the area of the faces around each vertex (V), and their sum. */
-double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count, const uint32_t *faces,
-                        size_t face_count);
-
 #endif

@@ -156,6 +156,19 @@ double npg_mesh_volume(const npg_mesh *mesh)
     return sum / 6; /* tetrahedra from the origin to every face: a . (b x c) / 6 = a . face_cross / 6 */
 }
 
+double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count, const uint32_t *faces,
+                        size_t face_count)
+{
+    double sum = 0, normal[3];
+    for (size_t i = 0; i < vert_count; i++) areas[i] = 0;
+    for (size_t f = 0; f < face_count; f++) {
+        double area = npg_face_normal(normal, vert_pos, faces + 3 * f);
+        for (size_t k = 0; k < 3; k++) areas[faces[3 * f + k]] += area / 3;
+        sum += area;
+    }
+    return sum;
+}
+
 static void count_edge(npg_manifold *out, const half_edge *run, size_t uses)
 {
     out->edge_count++;
@@ -249,6 +262,7 @@ static void copy_vertex(npg_mesh *out, size_t to, const npg_mesh *mesh, size_t f
     if (out->vert_normals)
         memcpy(out->vert_normals + 3 * to, mesh->vert_normals + 3 * from, 3 * sizeof(float));
     if (out->vert_colours) memcpy(out->vert_colours + 4 * to, mesh->vert_colours + 4 * from, 4);
+    if (out->vert_unseen) out->vert_unseen[to] = mesh->vert_unseen[from];
     if (out->vert_uvs) memcpy(out->vert_uvs + 2 * to, mesh->vert_uvs + 2 * from, 2 * sizeof(float));
 }
 
@@ -271,6 +285,7 @@ static npg_status alloc_vertex_data(npg_mesh *out, const npg_mesh *mesh)
     size_t v = out->vert_count;
     if (mesh->vert_normals) NPG_TRY(npg_alloc_array(&out->vert_normals, NPG_FOR_MESH, v, 3 * sizeof(float)));
     if (mesh->vert_colours) NPG_TRY(npg_alloc_array(&out->vert_colours, NPG_FOR_MESH, v, 4));
+    if (mesh->vert_unseen) NPG_TRY(npg_alloc(&out->vert_unseen, NPG_FOR_MESH, v));
     if (mesh->vert_uvs) NPG_TRY(npg_alloc_array(&out->vert_uvs, NPG_FOR_MESH, v, 2 * sizeof(float)));
     return NPG_OK;
 }

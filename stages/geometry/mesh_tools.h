@@ -37,6 +37,10 @@ double npg_face_area(const float *vert_pos, const uint32_t face[3]);
 double npg_mesh_area(const npg_mesh *mesh);
 double npg_mesh_volume(const npg_mesh *mesh);
 
+/* A third of the area of the faces around each vertex (V), and their sum. */
+double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count, const uint32_t *faces,
+                        size_t face_count);
+
 /* Edges by the number of faces that use them, and faces that use one in the wrong direction. */
 typedef struct npg_manifold {
     size_t edge_count, border_edges, crowded_edges /* > 2 faces */, misoriented_edges, degenerate_faces,

@@ -45,6 +45,10 @@ static npg_status renumber_faces(npg_thin *thin, const npg_mesh *whole, const ui
 static npg_status copy_vertices(npg_thin *thin, const npg_mesh *whole)
 {
     npg_thin_gather(thin, thin->mesh->vert_pos, whole->vert_pos);
+    if (whole->vert_unseen)
+        NPG_TRY(npg_alloc(&thin->mesh->vert_unseen, NPG_FOR_MESH, thin->mesh->vert_count));
+    for (size_t i = 0; whole->vert_unseen && i < thin->mesh->vert_count; i++)
+        thin->mesh->vert_unseen[i] = whole->vert_unseen[thin->vertex[i]];
     if (!whole->vert_normals) return NPG_OK;
     NPG_TRY(
         npg_alloc_array(&thin->mesh->vert_normals, NPG_FOR_MESH, thin->mesh->vert_count, 3 * sizeof(float)));

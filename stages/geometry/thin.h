@@ -13,7 +13,7 @@
 #define NPG_THIN_SURFACE 10000
 
 typedef struct npg_thin {
-    npg_mesh *mesh;   /* T vertices, with normals where the whole has them; counted reference */
+    npg_mesh *mesh;   /* T vertices, with normals and mask where the whole has them; counted reference */
     uint32_t *vertex; /* T, ascending: which vertex of the whole each one is                  */
 } npg_thin;
 

@@ -37,6 +37,13 @@ static json_t *json_of_cleaning(const npg_cleaning *c)
                      "normals_estimated", (json_int_t)c->normals_estimated);
 }
 
+static json_t *json_of_place(const double at[3])
+{
+    json_t *place = json_array();
+    for (int a = 0; a < 3; a++) json_array_append_new(place, npg_json_real(at[a]));
+    return place;
+}
+
 static json_t *json_of_figures(const npg_figures *f)
 {
     const struct {
@@ -47,6 +54,7 @@ static json_t *json_of_figures(const npg_figures *f)
                   {"point_dist_p95", f->point_dist_p95},
                   {"vertex_dist_mean", f->vertex_dist_mean},
                   {"coverage", f->coverage},
+                  {"unsupported_share", f->unsupported_share},
                   {"flipped_share", f->flipped_share},
                   {"stretched_share", f->stretched_share},
                   {"edge_change", f->edge_change},
@@ -58,6 +66,7 @@ static json_t *json_of_figures(const npg_figures *f)
     json_t *figures = json_object();
     for (size_t i = 0; i < sizeof values / sizeof *values; i++)
         json_object_set_new(figures, values[i].name, npg_json_real(values[i].value));
+    json_object_set_new(figures, "unsupported_at", json_of_place(f->unsupported_at));
     return figures;
 }
 
@@ -68,10 +77,9 @@ static json_t *json_of_misfits(const npg_figures *f)
     json_t *misfits = json_object();
     for (int i = 0; i < NPG_MISFITS; i++) {
         const npg_misfit *misfit = &f->misfits[i];
-        json_t *at = json_array();
-        for (int a = 0; a < 3; a++) json_array_append_new(at, npg_json_real(misfit->at[a]));
-        json_object_set_new(misfits, misfit_names[i],
-                            json_pack("{so so}", "share", npg_json_real(misfit->share), "at", at));
+        json_object_set_new(
+            misfits, misfit_names[i],
+            json_pack("{so so}", "share", npg_json_real(misfit->share), "at", json_of_place(misfit->at)));
     }
     return misfits;
 }

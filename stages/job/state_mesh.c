@@ -10,6 +10,7 @@ npg_status npg_state_put_mesh(npg_archive_writer *out, const npg_mesh *mesh)
     NPG_TRY(npg_archive_put(out, "reference.normals", mesh->vert_normals, v * 3 * sizeof(float)));
     NPG_TRY(npg_archive_put(out, "reference.faces", mesh->faces, mesh->face_count * 3 * sizeof(uint32_t)));
     if (mesh->vert_colours) NPG_TRY(npg_archive_put(out, "reference.colours", mesh->vert_colours, v * 4));
+    if (mesh->vert_unseen) NPG_TRY(npg_archive_put(out, "reference.unseen", mesh->vert_unseen, v));
     if (mesh->vert_uvs) NPG_TRY(npg_archive_put(out, "reference.uvs", mesh->vert_uvs, v * 2 * sizeof(float)));
     if (mesh->corner_uvs)
         NPG_TRY(npg_archive_put(out, "reference.corner_uvs", mesh->corner_uvs,
@@ -48,6 +49,7 @@ static npg_status fill(npg_mesh *mesh, const npg_archive *in)
                              mesh->faces[i], v);
     NPG_TRY(get_optional(in, "reference.normals", &mesh->vert_normals, v, 3 * sizeof(float)));
     NPG_TRY(get_optional(in, "reference.colours", &mesh->vert_colours, v, 4));
+    NPG_TRY(get_optional(in, "reference.unseen", &mesh->vert_unseen, v, 1));
     NPG_TRY(get_optional(in, "reference.corner_uvs", &mesh->corner_uvs, mesh->face_count, 6 * sizeof(float)));
     return get_optional(in, "reference.uvs", &mesh->vert_uvs, v, 2 * sizeof(float));
 }

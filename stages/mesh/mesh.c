@@ -15,6 +15,7 @@
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
+#include "mesh/unseen.h"
 #include "mesh/vdb.h"
 #include "mesh/weld.h"
 #include "pipeline/clock.h"
@@ -391,17 +392,38 @@ static npg_status make_again(making *m, npg_mesh **whole, bool *sound)
     return shape(m, sound);
 }
 
+/* Where the largest part of it lies on the finished reference, for the report and in words. */
+static void note_place(making *m, const npg_patch *largest, char *text, size_t size)
+{
+    const npg_frame_box *box = &npg_worker_facts(m->worker)->box;
+    json_t *place = json_null();
+    if (largest->share > 0) {
+        double at[3], radius = largest->radius / box->scale;
+        npg_box_unit_to_world(box, at, largest->at, 1);
+        place =
+            json_pack("{sf s[fff] sf}", "share", largest->share, "at", at[0], at[1], at[2], "radius", radius);
+        snprintf(text, size, ", the largest part within %.3g of (%.4g, %.4g, %.4g)", radius, at[0], at[1],
+                 at[2]);
+    }
+    json_object_set_new(npg_worker_report(m->worker), "invented_at", place);
+}
+
 /* Surface that stays although nothing was seen there is the mesher's invention: a run that carries much of it
  * through all frames is not a good one.  What was trimmed off is reported and is not in the result. */
-static void judge_invented(making *m)
+static npg_status judge_invented(making *m)
 {
+    npg_patch largest;
+    char place[128] = "";
+    NPG_TRY(npg_mesh_mark_unseen(m->mesh, &largest, m->points, m->count, SEEN_SPACINGS * m->seen));
     npg_worker_facts(m->worker)->unseen_share = m->invented;
     note(m, "invented_share", m->invented);
+    note_place(m, &largest, place, sizeof place);
     if (100 * m->invented > m->state->invented_max)
         warn(m, true,
              "%.1f %% of the reference's surface is invented: no point of %s saw it, "
-             "and it was kept (the bar is %g %%; --unseen trim leaves it out)",
-             100 * m->invented, m->fused ? "any frame" : "the keyframe", m->state->invented_max);
+             "and it was kept%s (the bar is %g %%; --unseen trim leaves it out)",
+             100 * m->invented, m->fused ? "any frame" : "the keyframe", place, m->state->invented_max);
+    return NPG_OK;
 }
 
 /* Poisson's mesh, trimmed and decimated; when that leaves folds and the surface is closed, it is rebuilt
@@ -419,7 +441,6 @@ static npg_status make(making *m)
     if (!status && !sound && closed) status = make_again(m, &whole, &sound);
     if (!status && !sound)
         warn(m, false, "the reference mesh still has flipped or degenerate faces after all mending");
-    if (!status) judge_invented(m);
     npg_mesh_unref(&whole);
     return status;
 }
@@ -545,6 +566,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg
     if (!status) status = measure_points(&m);
     if (!status) status = is_given ? read_reference(&m) : make(&m);
     if (!status && !is_given) status = cut_welds(&m);
+    if (!status && !is_given) status = judge_invented(&m);
     if (!status) status = measure_reference(&m);
     if (!status) status = colour_reference(&m);
     note(&m, "seconds", npg_clock_s() - since);

@@ -12,6 +12,7 @@
 #include "evaluate/evaluate_shape.h"
 #include "evaluate/evaluate_truth.h"
 #include "export/forms/writer.h"
+#include "mesh/unseen.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"
 
@@ -152,6 +153,8 @@ typedef struct scene {
     double share[FRAMES]; /* of the sphere from the north pole down that has points */
     double vert_scale[FRAMES];
     bool skipped[FRAMES], broken[FRAMES];
+    bool is_made;  /* the reference, from the points of all frames: it says what they did not see */
+    bool key_only; /* ... from those of frame 0 alone */
     /* seen */
     npg_figures figures[FRAMES];
     double diagonal;
@@ -167,6 +170,17 @@ static scene plain_scene(void)
 }
 
 /* A spiral of points that covers the sphere evenly, from the pole down to `share` of its area. */
+static void put_spiral(float *points, const scene *s, int64_t index)
+{
+    for (int i = 0; i < POINTS; i++) {
+        double z = 1 - 2 * s->share[index] * (i + 0.5) / POINTS, turn = i * pi * (3 - sqrt(5.0));
+        double radius = 1 + s->gap[index], flat = sqrt(1 - z * z);
+        points[3 * i] = (float)(radius * flat * cos(turn));
+        points[3 * i + 1] = (float)(radius * flat * sin(turn));
+        points[3 * i + 2] = (float)(radius * z);
+    }
+}
+
 static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
 {
     const scene *s = user;
@@ -175,14 +189,19 @@ static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *
     if (frame->is_skipped) return NPG_OK;
     NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, POINTS, 12));
     frame->point_count = POINTS;
-    for (int i = 0; i < POINTS; i++) {
-        double z = 1 - 2 * s->share[index] * (i + 0.5) / POINTS, turn = i * pi * (3 - sqrt(5.0));
-        double radius = 1 + s->gap[index], flat = sqrt(1 - z * z);
-        frame->pos_local[3 * i] = (float)(radius * flat * cos(turn));
-        frame->pos_local[3 * i + 1] = (float)(radius * flat * sin(turn));
-        frame->pos_local[3 * i + 2] = (float)(radius * z);
-    }
+    put_spiral(frame->pos_local, s, index);
     return NPG_OK;
+}
+
+/* What a reference made from points says: vertices more than 0.15 from all of them are unseen. */
+static npg_status mark_unseen(npg_facts *facts, const scene *s)
+{
+    static float points[3 * FRAMES * POINTS];
+    npg_patch largest;
+    size_t count = s->key_only ? POINTS : FRAMES * POINTS;
+    for (int t = 0; t < FRAMES; t++) put_spiral(points + 3 * t * POINTS, s, t);
+    npg_box_local_to_unit(&facts->box, points, points, count);
+    return npg_mesh_mark_unseen(facts->reference, &largest, points, count, 0.15 * facts->box.scale);
 }
 
 static npg_status give_mesh(npg_facts *facts, npg_frame *frame, const scene *s)
@@ -191,6 +210,7 @@ static npg_status give_mesh(npg_facts *facts, npg_frame *frame, const scene *s)
     if (!facts->reference) {
         NPG_TRY(open_sphere(&facts->reference));
         npg_box_local_to_unit(&facts->box, facts->reference->vert_pos, facts->reference->vert_pos, VERTS);
+        if (s->is_made) NPG_TRY(mark_unseen(facts, s));
     }
     NPG_TRY(open_sphere(&sphere));
     for (size_t i = 0; i < 3 * VERTS; i++) sphere->vert_pos[i] *= (float)s->vert_scale[frame->index];
@@ -328,6 +348,58 @@ static void coverage_is_the_share_with_points(void **state)
     assert_false(s.figures[2].good);
 }
 
+/* A cap of 60 degrees around the south pole, less the rim that points just beyond it still support: the wider
+ * of the mask's 0.15 and the cover radius, two mean spacings of the frame's points. */
+static void surface_without_support_is_measured_and_placed(void **state)
+{
+    (void)state;
+    scene s = plain_scene();
+    s.is_made = true;
+    for (int t = 0; t < FRAMES; t++) s.share[t] = 0.75;
+    assert_int_equal(run_scene(&s, NULL), NPG_PARTIAL);
+    double rim = 2 * sqrt(4 * pi / POINTS), tilt = pi / 3 - rim, share = (1 - cos(tilt)) / 2;
+    for (int t = 0; t < FRAMES; t++) {
+        const npg_figures *f = &s.figures[t];
+        assert_true(is_near(f->unsupported_share, share, 0.03));
+        assert_true(is_near(f->unsupported_at[0], 0, 0.01) && is_near(f->unsupported_at[1], 0, 0.01));
+        assert_true(is_near(f->unsupported_at[2], -(1 + cos(tilt)) / 2, 0.03));
+        assert_false(f->good);
+    }
+    assert_int_equal(s.bad_count, FRAMES);
+    const char *const lenient[][2] = {{"max-unsupported", "25"}, {NULL, NULL}};
+    assert_int_equal(run_scene(&s, lenient), NPG_OK);
+}
+
+static void what_another_frame_saw_has_support(void **state)
+{
+    (void)state;
+    scene s = plain_scene();
+    s.is_made = true;
+    s.share[1] = 0.75;
+    assert_int_equal(run_scene(&s, NULL), NPG_OK);
+    for (int t = 0; t < FRAMES; t++) {
+        assert_true(s.figures[t].unsupported_share == 0);
+        assert_true(isnan(s.figures[t].unsupported_at[0]));
+    }
+    assert_true(s.figures[1].coverage < 0.85);
+    s.is_made = false; /* a mesh of the user's own: nothing is known */
+    assert_int_equal(run_scene(&s, NULL), NPG_OK);
+    for (int t = 0; t < FRAMES; t++) assert_true(isnan(s.figures[t].unsupported_share));
+}
+
+/* The reference of one frame that saw less than another: what that one sees is supported there. */
+static void a_frames_own_points_support(void **state)
+{
+    (void)state;
+    scene s = plain_scene();
+    s.is_made = true;
+    s.key_only = true;
+    s.share[0] = s.share[2] = 0.75;
+    assert_int_equal(run_scene(&s, NULL), NPG_PARTIAL);
+    assert_true(s.figures[0].unsupported_share > 0.1 && s.figures[2].unsupported_share > 0.1);
+    assert_true(s.figures[1].unsupported_share == 0 && s.figures[1].good);
+}
+
 static void bad_frames_make_a_partial_run(void **state)
 {
     (void)state;
@@ -447,6 +519,9 @@ int main(void)
         cmocka_unit_test(distances_are_those_that_were_made),
         cmocka_unit_test(vertex_distances_agree_with_the_plain_way),
         cmocka_unit_test(coverage_is_the_share_with_points),
+        cmocka_unit_test(surface_without_support_is_measured_and_placed),
+        cmocka_unit_test(what_another_frame_saw_has_support),
+        cmocka_unit_test(a_frames_own_points_support),
         cmocka_unit_test(bad_frames_make_a_partial_run),
         cmocka_unit_test(fewer_points_give_nearly_the_same),
         cmocka_unit_test(a_vertex_that_is_not_finite_is_a_failure),

@@ -458,6 +458,20 @@ static void the_stage_makes_the_reference(void **state)
     }
 }
 
+/* The sensor saw the lower side alone; what it saw supports surface up to two spacings away. */
+static void check_mask(const outcome *o, bool is_kept)
+{
+    size_t marked = 0;
+    assert_non_null(o->mesh->vert_unseen);
+    for (size_t i = 0; i < o->mesh->vert_count; i++) {
+        float z = o->mesh->vert_pos[3 * i + 2];
+        marked += o->mesh->vert_unseen[i];
+        if (is_kept && z > 0.25f) assert_true(o->mesh->vert_unseen[i]);
+        if (z < -0.1f) assert_false(o->mesh->vert_unseen[i]);
+    }
+    assert_true(is_kept ? marked > o->mesh->vert_count / 5 : marked < o->mesh->vert_count / 50);
+}
+
 static void the_unseen_side_is_told_and_trimmed(void **state)
 {
     (void)state;
@@ -468,6 +482,7 @@ static void the_unseen_side_is_told_and_trimmed(void **state)
         assert_int_equal(run_stage(&o, "unseen", keep ? "keep" : "auto", text), keep ? NPG_PARTIAL : NPG_OK);
         check_reference(&o);
         if (keep) assert_true(o.unseen > 0.25);
+        check_mask(&o, keep);
         if (!keep) assert_true(o.unseen < 0.02); /* what is left of the surface was seen */
         assert_int_equal(npg_mesh_manifold(&m, o.mesh), NPG_OK);
         if (!keep) assert_true(m.border_edges > 20);
