@@ -16,8 +16,8 @@
 
 typedef struct npg_empty_cells npg_empty_cells;
 
-/* reference: unit coordinates.  side: of a cell; it grows until there are `most` at most.  band: distance from
- * the surface up to which there are cells.  NPG_MEMORY. */
+/* reference: unit coordinates.  side: of a cell; it grows until there are `most` at most.  band: distance
+ * from the surface up to which there are cells.  NPG_MEMORY. */
 npg_status npg_empty_cells_open(npg_empty_cells **cells, const npg_mesh *reference, double side, double band,
                                 size_t most);
 void npg_empty_cells_close(npg_empty_cells **cells);

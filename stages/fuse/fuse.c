@@ -38,7 +38,7 @@
 #define HUE_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
 #define HUE_HALF 2.0 /* frames away at which they count half of that                       */
 
-/* Space that sensors saw empty, in spacings of the keyframe's points; the spacing reaches over eight of them. */
+/* Space that sensors saw empty, in spacings of the keyframe's points, each over eight of them. */
 #define EMPTY_SIDE   0.4    /* of a cell ...                                                      */
 #define EMPTY_BAND   3      /* ... within this of the surface                                     */
 #define EMPTY_MOST   300000 /* cells at most: larger ones then                                    */

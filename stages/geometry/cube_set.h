@@ -1,5 +1,5 @@
-/* Cube set: which cubes of one size are in it, with a value between them: 1 in the middle of a cube of the set,
- * 0 in the middle of any other, linear along each axis between middles. */
+/* Cube set: cubes of one size, with a value in between: 1 in the middle of a cube of the set, 0 in the middle
+ * of any other, linear along each axis from middle to middle. */
 #ifndef NPG_CUBE_SET_H
 #define NPG_CUBE_SET_H
 

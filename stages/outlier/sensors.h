@@ -1,4 +1,4 @@
-/* Sensors: where sensors stood, of option sensor: the same places in all frames, or a file of places per frame.
+/* Sensors: where they stood, by option sensor: the same places in all frames, or a file of places per frame.
  *
  *     X,Y,Z             one that stands still; several: X,Y,Z:X,Y,Z
  *     FILE              lines "X Y Z": one sensor, a line per frame in order; or lines "NUMBER X Y Z": the

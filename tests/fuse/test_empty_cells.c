@@ -12,9 +12,8 @@
 #include "tests/support/ball_mesh.h"
 #include "tests/support/shapes.h"
 
-/* The reference is a ball of radius 0.5 (0.4 along y) that has swallowed a pit: the body has, where z > 0.3, a
- * floor at z = 0.3 instead.  It moves from frame to frame; two sensors go round it, a third one looks in from
- * above. */
+/* The reference is a ball of radius 0.5 (0.4 along y) that has swallowed a pit: the body has, where z > 0.3,
+ * a floor at z = 0.3 instead.  It moves from frame to frame before a sensor. */
 enum { FRAMES = 5, POINTS = 60000 };
 #define PIT  0.3
 #define SIDE 0.03

@@ -1,4 +1,4 @@
-/* Depth map: a ball before a wall, as one sensor sees them: empty, there, hidden, beside; edges, holes, noise. */
+/* Depth map: a ball before a wall, as one sensor sees them: empty, there, hidden, beside; edges, holes. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,8 +12,8 @@
 #include "geometry/depth_map.h"
 #include "pipeline/memory.h"
 
-/* The sensor stands at -4 on an axis and looks along it; a ball of radius 0.5 around the origin, behind it a wall
- * at 1, four wide. */
+/* The sensor stands at -4 on an axis and looks along it; a ball of radius 0.5 around the origin, behind it a
+ * wall at 1, four wide. */
 enum { WALL = 200, COUNT = WALL * WALL };
 #define BIN    0.04
 #define MARGIN 0.05
@@ -32,7 +32,7 @@ static void put(float out[3], const scene *s, double ahead, double x, double y)
     out[(s->axis + 2) % 3] = (float)y;
 }
 
-/* The first thing on the ray to a place of the wall; `skip` cuts a hole out of the wall. */
+/* How far along the ray to a place of the wall the first thing is, 1 at the wall. */
 static double hit(double x, double y)
 {
     const double way[3] = {5, x, y}, length = sqrt(25 + x * x + y * y);

@@ -107,7 +107,7 @@ static void a_piece_that_no_point_saw_keeps_its_shape(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
-/* The sheet is drawn flat where its balloon was; a sensor saw more of it empty: down to a bowl below the sheet. */
+/* The sheet is drawn flat where its balloon was; a sensor saw more to be empty: a bowl below the sheet. */
 static npg_cube_set *bowl(double side, double floor_z)
 {
     static float middles[3 * 40000];
