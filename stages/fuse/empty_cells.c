@@ -136,6 +136,7 @@ typedef struct looking {
     npg_empty_cells *c;
     const npg_carry_back *carry;
     const npg_depth_map *map;
+    bool has_outline; /* what lies beside all that a sensor saw is empty */
     size_t parts;
 } looking;
 
@@ -163,7 +164,7 @@ static npg_status look_part(void *user, size_t part)
         if (*says == FILLED) continue;
         npg_sight_kind kind = npg_depth_map_look(l->map, l->c->now + 3 * i);
         if (kind == NPG_SEEN_AT) *says = FILLED;
-        if (kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE) *says = EMPTY;
+        if (kind == NPG_SEEN_EMPTY || (kind == NPG_SEEN_BESIDE && l->has_outline)) *says = EMPTY;
     }
     return NPG_OK;
 }
@@ -180,7 +181,7 @@ static void count_frame(npg_empty_cells *c)
 /* One map at a time: they are large. */
 npg_status npg_empty_cells_see(npg_empty_cells *c, const npg_carry_back *carry, const npg_seen *seen)
 {
-    looking l = {c, carry, NULL, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
+    looking l = {c, carry, NULL, !seen->which, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
     npg_status status = npg_parallel(move_part, &l, l.parts);
     for (size_t i = 0; i < seen->sensor_count && !status; i++) {
         const float *sensor = seen->sensors + 3 * i;

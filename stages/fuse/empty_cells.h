@@ -5,7 +5,8 @@
  * the depth map of every sensor (depth_map.h).  A frame says
  *
  *     filled   where a sensor saw something there, within the margin
- *     empty    else, where a sensor saw past it: to something behind it, or beside all that it saw
+ *     empty    else, where a sensor saw past it: to something behind it, or beside all that it saw (but for
+ *              depth images, whose pixels at outlines are left out: beside what is left is the body, too)
  *     nothing  else: hidden, or too near to an edge
  *
  * and a cell is empty where most frames that say anything say so.  Not in the paper. */

@@ -155,13 +155,20 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
     return NPG_OK;
 }
 
+/* Not of a rig by itself: its images lose what lies at outlines and at a slant, and what is missing there
+ * passes for empty (by trial). */
+static bool knows_empty(const npg_frame *frame)
+{
+    return frame->sensor_count && !frame->sensors;
+}
+
 /* What the sensors of the frame say of the space around the surface. */
 static npg_status look_around(npg_worker *worker, const cloud *c, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     float at[3 * NPG_FRAME_SENSORS_MOST];
-    if (!frame->sensor_count) return NPG_OK;
+    if (!knows_empty(frame)) return NPG_OK;
     npg_box_local_to_unit(&facts->box, at, frame->sensor_local, frame->sensor_count);
     npg_seen seen = {.sensors = at,
                      .sensor_count = frame->sensor_count,
@@ -300,7 +307,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
             s->usable += !frame->is_skipped;
-            if (frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
+            if (knows_empty(frame) && frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
         } else {
             NPG_TRY(gather_frame(worker, frame));
         }

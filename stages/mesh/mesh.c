@@ -371,8 +371,9 @@ static npg_status flatten(making *m)
 static npg_status leave_empty_space(making *m)
 {
     if (!m->empty) return NPG_OK;
-    note(m, "seen_empty_share", npg_mesh_share_in(m->mesh, m->empty));
-    return flatten(m);
+    double share = npg_mesh_share_in(m->mesh, m->empty);
+    note(m, "seen_empty_share", share);
+    return share > 0 ? flatten(m) : NPG_OK;
 }
 
 /* Of clean points the surface is nearer the truth than their normals' means, and of few points, too. */

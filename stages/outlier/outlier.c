@@ -63,8 +63,8 @@ static const npg_option outlier_options[] = {
         "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file with "
         "a line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, and what lies before the points as seen from there is empty; none: the body is "
-        "closed, and nothing is known; auto: those of a rig, else normals point to the origin, if the points "
-        "look like one view from it"),
+        "closed, and nothing is known; auto: normals point to the origin, if the points look like one view "
+        "from it, and nothing is known of empty space"),
     {0}};
 /* clang-format on */
 
