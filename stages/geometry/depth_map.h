@@ -1,8 +1,9 @@
 /* Depth map: what one sensor says of space: how far it saw in every direction.
  *
  * Directions are bins of an octahedral map whose axis looks at the points' middle (T. Engelhardt and
- * C. Dachsbacher, Octahedron Environment Maps, 2008).  Each bin has the distance of the nearest point in it; a place is
- * compared with its own bin and the eight around it, so that slopes and gaps between points prove nothing. */
+ * C. Dachsbacher, Octahedron Environment Maps, 2008).  Each bin has the distance of the nearest point in it; a
+ * place is compared with its own bin and the eight around it, so that slopes and gaps between points prove
+ * nothing. */
 #ifndef NPG_DEPTH_MAP_H
 #define NPG_DEPTH_MAP_H
 
