@@ -1,7 +1,7 @@
 /* Depth map: what one sensor says of space: how far it saw in every direction.
  *
  * Directions are bins of an octahedral map whose axis looks at the points' middle (T. Engelhardt and
- * C. Dachsbacher, Octahedron Environment Maps, 2008).  Each bin has the distance of the nearest point in it; a
+ * C. Dachsbacher, Octahedron Environment Maps, 2008).  Each bin has the distance of its nearest point; a
  * place is compared with its own bin and the eight around it, so that slopes and gaps between points prove
  * nothing. */
 #ifndef NPG_DEPTH_MAP_H

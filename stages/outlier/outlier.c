@@ -60,7 +60,7 @@ static const npg_option outlier_options[] = {
     NPG_ROW_INT   ("normal-neighbours",  AT(normal_neighbours), "0",      0,     200,  NULL,
         "Points a normal is estimated from, 4 or more; 0: several numbers are tried"),
     NPG_ROW_TEXT  ("sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
-        "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file with a "
+        "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file of a "
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, and what lies before the points as seen from there is empty; none: the body is closed, "
         "and nothing is known; auto: normals point to the origin, if the points look like one view from it, "
