@@ -70,6 +70,7 @@ void npg_frame_clear(npg_frame *frame)
     npg_release(&frame->normals);
     npg_release(&frame->colours);
     npg_release(&frame->sensors);
+    npg_release(&frame->sensor_local);
     npg_release(&frame->vert_unit);
     npg_release(&frame->vert_colours);
     npg_release(&frame->align_state);
@@ -92,6 +93,7 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     out->path = NULL;
     out->pos_local = out->normals = out->vert_unit = NULL;
     out->colours = out->sensors = out->vert_colours = NULL;
+    out->sensor_local = NULL;
     out->align_state = NULL; /* belongs to one frame on its way, not to copies */
     out->align_state_size = 0;
     npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
@@ -100,6 +102,7 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     if (!status) status = copy_rows(&out->normals, frame->normals, n, row);
     if (!status) status = copy_rows(&out->colours, frame->colours, n, 4);
     if (!status) status = copy_rows(&out->sensors, frame->sensors, n, 1);
+    if (!status) status = copy_rows(&out->sensor_local, frame->sensor_local, frame->sensor_count, row);
     if (!status) status = copy_rows(&out->vert_colours, frame->vert_colours, frame->vert_count, 4);
     if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count, row);
     if (status) npg_frame_clear(out);

@@ -23,6 +23,8 @@ enum {
     NPG_FIELD_FIGURES = 1 << 5    /* figures                                  */
 };
 
+#define NPG_FRAME_SENSORS_MOST 64 /* far above any rig; a sensor's index is a byte */
+
 /* What the outlier stage did to a frame, in points. */
 typedef struct npg_cleaning {
     size_t read, not_finite, duplicate, isolated, thinned;
@@ -66,6 +68,8 @@ typedef struct npg_frame {
     uint8_t *colours;      /* N x 4 RGBA, sRGB; alpha 0: not known; owned, or NULL    */
     uint8_t *sensors;      /* N: index of the sensor that saw it; owned, or NULL      */
     bool has_sure_normals; /* they face the sensor that saw them: no side is open  */
+    size_t sensor_count;   /* S, 0: where sensors stood is not known                  */
+    float *sensor_local;   /* S x 3, owned, world - origin; NaN: it saw nothing, or NULL */
     npg_cleaning cleaning;
     size_t vert_count;     /* V                                                         */
     float *vert_unit;      /* V x 3, owned; the deformed reference, in unit coordinates */

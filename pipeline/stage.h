@@ -61,6 +61,7 @@ typedef struct npg_facts {
     /* fuse */
     int64_t fuse_left; /* fusing passes that are still to be walked: each follows the reference so far through
                           all frames and gathers their points for the next one */
+    size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
     /* mesh */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass
                             and in the solving one, before the first frame is passed on */

@@ -194,6 +194,17 @@ npg_status npg_carry_back_points(npg_carry_back *c, npg_carried *out, const floa
     return npg_parallel(carry_part, &w, w.parts);
 }
 
+void npg_carry_out(const npg_carry_back *c, float now[3], const npg_surface_hit *hit, const float place[3])
+{
+    float rest[3], turn[9];
+    at_hit(rest, c, hit, c->mesh->vert_pos, 3);
+    at_hit(now, c, hit, c->now, 3);
+    at_hit(turn, c, hit, c->turns, 9);
+    straighten(turn);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) now[i] += turn[3 * i + k] * (place[k] - rest[k]);
+}
+
 /* Positions, normals, rotations twice, Embree's tree (about 100 bytes a face, two faces a vertex); hits. */
 size_t npg_carry_back_memory(size_t vert_count, size_t points)
 {

@@ -34,6 +34,11 @@ npg_status npg_carry_back_move(npg_carry_back *carry, const float *vert_unit);
 npg_status npg_carry_back_points(npg_carry_back *carry, npg_carried *out, const float *points,
                                  const float *normals, size_t count);
 
+/* The other way: where a place near the surface at rest is now, p = c' + R (place - c).  hit: the point of
+ * the reference that it hangs on.  Thread-safe but for npg_carry_back_move(). */
+void npg_carry_out(const npg_carry_back *carry, float now[3], const npg_surface_hit *hit,
+                   const float place[3]);
+
 /* Bytes that it takes at most. */
 size_t npg_carry_back_memory(size_t vert_count, size_t points);
 

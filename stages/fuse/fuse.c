@@ -13,6 +13,7 @@
 #include "fuse/carry_back.h"
 #include "fuse/cells.h"
 #include "fuse/colour_cells.h"
+#include "fuse/empty_cells.h"
 #include "geometry/mesh_tools.h"
 #include "mesh/denoise.h"
 #include "mesh/fused.h"
@@ -37,14 +38,26 @@
 #define HUE_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
 #define HUE_HALF 2.0 /* frames away at which they count half of that                       */
 
+/* Space that sensors saw empty, in spacings of the keyframe's points, each over eight of them. */
+#define EMPTY_SIDE   0.4    /* of a cell ...                                                      */
+#define EMPTY_BAND   3      /* ... within this of the surface                                     */
+#define EMPTY_MOST   300000 /* cells at most: larger ones then                                    */
+#define EMPTY_BIN    0.5    /* of a depth map, at the points' distance                            */
+#define EMPTY_MARGIN 0.3    /* that a place must be before what was seen ...                      */
+#define EMPTY_NOISE  2.5    /* ... and so many deviations of the points' noise                    */
+#define EMPTY_SHARE  0.6    /* of the frames that say anything must say that it is empty, and ... */
+#define EMPTY_FRAMES 2      /* ... so many                                                        */
+
 enum { FROM_KEY, FROM_ALL };
 
 typedef struct state {
     int from;       /* option */
     int64_t rounds; /* option */
-    int64_t usable; /* frames with points, of the measuring pass */
+    int64_t usable; /* frames with points, and most sensors of one: of the measuring pass */
+    size_t sensors;
     npg_carry_back *carry;
     npg_cells *cells;
+    npg_empty_cells *empty; /* NULL: it is not known where sensors stood */
     npg_colour_cells *hues; /* NULL: the points have no colours, or none are wanted */
     int64_t key;            /* index of the keyframe */
     double spacing, noise;  /* of the keyframe's points */
@@ -70,6 +83,7 @@ static const npg_option options[] = {
 typedef struct cloud {
     float *points, *normals; /* unit; owned */
     npg_carried *carried;
+    uint8_t *sensors; /* that saw each; owned, or NULL */
     size_t count;
     const uint8_t *colours; /* of the frame, a loan, or NULL ... */
     size_t of;              /* ... and how many points it has    */
@@ -80,6 +94,7 @@ static void close_cloud(cloud *c)
     npg_release(&c->points);
     npg_release(&c->normals);
     npg_release(&c->carried);
+    npg_release(&c->sensors);
 }
 
 static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame *frame)
@@ -92,6 +107,9 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
         npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
     c->colours = npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? NULL : frame->colours;
     c->of = frame->point_count;
+    if (frame->sensors) NPG_TRY(npg_alloc(&c->sensors, NPG_FOR_MESH, c->count));
+    for (size_t i = 0; i < c->count && c->sensors; i++)
+        c->sensors[i] = frame->sensors[npg_spread_index(i, c->count, c->of)];
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, c->points, c->count);
     return NPG_OK;
 }
@@ -137,6 +155,34 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
     return NPG_OK;
 }
 
+/* Not of a rig by itself: its images lose what lies at outlines and at a slant, and what is missing there
+ * passes for empty (by trial). */
+static bool knows_empty(const npg_frame *frame)
+{
+    return frame->sensor_count && !frame->sensors;
+}
+
+/* What the sensors of the frame say of the space around the surface. */
+static npg_status look_around(npg_worker *worker, const cloud *c, const npg_frame *frame)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    float at[3 * NPG_FRAME_SENSORS_MOST];
+    if (!knows_empty(frame)) return NPG_OK;
+    npg_box_local_to_unit(&facts->box, at, frame->sensor_local, frame->sensor_count);
+    npg_seen seen = {.sensors = at,
+                     .sensor_count = frame->sensor_count,
+                     .points = c->points,
+                     .which = c->sensors,
+                     .point_count = c->count,
+                     .bin = EMPTY_BIN * s->spacing,
+                     .margin = EMPTY_MARGIN * s->spacing + EMPTY_NOISE * s->noise};
+    if (!s->empty)
+        NPG_TRY(npg_empty_cells_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
+                                     EMPTY_BAND * s->spacing, EMPTY_MOST));
+    return npg_empty_cells_see(s->empty, s->carry, &seen);
+}
+
 static size_t most_cells(const npg_facts *facts)
 {
     size_t points = (size_t)facts->frame_count * facts->point_count_max;
@@ -172,6 +218,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     }
     s->usual = (s->usual * (double)s->frames + median) / (double)(s->frames + 1);
     s->frames++;
+    NPG_TRY(look_around(worker, c, frame));
     return add_points(s, c, frame->index, NEAR_MEDIANS * median,
                       fmax(FAR_SPACINGS * s->spacing, NEAR_MEDIANS * median));
 }
@@ -212,6 +259,17 @@ static npg_status collect_hues(const state *s, npg_fused *fused)
     return NPG_OK;
 }
 
+static npg_status collect_empty(const state *s, npg_fused *fused)
+{
+    size_t most = s->empty ? npg_empty_cells_count(s->empty) : 0;
+    if (!most) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
+    fused->empty_side = npg_empty_cells_side(s->empty);
+    fused->empty_count = npg_empty_cells_find(s->empty, fused->empty,
+                                              s->frames < 2 * EMPTY_FRAMES ? 1 : EMPTY_FRAMES, EMPTY_SHARE);
+    return NPG_OK;
+}
+
 static npg_status publish(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
@@ -219,6 +277,7 @@ static npg_status publish(npg_worker *worker)
     NPG_TRY(npg_alloc(&fused, NPG_FOR_MESH, sizeof *fused));
     npg_status status = collect(s, fused);
     if (!status) status = collect_hues(s, fused);
+    if (!status) status = collect_empty(s, fused);
     if (status) {
         npg_fused_close(&fused);
         return status;
@@ -230,6 +289,8 @@ static npg_status publish(npg_worker *worker)
     json_object_set_new(report, "points_stray", json_integer(s->strays));
     json_object_set_new(report, "points_fused", json_integer((json_int_t)fused->count));
     json_object_set_new(report, "cell_unit", json_real(fused->spacing_unit));
+    if (fused->empty)
+        json_object_set_new(report, "cells_seen_empty", json_integer((json_int_t)fused->empty_count));
     npg_worker_log(worker, NPG_LOG_INFO, -1,
                    "%lld points of %lld frames in the keyframe's pose: %zu means over %.5f units",
                    (long long)(s->points - s->strays), (long long)s->frames, fused->count,
@@ -246,6 +307,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
             s->usable += !frame->is_skipped;
+            if (knows_empty(frame) && frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
         } else {
             NPG_TRY(gather_frame(worker, frame));
         }
@@ -260,6 +322,7 @@ static npg_status flush(npg_worker *worker)
     npg_facts *facts = npg_worker_facts(worker);
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
         facts->fuse_left = s->usable > 1 ? s->rounds : 0;
+        facts->sensor_count_max = s->sensors;
         return NPG_OK;
     }
     facts->fuse_left--;
@@ -271,6 +334,7 @@ static void uninit(npg_worker *worker)
     state *s = npg_worker_state(worker);
     npg_carry_back_close(&s->carry);
     npg_cells_close(&s->cells);
+    npg_empty_cells_close(&s->empty);
     npg_colour_cells_close(&s->hues);
 }
 
@@ -289,7 +353,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     *chunks_held = 1;
     size_t hues =
         npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(HUES_MOST);
-    return hues + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
+    size_t empty = facts->sensor_count_max ? npg_empty_cells_memory(EMPTY_MOST) + points : 0;
+    return empty + hues + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
 }
 

@@ -174,6 +174,16 @@ static bool put_array(npg_frame_store *s, off_t *at, const void *array, size_t s
     return !array || *at != NOT_ON_DISK;
 }
 
+/* A few numbers, which stay in memory. */
+static bool put_sensors(npg_frame *to, const npg_frame *frame)
+{
+    size_t bytes = frame->sensor_count * ROW;
+    if (!frame->sensor_local) return true;
+    if (npg_alloc(&to->sensor_local, NPG_FOR_FRAMES, bytes)) return false;
+    memcpy(to->sensor_local, frame->sensor_local, bytes);
+    return true;
+}
+
 /* The frame without its arrays, which go to disk. */
 static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
 {
@@ -183,10 +193,12 @@ static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
     *e->frame = *frame;
     e->frame->pos_local = e->frame->normals = e->frame->vert_unit = NULL;
     e->frame->colours = e->frame->sensors = e->frame->vert_colours = NULL;
+    e->frame->sensor_local = NULL;
     e->frame->align_state = NULL;
     e->frame->path = NULL;
     bool is_put = !frame->path || !npg_copy_text(&e->frame->path, frame->path);
-    is_put = is_put && put_array(s, &e->points_at, frame->pos_local, count * ROW) &&
+    is_put = is_put && put_sensors(e->frame, frame) &&
+             put_array(s, &e->points_at, frame->pos_local, count * ROW) &&
              put_array(s, &e->normals_at, frame->normals, count * ROW) &&
              put_array(s, &e->colours_at, frame->colours, count * COLOUR) &&
              put_array(s, &e->sensors_at, frame->sensors, count);

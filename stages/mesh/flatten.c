@@ -6,9 +6,14 @@
 #include "geometry/mesh_tools.h"
 #include "mesh/mesh_clean.h"
 
-#define SWEEPS_MOST 400
-#define RELAXATION  1.7  /* beyond the mean: successive over-relaxation */
-#define SETTLED     1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
+#define SWEEPS_MOST   400
+#define RELAXATION    1.7  /* beyond the mean: successive over-relaxation */
+#define SWEEPS_PUSHED 100  /* pushed and drawn, nothing settles */
+#define PUSH          0.3  /* of a cube's side */
+#define PUSHES_MOST   10   /* of a vertex, in a sweep */
+#define EMPTY_ABOVE   0.5  /* of a cube set's value */
+#define WELL_IN       0.9  /* the same: not at the border */
+#define SETTLED       1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
 
 /* How far the vertex went. */
 static double relax(npg_mesh *mesh, const npg_mesh_neighbours *r, size_t v)
@@ -26,7 +31,7 @@ static double relax(npg_mesh *mesh, const npg_mesh_neighbours *r, size_t v)
     return sqrt(moved);
 }
 
-enum { STAYS, UNSEEN, MOVES };
+enum { STAYS, UNSEEN, MOVES, PUSHED /* moves, and was in empty space */ };
 
 /* Unseen vertices move where their piece of the mesh has seen ones; without any they would fall into a point.
  * `ends` (V) is for the vertices that are reached. */
@@ -46,14 +51,45 @@ static size_t reach(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r,
     return moved;
 }
 
-static void sweep(npg_mesh *mesh, const npg_mesh_neighbours *r, const uint8_t *kind)
+/* What moves, and what keeps it from where it may not be. */
+typedef struct moving {
+    npg_mesh *mesh;
+    npg_mesh_neighbours r;
+    uint8_t *kind;             /* V, owned */
+    const npg_cube_set *empty; /* or NULL */
+    float *normals;            /* V x 3, where there is an empty space; owned */
+} moving;
+
+/* A vertex in empty space goes inward, out of it; how far. */
+static double push(const moving *m, size_t v)
+{
+    double step = PUSH * (m->empty ? npg_cube_set_side(m->empty) : 0), moved = 0;
+    float *x = &m->mesh->vert_pos[3 * v];
+    for (int i = 0; i < PUSHES_MOST && m->empty && npg_cube_set_value(m->empty, x) > EMPTY_ABOVE; i++) {
+        for (size_t a = 0; a < 3; a++) x[a] -= (float)step * m->normals[3 * v + a];
+        moved += step;
+        m->kind[v] = PUSHED;
+    }
+    return moved;
+}
+
+static void sweep(const moving *m, int most, bool pushes)
 {
     double largest = 1;
-    for (int i = 0; i < SWEEPS_MOST && largest > SETTLED; i++) {
+    for (int i = 0; i < most && largest > SETTLED; i++) {
         largest = 0;
-        for (size_t v = 0; v < mesh->vert_count; v++)
-            if (kind[v] == MOVES) largest = fmax(largest, relax(mesh, r, v));
+        for (size_t v = 0; v < m->mesh->vert_count; v++)
+            if (m->kind[v] >= MOVES)
+                largest = fmax(largest, relax(m->mesh, &m->r, v) + (pushes ? push(m, v) : 0));
     }
+}
+
+/* Inward is where the flat surface says: a surface on its way, folded for a moment, would push itself out. */
+static void push_out(const moving *m)
+{
+    const npg_mesh *mesh = m->mesh;
+    npg_mesh_vertex_normals(m->normals, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
+    sweep(m, SWEEPS_PUSHED, true);
 }
 
 /* kind (V), of the vertices farther from all points than seen_dist: UNSEEN; *unseen: how many. */
@@ -71,22 +107,39 @@ static npg_status find_unseen(uint8_t *kind, size_t *unseen, const npg_mesh *mes
     return status;
 }
 
-npg_status npg_mesh_flatten(npg_mesh *mesh, size_t *moved, const float *points, size_t point_count,
-                            double seen_dist)
+npg_status npg_mesh_flatten(npg_mesh *mesh, npg_flattened *done, const float *points, size_t point_count,
+                            double seen_dist, const npg_cube_set *empty)
 {
-    npg_mesh_neighbours r = {0};
-    uint8_t *kind = NULL;
+    moving m = {.mesh = mesh, .empty = empty};
     uint32_t *ends = NULL;
     size_t n = mesh->vert_count, unseen = 0;
-    *moved = 0;
-    npg_status status = npg_alloc_array(&kind, NPG_FOR_MESH, n, sizeof *kind);
-    if (!status) status = find_unseen(kind, &unseen, mesh, points, point_count, seen_dist);
-    if (!status && unseen) status = npg_mesh_neighbours_open(&r, mesh);
+    *done = (npg_flattened){0};
+    npg_status status = npg_alloc_array(&m.kind, NPG_FOR_MESH, n, sizeof *m.kind);
+    if (!status) status = find_unseen(m.kind, &unseen, mesh, points, point_count, seen_dist);
+    if (!status && unseen) status = npg_mesh_neighbours_open(&m.r, mesh);
     if (!status && unseen) status = npg_alloc_array(&ends, NPG_FOR_MESH, n, sizeof *ends);
-    if (!status && unseen) *moved = reach(kind, ends, &r, n);
-    if (*moved) sweep(mesh, &r, kind);
-    npg_mesh_neighbours_close(&r);
+    if (!status && empty) status = npg_alloc_array(&m.normals, NPG_FOR_MESH, n, 3 * sizeof *m.normals);
+    if (!status && unseen) done->moved = reach(m.kind, ends, &m.r, n);
+    if (done->moved) sweep(&m, SWEEPS_MOST, false);
+    if (done->moved && empty) push_out(&m);
+    for (size_t v = 0; v < n && done->moved; v++) done->pushed += m.kind[v] == PUSHED;
+    npg_mesh_neighbours_close(&m.r);
     npg_release(&ends);
-    npg_release(&kind);
+    npg_release(&m.normals);
+    npg_release(&m.kind);
     return status;
+}
+
+double npg_mesh_share_in(const npg_mesh *mesh, const npg_cube_set *cubes)
+{
+    double all = 0, in = 0;
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *face = mesh->faces + 3 * f;
+        double area = npg_face_area(mesh->vert_pos, face);
+        float middle[3] = {0, 0, 0};
+        for (size_t i = 0; i < 9; i++) middle[i % 3] += mesh->vert_pos[3 * (size_t)face[i / 3] + i % 3] / 3;
+        all += area;
+        if (npg_cube_set_value(cubes, middle) > WELL_IN) in += area;
+    }
+    return all > 0 ? in / all : 0;
 }

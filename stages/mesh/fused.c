@@ -17,5 +17,6 @@ void npg_fused_close(npg_fused **slot)
     npg_release(&(*slot)->hue_points);
     npg_release(&(*slot)->hue_normals);
     npg_release(&(*slot)->hues);
+    npg_release(&(*slot)->empty);
     npg_release(slot);
 }

@@ -18,6 +18,10 @@ typedef struct npg_fused {
     float *hue_points, *hue_normals;
     uint8_t *hues;
     size_t hue_count; /* M */
+    /* Cubes that sensors saw to be empty, their middles; not there where no sensor's place is known. */
+    float *empty; /* K x 3, owned, or NULL */
+    size_t empty_count;
+    double empty_side;
 } npg_fused;
 
 /* Written by stage fuse at the end of a fusing pass; stage mesh takes it in the pass that follows. */

@@ -98,16 +98,17 @@ typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
     const mesh_state *state;
     const npg_frame *frame;
-    npg_fused *fused; /* of all frames, a loan whose points and normals are taken; NULL: of the frame */
-    size_t count;     /* N, of the points used */
-    float *points;    /* N x 3, unit, owned */
-    float *normals;   /* N x 3 or NULL, owned */
-    double seen;      /* what SEEN_SPACINGS and FLAT_SPACINGS are taken of */
-    double spacing;   /* of the points */
-    double diagonal;  /* of the points */
-    double invented;  /* share of the mesh that no point saw, once it is trimmed */
-    bool is_rough;    /* the points were smoothed, and a frame's are noisy beyond doubt */
-    npg_mesh *mesh;   /* owned */
+    npg_fused *fused;    /* of all frames, a loan whose points and normals are taken; NULL: of the frame */
+    size_t count;        /* N, of the points used */
+    float *points;       /* N x 3, unit, owned */
+    float *normals;      /* N x 3 or NULL, owned */
+    double seen;         /* what SEEN_SPACINGS and FLAT_SPACINGS are taken of */
+    double spacing;      /* of the points */
+    double diagonal;     /* of the points */
+    double invented;     /* share of the mesh that no point saw, once it is trimmed */
+    npg_cube_set *empty; /* space that sensors saw to be empty, owned; NULL: not known */
+    bool is_rough;       /* the points were smoothed, and a frame's are noisy beyond doubt */
+    npg_mesh *mesh;      /* owned */
 } making;
 
 /* ---- report ---- */
@@ -168,7 +169,8 @@ static npg_status take_points(making *m)
     m->points = m->fused->points;
     m->normals = m->fused->normals;
     m->fused->points = m->fused->normals = NULL;
-    return NPG_OK;
+    if (!m->fused->empty) return NPG_OK;
+    return npg_cube_set_open(&m->empty, m->fused->empty, m->fused->empty_count, m->fused->empty_side);
 }
 
 static npg_status measure_points(making *m)
@@ -353,15 +355,26 @@ static npg_status is_sound(bool *sound, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-/* The closed balloon over what nobody saw becomes the least surface there. */
+/* The closed balloon over what nobody saw becomes the least surface there, out of space that is empty. */
 static npg_status flatten(making *m)
 {
-    size_t moved;
+    npg_flattened done;
     npg_mending mending;
     if (m->state->unseen != UNSEEN_AUTO) return NPG_OK;
-    NPG_TRY(npg_mesh_flatten(m->mesh, &moved, m->points, m->count, FLAT_SPACINGS * m->seen));
-    note_count(m, "vertices_flattened", moved);
-    return moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
+    NPG_TRY(npg_mesh_flatten(m->mesh, &done, m->points, m->count, FLAT_SPACINGS * m->seen, m->empty));
+    note_count(m, "vertices_flattened", done.moved);
+    if (m->empty) note_count(m, "vertices_pushed", done.pushed);
+    return done.moved ? npg_mesh_mend(&m->mesh, &mending) : NPG_OK;
+}
+
+/* Out of empty space while the faces are still small: the large ones that decimation leaves over nothing
+ * can't follow its border. */
+static npg_status leave_empty_space(making *m)
+{
+    if (!m->empty) return NPG_OK;
+    double share = npg_mesh_share_in(m->mesh, m->empty);
+    note(m, "seen_empty_share", share);
+    return share > 0 ? flatten(m) : NPG_OK;
 }
 
 /* Of clean points the surface is nearer the truth than their normals' means, and of few points, too. */
@@ -376,9 +389,11 @@ static npg_status turn_faces(making *m)
 static npg_status shape(making *m, bool *sound)
 {
     NPG_TRY(trim(m));
+    NPG_TRY(leave_empty_space(m));
     NPG_TRY(decimate(m));
     NPG_TRY(turn_faces(m));
     NPG_TRY(flatten(m));
+    if (m->empty) note(m, "seen_empty_left_share", npg_mesh_share_in(m->mesh, m->empty));
     return is_sound(sound, m->mesh);
 }
 
@@ -572,6 +587,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg
     note(&m, "seconds", npg_clock_s() - since);
     npg_release(&m.points);
     npg_release(&m.normals);
+    npg_cube_set_close(&m.empty);
     if (status) npg_mesh_unref(&m.mesh);
     npg_mesh_unref(&facts->reference);
     facts->reference = m.mesh;

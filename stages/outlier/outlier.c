@@ -14,6 +14,7 @@
 #include "outlier/isolated.h"
 #include "outlier/normals.h"
 #include "outlier/outliers.h"
+#include "outlier/sensors.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
@@ -29,7 +30,7 @@ typedef struct outlier_state {
     double ratio, voxel;
     /* what was found so far, over the pass */
     enum { SENSOR_AUTO, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
-    double sensor_world[3];
+    npg_sensors sensors; /* where given */
     npg_cleaning sum;
     size_t frames, skipped;
     double normals_s;
@@ -59,8 +60,11 @@ static const npg_option outlier_options[] = {
     NPG_ROW_INT   ("normal-neighbours",  AT(normal_neighbours), "0",      0,     200,  NULL,
         "Points a normal is estimated from, 4 or more; 0: several numbers are tried"),
     NPG_ROW_TEXT  ("sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
-        "Where a single-view capture was seen from (x,y,z in the capture's unit): normals point there; "
-        "none: the body is closed; auto: the origin, if the points look like one view from it"),
+        "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file of a "
+        "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
+        "single one, and what lies before the points as seen from there is empty; none: the body is closed, "
+        "and nothing is known; auto: normals point to the origin, if the points look like one view from it, "
+        "and nothing is known of empty space"),
     {0}};
 /* clang-format on */
 
@@ -68,22 +72,18 @@ static const npg_option outlier_options[] = {
 
 static npg_status parse_sensor(outlier_state *s)
 {
-    const char *at = s->sensor_text;
-    char *end = NULL;
     s->sensor_kind = SENSOR_AUTO;
-    if (!strcmp(at, "auto")) return NPG_OK;
+    if (!strcmp(s->sensor_text, "auto")) return NPG_OK;
     s->sensor_kind = SENSOR_NONE;
-    if (!strcmp(at, "none")) return NPG_OK;
+    if (!strcmp(s->sensor_text, "none")) return NPG_OK;
     s->sensor_kind = SENSOR_GIVEN;
-    for (int a = 0; a < 3; a++) {
-        s->sensor_world[a] = strtod(at, &end);
-        bool good = end != at && isfinite(s->sensor_world[a]) && *end == (a < 2 ? ',' : 0);
-        if (!good)
-            return npg_error(NPG_USAGE, "option sensor: \"%s\" is neither x,y,z nor auto nor none",
-                             s->sensor_text);
-        at = end + 1;
-    }
-    return NPG_OK;
+    return npg_sensors_open(&s->sensors, s->sensor_text);
+}
+
+static void outlier_uninit(npg_worker *worker)
+{
+    outlier_state *s = npg_worker_state(worker);
+    npg_sensors_close(&s->sensors);
 }
 
 #define KEPT_RESULTS_MAX ((size_t)4 << 20) /* bytes of what the statistical filter found; set by trial */
@@ -152,12 +152,14 @@ static void repair_directions(float *normals, size_t *bad, const float *estimate
     }
 }
 
+/* The one place that all points were seen from, given or found. */
 static npg_status find_sensor(npg_worker *worker, const npg_frame *frame, double sensor[3], bool *has_sensor)
 {
     const outlier_state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    *has_sensor = s->sensor_kind == SENSOR_GIVEN;
-    for (int a = 0; a < 3; a++) sensor[a] = s->sensor_world[a] - facts->origin.world[a];
+    *has_sensor = s->sensor_kind == SENSOR_GIVEN && frame->sensor_count == 1;
+    for (int a = 0; a < 3; a++)
+        sensor[a] = *has_sensor ? (double)frame->sensor_local[a] : -facts->origin.world[a];
     if (s->sensor_kind != SENSOR_AUTO) return NPG_OK;
     NPG_TRY(npg_cloud_is_single_view(has_sensor, frame->pos_local, frame->point_count, sensor));
     if (*has_sensor)
@@ -282,6 +284,8 @@ static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status 
     npg_release(&frame->normals);
     npg_release(&frame->colours);
     npg_release(&frame->sensors);
+    npg_release(&frame->sensor_local);
+    frame->sensor_count = 0;
     s->skipped++;
     return NPG_OK;
 }
@@ -292,9 +296,22 @@ static bool is_done(const npg_frame *frame)
     return frame->is_skipped || (frame->fields & NPG_FIELD_CLEAN);
 }
 
+/* As option sensor says; without it those that the frame brings. */
+static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    if (s->sensor_kind == SENSOR_AUTO || frame->is_skipped) return NPG_OK;
+    npg_release(&frame->sensors);
+    npg_release(&frame->sensor_local);
+    frame->sensor_count = 0;
+    if (s->sensor_kind == SENSOR_NONE) return NPG_OK;
+    return npg_sensors_set(&s->sensors, frame, &npg_worker_facts(worker)->origin);
+}
+
 static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
 {
     npg_status status = is_done(frame) ? NPG_OK : clean_points(worker, frame);
+    if (!status) status = set_sensors(worker, frame);
     return status ? skip_or_fail(worker, frame, status) : NPG_OK;
 }
 
@@ -415,4 +432,5 @@ const npg_stage npg_stage_outlier = {.name = "outlier",
                                      .init = outlier_init,
                                      .process = outlier_process,
                                      .flush = outlier_flush,
+                                     .uninit = outlier_uninit,
                                      .memory = outlier_memory};

@@ -1,8 +1,9 @@
-/* Fuzz target of trajectories, lists of images with times and OpenCV's camera files, for libFuzzer.  The
- * first byte says which. */
+/* Fuzz target of trajectories, lists of images with times, OpenCV's camera files and places of sensors, for
+ * libFuzzer.  The first byte says which. */
 #include <math.h>
 
 #include "ingest/rig/rig.h"
+#include "outlier/sensors.h"
 #include "tests/support/fuzz_target.h"
 
 static void read_list(const char *path, bool is_trajectory)
@@ -31,15 +32,30 @@ static void read_camera(const char *path)
     npg_release(&text);
 }
 
+static void read_sensors(const char *path)
+{
+    const npg_origin origin = {.known = true};
+    npg_sensors sensors;
+    npg_status status = npg_sensors_open(&sensors, path);
+    expect(status == NPG_OK || status == NPG_BAD_INPUT, "places of sensors");
+    npg_frame frame = {.number = 1, .index = 1};
+    if (!status) status = npg_sensors_set(&sensors, &frame, &origin);
+    expect(status == NPG_OK || status == NPG_BAD_INPUT, "sensors of a frame");
+    expect(frame.sensor_count <= NPG_FRAME_SENSORS_MOST, "too many sensors");
+    npg_frame_clear(&frame);
+    npg_sensors_close(&sensors);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     int fd;
     if (!size) return 0;
     const char *path = fuzz_file(&fd, "a.log", data + 1, size - 1);
     fuzz_bound(20 * size); /* a line of eight digits becomes an entry of 128 bytes */
-    if (data[0] % 3 == 0) read_list(path, true);
-    if (data[0] % 3 == 1) read_list(path, false);
-    if (data[0] % 3 == 2) read_camera(path);
+    if (data[0] % 4 == 0) read_list(path, true);
+    if (data[0] % 4 == 1) read_list(path, false);
+    if (data[0] % 4 == 2) read_camera(path);
+    if (data[0] % 4 == 3) read_sensors(path);
     fuzz_end();
     return 0;
 }

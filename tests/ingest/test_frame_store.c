@@ -29,6 +29,9 @@ static void make_frame(npg_frame *frame, int64_t index, uint32_t fields, bool ha
     /* those of a rig carry these, too */
     assert_int_equal(npg_alloc_array(&frame->colours, NPG_FOR_FRAMES, POINTS, 4), NPG_OK);
     assert_int_equal(npg_alloc_array(&frame->sensors, NPG_FOR_FRAMES, POINTS, 1), NPG_OK);
+    assert_int_equal(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, 2, 3 * sizeof(float)), NPG_OK);
+    frame->sensor_count = 2;
+    for (size_t i = 0; i < 6; i++) frame->sensor_local[i] = coordinate(index, i + 5);
     for (size_t i = 0; i < 4 * POINTS; i++) frame->colours[i] = (uint8_t)(index + (int64_t)i);
     for (size_t i = 0; i < POINTS; i++) frame->sensors[i] = (uint8_t)(index + (int64_t)i % 3);
 }
@@ -57,6 +60,9 @@ static void expect(npg_frame_store *store, int64_t index, bool has_normals, bool
     }
     assert_int_equal(frame.colours != NULL, has_normals);
     assert_int_equal(frame.sensors != NULL, has_normals);
+    assert_int_equal(frame.sensor_count, has_normals ? 2 : 0);
+    for (size_t i = 0; i < 3 * frame.sensor_count; i++)
+        assert_true(frame.sensor_local[i] == coordinate(index, i + 5));
     for (size_t i = 0; i < POINTS && has_normals; i++) {
         for (size_t c = 4 * i; c < 4 * i + 4; c++)
             assert_int_equal(frame.colours[c], (uint8_t)(index + (int64_t)c));

@@ -199,6 +199,9 @@ static void a_missing_image_is_a_gap_of_its_sensor(void **state)
         assert_int_equal(read_rig_frame(&frame, "two", f, NULL), NPG_OK);
         assert_int_equal(frame.point_count, f == 1 ? 2 * each : each);
         assert_int_equal(frame.sensors[frame.point_count - 1], f > 0);
+        assert_int_equal(frame.sensor_count, 2); /* where they stand; not known where an image is missing */
+        assert_int_equal(!isnan(frame.sensor_local[0]), f < 2);
+        assert_int_equal(!isnan(frame.sensor_local[3]), f > 0);
         npg_frame_clear(&frame);
     }
 }

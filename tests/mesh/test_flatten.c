@@ -54,11 +54,11 @@ static void the_balloon_over_a_hole_becomes_flat(void **state)
 {
     static seen s;
     npg_mesh *mesh = bulged(&s, 0, 0), *before;
-    size_t moved;
+    npg_flattened done;
     (void)state;
     assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
-    assert_int_equal(npg_mesh_flatten(mesh, &moved, s.points, s.count, 0.5 * STEP), NPG_OK);
-    assert_int_equal(moved, SIDE * SIDE - s.count);
+    assert_int_equal(npg_mesh_flatten(mesh, &done, s.points, s.count, 0.5 * STEP, NULL), NPG_OK);
+    assert_int_equal(done.moved, SIDE * SIDE - s.count);
     for (size_t v = 0; v < mesh->vert_count; v++) {
         const float *now = mesh->vert_pos + 3 * v, *was = before->vert_pos + 3 * v;
         if (!is_in_hole((double)was[0], (double)was[1])) assert_memory_equal(now, was, 3 * sizeof(float));
@@ -74,15 +74,15 @@ static void nothing_moves_where_all_is_seen_or_nothing(void **state)
     static seen s;
     const float far[3] = {9, 9, 9};
     npg_mesh *mesh = bulged(&s, 0, 0), *before;
-    size_t moved = 7;
+    npg_flattened done = {7, 7};
     (void)state;
     assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
-    assert_int_equal(npg_mesh_flatten(mesh, &moved, before->vert_pos, before->vert_count, 1e-6), NPG_OK);
-    assert_int_equal(moved, 0);
+    assert_int_equal(npg_mesh_flatten(mesh, &done, before->vert_pos, before->vert_count, 1e-6, NULL), NPG_OK);
+    assert_int_equal(done.moved, 0);
     assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * mesh->vert_count);
-    moved = 7;
-    assert_int_equal(npg_mesh_flatten(mesh, &moved, far, 1, 0.1), NPG_OK);
-    assert_int_equal(moved, 0);
+    done.moved = 7;
+    assert_int_equal(npg_mesh_flatten(mesh, &done, far, 1, 0.1, NULL), NPG_OK);
+    assert_int_equal(done.moved, 0);
     assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * mesh->vert_count);
     npg_mesh_unref(&before);
     npg_mesh_unref(&mesh);
@@ -96,24 +96,69 @@ static void a_piece_that_no_point_saw_keeps_its_shape(void **state)
     static const uint32_t sides[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
     const size_t verts = SIDE * SIDE;
     npg_mesh *mesh = bulged(&s, 4, 4);
-    size_t moved;
+    npg_flattened done;
     (void)state;
     memcpy(mesh->vert_pos + 3 * verts, corners, sizeof corners);
     for (size_t i = 0; i < 12; i++) mesh->faces[6 * (SIDE - 1) * (SIDE - 1) + i] = (uint32_t)verts + sides[i];
-    assert_int_equal(npg_mesh_flatten(mesh, &moved, s.points, s.count, 0.5 * STEP), NPG_OK);
-    assert_int_equal(moved, verts - s.count);
+    assert_int_equal(npg_mesh_flatten(mesh, &done, s.points, s.count, 0.5 * STEP, NULL), NPG_OK);
+    assert_int_equal(done.moved, verts - s.count);
     assert_memory_equal(mesh->vert_pos + 3 * verts, corners, sizeof corners);
     npg_mesh_unref(&mesh);
     assert_int_equal(npg_memory_used(), 0);
 }
 
-static npg_status flatten_with_failure(const npg_mesh *bulge, const seen *s, uint64_t n)
+/* The sheet is drawn flat where its balloon was; a sensor saw more to be empty: a bowl below the sheet. */
+static npg_cube_set *bowl(double side, double floor_z)
+{
+    static float middles[3 * 40000];
+    npg_cube_set *set;
+    size_t count = 0;
+    for (int i = -20; i < 20; i++)
+        for (int j = -20; j < 20; j++)
+            for (int k = -16; k < 31; k++) {
+                const double at[3] = {(i + 0.5) * side, (j + 0.5) * side, (k + 0.5) * side};
+                if (at[0] * at[0] + at[1] * at[1] > 0.3 * 0.3 || at[2] < floor_z) continue;
+                for (int a = 0; a < 3; a++) middles[3 * count + (size_t)a] = (float)at[a];
+                count++;
+            }
+    assert_int_equal(npg_cube_set_open(&set, middles, count, side), NPG_OK);
+    return set;
+}
+
+static void what_lies_in_empty_space_is_pushed_out_of_it(void **state)
+{
+    static seen s;
+    npg_mesh *mesh = bulged(&s, 0, 0);
+    npg_cube_set *empty = bowl(0.02, -0.12);
+    npg_flattened done;
+    double lowest = 1;
+    (void)state;
+    double before = npg_mesh_share_in(mesh, empty);
+    assert_int_equal(npg_mesh_flatten(mesh, &done, s.points, s.count, 0.5 * STEP, empty), NPG_OK);
+    assert_int_equal(done.moved, SIDE * SIDE - s.count);
+    assert_true(done.pushed > 0 && done.pushed < done.moved);
+    for (size_t v = 0; v < mesh->vert_count; v++) {
+        const float *now = mesh->vert_pos + 3 * v;
+        double from_middle = hypot((double)now[0], (double)now[1]);
+        if (from_middle < 0.1) assert_true(fabs((double)now[2] + 0.12) < 0.04); /* the floor of the bowl */
+        lowest = fmin(lowest, (double)now[2] - 0.1 * (double)now[0]);
+    }
+    assert_true(lowest > -0.2);
+    double left = npg_mesh_share_in(mesh, empty);
+    if (!(left > 0 && left < 0.5 * before)) fail_msg("%g of %g of the area is in empty space", left, before);
+    npg_cube_set_close(&empty);
+    npg_mesh_unref(&mesh);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
+static npg_status flatten_with_failure(const npg_mesh *bulge, const seen *s, const npg_cube_set *empty,
+                                       uint64_t n)
 {
     npg_mesh *mesh;
-    size_t moved;
+    npg_flattened done;
     assert_int_equal(npg_mesh_copy(&mesh, bulge), NPG_OK);
     npg_memory_fail_at(n, false);
-    npg_status status = npg_mesh_flatten(mesh, &moved, s->points, s->count, 0.5 * STEP);
+    npg_status status = npg_mesh_flatten(mesh, &done, s->points, s->count, 0.5 * STEP, empty);
     npg_memory_fail_at(0, false);
     npg_mesh_unref(&mesh);
     return status;
@@ -123,12 +168,15 @@ static void memory_that_fails_is_reported(void **state)
 {
     static seen s;
     npg_mesh *mesh = bulged(&s, 0, 0);
+    npg_cube_set *empty = bowl(0.02, -0.12);
     size_t used = npg_memory_used();
     uint64_t n = 1;
     (void)state;
-    for (; flatten_with_failure(mesh, &s, n) == NPG_MEMORY; n++) assert_int_equal(npg_memory_used(), used);
+    for (; flatten_with_failure(mesh, &s, empty, n) == NPG_MEMORY; n++)
+        assert_int_equal(npg_memory_used(), used);
     assert_true(n > 3);
-    assert_int_equal(flatten_with_failure(mesh, &s, n), NPG_OK);
+    assert_int_equal(flatten_with_failure(mesh, &s, empty, n), NPG_OK);
+    npg_cube_set_close(&empty);
     npg_mesh_unref(&mesh);
     assert_int_equal(npg_memory_used(), 0);
 }
@@ -139,6 +187,7 @@ int main(void)
         cmocka_unit_test(the_balloon_over_a_hole_becomes_flat),
         cmocka_unit_test(nothing_moves_where_all_is_seen_or_nothing),
         cmocka_unit_test(a_piece_that_no_point_saw_keeps_its_shape),
+        cmocka_unit_test(what_lies_in_empty_space_is_pushed_out_of_it),
         cmocka_unit_test(memory_that_fails_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,7 +14,7 @@
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 
-#define NPG_RIG_SENSORS_MAX 64                 /* far above any rig; a sensor's index is a byte           */
+#define NPG_RIG_SENSORS_MAX NPG_FRAME_SENSORS_MOST
 #define NPG_RIG_SHOTS_MAX   4000000            /* images of one sensor: 18 hours at 60 a second           */
 #define NPG_RIG_TEXT_MAX    ((size_t)64 << 20) /* bytes of a calibration or trajectory file    */
 

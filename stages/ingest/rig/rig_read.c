@@ -31,6 +31,9 @@ static npg_status reserve(npg_frame *frame, const reading *r)
     NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
     NPG_TRY(npg_alloc(&frame->sensors, NPG_FOR_FRAMES, count));
+    NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, r->rig->sensor_count, 3 * sizeof(float)));
+    frame->sensor_count = r->rig->sensor_count;
+    for (size_t i = 0; i < 3 * frame->sensor_count; i++) frame->sensor_local[i] = NAN;
     return has_colours ? npg_alloc_array(&frame->colours, NPG_FOR_FRAMES, count, 4) : NPG_OK;
 }
 
@@ -52,6 +55,8 @@ static void add_sensor(npg_frame *frame, const reading *r, size_t s, npg_origin 
         if (from->colours) memcpy(frame->colours + 4 * to, from->colours + 4 * i, 4);
         frame->sensors[to] = (uint8_t)s;
     }
+    for (size_t a = 0; a < 3; a++)
+        frame->sensor_local[3 * s + a] = (float)(pose[4 * a + 3] - origin->world[a]);
 }
 
 npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *origin)

@@ -1,0 +1,227 @@
+/* Empty cells: a band of cubes around the surface, and their votes. */
+#include "fuse/empty_cells.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/depth_map.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/parallel.h"
+
+#define GROW           1.26 /* of the side, where there are too many cells: half as many */
+#define PARTS_MOST     8
+#define GRID_BITS_MOST ((size_t)1 << 28) /* cells of the box around the band: 32 MiB of marks */
+
+enum { NOTHING, EMPTY, FILLED };
+
+typedef struct cell {
+    float place[3];         /* middle, at rest */
+    uint16_t empty, filled; /* frames */
+    uint8_t says;           /* the frame at work */
+} cell;
+
+struct npg_empty_cells {
+    double side;
+    size_t count;
+    cell *cells;           /* owned */
+    npg_surface_hit *hits; /* of their places, at rest; owned */
+    float *now;            /* where they are in the frame at work; owned */
+};
+
+/* ---- the band ---- */
+
+typedef struct grid {
+    double side, low[3];
+    size_t size[3];
+    uint8_t *bits; /* owned */
+} grid;
+
+static npg_status open_grid(grid *g, const npg_mesh *mesh, double side, double band)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    size_t count = 1;
+    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
+    g->side = side;
+    for (int a = 0; a < 3; a++) {
+        g->low[a] = floor((bounds.lo[a] - band) / side) * side;
+        g->size[a] = (size_t)ceil((bounds.hi[a] + band - g->low[a]) / side) + 1;
+        count *= g->size[a];
+        if (count > GRID_BITS_MOST) return NPG_OK;
+    }
+    return npg_alloc(&g->bits, NPG_FOR_MESH, count / 8 + 1);
+}
+
+/* Marks the cells around a vertex; returns how many are new. */
+static size_t mark_around(grid *g, const float vertex[3], double reach)
+{
+    long first[3], last[3];
+    size_t marked = 0;
+    for (int a = 0; a < 3; a++) {
+        first[a] = (long)fmax(0, floor(((double)vertex[a] - reach - g->low[a]) / g->side));
+        last[a] =
+            (long)fmin((double)g->size[a] - 1, floor(((double)vertex[a] + reach - g->low[a]) / g->side));
+    }
+    for (long z = first[2]; z <= last[2]; z++)
+        for (long y = first[1]; y <= last[1]; y++)
+            for (long x = first[0]; x <= last[0]; x++) {
+                size_t at = ((size_t)z * g->size[1] + (size_t)y) * g->size[0] + (size_t)x;
+                marked += !(g->bits[at / 8] >> at % 8 & 1);
+                g->bits[at / 8] |= (uint8_t)(1 << at % 8);
+            }
+    return marked;
+}
+
+static npg_status take_cells(npg_empty_cells *c, const grid *g, size_t count)
+{
+    NPG_TRY(npg_alloc_array(&c->cells, NPG_FOR_MESH, count, sizeof *c->cells));
+    NPG_TRY(npg_alloc_array(&c->hits, NPG_FOR_MESH, count, sizeof *c->hits));
+    NPG_TRY(npg_alloc_array(&c->now, NPG_FOR_MESH, count, 3 * sizeof *c->now));
+    for (size_t at = 0; at < g->size[0] * g->size[1] * g->size[2]; at++) {
+        if (!(g->bits[at / 8] >> at % 8 & 1)) continue;
+        const size_t i[3] = {at % g->size[0], at / g->size[0] % g->size[1], at / g->size[0] / g->size[1]};
+        for (int a = 0; a < 3; a++)
+            c->cells[c->count].place[a] = (float)(g->low[a] + ((double)i[a] + 0.5) * g->side);
+        c->count++;
+    }
+    return NPG_OK;
+}
+
+/* The points of the surface that the cells hang on. */
+static npg_status bind(npg_empty_cells *c, const npg_mesh *mesh)
+{
+    npg_surface *surface;
+    NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
+    for (size_t i = 0; i < c->count; i++) memcpy(c->now + 3 * i, c->cells[i].place, sizeof c->cells[i].place);
+    npg_status status = npg_surface_closest(surface, c->hits, c->now, c->count);
+    npg_surface_close(&surface);
+    return status;
+}
+
+npg_status npg_empty_cells_open(npg_empty_cells **out, const npg_mesh *mesh, double side, double band,
+                                size_t most)
+{
+    npg_empty_cells *c;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
+    npg_status status = NPG_OK;
+    for (size_t count = SIZE_MAX; count > most && !status; side *= GROW) {
+        grid g = {0};
+        c->side = side;
+        count = 0;
+        status = open_grid(&g, mesh, side, band);
+        if (!g.bits) count = SIZE_MAX;
+        for (size_t v = 0; v < mesh->vert_count && !status && count <= most; v++)
+            count += mark_around(&g, mesh->vert_pos + 3 * v, band);
+        if (!status && count <= most) status = take_cells(c, &g, count);
+        npg_release(&g.bits);
+    }
+    if (!status) status = bind(c, mesh);
+    if (status) npg_empty_cells_close(&c);
+    *out = c;
+    return status;
+}
+
+void npg_empty_cells_close(npg_empty_cells **cells)
+{
+    if (!cells || !*cells) return;
+    npg_release(&(*cells)->cells);
+    npg_release(&(*cells)->hits);
+    npg_release(&(*cells)->now);
+    npg_release(cells);
+}
+
+/* ---- a frame ---- */
+
+typedef struct looking {
+    npg_empty_cells *c;
+    const npg_carry_back *carry;
+    const npg_depth_map *map;
+    bool has_outline; /* what lies beside all that a sensor saw is empty */
+    size_t parts;
+} looking;
+
+static size_t first_of(const looking *l, size_t part)
+{
+    return part * l->c->count / l->parts;
+}
+
+static npg_status move_part(void *user, size_t part)
+{
+    const looking *l = user;
+    npg_empty_cells *c = l->c;
+    for (size_t i = first_of(l, part); i < first_of(l, part + 1); i++) {
+        npg_carry_out(l->carry, c->now + 3 * i, &c->hits[i], c->cells[i].place);
+        c->cells[i].says = NOTHING;
+    }
+    return NPG_OK;
+}
+
+static npg_status look_part(void *user, size_t part)
+{
+    const looking *l = user;
+    for (size_t i = first_of(l, part); i < first_of(l, part + 1); i++) {
+        uint8_t *says = &l->c->cells[i].says;
+        if (*says == FILLED) continue;
+        npg_sight_kind kind = npg_depth_map_look(l->map, l->c->now + 3 * i);
+        if (kind == NPG_SEEN_AT) *says = FILLED;
+        if (kind == NPG_SEEN_EMPTY || (kind == NPG_SEEN_BESIDE && l->has_outline)) *says = EMPTY;
+    }
+    return NPG_OK;
+}
+
+static void count_frame(npg_empty_cells *c)
+{
+    for (size_t i = 0; i < c->count; i++) {
+        cell *one = &c->cells[i];
+        one->empty += one->says == EMPTY && one->empty < UINT16_MAX;
+        one->filled += one->says == FILLED && one->filled < UINT16_MAX;
+    }
+}
+
+/* One map at a time: they are large. */
+npg_status npg_empty_cells_see(npg_empty_cells *c, const npg_carry_back *carry, const npg_seen *seen)
+{
+    looking l = {c, carry, NULL, !seen->which, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
+    npg_status status = npg_parallel(move_part, &l, l.parts);
+    for (size_t i = 0; i < seen->sensor_count && !status; i++) {
+        const float *sensor = seen->sensors + 3 * i;
+        npg_depth_map *map;
+        if (!isfinite(sensor[0] + sensor[1] + sensor[2])) continue;
+        status = npg_depth_map_open(&map, sensor, seen->points, seen->which, (uint8_t)i, seen->point_count,
+                                    seen->bin, seen->margin);
+        l.map = map;
+        if (!status) status = npg_parallel(look_part, &l, l.parts);
+        npg_depth_map_close(&map);
+    }
+    if (!status) count_frame(c);
+    return status;
+}
+
+/* ---- what came out ---- */
+
+size_t npg_empty_cells_count(const npg_empty_cells *c)
+{
+    return c->count;
+}
+
+double npg_empty_cells_side(const npg_empty_cells *c)
+{
+    return c->side;
+}
+
+size_t npg_empty_cells_find(const npg_empty_cells *c, float *places, int frames_least, double share)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < c->count; i++) {
+        const cell *one = &c->cells[i];
+        if (one->empty < frames_least || one->empty < share * (one->empty + one->filled)) continue;
+        memcpy(places + 3 * count++, one->place, sizeof one->place);
+    }
+    return count;
+}
+
+size_t npg_empty_cells_memory(size_t most)
+{
+    return most * (sizeof(cell) + sizeof(npg_surface_hit) + 6 * sizeof(float)) + GRID_BITS_MOST / 8 +
+           npg_depth_map_memory();
+}

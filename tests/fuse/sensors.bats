@@ -1,0 +1,78 @@
+# Where sensors stood (option --sensor) says what is empty: a slot that they looked through is not closed.
+
+small=(--faces 2500 --poisson-depth 6 --align-nodes 60 --align-steps 6 --keyframe 3 --no-outliers --quiet
+    --max-residual 100 --max-flipped 100 --max-stretched 100 --max-invented 100)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    python3 "$BATS_TEST_DIRNAME/slotted_ball.py" slot
+    "$NEUPIG" run slot/points -o closed "${small[@]}"
+    "$NEUPIG" run slot/points -o open --sensor slot/sensors.txt "${small[@]}"
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# The least height of the slot's floor near its middle (the ball of the keyframe 3 stands at x = 0.15): floor RUN
+floor_of() {
+    python3 - "$1/reference.ply" <<'P'
+import struct, sys
+head, body = open(sys.argv[1], "rb").read().split(b"end_header\n", 1)
+lines = head.decode().split("\n")
+count = int(next(l for l in lines if l.startswith("element vertex")).split()[2])
+names = [l.split()[-1] for l in lines[: next(i for i, l in enumerate(lines) if "element face" in l)] if l.startswith("property")]
+size = 4 * len(names)
+tops = []
+for v in range(count):
+    x, y, z = struct.unpack_from("<3f", body, size * v)
+    if abs(x - 0.15) < 0.1 and abs(y) < 0.5 and z > 0:
+        tops.append(z)
+print(min(tops))
+P
+}
+
+# report RUN KEY: of stage mesh
+report() {
+    sed -n 's/.*"'"$2"'": \([0-9.e+-]*\).*/\1/p' "$1/report.json"
+}
+
+@test "what sensors looked through is open" {
+    echo "floors: $(floor_of closed) $(floor_of open)"
+    awk -v closed="$(floor_of closed)" -v open="$(floor_of open)" 'BEGIN { exit !(closed > 0.6 && open < closed - 0.2) }'
+    [ "$(report open vertices_pushed)" -gt 50 ]
+    [ "$(report open cells_seen_empty)" -gt 1000 ]
+    awk -v was="$(report open seen_empty_share)" -v left="$(report open seen_empty_left_share)" \
+        'BEGIN { exit !(was > 0.03 && left < 0.7 * was) }'
+}
+
+@test "without them nothing is said of it, and --sensor none is the same as before" {
+    [ -z "$(report closed seen_empty_share)" ]
+    [ -z "$(report closed vertices_pushed)" ]
+    "$NEUPIG" run slot/points -o none --sensor none "${small[@]}"
+    cmp closed/reference.ply none/reference.ply
+}
+
+@test "sensors that see no slot leave it closed" {
+    # from the sides the ball hides it, but for the lines past its top
+    "$NEUPIG" run slot/points -o beside --sensor 60,0,-20:-60,0,-20 "${small[@]}"
+    echo "floor: $(floor_of beside)"
+    awk -v floor="$(floor_of beside)" 'BEGIN { exit !(floor > 0.6) }'
+}
+
+@test "a file of places that is none is refused, with its line" {
+    printf '0 1 2 3\n1 2 3\n' >bad.txt
+    run "$NEUPIG" run slot/points -o bad --sensor bad.txt "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"bad.txt"*"line 2"* ]]
+    printf '0 1 2 3\n1 1 2 3\n' >short.txt
+    run "$NEUPIG" run slot/points -o short --sensor short.txt "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"no place of a sensor for frame 2"* ]]
+    run "$NEUPIG" run slot/points -o none-such --sensor no/such/file "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"option sensor"* ]]
+}
