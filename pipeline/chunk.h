@@ -38,7 +38,8 @@ typedef struct npg_misfit {
     double at[3]; /* its middle, in world coordinates; NaN where there is none                      */
 } npg_misfit;
 
-/* How well a frame's surface explains its points.  Distances are in diagonals of the figure (npg_frame_box). */
+/* How well a frame's surface explains its points.  Distances are in diagonals of the figure
+ * (npg_frame_box). */
 typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
     double vertex_dist_mean;                                   /* surface vertices -> nearest point */

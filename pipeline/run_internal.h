@@ -96,8 +96,8 @@ struct npg_run {
  * passes to come. */
 void npg_timeline_begin_pass(npg_run *run);
 
-/* The share of the run that is done when the worker has done `share` of its work in this pass, and the seconds
- * left, -1 while there is no pace yet.  Under the lock. */
+/* The share of the run that is done when the worker has done `share` of its work in this pass, and the
+ * seconds left, -1 while there is no pace yet.  Under the lock. */
 void npg_timeline_advance(npg_worker *worker, npg_progress *progress);
 
 /* npg_run_open() with another chain in place of npg_chain. */

@@ -20,8 +20,8 @@
  *     OUT/job/poses.bin            where the last fusing pass brought the reference so far, frame by frame
  *                                  (align/poses.h): where the solving pass starts
  *
- *     OUT/job/followed_0.bin       what the first fusing pass found so far (align/follow_log.h); removed when there
- *                                  is a state to resume from
+ *     OUT/job/followed_0.bin       what the first fusing pass found so far (align/follow_log.h); removed when
+ *                                  there is a state to resume from
  *
  * The two newest windows stay, and the one that later frames start from (neupig append);
  * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the

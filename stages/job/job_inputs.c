@@ -141,6 +141,22 @@ static npg_status describe_capture(json_t *frames, const npg_options *options, n
     return status;
 }
 
+/* Options whose value may be a file that the result is made of, besides the reference. */
+static const char *const file_options[] = {"sensor"};
+
+static npg_status describe_option_files(json_t *files, const npg_options *options)
+{
+    for (size_t i = 0; i < sizeof file_options / sizeof *file_options; i++) {
+        const char *path = npg_options_get(options, file_options[i]);
+        json_t *file = json_object();
+        npg_status status = path && access(path, F_OK) == 0 ? describe_file(file, path) : NPG_OK;
+        if (json_object_size(file)) json_object_set(files, file_options[i], file);
+        json_decref(file);
+        if (status && status != NPG_BAD_INPUT) return status; /* the stage says what is wrong with it */
+    }
+    return NPG_OK;
+}
+
 npg_status npg_job_describe(json_t **out, const npg_options *options)
 {
     npg_settings settings;
@@ -148,13 +164,15 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     npg_options_fill(options, npg_run_options, &settings);
     npg_job_source source = npg_job_source_of(&settings);
     const char *input = source == NPG_JOB_FOLLOW ? settings.follow : settings.input;
-    json_t *frames = json_array(), *mesh = json_object();
+    json_t *frames = json_array(), *mesh = json_object(), *files = json_object();
     npg_status status = describe_capture(frames, options, source);
     if (!status && settings.reference[0]) status = describe_file(mesh, settings.reference);
-    json_t *description = json_pack("{ss so so so so so}", "neupig", npg_version(), "input",
-                                    source > NPG_JOB_FOLLOW ? npg_json_text(input) : absolute(input),
-                                    "options", describe_options(options), "custom_stages",
-                                    describe_custom_stages(options), "reference", mesh, "frames", frames);
+    if (!status) status = describe_option_files(files, options);
+    json_t *description =
+        json_pack("{ss so so so so so so}", "neupig", npg_version(), "input",
+                  source > NPG_JOB_FOLLOW ? npg_json_text(input) : absolute(input), "options",
+                  describe_options(options), "custom_stages", describe_custom_stages(options), "reference",
+                  mesh, "files", files, "frames", frames);
     if (source) json_object_set_new(description, "source", json_string(source_words[source]));
     if (!status && !description) status = npg_error(NPG_MEMORY, "no memory for the list of inputs");
     if (status) json_decref(description);
@@ -201,6 +219,14 @@ static bool is_same_file(const json_t *then, const json_t *now)
            !strcmp(text_of(then, "xxh3"), text_of(now, "xxh3"));
 }
 
+static npg_status compare_option_files(const json_t *then, const json_t *now)
+{
+    for (size_t i = 0; i < sizeof file_options / sizeof *file_options; i++)
+        if (!is_same_file(json_object_get(then, file_options[i]), json_object_get(now, file_options[i])))
+            return npg_error(NPG_USAGE, "the file of option %s is not the one it was", file_options[i]);
+    return NPG_OK;
+}
+
 static npg_status compare_frames(int64_t *added, const json_t *then, const json_t *now)
 {
     size_t was = json_array_size(then), is = json_array_size(now);
@@ -237,6 +263,7 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
         return npg_error(NPG_USAGE, "the stages that the program added are not those that it had");
     if (!is_same_file(json_object_get(then, "reference"), json_object_get(now, "reference")))
         return npg_error(NPG_USAGE, "the reference mesh is not the one it was");
+    NPG_TRY(compare_option_files(json_object_get(then, "files"), json_object_get(now, "files")));
     return compare_frames(added, json_object_get(then, "frames"), json_object_get(now, "frames"));
 }
 

@@ -76,3 +76,15 @@ report() {
     [ "$status" -eq 2 ]
     [[ "$output" == *"option sensor"* ]]
 }
+
+@test "a job that was begun with another file of places is another job" {
+    printf '0 0 60\n0 0 60\n' >places.txt
+    "$NEUPIG" run slot/points -o same --sensor places.txt "${small[@]}" --frames 0:2
+    run "$NEUPIG" run slot/points -o same --sensor places.txt "${small[@]}" --frames 0:2
+    [ "$status" -eq 0 ]
+    printf '0 0 61\n0 0 60\n' >places.txt
+    run "$NEUPIG" run slot/points -o same --sensor places.txt "${small[@]}" --frames 0:2
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"the file of option sensor is not the one it was"* ]]
+}
