@@ -1,6 +1,6 @@
 /* Cost: what the parts of a run take in processor seconds, on a machine whose core makes NPG_COST_CORE_FLOPS
- * multiply-adds x 2 a second.  One model for two uses: the share of a run that is done, where only ratios matter
- * (timeline.c), and the estimate before it.  Fitted to the runs in samples/guide/tuning.md. */
+ * multiply-adds x 2 a second.  One model for two uses: the share of a run that is done, where only ratios
+ * matter (timeline.c), and the estimate before it.  Fitted to the runs in samples/guide/tuning.md. */
 #ifndef NPG_COST_H
 #define NPG_COST_H
 
@@ -35,8 +35,8 @@ static inline double npg_cost_pass_s(double frames, double points, double step)
     return 0.5 * frames * (0.62 * searching + 36e-6 * fmin(points, NPG_COST_FRAME_POINTS));
 }
 
-/* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and backward, of which kernels make
- * about half as many as the registers could, at `flops` a second. */
+/* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and backward, of which kernels
+ * make about half as many as the registers could, at `flops` a second. */
 static inline double npg_cost_network_s(double frames, double vertices, double epochs, double flops)
 {
     return 1.72e6 * frames * vertices * epochs / (0.5 * fmax(flops, 2));

@@ -120,8 +120,8 @@ typedef struct npg_stage {
      * written and no other; one before it may be at work on later ones.  May be NULL. */
     npg_status (*save)(const npg_worker *worker, npg_archive_writer *out);
     /* Processor seconds that the stage expects to take in a pass (CHOOSE, FUSE or SOLVE), on whatever
-     * machine: the run's progress is the share of these that is done, and only their ratios matter.  Read from options
-     * and facts, before the pass.  NULL: not worth counting. */
+     * machine: the run's progress is the share of these that is done, and only their ratios matter.  Read
+     * from options and facts, before the pass.  NULL: not worth counting. */
     double (*expects)(const npg_worker *worker, npg_pass pass);
     /* After all stages ended well: the last word (files that must come last).  May be NULL. */
     npg_status (*conclude)(npg_worker *worker);
