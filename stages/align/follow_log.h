@@ -24,8 +24,8 @@ typedef struct npg_follow_key {
     size_t state_bytes;        /* of what the stage needs behind a group                  */
 } npg_follow_key;
 
-/* The log at `path` (kept as a copy), read from its begin; one of another key is begun anew.  *groups: how many
- * whole ones it holds.  NPG_DISK. */
+/* The log at `path` (kept as a copy), read from its begin; one of another key is begun anew.  *groups: how
+ * many whole ones it holds.  NPG_DISK. */
 npg_status npg_follow_log_open(npg_follow_log **log, int64_t *groups, const char *path,
                                const npg_follow_key *key);
 void npg_follow_log_close(npg_follow_log **log);

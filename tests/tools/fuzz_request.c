@@ -1,4 +1,4 @@
-/* Fuzz target of the requests to the server of neupig view --live, for libFuzzer: any bytes from a connection. */
+/* Fuzz target of the requests to the server of neupig view --live, for libFuzzer: any bytes of a connection. */
 #include <string.h>
 
 #include "tests/support/fuzz_target.h"

@@ -41,7 +41,7 @@ typedef struct npg_probe_spread {
 
 npg_probe_spread npg_probe_counts(npg_probe *probe);
 
-/* How far limbs go from frame to frame, in diagonals of the figure (probe_motion.h); 0 where nothing tells. */
+/* How far limbs go from frame to frame, in diagonals of the figure (probe_motion.h); 0: nothing tells. */
 double npg_probe_step(const npg_probe *probe);
 
 #endif

@@ -42,8 +42,8 @@ static double figure_diagonal(const float *points, size_t n, float *row)
     return sqrt(sum);
 }
 
-/* The 90th percentile of the distance from `from` to the nearest of `to`, in diagonals of `to`; negative where
- * the figure has no size. */
+/* The 90th percentile of the distance from `from` to the nearest of `to`, in diagonals of `to`; negative
+ * where the figure has no size. */
 static npg_status measure_step(double *step, const float *from, size_t from_count, const float *to,
                                size_t to_count)
 {
