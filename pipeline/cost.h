@@ -8,6 +8,7 @@
 #include <stdbool.h>
 
 #define NPG_COST_CORE_FLOPS 120e9
+#define NPG_COST_BUSY       1.55 /* cores that there is work for, on the average */
 
 #define NPG_COST_START_POINTS 30000 /* of a surface that only carries the frames of a fusing pass     */
 #define NPG_COST_FUSED_POINTS 45000 /* fused points of a capture, as a rule; 34 000 to 62 000 were seen */
@@ -18,13 +19,13 @@
 /* The choice of the keyframe: drafts of the candidates' surfaces, and their normals where they have none. */
 static inline double npg_cost_choice_s(double points, bool has_normals)
 {
-    return 3 + (has_normals ? 0 : 38e-6 * NPG_COST_CANDIDATES * points);
+    return 2.5 + (has_normals ? 0 : 38e-6 * NPG_COST_CANDIDATES * points);
 }
 
 /* A surface of so many points: Poisson, and the drafts before it, at the depth that is the default. */
 static inline double npg_cost_surface_s(double points)
 {
-    return 5 + 0.3e-3 * points;
+    return 8 + 0.1e-3 * points;
 }
 
 /* One pass that follows frames of so many points each, with all that is done to a frame beside it: reading,

@@ -2,11 +2,15 @@
  *
  * Every stage says before a pass how long it expects to take in it and in those to come, and then how much of
  * that is done: share = sum(expected x done) / sum(expected), over all passes.  Where it is wrong by the same
- * factor everywhere, as on a slower machine, nothing is wrong: the time left is the time taken so far, by
- * (1 - share) / share. */
+ * factor everywhere, as on a slower machine, little is wrong: the time left is what is left of the work, at
+ * the pace so far.  At the beginning, where one part that was estimated badly would decide the pace, that of
+ * the machine which the costs were taken on counts, too, as if it had done a fifth of the run. */
 #include <math.h>
 
+#include "pipeline/cost.h"
 #include "pipeline/run_internal.h"
+
+#define PRIOR_SHARE 0.2
 
 static const npg_pass timed[NPG_TIMED_PASSES] = {NPG_PASS_CHOOSE, NPG_PASS_FUSE, NPG_PASS_SOLVE};
 
@@ -39,32 +43,38 @@ void npg_timeline_begin_pass(npg_run *run)
     }
 }
 
-/* False where no stage expects anything. */
-static bool share_of_run(double *share, const npg_run *run)
+/* What there is to do and what is done of it; nothing where no stage expects anything. */
+typedef struct work {
+    double expected_s, done_s;
+} work;
+
+static work work_of(const npg_run *run)
 {
-    double expected = 0, done = 0;
+    work w = {0, 0};
     for (size_t p = 0; p < NPG_TIMED_PASSES; p++) {
         double times = times_walked(run, timed[p]), before = times_done(run, timed[p]);
         for (size_t i = 0; i < run->worker_count; i++) {
             const npg_worker *worker = &run->workers[i];
-            expected += times * worker->expected_s[p];
-            done += before * worker->expected_s[p];
-            if (timed[p] == run->pass) done += worker->done * worker->expected_s[p];
+            double done = before + (timed[p] == run->pass ? worker->done : 0);
+            w.expected_s += times * worker->expected_s[p];
+            w.done_s += done * worker->expected_s[p];
         }
     }
-    *share = expected > 0 ? done / expected : 0;
-    return expected > 0;
+    return w;
 }
 
-/* By the pace since the run began, or, where an earlier one had done a part already, since the first word of
- * progress. */
-static double time_left(npg_run *run, const npg_progress *now, bool from_begin)
+static double time_left(const work *w, double elapsed_s)
+{
+    double prior_s = PRIOR_SHARE * w->expected_s,
+           pace = (elapsed_s + prior_s / NPG_COST_BUSY) / (w->done_s + prior_s);
+    return fmax(w->expected_s - w->done_s, 0) * pace;
+}
+
+/* Where nothing is known of the parts, or an earlier run has done some: by the pace since the first word. */
+static double time_left_since(npg_run *run, const npg_progress *now)
 {
     const npg_progress *first = &run->progress;
-    if (!first->struct_size) {
-        run->progress = *now;
-        if (from_begin) run->progress.share = run->progress.elapsed_s = 0;
-    }
+    if (!first->struct_size) run->progress = *now;
     double done = now->share - first->share, taken_s = now->elapsed_s - first->elapsed_s;
     return done > 0 && taken_s > 0 ? (1 - now->share) * taken_s / done : -1;
 }
@@ -72,10 +82,9 @@ static double time_left(npg_run *run, const npg_progress *now, bool from_begin)
 void npg_timeline_advance(npg_worker *worker, npg_progress *progress)
 {
     npg_run *run = worker->run;
-    double of_run;
     worker->done = fmax(worker->done, fmin(progress->share, 1));
-    bool is_timed = share_of_run(&of_run, run);
-    if (is_timed) progress->share = of_run;
+    const work w = work_of(run);
+    if (w.expected_s > 0) progress->share = w.done_s / w.expected_s;
     progress->share = run->share = fmax(run->share, progress->share);
-    progress->left_s = time_left(run, progress, is_timed);
+    progress->left_s = w.expected_s > 0 ? time_left(&w, progress->elapsed_s) : time_left_since(run, progress);
 }

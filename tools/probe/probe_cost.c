@@ -94,7 +94,7 @@ static double aligned_work_s(const npg_probe *probe, const npg_cost_basis *basis
 static double aligned_s(const npg_probe *probe, const npg_cost_basis *basis, size_t most, double flops)
 {
     double cores = fmax((double)sysconf(_SC_NPROCESSORS_ONLN), 1);
-    double busy = cores < 2 ? 1 : 1.55;
+    double busy = cores < 2 ? 1 : NPG_COST_BUSY;
     return aligned_work_s(probe, basis, most) * NPG_COST_CORE_FLOPS / fmax(flops / cores, 1) / busy;
 }
 
