@@ -7,19 +7,22 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "pipeline/stage.h"
+
 #define NPG_COST_CORE_FLOPS 120e9
 #define NPG_COST_BUSY       1.55 /* cores that there is work for, on the average */
 
-#define NPG_COST_START_POINTS 30000 /* of a surface that only carries the frames of a fusing pass     */
+/* Limits that stages keep to, where the costs depend on them. */
+#define NPG_START_POINTS_MOST 30000 /* of a surface that only carries the frames of a fusing pass           */
+#define NPG_FUSED_FRAME_MOST  40000 /* points of a frame: more add time, and nothing that cells could hold */
+
 #define NPG_COST_FUSED_POINTS 45000 /* fused points of a capture, as a rule; 34 000 to 62 000 were seen */
-#define NPG_COST_FRAME_POINTS 40000 /* of a frame, that fusion has to do with at most                 */
-#define NPG_COST_CANDIDATES   4     /* for the keyframe                                               */
-#define NPG_COST_EASY_STEP    0.02  /* of the figure's diagonal: a limb that moves more is searched   */
+#define NPG_COST_EASY_STEP    0.02  /* of the figure's diagonal: a limb that moves more is searched     */
 
 /* The choice of the keyframe: drafts of the candidates' surfaces, and their normals where they have none. */
 static inline double npg_cost_choice_s(double points, bool has_normals)
 {
-    return 2.5 + (has_normals ? 0 : 38e-6 * NPG_COST_CANDIDATES * points);
+    return 2.5 + (has_normals ? 0 : 38e-6 * NPG_CHOICE_MAX * points);
 }
 
 /* A surface of so many points: Poisson, and the drafts before it, at the depth that is the default. */
@@ -33,7 +36,7 @@ static inline double npg_cost_surface_s(double points)
 static inline double npg_cost_pass_s(double frames, double points, double step)
 {
     double searching = 1 + 2.3 * fmax(0, step / NPG_COST_EASY_STEP - 1);
-    return 0.5 * frames * (0.62 * searching + 36e-6 * fmin(points, NPG_COST_FRAME_POINTS));
+    return 0.5 * frames * (0.62 * searching + 36e-6 * fmin(points, NPG_FUSED_FRAME_MOST));
 }
 
 /* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and backward, of which kernels

@@ -34,6 +34,32 @@ npg_status npg_join_path(char **out, const char *folder, const char *name)
     return NPG_OK;
 }
 
+bool npg_write_at(int fd, const void *data, size_t size, int64_t at)
+{
+    for (size_t done = 0; done < size;) {
+        ssize_t count = pwrite(fd, (const char *)data + done, size - done, (off_t)at + (off_t)done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count == 0) errno = ENOSPC;
+        if (count <= 0) return false;
+        done += (size_t)count;
+    }
+    return true;
+}
+
+bool npg_read_at(int fd, void *data, size_t *size, int64_t at)
+{
+    size_t done = 0;
+    while (done < *size) {
+        ssize_t count = pread(fd, (char *)data + done, *size - done, (off_t)at + (off_t)done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) return false;
+        if (!count) break;
+        done += (size_t)count;
+    }
+    *size = done;
+    return true;
+}
+
 bool npg_is_there(const char *path)
 {
     return access(path, F_OK) == 0;

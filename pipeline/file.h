@@ -55,6 +55,11 @@ npg_status npg_make_folder(const char *path);
 /* "<folder>/<name>", to be given to npg_release(). */
 npg_status npg_join_path(char **out, const char *folder, const char *name);
 
+/* All of the bytes to a place of an open file, and back; whatever signals come between.  *size gets how many
+ * there are up to the file's end.  False: errno says why. */
+bool npg_write_at(int fd, const void *data, size_t size, int64_t at);
+bool npg_read_at(int fd, void *data, size_t *size, int64_t at);
+
 /* Whether something lies at the path, or in the folder under that name; false, too, where that can't be found
  * out. */
 bool npg_is_there(const char *path);

@@ -220,7 +220,7 @@ typedef struct npg_progress {
     double share;                /* 0..1 of the whole run                                */
     double elapsed_s, left_s;    /* left_s < 0 while it is not known                     */
     int64_t frames_done, frames; /* written so far, in all (-1: not known yet)           */
-    int64_t step, steps;         /* epochs of the window at work; of stage align: frames  */
+    int64_t step, steps;         /* epochs of the window at work; of stage align: frames */
     int64_t window, windows;     /* the window at work, and how many there will be       */
     double loss;                 /* last mean loss per frame; NaN before the first       */
 } npg_progress;

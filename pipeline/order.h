@@ -11,6 +11,13 @@ static inline int npg_order_int64(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
+/* Ascending uint64_t. */
+static inline int npg_order_uint64(const void *left, const void *right)
+{
+    uint64_t a = *(const uint64_t *)left, b = *(const uint64_t *)right;
+    return (a > b) - (a < b);
+}
+
 /* Ascending float.  Values without an order (NaN) equal all. */
 static inline int npg_order_float(const void *left, const void *right)
 {

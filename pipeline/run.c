@@ -106,7 +106,7 @@ static npg_status open_worker_states(npg_run *run)
         npg_worker *worker = &run->workers[i];
         const npg_stage *stage = worker->stage;
         NPG_TRY(open_state(worker, stage->state_size, stage->options));
-        worker->is_in_pass = (stage->passes & run->pass) && (!stage->takes_part || stage->takes_part(worker));
+        worker->is_in_pass = (stage->passes & run->pass) && npg_worker_takes_part(worker);
     }
     return NPG_OK;
 }

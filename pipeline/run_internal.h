@@ -37,6 +37,12 @@ struct npg_worker {
     void (*release_kept)(void *thing);
 };
 
+/* Whether the stage is in the chain under the run's options (npg_stage.takes_part). */
+static inline bool npg_worker_takes_part(const npg_worker *worker)
+{
+    return !worker->stage->takes_part || worker->stage->takes_part(worker);
+}
+
 typedef struct npg_published {
     const npg_fact_kind *kind;
     void *value; /* owned; NULL once it was taken */

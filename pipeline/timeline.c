@@ -31,15 +31,15 @@ static double times_done(const npg_run *run, npg_pass pass)
 
 void npg_timeline_begin_pass(npg_run *run)
 {
-    run->fuse_walks = run->fuse_done + run->facts.fuse_left;
+    const npg_facts *facts = &run->facts;
+    bool is_known = !facts->is_live && !facts->is_resumed && facts->point_count_max;
+    run->fuse_walks = run->fuse_done + facts->fuse_left;
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
-        bool is_there = !worker->stage->takes_part || worker->stage->takes_part(worker);
-        bool is_known = !run->facts.is_live && !run->facts.is_resumed && run->facts.point_count_max;
+        bool expects = is_known && worker->stage->expects && npg_worker_takes_part(worker);
         worker->done = 0;
         for (size_t p = 0; p < NPG_TIMED_PASSES; p++)
-            worker->expected_s[p] =
-                is_known && is_there && worker->stage->expects ? worker->stage->expects(worker, timed[p]) : 0;
+            worker->expected_s[p] = expects ? worker->stage->expects(worker, timed[p]) : 0;
     }
 }
 

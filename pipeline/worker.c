@@ -55,7 +55,7 @@ bool npg_worker_has_field(const npg_worker *worker, uint32_t field)
 {
     for (const npg_worker *before = worker->run->workers; before < worker; before++) {
         const npg_stage *stage = before->stage;
-        bool solves = (stage->passes & NPG_PASS_SOLVE) && (!stage->takes_part || stage->takes_part(before));
+        bool solves = (stage->passes & NPG_PASS_SOLVE) && npg_worker_takes_part(before);
         if (solves && (stage->gives & field)) return true;
     }
     return false;

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "pipeline/file.h"
 #include "tools/cli.h"
 #include "tools/progress.h"
 #include "tools/run_job.h"
@@ -32,8 +33,7 @@ const npg_option npg_append_options[] = {
 
 static bool is_done(const char *folder)
 {
-    char path[4096];
-    return (size_t)snprintf(path, sizeof path, "%s/done.json", folder) < sizeof path && !access(path, F_OK);
+    return npg_is_in_folder(folder, "done.json");
 }
 
 /* A job that is not done yet is first brought to its end as it was begun. */

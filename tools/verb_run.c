@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "pipeline/clock.h"
+#include "pipeline/file.h"
 #include "tools/cli.h"
 #include "tools/progress.h"
 #include "tools/segments/segments.h"
@@ -157,7 +158,7 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
     if (status < 0 || status == NPG_STOPPED || status == NPG_CHANGED) return;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
-        if (access(path, F_OK) == 0) printf("%-14s %s\n", names[i], path);
+        if (npg_is_there(path)) printf("%-14s %s\n", names[i], path);
     }
 }
 

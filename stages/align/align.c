@@ -55,13 +55,12 @@ typedef struct state {
     npg_tracker *tracker;
     npg_poses *known; /* of the pass before, with the way to this one's nodes; owned, or NULL */
     npg_pose_map map;
-    double *known_pose; /* of its nodes; owned */
-    npg_poses *found;   /* of a fusing pass, for the next one; owned                             */
-    npg_follow_log
-        *log;      /* of a fusing pass with a job folder: what is found, and what an earlier run had; owned */
-    side sides[2]; /* forward, backward: of the frames that are passed on */
-    side ways[2];  /* the same with those that wait                       */
-    waiting *group; /* in order of arrival; owned, with what they own */
+    double *known_pose;  /* of its nodes; owned */
+    npg_poses *found;    /* of a fusing pass, for the next one; owned */
+    npg_follow_log *log; /* of it: what is found, and what an earlier run had; owned, NULL without a job */
+    side sides[2];       /* forward, backward: of the frames that are passed on */
+    side ways[2];        /* the same with those that wait                       */
+    waiting *group;      /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
@@ -297,10 +296,11 @@ static npg_status open_log(npg_worker *worker)
     const between *b = npg_worker_kept(worker);
     const npg_job *job = npg_job_of(worker);
     if (!job) return NPG_OK;
-    const npg_follow_key key = {npg_job_key(job), npg_worker_facts(worker)->reference,
-                                npg_tracker_node_count(s->tracker), state_bytes(s)};
+    npg_follow_key key = {0, npg_worker_facts(worker)->reference, npg_tracker_node_count(s->tracker),
+                          state_bytes(s)};
     char *path;
     int64_t groups;
+    NPG_TRY(npg_job_key(job, &key.job));
     NPG_TRY(npg_job_followed_path(job, &path, b ? b->passes : 0));
     npg_status status = npg_follow_log_open(&s->log, &groups, path, &key);
     npg_release(&path);

@@ -1,7 +1,6 @@
 /* Log of what a fusing pass found. */
 #include "align/follow_log.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -44,27 +43,12 @@ static npg_status fail(const npg_follow_log *log, const char *does)
 /* *size gets what there is of it. */
 static npg_status read_at(const npg_follow_log *log, void *data, size_t *size, off_t at)
 {
-    size_t done = 0;
-    while (done < *size) {
-        ssize_t count = pread(log->fd, (char *)data + done, *size - done, at + (off_t)done);
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0) return fail(log, "read");
-        if (!count) break;
-        done += (size_t)count;
-    }
-    *size = done;
-    return NPG_OK;
+    return npg_read_at(log->fd, data, size, at) ? NPG_OK : fail(log, "read");
 }
 
 static npg_status write_at(const npg_follow_log *log, const void *data, size_t size, off_t at)
 {
-    for (size_t done = 0; done < size;) {
-        ssize_t count = pwrite(log->fd, (const char *)data + done, size - done, at + (off_t)done);
-        if (count < 0 && errno == EINTR) continue;
-        if (count <= 0) return fail(log, "write");
-        done += (size_t)count;
-    }
-    return NPG_OK;
+    return npg_write_at(log->fd, data, size, at) ? NPG_OK : fail(log, "write");
 }
 
 static npg_status append(npg_follow_log *log, const void *data, size_t size)

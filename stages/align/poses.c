@@ -1,7 +1,6 @@
 /* Poses: records in a file, and the way from one graph to another. */
 #include "align/poses.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -104,28 +103,15 @@ static uint64_t hash_of(const npg_poses *p)
 
 static npg_status write_all(const npg_poses *p, const void *data, size_t size, off_t at)
 {
-    for (size_t done = 0; done < size;) {
-        ssize_t count = pwrite(p->fd, (const char *)data + done, size - done, at + (off_t)done);
-        if (count < 0 && errno == EINTR) continue;
-        if (count <= 0) return npg_error_errno(NPG_DISK, "can't write %s", name_of(p));
-        done += (size_t)count;
-    }
-    return NPG_OK;
+    if (npg_write_at(p->fd, data, size, at)) return NPG_OK;
+    return npg_error_errno(NPG_DISK, "can't write %s", name_of(p));
 }
 
 /* *size gets what there is of it. */
 static npg_status read_all(const npg_poses *p, void *data, size_t *size, off_t at)
 {
-    size_t done = 0;
-    while (done < *size) {
-        ssize_t count = pread(p->fd, (char *)data + done, *size - done, at + (off_t)done);
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0) return npg_error_errno(NPG_DISK, "can't read %s", name_of(p));
-        if (!count) break;
-        done += (size_t)count;
-    }
-    *size = done;
-    return NPG_OK;
+    if (npg_read_at(p->fd, data, size, at)) return NPG_OK;
+    return npg_error_errno(NPG_DISK, "can't read %s", name_of(p));
 }
 
 npg_status npg_poses_put(npg_poses *p, int64_t index, const double *pose)

@@ -18,9 +18,9 @@
 #include "mesh/denoise.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
+#include "pipeline/cost.h"
 #include "pipeline/order.h"
 
-#define POINTS_MOST 40000 /* of a frame: more add time, and nothing that the cells could hold */
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
 #define POINTS_A_CELL   1    /* that a cell should average, from all frames ...                        */
 #define SIDE_LEAST      0.25 /* ... but for its side, in spacings of the keyframe's points             */
@@ -83,7 +83,6 @@ static const npg_option options[] = {
 typedef struct cloud {
     float *points, *normals; /* unit; owned */
     npg_carried *carried;
-    uint8_t *sensors; /* that saw each; owned, or NULL */
     size_t count;
     const uint8_t *colours; /* of the frame, a loan, or NULL ... */
     size_t of;              /* ... and how many points it has    */
@@ -94,12 +93,11 @@ static void close_cloud(cloud *c)
     npg_release(&c->points);
     npg_release(&c->normals);
     npg_release(&c->carried);
-    npg_release(&c->sensors);
 }
 
 static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame *frame)
 {
-    size_t most = frame->point_count < POINTS_MOST ? frame->point_count : POINTS_MOST;
+    size_t most = frame->point_count < NPG_FUSED_FRAME_MOST ? frame->point_count : NPG_FUSED_FRAME_MOST;
     NPG_TRY(npg_alloc_array(&c->points, NPG_FOR_MESH, most, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&c->normals, NPG_FOR_MESH, most, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&c->carried, NPG_FOR_MESH, most, sizeof *c->carried));
@@ -107,9 +105,6 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
         npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
     c->colours = npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? NULL : frame->colours;
     c->of = frame->point_count;
-    if (frame->sensors) NPG_TRY(npg_alloc(&c->sensors, NPG_FOR_MESH, c->count));
-    for (size_t i = 0; i < c->count && c->sensors; i++)
-        c->sensors[i] = frame->sensors[npg_spread_index(i, c->count, c->of)];
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, c->points, c->count);
     return NPG_OK;
 }
@@ -173,7 +168,6 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
     npg_seen seen = {.sensors = at,
                      .sensor_count = frame->sensor_count,
                      .points = c->points,
-                     .which = c->sensors,
                      .point_count = c->count,
                      .bin = EMPTY_BIN * s->spacing,
                      .margin = EMPTY_MARGIN * s->spacing + EMPTY_NOISE * s->noise};
@@ -349,11 +343,12 @@ static bool takes_part(const npg_worker *worker)
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    size_t points = facts->point_count_max < POINTS_MOST ? facts->point_count_max : POINTS_MOST;
+    size_t points =
+        facts->point_count_max < NPG_FUSED_FRAME_MOST ? facts->point_count_max : NPG_FUSED_FRAME_MOST;
     *chunks_held = 1;
     size_t hues =
         npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(HUES_MOST);
-    size_t empty = facts->sensor_count_max ? npg_empty_cells_memory(EMPTY_MOST) + points : 0;
+    size_t empty = facts->sensor_count_max ? npg_empty_cells_memory(EMPTY_MOST) : 0;
     return empty + hues + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
 }

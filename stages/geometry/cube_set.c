@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "pipeline/memory.h"
+#include "pipeline/order.h"
 
 #define BITS 21 /* of a key, per axis */
 
@@ -24,12 +25,6 @@ static uint64_t key_of(const double at[3])
     return key;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
 npg_status npg_cube_set_open(npg_cube_set **out, const float *middles, size_t count, double side)
 {
     npg_cube_set *s;
@@ -43,7 +38,7 @@ npg_status npg_cube_set_open(npg_cube_set **out, const float *middles, size_t co
         for (int a = 0; a < 3; a++) at[a] = floor((double)middles[3 * s->count + (size_t)a] / side);
         s->keys[s->count] = key_of(at);
     }
-    if (!status && count) qsort(s->keys, count, sizeof *s->keys, by_value);
+    if (!status && count) qsort(s->keys, count, sizeof *s->keys, npg_order_uint64);
     if (status) npg_cube_set_close(&s);
     *out = s;
     return status;
@@ -77,7 +72,7 @@ double npg_cube_set_value(const npg_cube_set *s, const float place[3])
             weight *= upper ? share[a] : 1 - share[a];
         }
         uint64_t key = key_of(at);
-        if (weight > 0 && bsearch(&key, s->keys, s->count, sizeof key, by_value)) sum += weight;
+        if (weight > 0 && bsearch(&key, s->keys, s->count, sizeof key, npg_order_uint64)) sum += weight;
     }
     return sum;
 }

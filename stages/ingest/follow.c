@@ -107,6 +107,7 @@ size_t npg_follow_late_count(const npg_follow *follow)
 {
     return follow->late_count;
 }
+
 size_t npg_follow_digits(const npg_follow *follow)
 {
     return follow->number_place;
@@ -230,7 +231,7 @@ static bool end_file_is_there(const npg_follow *follow, npg_status *status)
     if (!follow->settings.end_name[0]) return false;
     *status = npg_join_path(&path, follow->folder, follow->settings.end_name);
     if (*status) return false;
-    bool is_there = access(path, F_OK) == 0;
+    bool is_there = npg_is_there(path);
     npg_release(&path);
     return is_there;
 }

@@ -1,7 +1,6 @@
 /* Frame store: entries in memory or on disk. */
 #include "ingest/frame_store.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -9,6 +8,8 @@
 #include <string.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
+
+#include "pipeline/file.h"
 
 #define ROW         (3 * sizeof(float))
 #define COLOUR      4 /* bytes of a point's colour; of its sensor's index it is one */
@@ -137,14 +138,9 @@ static off_t write_bytes(npg_frame_store *s, const void *data, size_t size)
 {
     off_t at = s->file_bytes;
     if (!may_write(s, (off_t)size)) return NOT_ON_DISK;
-    for (size_t done = 0; done < size;) {
-        ssize_t put = pwrite(s->file, (const char *)data + done, size - done, at + (off_t)done);
-        if (put < 0 && errno == EINTR) continue;
-        if (put <= 0) {
-            npg_release(&s->folder);
-            return NOT_ON_DISK;
-        }
-        done += (size_t)put;
+    if (!npg_write_at(s->file, data, size, at)) {
+        npg_release(&s->folder);
+        return NOT_ON_DISK;
     }
     s->file_bytes += (off_t)size;
     return at;
@@ -155,15 +151,8 @@ static void *read_bytes(const npg_frame_store *s, off_t at, size_t size)
 {
     char *data;
     if (npg_alloc(&data, NPG_FOR_FRAMES, size)) return NULL;
-    for (size_t done = 0; done < size;) {
-        ssize_t got = pread(s->file, data + done, size - done, at + (off_t)done);
-        if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) {
-            npg_release(&data);
-            return NULL;
-        }
-        done += (size_t)got;
-    }
+    size_t got = size;
+    if (!npg_read_at(s->file, data, &got, at) || got < size) npg_release(&data);
     return data;
 }
 

@@ -1,7 +1,6 @@
 /* Input log: what came from a live source, frame by frame. */
 #include "ingest/input_log.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -9,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "pipeline/file.h"
 #include "pipeline/json_lines.h"
 
 /* Where the line of a frame that was selected ends. */
@@ -216,18 +216,6 @@ npg_input_entry *npg_input_log_entries(const npg_input_log *log, size_t *count)
 
 /* ---- writing ---- */
 
-static npg_status append(npg_input_log *log, const char *text, size_t size)
-{
-    for (size_t at = 0; at < size;) {
-        ssize_t written = pwrite(log->fd, text + at, size - at, (off_t)log->bytes + (off_t)at);
-        if (written < 0 && errno == EINTR) continue;
-        if (written == 0) errno = ENOSPC;
-        if (written <= 0) return npg_error_errno(NPG_DISK, "can't write %s", log->path);
-        at += (size_t)written;
-    }
-    return NPG_OK;
-}
-
 npg_status npg_input_log_add(npg_input_log *log, const npg_input_entry *entry)
 {
     json_t *line = json_of_entry(entry);
@@ -236,11 +224,11 @@ npg_status npg_input_log_add(npg_input_log *log, const npg_input_entry *entry)
     if (!text) return npg_error(NPG_MEMORY, "no memory for the line of frame %lld", (long long)entry->number);
     size_t size = strlen(text);
     text[size] = '\n'; /* in the place of the final 0: the size goes along */
-    npg_status status = append(log, text, size + 1);
+    bool is_written = npg_write_at(log->fd, text, size + 1, log->bytes);
     free(text);
-    NPG_TRY(status);
+    if (!is_written) return npg_error_errno(NPG_DISK, "can't write %s", log->path);
     pthread_mutex_lock(&log->lock);
-    status = note_line(log, entry->index, size + 1);
+    npg_status status = note_line(log, entry->index, size + 1);
     pthread_mutex_unlock(&log->lock);
     return status;
 }

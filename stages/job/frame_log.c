@@ -1,7 +1,6 @@
 /* Frame log: one line for every frame whose results are on disk. */
 #include "job/frame_log.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -163,13 +162,8 @@ static npg_status add_place(npg_frame_log *list, int64_t index, size_t size)
 
 static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
 {
-    for (size_t at = 0; at < size;) {
-        ssize_t written = pwrite(list->fd, text + at, size - at, list->size + (off_t)at);
-        if (written < 0 && errno == EINTR) continue;
-        if (written == 0) errno = ENOSPC;
-        if (written <= 0) return npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
-        at += (size_t)written;
-    }
+    if (!npg_write_at(list->fd, text, size, list->size))
+        return npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
     return add_place(list, index, size);
 }
 

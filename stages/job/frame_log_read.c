@@ -81,7 +81,7 @@ npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lin
     char *whole, *partial = NULL;
     NPG_TRY(npg_join_path(&whole, output, "frames.jsonl"));
     npg_status status = npg_join_path(&partial, output, NPG_FRAME_LOG_NAME);
-    bool is_whole = !status && access(whole, F_OK) == 0;
+    bool is_whole = !status && npg_is_there(whole);
     if (!status) status = shorten(is_whole ? whole : partial, partial, below, lines, bytes);
     if (!status && is_whole && unlink(whole)) status = npg_error_errno(NPG_DISK, "can't remove %s", whole);
     npg_release(&whole);

@@ -132,8 +132,9 @@ npg_status npg_job_remove_new_poses(const npg_job *job); /* also where there are
  * npg_release().  They go when there is a state to resume from. */
 npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass);
 
-/* Of options and input: what of an earlier run has the same key is of the same job. */
-uint64_t npg_job_key(const npg_job *job);
+/* Hash of options and input, to be asked before the job is written: what of an earlier run has the same is of
+ * the same job. */
+npg_status npg_job_key(const npg_job *job, uint64_t *key);
 
 /* Block of a state: what stage align needs (npg_frame.align_state). */
 #define NPG_BLOCK_ALIGN     "align"

@@ -30,7 +30,6 @@ struct npg_job {
     char *output, *folder; /* owned */
     int lock_fd;
     json_t *then, *now;   /* owned; what an earlier run was made of, and this one; NULL once written */
-    uint64_t key;         /* hash of `now` */
     int64_t frame_count;  /* of the input, gaps included */
     npg_archive *archive; /* owned */
     char *grids_path;     /* of the archive, owned */
@@ -307,7 +306,7 @@ static npg_status open_inside(npg_job *job, npg_worker *worker, bool with_log)
     int64_t after = -1;
     char *path;
     NPG_TRY(npg_job_inside_path(job, &path));
-    bool is_there = access(path, F_OK) == 0;
+    bool is_there = npg_is_there(path);
     npg_status status = is_there ? npg_archive_open(&archive, path) : NPG_END;
     if (!status) status = npg_archive_get(archive, "after", &after, sizeof after);
     if (!status && after != (job->archive ? job->serial : -1)) status = NPG_END;
@@ -345,20 +344,30 @@ npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass)
     return npg_join_path(path, job->folder, name);
 }
 
-uint64_t npg_job_key(const npg_job *job)
+npg_status npg_job_key(const npg_job *job, uint64_t *key)
 {
-    return job->key;
+    char *text = json_dumps(job->now, JSON_COMPACT | JSON_SORT_KEYS);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for the job's description");
+    *key = XXH3_64bits(text, strlen(text));
+    free(text);
+    return NPG_OK;
 }
 
-npg_status npg_job_keep_poses(const npg_job *job)
+/* What was written under another name while an earlier run's file had this one. */
+static npg_status rename_file(const npg_job *job, const char *name, const char *new_name)
 {
     char *from, *to = NULL;
-    NPG_TRY(npg_job_poses_path(job, &from, true));
-    npg_status status = npg_job_poses_path(job, &to, false);
+    NPG_TRY(npg_join_path(&from, job->folder, name));
+    npg_status status = npg_join_path(&to, job->folder, new_name);
     if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
     npg_release(&from);
     npg_release(&to);
     return status;
+}
+
+npg_status npg_job_keep_poses(const npg_job *job)
+{
+    return rename_file(job, POSES_NEW, POSES_NAME);
 }
 
 npg_status npg_job_remove_new_poses(const npg_job *job)
@@ -374,14 +383,7 @@ npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new)
 /* The log is open: what is added to it goes on under the new name. */
 static npg_status keep_inputs(const npg_job *job)
 {
-    char *from, *to = NULL;
-    if (!job->source) return remove_file(job, INPUTS_NAME);
-    NPG_TRY(npg_job_inputs_path(job, &from, true));
-    npg_status status = npg_job_inputs_path(job, &to, false);
-    if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
-    npg_release(&from);
-    npg_release(&to);
-    return status;
+    return job->source ? rename_file(job, INPUTS_NEW, INPUTS_NAME) : remove_file(job, INPUTS_NAME);
 }
 
 int64_t npg_job_serial(const npg_job *job)
@@ -476,15 +478,6 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     return NPG_OK;
 }
 
-static npg_status hash_description(uint64_t *hash, const json_t *description)
-{
-    char *text = json_dumps(description, JSON_COMPACT | JSON_SORT_KEYS);
-    if (!text) return npg_error(NPG_MEMORY, "no memory for the job's description");
-    *hash = XXH3_64bits(text, strlen(text));
-    free(text);
-    return NPG_OK;
-}
-
 static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, bool restart, bool append)
 {
     job->lock_fd = -1;
@@ -497,7 +490,6 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
     job->frame_count = (int64_t)json_array_size(json_object_get(job->now, "frames"));
-    NPG_TRY(hash_description(&job->key, job->now));
     if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
     NPG_TRY(npg_make_folder(job->folder));
     NPG_TRY(take_lock(job));

@@ -149,7 +149,7 @@ static npg_status describe_option_files(json_t *files, const npg_options *option
     for (size_t i = 0; i < sizeof file_options / sizeof *file_options; i++) {
         const char *path = npg_options_get(options, file_options[i]);
         json_t *file = json_object();
-        npg_status status = path && access(path, F_OK) == 0 ? describe_file(file, path) : NPG_OK;
+        npg_status status = path && npg_is_there(path) ? describe_file(file, path) : NPG_OK;
         if (json_object_size(file)) json_object_set(files, file_options[i], file);
         json_decref(file);
         if (status && status != NPG_BAD_INPUT) return status; /* the stage says what is wrong with it */

@@ -493,12 +493,12 @@ static npg_status flush(npg_worker *worker)
 static void uninit(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
+    if (state->held.lock) pthread_mutex_destroy(&state->lock);
     npg_look_ahead_clear(&state->held);
     npg_likeness_close(&state->likeness);
     npg_choose_pass_clear(&state->choosing);
     npg_release(&state->cells);
     npg_release(&state->diagonals);
-    if (state->held.lock) pthread_mutex_destroy(&state->lock);
 }
 
 /* Of a state on disk: the plan and the box are facts. */

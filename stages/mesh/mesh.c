@@ -152,7 +152,7 @@ static npg_status take_frame_points(making *m)
 {
     const npg_frame *frame = m->frame;
     size_t n = frame->point_count;
-    size_t most = npg_worker_pass(m->worker) == NPG_PASS_FUSE ? NPG_COST_START_POINTS : POINTS_MAX;
+    size_t most = npg_worker_pass(m->worker) == NPG_PASS_FUSE ? NPG_START_POINTS_MOST : POINTS_MAX;
     m->count = n < most ? n : most;
     NPG_TRY(npg_alloc_array(&m->points, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_MESH, m->count, 3 * sizeof(float)));
@@ -671,7 +671,7 @@ static double mesh_expects(const npg_worker *worker, npg_pass pass)
     bool from_all = pass == NPG_PASS_SOLVE && (facts->fuse_left || npg_worker_fact(worker, &npg_fact_fused));
     if (pass == NPG_PASS_CHOOSE || facts->own_verts) return 0;
     return npg_cost_surface_s(from_all ? fmin(points * (double)facts->frame_count, NPG_COST_FUSED_POINTS)
-                                       : fmin(points, NPG_COST_START_POINTS));
+                                       : fmin(points, NPG_START_POINTS_MOST));
 }
 
 const npg_stage npg_stage_mesh = {.name = "mesh",

@@ -12,24 +12,9 @@
 #include <time.h>
 
 #include "neupig.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/group_folder.h"
 
 enum { FRAMES = 26, POINTS = 400, FIRST = 100, STEP = 10 };
-
-static temp_folder folder;
-
-static int open_folder(void **state)
-{
-    (void)state;
-    return open_temp_folder(&folder);
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    close_temp_folder(&folder);
-    return npg_memory_used() ? -1 : 0;
-}
 
 /* ---- a run ---- */
 

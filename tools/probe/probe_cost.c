@@ -82,7 +82,7 @@ static double measure_flops(void)
 static double aligned_work_s(const npg_probe *probe, const npg_cost_basis *basis, size_t most)
 {
     const double per_read_point = 2e-6, frames = (double)probe->frames, points = (double)probe->point_total;
-    double first = fmin((double)most, NPG_COST_START_POINTS);
+    double first = fmin((double)most, NPG_START_POINTS_MOST);
     double pass_s = npg_cost_pass_s(frames, points / fmax(frames, 1), npg_probe_step(probe));
     double work_s = per_read_point * points +
                     npg_cost_choice_s((double)most, probe->with_normals == probe->frames) +

@@ -5,14 +5,9 @@
 #include <stdlib.h>
 
 #include "geometry/geometry.h"
+#include "pipeline/order.h"
 
 enum { KEPT = 5000, ASKED = 500, LEAST = 50 };
-
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
 
 /* Thin a frame to KEPT points, spread over it, and leave out what is not finite. */
 static npg_status thin_frame(float **points, size_t *count, const npg_frame *frame)
@@ -35,7 +30,7 @@ static double figure_diagonal(const float *points, size_t n, float *row)
     double sum = 0;
     for (size_t k = 0; k < 3; k++) {
         for (size_t i = 0; i < n; i++) row[i] = points[3 * i + k];
-        qsort(row, n, sizeof *row, compare_floats);
+        qsort(row, n, sizeof *row, npg_order_float);
         double side = (double)row[n - 1 - n / 100] - (double)row[n / 100];
         sum += side * side;
     }
@@ -56,7 +51,7 @@ static npg_status measure_step(double *step, const float *from, size_t from_coun
     npg_status status = npg_kdtree_nearest(tree, nearest, dist_sq, asked, n, 1, 1);
     npg_kdtree_close(&tree);
     if (status) return status;
-    qsort(dist_sq, n, sizeof *dist_sq, compare_floats);
+    qsort(dist_sq, n, sizeof *dist_sq, npg_order_float);
     *step = diagonal > 0 ? sqrt((double)dist_sq[n * 9 / 10]) / diagonal : -1;
     return NPG_OK;
 }

@@ -90,7 +90,7 @@ static npg_status load(npg_segments *s, const char *name)
     json_error_t error;
     NPG_TRY(npg_join_path(&path, s->output, name));
     npg_status status = NPG_OK;
-    json_t *saved = access(path, F_OK) == 0 ? json_load_file(path, 0, &error) : json_null();
+    json_t *saved = npg_is_there(path) ? json_load_file(path, 0, &error) : json_null();
     if (!saved)
         status =
             npg_error(NPG_USAGE, "%s is damaged (%s); --restart discards what is there", path, error.text);

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "export/forms/write_obj.h"
+#include "pipeline/file.h"
 
 npg_status npg_cache_check(const char *form, const npg_form_facts *facts)
 {
@@ -51,7 +52,7 @@ static npg_status write_reference(const npg_form_facts *facts)
     char *path;
     NPG_TRY(npg_join_path(&path, facts->output, "reference.obj"));
     npg_status status = NPG_OK;
-    if (access(path, F_OK) != 0) { /* the other point cache may have made it in this pass */
+    if (!npg_is_there(path)) { /* the other point cache may have made it in this pass */
         status = npg_write_obj_pose(path, facts, facts->rest, NULL, NULL);
         if (!status) status = npg_form_made(facts->log, "obj", "reference.obj", facts->first_index, 1);
     }
