@@ -35,7 +35,8 @@ typedef struct waiting {
     npg_frame frame;
     double *pose;            /* K x 12 */
     float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
-    size_t point_count;
+    float *sensors;          /* unit; where they are not known NULL */
+    npg_tracker_cloud cloud; /* all of these */
     npg_tracked tracked;
     bool is_known; /* starts from the pose that the pass before found */
 } waiting;
@@ -96,6 +97,7 @@ static void clear_waiting(waiting *w)
     npg_release(&w->pose);
     npg_release(&w->points);
     npg_release(&w->normals);
+    npg_release(&w->sensors);
 }
 
 static void uninit(npg_worker *worker)
@@ -396,13 +398,19 @@ static npg_status take_points(const npg_worker *worker, waiting *w)
 {
     const state *s = npg_worker_state(worker);
     const npg_frame *frame = &w->frame;
+    const npg_frame_box *box = &npg_worker_facts(worker)->box;
     size_t most = POINTS_MOST * (size_t)s->samples;
-    w->point_count = frame->point_count < most ? frame->point_count : most;
-    if (!w->point_count) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&w->points, NPG_FOR_FIT, w->point_count, 3 * sizeof(float)));
-    if (frame->normals) NPG_TRY(npg_alloc_array(&w->normals, NPG_FOR_FIT, w->point_count, 3 * sizeof(float)));
+    size_t count = frame->point_count < most ? frame->point_count : most;
+    if (!count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&w->points, NPG_FOR_FIT, count, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&w->normals, NPG_FOR_FIT, count, 3 * sizeof(float)));
     npg_points_spread(w->points, w->normals, most, frame->pos_local, frame->normals, frame->point_count);
-    npg_box_local_to_unit(&npg_worker_facts(worker)->box, w->points, w->points, w->point_count);
+    npg_box_local_to_unit(box, w->points, w->points, count);
+    if (frame->sensor_count) {
+        NPG_TRY(npg_alloc_array(&w->sensors, NPG_FOR_FIT, frame->sensor_count, 3 * sizeof(float)));
+        npg_box_local_to_unit(box, w->sensors, frame->sensor_local, frame->sensor_count);
+    }
+    w->cloud = (npg_tracker_cloud){w->points, w->normals, count, w->sensors, frame->sensor_count};
     return NPG_OK;
 }
 
@@ -422,16 +430,15 @@ static npg_status fit_pose(npg_worker *worker, waiting *w, side *at)
     const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
                                       AGAIN_WIDTH, 1};
     NPG_TRY(start_from_known(s, w, at));
-    if (w->point_count) {
-        NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, w->points, w->normals, w->point_count,
-                                w->is_known ? &again : NULL));
+    if (w->cloud.count) {
+        NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, w->is_known ? &again : NULL));
         npg_worker_log(worker, NPG_LOG_DEBUG, w->frame.number,
                        "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps",
                        w->tracked.point_dist_mean, w->tracked.chamfer, w->tracked.steps);
     }
     memcpy(w->pose, at->now, pose_bytes(s));
     at->now_tracked = w->tracked;
-    at->has_now = w->point_count > 0;
+    at->has_now = w->cloud.count > 0;
     return NPG_OK;
 }
 
@@ -472,20 +479,20 @@ static int by_index(const void *a, const void *b)
 /* The frames that wait and, as fixed ones, the last two of either side. */
 static size_t list_frames(const state *s, npg_recover_frame *frames)
 {
+    const npg_tracker_cloud known = {.count = 1};
     size_t count = 0;
     for (size_t i = 0; i < s->group_count; i++) {
         const waiting *w = &s->group[i];
-        frames[count++] = (npg_recover_frame){w->frame.index, w->pose,        w->tracked, w->points,
-                                              w->normals,     w->point_count, false};
+        frames[count++] = (npg_recover_frame){w->frame.index, w->pose, w->tracked, w->cloud, false};
     }
     for (int d = 0; d < 2; d++) {
         const side *at = &s->sides[d];
         int64_t away = d ? 1 : -1;
         if (at->has_now) /* the key, which both sides begin with, once */
-            frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, NULL, NULL, 1, true};
+            frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, known, true};
         if (at->has_now && at->has_before && at->before_tracked.steps)
             frames[count++] =
-                (npg_recover_frame){at->index + away, at->before, at->before_tracked, NULL, NULL, 1, true};
+                (npg_recover_frame){at->index + away, at->before, at->before_tracked, known, true};
     }
     qsort(frames, count, sizeof *frames, by_index);
     size_t kept = 0;
@@ -552,7 +559,7 @@ static npg_status recover_group(npg_worker *worker)
 
 static void add_to_report(state *s, const waiting *w)
 {
-    if (!w->point_count) return;
+    if (!w->cloud.count) return;
     s->sum.frames++;
     s->sum.dist_sum += w->tracked.point_dist_mean;
     if (w->tracked.point_dist_mean <= s->sum.worst_dist) return;

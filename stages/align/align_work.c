@@ -68,7 +68,8 @@ static npg_status align_frame(void *user)
     aligning *a = user;
     npg_tracked tracked;
     npg_pose_rest(a->pose, npg_tracker_node_count(a->tracker));
-    return npg_tracker_fit(a->tracker, &tracked, a->pose, a->points, NULL, a->point_count, NULL);
+    const npg_tracker_cloud cloud = {.points = a->points, .count = a->point_count};
+    return npg_tracker_fit(a->tracker, &tracked, a->pose, &cloud, NULL);
 }
 
 npg_status npg_align_frame_work(npg_mesh *reference, const float *points, size_t point_count,

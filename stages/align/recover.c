@@ -47,7 +47,7 @@ typedef struct recovery {
 
 static bool is_known(const npg_recover_frame *frame)
 {
-    return frame->point_count > 0;
+    return frame->cloud.count > 0;
 }
 
 static bool is_lost(const recovery *r, const npg_recover_frame *frame)
@@ -147,8 +147,7 @@ static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *
         npg_pose_extrapolate(r->trial, from->now, from->before, nodes);
     else
         memcpy(r->trial, from->now, bytes);
-    NPG_TRY(npg_tracker_fit(r->tracker, &tracked, r->trial, frame->points, frame->normals, frame->point_count,
-                            from->effort));
+    NPG_TRY(npg_tracker_fit(r->tracker, &tracked, r->trial, &frame->cloud, from->effort));
     r->result->tried++;
     if (tracked.chamfer >= BETTER * frame->tracked.chamfer) return NPG_OK;
     frame->tracked = tracked;
@@ -214,9 +213,9 @@ static npg_status open_recovery(recovery *r)
     NPG_TRY(npg_alloc_array(&r->look_count, NPG_FOR_FIT, r->count, sizeof *r->look_count));
     for (size_t i = 0; i < r->count; i++) {
         const npg_recover_frame *frame = &r->frames[i];
-        if (frame->points)
+        if (frame->cloud.points)
             r->look_count[i] = npg_points_spread(r->looks + i * LOOK_POINTS * 3, NULL, LOOK_POINTS,
-                                                 frame->points, NULL, frame->point_count);
+                                                 frame->cloud.points, NULL, frame->cloud.count);
     }
     return NPG_OK;
 }

@@ -22,9 +22,8 @@ typedef struct npg_recover_frame {
     int64_t index;
     double *pose; /* K x 12 */
     npg_tracked tracked;
-    const float *points, *normals; /* N x 3, unit; N x 3 or NULL                                            */
-    size_t point_count;            /* 0: nothing is known of the frame, its pose is not started from either */
-    bool is_fixed;                 /* of the group before: a place to start from, no more                   */
+    npg_tracker_cloud cloud; /* count 0: nothing is known of the frame, its pose is not started from either */
+    bool is_fixed;           /* of the group before: a place to start from, no more                         */
 } npg_recover_frame;
 
 /* What was done; frames. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "align/block_system.h"
+#include "align/visible.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
@@ -28,6 +29,7 @@
 #define NOISE_WIDTH 2.5    /* mean distances of points that the robust weight is wide at least */
 #define SETTLED     0.01   /* of the graph's radius: a step that moves no node farther ends the fit */
 #define PAIR_WIDTHS 3.0    /* samples farther than so many widths from every point have no pair: a hole */
+#define SEEN_OFFSET 0.004  /* surface nearer than this hides nothing from a sensor */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
 #define LENT_TERMS 0.18
@@ -47,11 +49,12 @@ struct npg_tracker {
     float *vert_pos, *vert_normals; /* W x 3: the pose at work */
     uint32_t *samples;              /* vertices, spread over the surface */
     size_t sample_count;
-    double *step; /* K x 6 */
-    float *rows;  /* K x 16: the pose at work, for many points */
-    bool is_open; /* the surface has a border */
-    double along; /* share of distances along the surface in the fit at work */
-    double size;  /* longest side of the reference against that of the box of all frames */
+    double *step;       /* K x 6 */
+    float *rows;        /* K x 16: the pose at work, for many points */
+    uint8_t *is_border; /* W */
+    bool is_open;       /* the surface has a border */
+    double along;       /* share of distances along the surface in the fit at work */
+    double size;        /* longest side of the reference against that of the box of all frames */
     /* of the frame at work */
     float *targets, *target_normals; /* M x 3 */
     size_t target_count, target_capacity;
@@ -59,6 +62,8 @@ struct npg_tracker {
     uint32_t *start_face;  /* M: where the step before found each point's nearest */
     uint32_t *near;        /* samples: nearest target */
     float *near_sq, *sample_pos;
+    uint8_t *is_seen; /* samples: by a sensor, in the pose at work */
+    npg_visible visible;
 };
 
 size_t npg_tracker_node_count(const npg_tracker *tracker)
@@ -86,9 +91,10 @@ void npg_tracker_close(npg_tracker **slot)
     npg_block_close(&t->system);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->reference);
-    void *all[] = {&t->vert_pos,   &t->vert_normals, &t->samples,        &t->step,
-                   &t->rows,       &t->targets,      &t->target_normals, &t->hits,
-                   &t->start_face, &t->near,         &t->near_sq,        &t->sample_pos};
+    void *all[] = {&t->is_border, &t->vert_pos, &t->vert_normals,   &t->samples, &t->step,
+                   &t->rows,      &t->targets,  &t->target_normals, &t->hits,    &t->start_face,
+                   &t->near,      &t->near_sq,  &t->sample_pos,     &t->is_seen};
+    npg_visible_close(&t->visible);
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -114,10 +120,8 @@ static npg_status open_surface(npg_tracker *t)
 
 static npg_status find_border(npg_tracker *t)
 {
-    npg_manifold manifold;
-    NPG_TRY(npg_mesh_manifold(&manifold, t->mesh));
-    t->is_open = manifold.border_edges > 0;
-    return NPG_OK;
+    NPG_TRY(npg_alloc(&t->is_border, NPG_FOR_FIT, t->mesh->vert_count));
+    return npg_mesh_border(t->is_border, &t->is_open, t->mesh);
 }
 
 static npg_status open_system(npg_tracker *t)
@@ -161,6 +165,8 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     if (!status) status = npg_alloc_array(&t->near, NPG_FOR_FIT, t->sample_count, sizeof(uint32_t));
     if (!status) status = npg_alloc_array(&t->near_sq, NPG_FOR_FIT, t->sample_count, sizeof(float));
     if (!status) status = npg_alloc_array(&t->sample_pos, NPG_FOR_FIT, t->sample_count, 3 * sizeof(float));
+    if (!status) status = npg_alloc_array(&t->is_seen, NPG_FOR_FIT, t->sample_count, 1);
+    if (!status) status = npg_visible_open(&t->visible, t->sample_count);
     if (status) npg_tracker_close(&t);
     *out = t;
     return status;
@@ -259,10 +265,19 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
+/* Whether a point that a sensor saw can be of the surface that is nearest to it: a side that faces a sensor, and
+ * not the border of what is known, beyond which the body goes on. */
+static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, const npg_surface_hit *hit,
+                          const float *point, const double normal[3])
+{
+    return !npg_hit_on_border(hit, t->mesh->faces + 3 * (size_t)hit->face, t->is_border) &&
+           npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, FACING_AWAY);
+}
+
 /* Points -> surface, targets [first, last).  tracked: their share of the mean distance
  * and of the Chamfer distance. */
 static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t first, size_t last,
-                        const double *pose, bool with_normals, double width)
+                        const double *pose, const npg_tracker_cloud *cloud, bool with_normals, double width)
 {
     double sum = 0, squares = 0, share = 1 / (double)t->target_count;
     for (size_t i = first; i < last; i++) {
@@ -275,6 +290,7 @@ static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_
         for (size_t c = 0; c < 3 && with_normals; c++)
             facing += p.normal[c] * (double)t->target_normals[3 * i + c];
         if (facing < FACING_AWAY) continue;
+        if (cloud->sensor_count && !could_be_seen(t, cloud, hit, t->targets + 3 * i, p.normal)) continue;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
         add_pull(t, part, &p, pose, share, width);
@@ -289,6 +305,7 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
 {
     double share = REVERSE / (double)t->sample_count;
     for (size_t s = 0; s < t->sample_count; s++) {
+        if (!t->is_seen[s]) continue;
         size_t v = t->samples[s];
         pull p;
         double facing = 0;
@@ -386,7 +403,7 @@ typedef struct step {
     npg_tracker *t;
     const double *pose;
     const npg_kdtree *tree;
-    const float *points, *normals;
+    const npg_tracker_cloud *cloud;
     double width, stiffness;
     npg_tracked tracked[NPG_BLOCK_PARTS]; /* what each thread sums up */
     bool is_first, is_settling;
@@ -409,13 +426,16 @@ static size_t lent_of(const npg_tracker *t, double share)
 static npg_status find_pairs(void *user, size_t part)
 {
     const step *s = user;
-    const npg_tracker *t = s->t;
+    npg_tracker *t = s->t;
     size_t lent = lent_of(t, LENT_PAIRS);
     if (part == TO_SURFACE) return find_on_surface(s, lent, t->target_count);
     npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
                             t->mesh->face_count);
     npg_rows_gather(t->sample_pos, t->vert_pos, t->samples, t->sample_count);
     NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
+    NPG_TRY(npg_visible_find(&t->visible, t->is_seen, t->surface, s->cloud->sensors, s->cloud->sensor_count,
+                             t->sample_pos, t->samples, t->vert_normals, t->sample_count,
+                             SEEN_OFFSET * t->size));
     return find_on_surface(s, 0, lent);
 }
 
@@ -428,22 +448,26 @@ static npg_status add_terms(void *user, size_t part)
     /* Near its end a fit has its parts in place: what still disagrees is a thin part's other side, which must
      * not keep the points of this one, or a given normal that is wrong.  An open surface lacks other sides,
      * whose points must not pull at what it has. */
-    const float *normals = s->is_settling && !t->is_open ? NULL : s->normals;
+    const float *normals = s->is_settling && !t->is_open ? NULL : s->cloud->normals;
     npg_block_clear(t->system, part);
     add_targets(t, part, &s->tracked[part], is_lent ? 0 : lent, is_lent ? lent : t->target_count, s->pose,
-                normals != NULL, s->width);
+                s->cloud, normals != NULL, s->width);
     if (part == TO_SURFACE) return NPG_OK;
-    add_samples(t, s->pose, s->points, normals, s->width);
+    add_samples(t, s->pose, s->cloud->points, normals, s->width);
     add_edges(t, s->pose, s->stiffness);
     return NPG_OK;
 }
 
-/* Surface -> points: its part of the Chamfer distance. */
+/* Surface -> points: its part of the Chamfer distance, of what could be seen. */
 static double samples_chamfer(const npg_tracker *t)
 {
     double sum = 0;
-    for (size_t i = 0; i < t->sample_count; i++) sum += (double)t->near_sq[i];
-    return sum / (double)t->sample_count;
+    size_t count = 0;
+    for (size_t i = 0; i < t->sample_count; i++) {
+        sum += t->is_seen[i] ? (double)t->near_sq[i] : 0;
+        count += t->is_seen[i];
+    }
+    return count ? sum / (double)count : 0;
 }
 
 static npg_status gather(step *s)
@@ -485,18 +509,18 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     return NPG_OK;
 }
 
-npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const float *points,
-                           const float *normals, size_t point_count, const npg_tracker_effort *effort)
+npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_tracker_cloud *cloud,
+                           const npg_tracker_effort *effort)
 {
     const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START, 1};
     npg_kdtree *tree;
-    NPG_REQUIRE(point_count);
-    t->target_count =
-        npg_points_spread(t->targets, t->target_normals, t->settings.samples, points, normals, point_count);
-    NPG_TRY(npg_kdtree_open(&tree, points, point_count));
+    NPG_REQUIRE(cloud->count);
+    t->target_count = npg_points_spread(t->targets, t->target_normals, t->settings.samples, cloud->points,
+                                        cloud->normals, cloud->count);
+    NPG_TRY(npg_kdtree_open(&tree, cloud->points, cloud->count));
     *tracked = (npg_tracked){0};
     npg_status status = NPG_OK;
-    step s = {.t = t, .pose = pose, .tree = tree, .points = points, .normals = normals};
+    step s = {.t = t, .pose = pose, .tree = tree, .cloud = cloud};
     if (!effort) effort = &usual;
     t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {

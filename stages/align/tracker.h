@@ -44,6 +44,15 @@ size_t npg_tracker_node_count(const npg_tracker *tracker);
 const npg_graph *npg_tracker_graph(const npg_tracker *tracker);
 const npg_mesh *npg_tracker_reference(const npg_tracker *tracker);
 
+/* What a frame saw, in unit coordinates; loans.  normals (or NULL): points whose normal speaks against the
+ * surface's are left out, but for the last steps with a closed surface. */
+typedef struct npg_tracker_cloud {
+    const float *points, *normals; /* N x 3 */
+    size_t count;                  /* N     */
+    const float *sensors; /* S x 3: where the points were seen from, not finite where one saw nothing */
+    size_t sensor_count;  /* S, 0: not known; the points are taken to be of all sides                 */
+} npg_tracker_cloud;
+
 /* How a fit goes about it. */
 typedef struct npg_tracker_effort {
     int steps;         /* at most                                          */
@@ -52,11 +61,11 @@ typedef struct npg_tracker_effort {
     double along;      /* times the share of distances along the surface   */
 } npg_tracker_effort;
 
-/* Improve pose (K x 12) to explain the points (N x 3, unit; normals N x 3 or NULL: points whose normal speaks
- * against the surface's are left out, but for the last steps with a closed one).
- * effort: NULL for the usual one. */
-npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose, const float *points,
-                           const float *normals, size_t point_count, const npg_tracker_effort *effort);
+/* Improve pose (K x 12) to explain the points, of which there is one at least.  Where it is known where they
+ * were seen from, they are compared with what can be seen of the surface from there (visible.h), and points
+ * beyond its border do not pull; all else is carried by the edges.  effort: NULL for the usual one. */
+npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose,
+                           const npg_tracker_cloud *cloud, const npg_tracker_effort *effort);
 
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);

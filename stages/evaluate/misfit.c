@@ -71,17 +71,11 @@ static npg_status measure_reference(npg_misfit_finder *f)
 static npg_status find_borders(npg_misfit_finder *f)
 {
     const npg_mesh *mesh = f->reference;
-    uint32_t *twins;
+    bool is_open;
     NPG_TRY(npg_alloc_array(&f->is_border, NPG_FOR_MESH, mesh->vert_count, sizeof *f->is_border));
-    NPG_TRY(npg_alloc_array(&twins, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twins));
-    npg_status status = npg_mesh_twins(twins, mesh->faces, mesh->face_count);
-    for (size_t h = 0; h < 3 * mesh->face_count && !status; h++) {
-        if (twins[h] != UINT32_MAX) continue;
-        f->is_closed = false;
-        f->is_border[mesh->faces[h]] = f->is_border[mesh->faces[h - h % 3 + (h + 1) % 3]] = 1;
-    }
-    npg_release(&twins);
-    return status;
+    NPG_TRY(npg_mesh_border(f->is_border, &is_open, mesh));
+    if (is_open) f->is_closed = false;
+    return NPG_OK;
 }
 
 npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, double unseen_share)
@@ -155,13 +149,10 @@ static npg_status link_far(npg_misfit_finder *f, size_t count, double link)
 /* Points beyond the border of a reference that its frame saw in part are of what it did not see. */
 static bool is_far(const npg_misfit_finder *f, const npg_surface_hit *hit, double reach)
 {
-    double dist_sq = (double)hit->dist_sq, beside = BESIDE_SIZE * f->size, on_border = 0;
+    double dist_sq = (double)hit->dist_sq, beside = BESIDE_SIZE * f->size;
     if (!(dist_sq > reach * reach)) return false;
     const uint32_t *face = f->reference->faces + 3 * (size_t)hit->face;
-    for (int k = 0; k < 3; k++)
-        if (f->is_border[face[k]]) on_border += (double)hit->weights[k];
-    /* Weights of 1 on border vertices, but for rounding: the closest point is on the border itself. */
-    return on_border < 0.999 || dist_sq > beside * beside;
+    return !npg_hit_on_border(hit, face, f->is_border) || dist_sq > beside * beside;
 }
 
 static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,

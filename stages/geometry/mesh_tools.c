@@ -213,6 +213,23 @@ static size_t count_distinct(const uint32_t *list, size_t count, uint32_t *seen,
     return distinct;
 }
 
+npg_status npg_mesh_border(uint8_t *is_border, bool *found, const npg_mesh *mesh)
+{
+    uint32_t *twins;
+    bool is_open = false;
+    memset(is_border, 0, mesh->vert_count);
+    NPG_TRY(npg_alloc_array(&twins, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twins));
+    npg_status status = npg_mesh_twins(twins, mesh->faces, mesh->face_count);
+    for (size_t h = 0; h < 3 * mesh->face_count && !status; h++) {
+        if (twins[h] != UINT32_MAX) continue;
+        is_open = true;
+        is_border[mesh->faces[h]] = is_border[mesh->faces[h - h % 3 + (h + 1) % 3]] = 1;
+    }
+    npg_release(&twins);
+    if (found) *found = is_open;
+    return status;
+}
+
 /* Border loops: components of the border's edges, each taken as a face with two equal corners. */
 static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
 {

@@ -27,6 +27,19 @@ void npg_mesh_neighbours_close(npg_mesh_neighbours *neighbours);
  * directions.  twin: F x 3. */
 npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count);
 
+/* is_border (V): whether each vertex lies on the border; *found (or NULL): whether there is one.  NPG_MEMORY. */
+npg_status npg_mesh_border(uint8_t *is_border, bool *found, const npg_mesh *mesh);
+
+/* Whether the closest point of the surface lies on its border: corners are those of the face that was hit. */
+static inline bool npg_hit_on_border(const npg_surface_hit *hit, const uint32_t corners[3],
+                                     const uint8_t *is_border)
+{
+    float on_border = 0;
+    for (int k = 0; k < 3; k++)
+        if (is_border[corners[k]]) on_border += hit->weights[k];
+    return on_border >= 0.999f; /* weights of 1 on border vertices, but for rounding */
+}
+
 /* Component of every vertex (0.. *component_count - 1, in order of first vertex) over the faces; vertices
  * without a face are components of their own. */
 npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, size_t vert_count,

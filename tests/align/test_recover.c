@@ -41,10 +41,9 @@ static void open_capture(capture *c)
         pose_ball(c->points[t], c->ball->vert_pos, VERTS, 0.3 * t);
         for (int i = 0; i < 3 * VERTS; i++)
             c->points[t][i] += (float)(0.02 * (npg_random_real(&random) - 0.5));
-        assert_int_equal(npg_tracker_fit(c->tracker, &tracked, pose, c->points[t], NULL, VERTS, NULL),
-                         NPG_OK);
-        c->frames[t] = (npg_recover_frame){
-            .index = 10 + t, .pose = pose, .tracked = tracked, .points = c->points[t], .point_count = VERTS};
+        const npg_tracker_cloud cloud = {.points = c->points[t], .count = VERTS};
+        assert_int_equal(npg_tracker_fit(c->tracker, &tracked, pose, &cloud, NULL), NPG_OK);
+        c->frames[t] = (npg_recover_frame){.index = 10 + t, .pose = pose, .tracked = tracked, .cloud = cloud};
     }
 }
 
