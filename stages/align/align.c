@@ -23,6 +23,10 @@
 #define AGAIN_STIFFNESS 2    /* of the first step, in final stiffnesses      */
 #define AGAIN_WIDTH     0.02 /* of the first step's robust weight, in units  */
 
+/* Of a frame's points, as a reference that is one side of a body must have places for: frames beyond the first
+ * one that has fewer are not followed while it grows. */
+#define EXPLAINED 0.5
+
 /* What one pass leaves to the next. */
 typedef struct between {
     npg_tracker *tracker; /* of the reference that the poses are of */
@@ -46,6 +50,7 @@ typedef struct side {
     double *now, *before; /* K x 12, owned */
     int64_t index;        /* of now        */
     bool has_now, has_before;
+    bool is_past; /* what a growing reference reaches */
     npg_tracked now_tracked, before_tracked;
 } side;
 
@@ -63,6 +68,7 @@ typedef struct state {
     side ways[2];        /* the same with those that wait                       */
     waiting *group;      /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
+    int64_t past_count;           /* frames that a growing reference does not reach */
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
     struct figures {
@@ -133,6 +139,7 @@ static void strip(side *plain, const side *from)
     plain->index = from->index;
     plain->has_now = from->has_now;
     plain->has_before = from->has_before;
+    plain->is_past = from->is_past;
     plain->now_tracked = from->now_tracked;
     plain->before_tracked = from->before_tracked;
 }
@@ -264,7 +271,8 @@ static npg_status restore_known(npg_worker *worker)
 /* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
 static npg_status drop_if_changed(npg_worker *worker, between *b)
 {
-    if (!b || !npg_facts_has_changed(npg_worker_facts(worker))) return NPG_OK;
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (!b || facts->growing_passes || !npg_facts_has_changed(facts)) return NPG_OK;
     npg_poses_close(&b->poses);
     npg_tracker_close(&b->tracker);
     return remove_new_poses(worker);
@@ -447,6 +455,28 @@ static bool is_read_back(const state *s)
     return s->log && npg_follow_log_has_group(s->log);
 }
 
+/* Whether the reference is a side of the body that this pass adds to. */
+static bool is_growing(const npg_worker *worker, size_t sensor_count)
+{
+    const state *s = npg_worker_state(worker);
+    return npg_worker_pass(worker) == NPG_PASS_FUSE && sensor_count && npg_tracker_is_open(s->tracker);
+}
+
+/* A frame that a growing reference does not reach, nor those beyond it: a pose that is no number says so, in the
+ * log, too. */
+static void leave_past(waiting *w, side *at)
+{
+    at->is_past = true;
+    at->has_now = false;
+    w->pose[0] = (double)NAN;
+    w->cloud.count = 0;
+}
+
+static bool is_past(const waiting *w)
+{
+    return isnan(w->pose[0]);
+}
+
 /* Takes the frame's content. */
 static npg_status align_frame(npg_worker *worker, npg_frame *frame)
 {
@@ -461,8 +491,14 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     NPG_TRY(take_points(worker, w));
     side *at = &s->ways[w->frame.index < facts->plan.key];
     bool is_key = w->frame.index == facts->plan.key;
+    if (at->is_past) {
+        leave_past(w, at);
+        return NPG_OK;
+    }
     if (!is_key) step_on(s, at, w->frame.index);
     NPG_TRY(fit_pose(worker, w, at));
+    if (!is_key && is_growing(worker, w->cloud.sensor_count) && w->tracked.explained < EXPLAINED)
+        leave_past(w, at);
     at->index = w->frame.index;
     if (is_key) copy_side(s, &s->ways[1], at);
     return NPG_OK;
@@ -535,6 +571,17 @@ static bool should_stop(void *worker)
     return npg_worker_stopping(worker);
 }
 
+/* Where frames see a side of the body each, none is tried again: distances differ by what is seen, and the
+ * frames that look most alike are those of a body's front and back. */
+static npg_status move_on(state *s)
+{
+    npg_recover_frame *frames;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
+    move_sides(s, frames, list_frames(s, frames));
+    npg_release(&frames);
+    return NPG_OK;
+}
+
 static npg_status recover_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -569,15 +616,21 @@ static void add_to_report(state *s, const waiting *w)
 
 static npg_status pass_on(npg_worker *worker, waiting *w)
 {
-    const state *s = npg_worker_state(worker);
+    state *s = npg_worker_state(worker);
     const npg_mesh *reference = npg_worker_facts(worker)->reference;
     npg_chunk *chunk;
     npg_frame *frame = &w->frame;
     NPG_TRY(npg_alloc_array(&frame->vert_unit, NPG_FOR_FRAMES, reference->vert_count, 3 * sizeof(float)));
     frame->vert_count = reference->vert_count;
     frame->fields |= NPG_FIELD_POSE;
-    npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
-    if (s->found) NPG_TRY(npg_poses_put(s->found, frame->index, w->pose));
+    if (is_past(w)) {
+        memcpy(frame->vert_unit, reference->vert_pos, reference->vert_count * 3 * sizeof(float));
+        frame->point_count = 0; /* nothing of it can be compared with the surface */
+        s->past_count++;
+    } else {
+        npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
+    }
+    if (s->found && !is_past(w)) NPG_TRY(npg_poses_put(s->found, frame->index, w->pose));
     NPG_TRY(npg_chunk_open(&chunk, 1));
     npg_chunk_add(chunk, frame);
     npg_status status = npg_worker_push(worker, &chunk);
@@ -612,7 +665,9 @@ static npg_status follow_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (is_read_back(s)) return read_back_group(s);
-    NPG_TRY(recover_group(worker));
+    const npg_facts *facts = npg_worker_facts(worker);
+    bool is_of_one_side = facts->growing_passes || is_growing(worker, facts->sensor_count_max);
+    NPG_TRY(is_of_one_side ? move_on(s) : recover_group(worker));
     for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
     return log_group(s);
 }
@@ -674,6 +729,7 @@ static npg_status flush(npg_worker *worker)
     NPG_TRY(close_group(worker, npg_plan_is_open(&npg_worker_facts(worker)->plan)));
     report_progress(worker);
     NPG_TRY(leave_found(worker));
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) npg_worker_facts(worker)->past_count = s->past_count;
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
     json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));

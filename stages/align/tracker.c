@@ -71,6 +71,11 @@ size_t npg_tracker_node_count(const npg_tracker *tracker)
     return tracker->graph->node_count;
 }
 
+bool npg_tracker_is_open(const npg_tracker *tracker)
+{
+    return tracker->is_open;
+}
+
 const npg_graph *npg_tracker_graph(const npg_tracker *tracker)
 {
     return tracker->whole;
@@ -274,29 +279,35 @@ static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, 
            npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, FACING_AWAY);
 }
 
-/* Points -> surface, targets [first, last).  tracked: their share of the mean distance
- * and of the Chamfer distance. */
-static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t first, size_t last,
-                        const double *pose, const npg_tracker_cloud *cloud, bool with_normals, double width)
+/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the Chamfer
+ * distance; *compared_count: those of them that can be of the surface at all. */
+static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t *compared_count,
+                        size_t first, size_t last, const double *pose, const npg_tracker_cloud *cloud,
+                        bool with_normals, double width)
 {
+    size_t compared = 0, explained = 0;
     double sum = 0, squares = 0, share = 1 / (double)t->target_count;
     for (size_t i = first; i < last; i++) {
         const npg_surface_hit *hit = &t->hits[i];
         pull p;
+        hit_normal(p.normal, t, hit);
+        if (cloud->sensor_count && !could_be_seen(t, cloud, hit, t->targets + 3 * i, p.normal)) continue;
+        compared++;
         sum += sqrt((double)hit->dist_sq);
         squares += (double)hit->dist_sq;
-        hit_normal(p.normal, t, hit);
         double facing = 0;
         for (size_t c = 0; c < 3 && with_normals; c++)
             facing += p.normal[c] * (double)t->target_normals[3 * i + c];
         if (facing < FACING_AWAY) continue;
-        if (cloud->sensor_count && !could_be_seen(t, cloud, hit, t->targets + 3 * i, p.normal)) continue;
+        explained += (double)hit->dist_sq <= PAIR_WIDTHS * PAIR_WIDTHS * width * width;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
         add_pull(t, part, &p, pose, share, width);
     }
     tracked->point_dist_mean = sum * share;
     tracked->chamfer = squares * share;
+    tracked->explained = (double)explained * share;
+    *compared_count = compared;
 }
 
 /* Surface -> points, for samples whose nearest point is close enough to be theirs. */
@@ -405,7 +416,8 @@ typedef struct step {
     const npg_kdtree *tree;
     const npg_tracker_cloud *cloud;
     double width, stiffness;
-    npg_tracked tracked[NPG_BLOCK_PARTS]; /* what each thread sums up */
+    npg_tracked tracked[NPG_BLOCK_PARTS]; /* what each thread sums up ... */
+    size_t compared[NPG_BLOCK_PARTS];     /* ... over so many targets     */
     bool is_first, is_settling;
 } step;
 
@@ -450,8 +462,8 @@ static npg_status add_terms(void *user, size_t part)
      * whose points must not pull at what it has. */
     const float *normals = s->is_settling && !t->is_open ? NULL : s->cloud->normals;
     npg_block_clear(t->system, part);
-    add_targets(t, part, &s->tracked[part], is_lent ? 0 : lent, is_lent ? lent : t->target_count, s->pose,
-                s->cloud, normals != NULL, s->width);
+    add_targets(t, part, &s->tracked[part], &s->compared[part], is_lent ? 0 : lent,
+                is_lent ? lent : t->target_count, s->pose, s->cloud, normals != NULL, s->width);
     if (part == TO_SURFACE) return NPG_OK;
     add_samples(t, s->pose, s->cloud->points, normals, s->width);
     add_edges(t, s->pose, s->stiffness);
@@ -499,8 +511,13 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 {
     npg_tracker *t = s->t;
     NPG_TRY(gather(s));
-    tracked->point_dist_mean = s->tracked[TO_SURFACE].point_dist_mean + s->tracked[TO_POINTS].point_dist_mean;
-    tracked->chamfer = s->tracked[TO_SURFACE].chamfer + s->tracked[TO_POINTS].chamfer + samples_chamfer(t);
+    size_t compared = s->compared[TO_SURFACE] + s->compared[TO_POINTS];
+    double scale = compared && compared < t->target_count ? (double)t->target_count / (double)compared : 1;
+    tracked->point_dist_mean =
+        scale * (s->tracked[TO_SURFACE].point_dist_mean + s->tracked[TO_POINTS].point_dist_mean);
+    tracked->explained = s->tracked[TO_SURFACE].explained + s->tracked[TO_POINTS].explained;
+    tracked->chamfer =
+        scale * (s->tracked[TO_SURFACE].chamfer + s->tracked[TO_POINTS].chamfer) + samples_chamfer(t);
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");

@@ -31,6 +31,7 @@ typedef struct npg_tracker_settings {
 typedef struct npg_tracked {
     double point_dist_mean; /* target points -> surface, mean of distances                        */
     double chamfer;         /* mean of squared distances, points -> surface and surface -> points */
+    double explained;       /* share of the target points that it has a place for                 */
     double change;          /* the last step's largest movement of a node                         */
     int steps;
 } npg_tracked;
@@ -39,6 +40,9 @@ typedef struct npg_tracked {
 npg_status npg_tracker_open(npg_tracker **tracker, npg_mesh *reference, const npg_tracker_settings *settings);
 void npg_tracker_close(npg_tracker **tracker);
 size_t npg_tracker_node_count(const npg_tracker *tracker);
+
+/* Whether the reference has a border. */
+bool npg_tracker_is_open(const npg_tracker *tracker);
 
 /* The graph over the whole reference, and the reference; loans. */
 const npg_graph *npg_tracker_graph(const npg_tracker *tracker);

@@ -13,6 +13,8 @@
 
 struct npg_carry_back {
     npg_mesh *mesh;        /* counted reference; V, F */
+    uint8_t *is_border;    /* V */
+    bool is_open;          /* there is one */
     npg_surface *surface;  /* where it is now */
     float *now, *normals;  /* V x 3: positions and normals there */
     float *turns, *spread; /* V x 9: rotation of the neighbourhood, rows */
@@ -30,6 +32,8 @@ npg_status npg_carry_back_open(npg_carry_back **out, npg_mesh *reference)
     c->mesh = npg_mesh_ref(reference);
     npg_status status =
         npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+    if (!status) status = npg_alloc(&c->is_border, NPG_FOR_MESH, v);
+    if (!status) status = npg_mesh_border(c->is_border, &c->is_open, reference);
     if (!status) status = npg_alloc_array(&c->now, NPG_FOR_MESH, v, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&c->normals, NPG_FOR_MESH, v, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&c->turns, NPG_FOR_MESH, v, 9 * sizeof(float));
@@ -45,9 +49,14 @@ void npg_carry_back_close(npg_carry_back **slot)
     npg_carry_back *c = *slot;
     npg_surface_close(&c->surface);
     npg_mesh_unref(&c->mesh);
-    void *all[] = {&c->now, &c->normals, &c->turns, &c->spread, &c->hits};
+    void *all[] = {&c->is_border, &c->now, &c->normals, &c->turns, &c->spread, &c->hits};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
+}
+
+bool npg_carry_back_is_open(const npg_carry_back *carry)
+{
+    return carry->is_open;
 }
 
 /* ---- rotations ---- */
@@ -163,6 +172,7 @@ static void carry(npg_carried *out, const npg_carry_back *c, const npg_surface_h
     for (int i = 0; i < 3; i++) out->point[i] += out->foot[i];
     out->dist = npg_vec3_lengthf(away);
     out->offset = npg_vec3_dotf(away, facing_now);
+    out->is_beyond = npg_hit_on_border(hit, c->mesh->faces + 3 * (size_t)hit->face, c->is_border);
     out->agreement = normal ? npg_vec3_dotf(normal, facing_now) : 1;
     if (normal)
         turn_back(out->normal, turn, normal);

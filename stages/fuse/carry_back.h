@@ -7,6 +7,8 @@
 #ifndef NPG_CARRY_BACK_H
 #define NPG_CARRY_BACK_H
 
+#include <stdbool.h>
+
 #include "pipeline/mesh.h"
 
 typedef struct npg_carry_back npg_carry_back;
@@ -19,12 +21,16 @@ typedef struct npg_carried {
     float facing[3]; /* the surface's normal at c */
     float offset;    /* (p - c') along the deformed surface's normal */
     float dist;      /* |p - c'| */
+    bool is_beyond;  /* c' is on the surface's border: the point lies past what is known */
     float agreement; /* cosine of the point's normal and the surface's; 1 without one */
 } npg_carried;
 
 /* reference: unit coordinates, with normals; a counted reference is kept.  NPG_MEMORY. */
 npg_status npg_carry_back_open(npg_carry_back **carry, npg_mesh *reference);
 void npg_carry_back_close(npg_carry_back **carry);
+
+/* Whether the reference has a border. */
+bool npg_carry_back_is_open(const npg_carry_back *carry);
 
 /* The surface is now where vert_unit (V x 3) says.  NPG_MEMORY. */
 npg_status npg_carry_back_move(npg_carry_back *carry, const float *vert_unit);

@@ -5,6 +5,11 @@
  * (cells.h); stage mesh makes the next reference from what comes out.  Parts that touch in a frame are told
  * apart by the surface that each point belongs to, so one frame's contact joins nothing.
  *
+ * Where sensors see a side of the body, the reference so far is that side, and open.  It then grows: points that
+ * lie past its border are carried by the border's motion and added, frame by frame outward from the keyframe
+ * for as long as the surface has a place for half of a frame's points (stage align).  The next pass follows what
+ * came out and gets farther, until all frames are reached.
+ *
  * Not in the paper, whose reference is the surface of one frame. */
 #include <math.h>
 #include <stdlib.h>
@@ -14,6 +19,7 @@
 #include "fuse/cells.h"
 #include "fuse/colour_cells.h"
 #include "fuse/empty_cells.h"
+#include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "mesh/denoise.h"
 #include "mesh/fused.h"
@@ -48,6 +54,14 @@
 #define EMPTY_SHARE  0.6    /* of the frames that say anything must say that it is empty, and ... */
 #define EMPTY_FRAMES 2      /* ... so many                                                        */
 
+/* While a reference that is one side of the body grows. */
+#define GROW_SIZE        0.1  /* of its diagonal: so far past its border points are taken to be of the body */
+#define GROW_WEIGHT      0.25 /* of such a point, one on the surface being 1                              */
+#define GROW_PASSES      20   /* at most                                                                  */
+#define DENSE_SPACINGS   1.5  /* of the keyframe's points, or ...                                         */
+#define DENSE_CELLS      4    /* ... sides of a cell, within which a place must have ...                  */
+#define DENSE_NEIGHBOURS 16   /* ... so many others, itself counted: single ones are of other parts       */
+
 enum { FROM_KEY, FROM_ALL };
 
 typedef struct state {
@@ -63,6 +77,8 @@ typedef struct state {
     double spacing, noise;  /* of the keyframe's points */
     double usual;           /* mean of the frames' median distances */
     int64_t frames, misaligned, points, strays;
+    double
+        grow_dist; /* of an open reference that sensors saw: what is so near its border adds to it; else 0 */
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -109,13 +125,16 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
     return NPG_OK;
 }
 
-static npg_status median_dist(double *median, const cloud *c)
+/* Of the points that the surface has a place for, where it grows; without any infinite. */
+static npg_status median_dist(double *median, const cloud *c, bool is_growing)
 {
+    size_t count = 0;
     float *dists;
     NPG_TRY(npg_alloc_array(&dists, NPG_FOR_MESH, c->count, sizeof *dists));
-    for (size_t i = 0; i < c->count; i++) dists[i] = c->carried[i].dist;
-    qsort(dists, c->count, sizeof *dists, npg_order_float);
-    *median = (double)dists[c->count / 2];
+    for (size_t i = 0; i < c->count; i++)
+        if (!is_growing || !c->carried[i].is_beyond) dists[count++] = c->carried[i].dist;
+    qsort(dists, count, sizeof *dists, npg_order_float);
+    *median = count ? (double)dists[count / 2] : HUGE_VAL;
     npg_release(&dists);
     return NPG_OK;
 }
@@ -136,6 +155,10 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
         const npg_carried *p = &c->carried[i];
         bool is_near = (double)p->dist <= near_dist;
         double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
+        if (p->is_beyond && (double)p->dist <= s->grow_dist) {
+            NPG_TRY(npg_cells_add(s->cells, p->point, p->normal, p->point, p->normal, GROW_WEIGHT, frame));
+            continue;
+        }
         if ((double)p->dist > far_dist || p->agreement < (float)AGREEMENT) {
             s->strays++;
             continue;
@@ -193,7 +216,13 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->count));
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));
-    return npg_carry_back_open(&s->carry, facts->reference);
+    NPG_TRY(npg_carry_back_open(&s->carry, facts->reference));
+    if (facts->sensor_count_max && npg_carry_back_is_open(s->carry)) {
+        npg_bounds bounds = npg_bounds_empty();
+        npg_bounds_add_points(&bounds, facts->reference->vert_pos, facts->reference->vert_count);
+        s->grow_dist = GROW_SIZE * npg_bounds_diagonal(&bounds);
+    }
+    return NPG_OK;
 }
 
 static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
@@ -205,7 +234,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     if (c->colours && !s->hues) NPG_TRY(npg_colour_cells_open(&s->hues, HUE_SIDE * s->spacing, HUES_MOST));
     NPG_TRY(npg_carry_back_move(s->carry, frame->vert_unit));
     NPG_TRY(npg_carry_back_points(s->carry, c->carried, c->points, c->normals, c->count));
-    NPG_TRY(median_dist(&median, c));
+    NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
     if (s->frames > 1 && median > MISALIGNED * s->usual) {
         s->misaligned++;
         return NPG_OK;
@@ -228,17 +257,47 @@ static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 
 /* ---- the end of a pass ---- */
 
-static npg_status collect(const state *s, npg_fused *fused)
+/* What grows must hang together: single places past the border are of other parts, carried by a wrong motion. */
+static npg_status drop_scattered(npg_fused *fused, double radius)
 {
+    npg_kdtree *tree;
+    uint32_t *near;
+    float *dist_sq = NULL;
+    size_t n = fused->count, kept = 0;
+    if (n < DENSE_NEIGHBOURS) return NPG_OK;
+    NPG_TRY(npg_kdtree_open(&tree, fused->points, n));
+    npg_status status = npg_alloc_array(&near, NPG_FOR_MESH, n, DENSE_NEIGHBOURS * sizeof *near);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, DENSE_NEIGHBOURS * sizeof *dist_sq);
+    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, fused->points, n, DENSE_NEIGHBOURS, 0);
+    for (size_t i = 0; i < n && !status; i++) {
+        if ((double)dist_sq[(i + 1) * DENSE_NEIGHBOURS - 1] > radius * radius) continue;
+        memmove(fused->points + 3 * kept, fused->points + 3 * i, 3 * sizeof(float));
+        memmove(fused->normals + 3 * kept++, fused->normals + 3 * i, 3 * sizeof(float));
+    }
+    if (!status) fused->count = kept;
+    npg_kdtree_close(&tree);
+    npg_release(&near);
+    npg_release(&dist_sq);
+    return status;
+}
+
+static npg_status collect(npg_worker *worker, npg_fused *fused)
+{
+    const state *s = npg_worker_state(worker);
     size_t most = npg_cells_count(s->cells);
     double least = fmax(FRAMES_AT_LEAST, FRAMES_SHARE * (double)s->frames);
-    int64_t frames_least = s->frames < 2 * FRAMES_AT_LEAST ? 1 : (int64_t)least;
+    /* What is new may be seen by the last frame that is reached alone. */
+    bool is_one_enough = s->frames < 2 * FRAMES_AT_LEAST || npg_worker_facts(worker)->is_growing;
+    int64_t frames_least = is_one_enough ? 1 : (int64_t)least;
     NPG_TRY(npg_alloc_array(&fused->points, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     fused->spacing_unit = npg_cells_side(s->cells);
     fused->key_spacing_unit = s->spacing;
     fused->key_noise_unit = s->noise;
-    return npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least);
+    NPG_TRY(npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least));
+    return s->grow_dist > 0
+               ? drop_scattered(fused, fmax(DENSE_SPACINGS * s->spacing, DENSE_CELLS * fused->spacing_unit))
+               : NPG_OK;
 }
 
 static npg_status collect_hues(const state *s, npg_fused *fused)
@@ -269,7 +328,7 @@ static npg_status publish(npg_worker *worker)
     const state *s = npg_worker_state(worker);
     npg_fused *fused;
     NPG_TRY(npg_alloc(&fused, NPG_FOR_MESH, sizeof *fused));
-    npg_status status = collect(s, fused);
+    npg_status status = collect(worker, fused);
     if (!status) status = collect_hues(s, fused);
     if (!status) status = collect_empty(s, fused);
     if (status) {
@@ -279,6 +338,7 @@ static npg_status publish(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "frames", json_integer(s->frames));
     json_object_set_new(report, "frames_misaligned", json_integer(s->misaligned));
+    json_object_set_new(report, "passes_grown", json_integer(npg_worker_facts(worker)->growing_passes));
     json_object_set_new(report, "points", json_integer(s->points));
     json_object_set_new(report, "points_stray", json_integer(s->strays));
     json_object_set_new(report, "points_fused", json_integer((json_int_t)fused->count));
@@ -301,13 +361,28 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
             s->usable += !frame->is_skipped;
-            if (knows_empty(frame) && frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
+            if (frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
         } else {
             NPG_TRY(gather_frame(worker, frame));
         }
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     return NPG_OK;
+}
+
+/* A side of the body grows until all frames are reached, or two passes in a row have reached no more. */
+static void decide_growth(npg_worker *worker)
+{
+    npg_facts *facts = npg_worker_facts(worker);
+    bool has_gained = !facts->growing_passes || facts->past_count < facts->past_before;
+    facts->passes_in_vain = has_gained ? 0 : facts->passes_in_vain + 1;
+    facts->is_growing = facts->past_count && facts->passes_in_vain < 2 && facts->growing_passes < GROW_PASSES;
+    facts->growing_passes += facts->past_count > 0;
+    facts->past_before = facts->past_count;
+    if (facts->past_count)
+        npg_worker_log(
+            worker, NPG_LOG_INFO, -1, "%lld frames see too much that the reference does not have yet%s",
+            (long long)facts->past_count, facts->is_growing ? ": it grows, and they are followed again" : "");
 }
 
 static npg_status flush(npg_worker *worker)
@@ -319,7 +394,8 @@ static npg_status flush(npg_worker *worker)
         facts->sensor_count_max = s->sensors;
         return NPG_OK;
     }
-    facts->fuse_left--;
+    decide_growth(worker);
+    facts->fuse_left -= !facts->is_growing;
     return publish(worker);
 }
 

@@ -92,7 +92,10 @@ static const npg_option mesh_options[] = {
     {0}};
 /* clang-format on */
 
+#define GROWING_DEPTH 8 /* of the octree while the reference grows: it is to carry frames, no more */
+
 #define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
+#define UNSEEN_IS_LEFT   0.05 /* of that of a reference that has grown: where the body goes on, out of sight */
 
 typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
@@ -222,6 +225,8 @@ static npg_status smooth(making *m)
 static npg_status reconstruct(making *m)
 {
     npg_poisson_settings settings = settings_of(m->state);
+    if (npg_worker_facts(m->worker)->is_growing && settings.depth > GROWING_DEPTH)
+        settings.depth = GROWING_DEPTH;
     settings.should_stop = should_stop;
     settings.user = m->worker;
     if (m->fused) settings.rounds_max = 1; /* the surface that carried them has told their sides */
@@ -259,8 +264,10 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
 {
     double share, seen_dist = SEEN_SPACINGS * m->seen;
     NPG_TRY(npg_mesh_unseen(&share, m->mesh, m->points, m->count, seen_dist));
-    *trim_unseen =
-        m->state->unseen == UNSEEN_TRIM || (m->state->unseen == UNSEEN_AUTO && share > UNSEEN_IS_A_SIDE);
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    double side = facts->growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
+    *trim_unseen = m->state->unseen == UNSEEN_TRIM || facts->is_growing ||
+                   (m->state->unseen == UNSEEN_AUTO && share > side);
     note(m, "unseen_share", share);
     json_object_set_new(npg_worker_report(m->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
@@ -599,10 +606,12 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg
 /* ---- the stage ---- */
 
 /* What all frames saw is one body only where the reference so far explains the capture to its ends: parts
- * that come, go or open belong to no common surface, and hiding them in one would silence the alarm. */
+ * that come, go or open belong to no common surface, and hiding them in one would silence the alarm.  A side of
+ * the body that is growing explains what it has reached, and no more is gathered. */
 static void drop_if_changed(npg_worker *worker, npg_fused **fused)
 {
-    if (!*fused || !npg_facts_has_changed(npg_worker_facts(worker))) return;
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (!*fused || facts->growing_passes || !npg_facts_has_changed(facts)) return;
     npg_worker_log(worker, NPG_LOG_INFO, -1,
                    "the keyframe's surface does not explain all frames: the reference is made from it alone");
     npg_fused_close(fused);

@@ -30,6 +30,7 @@ typedef struct outlier_state {
     double ratio, voxel;
     /* what was found so far, over the pass */
     enum { SENSOR_AUTO, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
+    bool has_found_sensor;
     npg_sensors sensors; /* where given */
     npg_cleaning sum;
     size_t frames, skipped;
@@ -62,9 +63,9 @@ static const npg_option outlier_options[] = {
     NPG_ROW_TEXT  ("sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
         "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file of a "
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
-        "single one, and what lies before the points as seen from there is empty; none: the body is closed, "
-        "and nothing is known; auto: normals point to the origin, if the points look like one view from it, "
-        "and nothing is known of empty space"),
+        "single one, what lies before the points is empty, and surface that can't be seen from there waits for "
+        "frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, if the "
+        "points look like one view from it"),
     {0}};
 /* clang-format on */
 
@@ -152,20 +153,12 @@ static void repair_directions(float *normals, size_t *bad, const float *estimate
     }
 }
 
-/* The one place that all points were seen from, given or found. */
-static npg_status find_sensor(npg_worker *worker, const npg_frame *frame, double sensor[3], bool *has_sensor)
+/* The one place that all points were seen from, given or found.  A rig's own normals face its sensors already. */
+static bool find_sensor(const npg_frame *frame, double sensor[3])
 {
-    const outlier_state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    *has_sensor = s->sensor_kind == SENSOR_GIVEN && frame->sensor_count == 1;
-    for (int a = 0; a < 3; a++)
-        sensor[a] = *has_sensor ? (double)frame->sensor_local[a] : -facts->origin.world[a];
-    if (s->sensor_kind != SENSOR_AUTO) return NPG_OK;
-    NPG_TRY(npg_cloud_is_single_view(has_sensor, frame->pos_local, frame->point_count, sensor));
-    if (*has_sensor)
-        npg_worker_log(worker, NPG_LOG_INFO, frame->number,
-                       "the points look like one view from 0,0,0: normals point there (option sensor)");
-    return NPG_OK;
+    if (frame->sensor_count != 1 || frame->sensors) return false;
+    for (int a = 0; a < 3; a++) sensor[a] = (double)frame->sensor_local[a];
+    return true;
 }
 
 static int neighbours_of(const outlier_state *s)
@@ -178,10 +171,9 @@ static npg_status make_normals(npg_worker *worker, npg_frame *frame)
     const outlier_state *s = npg_worker_state(worker);
     size_t n = frame->point_count;
     double sensor[3];
-    bool has_sensor;
+    bool has_sensor = find_sensor(frame, sensor);
     NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
     frame->cleaning.normals_estimated = n;
-    NPG_TRY(find_sensor(worker, frame, sensor, &has_sensor));
     if (!has_sensor && !s->normal_neighbours) return npg_normals_make(frame->normals, frame->pos_local, n);
     NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, neighbours_of(s)));
     double score;
@@ -197,7 +189,6 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     size_t n = frame->point_count, bad;
     float *estimate;
     double sensor[3];
-    bool has_sensor;
     NPG_TRY(npg_alloc_array(&estimate, NPG_FOR_FRAMES, n, 3 * sizeof *estimate));
     npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, neighbours_of(s));
     if (!status) repair_directions(frame->normals, &bad, estimate, n);
@@ -206,8 +197,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     frame->cleaning.normals_given = n - bad;
     frame->cleaning.normals_estimated = bad;
     if (frame->has_sure_normals && s->sensor_kind == SENSOR_AUTO) return NPG_OK;
-    NPG_TRY(find_sensor(worker, frame, sensor, &has_sensor));
-    if (has_sensor) {
+    if (find_sensor(frame, sensor)) {
         npg_normals_face_sensor(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n,
                                 sensor);
         return NPG_OK;
@@ -244,6 +234,7 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
     }
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
     if (facts->is_live) return true; /* the plan is about to be made behind this stage */
+    if (frame->sensor_count == 1 && !frame->sensors) return true; /* they face it: sure, and needed to grow */
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
     return s->normals_for == FOR_ALL || frame->is_key || is_planned_key;
 }
@@ -296,11 +287,32 @@ static bool is_done(const npg_frame *frame)
     return frame->is_skipped || (frame->fields & NPG_FIELD_CLEAN);
 }
 
-/* As option sensor says; without it those that the frame brings. */
+/* A depth camera's points are in its own coordinates, as a rule. */
+static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
+{
+    outlier_state *s = npg_worker_state(worker);
+    double origin[3];
+    bool is_single;
+    if (is_done(frame) || frame->sensor_count || !frame->point_count) return NPG_OK;
+    for (int a = 0; a < 3; a++) origin[a] = -npg_worker_facts(worker)->origin.world[a];
+    NPG_TRY(npg_cloud_is_single_view(&is_single, frame->pos_local, frame->point_count, origin));
+    if (!is_single) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, 1, 3 * sizeof(float)));
+    frame->sensor_count = 1;
+    for (int a = 0; a < 3; a++) frame->sensor_local[a] = (float)origin[a];
+    if (!s->has_found_sensor)
+        npg_worker_log(worker, NPG_LOG_INFO, frame->number,
+                       "the points look like one view from 0,0,0: taken for a sensor's (option sensor)");
+    s->has_found_sensor = true;
+    return NPG_OK;
+}
+
+/* As option sensor says; without it those that the frame brings, or the origin where it looks like one. */
 static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
-    if (s->sensor_kind == SENSOR_AUTO || frame->is_skipped) return NPG_OK;
+    if (frame->is_skipped) return NPG_OK;
+    if (s->sensor_kind == SENSOR_AUTO) return look_for_sensor(worker, frame);
     npg_release(&frame->sensors);
     npg_release(&frame->sensor_local);
     frame->sensor_count = 0;
