@@ -11,7 +11,7 @@
 
 /* The default settings of the fit (options of the optimize stage). */
 enum { POSITION_LEVELS = 8, BATCH = 4, TIME_CODE = 8 };
-static const npg_mlp_shape decoder = {512, 512, TIME_CODE, 0.01f};
+static const npg_mlp_shape decoder = {512, 512, 2, TIME_CODE, 0.01f};
 
 /* Whom the work is handed to. */
 typedef struct visitor {
@@ -204,7 +204,7 @@ static npg_status visit_moves(const visitor *to, moves *m, const npg_workload *l
 {
     const double T = (double)m->count, V = (double)rows, N = (double)load->point_count;
     const double W = (double)decoder.w1, C = NPG_LATENT_CHANNELS;
-    const double layers = W * W + 7 * W, samples = T * V;
+    const double layers = npg_mlp_multiply_adds(&decoder), samples = T * V;
     NPG_TRY(hand_over(to, "mlp_input", mlp_input, m, 2 * V * C * W, 4 * V * (C + W)));
     NPG_TRY(hand_over(to, "mlp_forward", mlp_forward, m, 2 * samples * layers, 4 * samples * (2 * W + 8)));
     NPG_TRY(hand_over(to, "mlp_backward", mlp_backward, m, 4 * samples * layers, 4 * samples * (4 * W + 8)));
@@ -268,7 +268,7 @@ npg_status npg_decoder_work(npg_device *device, const float *vert_pos, size_t ve
     npg_work work = {.name = "dense_decode",
                      .call = decode,
                      .user = &d,
-                     .flops = 2 * V * (W * W + 7 * W),
+                     .flops = 2 * V * npg_mlp_multiply_adds(&decoder),
                      .bytes = 4 * V * (W + 8 + 9),
                      .vertex_frames = V};
     npg_status status = open_dense(&d, device, vert_pos);
