@@ -24,7 +24,7 @@ size_t npg_mlp_at_weights(const npg_mlp_shape *s, size_t layer)
 }
 size_t npg_mlp_at_head(const npg_mlp_shape *s)
 {
-    return s->layers > 1 ? npg_mlp_at_weights(s, s->layers + 1) : 0;
+    return npg_mlp_at_weights(s, s->layers + 1);
 }
 size_t npg_mlp_at_bias(const npg_mlp_shape *s, size_t layer)
 {

@@ -46,7 +46,7 @@
 /* Offsets (floats) in the parameters, in their gradient and in a group's sums of it; w1t and b1 of op "time" follow
  * in the first two.  AT_W and AT_B are of layer l > 1. */
 #define AT_W(l)        ((l) > 2 ? ((size_t)W1 + ((l) - 3) * (size_t)W2) * W2 : 0)
-#define AT_HEAD        (LAYERS > 1 ? AT_W(LAYERS + 1) : 0)
+#define AT_HEAD        AT_W(LAYERS + 1)
 #define AT_B(l)        (AT_HEAD + (size_t)WLAST * NPG_MLP_HEAD_ROW + ((l) - 2) * (size_t)W2)
 #define AT_HEAD_BIAS   AT_B(LAYERS + 1)
 #define AT_W1Z         (AT_HEAD_BIAS + NPG_MLP_HEAD_ROW)

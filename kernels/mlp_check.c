@@ -16,13 +16,14 @@ typedef struct mlp_data {
     double *out, *grad, *dz, *dcode;
 } mlp_data;
 
-/* Some sizes have one block, some several frames in several batches, some uneven widths. */
+/* Some sizes have one block, some several batches of frames, some uneven widths; all have frames whose sums come
+ * together. */
 static npg_status open_mlp_data(mlp_data *d, size_t block, size_t layers, int size, uint64_t seed)
 {
     npg_random random = npg_random_stream(seed, 12, (uint64_t)size);
     d->shape = (npg_mlp_shape){32 * (size_t)size, size > 1 ? 64 : 32, layers, size == 2 ? 2 : 8, 0.01f};
     d->rows = block * (size > 2 ? 3 : 1);
-    d->frames = size == 1 ? 1 : 5;
+    d->frames = size == 1 ? 2 : 5;
     size_t n = d->param_count = npg_mlp_param_count(&d->shape), samples = d->rows * d->frames;
     NPG_TRY(npg_check_values(&d->params, &d->params_wide, n, 1 / sqrt((double)d->shape.w1), &random));
     NPG_TRY(npg_check_values(&d->z, &d->z_wide, d->rows * CHANNELS, 1, &random));
@@ -76,7 +77,7 @@ static npg_status run_mlp(npg_mlp *mlp, mlp_data *d)
 
 static npg_status compare_mlp(npg_device *device, mlp_data *d, npg_mlp *mlp, npg_buffer *dcode, double *error)
 {
-    NPG_TRY(npg_mlp_open(mlp, device, &d->shape, d->rows, d->frames, d->frames > 1 ? 2 : 1));
+    NPG_TRY(npg_mlp_open(mlp, device, &d->shape, d->rows, d->frames, 2));
     NPG_TRY(npg_buffer_open(dcode, device, d->frames * d->shape.code_size * sizeof(float)));
     NPG_TRY(run_mlp(mlp, d));
     NPG_TRY(npg_mlp_code_back(mlp, dcode));

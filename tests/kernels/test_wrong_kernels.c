@@ -41,7 +41,7 @@ static const struct change {
     {"sobolev", "a = fma(c, vload16(2 * row, in), a)", "a = fma(c, vload16(2 * row, in), 0.99f * a)",
      "sobolev"},
     {"mlp", "sum[j] += a;", "sum[j] -= a;", "mlp"},
-    {"mlp", "LAYERS > 1 ? AT_W(LAYERS + 1) : 0", "AT_W(LAYERS + 1)", "mlp, one layer"},
+    {"mlp", "LAYERS == 1);", "0);", "mlp, one layer"},
     {"mlp", "d = spare;", "", "mlp, deeper"},
     {"mlp", "STORE(adds ? d + LOAD(j, to) : d, j, to)", "STORE(d + LOAD(j, to), j, to)", "mlp"},
     {"mlp", "sum + AT_B(l - 1) : dc1", "sum + AT_B(2) - W2 : dc1", "mlp, deeper"},
