@@ -1,11 +1,11 @@
 /* mlp: the decoder psi of the paper's section on the temporal deformation model.
  *
- *     y = (z(v), gamma(t))        h_1 = f(z W1z + c_t)    h_l = f(h_(l-1) W_l + b_l)    out = h_L W_out + b_out
- *     c_t = gamma(t) W1t + b1     f(x) = x for x > 0, SLOPE x else
+ *     y = (z(v), gamma(t))        h_1 = f(z W1z + c_t)     h_l = f(h_(l-1) W_l + b_l), l = 2 .. L
+ *     c_t = gamma(t) W1t + b1     out = h_L head + bias    f(x) = x for x > 0, SLOPE x else
  *
- * with L hidden layers, l = 2 .. L; the first has W1 units, all others have W2.  The first layer is split: z W1z is
- * computed once per vertex, c_t once per frame (op "time"), and the sum is made when it is needed.  The backward pass
- * forms h_1 again from both rather than keep it; h_2 .. h_L are kept.  With L = 1 the head lies on h_1.
+ * L hidden layers: the first has W1 units, all others have W2.  The first is split: z W1z is computed once
+ * per vertex, c_t once per frame (op "time"), and the sum is made when it is needed.  The backward pass forms
+ * h_1 again from both rather than keep it; h_2 .. h_L are kept.  With L = 1 the head lies on h_1.
  *
  * Layouts.  Vertices come in blocks of ROWS.  A matrix with one row per vertex and C columns is stored in panels:
  * [block][C / 32][ROWS][32], so that all operands of the inner products are contiguous.  Weights K x C are stored
@@ -14,8 +14,9 @@
  * sum over vertices is made per group, in a fixed order, and added over groups by mlp_reduce: equal input and equal
  * constants give equal bits.
  *
- * Build constants: CZ (columns of z, multiple of 32), W1, W2 (multiples of 32), LAYERS (L), SLOPE; and from the tuning of
- * the device ROWS (multiple of MR and HR), MR, VW, NV (VW * NV divides 32), GR (divides 32), HR, LOCAL, SPAN.
+ * Build constants: CZ (columns of z, multiple of 32), W1, W2 (multiples of 32), LAYERS (L), SLOPE; and from
+ * the tuning of the device ROWS (multiple of MR and HR), MR, VW, NV (VW * NV divides 32), GR (divides 32), HR,
+ * LOCAL, SPAN.
  * Padded rows take part in the products; their output gradient must be 0, then they change nothing. */
 
 #define PASTE_(a, b) a##b
@@ -43,14 +44,14 @@
 /* Blocks of WMAX columns that a group computes in: h_1, and gradients before two rectifiers. */
 #define SCRATCH ((LAYERS > 2 ? 3 : 2) * BLOCK(WMAX))
 
-/* Offsets (floats) in the parameters, in their gradient and in a group's sums of it; w1t and b1 of op "time" follow
- * in the first two.  AT_W and AT_B are of layer l > 1. */
-#define AT_W(l)        ((l) > 2 ? ((size_t)W1 + ((l) - 3) * (size_t)W2) * W2 : 0)
-#define AT_HEAD        AT_W(LAYERS + 1)
-#define AT_B(l)        (AT_HEAD + (size_t)WLAST * NPG_MLP_HEAD_ROW + ((l) - 2) * (size_t)W2)
-#define AT_HEAD_BIAS   AT_B(LAYERS + 1)
-#define AT_W1Z         (AT_HEAD_BIAS + NPG_MLP_HEAD_ROW)
-#define AT_END         (AT_W1Z + (size_t)CZ * W1)
+/* Offsets (floats) in the parameters, in their gradient and in a group's sums of it; w1t and b1 of op "time"
+ * follow in the first two.  AT_W and AT_B are of layer l > 1. */
+#define AT_W(l)      ((l) > 2 ? ((size_t)W1 + ((l) - 3) * (size_t)W2) * W2 : 0)
+#define AT_HEAD      AT_W(LAYERS + 1)
+#define AT_B(l)      (AT_HEAD + (size_t)WLAST * NPG_MLP_HEAD_ROW + ((l) - 2) * (size_t)W2)
+#define AT_HEAD_BIAS AT_B(LAYERS + 1)
+#define AT_W1Z       (AT_HEAD_BIAS + NPG_MLP_HEAD_ROW)
+#define AT_END       (AT_W1Z + (size_t)CZ * W1)
 
 /* The same for the transposes; those of W_2 .. W_L lie as they do. */
 #define AT_W1Z_BACK  AT_HEAD
@@ -157,7 +158,8 @@ GROUP_KERNEL mlp_input(global float *p, global const float *z, global const floa
 }
 
 /* out (one block, W2 columns) = f(in w + b), in with K columns. */
-inline void hidden_layer(global float *out, global const float *in, global const float *w, global const float *b, int K)
+inline void hidden_layer(global float *out, global const float *in, global const float *w,
+                         global const float *b, int K)
 {
     FOR_COLUMNS(col, W2)
     {
@@ -178,7 +180,8 @@ inline void hidden_layer(global float *out, global const float *in, global const
 }
 
 /* out (ROWS x 8) = h w + b, h of the last hidden layer; w has rows of 16, columns 7..15 are 0. */
-inline void head_layer(global float *out, global const float *h, global const float *head, global const float *bias)
+inline void head_layer(global float *out, global const float *h, global const float *head,
+                       global const float *bias)
 {
     for (int r0 = ITEM * HR; r0 < ROWS; r0 += LOCAL * HR) {
         float8 acc[HR];
@@ -195,8 +198,8 @@ inline void head_layer(global float *out, global const float *h, global const fl
 }
 
 /* For the frames first_frame ...: out [all frames][blocks * ROWS][8] and, for the backward pass,
- * h [frames][blocks][LAYERS - 1][W2 panels], of layers 2 and up; with keep = 0 h is not kept and has room for G blocks
- * of each.  c: [all frames][W1].  scratch: [G][SCRATCH].  Global size: G groups. */
+ * h [frames][blocks][LAYERS - 1][W2 panels], of layers 2 and up; with keep = 0 h is not kept and has room
+ * for G blocks of each.  c: [all frames][W1].  scratch: [G][SCRATCH].  Global size: G groups. */
 GROUP_KERNEL mlp_forward(global float *out, global float *h, global const float *p, global const float *c,
                          global const float *params, global float *scratch, int blocks, int frames,
                          int first_frame, int keep)
@@ -218,7 +221,7 @@ GROUP_KERNEL mlp_forward(global float *out, global float *h, global const float 
     }
 }
 
-/* What a gradient is put into: the first layer's is added up over frames, those of others stand for themselves. */
+/* A gradient before a rectifier: the first layer's is added up over frames, those of others stand alone. */
 inline void put_gradient(REAL d, int j, global float *to, int adds)
 {
     STORE(adds ? d + LOAD(j, to) : d, j, to);
@@ -252,7 +255,8 @@ inline void head_back(global float *d, global float *db, global const float *dou
 }
 
 /* dhead (rows of 16) += h^T dout, dbias (16) += column sums of dout. */
-inline void head_grad(global float *dhead, global float *dbias, global const float *h, global const float *dout)
+inline void head_grad(global float *dhead, global float *dbias, global const float *h,
+                      global const float *dout)
 {
     if (ITEM == 0) {
         float8 sum = vload8(0, dbias);
@@ -274,8 +278,8 @@ inline void head_grad(global float *dhead, global float *dbias, global const flo
     }
 }
 
-/* From layer l to the one before it, of C units: to (one block) = (d w^T) f'(h), h of that one, and its column sums
- * into db. */
+/* From layer l to the one before it, of C units: to (one block) = (d w^T) f'(h), h of that one, and its
+ * column sums into db. */
 inline void hidden_back(global float *to, global float *db, global const float *d, global const float *h,
                         global const float *transposed, int C, int adds)
 {
@@ -319,17 +323,18 @@ GROUP_KERNEL mlp_backward(global float *dp, global float *sums, global float *dc
     global float *sum = sums + group * AT_END;
     for (int block = group; block < blocks; block += get_num_groups(0))
         for (int frame = 0; frame < frames; frame++) {
-            global const float *dy = dout + ((size_t)(first_frame + frame) * blocks + block) * ROWS * NPG_MLP_OUT;
+            size_t at = first_frame + frame;
+            global const float *dy = dout + (at * blocks + block) * ROWS * NPG_MLP_OUT;
             global const float *mine = h + ((size_t)frame * blocks + block) * KEPT;
             global const float *last = LAYERS > 1 ? mine + AT_KEPT(LAYERS) : h1;
-            global float *d = h1 + BLOCK(WMAX), *spare = d + BLOCK(WMAX); /* take turns; spare with three layers */
-            global float *dp1 = dp + block * BLOCK(W1), *dc1 = dc + (group * all_frames + first_frame + frame) * W1;
-            first_layer(h1, p + block * BLOCK(W1), c + (first_frame + frame) * W1);
+            global float *dp1 = dp + block * BLOCK(W1), *dc1 = dc + (group * all_frames + at) * W1;
+            global float *d = h1 + BLOCK(WMAX), *spare = d + BLOCK(WMAX); /* by turns, from three layers on */
+            first_layer(h1, p + block * BLOCK(W1), c + at * W1);
             if (LAYERS == 1) {
                 SYNC
             }
-            head_back(LAYERS > 1 ? d : dp1, LAYERS > 1 ? sum + AT_B(LAYERS) : dc1, dy, last, transposed + AT_HEAD_BACK,
-                      LAYERS == 1);
+            head_back(LAYERS > 1 ? d : dp1, LAYERS > 1 ? sum + AT_B(LAYERS) : dc1, dy, last,
+                      transposed + AT_HEAD_BACK, LAYERS == 1);
             head_grad(sum + AT_HEAD, sum + AT_HEAD_BIAS, last, dy);
             for (int l = LAYERS; l > 1; l--) {
                 global const float *in = l > 2 ? mine + AT_KEPT(l - 1) : h1;
@@ -384,8 +389,9 @@ inline void transpose_panel(global float *to, global const float *from, int K, i
             to[kp * C + (cp + c) * NPG_PANEL + k] = from[cp * K + (kp + k) * NPG_PANEL + c];
 }
 
-/* The transposes that the backward pass multiplies with, in the order W_2^T (packed W2 x W1), W_3^T .. W_L^T (packed
- * W2 x W2), w1z^T (packed W1 x CZ), head^T (7 x units of the last layer).  Global size: (WMAX / 32, WMAX / 32). */
+/* The transposes that the backward pass multiplies with, in the order W_2^T (packed W2 x W1), W_3^T .. W_L^T
+ * (packed W2 x W2), w1z^T (packed W1 x CZ), head^T (7 x units of the last layer).
+ * Global size: (WMAX / 32, WMAX / 32). */
 kernel void mlp_transpose(global float *transposed, global const float *params)
 {
     size_t kp = get_global_id(0) * NPG_PANEL, cp = get_global_id(1) * NPG_PANEL;

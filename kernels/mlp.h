@@ -62,8 +62,8 @@ size_t npg_mlp_rows(const npg_device *device, size_t vertices);
 /* Floats of a group's own memory for `block` vertices: h of the first layer, and gradients of two others. */
 size_t npg_mlp_scratch(const npg_mlp_shape *shape, size_t block);
 
-/* rows: from npg_mlp_rows; frames: T; batch: frames whose hidden layers but the first are kept between forward
- * and backward (0: forward only).  Device memory in bytes: about
+/* rows: from npg_mlp_rows; frames: T; batch: frames whose hidden layers but the first are kept between
+ * forward and backward (0: forward only).  Device memory in bytes: about
  * 4 (rows (2 W1 + batch (L - 1) W2) + groups (W1 W2 + (L - 2) W2^2)). */
 npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
                         size_t frames, size_t batch);

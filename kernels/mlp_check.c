@@ -16,8 +16,8 @@ typedef struct mlp_data {
     double *out, *grad, *dz, *dcode;
 } mlp_data;
 
-/* Some sizes have one block, some several batches of frames, some uneven widths; all have frames whose sums come
- * together. */
+/* Some sizes have one block, some several batches of frames, some uneven widths; all have frames whose sums
+ * come together. */
 static npg_status open_mlp_data(mlp_data *d, size_t block, size_t layers, int size, uint64_t seed)
 {
     npg_random random = npg_random_stream(seed, 12, (uint64_t)size);

@@ -198,8 +198,8 @@ static npg_status open_moves(moves *m, npg_device *device, const npg_workload *l
                            rows, load->edges, load->edge_count, targets, m->count);
 }
 
-/* Both ways through the decoder behind its first layer, for all frames of the batch.  In and out go p, each kept
- * layer, what the decoder gives, and backward dp twice. */
+/* Both ways through the decoder behind its first layer, for all frames of the batch.  In or out go p, each
+ * kept layer, what the decoder gives, and backward dp twice. */
 static npg_status visit_decoder(const visitor *to, moves *m, const char *forward, const char *backward,
                                 size_t rows)
 {

@@ -48,7 +48,7 @@ static inline double npg_cost_decoder_flops(double width_1, double width_2, doub
     return 3 * 2 * (40 * width_1 + between + 7 * (is_single ? width_1 : width_2));
 }
 
-/* So many of them by the kernels, which make about half as many as the registers could, at `flops` a second. */
+/* So many of them: of `flops` a second, which the registers could make, the kernels make about half. */
 static inline double npg_cost_network_s(double count, double flops)
 {
     return count / (0.5 * fmax(flops, 2));

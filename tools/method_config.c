@@ -69,7 +69,7 @@ static const rule rules[] = {
     {"grid",         "smoothness",         NULL,        {"lambda"},             0, 0},
     {"grid",         "lr",                 NULL,        {"grid-rate"},          0, 0},
     {"mlp",          "hidden",             NULL,        {"width-1", "width-2"}, 0, 0},
-    {"mlp",          "layers",             NULL,        {"hidden-layers"},      0, 1}, /* there with the head */
+    {"mlp",          "layers",             NULL,        {"hidden-layers"},      0, 1}, /* with the head */
     {"mlp",          "point_dim",          NULL,        {"position-channels"},  0, 0},
     {"mlp",          "normal_dim",         NULL,        {"normal-channels"},    0, 0},
     {"mlp",          "time_dim",           NULL,        {"time-frequencies"},   2, 0},

@@ -142,25 +142,28 @@ static void draw_zero(float *values, size_t at, size_t end, npg_random *random)
 }
 
 /* Weights and biases in the order of their list; the head is zero, so that all begins as the identity. */
+static void draw_layers(float *to, const npg_mlp_shape *s, size_t inputs, npg_random *random)
+{
+    for (size_t l = 2; l <= s->layers; l++)
+        draw_uniform(to, npg_mlp_at_weights(s, l), npg_mlp_at_weights(s, l + 1), npg_mlp_units(s, l - 1),
+                     random);
+    draw_zero(to, npg_mlp_at_head(s), npg_mlp_at_bias(s, 2), random);
+    for (size_t l = 2; l <= s->layers; l++)
+        draw_uniform(to, npg_mlp_at_bias(s, l), npg_mlp_at_bias(s, l + 1), npg_mlp_units(s, l - 1), random);
+    draw_zero(to, npg_mlp_at_head_bias(s), npg_mlp_at_w1z(s), random);
+    draw_uniform(to, npg_mlp_at_w1z(s), npg_mlp_param_count(s), inputs, random);
+}
+
 static npg_status draw_params(npg_fit *fit)
 {
-    npg_mlp_shape s = shape_of(&fit->settings);
+    const npg_fit_settings *settings = &fit->settings;
+    npg_mlp_shape s = shape_of(settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
     size_t count = npg_mlp_param_count(&s);
-    size_t inputs = (size_t)(fit->settings.position_channels + fit->settings.normal_channels) + s.code_size;
-    float *to;
+    size_t inputs = (size_t)(settings->position_channels + settings->normal_channels) + s.code_size;
+    float rate = (float)settings->mlp_rate;
     NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
-    to = fit->params;
-    for (size_t l = 2; l <= s.layers; l++)
-        draw_uniform(to, npg_mlp_at_weights(&s, l), npg_mlp_at_weights(&s, l + 1), npg_mlp_units(&s, l - 1),
-                     &random);
-    draw_zero(to, npg_mlp_at_head(&s), npg_mlp_at_bias(&s, 2), &random);
-    for (size_t l = 2; l <= s.layers; l++)
-        draw_uniform(to, npg_mlp_at_bias(&s, l), npg_mlp_at_bias(&s, l + 1), npg_mlp_units(&s, l - 1),
-                     &random);
-    draw_zero(to, npg_mlp_at_head_bias(&s), npg_mlp_at_w1z(&s), &random);
-    draw_uniform(to, npg_mlp_at_w1z(&s), count, inputs, &random);
-    float rate = (float)fit->settings.mlp_rate;
+    draw_layers(fit->params, &s, inputs, &random);
     return npg_adam_open(&fit->mlp_adam, fit->device, &rate, count, count);
 }
 
