@@ -30,6 +30,8 @@ const npg_kernel_case npg_kernel_cases[] = {
     {"sobolev, graph",         npg_check_sobolev_graph,   NULL,                  1e-5},
     {"sobolev, doubled",       npg_check_sobolev_doubled, NULL,                  1e-5},
     {"mlp",                    npg_check_mlp,             npg_slope_mlp,         2e-5},
+    {"mlp, one layer",         npg_check_mlp_single,      npg_slope_mlp_single,  2e-5},
+    {"mlp, deeper",            npg_check_mlp_deep,        npg_slope_mlp_deep,    2e-5},
     {"adam",                   npg_check_adam,            NULL,                  1e-5},
     {"transform",              npg_check_transform,       npg_slope_transform,   2e-5},
     {"transform, cayley",      npg_check_cayley,          npg_slope_cayley,      2e-5},

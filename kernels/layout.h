@@ -63,9 +63,9 @@
 #define NPG_PANEL 32
 
 /* Floats of the decoder's output for a vertex: 8, so one vector, of which four of rotation and three of
- * translation are used.  The rows of its last weights W3 have 16 columns, zero from the eighth on. */
-#define NPG_MLP_OUT    8
-#define NPG_MLP_USED   7
-#define NPG_MLP_W3_ROW 16
+ * translation are used.  The rows of its last weights have 16 columns, zero from the eighth on. */
+#define NPG_MLP_OUT      8
+#define NPG_MLP_USED     7
+#define NPG_MLP_HEAD_ROW 16
 
 #endif

@@ -11,7 +11,7 @@
 
 /* The default settings of the fit (options of the optimize stage). */
 enum { POSITION_LEVELS = 8, BATCH = 4, TIME_CODE = 8 };
-static const npg_mlp_shape decoder = {512, 512, TIME_CODE, 0.01f};
+static const npg_mlp_shape decoder = {512, 512, 2, TIME_CODE, 0.01f};
 
 /* Whom the work is handed to. */
 typedef struct visitor {
@@ -198,16 +198,27 @@ static npg_status open_moves(moves *m, npg_device *device, const npg_workload *l
                            rows, load->edges, load->edge_count, targets, m->count);
 }
 
+/* Both ways through the decoder behind its first layer, for all frames of the batch.  In or out go p, each
+ * kept layer, what the decoder gives, and backward dp twice. */
+static npg_status visit_decoder(const visitor *to, moves *m, const char *forward, const char *backward,
+                                size_t rows)
+{
+    const npg_mlp_shape *s = &m->mlp.shape;
+    const double samples = (double)m->count * (double)rows, W = (double)s->w1, L = (double)s->layers;
+    const double layers = samples * npg_mlp_multiply_adds(s);
+    NPG_TRY(hand_over(to, forward, mlp_forward, m, 2 * layers, 4 * samples * (L * W + 8)));
+    return hand_over(to, backward, mlp_backward, m, 4 * layers, 4 * samples * ((L + 2) * W + 8));
+}
+
 /* As above; nearest neighbours are not counted in operations, how many the search takes depends on the
  * data. */
 static npg_status visit_moves(const visitor *to, moves *m, const npg_workload *load, size_t rows)
 {
     const double T = (double)m->count, V = (double)rows, N = (double)load->point_count;
     const double W = (double)decoder.w1, C = NPG_LATENT_CHANNELS;
-    const double layers = W * W + 7 * W, samples = T * V;
+    const double samples = T * V;
     NPG_TRY(hand_over(to, "mlp_input", mlp_input, m, 2 * V * C * W, 4 * V * (C + W)));
-    NPG_TRY(hand_over(to, "mlp_forward", mlp_forward, m, 2 * samples * layers, 4 * samples * (2 * W + 8)));
-    NPG_TRY(hand_over(to, "mlp_backward", mlp_backward, m, 4 * samples * layers, 4 * samples * (4 * W + 8)));
+    NPG_TRY(visit_decoder(to, m, "mlp_forward", "mlp_backward", rows));
     NPG_TRY(hand_over(to, "mlp_input_back", mlp_input_back, m, 4 * V * C * W, 4 * V * (2 * C + W)));
     NPG_TRY(hand_over(to, "transform", transform, m, 60 * samples, 4 * samples * 11));
     NPG_TRY(hand_over(to, "nearest_and_chamfer", nearest_and_chamfer, m, 0, 4 * T * (V * 10 + N * 7)));
@@ -225,12 +236,25 @@ static npg_status work_on_moves(npg_device *device, const npg_workload *load, si
     return status;
 }
 
+/* A decoder of three hidden layers: what the option hidden-layers costs. */
+static npg_status work_on_deeper(npg_device *device, const npg_workload *load, size_t rows, const visitor *to)
+{
+    moves m = {.count = load->frame_count < BATCH ? load->frame_count : BATCH};
+    npg_mlp_shape deeper = decoder;
+    deeper.layers = 3;
+    npg_status status = npg_mlp_open(&m.mlp, device, &deeper, rows, m.count, m.count);
+    if (!status) status = visit_decoder(to, &m, "deeper_forward", "deeper_backward", rows);
+    npg_mlp_close(&m.mlp);
+    return status;
+}
+
 npg_status npg_kernels_work(npg_device *device, const npg_workload *load, npg_work_visit *visit, void *user)
 {
     const visitor to = {visit, user};
     size_t rows = npg_mlp_rows(device, load->vert_count);
     NPG_TRY(work_on_grids(device, load, rows, &to));
-    return work_on_moves(device, load, rows, &to);
+    NPG_TRY(work_on_moves(device, load, rows, &to));
+    return work_on_deeper(device, load, rows, &to);
 }
 
 /* ---- the decoder alone ---- */
@@ -268,7 +292,7 @@ npg_status npg_decoder_work(npg_device *device, const float *vert_pos, size_t ve
     npg_work work = {.name = "dense_decode",
                      .call = decode,
                      .user = &d,
-                     .flops = 2 * V * (W * W + 7 * W),
+                     .flops = 2 * V * npg_mlp_multiply_adds(&decoder),
                      .bytes = 4 * V * (W + 8 + 9),
                      .vertex_frames = V};
     npg_status status = open_dense(&d, device, vert_pos);

@@ -39,11 +39,19 @@ static inline double npg_cost_pass_s(double frames, double points, double step)
     return 0.5 * frames * (0.62 * searching + 36e-6 * fmin(points, NPG_FUSED_FRAME_MOST));
 }
 
-/* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and backward, of which kernels
- * make about half as many as the registers could, at `flops` a second. */
-static inline double npg_cost_network_s(double frames, double vertices, double epochs, double flops)
+/* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and twice as many backward.  40
+ * inputs, a first hidden layer of width_1 units, all others of width_2, and a head of 7. */
+static inline double npg_cost_decoder_flops(double width_1, double width_2, double hidden_layers)
 {
-    return 1.72e6 * frames * vertices * epochs / (0.5 * fmax(flops, 2));
+    bool is_single = hidden_layers < 2;
+    double between = is_single ? 0 : (width_1 + (hidden_layers - 2) * width_2) * width_2;
+    return 3 * 2 * (40 * width_1 + between + 7 * (is_single ? width_1 : width_2));
+}
+
+/* So many of them: of `flops` a second, which the registers could make, the kernels make about half. */
+static inline double npg_cost_network_s(double count, double flops)
+{
+    return count / (0.5 * fmax(flops, 2));
 }
 
 #endif

@@ -99,8 +99,8 @@ TABLES = {
             Row("confidence single", "--confidence single", (1.15, 0.931, 0.952, 0.098)),
             Row("catch-up root, confidence cumulative", "", (0.53, 0.947, 0.981, 0.025), base=True)], frames=40),
     "decoder": Table(
-        "Decoder", "Sizes of the time code, of the features by normal and by position, and of the hidden layers. "
-        "Paper: AMA, 40 frames.", [
+        "Decoder", "Sizes of the time code, of the features by normal and by position, and of the hidden layers, and how many "
+        "of these there are, which the paper does not vary. Paper: AMA, 40 frames.", [
             Row("time code of 2", "--time-frequencies 1", (0.63, 0.945, 0.970, 0.027)),
             Row("time code of 32", "--time-frequencies 16", (0.64, 0.943, 0.973, 0.040)),
             Row("1 feature by normal", "--normal-channels 1", (0.55, 0.946, 0.979, 0.026)),
@@ -110,7 +110,10 @@ TABLES = {
             Row("120 features by position (here 32 in all)", paper=(0.59, 0.947, 0.978, 0.032), run=False),
             Row("layers of 128", "--width-1 128 --width-2 128", (0.76, 0.938, 0.959, 0.045)),
             Row("layers of 2048", "--width-1 2048 --width-2 2048", (0.54, 0.948, 0.980, 0.021)),
-            Row("8, 2 and 30, 512", "", (0.53, 0.947, 0.981, 0.019), base=True)], frames=40),
+            Row("1 hidden layer", "--hidden-layers 1"),
+            Row("3 hidden layers", "--hidden-layers 3"),
+            Row("4 hidden layers", "--hidden-layers 4"),
+            Row("8, 2 and 30, two of 512", "", (0.53, 0.947, 0.981, 0.019), base=True)], frames=40),
     "rotation": Table(
         "Rotation", "Compared at each number of epochs. Paper: AMA, 17 frames.",
         rotation_rows(75, (1.96, 0.921, 0.866, 0.047), (1.62, 0.924, 0.886, 0.043), (1.59, 0.923, 0.884, 0.044))

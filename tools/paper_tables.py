@@ -127,7 +127,9 @@ def estimate(key):
         return 5 + 2.5 * frames
     verts = min(number_after("--faces", options, 20000), 4 * (points or POINTS)) / 2
     first, second = number_after("--width-1", options, 512), number_after("--width-2", options, 512)
-    flops = 6 * (40 * first + first * second + 7 * second)
+    layers = number_after("--hidden-layers", options, 2)
+    between = (first + (layers - 2) * second) * second if layers > 1 else 0
+    flops = 6 * (40 * first + between + 7 * (second if layers > 1 else first))
     return 5 + frames * number_after("--epochs", options, 250) * verts * (flops / 2.25e11 + 9.4e-6)
 
 

@@ -123,27 +123,47 @@ static npg_status open_grids(npg_fit *fit, const float *normals)
 
 static npg_mlp_shape shape_of(const npg_fit_settings *s)
 {
-    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies,
-                           (float)s->slope};
+    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, (size_t)s->hidden_layers,
+                           2 * (size_t)s->frequencies, (float)s->slope};
 }
 
-/* Uniform in +-1 / sqrt(inputs) for weights and biases; the head is zero, so that all
- * begins as the identity. */
+/* values[at] .. values[end - 1], uniform in +-1 / sqrt(inputs). */
+static void draw_uniform(float *values, size_t at, size_t end, size_t inputs, npg_random *random)
+{
+    double bound = 1 / sqrt((double)inputs);
+    for (size_t i = at; i < end; i++) values[i] = (float)(bound * (2 * npg_random_real(random) - 1));
+}
+
+/* Zero: random numbers are taken for it as for all others. */
+static void draw_zero(float *values, size_t at, size_t end, npg_random *random)
+{
+    draw_uniform(values, at, end, 1, random);
+    memset(values + at, 0, (end - at) * sizeof *values);
+}
+
+/* Weights and biases in the order of their list; the head is zero, so that all begins as the identity. */
+static void draw_layers(float *to, const npg_mlp_shape *s, size_t inputs, npg_random *random)
+{
+    for (size_t l = 2; l <= s->layers; l++)
+        draw_uniform(to, npg_mlp_at_weights(s, l), npg_mlp_at_weights(s, l + 1), npg_mlp_units(s, l - 1),
+                     random);
+    draw_zero(to, npg_mlp_at_head(s), npg_mlp_at_bias(s, 2), random);
+    for (size_t l = 2; l <= s->layers; l++)
+        draw_uniform(to, npg_mlp_at_bias(s, l), npg_mlp_at_bias(s, l + 1), npg_mlp_units(s, l - 1), random);
+    draw_zero(to, npg_mlp_at_head_bias(s), npg_mlp_at_w1z(s), random);
+    draw_uniform(to, npg_mlp_at_w1z(s), npg_mlp_param_count(s), inputs, random);
+}
+
 static npg_status draw_params(npg_fit *fit)
 {
-    npg_mlp_shape s = shape_of(&fit->settings);
+    const npg_fit_settings *settings = &fit->settings;
+    npg_mlp_shape s = shape_of(settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
     size_t count = npg_mlp_param_count(&s);
-    size_t inputs = (size_t)(fit->settings.position_channels + fit->settings.normal_channels) + s.code_size;
-    double first = 1 / sqrt((double)inputs), second = 1 / sqrt((double)s.w1);
+    size_t inputs = (size_t)(settings->position_channels + settings->normal_channels) + s.code_size;
+    float rate = (float)settings->mlp_rate;
     NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
-    for (size_t i = 0; i < count; i++) {
-        double value = 2 * npg_random_real(&random) - 1;
-        bool head = (i >= npg_mlp_at_w3(&s) && i < npg_mlp_at_b2(&s)) ||
-                    (i >= npg_mlp_at_b3(&s) && i < npg_mlp_at_w1z(&s));
-        fit->params[i] = head ? 0 : (float)(value * (i >= npg_mlp_at_w1z(&s) ? first : second));
-    }
-    float rate = (float)fit->settings.mlp_rate;
+    draw_layers(fit->params, &s, inputs, &random);
     return npg_adam_open(&fit->mlp_adam, fit->device, &rate, count, count);
 }
 
@@ -639,9 +659,10 @@ size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frame
     size_t block = (size_t)tuning->mlp_rows, groups = (size_t)(tuning->mlp_groups * units);
     size_t rows = (vert_count + block - 1) / block * block;
     size_t batch = (size_t)s->batch < frames ? (size_t)s->batch : frames;
-    size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
+    size_t kept = (shape.layers - 1) * shape.w2;
+    size_t per_row = 2 * shape.w1 + batch * kept + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
     size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
-    size_t per_group = npg_mlp_param_count(&shape) + 2 * block * (shape.w1 > shape.w2 ? shape.w1 : shape.w2);
+    size_t per_group = npg_mlp_param_count(&shape) + npg_mlp_scratch(&shape, block);
     size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_param_count(&shape) * 7;
     return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
 }

@@ -52,10 +52,10 @@ typedef struct npg_fit_settings {
     bool normal_grid;
     double lambda, lambda_growth, grid_rate, grid_rate_growth;
     double mlp_rate, slope, isometry, alpha;
-    int64_t width_1, width_2;
+    int64_t width_1, width_2, hidden_layers; /* of the decoder: npg_mlp_shape */
     double rate_end;      /* learning rates at the last epoch, as a share; they fall by half a cosine */
     double feature_start; /* grid features begin evenly spread over +- this before smoothing; paper: 0 */
-    int64_t batch;        /* frames whose hidden layer is kept at a time */
+    int64_t batch;        /* frames whose hidden layers are kept at a time */
 } npg_fit_settings;
 
 /* The values that the options have now (table of the optimize stage). */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "kernels/kernels.h"
+#include "kernels/mlp.h"
 #include "optimize/checkpoint.h"
 #include "optimize/fit_state.h"
 #include "optimize/record.h"
@@ -89,7 +90,9 @@ static const npg_option options[] = {
     NPG_ROW_INT   ("width-1",          FIT(width_1),          "512",        32,    4096, "N",
         "units of the first hidden layer"),
     NPG_ROW_INT   ("width-2",          FIT(width_2),          "512",        32,    4096, "N",
-        "units of the second hidden layer"),
+        "units of each of the hidden layers after it"),
+    NPG_ROW_INT   ("hidden-layers",    FIT(hidden_layers),    "2",          1,     NPG_MLP_LAYERS_MAX, "N",
+        "hidden layers of the decoder, before the one that gives the motion"),
     NPG_ROW_REAL  ("mlp-rate",         FIT(mlp_rate),         "0.001",      0,     1,    NULL,
         "learning rate of the decoder"),
     NPG_ROW_REAL  ("slope",            FIT(slope),            "0.01",       0,     1,    NULL,
@@ -136,7 +139,7 @@ static const npg_option options[] = {
         "without alignment: a window that takes longer writes its state meanwhile, "
         "so that no more is lost when the run is killed"),
     NPG_ROW_INT   ("fit-batch",        FIT(batch),            "4",          1,     64,   "N",
-        "frames whose hidden layer is kept at a time"),
+        "frames whose hidden layers are kept at a time"),
     {0}};
 /* clang-format on */
 
@@ -548,8 +551,11 @@ static double expects(const npg_worker *worker, npg_pass pass)
     bool by_samples = s->window_settings.warm.distance == NPG_DISTANCE_SURFACE && s->window_settings.samples;
     double vertices = (double)npg_worker_verts_at_most(worker);
     if (by_samples) vertices = fmin(vertices, (double)s->window_settings.samples);
-    return cores * npg_cost_network_s(frames, vertices, (double)s->window_settings.fit.epochs,
-                                      cores * NPG_COST_CORE_FLOPS);
+    const npg_fit_settings *fit = &s->window_settings.fit;
+    double sample =
+        npg_cost_decoder_flops((double)fit->width_1, (double)fit->width_2, (double)fit->hidden_layers);
+    return cores *
+           npg_cost_network_s(frames * vertices * (double)fit->epochs * sample, cores * NPG_COST_CORE_FLOPS);
 }
 
 const npg_stage npg_stage_optimize = {

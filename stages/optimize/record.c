@@ -39,13 +39,14 @@ static npg_status put_features(npg_archive_writer *out, npg_fit *fit, size_t ver
     return status;
 }
 
-static npg_status put_decoder(npg_archive_writer *out, npg_fit *fit)
+static npg_status put_decoder(npg_archive_writer *out, npg_fit *fit, int64_t layers)
 {
     npg_fit_parts parts = npg_fit_open_parts(fit);
     size_t count;
     int64_t *step;
     const double *code = npg_time_code_parts(parts.time_code, &count, &step);
     NPG_TRY(npg_archive_put(out, "decoder", parts.params, parts.param_count * sizeof *parts.params));
+    if (layers != NPG_RECORD_LAYERS) NPG_TRY(npg_archive_put(out, "layers", &layers, sizeof layers));
     return npg_archive_put(out, "time", code, count * sizeof *code);
 }
 
@@ -71,7 +72,7 @@ static npg_status put_all(npg_archive_writer *out, const npg_record_source *from
     NPG_TRY(npg_archive_put(out, "window", &facts, sizeof facts));
     NPG_TRY(npg_archive_put(out, "rest", from->facts->reference->vert_pos, size));
     if (facts.is_aligned) return put_poses(out, from, size);
-    NPG_TRY(put_decoder(out, fit));
+    NPG_TRY(put_decoder(out, fit, from->settings->hidden_layers));
     return put_features(out, fit, verts);
 }
 

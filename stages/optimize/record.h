@@ -9,6 +9,7 @@
  * without alignment
  *
  *     decoder    its parameters (npg_mlp_param_count floats)
+ *     layers     int64_t: its hidden layers, where they are not two
  *     time       parameters of a learned time code and their moments, doubles; else empty
  *     features   V x NPG_LATENT_CHANNELS floats: what the latent grids give at the vertices
  *
@@ -21,6 +22,8 @@
 #define NPG_RECORD_H
 
 #include "optimize/window.h"
+
+#define NPG_RECORD_LAYERS 2 /* hidden layers of a decoder whose record does not name them */
 
 typedef struct npg_record_facts {                        /* no padding: the same bytes every time */
     int64_t first, last, new_first, new_last, direction; /* as npg_window                         */

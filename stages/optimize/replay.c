@@ -19,6 +19,7 @@
 typedef struct record {
     int64_t serial;
     npg_record_facts facts;
+    int64_t layers; /* hidden ones of its decoder */
 } record;
 
 typedef struct open_record {
@@ -90,18 +91,37 @@ static bool are_sane(const npg_record_facts *f)
            f->rotation <= NPG_ROTATION_EXPONENTIAL;
 }
 
-static bool belong_together(const npg_record_facts *a, const npg_record_facts *b)
+static bool belong_together(const record *one, const record *other)
 {
+    const npg_record_facts *a = &one->facts, *b = &other->facts;
     return a->vert_count == b->vert_count && a->is_aligned == b->is_aligned && a->width_1 == b->width_1 &&
-           a->width_2 == b->width_2 && a->frequencies == b->frequencies && a->time_kind == b->time_kind &&
-           a->rotation == b->rotation;
+           a->width_2 == b->width_2 && one->layers == other->layers && a->frequencies == b->frequencies &&
+           a->time_kind == b->time_kind && a->rotation == b->rotation;
+}
+
+static npg_mlp_shape shape_of(const record *of)
+{
+    const npg_record_facts *f = &of->facts;
+    return (npg_mlp_shape){(size_t)f->width_1, (size_t)f->width_2, (size_t)of->layers,
+                           2 * (size_t)f->frequencies, (float)f->slope};
+}
+
+static npg_status read_layers(record *of, const npg_archive *in)
+{
+    size_t size;
+    of->layers = NPG_RECORD_LAYERS;
+    if (!npg_archive_find(in, "layers", &size)) return NPG_OK;
+    NPG_TRY(npg_archive_get(in, "layers", &of->layers, sizeof of->layers));
+    return of->layers >= 1 && of->layers <= NPG_MLP_LAYERS_MAX
+               ? NPG_OK
+               : bad(of->serial, "its decoder has a number of layers that makes no sense");
 }
 
 /* Sizes of all blocks, so that a record which opens can be used. */
 static npg_status check_blocks(const npg_archive *in, const record *of)
 {
     const npg_record_facts *f = &of->facts;
-    const npg_mlp_shape shape = {(size_t)f->width_1, (size_t)f->width_2, 2 * (size_t)f->frequencies, 0};
+    const npg_mlp_shape shape = shape_of(of);
     size_t verts = (size_t)f->vert_count;
     npg_status status = NPG_OK;
     block(&status, in, of, "rest", verts * 3 * sizeof(float));
@@ -126,6 +146,7 @@ static npg_status read_record(const npg_replay *r, npg_archive **out, record *of
     NPG_TRY(status);
     status = npg_archive_get(*out, "window", &of->facts, sizeof of->facts);
     if (!status && !are_sane(&of->facts)) status = bad(of->serial, "its window makes no sense");
+    if (!status) status = read_layers(of, *out);
     if (!status) status = check_blocks(*out, of);
     if (status) npg_archive_close(out);
     return status;
@@ -151,7 +172,7 @@ static npg_status read_records(npg_replay *r)
         record *at = &r->records[i];
         NPG_TRY(read_record(r, &in, at));
         npg_status status = NPG_OK;
-        if (!belong_together(&at->facts, &r->records[0].facts))
+        if (!belong_together(at, &r->records[0]))
             status = bad(at->serial, "it is of another run than the records before it");
         size_t size = (size_t)at->facts.vert_count * 3 * sizeof(float);
         if (!i && !status) status = npg_alloc(&r->rest, NPG_FOR_MESH, size);
@@ -188,8 +209,7 @@ static npg_status open_one(npg_replay *r, size_t which, const npg_archive **out)
 static npg_status open_decoder(npg_replay *r, npg_device *device)
 {
     const npg_record_facts *f = &r->records[0].facts;
-    const npg_mlp_shape shape = {(size_t)f->width_1, (size_t)f->width_2, 2 * (size_t)f->frequencies,
-                                 (float)f->slope};
+    const npg_mlp_shape shape = shape_of(&r->records[0]);
     size_t rows = npg_mlp_rows(device, r->verts);
     NPG_TRY(npg_time_code_open(&r->time_code, (npg_time_kind)f->time_kind, (size_t)f->frequencies, f->seed));
     NPG_TRY(npg_alloc_array(&r->codes, NPG_FOR_FIT, shape.code_size, sizeof(float)));

@@ -61,6 +61,13 @@ check_killed() {
     check_killed warm "3 20" "${warm[@]}"
 }
 
+@test "a decoder of three hidden layers that is killed gives the same bytes" {
+    check_killed deep "4" "${joint[@]}" --hidden-layers 3
+    run "$NEUPIG" run capture/points -o deep "${small[@]}" "${joint[@]}"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'option hidden-layers was "3" and is "2"'* ]]
+}
+
 @test "windows by the surface that are killed inside give the same bytes" {
     check_killed surface "2 3" "${surface[@]}"
 }

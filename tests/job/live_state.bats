@@ -103,7 +103,7 @@ check_killed() {
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--align=no --deliver last --samples 100 --state-every 0 --epochs 20)
+    local free=(--align=no --deliver last --samples 100 --state-every 0 --epochs 80)
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
     for place in 1 2; do

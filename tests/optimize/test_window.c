@@ -76,7 +76,7 @@ static void open_tied(tied *t, npg_mesh *ball)
     const npg_match_settings match = {200, 0.02, 0.5, 5000, 0.7};
     npg_random random = npg_random_stream(11, 0, 0);
     float dense[3 * VERTS], before[3 * VERTS];
-    *t = (tied){.shape = {32, 64, 4, 0.01f}};
+    *t = (tied){.shape = {32, 64, 3, 4, 0.01f}};
     assert_int_equal(npg_carry_open(&t->carry, ball, 60, 0), 0);
     assert_int_equal(npg_matcher_open(&t->matcher, t->carry, &match), 0);
     size_t s = t->samples = t->carry->samples->mesh->vert_count;
@@ -228,6 +228,7 @@ static const npg_fit_settings small = {.epochs = 12,
                                        .alpha = 0.3,
                                        .width_1 = 32,
                                        .width_2 = 32,
+                                       .hidden_layers = 2,
                                        .rate_end = 0.1,
                                        .feature_start = 3,
                                        .batch = 2};

@@ -121,9 +121,10 @@ between_run() {
 
 @test "the saved windows are enough: without meshes all frames are the same" {
     fine_and_coarse
-    for run in wide paper; do
+    for run in wide paper deep; do
         options=()
-        [ $run = paper ] && options=(--align=no --epochs 30 --axes xz-y --unit cm)
+        [ $run = wide ] || options=(--align=no --epochs 30 --axes xz-y --unit cm)
+        [ $run != deep ] || options+=(--hidden-layers 3)
         [ -d $run ] || between_run $run "${options[@]}"
         rm -rf $run-with $run-alone
         "$NEUPIG" apply $run --mesh coarse/frame_0004.ply -o $run-with --fps-scale 2 --between windows --far 1000

@@ -240,7 +240,7 @@ setup() {
  "optimization": {"epochs": 2, "edgeloss": 50, "time_smoothing": "direct", "catchup_scaling": "pdg"},
  "grid": {"base_res": 2, "increase_per_level": 3, "n_level": 2, "lr_adapt": 2.5, "local_lambda_adapt": 1.25,
           "neighbours": 3, "smoothness": 0.25, "lr": 0.004, "solver": "CG"},
- "mlp": {"hidden": 64, "layers": 3, "point_dim": 30, "time_dim": 6, "normal_dim": 1}}
+ "mlp": {"hidden": 64, "layers": 4, "point_dim": 30, "time_dim": 6, "normal_dim": 1}}
 CONFIG
     run "$NEUPIG" batch ama -o ama --list
     [ "$output" = $'crane\njump' ]
@@ -252,7 +252,8 @@ CONFIG
     [[ "$output" == *'jump: warning: '*'their vertices are the points'* ]]
     for option in '"preset": "paper"' '"epochs": "2"' '"isometry": "50"' '"confidence": "single"' '"catch-up": "root"' \
         '"rotation": "cayley"' '"time-frequencies": "3"' '"grid-levels": "2"' '"lambda-growth": "1.25"' \
-        '"lambda": "0.25"' '"normal-channels": "1"' '"grid-rate": "0.004"' '"width-1": "64"' '"width-2": "64"'; do
+        '"lambda": "0.25"' '"normal-channels": "1"' '"grid-rate": "0.004"' '"width-1": "64"' '"width-2": "64"' \
+        '"hidden-layers": "3"'; do
         grep -q "$option" results/crane/done.json
     done
     grep -q 'point_clouds/0000.ply' results/crane/frames.jsonl

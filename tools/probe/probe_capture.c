@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "ingest/ingest.h"
+#include "pipeline/cost.h"
 #include "pipeline/plan.h"
 #include "pipeline/run_settings.h"
 #include "tools/listing.h"
@@ -109,6 +110,13 @@ static bool is_fused(const npg_options *options)
     return (!text || !strcmp(text, "all")) && !(given && *given);
 }
 
+static double decoder_flops(const npg_options *options)
+{
+    return npg_cost_decoder_flops((double)positive_number(options, "width-1", 512),
+                                  (double)positive_number(options, "width-2", 512),
+                                  (double)positive_number(options, "hidden-layers", 2));
+}
+
 void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_options *options)
 {
     /* A closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point. */
@@ -116,6 +124,7 @@ void npg_probe_estimate_run(npg_estimate *estimate, npg_probe *probe, const npg_
     npg_cost_basis basis = {.vertices = (faces < 4 * most ? faces : 4 * most) / 2,
                             .epochs = positive_number(options, "epochs", 250),
                             .window = window_of(probe, options),
+                            .decoder_flops = decoder_flops(options),
                             .aligned = is_aligned(options),
                             .fused = is_fused(options)};
     npg_probe_estimate(estimate, probe, &basis);

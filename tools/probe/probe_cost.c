@@ -98,6 +98,12 @@ static double aligned_s(const npg_probe *probe, const npg_cost_basis *basis, siz
     return aligned_work_s(probe, basis, most) * NPG_COST_CORE_FLOPS / fmax(flops / cores, 1) / busy;
 }
 
+static double network_s(const npg_cost_basis *basis, double frames, double flops)
+{
+    double samples = frames * (double)basis->vertices * (double)basis->epochs;
+    return npg_cost_network_s(samples * basis->decoder_flops, flops);
+}
+
 /* Of the network: all samples and activations of a window's frames.  Of aligned frames: the window, chunks in
  * the rings, and the process that Poisson runs in. */
 static double memory_bytes(const npg_cost_basis *basis, double in_window, double most)
@@ -116,8 +122,7 @@ void npg_probe_estimate(npg_estimate *e, const npg_probe *probe, const npg_cost_
         if (probe->counts[i] > most) most = probe->counts[i];
     *e = (npg_estimate){.basis = *basis, .flops = measure_flops()};
     e->time_s = basis->aligned ? probe->read_s + aligned_s(probe, basis, most, e->flops)
-                               : 3 * probe->read_s + npg_cost_network_s(frames, (double)basis->vertices,
-                                                                        (double)basis->epochs, e->flops);
+                               : 3 * probe->read_s + network_s(basis, frames, e->flops);
     e->memory_bytes = memory_bytes(basis, in_window, (double)most);
     /* a mesh, and in job/ the alignment, of every frame; the decoder of every window */
     e->disk_bytes =

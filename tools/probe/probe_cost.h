@@ -6,6 +6,7 @@
 
 typedef struct npg_cost_basis {
     size_t vertices, epochs, window;
+    double decoder_flops; /* of the network: npg_cost_decoder_flops() */
     bool aligned; /* frames are aligned and fitted on the host, as they are by default; else by the network */
     bool fused;   /* the reference is made from all frames, in a pass of its own                            */
 } npg_cost_basis;
