@@ -315,22 +315,20 @@ static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
     return status ? skip_or_fail(worker, frame, status) : NPG_OK;
 }
 
-/* A held frame is the copy of another one, which is kept under its own number. */
 static npg_status check_and_keep(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     NPG_TRY(npg_clean_check(frame));
     frame->fields |= NPG_FIELD_CLEAN;
-    if (s->store && s->keeps && !frame->is_held) npg_frame_store_put(s->store, frame);
-    return NPG_OK;
+    return s->store && s->keeps ? npg_frame_store_put(s->store, frame, true) : NPG_OK;
 }
 
 static npg_status find_normals(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
-    if (s->store && !frame->is_held && npg_frame_store_get_normals(s->store, frame)) return NPG_OK;
+    if (s->store && npg_frame_store_get_normals(s->store, frame)) return NPG_OK;
     NPG_TRY(make_or_mend_normals(worker, frame));
-    if (s->store && s->keeps && !frame->is_held) npg_frame_store_put_normals(s->store, frame);
+    if (s->store && s->keeps) npg_frame_store_put_normals(s->store, frame);
     return NPG_OK;
 }
 
