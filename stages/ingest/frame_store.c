@@ -241,12 +241,12 @@ static npg_status put_frame(npg_frame_store *s, entry *e, const npg_frame *frame
     return s->keeps_all ? put_in_memory(s, e, frame) : NPG_OK;
 }
 
-/* Under the lock: room for one more frame. */
+/* Under the lock: an entry for this index, too. */
 static npg_status grow(npg_frame_store *s, int64_t index)
 {
-    if (!s->keeps_all || index != (int64_t)s->count) return NPG_OK;
-    NPG_TRY(npg_grow(&s->entries, &s->capacity, s->count + 1, sizeof *s->entries, NPG_FOR_FILES));
-    s->entries[s->count++] = (entry){0};
+    if (!s->keeps_all || index < (int64_t)s->count) return NPG_OK;
+    NPG_TRY(npg_grow(&s->entries, &s->capacity, (size_t)index + 1, sizeof *s->entries, NPG_FOR_FILES));
+    while ((int64_t)s->count <= index) s->entries[s->count++] = (entry){0};
     return NPG_OK;
 }
 

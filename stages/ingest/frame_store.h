@@ -23,8 +23,7 @@ typedef struct npg_frame_store_use {
 npg_status npg_frame_store_open(npg_frame_store **store, size_t frame_count, size_t byte_max,
                                 const char *spill_folder);
 
-/* For frames that can't be had again: none is left out, whatever byte_max says.  They are put first in the
- * order of their indices, from 0 on. */
+/* For frames that can't be had again, however many: none is left out, whatever byte_max says. */
 npg_status npg_frame_store_open_all(npg_frame_store **store, size_t byte_max, const char *spill_folder);
 void npg_frame_store_close(npg_frame_store **store);
 npg_frame_store_use npg_frame_store_used(npg_frame_store *store);
