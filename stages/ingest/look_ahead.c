@@ -61,7 +61,7 @@ static npg_status fill(npg_look_ahead *l)
 {
     const npg_facts *facts = npg_worker_facts(l->source.worker);
     l->is_filled = true;
-    while (l->source.next < facts->planned_count) {
+    while (l->source.next < facts->planned_count && l->source.replay_at < l->source.replay_count) {
         npg_chunk *chunk;
         NPG_TRY(npg_chunk_open(&chunk, 1));
         npg_status status = npg_live_replay(&l->source, chunk);

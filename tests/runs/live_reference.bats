@@ -105,6 +105,12 @@ has_colours() {
     ! has_colours dull/reference.ply
 }
 
+@test "progress counts the frames of the look-ahead; the share of the whole is 0 until the end is known" {
+    "$NEUPIG" run --follow noisy0/points -o watched "${small[@]}" "${open[@]}" --progress json 2>watched.log >progress
+    grep -q '"stage":"align","share":0.0,.*"step":9,"steps":9' progress
+    sed -n 's/.*"share":\([0-9.]*\).*/\1/p' progress | awk '$1 < last { exit 1 } { last = $1 } END { exit last != 1 }'
+}
+
 # Wait as long as process $2 lives until file $1 has $3 bytes.
 await() {
     until [ "$(stat -c %s "$1" 2>/dev/null || echo 0)" -ge "$3" ]; do
