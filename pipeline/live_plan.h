@@ -12,7 +12,8 @@
  * that last window is then shorter.  The functions take both kinds of plans; an ordinary one gives what
  * pipeline/plan.h gives.
  *
- * `total` is the number of frames of the capture, -1 while the source is open; it matters to open plans only.
+ * `total` is the number of frames of the capture, -1 while the source is open; in a fusing pass, which walks
+ * the look-ahead alone, the number of these.  It matters to open plans only.
  * Once it is known (in a stage's flush: npg_facts.frame_count) the windows that reach beyond the end are
  * shorter: a stage that waits for a window asks for it again and finds that it has all its frames. */
 #ifndef NPG_LIVE_PLAN_H

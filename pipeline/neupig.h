@@ -192,8 +192,9 @@ typedef struct npg_custom_stage {
  *
  * Every run calls the callback from one thread at a time, a thread of the stage's own, so it works beside the
  * other stages; it must not call functions of the same run but npg_run_stop().  After ingest and outlier it
- * sees each frame up to four times (to measure, to score, to choose the keyframe, to solve) and must do the
- * same each time, or the result is undefined; after the others once.  Frames do not come in time order but as
+ * sees each frame several times (to measure, to score, to choose the keyframe, to make the reference, to
+ * solve; of a live source those of the look-ahead) and must do the same each time, or the result is
+ * undefined; after the others once.  Frames do not come in time order but as
  * they are solved, outwards from the keyframe.  Points after outlier and vertices must stay finite, and a
  * frame that has been cleaned must keep a point (NPG_USAGE, NPG_BAD_INPUT).
  *

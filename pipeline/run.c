@@ -90,6 +90,42 @@ void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t f
     pthread_mutex_unlock(&run->lock);
 }
 
+/* ---- memory formula ---- */
+
+/* The bound on memory to the log and the report. */
+static void announce_memory(npg_run *run)
+{
+    const npg_facts *facts = &run->facts;
+    size_t verts = npg_worker_verts_at_most(&run->workers[0]);
+    size_t frame_bytes = facts->point_count_max * 6 * sizeof(float) + verts * 3 * sizeof(float);
+    size_t chunk_bytes = frame_bytes * (size_t)run->settings.chunk_frames;
+    size_t rings = 0, held = 0, stages = 0;
+    json_t *parts = json_object();
+    for (size_t i = 0; i < run->worker_count; i++) {
+        const npg_worker *worker = &run->workers[i];
+        if (!worker->is_in_pass) continue;
+        size_t chunks = 1, bytes = worker->stage->memory ? worker->stage->memory(worker, &chunks) : 0;
+        rings += (size_t)run->settings.ring_capacity;
+        held += chunks;
+        stages += bytes;
+        json_object_set_new(parts, worker->name, json_integer((json_int_t)(bytes + chunks * chunk_bytes)));
+    }
+    size_t total = (rings + held) * chunk_bytes + stages;
+    char text[256];
+    snprintf(
+        text, sizeof text,
+        "memory: (%zu chunks in rings + %zu held by stages) x %.2f MiB + stages %.0f MiB = %.0f MiB at most",
+        rings, held, (double)chunk_bytes / 1048576, (double)stages / 1048576, (double)total / 1048576);
+    npg_run_log(run, NPG_LOG_INFO, "run", -1, text);
+    json_object_set_new(parts, "rings", json_integer((json_int_t)(rings * chunk_bytes)));
+    json_object_set_new(parts, "total", json_integer((json_int_t)total));
+    json_t *before = json_object_get(json_object_get(run->report, "memory_bound_bytes"), "total");
+    if (before && (size_t)json_integer_value(before) > total) /* a fusing pass that takes more */
+        json_decref(parts);
+    else
+        json_object_set_new(run->report, "memory_bound_bytes", parts);
+}
+
 /* ---- one pass ---- */
 
 static npg_status open_state(npg_worker *worker, size_t size, const npg_option *options)
@@ -229,50 +265,15 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
     run->pass = pass;
     atomic_store(&run->ended_count, 0);
     npg_status status = open_worker_states(run);
-    bool is_heavy = pass == NPG_PASS_FUSE || (pass == NPG_PASS_SOLVE && !run->facts.is_live);
+    bool is_heavy = pass == NPG_PASS_FUSE || pass == NPG_PASS_SOLVE;
     if (!status) npg_timeline_begin_pass(run);
-    if (!status && is_heavy) npg_run_announce_memory(run);
+    if (!status && is_heavy) announce_memory(run);
     if (!status) status = open_rings(run);
     if (!status) status = start_threads(run);
     if (status) npg_run_fail(run, "run", status);
     close_pass(run);
     report_pass(run, &begun);
     return run->first_failure;
-}
-
-/* ---- memory formula ---- */
-
-void npg_run_announce_memory(npg_run *run)
-{
-    const npg_facts *facts = &run->facts;
-    size_t verts = npg_worker_verts_at_most(&run->workers[0]);
-    size_t frame_bytes = facts->point_count_max * 6 * sizeof(float) + verts * 3 * sizeof(float);
-    size_t chunk_bytes = frame_bytes * (size_t)run->settings.chunk_frames;
-    size_t rings = 0, held = 0, stages = 0;
-    json_t *parts = json_object();
-    for (size_t i = 0; i < run->worker_count; i++) {
-        const npg_worker *worker = &run->workers[i];
-        if (!worker->is_in_pass) continue;
-        size_t chunks = 1, bytes = worker->stage->memory ? worker->stage->memory(worker, &chunks) : 0;
-        rings += (size_t)run->settings.ring_capacity;
-        held += chunks;
-        stages += bytes;
-        json_object_set_new(parts, worker->name, json_integer((json_int_t)(bytes + chunks * chunk_bytes)));
-    }
-    size_t total = (rings + held) * chunk_bytes + stages;
-    char text[256];
-    snprintf(
-        text, sizeof text,
-        "memory: (%zu chunks in rings + %zu held by stages) x %.2f MiB + stages %.0f MiB = %.0f MiB at most",
-        rings, held, (double)chunk_bytes / 1048576, (double)stages / 1048576, (double)total / 1048576);
-    npg_run_log(run, NPG_LOG_INFO, "run", -1, text);
-    json_object_set_new(parts, "rings", json_integer((json_int_t)(rings * chunk_bytes)));
-    json_object_set_new(parts, "total", json_integer((json_int_t)total));
-    json_t *before = json_object_get(json_object_get(run->report, "memory_bound_bytes"), "total");
-    if (before && (size_t)json_integer_value(before) > total) /* a fusing pass that takes more */
-        json_decref(parts);
-    else
-        json_object_set_new(run->report, "memory_bound_bytes", parts);
 }
 
 /* ---- the conductor ---- */
@@ -323,7 +324,7 @@ static npg_status do_passes(npg_run *run)
     if (begun == NPG_END) npg_latch_abort(run->begun_latch); /* nobody waits for passes that never come */
     if (begun) return begun == NPG_END ? NPG_OK : begun;
     npg_latch_raise(run->begun_latch, 1);
-    if (!run->facts.is_live && !run->facts.is_resumed) {
+    if (!run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
         if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));

@@ -118,9 +118,6 @@ void npg_run_fail(npg_run *run, const char *stage, npg_status status);
  * The argument is the npg_worker. */
 void *npg_worker_main(void *worker);
 
-/* The bound on memory to the log and the report. */
-void npg_run_announce_memory(npg_run *run);
-
 /* A log record through the run's hook. */
 void npg_run_log(npg_run *run, npg_log_level level, const char *stage, int64_t frame, const char *message);
 

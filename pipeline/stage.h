@@ -18,13 +18,14 @@
 #include "pipeline/plan.h"
 #include "pipeline/run_settings.h"
 
-/* A pass is one walk of the capture through the stages that take part in it. */
+/* A pass is one walk of the capture through the stages that take part in it.  Of a live source the passes
+ * before SOLVE walk the look-ahead, as if it were the capture; SOLVE goes on behind it. */
 typedef enum npg_pass {
-    NPG_PASS_MEASURE = 1, /* files: find count, box and sizes                */
-    NPG_PASS_SCORE = 2,   /* files: score every frame, choose the keyframe   */
-    NPG_PASS_SOLVE = 4,   /* the work itself; the only pass of a live source */
-    NPG_PASS_CHOOSE = 8,  /* files, after SCORE: look closer at a few frames */
-    NPG_PASS_FUSE = 16    /* files, facts.fuse_left times: all frames' points    */
+    NPG_PASS_MEASURE = 1, /* find count, box and sizes                */
+    NPG_PASS_SCORE = 2,   /* score every frame, choose the keyframe   */
+    NPG_PASS_SOLVE = 4,   /* the work itself                          */
+    NPG_PASS_CHOOSE = 8,  /* after SCORE: look closer at a few frames */
+    NPG_PASS_FUSE = 16    /* facts.fuse_left times: all frames' points */
 } npg_pass;
 
 /* The frames that the choosing pass reads, in time order. */
@@ -40,11 +41,13 @@ typedef struct npg_choice {
 /* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
  * it passes on the first chunk (or ends the pass) that depends on it; the rings' locks publish it downstream.
  * Where a live source goes on behind the look-ahead, number_min, number_max, point_count_max and bounds_local
- * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h). */
+ * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h) in all passes. */
 typedef struct npg_facts {
     /* ingest */
-    bool is_live;                /* frames can't be read a second time                   */
-    npg_origin origin;           /* world; a point of the first frame                    */
+    bool is_live;          /* frames come once, and how many is not known before   */
+    npg_origin origin;     /* world; a point of the first frame                    */
+    int64_t planned_count; /* frames that the passes before SOLVE walk, from index 0: T, or the look-ahead;
+                              of a live source known once they are measured                              */
     _Atomic int64_t frame_count; /* T, gaps included; -1 while a live source is open     */
     int64_t skipped_count;       /* frames left out under --missing skip or --keep-going; live: at the end */
     /* keyframe */
@@ -55,7 +58,6 @@ typedef struct npg_facts {
     npg_frame_box box;
     npg_plan plan;                       /* its key is the one by score until the choosing pass has ended   */
     int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture                  */
-    int64_t planned_from;                /* live: the plan is made from the frames before this index        */
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
     /* fuse */
@@ -227,11 +229,6 @@ void npg_worker_restore_reports(npg_worker *worker, const json_t *saved);
 
 /* Let every stage add to a state on disk what it needs to be resumed (npg_stage.save). */
 npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out);
-
-/* Log and report the bound on memory.  The run itself does so before the solving pass of files; in a live one
- * the stage that makes the plan does, as soon as it is made.  Asks all stages' memory(), which then read
- * nothing but options and facts. */
-void npg_worker_announce_memory(npg_worker *worker);
 
 /* The whole report, for conclude(). */
 json_t *npg_worker_run_report(npg_worker *worker);

@@ -4,7 +4,9 @@
  * that is done: share = sum(expected x done) / sum(expected), over all passes.  Where it is wrong by the same
  * factor everywhere, as on a slower machine, little is wrong: the time left is what is left of the work, at
  * the pace so far.  At the beginning, where one part that was estimated badly would decide the pace, that of
- * the machine which the costs were taken on counts, too, as if it had done a fifth of the run. */
+ * the machine which the costs were taken on counts, too, as if it had done a fifth of the run.
+ *
+ * How long a live source goes on behind the look-ahead nobody knows: its share is 0 until it has ended. */
 #include <math.h>
 
 #include "pipeline/cost.h"
@@ -32,7 +34,7 @@ static double times_done(const npg_run *run, npg_pass pass)
 void npg_timeline_begin_pass(npg_run *run)
 {
     const npg_facts *facts = &run->facts;
-    bool is_known = !facts->is_live && !facts->is_resumed && facts->point_count_max;
+    bool is_known = facts->frame_count >= 0 && !facts->is_resumed && facts->point_count_max;
     run->fuse_walks = run->fuse_done + facts->fuse_left;
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
@@ -85,6 +87,7 @@ void npg_timeline_advance(npg_worker *worker, npg_progress *progress)
     worker->done = fmax(worker->done, fmin(progress->share, 1));
     const work w = work_of(run);
     if (w.expected_s > 0) progress->share = w.done_s / w.expected_s;
+    if (run->facts.frame_count < 0) progress->share = 0;
     progress->share = run->share = fmax(run->share, progress->share);
     progress->left_s = w.expected_s > 0 ? time_left(&w, progress->elapsed_s) : time_left_since(run, progress);
 }

@@ -258,11 +258,6 @@ void npg_worker_step(npg_worker *worker, double share, int64_t step, int64_t ste
     npg_worker_progress(worker, &progress);
 }
 
-void npg_worker_announce_memory(npg_worker *worker)
-{
-    npg_run_announce_memory(worker->run);
-}
-
 /* ---- the thread ---- */
 
 static npg_status work_as_source(npg_worker *worker)

@@ -211,8 +211,8 @@ static npg_status restore_state(npg_worker *worker)
     return NPG_OK;
 }
 
-/* Whether the last frame read is the last that a window waits for. */
-static bool closes_window(state *s, const npg_plan *plan)
+/* Whether the last frame read is the last that a window waits for.  total: as in pipeline/live_plan.h. */
+static bool closes_window(state *s, const npg_plan *plan, int64_t total)
 {
     if (!npg_plan_is_open(plan)) {
         for (int64_t w = 0; w < npg_plan_window_count(plan); w++)
@@ -220,7 +220,7 @@ static bool closes_window(state *s, const npg_plan *plan)
         return false;
     }
     while (s->closes_at < s->read || !s->window_at) {
-        npg_window window = npg_live_window(plan, s->window_at++, -1);
+        npg_window window = npg_live_window(plan, s->window_at++, total);
         s->closes_at += window.new_last - window.new_first + 1;
     }
     return s->closes_at == s->read;
@@ -310,7 +310,7 @@ static npg_status open_log(npg_worker *worker)
                           state_bytes(s)};
     char *path;
     int64_t groups;
-    NPG_TRY(npg_job_key(job, &key.job));
+    NPG_TRY(npg_job_fusing_key(worker, &key.job));
     NPG_TRY(npg_job_followed_path(job, &path, b ? b->passes : 0));
     npg_status status = npg_follow_log_open(&s->log, &groups, path, &key);
     npg_release(&path);
@@ -686,12 +686,19 @@ static npg_status close_group(npg_worker *worker, bool with_state)
     return NPG_OK;
 }
 
+/* Of a live source that goes on a fusing pass has the look-ahead; in the solving one nobody knows: -1. */
+static int64_t frames_of_pass(const npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    return npg_worker_pass(worker) == NPG_PASS_FUSE ? facts->planned_count : facts->frame_count;
+}
+
 /* Frames that are followed, and those that are passed on: between the two, lost ones are searched. */
 #define FOLLOWED_COUNTS 0.8
 static void report_progress(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    double frames = (double)npg_worker_facts(worker)->frame_count, followed = (double)s->read;
+    double frames = (double)frames_of_pass(worker), followed = (double)s->read;
     double passed_on = followed - (double)s->group_count;
     if (frames > 0)
         npg_worker_step(worker, (FOLLOWED_COUNTS * followed + (1 - FOLLOWED_COUNTS) * passed_on) / frames,
@@ -712,8 +719,9 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         NPG_TRY(npg_error_prefix(align_frame(worker, frame), "frame %lld", (long long)number));
         s->read++;
         report_progress(worker);
-        bool is_window = closes_window(s, &facts->plan);
         /* where an open source will end, and with it the last window, is not known */
+        int64_t total = npg_worker_pass(worker) == NPG_PASS_FUSE ? facts->planned_count : -1;
+        bool is_window = closes_window(s, &facts->plan, total);
         bool with_state = is_window || npg_plan_is_open(&facts->plan);
         if (is_window || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;

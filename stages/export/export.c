@@ -158,8 +158,18 @@ static npg_status check_numbers(npg_worker *worker)
                 "two frames have the number %lld and would be written to one file: set numbering to index",
                 (long long)state->numbers[i]);
     set_width(state, npg_worker_facts(worker));
-    if (state->overwrite) return NPG_OK;
+    if (state->overwrite || npg_worker_facts(worker)->is_live) return NPG_OK;
     return npg_folder_check(output_of(worker), &state->names, state->numbers, state->number_count);
+}
+
+/* The numbers that a live source will bring are not known: whatever lies there would be in their way. */
+static npg_status check_for_live(const npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    const npg_job *job = npg_job_of(worker);
+    bool discards = state->overwrite || (job && npg_job_is_restart(job));
+    if (!npg_worker_facts(worker)->is_live || discards) return NPG_OK;
+    return npg_folder_check(output_of(worker), &state->names, NULL, 0);
 }
 
 /* ---- solving pass ---- */
@@ -232,9 +242,6 @@ static npg_status prepare_folder(npg_worker *worker)
     const char *output = output_of(worker);
     char *meshes;
     npg_job *job = npg_job_of(worker);
-    bool discards = state->overwrite || (job && npg_job_is_restart(job));
-    if (npg_worker_facts(worker)->is_live && !discards)
-        NPG_TRY(npg_folder_check(output, &state->names, NULL, 0));
     NPG_TRY(check_forms(worker));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     NPG_TRY(npg_folder_clear(output));
@@ -506,8 +513,10 @@ static npg_status init(npg_worker *worker)
     if (!output_of(worker)[0]) return NPG_OK;
     NPG_TRY(check_reference(worker));
     if (npg_worker_settings(worker)->confine) NPG_TRY(check_own(worker));
-    if (npg_worker_pass(worker) == NPG_PASS_MEASURE || facts->is_live)
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
         NPG_TRY(npg_folder_probe(output_of(worker)));
+        NPG_TRY(check_for_live(worker));
+    }
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
     return facts->is_resumed ? resume_folder(worker) : prepare_folder(worker);
 }

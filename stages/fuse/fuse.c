@@ -88,7 +88,7 @@ static const npg_option options[] = {
     /* type        name              place       default  least  most  shown as or words */
     NPG_ROW_CHOICE("reference-from", AT(from),   "all",   "key|all",
         "What the reference is made from: the keyframe's points alone, "
-        "or those of all frames, brought to its pose (files only)"),
+        "or those of all frames (of a live source those of the look-ahead), brought to its pose"),
     NPG_ROW_INT   ("reference-rounds", AT(rounds), "1",   1,     20,   "N",
         "Times that the points of all frames are gathered with the reference so far"),
     {0}};
@@ -202,7 +202,7 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
 
 static size_t most_cells(const npg_facts *facts)
 {
-    size_t points = (size_t)facts->frame_count * facts->point_count_max;
+    size_t points = (size_t)facts->planned_count * facts->point_count_max;
     return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
@@ -210,7 +210,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    double per_frame = (double)POINTS_A_CELL / (double)facts->frame_count; /* of the points of one frame */
+    double per_frame = (double)POINTS_A_CELL / (double)facts->planned_count; /* of the points of one frame */
     s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
     NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->count));
@@ -408,12 +408,12 @@ static void uninit(npg_worker *worker)
     npg_colour_cells_close(&s->hues);
 }
 
-/* Files are walked again, live sources are not; without alignment nothing is known to carry points by. */
+/* Without alignment nothing is known to carry points by. */
 static bool takes_part(const npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    return s->from == FROM_ALL && !npg_worker_facts(worker)->is_live &&
-           !npg_worker_settings(worker)->reference[0] && npg_worker_has_field(worker, NPG_FIELD_POSE);
+    return s->from == FROM_ALL && !npg_worker_settings(worker)->reference[0] &&
+           npg_worker_has_field(worker, NPG_FIELD_POSE);
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)

@@ -57,12 +57,11 @@ void npg_capture_close(npg_capture **slot)
 static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin,
                             bool is_last_use)
 {
-    if (npg_frame_store_get(c->store, frame, index, is_last_use)) return NPG_OK;
+    if (!npg_frame_store_get(c->store, frame, index, is_last_use)) return NPG_OK;
     c->reads++;
     NPG_TRY(npg_frame_files_read(c->list, (size_t)index, frame, origin));
     frame->index = index; /* what the store keeps it under; a gap that holds it has another one */
-    if (!is_last_use) npg_frame_store_put(c->store, frame);
-    return NPG_OK;
+    return is_last_use ? NPG_OK : npg_frame_store_put(c->store, frame, false);
 }
 
 /* ---- frames that are not there ---- */

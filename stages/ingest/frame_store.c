@@ -27,7 +27,8 @@ typedef struct entry {
 struct npg_frame_store {
     pthread_mutex_t lock;
     entry *entries; /* owned */
-    size_t count, bytes, byte_max;
+    size_t count, capacity, bytes, byte_max;
+    bool keeps_all;
     char *folder; /* owned; NULL: nothing goes to disk (any more) */
     int file;     /* -1: not made yet */
     off_t file_bytes, file_max;
@@ -40,19 +41,30 @@ static void release_nothing(void *value)
 
 const npg_fact_kind npg_fact_frame_store = {"frame_store", "ingest", release_nothing};
 
-npg_status npg_frame_store_open(npg_frame_store **out, size_t frame_count, size_t byte_max,
-                                const char *spill_folder)
+static npg_status open_store(npg_frame_store **out, npg_frame_store settings, const char *spill_folder)
 {
     npg_frame_store *s;
     *out = NULL;
     NPG_TRY(npg_alloc(&s, NPG_FOR_FILES, sizeof *s));
-    *s = (npg_frame_store){.count = frame_count, .byte_max = byte_max, .file = -1};
+    *s = settings;
+    s->file = -1;
     pthread_mutex_init(&s->lock, NULL);
-    npg_status status = npg_alloc_array(&s->entries, NPG_FOR_FILES, frame_count, sizeof *s->entries);
+    npg_status status = npg_alloc_array(&s->entries, NPG_FOR_FILES, s->count, sizeof *s->entries);
     if (!status && spill_folder) status = npg_copy_text(&s->folder, spill_folder);
     if (status) npg_frame_store_close(&s);
     *out = s;
     return status;
+}
+
+npg_status npg_frame_store_open(npg_frame_store **store, size_t frame_count, size_t byte_max,
+                                const char *spill_folder)
+{
+    return open_store(store, (npg_frame_store){.count = frame_count, .byte_max = byte_max}, spill_folder);
+}
+
+npg_status npg_frame_store_open_all(npg_frame_store **store, size_t byte_max, const char *spill_folder)
+{
+    return open_store(store, (npg_frame_store){.byte_max = byte_max, .keeps_all = true}, spill_folder);
 }
 
 /* Of a point, in the arrays that the frame has. */
@@ -146,14 +158,19 @@ static off_t write_bytes(npg_frame_store *s, const void *data, size_t size)
     return at;
 }
 
-/* An array of `size` bytes from the file; NULL: it can't be had. */
-static void *read_bytes(const npg_frame_store *s, off_t at, size_t size)
+/* An array of `size` bytes from the file into *array, which stays NULL where it is not there. */
+static npg_status read_bytes(const npg_frame_store *s, void *array, off_t at, size_t size)
 {
     char *data;
-    if (npg_alloc(&data, NPG_FOR_FRAMES, size)) return NULL;
+    if (at == NOT_ON_DISK) return NPG_OK;
+    NPG_TRY(npg_alloc(&data, NPG_FOR_FRAMES, size));
     size_t got = size;
-    if (!npg_read_at(s->file, data, &got, at) || got < size) npg_release(&data);
-    return data;
+    if (!npg_read_at(s->file, data, &got, at) || got < size) {
+        npg_release(&data);
+        return npg_error(NPG_DISK, "what was kept of a frame on disk can't be read back");
+    }
+    *(void **)array = data;
+    return NPG_OK;
 }
 
 /* An array of the frame into the file, where it has one; false: it found no place there. */
@@ -177,8 +194,7 @@ static bool put_sensors(npg_frame *to, const npg_frame *frame)
 static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
 {
     size_t count = frame->point_count;
-    if (!(frame->fields & NPG_FIELD_CLEAN) || npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame))
-        return false;
+    if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return false;
     *e->frame = *frame;
     e->frame->pos_local = e->frame->normals = e->frame->vert_unit = NULL;
     e->frame->colours = e->frame->sensors = e->frame->vert_colours = NULL;
@@ -195,68 +211,97 @@ static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
     if (!is_put) {
         npg_frame_clear(e->frame);
         npg_release(&e->frame);
+        drop(s, e);
     }
     return is_put;
 }
 
 /* ---- frames ---- */
 
-static bool put_in_memory(npg_frame_store *s, entry *e, const npg_frame *frame)
+static bool fits(const npg_frame_store *s, const npg_frame *frame)
 {
     size_t bytes = sizeof *frame + frame->point_count * point_bytes(frame);
-    if (s->bytes > s->byte_max || bytes > s->byte_max - s->bytes) return false;
-    if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return false;
-    if (npg_frame_copy(e->frame, frame)) {
-        npg_release(&e->frame);
-        return false;
-    }
-    s->bytes += bytes_of(e);
-    return true;
+    return s->bytes <= s->byte_max && bytes <= s->byte_max - s->bytes;
 }
 
-void npg_frame_store_put(npg_frame_store *s, const npg_frame *frame)
+static npg_status put_in_memory(npg_frame_store *s, entry *e, const npg_frame *frame)
+{
+    NPG_TRY(npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame));
+    npg_status status = npg_frame_copy(e->frame, frame);
+    if (status) npg_release(&e->frame);
+    s->bytes += bytes_of(e);
+    return status;
+}
+
+/* Where nothing may be left out, memory takes what the disk does not. */
+static npg_status put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool is_final)
+{
+    if (fits(s, frame) && !put_in_memory(s, e, frame)) return NPG_OK;
+    if (is_final && frame->point_count && put_on_disk(s, e, frame)) return NPG_OK;
+    return s->keeps_all ? put_in_memory(s, e, frame) : NPG_OK;
+}
+
+/* Under the lock: an entry for this index, too. */
+static npg_status grow(npg_frame_store *s, int64_t index)
+{
+    if (!s->keeps_all || index < (int64_t)s->count) return NPG_OK;
+    NPG_TRY(npg_grow(&s->entries, &s->capacity, (size_t)index + 1, sizeof *s->entries, NPG_FOR_FILES));
+    while ((int64_t)s->count <= index) s->entries[s->count++] = (entry){0};
+    return NPG_OK;
+}
+
+npg_status npg_frame_store_put(npg_frame_store *s, const npg_frame *frame, bool is_final)
 {
     pthread_mutex_lock(&s->lock);
-    entry *e = find(s, frame->index);
-    if (e) {
-        drop(s, e);
-        if (frame->point_count && !put_in_memory(s, e, frame)) put_on_disk(s, e, frame);
-    }
+    npg_status status = grow(s, frame->index);
+    entry *e = status ? NULL : find(s, frame->index);
+    bool is_kept = s->keeps_all || (frame->point_count && !frame->is_held);
+    if (e) drop(s, e);
+    if (e && is_kept) status = put_frame(s, e, frame, is_final);
     pthread_mutex_unlock(&s->lock);
+    return status;
 }
 
-static bool get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
+static npg_status get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
 {
     size_t count = e->frame->point_count;
-    if (npg_frame_copy(frame, e->frame)) return false;
-    bool has_all = (frame->pos_local = read_bytes(s, e->points_at, count * ROW));
-    if (e->normals_at != NOT_ON_DISK)
-        has_all &= !!(frame->normals = read_bytes(s, e->normals_at, count * ROW));
-    if (e->colours_at != NOT_ON_DISK)
-        has_all &= !!(frame->colours = read_bytes(s, e->colours_at, count * COLOUR));
-    if (e->sensors_at != NOT_ON_DISK) has_all &= !!(frame->sensors = read_bytes(s, e->sensors_at, count));
-    if (!has_all) npg_frame_clear(frame);
-    return has_all;
+    npg_status status = npg_frame_copy(frame, e->frame);
+    if (!status) status = read_bytes(s, &frame->pos_local, e->points_at, count * ROW);
+    if (!status) status = read_bytes(s, &frame->normals, e->normals_at, count * ROW);
+    if (!status) status = read_bytes(s, &frame->colours, e->colours_at, count * COLOUR);
+    if (!status) status = read_bytes(s, &frame->sensors, e->sensors_at, count);
+    if (status) npg_frame_clear(frame);
+    return status;
 }
 
-bool npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t index, bool give_away)
+static void give_frame_away(npg_frame_store *s, npg_frame *frame, entry *e)
 {
+    size_t before = bytes_of(e);
+    *frame = *e->frame;
+    *e->frame = (npg_frame){.point_count = frame->point_count}; /* its made normals may still be asked for */
+    s->bytes -= before - bytes_of(e);
+}
+
+static bool was_given_away(const entry *e)
+{
+    return e->frame->point_count && !e->frame->pos_local && e->points_at == NOT_ON_DISK;
+}
+
+npg_status npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t index, bool give_away)
+{
+    npg_status status = NPG_OK;
     pthread_mutex_lock(&s->lock);
     entry *e = find(s, index);
-    bool is_there = e && e->frame;
-    if (is_there && !e->frame->pos_local) {
-        is_there = get_from_disk(s, frame, e);
-    } else if (is_there && give_away) {
-        size_t before = bytes_of(e);
-        *frame = *e->frame;
-        *e->frame =
-            (npg_frame){.point_count = frame->point_count}; /* its made normals may still be asked for */
-        s->bytes -= before - bytes_of(e);
-    } else if (is_there) {
-        is_there = !npg_frame_copy(frame, e->frame);
-    }
+    if (!e || !e->frame || was_given_away(e))
+        status = NPG_END;
+    else if (e->points_at != NOT_ON_DISK)
+        status = get_from_disk(s, frame, e);
+    else if (give_away)
+        give_frame_away(s, frame, e);
+    else
+        status = npg_frame_copy(frame, e->frame);
     pthread_mutex_unlock(&s->lock);
-    return is_there;
+    return status;
 }
 
 /* ---- normals ---- */
@@ -267,8 +312,8 @@ void npg_frame_store_put_normals(npg_frame_store *s, const npg_frame *frame)
     pthread_mutex_lock(&s->lock);
     entry *e = find(s, frame->index);
     if (e && e->frame && e->frame->point_count == frame->point_count && !e->has_made) {
-        bool fits = s->bytes <= s->byte_max && size <= s->byte_max - s->bytes;
-        if (fits && !npg_alloc(&e->made, NPG_FOR_FRAMES, size)) {
+        bool has_room = s->bytes <= s->byte_max && size <= s->byte_max - s->bytes;
+        if (has_room && !npg_alloc(&e->made, NPG_FOR_FRAMES, size)) {
             memcpy(e->made, frame->normals, size);
             s->bytes += size;
         } else {
@@ -287,7 +332,7 @@ bool npg_frame_store_get_normals(npg_frame_store *s, npg_frame *frame)
     pthread_mutex_lock(&s->lock);
     const entry *e = find(s, frame->index);
     bool is_there = e && e->has_made && e->frame->point_count == frame->point_count;
-    if (is_there && !e->made) normals = read_bytes(s, e->made_at, size);
+    if (is_there && !e->made && read_bytes(s, &normals, e->made_at, size)) normals = NULL;
     if (is_there && e->made && !npg_alloc(&normals, NPG_FOR_FRAMES, size)) memcpy(normals, e->made, size);
     if (normals) frame->cleaning = e->made_cleaning;
     pthread_mutex_unlock(&s->lock);

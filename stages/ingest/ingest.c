@@ -1,21 +1,21 @@
 /* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
  * from standard input, from a folder that grows, or from those that are pushed. */
 #include "ingest/capture.h"
-#include "ingest/live_source.h"
+#include "ingest/look_ahead.h"
 #include "ingest/rig/rig_report.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
+#include "pipeline/live_plan.h"
 #include "pipeline/stage.h"
 
 typedef struct state {
     const char *frames, *follow_end;
     double follow_idle_s, follow_settle_s;
     int missing;
-    int64_t cache_mib;
+    int64_t cache_mib, look_ahead;
     bool align_sensors;
     npg_rig_settings rig;
-    int64_t next; /* place in the pass's order; of files */
-    npg_live_source live;
+    int64_t next; /* place in the pass's order */
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -32,7 +32,10 @@ static const npg_option ingest_options[] = {
     NPG_ROW_INT   ("cache",         AT(cache_mib),       "256",         0,     1048576, "MIB",
         "Memory for frames that were read and cleaned, so that later passes need not do that again; "
         "what does not fit goes to a file in OUT/job that has no name, and is gone with the run; "
-        "0: nothing is kept, neither in memory nor on disk"),
+        "0: nothing is kept, neither in memory nor on disk, but for the look-ahead of a live run"),
+    NPG_ROW_INT   ("look-ahead",    AT(look_ahead),      "64",          1,     1e6,     NULL,
+        "Live runs: frames that are kept first: box, keyframe and reference are made from them as from a "
+        "capture of that many frames"),
     NPG_ROW_TEXT  ("follow-end",    AT(follow_end),      "capture.end", "NAME",
         "Name of the file that ends a folder that is followed, once it is there; empty: none does"),
     NPG_ROW_REAL  ("follow-idle",   AT(follow_idle_s),   "30",          0,     1e9,     "SECONDS",
@@ -71,7 +74,7 @@ static void release_capture(void *thing)
     npg_capture_close(&capture);
 }
 
-static size_t cache_limit(npg_worker *worker)
+static size_t cache_limit(const npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     size_t limit = (size_t)s->cache_mib << 20,
@@ -170,15 +173,24 @@ npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
     return npg_capture_select(list, options, NULL);
 }
 
+/* Where frames go that the cache does not hold; NULL: nowhere.  To npg_release(). */
+static npg_status spill_folder(char **folder, const npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_settings *settings = npg_worker_settings(worker);
+    *folder = NULL;
+    if (!settings->output[0] || !s->cache_mib) return NPG_OK;
+    return npg_join_path(folder, settings->output, "job");
+}
+
 static npg_status open_capture(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_settings *settings = npg_worker_settings(worker);
     npg_capture *capture;
     npg_frame_files *list;
-    char *folder = NULL;
-    if (npg_worker_kept(worker)) return NPG_OK;
-    if (settings->output[0] && s->cache_mib) NPG_TRY(npg_join_path(&folder, settings->output, "job"));
+    char *folder;
+    NPG_TRY(spill_folder(&folder, worker));
     npg_status status = list_frames(&list, s, settings, s->frames);
     if (!status)
         status = npg_capture_open_list(&capture, &list, settings->input, (npg_missing)s->missing,
@@ -189,7 +201,7 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
     npg_facts *facts = npg_worker_facts(worker);
     /* A resumed run has restored it. */
-    if (!facts->is_resumed) facts->frame_count = (int64_t)capture->list->count;
+    if (!facts->is_resumed) facts->frame_count = facts->planned_count = (int64_t)capture->list->count;
     report_list(worker, capture->list);
     if (capture->list->rig) report_rig(worker, capture->list->rig);
     return capture->list->rig && s->align_sensors ? align_sensors(worker, capture->list) : NPG_OK;
@@ -210,84 +222,154 @@ static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index
     return status;
 }
 
+static void report_cache(npg_worker *worker)
+{
+    json_t *report = npg_worker_report(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) return;
+    npg_frame_store_use use = npg_frame_store_used(npg_worker_fact(worker, &npg_fact_frame_store));
+    json_object_set_new(report, "cache_bytes", json_integer((json_int_t)use.memory_bytes));
+    json_object_set_new(report, "cache_disk_bytes", json_integer((json_int_t)use.disk_bytes));
+}
+
 /* Figures of the capture as it was read; the first pass sees every frame once. */
-static void report_capture(npg_worker *worker)
+static npg_status end_files(npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_capture *capture = npg_worker_kept(worker);
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
     json_object_set_new(report, "files_parsed", json_integer((json_int_t)capture->reads));
-    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) return;
-    npg_frame_store_use use = npg_frame_store_used(capture->store);
-    json_object_set_new(report, "cache_bytes", json_integer((json_int_t)use.memory_bytes));
-    json_object_set_new(report, "cache_disk_bytes", json_integer((json_int_t)use.disk_bytes));
-}
-
-static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
-{
-    state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    npg_pass pass = npg_worker_pass(worker);
-    int64_t count = pass == NPG_PASS_CHOOSE ? (int64_t)facts->choice.count : facts->frame_count;
-    bool is_in_order = pass == NPG_PASS_SOLVE || pass == NPG_PASS_FUSE;
-    if (is_in_order) count = npg_plan_read_count(&facts->plan);
-    while (s->next < count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
-        npg_frame frame;
-        int64_t index = s->next;
-        if (is_in_order) index = npg_plan_frame(&facts->plan, s->next);
-        if (pass == NPG_PASS_CHOOSE) index = facts->choice.frames[s->next];
-        if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
-        NPG_TRY(read_frame(worker, &frame, index));
-        npg_chunk_add(chunk, &frame);
-        s->next++;
-    }
-    if (npg_chunk_count(chunk)) return NPG_OK;
-    report_capture(worker);
+    report_cache(worker);
     if (facts->skipped_count == facts->frame_count)
         return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used",
                          npg_worker_settings(worker)->input, (long long)facts->frame_count);
     return NPG_END;
 }
 
+/* ---- the order of a pass ---- */
+
+/* Places of the pass's order; INT64_MAX while the end of a live source is not known. */
+static int64_t place_count(const npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    int64_t total = pass == NPG_PASS_FUSE ? facts->planned_count : facts->frame_count;
+    if (pass == NPG_PASS_CHOOSE) return (int64_t)facts->choice.count;
+    if (pass != NPG_PASS_SOLVE && pass != NPG_PASS_FUSE) return facts->planned_count;
+    if (!npg_plan_is_open(&facts->plan)) return npg_plan_read_count(&facts->plan);
+    return total < 0 ? INT64_MAX : npg_live_next_place(&facts->plan, total, total);
+}
+
+/* Index of the frame at this place; under an open plan there may be none with it. */
+static int64_t index_at(const npg_worker *worker, int64_t place)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_pass pass = npg_worker_pass(worker);
+    if (pass == NPG_PASS_CHOOSE) return facts->choice.frames[place];
+    return pass == NPG_PASS_SOLVE || pass == NPG_PASS_FUSE ? npg_live_frame(&facts->plan, place) : place;
+}
+
+static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
+{
+    state *s = npg_worker_state(worker);
+    const int64_t count = place_count(worker);
+    while (s->next < count && npg_chunk_count(chunk) < npg_chunk_capacity(chunk)) {
+        npg_frame frame;
+        if (npg_worker_stopping(worker)) return npg_error(NPG_STOPPED, "stopped while reading");
+        NPG_TRY(read_frame(worker, &frame, index_at(worker, s->next)));
+        npg_chunk_add(chunk, &frame);
+        s->next++;
+    }
+    return npg_chunk_count(chunk) ? NPG_OK : end_files(worker);
+}
+
+/* ---- a live source ---- */
+
+static void release_look_ahead(void *thing)
+{
+    npg_look_ahead *look_ahead = thing;
+    npg_look_ahead_close(&look_ahead);
+}
+
+static npg_status open_look_ahead(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_live_settings settings = {.frames = s->frames,
+                                        .follow_end = s->follow_end,
+                                        .follow_idle_s = s->follow_idle_s,
+                                        .follow_settle_s = s->follow_settle_s,
+                                        .missing = (npg_missing)s->missing};
+    npg_look_ahead *look_ahead;
+    char *folder;
+    NPG_TRY(spill_folder(&folder, worker));
+    npg_status status = npg_look_ahead_open(&look_ahead, worker, &settings, cache_limit(worker), folder);
+    npg_release(&folder);
+    NPG_TRY(status);
+    npg_worker_keep(worker, look_ahead, release_look_ahead);
+    return npg_worker_publish(worker, &npg_fact_frame_store, look_ahead->store);
+}
+
+/* One frame per chunk, so that nothing waits for frames that may come much later. */
+static npg_status next_from_source(npg_worker *worker, npg_chunk *chunk)
+{
+    state *s = npg_worker_state(worker);
+    npg_look_ahead *look_ahead = npg_worker_kept(worker);
+    bool is_last = npg_worker_pass(worker) == NPG_PASS_SOLVE;
+    npg_status status = NPG_END;
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE)
+        status = npg_look_ahead_take(look_ahead, chunk, s->look_ahead);
+    else
+        while (status == NPG_END && s->next < place_count(worker))
+            status = npg_look_ahead_read(look_ahead, chunk, index_at(worker, s->next++), is_last);
+    if (status != NPG_END) return status;
+    report_cache(worker);
+    return is_last ? npg_look_ahead_end(look_ahead) : NPG_END;
+}
+
 /* ---- the stage ---- */
+
+/* Under an open plan frames behind the end never came. */
+static int64_t resumed_place(const npg_facts *facts)
+{
+    return facts->is_live ? npg_live_next_place(&facts->plan, facts->resumed_read, facts->frame_count)
+                          : facts->resumed_read;
+}
 
 static npg_status init(npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     state *s = npg_worker_state(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_SOLVE) s->next = facts->resumed_read;
-    const npg_live_settings of_live = {.frames = s->frames,
-                                       .follow_end = s->follow_end,
-                                       .follow_idle_s = s->follow_idle_s,
-                                       .follow_settle_s = s->follow_settle_s,
-                                       .missing = (npg_missing)s->missing};
-    return facts->is_live ? npg_live_source_open(&s->live, worker, &of_live) : open_capture(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE && facts->is_resumed) s->next = resumed_place(facts);
+    if (npg_worker_kept(worker)) return NPG_OK; /* from an earlier pass */
+    return facts->is_live ? open_look_ahead(worker) : open_capture(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
-    state *s = npg_worker_state(worker);
     bool is_live = npg_worker_facts(worker)->is_live;
     size_t frames = is_live ? 1 : (size_t)npg_worker_settings(worker)->chunk_frames;
     NPG_TRY(npg_chunk_open(chunk, frames));
-    npg_status status = is_live ? npg_live_source_next(&s->live, *chunk) : next_from_files(worker, *chunk);
+    npg_status status = is_live ? next_from_source(worker, *chunk) : next_from_files(worker, *chunk);
     if (status) npg_chunk_unref(chunk);
     return status;
 }
 
-static void uninit(npg_worker *worker)
+/* A run that is resumed has yet to keep what it still needs of the look-ahead. */
+static size_t kept_at_most(const npg_worker *worker)
 {
-    state *s = npg_worker_state(worker);
-    npg_live_source_close(&s->live);
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_frame_store *store = npg_worker_fact(worker, &npg_fact_frame_store);
+    if (!facts->is_live || !facts->is_resumed) return store ? npg_frame_store_used(store).memory_bytes : 0;
+    size_t frame = sizeof(npg_frame) + facts->point_count_max * (6 * sizeof(float) + 5);
+    size_t all = (size_t)facts->planned_count * frame, limit = cache_limit(worker);
+    return all < limit ? all : limit;
 }
 
+/* The normals are those of the keyframe, which are to come. */
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
-    const npg_capture *capture = npg_worker_kept(worker);
-    size_t normals = npg_worker_facts(worker)->point_count_max * 3 * sizeof(float); /* of the keyframe, yet */
     *chunks_held = 1;
-    return capture ? npg_frame_store_used(capture->store).memory_bytes + normals : 0;
+    return kept_at_most(worker) + npg_worker_facts(worker)->point_count_max * 3 * sizeof(float);
 }
 
 extern const npg_stage npg_stage_ingest;
@@ -300,5 +382,4 @@ const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .gives = NPG_FIELD_POINTS,
                                     .init = init,
                                     .process = process,
-                                    .uninit = uninit,
                                     .memory = memory};

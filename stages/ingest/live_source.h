@@ -4,6 +4,7 @@
  * What comes is noted in the input log (input_log.h) where the run keeps one.  A run that is resumed goes
  * through the log first (live_replay.c): a frame that is solved is not brought again, but compared where it
  * comes again; the others are.  Then the source goes on behind it.  A source that had ended ends there again.
+ * Which frames a pass brings, and in what order, look_ahead.h says.
  *
  * Threads: that of stage ingest. */
 #ifndef NPG_LIVE_SOURCE_H

@@ -136,6 +136,9 @@ npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass);
  * the same job. */
 npg_status npg_job_key(const npg_job *job, uint64_t *key);
 
+/* The same in a fusing pass: of a live source the input is the look-ahead that has come (job_live.c). */
+npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key);
+
 /* Block of a state: what stage align needs (npg_frame.align_state). */
 #define NPG_BLOCK_ALIGN     "align"
 #define NPG_BLOCK_ALIGN_MAP "align.map" /* from the nodes of those poses to the reference's */

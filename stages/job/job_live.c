@@ -18,6 +18,23 @@ npg_status npg_job_begin_inputs(npg_worker *worker, npg_job *job)
     return status ? status : npg_worker_publish(worker, &npg_fact_input_log, log);
 }
 
+npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key)
+{
+    const npg_job *job = npg_job_of(worker);
+    npg_input_log *log = npg_worker_fact(worker, &npg_fact_input_log);
+    npg_input_place place;
+    uint64_t hash;
+    char *path;
+    NPG_TRY(npg_job_key(job, key));
+    if (!log) return NPG_OK;
+    npg_input_log_place(log, npg_worker_facts(worker)->planned_count - 1, &place);
+    NPG_TRY(npg_job_inputs_path(job, &path, true));
+    npg_status status = npg_hash_file(&hash, path, (uint64_t)place.bytes);
+    npg_release(&path);
+    if (!status) *key ^= hash;
+    return status;
+}
+
 /* ---- the files of a folder that is followed ---- */
 
 static npg_status open_folder(npg_follow **follow, const npg_worker *worker)

@@ -57,7 +57,7 @@ static npg_status put_inputs(npg_archive_writer *out, const npg_worker *worker, 
     npg_input_place place;
     char *path;
     if (!log) return NPG_OK;
-    if (last < facts->planned_from - 1) last = facts->planned_from - 1;
+    if (last < facts->planned_count - 1) last = facts->planned_count - 1;
     npg_input_log_place(log, last, &place);
     NPG_TRY(npg_input_log_sync(log));
     NPG_TRY(npg_job_inputs_path(npg_job_of(worker), &path, false));

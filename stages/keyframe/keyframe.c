@@ -10,14 +10,13 @@
  * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
  * (likeness.h). */
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "job/job.h"
 #include "keyframe/choose_pass.h"
 #include "keyframe/likeness.h"
-#include "keyframe/look_ahead.h"
+#include "keyframe/outside.h"
 #include "keyframe/shortlist.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
@@ -39,8 +38,8 @@ typedef struct candidate {
 } candidate;
 
 typedef struct keyframe_state {
-    int64_t number, window, overlap, look_ahead; /* options */
-    int choice, welds;                           /* options */
+    int64_t number, window, overlap; /* options */
+    int choice, welds;               /* options */
     npg_shortlist shortlist;
     double box_margin;            /* option */
     uint64_t *cells;              /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
@@ -54,10 +53,14 @@ typedef struct keyframe_state {
     size_t diagonal_count, diagonal_room;
     int64_t usable_count; /* frames that were not skipped               */
     int64_t passed_count; /* frames of the solving pass so far          */
-    npg_look_ahead held;  /* a live run's frames until it is their turn */
-    bool is_planned;      /* live: the key is known                     */
-    pthread_mutex_t lock; /* of what a state on disk has of `held`      */
+    npg_outside outside;  /* of a live source, behind the look-ahead    */
 } keyframe_state;
+
+/* Whether a live source goes on behind the look-ahead; known once that is measured. */
+static bool is_open(const npg_facts *facts)
+{
+    return facts->frame_count < 0;
+}
 
 /* ---- measuring ---- */
 
@@ -116,12 +119,35 @@ static void report_box(json_t *report, const npg_facts *facts)
     json_object_set_new(report, "point_count_max", json_integer((json_int_t)facts->point_count_max));
 }
 
+/* The source goes on: what comes later needs room, too. */
+static void widen_box(const keyframe_state *state, npg_bounds *bounds)
+{
+    double longest = 0;
+    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds->hi[a] - bounds->lo[a]);
+    for (int a = 0; a < 3; a++) {
+        bounds->lo[a] -= state->box_margin / 100 * longest;
+        bounds->hi[a] += state->box_margin / 100 * longest;
+    }
+}
+
+static npg_status refuse_one_window(const npg_facts *facts)
+{
+    return npg_error(NPG_USAGE,
+                     "the live capture is longer than the look-ahead of %lld frames, "
+                     "and one window over all frames needs all of them: "
+                     "set the option window, raise look-ahead, "
+                     "or write the frames to files and give those as input",
+                     (long long)facts->planned_count);
+}
+
 static npg_status close_measuring(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
+    if (is_open(facts) && !state->window) return refuse_one_window(facts);
     if (!state->usable_count)
         return npg_error(NPG_BAD_INPUT, "no frame is left: every frame was skipped or the input has none");
+    if (is_open(facts)) widen_box(state, &facts->bounds_local);
     NPG_TRY(npg_frame_box_set(&facts->box, &facts->origin, &facts->bounds_local));
     set_diagonal(state, &facts->box);
     report_box(npg_worker_report(worker), facts);
@@ -183,8 +209,7 @@ static const char *own_mesh(const npg_worker *worker)
     return npg_worker_settings(worker)->reference;
 }
 
-/* Whether there is a choosing pass, which takes files, and a keyframe that is neither
- * named nor that of a mesh. */
+/* Whether the keyframe is to be chosen among candidates: it is neither named nor that of a mesh. */
 static bool has_candidates(const npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
@@ -213,10 +238,11 @@ static double score_of(size_t cell_count, int64_t index, int64_t frame_count)
     return (double)cell_count * exp(-0.001 * from_middle * from_middle);
 }
 
-static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg_frame *frame)
+static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
+    const int64_t frame_count = facts->planned_count;
     bool is_named = frame->number == state->number && state->number != NO_NUMBER;
     if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
     if (frame->is_skipped) return NPG_OK;
@@ -230,8 +256,7 @@ static npg_status score_frame(npg_worker *worker, int64_t frame_count, const npg
         state->chosen = scored;
         state->is_chosen = true;
     }
-    if (facts->is_live || !has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count))
-        return NPG_OK;
+    if (!has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count)) return NPG_OK;
     return npg_shortlist_add(&state->shortlist, frame, cell_count);
 }
 
@@ -257,43 +282,68 @@ static npg_status choose(const keyframe_state *state, candidate *key)
     return npg_error(NPG_USAGE, "keyframe %lld: no usable frame has this number", (long long)state->number);
 }
 
+/* Of an open source at its end. */
 static void report_windows(npg_worker *worker)
 {
-    const npg_plan *plan = &npg_worker_facts(worker)->plan;
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (is_open(facts)) return;
     json_object_set_new(npg_worker_report(worker), "windows",
-                        json_integer((json_int_t)npg_plan_window_count(plan)));
+                        json_integer((json_int_t)npg_live_window_count(&facts->plan, facts->frame_count)));
 }
 
-static npg_status set_plan(npg_worker *worker, int64_t frame_count)
+static npg_plan plan_around(const keyframe_state *state, const npg_facts *facts, int64_t key)
 {
-    keyframe_state *state = npg_worker_state(worker);
+    int64_t count = is_open(facts) ? NPG_FRAMES_OPEN : facts->planned_count;
+    int64_t asked = npg_plan_window_asked(state->window, is_open(facts) ? INT64_MAX : count);
+    int64_t window = asked && asked < count ? asked : count;
+    return (npg_plan){
+        .frame_count = count, .key = key, .window = window, .overlap = window < count ? state->overlap : 0};
+}
+
+/* What the choosing pass is to look at. */
+static void set_choice(npg_worker *worker)
+{
+    const keyframe_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
-    candidate key = {0};
-    NPG_TRY(choose(state, &key));
-    int64_t asked = npg_plan_window_asked(state->window, frame_count);
-    int64_t window = asked && asked < frame_count ? asked : frame_count;
-    int64_t overlap = window < frame_count ? state->overlap : 0;
-    facts->plan =
-        (npg_plan){.frame_count = frame_count, .key = key.index, .window = window, .overlap = overlap};
-    facts->window_asked = npg_plan_window_asked(state->window, INT64_MAX);
-    facts->overlap_asked = state->overlap;
+    bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker), chooses = has_candidates(worker);
+    if (facts->planned_count < 2 || (!chooses && !cuts_welds)) return;
+    npg_shortlist_choose(&facts->choice, &state->shortlist, facts->plan.key, facts->planned_count, !chooses);
+    facts->choice.cut_welds = cuts_welds;
+}
+
+static void report_key(npg_worker *worker, const candidate *key)
+{
+    const keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     bool is_own = *own_mesh(worker) != 0, is_named = state->number != NO_NUMBER;
-    bool cuts_welds = state->welds == WELDS_CUT && !is_own, is_open = has_candidates(worker);
-    if (!facts->is_live && frame_count > 1 && (is_open || cuts_welds)) {
-        npg_shortlist_choose(&facts->choice, &state->shortlist, key.index, frame_count, !is_open);
-        facts->choice.cut_welds = cuts_welds;
-    }
     json_t *report = npg_worker_report(worker), *scores = json_array();
     for (size_t i = 0; i < state->best_count; i++)
         json_array_append_new(scores, json_of(&state->best[i], is_own));
-    json_object_set_new(report, "key", json_of(&key, is_own));
+    json_object_set_new(report, "key", json_of(key, is_own));
     json_object_set_new(report, "best", scores);
+    if (facts->is_live) json_object_set_new(report, "open", json_boolean(is_open(facts)));
     report_windows(worker);
     const char *what = is_own && !is_named                 ? "is the keyframe, nearest to the reference"
                        : facts->choice.candidate_count > 1 ? "has the best score"
                                                            : "is the keyframe";
-    npg_worker_log(worker, NPG_LOG_INFO, key.number, "%s of %lld frames (%zu cells, score %.4g)", what,
-                   (long long)frame_count, key.cell_count, key.score);
+    npg_worker_log(worker, NPG_LOG_INFO, key->number, "%s of %lld frames (%zu cells, score %.4g)", what,
+                   (long long)facts->planned_count, key->cell_count, key->score);
+}
+
+static npg_status set_plan(npg_worker *worker)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    npg_facts *facts = npg_worker_facts(worker);
+    candidate key = {0};
+    npg_status status = choose(state, &key);
+    if (status && is_open(facts))
+        return npg_error_prefix(status, "look-ahead of %lld frames", (long long)facts->planned_count);
+    NPG_TRY(status);
+    facts->plan = plan_around(state, facts, key.index);
+    facts->window_asked = npg_plan_window_asked(state->window, INT64_MAX);
+    facts->overlap_asked = state->overlap;
+    set_choice(worker);
+    report_key(worker, &key);
     return NPG_OK;
 }
 
@@ -316,7 +366,7 @@ static npg_status close_choosing(npg_worker *worker)
     return NPG_OK;
 }
 
-/* ---- solving pass, from files ---- */
+/* ---- fusing and solving pass ---- */
 
 static npg_status mark_key(npg_worker *worker, npg_frame *frame)
 {
@@ -336,97 +386,22 @@ static npg_status mark_key(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* ---- solving pass of a live run: hold the look-ahead, then pass on in the plan's order ---- */
-
-/* The source goes on: what comes later needs room, too. */
-static void widen_box(const keyframe_state *state, npg_bounds *bounds)
-{
-    double longest = 0;
-    for (int a = 0; a < 3; a++) longest = fmax(longest, bounds->hi[a] - bounds->lo[a]);
-    for (int a = 0; a < 3; a++) {
-        bounds->lo[a] -= state->box_margin / 100 * longest;
-        bounds->hi[a] += state->box_margin / 100 * longest;
-    }
-}
-
-static npg_status refuse_one_window(const keyframe_state *state)
-{
-    return npg_error(NPG_USAGE,
-                     "the live capture is longer than the look-ahead of %lld frames, "
-                     "and one window over all frames needs all of them: "
-                     "set the option window, raise look-ahead (each frame is held in memory), "
-                     "or write the frames to files and give those as input",
-                     (long long)state->look_ahead);
-}
-
-/* Box, keyframe and plan from the frames held.  is_open: the source goes on behind them. */
-static npg_status plan_live(npg_worker *worker, bool is_open)
+/* What comes behind the look-ahead had no part in the box. */
+static npg_status pass_frame(npg_worker *worker, npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
-    int64_t frame_count = npg_look_ahead_frame_count(&state->held);
-    if (is_open && !state->window) return refuse_one_window(state);
-    if (is_open && state->usable_count) widen_box(state, &facts->bounds_local);
-    NPG_TRY(close_measuring(worker));
-    if (!is_open && facts->frame_count < frame_count) facts->frame_count = frame_count;
-    facts->planned_from = frame_count;
-    for (size_t i = 0; i < state->held.count; i++)
-        NPG_TRY(score_frame(worker, frame_count, &state->held.frames[i]));
-    npg_status status = set_plan(worker, frame_count);
-    if (status && is_open)
-        return npg_error_prefix(status, "look-ahead of %lld frames", (long long)state->look_ahead);
-    NPG_TRY(status);
-    if (is_open)
-        facts->plan = (npg_plan){.frame_count = NPG_FRAMES_OPEN,
-                                 .key = facts->plan.key,
-                                 .window = npg_plan_window_asked(state->window, INT64_MAX),
-                                 .overlap = state->overlap};
-    json_object_set_new(npg_worker_report(worker), "open", json_boolean(is_open));
-    state->is_planned = true;
-    npg_release(&state->cells);
-    npg_worker_close_report(worker);
-    npg_worker_announce_memory(worker);
-    return NPG_OK;
-}
-
-/* An earlier run has made the plan: the frames that it solved don't come again. */
-static npg_status resume_live(npg_worker *worker)
-{
-    keyframe_state *state = npg_worker_state(worker);
+    NPG_TRY(mark_key(worker, frame));
     const npg_facts *facts = npg_worker_facts(worker);
-    state->is_planned = true;
-    state->held.next = npg_live_next_place(&facts->plan, facts->resumed_read, facts->frame_count);
-    NPG_TRY(npg_look_ahead_restore(&state->held, npg_job_archive(npg_job_of(worker)), facts));
-    npg_worker_announce_memory(worker);
-    return NPG_OK;
-}
-
-/* Facts may not change behind the plan: other stages read them. */
-static npg_status take_live(npg_worker *worker, npg_frame *frame)
-{
-    keyframe_state *state = npg_worker_state(worker);
-    size_t limit = (size_t)state->look_ahead;
-    if (!state->is_planned && state->held.count < limit) {
-        NPG_TRY(measure_frame(state, npg_worker_facts(worker), frame));
-        return npg_look_ahead_add(&state->held, frame);
-    }
-    if (!state->is_planned) NPG_TRY(plan_live(worker, true));
-    if (frame->index >= npg_worker_facts(worker)->planned_from)
-        NPG_TRY(npg_look_ahead_watch(worker, &state->held, frame));
-    NPG_TRY(npg_look_ahead_add(&state->held, frame));
-    return npg_look_ahead_release(worker, &state->held,
-                                  limit + (size_t)npg_plan_window_asked(state->window, INT64_MAX), false);
+    bool is_behind = facts->is_live && frame->index >= facts->planned_count;
+    return is_behind ? npg_outside_watch(worker, &state->outside, frame) : NPG_OK;
 }
 
 static npg_status end_live(npg_worker *worker)
 {
-    keyframe_state *state = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    if (!state->is_planned) NPG_TRY(plan_live(worker, false));
-    json_object_set_new(npg_worker_report(worker), "windows",
-                        json_integer((json_int_t)npg_live_window_count(&facts->plan, facts->frame_count)));
-    npg_look_ahead_tell_outside(worker, &state->held);
-    return npg_look_ahead_release(worker, &state->held, 0, true);
+    const keyframe_state *state = npg_worker_state(worker);
+    report_windows(worker);
+    npg_outside_tell(worker, &state->outside);
+    return NPG_OK;
 }
 
 /* ---- the stage ---- */
@@ -437,20 +412,20 @@ static npg_status init(npg_worker *worker)
     npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
     int64_t window = npg_plan_window_asked(state->window, INT64_MAX);
+    npg_outside_open(&state->outside);
     if (window && state->overlap >= window)
         return npg_error(NPG_USAGE, "option overlap: %lld frames don't fit in windows of %lld",
                          (long long)state->overlap, (long long)window);
-    state->held.lock = &state->lock;
-    pthread_mutex_init(&state->lock, NULL);
-    if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed) return resume_live(worker);
-    if (pass == NPG_PASS_MEASURE || (pass == NPG_PASS_SOLVE && facts->is_live)) {
+    if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed)
+        return npg_outside_restore(&state->outside, npg_job_archive(npg_job_of(worker)), facts);
+    if (pass == NPG_PASS_MEASURE) {
         facts->bounds_local = npg_bounds_empty();
         facts->point_count_max = 0;
         facts->has_normals = true;
         facts->number_min = INT64_MAX;
         facts->number_max = INT64_MIN;
     }
-    if (pass == NPG_PASS_SCORE || (pass == NPG_PASS_SOLVE && facts->is_live))
+    if (pass == NPG_PASS_SCORE)
         NPG_TRY(npg_alloc_array(&state->cells, NPG_FOR_RUN, CELL_WORDS, sizeof *state->cells));
     return NPG_OK;
 }
@@ -466,35 +441,32 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         if (pass == NPG_PASS_MEASURE)
             NPG_TRY(measure_frame(state, facts, frame));
         else if (pass == NPG_PASS_SCORE)
-            NPG_TRY(score_frame(worker, facts->frame_count, frame));
+            NPG_TRY(score_frame(worker, frame));
         else
-            NPG_TRY(facts->is_live ? take_live(worker, frame) : mark_key(worker, frame));
+            NPG_TRY(pass_frame(worker, frame));
     }
-    if (pass == NPG_PASS_SOLVE && facts->is_live) npg_chunk_unref(chunk);
     return NPG_OK;
 }
 
 static npg_status flush(npg_worker *worker)
 {
-    npg_facts *facts = npg_worker_facts(worker);
     switch (npg_worker_pass(worker)) {
     case NPG_PASS_MEASURE: return close_measuring(worker);
-    case NPG_PASS_SCORE: return set_plan(worker, facts->frame_count);
+    case NPG_PASS_SCORE: return set_plan(worker);
     case NPG_PASS_CHOOSE:
         NPG_TRY(close_choosing(worker));
         npg_worker_step(worker, 1, 1, 1);
         return NPG_OK;
-    case NPG_PASS_FUSE:
+    case NPG_PASS_FUSE: return NPG_OK;
     case NPG_PASS_SOLVE: break;
     }
-    return facts->is_live ? end_live(worker) : NPG_OK;
+    return npg_worker_facts(worker)->is_live ? end_live(worker) : NPG_OK;
 }
 
 static void uninit(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
-    if (state->held.lock) pthread_mutex_destroy(&state->lock);
-    npg_look_ahead_clear(&state->held);
+    npg_outside_close(&state->outside);
     npg_likeness_close(&state->likeness);
     npg_choose_pass_clear(&state->choosing);
     npg_release(&state->cells);
@@ -504,18 +476,8 @@ static void uninit(npg_worker *worker)
 /* Of a state on disk: the plan and the box are facts. */
 static npg_status save(const npg_worker *worker, npg_archive_writer *out)
 {
-    const keyframe_state *state = npg_worker_state(worker);
-    return npg_worker_facts(worker)->is_live ? npg_look_ahead_save(&state->held, out) : NPG_OK;
-}
-
-static size_t memory(const npg_worker *worker, size_t *chunks_held)
-{
-    const keyframe_state *state = npg_worker_state(worker);
-    if (!npg_worker_facts(worker)->is_live) return 0;
-    int64_t per_chunk = npg_worker_settings(worker)->chunk_frames;
-    *chunks_held =
-        (size_t)((state->look_ahead + per_chunk - 1) / per_chunk) + 1; /* live chunks hold a frame */
-    return CELL_WORDS * sizeof(uint64_t);
+    keyframe_state *state = npg_worker_state(worker);
+    return npg_worker_facts(worker)->is_live ? npg_outside_save(&state->outside, out) : NPG_OK;
 }
 
 #define AT(member) offsetof(keyframe_state, member)
@@ -529,18 +491,15 @@ static const npg_option options[] = {
     NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
         "Take the frame with the best score (paper), "
         "or the one of several good frames whose surface fares best in the others, "
-        "so that limbs which touch in one frame are not joined for the whole capture "
-        "(apart; not for live runs)"),
+        "so that limbs which touch in one frame are not joined for the whole capture (apart)"),
     NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",
         "Surface of the reference that other frames stretch far from all points: "
-        "cut it and close the holes, or keep it (live runs keep it)"),
+        "cut it and close the holes, or keep it"),
     NPG_ROW_INT   ("window",          AT(window),     "24",    -1,    1e6,  NULL,
         "Frames that are solved together; 0: all of them in one window; "
         "-1: so up to 60 frames, and windows of 24 where there are more"),
     NPG_ROW_INT   ("overlap",         AT(overlap),    "4",     0,     1e6,  NULL,
         "Frames that a window shares with its neighbour"),
-    NPG_ROW_INT   ("look-ahead",      AT(look_ahead), "64",    1,     1e6,  NULL,
-        "Live runs: frames that are held while box and keyframe are chosen among them"),
     NPG_ROW_REAL  ("box-margin",      AT(box_margin), "10",    0,     1000, "PERCENT",
         "Live runs that go on behind the look-ahead: "
         "room left around its box, in per cent of its longest side"),
@@ -568,6 +527,5 @@ const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .process = process,
                                       .flush = flush,
                                       .uninit = uninit,
-                                      .memory = memory,
                                       .expects = expects,
                                       .save = save};

@@ -193,7 +193,7 @@ static npg_status init(npg_worker *worker)
     NPG_TRY(npg_device_open_tuned(&s->device, npg_worker_settings(worker)->device,
                                   npg_worker_settings(worker)->tuning));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
-    if (npg_worker_facts(worker)->is_live || is_resumed(worker)) NPG_TRY(npg_kernels_self_test(s->device));
+    if (is_resumed(worker)) NPG_TRY(npg_kernels_self_test(s->device));
     const npg_device_info *info = npg_device_facts(s->device);
     npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
                    info->units);

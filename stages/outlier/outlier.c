@@ -114,10 +114,13 @@ static npg_status outlier_init(npg_worker *worker)
     return parse_sensor(npg_worker_state(worker));
 }
 
-/* Every pass cleans the frames again; only the first one reports what it did to them. */
-static bool is_first_pass(npg_worker *worker)
+/* Every pass cleans frames again that are not kept; only the first one that brings them reports what it did:
+ * the solving one those behind a look-ahead. */
+static bool comes_first(npg_worker *worker, const npg_frame *frame)
 {
-    return npg_worker_pass(worker) == NPG_PASS_MEASURE || npg_worker_facts(worker)->is_live;
+    const npg_facts *facts = npg_worker_facts(worker);
+    return npg_worker_pass(worker) == NPG_PASS_MEASURE ||
+           (facts->is_live && frame->index >= facts->planned_count);
 }
 
 /* ---- points ---- */
@@ -132,7 +135,7 @@ static npg_status clean_points(npg_worker *worker, npg_frame *frame)
     NPG_TRY(npg_clean_duplicates(frame));
     if (s->voxel > 0) NPG_TRY(npg_clean_voxels(frame, s->voxel));
     NPG_TRY(npg_clean_cap(frame, &side, (size_t)s->point_max));
-    if (side > 0 && is_first_pass(worker))
+    if (side > 0 && comes_first(worker, frame))
         npg_worker_warn(worker, false, frame->number,
                         "%zu points are more than points-max %lld: thinned to %zu, one per cube of side %g",
                         read, (long long)s->point_max, frame->point_count, side);
@@ -221,7 +224,6 @@ static npg_status make_or_mend_normals(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* A live run chooses its keyframe after this stage, so there every frame may be the one. */
 static bool needs_normals(npg_worker *worker, const npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -233,10 +235,9 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
         return false;
     }
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
-    if (facts->is_live) return true; /* the plan is about to be made behind this stage */
     if (frame->sensor_count == 1 && !frame->sensors) return true; /* they face it: sure, and needed to grow */
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
-    return s->normals_for == FOR_ALL || frame->is_key || is_planned_key;
+    return s->normals_for == FOR_ALL || is_planned_key;
 }
 
 /* ---- the stage ---- */
@@ -266,7 +267,7 @@ static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status 
 {
     outlier_state *s = npg_worker_state(worker);
     if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return name_frame(status, frame);
-    if (is_first_pass(worker))
+    if (comes_first(worker, frame))
         npg_worker_warn(worker, true, frame->number, "skipped %s: %s",
                         frame->path ? frame->path : "what was pushed", npg_error_text());
     frame->is_skipped = true;
@@ -327,22 +328,20 @@ static npg_status clean_frame(npg_worker *worker, npg_frame *frame)
     return status ? skip_or_fail(worker, frame, status) : NPG_OK;
 }
 
-/* A held frame is the copy of another one, which is kept under its own number. */
 static npg_status check_and_keep(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     NPG_TRY(npg_clean_check(frame));
     frame->fields |= NPG_FIELD_CLEAN;
-    if (s->store && s->keeps && !frame->is_held) npg_frame_store_put(s->store, frame);
-    return NPG_OK;
+    return s->store && s->keeps ? npg_frame_store_put(s->store, frame, true) : NPG_OK;
 }
 
 static npg_status find_normals(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
-    if (s->store && !frame->is_held && npg_frame_store_get_normals(s->store, frame)) return NPG_OK;
+    if (s->store && npg_frame_store_get_normals(s->store, frame)) return NPG_OK;
     NPG_TRY(make_or_mend_normals(worker, frame));
-    if (s->store && s->keeps && !frame->is_held) npg_frame_store_put_normals(s->store, frame);
+    if (s->store && s->keeps) npg_frame_store_put_normals(s->store, frame);
     return NPG_OK;
 }
 

@@ -11,8 +11,9 @@
 
 #include "tests/support/test_chain.h"
 
-extern const npg_stage npg_stage_keyframe;
+extern const npg_stage npg_stage_ingest, npg_stage_keyframe;
 static const npg_stage *const chain[] = {&test_source, &npg_stage_keyframe, &test_sink, NULL};
+static const npg_stage *const live_chain[] = {&npg_stage_ingest, &npg_stage_keyframe, &test_sink, NULL};
 
 enum { FRAMES = 11 };
 
@@ -59,7 +60,6 @@ static npg_status fill_points(npg_frame *frame, size_t count, bool with_bad_poin
 static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
 {
     const scene *s = user;
-    if (facts->is_live) return NPG_OK;
     if (!facts->origin.known) facts->origin.known = true;
     frame->number = s->first_number + index;
     frame->is_skipped = s->skipped[index];
@@ -287,12 +287,12 @@ static npg_status run_live_windows(scene *s, int64_t frame_count, const char *lo
     npg_options *options;
     npg_run *run = NULL;
     script = (test_script){FRAMES, make, see, s};
-    npg_status status = npg_options_open_chain(&options, chain);
+    npg_status status = npg_options_open_chain(&options, live_chain);
     if (!status) status = npg_options_set(options, "output", "any");
     if (!status) status = npg_options_set(options, "look-ahead", look_ahead);
     if (!status) status = npg_options_set(options, "keyframe", keyframe);
     if (!status) status = npg_options_set(options, "window", window);
-    if (!status) status = npg_run_open_chain(&run, options, NULL, chain);
+    if (!status) status = npg_run_open_chain(&run, options, NULL, live_chain);
     if (!status) status = push_scene(run, s, frame_count);
     if (!status) status = npg_run_finish(run);
     if (!status) status = npg_run_wait(run);

@@ -171,10 +171,48 @@ static void closing_while_the_fit_is_at_work_frees_everything(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
+/* One thread that pushes and pulls by turns.  What it pushes while the look-ahead is walked waits for its
+ * turn, and so does the push that finds no room. */
+static void one_thread_pushes_and_pulls_by_turns(void **state)
+{
+    enum { LOOK_AHEAD = 4, WINDOW = 3, LEAD = LOOK_AHEAD + 1 + WINDOW, IN_ALL = 16 };
+    (void)state;
+    static double points[3 * POINTS];
+    static float normals[3 * POINTS];
+    npg_options *options = open_options();
+    const char *const more[][2] = {
+        {"look-ahead", "4"}, {"window", "3"}, {"overlap", "1"}, {"keyframe", "11"}, {"epochs", "2"}};
+    for (size_t i = 0; i < sizeof more / sizeof *more; i++)
+        assert_int_equal(npg_options_set(options, more[i][0], more[i][1]), NPG_OK);
+    npg_run *run;
+    npg_result *result;
+    int64_t pulled = 0;
+    assert_int_equal(npg_run_open(&run, options, NULL), NPG_OK);
+    for (int64_t t = 0; t < IN_ALL; t++) {
+        npg_cloud cloud = {sizeof cloud, 10 + t, POINTS, points, normals, NULL};
+        make_ball(points, normals, t);
+        assert_int_equal(npg_run_push(run, &cloud), NPG_OK);
+        if (t + 1 < LEAD) continue;
+        assert_int_equal(npg_run_pull(run, &result), NPG_OK);
+        npg_result_close(&result);
+        pulled++;
+    }
+    assert_int_equal(npg_run_finish(run), NPG_OK);
+    npg_status status;
+    for (; (status = npg_run_pull(run, &result)) == NPG_OK; pulled++) npg_result_close(&result);
+    assert_int_equal(status, NPG_END);
+    assert_int_equal(pulled, IN_ALL);
+    assert_true(npg_run_wait(run) >= 0);
+    npg_run_close(&run);
+    npg_options_close(&options);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(clouds_become_one_moving_mesh_the_same_every_time),
                                        cmocka_unit_test(no_memory_anywhere_ends_the_run_cleanly),
-                                       cmocka_unit_test(closing_while_the_fit_is_at_work_frees_everything)};
+                                       cmocka_unit_test(closing_while_the_fit_is_at_work_frees_everything),
+                                       cmocka_unit_test(one_thread_pushes_and_pulls_by_turns)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

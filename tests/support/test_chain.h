@@ -37,8 +37,10 @@ static npg_status source_process(npg_worker *worker, npg_chunk **chunk)
 {
     source_state *state = npg_worker_state(worker);
     npg_facts *facts = npg_worker_facts(worker);
-    if (facts->is_live) return source_from_feed(worker, chunk);
-    if (!state->next) facts->frame_count = script.frame_count; /* written once, before the first chunk */
+    bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
+    if (facts->is_live) return is_solving ? source_from_feed(worker, chunk) : NPG_END; /* no look-ahead */
+    if (!state->next) /* written once, before the first chunk */
+        facts->frame_count = facts->planned_count = script.frame_count;
     bool is_choosing = npg_worker_pass(worker) == NPG_PASS_CHOOSE;
     int64_t count = is_choosing ? (int64_t)facts->choice.count : script.frame_count;
     if (state->next >= count) return NPG_END;

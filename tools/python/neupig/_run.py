@@ -356,8 +356,8 @@ def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None]
                 stages: Sequence[Stage] = (), **options: object) -> Motion:
     """Arrays in, a moving mesh out.  ``frames`` gives N x 3 points, (points, normals) or (points, normals or None,
     colours), in time order; it is read on a
-    thread of its own, as fast as the run can take it.  The keyframe is chosen inside the look-ahead, as for a live
-    source: name a better one with ``keyframe=NUMBER``.  When the run fails this returns once ``frames`` has given its next
+    thread of its own, as fast as the run can take it.  Keyframe and reference are made from the look-ahead, as for a
+    live source: ``look_ahead=N`` with as many as there are gives what files give.  When the run fails this returns once ``frames`` has given its next
     frame."""
     failures: list[BaseException] = []
     with Run(options=Options({**options, "pull": True}), progress=progress, stages=stages) as run:
