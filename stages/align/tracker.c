@@ -29,6 +29,7 @@
 #define NOISE_WIDTH 2.5    /* mean distances of points that the robust weight is wide at least */
 #define SETTLED     0.01   /* of the graph's radius: a step that moves no node farther ends the fit */
 #define PAIR_WIDTHS 3.0    /* samples farther than so many widths from every point have no pair: a hole */
+#define ONE_SIDE    20     /* times the stiffness where one sensor leaves half of the body to the edges */
 #define SEEN_OFFSET 0.004  /* surface nearer than this hides nothing from a sensor */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
@@ -503,6 +504,7 @@ static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_
     s->is_first = !tracked->steps;
     s->is_settling = progress >= 1;
     s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
+    if (s->cloud->sensor_count == 1) s->stiffness *= ONE_SIDE;
     s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
     s->width = fmax(s->width, NOISE_WIDTH * tracked->point_dist_mean);
 }

@@ -370,11 +370,14 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     return NPG_OK;
 }
 
-/* A side of the body grows until all frames are reached, or two passes in a row have reached no more. */
-static void decide_growth(npg_worker *worker)
+/* A side of the body grows until all frames are reached, or two passes in a row have reached no more.  What has
+ * grown is gathered once more: the last frames that were reached had nothing around them yet.  Whether the pass
+ * is one of those that the options ask for. */
+static bool decide_growth(npg_worker *worker)
 {
     npg_facts *facts = npg_worker_facts(worker);
     bool has_gained = !facts->growing_passes || facts->past_count < facts->past_before;
+    bool is_whole_now = facts->past_before && !facts->past_count;
     facts->passes_in_vain = has_gained ? 0 : facts->passes_in_vain + 1;
     facts->is_growing = facts->past_count && facts->passes_in_vain < 2 && facts->growing_passes < GROW_PASSES;
     facts->growing_passes += facts->past_count > 0;
@@ -383,6 +386,7 @@ static void decide_growth(npg_worker *worker)
         npg_worker_log(
             worker, NPG_LOG_INFO, -1, "%lld frames see too much that the reference does not have yet%s",
             (long long)facts->past_count, facts->is_growing ? ": it grows, and they are followed again" : "");
+    return !facts->is_growing && !is_whole_now;
 }
 
 static npg_status flush(npg_worker *worker)
@@ -394,8 +398,7 @@ static npg_status flush(npg_worker *worker)
         facts->sensor_count_max = s->sensors;
         return NPG_OK;
     }
-    decide_growth(worker);
-    facts->fuse_left -= !facts->is_growing;
+    facts->fuse_left -= decide_growth(worker);
     return publish(worker);
 }
 

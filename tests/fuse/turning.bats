@@ -21,7 +21,7 @@ setup() {
         python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide key 6
     )
     echo "grown: slide $slide, share $share; from the keyframe: $slide_key, $share_key"
-    awk -v s="$slide" -v w="$share" -v k="$share_key" 'BEGIN { exit !(s < 0.03 && w > 0.9 && k < 0.8) }'
+    awk -v s="$slide" -v w="$share" -v k="$share_key" 'BEGIN { exit !(s < 0.01 && w > 0.95 && k < 0.8) }'
 }
 
 @test "killed while it grows, it goes on to the same bytes" {
