@@ -332,17 +332,21 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 
 /* ---- the verdict ---- */
 
+#define ONE_SENSOR_SEES 0.5 /* of a body, at most: the bar on what points are near to is lower by that */
+
 static const char unsupported_fault[] = "share of the surface that no points support, in %,";
 
 /* What is wrong with a frame, NULL when it is above the bar.  A comparison with NaN fails, as it should. */
-static const char *fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share,
+static const char *fault_of(const evaluate_state *state, const npg_frame *frame, double unseen_share,
                             double *value, double *bound)
 {
+    const npg_figures *f = &frame->figures;
+    double seen = frame->sensor_count == 1 ? ONE_SENSOR_SEES : 1;
     *value = 100 * f->point_dist_median;
     *bound = state->residual_max;
     if (!(*value <= *bound)) return "median distance of the points to the surface, in % of the diagonal,";
     *value = 100 * f->coverage;
-    *bound = state->coverage_min * (1 - unseen_share); /* of what the keyframe saw */
+    *bound = state->coverage_min * seen * (1 - unseen_share); /* of what the keyframe saw */
     if (!(*value >= *bound)) return "share of the surface with points near it, in %,";
     *value = 100 * f->flipped_share;
     *bound = state->flipped_max;
@@ -396,8 +400,7 @@ static npg_status judge_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     double value, bound;
-    const char *fault =
-        fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share, &value, &bound);
+    const char *fault = fault_of(state, frame, npg_worker_facts(worker)->unseen_share, &value, &bound);
     frame->figures.good = !fault && !frame->is_skipped;
     if (frame->is_shared) return NPG_OK;
     add_up(state, frame);
@@ -582,7 +585,8 @@ static const npg_option options[] = {
         "A frame is good when the median distance of its points to the surface is at most this, "
         "in per cent of the figure's diagonal"),
     NPG_ROW_REAL  ("min-coverage",    AT(coverage_min),       "50",     0,     100,  "PERCENT",
-        "... and at least this share of the surface that the keyframe saw has points near it, in per cent"),
+        "... and at least this share of the surface that the keyframe saw has points near it, in per cent; "
+        "half as much in frames that one sensor saw"),
     NPG_ROW_REAL  ("max-flipped",     AT(flipped_max),        "1",      0,     100,  "PERCENT",
         "... and at most this share of its faces is turned over, in per cent"),
     NPG_ROW_REAL  ("max-stretched",   AT(stretched_max),      "5",      0,     100,  "PERCENT",

@@ -95,7 +95,9 @@ static const npg_option mesh_options[] = {
 #define GROWING_DEPTH 8 /* of the octree while the reference grows: it is to carry frames, no more */
 
 #define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
-#define UNSEEN_IS_LEFT   0.05 /* of that of a reference that has grown: where the body goes on, out of sight */
+#define IN_EMPTY         0.5 /* value of the cubes above which a point lies in space that sensors saw to be empty */
+
+#define UNSEEN_IS_LEFT 0.05 /* of that of a reference that has grown: where the body goes on, out of sight */
 
 typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
@@ -164,6 +166,19 @@ static npg_status take_frame_points(making *m)
     return NPG_OK;
 }
 
+/* What has grown where most frames look through was carried there by a wrong motion. */
+static void drop_empty(making *m)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < m->count; i++) {
+        if (npg_cube_set_value(m->empty, m->points + 3 * i) > IN_EMPTY) continue;
+        memmove(m->points + 3 * kept, m->points + 3 * i, 3 * sizeof(float));
+        memmove(m->normals + 3 * kept++, m->normals + 3 * i, 3 * sizeof(float));
+    }
+    note_count(m, "points_in_empty_space", m->count - kept);
+    m->count = kept;
+}
+
 /* Those of all frames are thinned already.  `making` owns them from here on; `fused` keeps its figures. */
 static npg_status take_points(making *m)
 {
@@ -173,7 +188,9 @@ static npg_status take_points(making *m)
     m->normals = m->fused->normals;
     m->fused->points = m->fused->normals = NULL;
     if (!m->fused->empty) return NPG_OK;
-    return npg_cube_set_open(&m->empty, m->fused->empty, m->fused->empty_count, m->fused->empty_side);
+    NPG_TRY(npg_cube_set_open(&m->empty, m->fused->empty, m->fused->empty_count, m->fused->empty_side));
+    if (npg_worker_facts(m->worker)->growing_passes) drop_empty(m);
+    return NPG_OK;
 }
 
 static npg_status measure_points(making *m)

@@ -1,7 +1,7 @@
 # A body that turns before one sensor whose place is known: the reference grows from the side that the keyframe
 # saw to the whole body, whose vertices turn with it.
 
-small=(--sensor body/sensor.txt --faces 3000 --align-nodes 200 --no-outliers --quiet --keyframe 6
+small=(--sensor body/sensor.txt --faces 3000 --align-nodes 200 --poisson-depth 7 --no-outliers --quiet --keyframe 6
     --max-residual 100 --max-flipped 100 --max-stretched 100 --max-unsupported 100 --max-invented 100)
 
 setup_file() {

@@ -14,7 +14,7 @@ import random
 import struct
 import sys
 
-FRAMES, POINTS, SENSOR = 24, 2500, (0.0, 0.5, 8.0)
+FRAMES, POINTS, SENSOR = 24, 1500, (0.0, 0.5, 8.0)
 
 
 def radius(a, b, c):
