@@ -10,6 +10,7 @@
 #include "align/follow_log.h"
 #include "align/poses.h"
 #include "align/recover.h"
+#include "align/sides.h"
 #include "geometry/mesh_tools.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
@@ -45,15 +46,6 @@ typedef struct waiting {
     bool is_known; /* starts from the pose that the pass before found */
 } waiting;
 
-/* The two last poses on one side of the key. */
-typedef struct side {
-    double *now, *before; /* K x 12, owned */
-    int64_t index;        /* of now        */
-    bool has_now, has_before;
-    bool is_past; /* what a growing reference reaches */
-    npg_tracked now_tracked, before_tracked;
-} side;
-
 typedef struct state {
     bool is_on;
     int64_t nodes, samples, steps;
@@ -64,8 +56,8 @@ typedef struct state {
     double *known_pose;  /* of its nodes; owned */
     npg_poses *found;    /* of a fusing pass, for the next one; owned */
     npg_follow_log *log; /* of it: what is found, and what an earlier run had; owned, NULL without a job */
-    side sides[2];       /* forward, backward: of the frames that are passed on */
-    side ways[2];        /* the same with those that wait                       */
+    npg_side sides[2];   /* forward, backward: of the frames that are passed on */
+    npg_side ways[2];    /* the same with those that wait                       */
     waiting *group;      /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
     int64_t past_count;           /* frames that a growing reference does not reach */
@@ -116,10 +108,8 @@ static void uninit(npg_worker *worker)
     npg_pose_map_close(&s->map);
     npg_release(&s->known_pose);
     for (int i = 0; i < 2; i++) {
-        npg_release(&s->sides[i].now);
-        npg_release(&s->sides[i].before);
-        npg_release(&s->ways[i].now);
-        npg_release(&s->ways[i].before);
+        npg_side_close(&s->sides[i]);
+        npg_side_close(&s->ways[i]);
     }
     for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
     npg_release(&s->group);
@@ -132,33 +122,19 @@ static size_t pose_bytes(const state *s)
     return npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
 }
 
-/* A side without its arrays, for the state on disk; no padding is left to chance. */
-static void strip(side *plain, const side *from)
+static size_t nodes_of(const state *s)
 {
-    memset(plain, 0, sizeof *plain);
-    plain->index = from->index;
-    plain->has_now = from->has_now;
-    plain->has_before = from->has_before;
-    plain->is_past = from->is_past;
-    plain->now_tracked = from->now_tracked;
-    plain->before_tracked = from->before_tracked;
+    return npg_tracker_node_count(s->tracker);
 }
 
 static size_t state_bytes(const state *s)
 {
-    return 2 * (sizeof(side) + 2 * pose_bytes(s)) + sizeof s->sum;
+    return 2 * npg_side_bytes(nodes_of(s)) + sizeof s->sum;
 }
 
 static void pack_state(const state *s, unsigned char *to)
 {
-    size_t bytes = pose_bytes(s);
-    for (int i = 0; i < 2; i++, to += sizeof(side) + 2 * bytes) {
-        side plain;
-        strip(&plain, &s->sides[i]);
-        memcpy(to, &plain, sizeof plain);
-        memcpy(to + sizeof plain, s->sides[i].now, bytes);
-        memcpy(to + sizeof plain + bytes, s->sides[i].before, bytes);
-    }
+    for (int i = 0; i < 2; i++) to = npg_side_pack(to, &s->sides[i], nodes_of(s));
     memcpy(to, &s->sum, sizeof s->sum);
 }
 
@@ -174,28 +150,11 @@ static npg_status attach_state(const state *s, npg_frame *frame)
     return NPG_OK;
 }
 
-static void copy_side(const state *s, side *to, const side *from)
-{
-    side copy = *from;
-    copy.now = to->now;
-    copy.before = to->before;
-    memcpy(copy.now, from->now, pose_bytes(s));
-    memcpy(copy.before, from->before, pose_bytes(s));
-    *to = copy;
-}
-
 static void unpack_state(state *s, const unsigned char *from)
 {
-    size_t bytes = pose_bytes(s);
-    for (int i = 0; i < 2; i++, from += sizeof(side) + 2 * bytes) {
-        side plain;
-        memcpy(&plain, from, sizeof plain);
-        plain.now = s->sides[i].now;
-        plain.before = s->sides[i].before;
-        memcpy(plain.now, from + sizeof plain, bytes);
-        memcpy(plain.before, from + sizeof plain + bytes, bytes);
-        s->sides[i] = plain;
-        copy_side(s, &s->ways[i], &s->sides[i]);
+    for (int i = 0; i < 2; i++) {
+        from = npg_side_unpack(&s->sides[i], from, nodes_of(s));
+        npg_side_copy(&s->ways[i], &s->sides[i], nodes_of(s));
     }
     memcpy(&s->sum, from, sizeof s->sum);
 }
@@ -371,12 +330,8 @@ static npg_status open_tracker(npg_worker *worker)
     NPG_TRY(npg_tracker_open(&s->tracker, npg_worker_facts(worker)->reference, &settings));
     size_t nodes = npg_tracker_node_count(s->tracker);
     for (int i = 0; i < 2; i++) {
-        side *both[2] = {&s->sides[i], &s->ways[i]};
-        for (int k = 0; k < 2; k++) {
-            NPG_TRY(npg_alloc_array(&both[k]->now, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
-            NPG_TRY(npg_alloc_array(&both[k]->before, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof(double)));
-            npg_pose_rest(both[k]->now, nodes);
-        }
+        NPG_TRY(npg_side_open(&s->sides[i], nodes));
+        NPG_TRY(npg_side_open(&s->ways[i], nodes));
     }
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
     NPG_TRY(open_known(worker));
@@ -385,22 +340,6 @@ static npg_status open_tracker(npg_worker *worker)
 }
 
 /* ---- frame after frame ---- */
-
-/* The pose to start from becomes `now`, the last one `before`. */
-static void step_on(const state *s, side *at, int64_t index)
-{
-    size_t nodes = npg_tracker_node_count(s->tracker);
-    double *start = at->before; /* its content is not needed once the extrapolation is made */
-    if (at->has_before)
-        npg_pose_extrapolate(start, at->now, at->before, nodes);
-    else
-        memcpy(start, at->now, pose_bytes(s));
-    at->before = at->now;
-    at->before_tracked = at->now_tracked;
-    at->now = start;
-    at->has_before = true;
-    at->index = index;
-}
 
 static npg_status take_points(const npg_worker *worker, waiting *w)
 {
@@ -423,7 +362,7 @@ static npg_status take_points(const npg_worker *worker, waiting *w)
 }
 
 /* In place of where the motion leads: what the pass before found. */
-static npg_status start_from_known(const state *s, waiting *w, side *at)
+static npg_status start_from_known(const state *s, waiting *w, npg_side *at)
 {
     if (!s->known) return NPG_OK;
     NPG_TRY(npg_poses_get(s->known, w->frame.index, s->known_pose, &w->is_known));
@@ -432,7 +371,7 @@ static npg_status start_from_known(const state *s, waiting *w, side *at)
 }
 
 /* The pose that the motion so far leads to, fitted to the points; without any it stays. */
-static npg_status fit_pose(npg_worker *worker, waiting *w, side *at)
+static npg_status fit_pose(npg_worker *worker, waiting *w, npg_side *at)
 {
     const state *s = npg_worker_state(worker);
     const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
@@ -464,7 +403,7 @@ static bool is_growing(const npg_worker *worker, size_t sensor_count)
 
 /* A frame that a growing reference does not reach, nor those beyond it: a pose that is no number says so, in the
  * log, too. */
-static void leave_past(waiting *w, side *at)
+static void leave_past(waiting *w, npg_side *at)
 {
     at->is_past = true;
     at->has_now = false;
@@ -489,18 +428,18 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     NPG_TRY(npg_alloc(&w->pose, NPG_FOR_FIT, pose_bytes(s)));
     if (is_read_back(s)) return npg_follow_log_read(s->log, w->frame.index, w->pose);
     NPG_TRY(take_points(worker, w));
-    side *at = &s->ways[w->frame.index < facts->plan.key];
+    npg_side *at = &s->ways[w->frame.index < facts->plan.key];
     bool is_key = w->frame.index == facts->plan.key;
     if (at->is_past) {
         leave_past(w, at);
         return NPG_OK;
     }
-    if (!is_key) step_on(s, at, w->frame.index);
+    if (!is_key) npg_side_step_on(at, nodes_of(s), w->frame.index);
     NPG_TRY(fit_pose(worker, w, at));
     if (!is_key && is_growing(worker, w->cloud.sensor_count) && w->tracked.explained < EXPLAINED)
         leave_past(w, at);
     at->index = w->frame.index;
-    if (is_key) copy_side(s, &s->ways[1], at);
+    if (is_key) npg_side_copy(&s->ways[1], at, nodes_of(s));
     return NPG_OK;
 }
 
@@ -522,7 +461,7 @@ static size_t list_frames(const state *s, npg_recover_frame *frames)
         frames[count++] = (npg_recover_frame){w->frame.index, w->pose, w->tracked, w->cloud, false};
     }
     for (int d = 0; d < 2; d++) {
-        const side *at = &s->sides[d];
+        const npg_side *at = &s->sides[d];
         int64_t away = d ? 1 : -1;
         if (at->has_now) /* the key, which both sides begin with, once */
             frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, known, true};
@@ -548,7 +487,7 @@ static npg_recover_frame *frame_of(npg_recover_frame *frames, size_t count, int6
 static void move_sides(state *s, npg_recover_frame *frames, size_t count)
 {
     for (int d = 0; d < 2; d++) {
-        side *to = &s->sides[d], next = s->ways[d];
+        npg_side *to = &s->sides[d], next = s->ways[d];
         int64_t away = d ? 1 : -1;
         const npg_recover_frame *now = frame_of(frames, count, next.index);
         const npg_recover_frame *before = frame_of(frames, count, next.index + away);
@@ -562,7 +501,7 @@ static void move_sides(state *s, npg_recover_frame *frames, size_t count)
             next.before_tracked = before->tracked;
         }
         s->ways[d] = next;
-        copy_side(s, to, &s->ways[d]);
+        npg_side_copy(to, &s->ways[d], nodes_of(s));
     }
 }
 

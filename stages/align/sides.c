@@ -1,0 +1,90 @@
+/* Sides: two poses each, and their bytes. */
+#include "align/sides.h"
+
+#include <string.h>
+
+static size_t pose_bytes(size_t node_count)
+{
+    return node_count * NPG_POSE_SIZE * sizeof(double);
+}
+
+npg_status npg_side_open(npg_side *side, size_t node_count)
+{
+    NPG_TRY(npg_alloc_array(&side->now, NPG_FOR_FIT, node_count, NPG_POSE_SIZE * sizeof(double)));
+    NPG_TRY(npg_alloc_array(&side->before, NPG_FOR_FIT, node_count, NPG_POSE_SIZE * sizeof(double)));
+    npg_pose_rest(side->now, node_count);
+    return NPG_OK;
+}
+
+void npg_side_close(npg_side *side)
+{
+    npg_release(&side->now);
+    npg_release(&side->before);
+}
+
+void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count)
+{
+    npg_side copy = *from;
+    copy.now = to->now;
+    copy.before = to->before;
+    memcpy(copy.now, from->now, pose_bytes(node_count));
+    memcpy(copy.before, from->before, pose_bytes(node_count));
+    *to = copy;
+}
+
+void npg_side_step_on(npg_side *side, size_t node_count, int64_t index)
+{
+    double *start = side->before; /* its content is not needed once the extrapolation is made */
+    if (side->has_before)
+        npg_pose_extrapolate(start, side->now, side->before, node_count);
+    else
+        memcpy(start, side->now, pose_bytes(node_count));
+    side->before = side->now;
+    side->before_tracked = side->now_tracked;
+    side->now = start;
+    side->has_before = true;
+    side->index = index;
+}
+
+/* ---- bytes ---- */
+
+size_t npg_side_bytes(size_t node_count)
+{
+    return sizeof(npg_side) + 2 * pose_bytes(node_count);
+}
+
+/* A side without its arrays; no padding is left to chance. */
+static void strip(npg_side *plain, const npg_side *from)
+{
+    memset(plain, 0, sizeof *plain);
+    plain->index = from->index;
+    plain->has_now = from->has_now;
+    plain->has_before = from->has_before;
+    plain->is_past = from->is_past;
+    plain->now_tracked = from->now_tracked;
+    plain->before_tracked = from->before_tracked;
+}
+
+unsigned char *npg_side_pack(unsigned char *to, const npg_side *side, size_t node_count)
+{
+    npg_side plain;
+    size_t bytes = pose_bytes(node_count);
+    strip(&plain, side);
+    memcpy(to, &plain, sizeof plain);
+    memcpy(to + sizeof plain, side->now, bytes);
+    memcpy(to + sizeof plain + bytes, side->before, bytes);
+    return to + npg_side_bytes(node_count);
+}
+
+const unsigned char *npg_side_unpack(npg_side *side, const unsigned char *from, size_t node_count)
+{
+    npg_side plain;
+    size_t bytes = pose_bytes(node_count);
+    memcpy(&plain, from, sizeof plain);
+    plain.now = side->now;
+    plain.before = side->before;
+    memcpy(plain.now, from + sizeof plain, bytes);
+    memcpy(plain.before, from + sizeof plain + bytes, bytes);
+    *side = plain;
+    return from + npg_side_bytes(node_count);
+}
