@@ -237,7 +237,7 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
     if (frame->sensor_count == 1 && !frame->sensors) return true; /* they face it: sure, and needed to grow */
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
-    return s->normals_for == FOR_ALL || is_planned_key;
+    return s->normals_for == FOR_ALL || frame->is_key || is_planned_key;
 }
 
 /* ---- the stage ---- */
@@ -288,13 +288,14 @@ static bool is_done(const npg_frame *frame)
     return frame->is_skipped || (frame->fields & NPG_FIELD_CLEAN);
 }
 
-/* A depth camera's points are in its own coordinates, as a rule. */
+/* A depth camera's points are in its own coordinates, as a rule.  Isolated points are gone by now: they would make
+ * any cloud look like one view. */
 static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
 {
     outlier_state *s = npg_worker_state(worker);
     double origin[3];
     bool is_single;
-    if (is_done(frame) || frame->sensor_count || !frame->point_count) return NPG_OK;
+    if (frame->sensor_count) return NPG_OK;
     for (int a = 0; a < 3; a++) origin[a] = -npg_worker_facts(worker)->origin.world[a];
     NPG_TRY(npg_cloud_is_single_view(&is_single, frame->pos_local, frame->point_count, origin));
     if (!is_single) return NPG_OK;
@@ -308,12 +309,12 @@ static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* As option sensor says; without it those that the frame brings, or the origin where it looks like one. */
+/* As option sensor says; without it those that the frame brings. */
 static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     if (frame->is_skipped) return NPG_OK;
-    if (s->sensor_kind == SENSOR_AUTO) return look_for_sensor(worker, frame);
+    if (s->sensor_kind == SENSOR_AUTO) return NPG_OK;
     npg_release(&frame->sensors);
     npg_release(&frame->sensor_local);
     frame->sensor_count = 0;
@@ -332,6 +333,7 @@ static npg_status check_and_keep(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     NPG_TRY(npg_clean_check(frame));
+    if (s->sensor_kind == SENSOR_AUTO) NPG_TRY(look_for_sensor(worker, frame));
     frame->fields |= NPG_FIELD_CLEAN;
     return s->store && s->keeps ? npg_frame_store_put(s->store, frame, true) : NPG_OK;
 }

@@ -58,7 +58,7 @@ check_killed() {
 }
 
 @test "windows by vertices that are killed inside give the same bytes" {
-    check_killed warm "3 20" "${warm[@]}"
+    check_killed warm "3 12" "${warm[@]}"
 }
 
 @test "a decoder of three hidden layers that is killed gives the same bytes" {
