@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "align/follow_log.h"
-#include "align/poses.h"
+#include "align/handover.h"
 #include "align/recover.h"
 #include "align/sides.h"
 #include "geometry/mesh_tools.h"
@@ -28,13 +28,6 @@
  * one that has fewer are not followed while it grows. */
 #define EXPLAINED 0.5
 
-/* What one pass leaves to the next. */
-typedef struct between {
-    npg_tracker *tracker; /* of the reference that the poses are of */
-    npg_poses *poses;
-    int64_t passes; /* fusing passes so far */
-} between;
-
 /* A frame that waits for its window. */
 typedef struct waiting {
     npg_frame frame;
@@ -51,14 +44,11 @@ typedef struct state {
     int64_t nodes, samples, steps;
     double stiffness, along;
     npg_tracker *tracker;
-    npg_poses *known; /* of the pass before, with the way to this one's nodes; owned, or NULL */
-    npg_pose_map map;
-    double *known_pose;  /* of its nodes; owned */
-    npg_poses *found;    /* of a fusing pass, for the next one; owned */
-    npg_follow_log *log; /* of it: what is found, and what an earlier run had; owned, NULL without a job */
-    npg_side sides[2];   /* forward, backward: of the frames that are passed on */
-    npg_side ways[2];    /* the same with those that wait                       */
-    waiting *group;      /* in order of arrival; owned, with what they own */
+    npg_handover handover; /* from the pass before, to the next */
+    npg_follow_log *log;   /* of a fusing pass: what is found, and what an earlier run had; owned, or NULL */
+    npg_side sides[2];     /* forward, backward: of the frames that are passed on */
+    npg_side ways[2];      /* the same with those that wait                       */
+    waiting *group;        /* in order of arrival; owned, with what they own */
     size_t group_count, group_capacity;
     int64_t past_count;           /* frames that a growing reference does not reach */
     int64_t read;                 /* frames of the plan so far                           */
@@ -102,11 +92,8 @@ static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_tracker_close(&s->tracker);
-    npg_poses_close(&s->known);
-    npg_poses_close(&s->found);
+    npg_handover_close(&s->handover);
     npg_follow_log_close(&s->log);
-    npg_pose_map_close(&s->map);
-    npg_release(&s->known_pose);
     for (int i = 0; i < 2; i++) {
         npg_side_close(&s->sides[i]);
         npg_side_close(&s->ways[i]);
@@ -117,14 +104,14 @@ static void uninit(npg_worker *worker)
 
 /* ---- what a resumed run needs: both sides and the figures so far ---- */
 
-static size_t pose_bytes(const state *s)
-{
-    return npg_tracker_node_count(s->tracker) * NPG_POSE_SIZE * sizeof(double);
-}
-
 static size_t nodes_of(const state *s)
 {
     return npg_tracker_node_count(s->tracker);
+}
+
+static size_t pose_bytes(const state *s)
+{
+    return npg_pose_bytes(nodes_of(s));
 }
 
 static size_t state_bytes(const state *s)
@@ -185,92 +172,19 @@ static bool closes_window(state *s, const npg_plan *plan, int64_t total)
     return s->closes_at == s->read;
 }
 
-/* ---- what one pass leaves to the next ---- */
-
-static void release_between(void *thing)
-{
-    between *b = thing;
-    npg_tracker_close(&b->tracker);
-    npg_poses_close(&b->poses);
-    npg_release(&b);
-}
-
-/* Where poses are kept: NULL for a run without a job folder. */
-static npg_status poses_path(const npg_worker *worker, char **path, bool is_new)
-{
-    const npg_job *job = npg_job_of(worker);
-    *path = NULL;
-    return job ? npg_job_poses_path(job, path, is_new) : NPG_OK;
-}
-
-static npg_status remove_new_poses(const npg_worker *worker)
-{
-    const npg_job *job = npg_job_of(worker);
-    return job ? npg_job_remove_new_poses(job) : NPG_OK;
-}
-
-static npg_status restore_known(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    char *path;
-    size_t size;
-    const unsigned char *map =
-        npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN_MAP, &size);
-    if (!map) return NPG_OK; /* the reference is the keyframe's own */
-    NPG_TRY(npg_pose_map_unpack(&s->map, map, size));
-    if (s->map.count != npg_tracker_node_count(s->tracker))
-        return npg_error(NPG_BAD_INPUT, "the state to resume from has poses for %zu nodes, not %zu",
-                         s->map.count, npg_tracker_node_count(s->tracker));
-    NPG_TRY(poses_path(worker, &path, false));
-    npg_status status = npg_poses_open(&s->known, path, s->map.old_count);
-    npg_release(&path);
-    return status;
-}
-
-/* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
-static npg_status drop_if_changed(npg_worker *worker, between *b)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    if (!b || facts->growing_passes || !npg_facts_has_changed(facts)) return NPG_OK;
-    npg_poses_close(&b->poses);
-    npg_tracker_close(&b->tracker);
-    return remove_new_poses(worker);
-}
-
-/* The poses of the pass before, or of the run that is resumed. */
-static npg_status open_known(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    between *b = npg_worker_kept(worker);
-    NPG_TRY(drop_if_changed(worker, b));
-    if (b && b->poses) {
-        NPG_TRY(npg_pose_map_open(&s->map, b->tracker, s->tracker));
-        s->known = b->poses;
-        b->poses = NULL;
-        npg_tracker_close(&b->tracker);
-        if (npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_job_of(worker))
-            NPG_TRY(npg_job_keep_poses(npg_job_of(worker)));
-    } else if (npg_worker_facts(worker)->is_resumed) {
-        NPG_TRY(restore_known(worker));
-    }
-    if (!s->known) return NPG_OK;
-    return npg_alloc_array(&s->known_pose, NPG_FOR_FIT, npg_poses_nodes(s->known),
-                           NPG_POSE_SIZE * sizeof(double));
-}
+/* ---- what is open for a pass ---- */
 
 /* What an earlier run of the same job followed before it was killed is read back. */
 static npg_status open_log(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    const between *b = npg_worker_kept(worker);
     const npg_job *job = npg_job_of(worker);
-    if (!job) return NPG_OK;
-    npg_follow_key key = {0, npg_worker_facts(worker)->reference, npg_tracker_node_count(s->tracker),
-                          state_bytes(s)};
+    if (!job || npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
+    npg_follow_key key = {0, npg_worker_facts(worker)->reference, nodes_of(s), state_bytes(s)};
     char *path;
     int64_t groups;
     NPG_TRY(npg_job_fusing_key(worker, &key.job));
-    NPG_TRY(npg_job_followed_path(job, &path, b ? b->passes : 0));
+    NPG_TRY(npg_job_followed_path(job, &path, npg_handover_passes(worker)));
     npg_status status = npg_follow_log_open(&s->log, &groups, path, &key);
     npg_release(&path);
     if (!status && groups)
@@ -279,47 +193,10 @@ static npg_status open_log(npg_worker *worker)
     return status;
 }
 
-static npg_status open_found(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    char *path;
-    if (npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
-    NPG_TRY(remove_new_poses(worker)); /* `known` still reads what had the name before */
-    NPG_TRY(poses_path(worker, &path, true));
-    npg_status status = npg_poses_create(&s->found, path, npg_tracker_node_count(s->tracker));
-    npg_release(&path);
-    return status ? status : open_log(worker);
-}
-
-static npg_status leave_found(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    between *b = npg_worker_kept(worker);
-    if (!s->found) return NPG_OK;
-    NPG_TRY(npg_poses_sync(s->found));
-    if (!b) {
-        NPG_TRY(npg_alloc(&b, NPG_FOR_FIT, sizeof *b));
-        npg_worker_keep(worker, b, release_between);
-    }
-    b->tracker = s->tracker;
-    b->poses = s->found;
-    b->passes++;
-    s->tracker = NULL;
-    s->found = NULL;
-    return NPG_OK;
-}
-
-/* Of a state on disk: the map does not change while frames pass. */
 static npg_status save(const npg_worker *worker, npg_archive_writer *out)
 {
     const state *s = npg_worker_state(worker);
-    unsigned char *bytes;
-    size_t size;
-    if (!s->known) return NPG_OK;
-    NPG_TRY(npg_pose_map_pack(&s->map, &bytes, &size));
-    npg_status status = npg_archive_put(out, NPG_BLOCK_ALIGN_MAP, bytes, size);
-    npg_release(&bytes);
-    return status;
+    return npg_handover_save(&s->handover, out);
 }
 
 static npg_status open_tracker(npg_worker *worker)
@@ -328,14 +205,14 @@ static npg_status open_tracker(npg_worker *worker)
     const npg_tracker_settings settings = {(size_t)s->nodes, (size_t)s->samples, (int)s->steps, s->stiffness,
                                            s->along};
     NPG_TRY(npg_tracker_open(&s->tracker, npg_worker_facts(worker)->reference, &settings));
-    size_t nodes = npg_tracker_node_count(s->tracker);
+    size_t nodes = nodes_of(s);
     for (int i = 0; i < 2; i++) {
         NPG_TRY(npg_side_open(&s->sides[i], nodes));
         NPG_TRY(npg_side_open(&s->ways[i], nodes));
     }
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
-    NPG_TRY(open_known(worker));
-    NPG_TRY(open_found(worker));
+    NPG_TRY(npg_handover_open(&s->handover, worker, s->tracker));
+    NPG_TRY(open_log(worker));
     return npg_worker_facts(worker)->is_resumed ? restore_state(worker) : NPG_OK;
 }
 
@@ -361,22 +238,13 @@ static npg_status take_points(const npg_worker *worker, waiting *w)
     return NPG_OK;
 }
 
-/* In place of where the motion leads: what the pass before found. */
-static npg_status start_from_known(const state *s, waiting *w, npg_side *at)
-{
-    if (!s->known) return NPG_OK;
-    NPG_TRY(npg_poses_get(s->known, w->frame.index, s->known_pose, &w->is_known));
-    if (w->is_known) npg_pose_map_apply(&s->map, s->tracker, at->now, s->known_pose);
-    return NPG_OK;
-}
-
 /* The pose that the motion so far leads to, fitted to the points; without any it stays. */
 static npg_status fit_pose(npg_worker *worker, waiting *w, npg_side *at)
 {
     const state *s = npg_worker_state(worker);
     const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
                                       AGAIN_WIDTH, 1};
-    NPG_TRY(start_from_known(s, w, at));
+    NPG_TRY(npg_handover_start(&s->handover, s->tracker, w->frame.index, at->now, &w->is_known));
     if (w->cloud.count) {
         NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, w->is_known ? &again : NULL));
         npg_worker_log(worker, NPG_LOG_DEBUG, w->frame.number,
@@ -510,30 +378,14 @@ static bool should_stop(void *worker)
     return npg_worker_stopping(worker);
 }
 
-/* Where frames see a side of the body each, none is tried again: distances differ by what is seen, and the
- * frames that look most alike are those of a body's front and back. */
-static npg_status move_on(state *s)
-{
-    npg_recover_frame *frames;
-    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
-    move_sides(s, frames, list_frames(s, frames));
-    npg_release(&frames);
-    return NPG_OK;
-}
-
-static npg_status recover_group(npg_worker *worker)
+/* Lost frames are tried again, `frames` become what was found. */
+static npg_status recover_group(npg_worker *worker, npg_recover_frame *frames, size_t count)
 {
     state *s = npg_worker_state(worker);
-    npg_recover_frame *frames;
     npg_recover_result result;
-    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
-    size_t count = list_frames(s, frames);
-    npg_status status = npg_recover(s->tracker, &result, frames, count, should_stop, worker);
-    for (size_t i = 0; i < s->group_count && !status; i++)
+    NPG_TRY(npg_recover(s->tracker, &result, frames, count, should_stop, worker));
+    for (size_t i = 0; i < s->group_count; i++)
         s->group[i].tracked = frame_of(frames, count, s->group[i].frame.index)->tracked;
-    if (!status) move_sides(s, frames, count);
-    npg_release(&frames);
-    NPG_TRY(status);
     s->sum.lost += result.lost;
     s->sum.found += result.found;
     if (result.lost)
@@ -541,6 +393,22 @@ static npg_status recover_group(npg_worker *worker)
                        "of %zu frames %lld were lost, %lld of them found again in %lld fits", s->group_count,
                        (long long)result.lost, (long long)result.found, (long long)result.tried);
     return NPG_OK;
+}
+
+/* Where frames see a side of the body each, none is tried again: distances differ by what is seen, and the
+ * frames that look most alike are those of a body's front and back. */
+static npg_status finish_group(npg_worker *worker)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    bool is_of_one_side = facts->growing_passes || is_growing(worker, facts->sensor_count_max);
+    npg_recover_frame *frames;
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
+    size_t count = list_frames(s, frames);
+    npg_status status = is_of_one_side ? NPG_OK : recover_group(worker, frames, count);
+    if (!status) move_sides(s, frames, count);
+    npg_release(&frames);
+    return status;
 }
 
 static void add_to_report(state *s, const waiting *w)
@@ -568,8 +436,8 @@ static npg_status pass_on(npg_worker *worker, waiting *w)
         s->past_count++;
     } else {
         npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
+        NPG_TRY(npg_handover_put(&s->handover, frame->index, w->pose));
     }
-    if (s->found && !is_past(w)) NPG_TRY(npg_poses_put(s->found, frame->index, w->pose));
     NPG_TRY(npg_chunk_open(&chunk, 1));
     npg_chunk_add(chunk, frame);
     npg_status status = npg_worker_push(worker, &chunk);
@@ -577,7 +445,7 @@ static npg_status pass_on(npg_worker *worker, waiting *w)
     return status;
 }
 
-/* As recover_group() left it in an earlier run. */
+/* As finish_group() left it in an earlier run. */
 static npg_status read_back_group(state *s)
 {
     const void *packed;
@@ -604,9 +472,7 @@ static npg_status follow_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (is_read_back(s)) return read_back_group(s);
-    const npg_facts *facts = npg_worker_facts(worker);
-    bool is_of_one_side = facts->growing_passes || is_growing(worker, facts->sensor_count_max);
-    NPG_TRY(is_of_one_side ? move_on(s) : recover_group(worker));
+    NPG_TRY(finish_group(worker));
     for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
     return log_group(s);
 }
@@ -675,7 +541,7 @@ static npg_status flush(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     NPG_TRY(close_group(worker, npg_plan_is_open(&npg_worker_facts(worker)->plan)));
     report_progress(worker);
-    NPG_TRY(leave_found(worker));
+    NPG_TRY(npg_handover_leave(&s->handover, worker, &s->tracker));
     if (npg_worker_pass(worker) == NPG_PASS_FUSE) npg_worker_facts(worker)->past_count = s->past_count;
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));

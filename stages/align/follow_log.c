@@ -120,7 +120,7 @@ npg_status npg_follow_log_open(npg_follow_log **out, int64_t *groups, const char
     *out = NULL;
     *groups = 0;
     NPG_TRY(npg_alloc(&log, NPG_FOR_FIT, sizeof *log));
-    log->pose_bytes = key->node_count * NPG_POSE_SIZE * sizeof(double);
+    log->pose_bytes = npg_pose_bytes(key->node_count);
     log->state_bytes = key->state_bytes;
     log->fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
     npg_status status = npg_copy_text(&log->path, path);

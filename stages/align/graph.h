@@ -31,6 +31,10 @@ npg_status npg_graph_take(npg_graph **part, const npg_graph *whole, const uint32
 
 /* A pose: for each node the rotation (row-major 3 x 3) and the translation, 12 doubles. */
 #define NPG_POSE_SIZE 12
+static inline size_t npg_pose_bytes(size_t node_count)
+{
+    return node_count * NPG_POSE_SIZE * sizeof(double);
+}
 
 /* All nodes at rest.  pose: K x 12. */
 void npg_pose_rest(double *pose, size_t node_count);

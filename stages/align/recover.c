@@ -139,7 +139,7 @@ static npg_status find_starts(start starts[STARTS_MOST], size_t *count, const re
 
 static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *from)
 {
-    size_t nodes = npg_tracker_node_count(r->tracker), bytes = nodes * NPG_POSE_SIZE * sizeof(double);
+    size_t nodes = npg_tracker_node_count(r->tracker), bytes = npg_pose_bytes(nodes);
     npg_tracked tracked;
     if (r->should_stop && r->should_stop(r->user))
         return npg_error(NPG_STOPPED, "stopped while lost frames were tried again");
@@ -208,7 +208,7 @@ static npg_status open_recovery(recovery *r)
     NPG_TRY(npg_alloc_array(&r->lost, NPG_FOR_FIT, r->count, sizeof *r->lost));
     set_level(r);
     if (!list_lost(r)) return NPG_END;
-    NPG_TRY(npg_alloc_array(&r->trial, NPG_FOR_FIT, nodes, NPG_POSE_SIZE * sizeof *r->trial));
+    NPG_TRY(npg_alloc(&r->trial, NPG_FOR_FIT, npg_pose_bytes(nodes)));
     NPG_TRY(npg_alloc_array(&r->looks, NPG_FOR_FIT, r->count * LOOK_POINTS, 3 * sizeof *r->looks));
     NPG_TRY(npg_alloc_array(&r->look_count, NPG_FOR_FIT, r->count, sizeof *r->look_count));
     for (size_t i = 0; i < r->count; i++) {

@@ -3,15 +3,10 @@
 
 #include <string.h>
 
-static size_t pose_bytes(size_t node_count)
-{
-    return node_count * NPG_POSE_SIZE * sizeof(double);
-}
-
 npg_status npg_side_open(npg_side *side, size_t node_count)
 {
-    NPG_TRY(npg_alloc_array(&side->now, NPG_FOR_FIT, node_count, NPG_POSE_SIZE * sizeof(double)));
-    NPG_TRY(npg_alloc_array(&side->before, NPG_FOR_FIT, node_count, NPG_POSE_SIZE * sizeof(double)));
+    NPG_TRY(npg_alloc(&side->now, NPG_FOR_FIT, npg_pose_bytes(node_count)));
+    NPG_TRY(npg_alloc(&side->before, NPG_FOR_FIT, npg_pose_bytes(node_count)));
     npg_pose_rest(side->now, node_count);
     return NPG_OK;
 }
@@ -27,8 +22,8 @@ void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count)
     npg_side copy = *from;
     copy.now = to->now;
     copy.before = to->before;
-    memcpy(copy.now, from->now, pose_bytes(node_count));
-    memcpy(copy.before, from->before, pose_bytes(node_count));
+    memcpy(copy.now, from->now, npg_pose_bytes(node_count));
+    memcpy(copy.before, from->before, npg_pose_bytes(node_count));
     *to = copy;
 }
 
@@ -38,7 +33,7 @@ void npg_side_step_on(npg_side *side, size_t node_count, int64_t index)
     if (side->has_before)
         npg_pose_extrapolate(start, side->now, side->before, node_count);
     else
-        memcpy(start, side->now, pose_bytes(node_count));
+        memcpy(start, side->now, npg_pose_bytes(node_count));
     side->before = side->now;
     side->before_tracked = side->now_tracked;
     side->now = start;
@@ -50,7 +45,7 @@ void npg_side_step_on(npg_side *side, size_t node_count, int64_t index)
 
 size_t npg_side_bytes(size_t node_count)
 {
-    return sizeof(npg_side) + 2 * pose_bytes(node_count);
+    return sizeof(npg_side) + 2 * npg_pose_bytes(node_count);
 }
 
 /* A side without its arrays; no padding is left to chance. */
@@ -68,7 +63,7 @@ static void strip(npg_side *plain, const npg_side *from)
 unsigned char *npg_side_pack(unsigned char *to, const npg_side *side, size_t node_count)
 {
     npg_side plain;
-    size_t bytes = pose_bytes(node_count);
+    size_t bytes = npg_pose_bytes(node_count);
     strip(&plain, side);
     memcpy(to, &plain, sizeof plain);
     memcpy(to + sizeof plain, side->now, bytes);
@@ -79,7 +74,7 @@ unsigned char *npg_side_pack(unsigned char *to, const npg_side *side, size_t nod
 const unsigned char *npg_side_unpack(npg_side *side, const unsigned char *from, size_t node_count)
 {
     npg_side plain;
-    size_t bytes = pose_bytes(node_count);
+    size_t bytes = npg_pose_bytes(node_count);
     memcpy(&plain, from, sizeof plain);
     plain.now = side->now;
     plain.before = side->before;

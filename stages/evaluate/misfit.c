@@ -5,6 +5,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
 #include "geometry/sets.h"
 #include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
@@ -54,9 +55,7 @@ static double length_of(const float *vert_pos, const uint32_t edge[2])
 static npg_status measure_reference(npg_misfit_finder *f)
 {
     const npg_mesh *mesh = f->reference;
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
-    f->size = npg_bounds_diagonal(&bounds);
+    f->size = npg_points_diagonal(mesh->vert_pos, mesh->vert_count);
     NPG_TRY(npg_alloc_array(&f->part_of, NPG_FOR_MESH, mesh->vert_count, sizeof *f->part_of));
     NPG_TRY(npg_mesh_components(f->part_of, &f->part_count, mesh->vert_count, mesh->faces, mesh->face_count));
     NPG_TRY(npg_alloc_array(&f->part_sums, NPG_FOR_MESH, f->part_count, 5 * sizeof *f->part_sums));

@@ -21,6 +21,7 @@
 #include "fuse/empty_cells.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
 #include "mesh/denoise.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
@@ -77,8 +78,7 @@ typedef struct state {
     double spacing, noise;  /* of the keyframe's points */
     double usual;           /* mean of the frames' median distances */
     int64_t frames, misaligned, points, strays;
-    double
-        grow_dist; /* of an open reference that sensors saw: what is so near its border adds to it; else 0 */
+    double grow_dist; /* of an open reference that sensors saw: so near its border points add to it; else 0 */
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -217,11 +217,9 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));
     NPG_TRY(npg_carry_back_open(&s->carry, facts->reference));
-    if (facts->sensor_count_max && npg_carry_back_is_open(s->carry)) {
-        npg_bounds bounds = npg_bounds_empty();
-        npg_bounds_add_points(&bounds, facts->reference->vert_pos, facts->reference->vert_count);
-        s->grow_dist = GROW_SIZE * npg_bounds_diagonal(&bounds);
-    }
+    if (facts->sensor_count_max && npg_carry_back_is_open(s->carry))
+        s->grow_dist =
+            GROW_SIZE * npg_points_diagonal(facts->reference->vert_pos, facts->reference->vert_count);
     return NPG_OK;
 }
 
@@ -263,19 +261,19 @@ static npg_status drop_scattered(npg_fused *fused, double radius)
     npg_kdtree *tree;
     uint32_t *near;
     float *dist_sq = NULL;
-    size_t n = fused->count, kept = 0;
+    uint8_t *keep = NULL;
+    size_t n = fused->count;
     if (n < DENSE_NEIGHBOURS) return NPG_OK;
     NPG_TRY(npg_kdtree_open(&tree, fused->points, n));
     npg_status status = npg_alloc_array(&near, NPG_FOR_MESH, n, DENSE_NEIGHBOURS * sizeof *near);
     if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, DENSE_NEIGHBOURS * sizeof *dist_sq);
+    if (!status) status = npg_alloc(&keep, NPG_FOR_MESH, n);
     if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, fused->points, n, DENSE_NEIGHBOURS, 0);
-    for (size_t i = 0; i < n && !status; i++) {
-        if ((double)dist_sq[(i + 1) * DENSE_NEIGHBOURS - 1] > radius * radius) continue;
-        memmove(fused->points + 3 * kept, fused->points + 3 * i, 3 * sizeof(float));
-        memmove(fused->normals + 3 * kept++, fused->normals + 3 * i, 3 * sizeof(float));
-    }
-    if (!status) fused->count = kept;
+    for (size_t i = 0; i < n && !status; i++)
+        keep[i] = (double)dist_sq[(i + 1) * DENSE_NEIGHBOURS - 1] <= radius * radius;
+    if (!status) fused->count = npg_points_keep(fused->points, fused->normals, n, keep);
     npg_kdtree_close(&tree);
+    npg_release(&keep);
     npg_release(&near);
     npg_release(&dist_sq);
     return status;

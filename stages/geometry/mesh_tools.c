@@ -356,3 +356,15 @@ size_t npg_points_spread(float *out, float *out_normals, size_t most, const floa
     }
     return count;
 }
+
+size_t npg_points_keep(float *points, float *normals, size_t point_count, const uint8_t *keep)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < point_count; i++) {
+        if (!keep[i]) continue;
+        memmove(points + 3 * kept, points + 3 * i, 3 * sizeof(float));
+        if (normals) memmove(normals + 3 * kept, normals + 3 * i, 3 * sizeof(float));
+        kept++;
+    }
+    return kept;
+}

@@ -86,4 +86,7 @@ static inline size_t npg_spread_index(size_t i, size_t count, size_t n)
 size_t npg_points_spread(float *out, float *out_normals, size_t most, const float *points,
                          const float *normals, size_t point_count);
 
+/* Keep the points (N x 3), and their normals (or NULL), whose keep is not 0, in order; returns how many. */
+size_t npg_points_keep(float *points, float *normals, size_t point_count, const uint8_t *keep);
+
 #endif

@@ -8,6 +8,7 @@
 #include "align/sights.h"
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
 #include "ingest/formats/reader.h"
 #include "mesh/denoise.h"
 #include "mesh/flatten.h"
@@ -167,16 +168,17 @@ static npg_status take_frame_points(making *m)
 }
 
 /* What has grown where most frames look through was carried there by a wrong motion. */
-static void drop_empty(making *m)
+static npg_status drop_empty(making *m)
 {
-    size_t kept = 0;
-    for (size_t i = 0; i < m->count; i++) {
-        if (npg_cube_set_value(m->empty, m->points + 3 * i) > IN_EMPTY) continue;
-        memmove(m->points + 3 * kept, m->points + 3 * i, 3 * sizeof(float));
-        memmove(m->normals + 3 * kept++, m->normals + 3 * i, 3 * sizeof(float));
-    }
+    uint8_t *keep;
+    NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, m->count));
+    for (size_t i = 0; i < m->count; i++)
+        keep[i] = npg_cube_set_value(m->empty, m->points + 3 * i) <= IN_EMPTY;
+    size_t kept = npg_points_keep(m->points, m->normals, m->count, keep);
+    npg_release(&keep);
     note_count(m, "points_in_empty_space", m->count - kept);
     m->count = kept;
+    return NPG_OK;
 }
 
 /* Those of all frames are thinned already.  `making` owns them from here on; `fused` keeps its figures. */
@@ -189,15 +191,12 @@ static npg_status take_points(making *m)
     m->fused->points = m->fused->normals = NULL;
     if (!m->fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&m->empty, m->fused->empty, m->fused->empty_count, m->fused->empty_side));
-    if (npg_worker_facts(m->worker)->growing_passes) drop_empty(m);
-    return NPG_OK;
+    return npg_worker_facts(m->worker)->growing_passes ? drop_empty(m) : NPG_OK;
 }
 
 static npg_status measure_points(making *m)
 {
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, m->points, m->count);
-    m->diagonal = npg_bounds_diagonal(&bounds);
+    m->diagonal = npg_points_diagonal(m->points, m->count);
     note_count(m, "points", m->fused ? m->fused->count : m->frame->point_count);
     note_count(m, "points_used", m->count);
     NPG_TRY(npg_cloud_spacing(&m->spacing, m->points, m->count));

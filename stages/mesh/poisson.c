@@ -6,6 +6,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
 #include "geometry/vec3.h"
 #include "mesh/poisson_wire.h"
 #include "pipeline/child.h"
@@ -51,9 +52,7 @@ static npg_status check_spread(const float *normals, size_t n)
 
 static npg_status check_extent(const float *points, size_t n)
 {
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, points, n);
-    if (!(npg_bounds_diagonal(&bounds) > 0))
+    if (!(npg_points_diagonal(points, n) > 0))
         return npg_error(NPG_BAD_INPUT, "all %zu points are in one place", n);
     return NPG_OK;
 }
@@ -167,10 +166,8 @@ static npg_status check_numbers(const npg_mesh *mesh)
 
 static npg_status check_box(const npg_mesh *mesh, const float *points, size_t point_count)
 {
-    npg_bounds theirs = npg_bounds_empty(), ours = npg_bounds_empty();
-    npg_bounds_add_points(&theirs, mesh->vert_pos, mesh->vert_count);
-    npg_bounds_add_points(&ours, points, point_count);
-    double growth = npg_bounds_diagonal(&theirs) / npg_bounds_diagonal(&ours);
+    double growth =
+        npg_points_diagonal(mesh->vert_pos, mesh->vert_count) / npg_points_diagonal(points, point_count);
     if (growth > BOX_GROWTH_MAX || growth < 0.5)
         return npg_error(NPG_FAILED, "Poisson: the mesh's box has %.2f times the diagonal of the points' box",
                          growth);
