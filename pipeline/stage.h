@@ -66,8 +66,6 @@ typedef struct npg_facts {
     size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
     int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */
     bool is_growing;        /* ... and goes on to: the next one is not closed                               */
-    int64_t past_before;    /* past_count of the pass before ...                            */
-    int64_t passes_in_vain; /* ... and passes in a row that have reached no more since      */
     /* align, at the end of a fusing pass */
     int64_t past_count; /* frames that see too much that the reference does not have, and those beyond them */
     /* mesh */

@@ -368,23 +368,47 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     return NPG_OK;
 }
 
+/* What growth knows from pass to pass. */
+typedef struct growth {
+    int64_t past_before; /* frames that the reference did not reach in the pass before ...  */
+    int64_t in_vain;     /* ... and passes in a row that have reached no more since         */
+} growth;
+
+static void release_growth(void *thing)
+{
+    growth *g = thing;
+    npg_release(&g);
+}
+
+static npg_status growth_of(npg_worker *worker, growth **g)
+{
+    *g = npg_worker_kept(worker);
+    if (*g) return NPG_OK;
+    NPG_TRY(npg_alloc(g, NPG_FOR_MESH, sizeof **g));
+    npg_worker_keep(worker, *g, release_growth);
+    return NPG_OK;
+}
+
 /* A side of the body grows until all frames are reached, or two passes in a row have reached no more.  What has
- * grown is gathered once more: the last frames that were reached had nothing around them yet.  Whether the pass
- * is one of those that the options ask for. */
-static bool decide_growth(npg_worker *worker)
+ * grown is gathered once more: the last frames that were reached had nothing around them yet.  *counts: whether
+ * the pass is one of those that the options ask for. */
+static npg_status decide_growth(npg_worker *worker, bool *counts)
 {
     npg_facts *facts = npg_worker_facts(worker);
-    bool has_gained = !facts->growing_passes || facts->past_count < facts->past_before;
-    bool is_whole_now = facts->past_before && !facts->past_count;
-    facts->passes_in_vain = has_gained ? 0 : facts->passes_in_vain + 1;
-    facts->is_growing = facts->past_count && facts->passes_in_vain < 2 && facts->growing_passes < GROW_PASSES;
+    growth *g;
+    NPG_TRY(growth_of(worker, &g));
+    bool has_gained = !facts->growing_passes || facts->past_count < g->past_before;
+    bool is_whole_now = g->past_before && !facts->past_count;
+    g->in_vain = has_gained ? 0 : g->in_vain + 1;
+    facts->is_growing = facts->past_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
     facts->growing_passes += facts->past_count > 0;
-    facts->past_before = facts->past_count;
+    g->past_before = facts->past_count;
     if (facts->past_count)
         npg_worker_log(
             worker, NPG_LOG_INFO, -1, "%lld frames see too much that the reference does not have yet%s",
             (long long)facts->past_count, facts->is_growing ? ": it grows, and they are followed again" : "");
-    return !facts->is_growing && !is_whole_now;
+    *counts = !facts->is_growing && !is_whole_now;
+    return NPG_OK;
 }
 
 static npg_status flush(npg_worker *worker)
@@ -396,7 +420,9 @@ static npg_status flush(npg_worker *worker)
         facts->sensor_count_max = s->sensors;
         return NPG_OK;
     }
-    facts->fuse_left -= decide_growth(worker);
+    bool counts;
+    NPG_TRY(decide_growth(worker, &counts));
+    facts->fuse_left -= counts;
     return publish(worker);
 }
 

@@ -1,4 +1,4 @@
-/* Normals: principal components, and the view from a sensor. */
+/* Normals: principal components, and the side of a sensor. */
 #include "outlier/normals.h"
 
 #include <math.h>
@@ -114,84 +114,4 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
         ++*flipped;
     }
-}
-
-/* All set by trial. */
-#define VIEW_CELLS_MAX 512 /* per side of the picture                                                */
-#define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
-#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half    */
-
-typedef struct view { /* a pinhole picture toward the middle of the cloud */
-    double right[3], up[3], forward[3], sensor[3];
-    double half_width; /* tangent of half the angle */
-    size_t cells;      /* per side */
-    double cell_width; /* at the cloud's middle */
-} view;
-
-/* False when the sensor is inside the ball around the box or so near that the picture would be wider than
- * 120 degrees: asin(1 / 1.15) is 60. */
-static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], size_t point_count)
-{
-    double middle[3], radius = npg_bounds_diagonal(bounds) / 2;
-    for (int a = 0; a < 3; a++) {
-        middle[a] = (bounds->lo[a] + bounds->hi[a]) / 2;
-        v->forward[a] = middle[a] - sensor[a];
-        v->sensor[a] = sensor[a];
-    }
-    double distance = npg_vec3_length(v->forward);
-    if (!(distance > 1.15 * radius)) return false;
-    int least = fabs(v->forward[0]) < fabs(v->forward[1]) ? 0 : 1;
-    if (fabs(v->forward[2]) < fabs(v->forward[least])) least = 2;
-    double axis[3] = {least == 0, least == 1, least == 2};
-    npg_vec3_make_unit(v->forward);
-    npg_vec3_cross(v->right, axis, v->forward);
-    npg_vec3_make_unit(v->right);
-    npg_vec3_cross(v->up, v->forward, v->right);
-    v->half_width = radius / sqrt(distance * distance - radius * radius);
-    v->cells = (size_t)sqrt((double)point_count / 4); /* four points a cell, if they filled the picture */
-    if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
-    v->cell_width = 2 * v->half_width * distance / (double)v->cells;
-    return v->cells >= 4;
-}
-
-/* The cell a point falls into, and its depth. */
-static size_t project(double *depth, const view *v, const float *p)
-{
-    double d[3], at[2];
-    for (int a = 0; a < 3; a++) d[a] = (double)p[a] - v->sensor[a];
-    *depth = npg_vec3_dot(d, v->forward);
-    at[0] = npg_vec3_dot(d, v->right) / *depth;
-    at[1] = npg_vec3_dot(d, v->up) / *depth;
-    size_t cell = 0;
-    for (int i = 0; i < 2; i++) {
-        double x = (at[i] / v->half_width + 1) / 2 * (double)v->cells;
-        size_t c = x < 0 ? 0 : x >= (double)v->cells ? v->cells - 1 : (size_t)x;
-        cell = cell * v->cells + c;
-    }
-    return cell;
-}
-
-npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, const double sensor[3])
-{
-    view v;
-    float *nearest;
-    size_t hidden = 0;
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, points, n);
-    *yes = false;
-    if (!aim_view(&v, &bounds, sensor, n)) return NPG_OK;
-    double depth, hidden_depth = HIDDEN_CELLS * v.cell_width;
-    NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));
-    for (size_t i = 0; i < v.cells * v.cells; i++) nearest[i] = INFINITY;
-    for (size_t i = 0; i < n; i++) {
-        size_t cell = project(&depth, &v, points + 3 * i);
-        nearest[cell] = fminf(nearest[cell], (float)depth);
-    }
-    for (size_t i = 0; i < n; i++) {
-        size_t cell = project(&depth, &v, points + 3 * i);
-        hidden += depth > (double)nearest[cell] + hidden_depth;
-    }
-    npg_release(&nearest);
-    *yes = (double)hidden < HIDDEN_MAX * (double)n;
-    return NPG_OK;
 }

@@ -42,9 +42,4 @@ npg_status npg_normals_make(float *normals, const float *points, size_t point_co
  * from the sides given.  *flipped counts the turned ones. */
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t point_count);
 
-/* Whether the cloud looks like one view from a sensor: hardly a point is hidden behind another as seen from
- * there, and the sensor is outside the cloud's box. */
-npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point_count,
-                                    const double sensor[3]);
-
 #endif

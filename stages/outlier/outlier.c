@@ -13,6 +13,7 @@
 #include "outlier/cleaning.h"
 #include "outlier/isolated.h"
 #include "outlier/normals.h"
+#include "outlier/one_view.h"
 #include "outlier/outliers.h"
 #include "outlier/sensors.h"
 #include "pipeline/clock.h"
@@ -65,7 +66,7 @@ static const npg_option outlier_options[] = {
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, what lies before the points is empty, and surface that can't be seen from there waits for "
         "frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, if the "
-        "points look like one view from it"),
+        "points look like one view from it, or else a place from which they do, if there is one"),
     {0}};
 /* clang-format on */
 
@@ -293,18 +294,23 @@ static bool is_done(const npg_frame *frame)
 static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
 {
     outlier_state *s = npg_worker_state(worker);
-    double origin[3];
-    bool is_single;
+    double place[3];
+    bool is_found;
     if (frame->sensor_count) return NPG_OK;
-    for (int a = 0; a < 3; a++) origin[a] = -npg_worker_facts(worker)->origin.world[a];
-    NPG_TRY(npg_cloud_is_single_view(&is_single, frame->pos_local, frame->point_count, origin));
-    if (!is_single) return NPG_OK;
+    for (int a = 0; a < 3; a++) place[a] = -npg_worker_facts(worker)->origin.world[a];
+    NPG_TRY(npg_cloud_is_single_view(&is_found, frame->pos_local, frame->point_count, place));
+    if (!is_found) NPG_TRY(npg_one_view_find(&is_found, place, frame->pos_local, frame->point_count));
+    if (!is_found) return NPG_OK;
     NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, 1, 3 * sizeof(float)));
     frame->sensor_count = 1;
-    for (int a = 0; a < 3; a++) frame->sensor_local[a] = (float)origin[a];
+    for (int a = 0; a < 3; a++) frame->sensor_local[a] = (float)place[a];
+    const double *world = npg_worker_facts(worker)->origin.world;
     if (!s->has_found_sensor)
-        npg_worker_log(worker, NPG_LOG_INFO, frame->number,
-                       "the points look like one view from 0,0,0: taken for a sensor's (option sensor)");
+        npg_worker_log(
+            worker, NPG_LOG_INFO, frame->number,
+            "the points look like one view, from about %.3g,%.3g,%.3g: taken for a sensor's (option "
+            "sensor)",
+            place[0] + world[0], place[1] + world[1], place[2] + world[2]);
     s->has_found_sensor = true;
     return NPG_OK;
 }
@@ -313,8 +319,7 @@ static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
 static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
-    if (frame->is_skipped) return NPG_OK;
-    if (s->sensor_kind == SENSOR_AUTO) return NPG_OK;
+    if (frame->is_skipped || s->sensor_kind == SENSOR_AUTO) return NPG_OK;
     npg_release(&frame->sensors);
     npg_release(&frame->sensor_local);
     frame->sensor_count = 0;

@@ -1,0 +1,272 @@
+/* One view: pictures of the cloud, cells of a pinhole camera's. */
+#include "outlier/one_view.h"
+
+#include <math.h>
+
+#include "geometry/mesh_tools.h"
+#include "geometry/vec3.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/memory.h"
+
+/* All set by trial. */
+#define VIEW_CELLS_MAX 512 /* per side of the picture                                                */
+#define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
+#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half    */
+#define DISTANCE       1.5 /* of a sensor that is looked for, in sizes of the cloud */
+/* First few points from few places: a cloud of many views has from all of them more that is hidden (bodies
+ * 0.15, with noise and holes 0.08; one view at most 0.05) ... */
+#define FEW_POINTS 2000
+#define FEW_PLACES 100
+#define FEW_HIDDEN 0.12
+/* ... then more of both (bodies 0.2, with noise and holes 0.09; one view 0.05), near the best so far. */
+#define MANY_POINTS   5000
+#define MANY_PLACES   400
+#define MANY_HIDDEN   0.06
+#define NEAR_COSINE   0.75 /* of the angle around the best of few */
+#define AS_GOOD       0.03 /* more hidden than from the best place, and still of the mean */
+#define MEAN_ROUNDS   5
+#define OUTLINE_VOTES 0.54 /* share of the outline that must be farther away */
+#define OUTLINE_STEP  4    /* cell widths: more between two cells is another part behind */
+
+typedef struct view { /* a pinhole picture toward the middle of the cloud */
+    double right[3], up[3], forward[3], sensor[3];
+    double half_width; /* tangent of half the angle */
+    size_t cells;      /* per side */
+    double cell_width; /* at the cloud's middle */
+} view;
+
+/* False when the sensor is inside the ball around the box or so near that the picture would be wider than
+ * 120 degrees: asin(1 / 1.15) is 60. */
+static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], size_t point_count)
+{
+    double middle[3], radius = npg_bounds_diagonal(bounds) / 2;
+    for (int a = 0; a < 3; a++) {
+        middle[a] = (bounds->lo[a] + bounds->hi[a]) / 2;
+        v->forward[a] = middle[a] - sensor[a];
+        v->sensor[a] = sensor[a];
+    }
+    double distance = npg_vec3_length(v->forward);
+    if (!(distance > 1.15 * radius)) return false;
+    int least = fabs(v->forward[0]) < fabs(v->forward[1]) ? 0 : 1;
+    if (fabs(v->forward[2]) < fabs(v->forward[least])) least = 2;
+    double axis[3] = {least == 0, least == 1, least == 2};
+    npg_vec3_make_unit(v->forward);
+    npg_vec3_cross(v->right, axis, v->forward);
+    npg_vec3_make_unit(v->right);
+    npg_vec3_cross(v->up, v->forward, v->right);
+    v->half_width = radius / sqrt(distance * distance - radius * radius);
+    v->cells = (size_t)sqrt((double)point_count / 4); /* four points a cell, if they filled the picture */
+    if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;
+    v->cell_width = 2 * v->half_width * distance / (double)v->cells;
+    return v->cells >= 4;
+}
+
+/* The cell a point falls into, and its depth. */
+static size_t project(double *depth, const view *v, const float *p)
+{
+    double d[3], at[2];
+    for (int a = 0; a < 3; a++) d[a] = (double)p[a] - v->sensor[a];
+    *depth = npg_vec3_dot(d, v->forward);
+    at[0] = npg_vec3_dot(d, v->right) / *depth;
+    at[1] = npg_vec3_dot(d, v->up) / *depth;
+    size_t cell = 0;
+    for (int i = 0; i < 2; i++) {
+        double x = (at[i] / v->half_width + 1) / 2 * (double)v->cells;
+        size_t c = x < 0 ? 0 : x >= (double)v->cells ? v->cells - 1 : (size_t)x;
+        cell = cell * v->cells + c;
+    }
+    return cell;
+}
+
+/* ---- hidden points ---- */
+
+/* Share of points that are hidden behind others; nearest: room for the picture's cells. */
+static double hidden_share(const view *v, float *nearest, const float *points, size_t n)
+{
+    double depth, hidden_depth = HIDDEN_CELLS * v->cell_width;
+    size_t hidden = 0;
+    for (size_t i = 0; i < v->cells * v->cells; i++) nearest[i] = INFINITY;
+    for (size_t i = 0; i < n; i++) {
+        size_t cell = project(&depth, v, points + 3 * i);
+        nearest[cell] = fminf(nearest[cell], (float)depth);
+    }
+    for (size_t i = 0; i < n; i++) {
+        size_t cell = project(&depth, v, points + 3 * i);
+        hidden += depth > (double)nearest[cell] + hidden_depth;
+    }
+    return (double)hidden / (double)n;
+}
+
+npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, const double sensor[3])
+{
+    view v;
+    float *nearest;
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, points, n);
+    *yes = false;
+    if (!aim_view(&v, &bounds, sensor, n)) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));
+    *yes = hidden_share(&v, nearest, points, n) < HIDDEN_MAX;
+    npg_release(&nearest);
+    return NPG_OK;
+}
+
+/* ---- a place that is looked for ---- */
+
+typedef struct search {
+    const float *points;
+    size_t count;
+    npg_bounds bounds;
+    float *cells, *counts; /* room for a picture, owned */
+    double best[3];        /* direction from the cloud's middle */
+} search;
+
+/* The i-th of `count` directions that are spread evenly (a Fibonacci lattice). */
+static void spread_direction(double direction[3], size_t i, size_t count)
+{
+    const double turn = 2.399963229728653; /* the golden angle */
+    double z = 1 - (2 * (double)i + 1) / (double)count, r = sqrt(1 - z * z);
+    direction[0] = r * cos(turn * (double)i);
+    direction[1] = r * sin(turn * (double)i);
+    direction[2] = z;
+}
+
+static void place_of(double sensor[3], const search *s, const double direction[3])
+{
+    double away = DISTANCE * npg_bounds_diagonal(&s->bounds);
+    for (int a = 0; a < 3; a++) sensor[a] = (s->bounds.lo[a] + s->bounds.hi[a]) / 2 + away * direction[a];
+}
+
+/* False for so few points that there is no picture. */
+static bool aim(view *v, const search *s, const double direction[3])
+{
+    double sensor[3];
+    place_of(sensor, s, direction);
+    return aim_view(v, &s->bounds, sensor, s->count);
+}
+
+/* Of the directions whose line is within an angle of `near` (NULL: all), each with its hidden share in shares
+ * (INFINITY: not one of them); the best of them becomes s->best.  Returns its share. */
+static double try_places(search *s, double *shares, size_t place_count, const double *near)
+{
+    double least = INFINITY, best[3] = {0};
+    for (size_t i = 0; i < place_count; i++) {
+        double direction[3];
+        view v;
+        spread_direction(direction, i, place_count);
+        shares[i] = INFINITY;
+        if (near && fabs(npg_vec3_dot(direction, near)) < NEAR_COSINE) continue;
+        if (!aim(&v, s, direction)) continue;
+        shares[i] = hidden_share(&v, s->cells, s->points, s->count);
+        if (shares[i] >= least) continue;
+        least = shares[i];
+        for (int a = 0; a < 3; a++) best[a] = direction[a];
+    }
+    for (int a = 0; a < 3; a++) s->best[a] = best[a];
+    return least;
+}
+
+/* The mean line of the places that are nearly as good as the best, both sides of the cloud alike. */
+static void take_mean(search *s, const double *shares, size_t place_count, double least)
+{
+    for (int round = 0; round < MEAN_ROUNDS; round++) {
+        double mean[3] = {0};
+        for (size_t i = 0; i < place_count; i++) {
+            double direction[3], weight = least + AS_GOOD - shares[i];
+            if (!(weight > 0)) continue;
+            spread_direction(direction, i, place_count);
+            if (npg_vec3_dot(direction, s->best) < 0) weight = -weight;
+            for (int a = 0; a < 3; a++) mean[a] += weight * direction[a];
+        }
+        npg_vec3_make_unit(mean);
+        for (int a = 0; a < 3; a++) s->best[a] = mean[a];
+    }
+}
+
+/* Mean depth of each cell, NAN where there is no point. */
+static void draw_depths(const view *v, search *s)
+{
+    for (size_t i = 0; i < v->cells * v->cells; i++) s->cells[i] = s->counts[i] = 0;
+    for (size_t i = 0; i < s->count; i++) {
+        double depth;
+        size_t cell = project(&depth, v, s->points + 3 * i);
+        s->cells[cell] += (float)depth;
+        s->counts[cell]++;
+    }
+    for (size_t i = 0; i < v->cells * v->cells; i++)
+        s->cells[i] = s->counts[i] > 0 ? s->cells[i] / s->counts[i] : NAN;
+}
+
+/* Cells on the outline that are farther away, and nearer, than the one two steps inward. */
+static void count_outline(const view *v, search *s, size_t *farther, size_t *nearer)
+{
+    const size_t side = v->cells;
+    draw_depths(v, s);
+    for (size_t cell = 0; cell < side * side; cell++) {
+        size_t at[2] = {cell / side, cell % side};
+        for (int way = 0; way < 4; way++) {
+            size_t along = at[way / 2], stride = way / 2 ? 1 : side;
+            if (along < 2 || along + 2 >= side) continue;
+            const float *here = s->cells + cell;
+            ptrdiff_t inward = way % 2 ? (ptrdiff_t)stride : -(ptrdiff_t)stride;
+            float difference = *here - here[2 * inward];
+            bool is_outline = isnan(here[-inward]) && !isnan(here[inward]) && !isnan(difference) &&
+                              fabs((double)difference) < OUTLINE_STEP * v->cell_width;
+            *farther += is_outline && difference > 0;
+            *nearer += is_outline && difference < 0;
+        }
+    }
+}
+
+/* Turn s->best to the side that the cloud bulges to; false where the outline does not tell. */
+static bool choose_side(search *s)
+{
+    size_t farther = 0, nearer = 0;
+    double other[3] = {-s->best[0], -s->best[1], -s->best[2]};
+    view v;
+    if (aim(&v, s, s->best)) count_outline(&v, s, &farther, &nearer);
+    if (aim(&v, s, other)) count_outline(&v, s, &nearer, &farther);
+    if (nearer > farther)
+        for (int a = 0; a < 3; a++) s->best[a] = other[a];
+    double votes = (double)(farther > nearer ? farther : nearer);
+    return votes > OUTLINE_VOTES * (double)(farther + nearer);
+}
+
+static bool find_place(search *few, search *many)
+{
+    double shares[MANY_PLACES];
+    if (!(try_places(few, shares, FEW_PLACES, NULL) < FEW_HIDDEN)) return false;
+    double least = try_places(many, shares, MANY_PLACES, few->best);
+    if (!(least < MANY_HIDDEN)) return false;
+    take_mean(many, shares, MANY_PLACES, least);
+    return choose_side(many);
+}
+
+static void take_few(search *s, float *room, const float *points, size_t n, size_t most)
+{
+    s->count = npg_points_spread(room, NULL, most, points, NULL, n);
+    s->points = room;
+    s->bounds = npg_bounds_empty();
+    npg_bounds_add_points(&s->bounds, room, s->count);
+}
+
+npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t n)
+{
+    search few, many;
+    float *room, *pictures = NULL;
+    *found = false;
+    NPG_TRY(npg_alloc_array(&room, NPG_FOR_FRAMES, FEW_POINTS + MANY_POINTS, 3 * sizeof *room));
+    /* four points a cell (aim_view): never more cells than points */
+    npg_status status = npg_alloc_array(&pictures, NPG_FOR_FRAMES, MANY_POINTS, 2 * sizeof *pictures);
+    if (!status) {
+        take_few(&few, room, points, n, FEW_POINTS);
+        take_few(&many, room + 3 * FEW_POINTS, points, n, MANY_POINTS);
+        few.cells = many.cells = pictures;
+        few.counts = many.counts = pictures + MANY_POINTS;
+        *found = find_place(&few, &many);
+        if (*found) place_of(sensor, &many, many.best);
+    }
+    npg_release(&room);
+    npg_release(&pictures);
+    return status;
+}
