@@ -13,6 +13,7 @@
 #include "mesh/denoise.h"
 #include "mesh/flatten.h"
 #include "mesh/follow_normals.h"
+#include "mesh/fringe.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "mesh/resurface.h"
@@ -296,6 +297,18 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
     return NPG_OK;
 }
 
+/* Of a side that has grown to a body shreds are left along the border.  One that still grows needs all it has, and
+ * of one frame half a limb is as narrow. */
+static npg_status drop_fringe(making *m)
+{
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    double share;
+    if (!facts->growing_passes || facts->is_growing) return NPG_OK;
+    NPG_TRY(npg_mesh_drop_fringe(&m->mesh, &share, SEEN_SPACINGS * m->seen));
+    note(m, "fringe_share", share);
+    return NPG_OK;
+}
+
 static npg_status trim(making *m)
 {
     bool trim_unseen;
@@ -305,6 +318,7 @@ static npg_status trim(making *m)
     NPG_TRY(npg_mesh_trim(&m->mesh, &share, m->points, m->count, limit));
     note(m, "trimmed_share", share);
     if (!m->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
+    if (trim_unseen) NPG_TRY(drop_fringe(m));
     NPG_TRY(npg_mesh_unseen(&m->invented, m->mesh, m->points, m->count, SEEN_SPACINGS * m->seen));
     if (!trim_unseen && share > LOST_TOLERATED)
         warn(m, false,

@@ -30,7 +30,7 @@ typedef struct outlier_state {
     int64_t neighbours, normal_neighbours, point_max;
     double ratio, voxel;
     /* what was found so far, over the pass */
-    enum { SENSOR_AUTO, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
+    enum { SENSOR_AUTO, SENSOR_FIND, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
     bool has_found_sensor;
     npg_sensors sensors; /* where given */
     npg_cleaning sum;
@@ -66,7 +66,7 @@ static const npg_option outlier_options[] = {
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, what lies before the points is empty, and surface that can't be seen from there waits for "
         "frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, if the "
-        "points look like one view from it, or else a place from which they do, if there is one"),
+        "points look like one view from it; find: one sensor saw each frame, from a place that is looked for"),
     {0}};
 /* clang-format on */
 
@@ -76,6 +76,8 @@ static npg_status parse_sensor(outlier_state *s)
 {
     s->sensor_kind = SENSOR_AUTO;
     if (!strcmp(s->sensor_text, "auto")) return NPG_OK;
+    s->sensor_kind = SENSOR_FIND;
+    if (!strcmp(s->sensor_text, "find")) return NPG_OK;
     s->sensor_kind = SENSOR_NONE;
     if (!strcmp(s->sensor_text, "none")) return NPG_OK;
     s->sensor_kind = SENSOR_GIVEN;
@@ -289,22 +291,14 @@ static bool is_done(const npg_frame *frame)
     return frame->is_skipped || (frame->fields & NPG_FIELD_CLEAN);
 }
 
-/* A depth camera's points are in its own coordinates, as a rule.  Isolated points are gone by now: they would make
- * any cloud look like one view. */
-static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
+/* One sensor that saw the whole frame, at `place`: the frame's, if none is named. */
+static npg_status add_sensor(npg_worker *worker, npg_frame *frame, const double place[3])
 {
     outlier_state *s = npg_worker_state(worker);
-    double place[3];
-    bool is_found;
-    if (frame->sensor_count) return NPG_OK;
-    for (int a = 0; a < 3; a++) place[a] = -npg_worker_facts(worker)->origin.world[a];
-    NPG_TRY(npg_cloud_is_single_view(&is_found, frame->pos_local, frame->point_count, place));
-    if (!is_found) NPG_TRY(npg_one_view_find(&is_found, place, frame->pos_local, frame->point_count));
-    if (!is_found) return NPG_OK;
+    const double *world = npg_worker_facts(worker)->origin.world;
     NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, 1, 3 * sizeof(float)));
     frame->sensor_count = 1;
     for (int a = 0; a < 3; a++) frame->sensor_local[a] = (float)place[a];
-    const double *world = npg_worker_facts(worker)->origin.world;
     if (!s->has_found_sensor)
         npg_worker_log(
             worker, NPG_LOG_INFO, frame->number,
@@ -315,15 +309,35 @@ static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
+/* A depth camera's points are in its own coordinates, as a rule.  Isolated points are gone by now: they would make
+ * any cloud look like one view.  Of clouds in other coordinates only the user knows that one sensor saw them: thin
+ * bodies, and those that two sensors see, may look like one view. */
+static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
+{
+    const outlier_state *s = npg_worker_state(worker);
+    double place[3];
+    bool is_found = false, is_asked = s->sensor_kind == SENSOR_FIND;
+    if (frame->sensor_count || (s->sensor_kind != SENSOR_AUTO && !is_asked)) return NPG_OK;
+    for (int a = 0; a < 3; a++) place[a] = -npg_worker_facts(worker)->origin.world[a];
+    NPG_TRY(is_asked ? npg_one_view_find(&is_found, place, frame->pos_local, frame->point_count)
+                     : npg_cloud_is_single_view(&is_found, frame->pos_local, frame->point_count, place));
+    if (is_found) return add_sensor(worker, frame, place);
+    if (is_asked && comes_first(worker, frame))
+        npg_worker_warn(worker, false, frame->number,
+                        "there is no place from which the points look like one view (option sensor)");
+    return NPG_OK;
+}
+
 /* As option sensor says; without it those that the frame brings. */
 static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     if (frame->is_skipped || s->sensor_kind == SENSOR_AUTO) return NPG_OK;
+    if (s->sensor_kind == SENSOR_FIND && is_done(frame)) return NPG_OK; /* kept with what was found */
     npg_release(&frame->sensors);
     npg_release(&frame->sensor_local);
     frame->sensor_count = 0;
-    if (s->sensor_kind == SENSOR_NONE) return NPG_OK;
+    if (s->sensor_kind != SENSOR_GIVEN) return NPG_OK;
     return npg_sensors_set(&s->sensors, frame, &npg_worker_facts(worker)->origin);
 }
 
@@ -338,7 +352,7 @@ static npg_status check_and_keep(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     NPG_TRY(npg_clean_check(frame));
-    if (s->sensor_kind == SENSOR_AUTO) NPG_TRY(look_for_sensor(worker, frame));
+    NPG_TRY(look_for_sensor(worker, frame));
     frame->fields |= NPG_FIELD_CLEAN;
     return s->store && s->keeps ? npg_frame_store_put(s->store, frame, true) : NPG_OK;
 }
