@@ -24,6 +24,8 @@
 #define AGAIN_STIFFNESS 2    /* of the first step, in final stiffnesses      */
 #define AGAIN_WIDTH     0.02 /* of the first step's robust weight, in units  */
 
+#define RAY_BYTES 64 /* of a sample of the surface, to tell whether a sensor sees it */
+
 /* Of a frame's points, as a reference that is one side of a body must have places for: frames beyond the first
  * one that has fewer are not followed while it grows. */
 #define EXPLAINED 0.5
@@ -586,7 +588,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
      * the graph's search for them, positions, normals; the waiting frames' poses, once more for the log, and
      * thinned points */
     return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + known) + verts * 320 +
-           group * (2 * nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float));
+           group * (2 * nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float)) +
+           (size_t)s->samples * RAY_BYTES;
 }
 
 extern const npg_stage npg_stage_align;

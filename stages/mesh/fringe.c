@@ -23,14 +23,13 @@ static void close_fringe(fringe *f)
     npg_release(&f->dist);
 }
 
-/* Distances of all vertices to those whose mask is `wanted`; *count: how many these are. */
-static npg_status measure(fringe *f, size_t *count, const uint8_t *mask, uint8_t wanted)
+/* Distances of all vertices to those whose mask is not 0; *count: how many these are. */
+static npg_status measure(fringe *f, size_t *count, const uint8_t *mask)
 {
     const npg_mesh *mesh = f->mesh;
     *count = 0;
     for (size_t v = 0; v < mesh->vert_count; v++)
-        if (mask[v] == wanted)
-            memcpy(f->places + 3 * (*count)++, mesh->vert_pos + 3 * v, 3 * sizeof *f->places);
+        if (mask[v]) memcpy(f->places + 3 * (*count)++, mesh->vert_pos + 3 * v, 3 * sizeof *f->places);
     return *count ? npg_points_dist(f->dist, mesh->vert_pos, mesh->vert_count, f->places, *count) : NPG_OK;
 }
 
@@ -43,10 +42,10 @@ static npg_status find_core(fringe *f, bool *found, double width)
     NPG_TRY(npg_alloc_array(&f->dist, NPG_FOR_MESH, n, sizeof *f->dist));
     NPG_TRY(npg_mesh_border(f->is_border, found, f->mesh));
     if (!*found) return NPG_OK;
-    NPG_TRY(measure(f, &count, f->is_border, 1));
+    NPG_TRY(measure(f, &count, f->is_border));
     uint8_t *is_core = f->is_border; /* no longer needed */
     for (size_t v = 0; v < n; v++) is_core[v] = (double)f->dist[v] > width;
-    NPG_TRY(measure(f, &count, is_core, 1));
+    NPG_TRY(measure(f, &count, is_core));
     *found = count > 0;
     return NPG_OK;
 }
@@ -56,20 +55,15 @@ npg_status npg_mesh_drop_fringe(npg_mesh **mesh, double *share, double width)
     fringe f = {.mesh = *mesh};
     uint8_t *keep_face = NULL;
     bool found = false;
-    double total = 0, gone = 0;
     *share = 0;
     npg_status status = find_core(&f, &found, width);
     if (!status && found) status = npg_alloc(&keep_face, NPG_FOR_MESH, (*mesh)->face_count);
     for (size_t i = 0; i < (*mesh)->face_count && !status && found; i++) {
         const uint32_t *face = (*mesh)->faces + 3 * i;
-        double area = npg_face_area((*mesh)->vert_pos, face);
         float farthest = fmaxf(f.dist[face[0]], fmaxf(f.dist[face[1]], f.dist[face[2]]));
         keep_face[i] = (double)farthest <= BACK * width;
-        total += area;
-        gone += keep_face[i] ? 0 : area;
     }
-    if (!status && found) status = npg_mesh_keep_faces(mesh, keep_face);
-    if (!status && total > 0) *share = gone / total;
+    if (!status && found) status = npg_mesh_keep_share(mesh, share, keep_face);
     npg_release(&keep_face);
     close_fringe(&f);
     return status;

@@ -62,7 +62,7 @@ npg_status npg_cloud_spacing(double *spacing, const float *points, size_t n)
 }
 
 /* Keep some faces; *share is the part of the area that goes. */
-static npg_status keep(npg_mesh **mesh, double *share, const uint8_t *keep_face)
+npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face)
 {
     double total = 0, gone = 0;
     for (size_t f = 0; f < (*mesh)->face_count; f++) {
@@ -87,7 +87,7 @@ npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, si
         const uint32_t *face = (*mesh)->faces + 3 * f;
         keep_face[f] = (double)fmaxf(dist[face[0]], fmaxf(dist[face[1]], dist[face[2]])) <= dist_max;
     }
-    if (!status) status = keep(mesh, share, keep_face);
+    if (!status) status = npg_mesh_keep_share(mesh, share, keep_face);
     npg_release(&dist);
     npg_release(&keep_face);
     return status;
@@ -164,7 +164,7 @@ static npg_status keep_pieces(npg_mesh **mesh, npg_pieces *pieces, const uint32_
     for (size_t i = 0; i < pieces->found && !status; i++) pieces->kept += is_kept[i];
     for (size_t f = 0; f < face_count && !status; f++)
         keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];
-    if (!status) status = keep(mesh, &pieces->lost_share, keep_face);
+    if (!status) status = npg_mesh_keep_share(mesh, &pieces->lost_share, keep_face);
     npg_release(&area);
     npg_release(&is_kept);
     npg_release(&keep_face);

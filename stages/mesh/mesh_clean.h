@@ -20,6 +20,9 @@ npg_status npg_points_dist(float *dist, const float *places, size_t place_count,
 /* Median distance to the 8th neighbour, over the points: how dense a cloud is. */
 npg_status npg_cloud_spacing(double *spacing, const float *points, size_t point_count);
 
+/* Keep the faces whose keep_face (F) is not 0.  *share gets the share of the area that went. */
+npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face);
+
 /* Drop the faces of which a vertex is farther than dist_max from every point.  *share gets the share of the
  * area that went. */
 npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, size_t point_count,

@@ -250,6 +250,11 @@ static void take_few(search *s, float *room, const float *points, size_t n, size
     npg_bounds_add_points(&s->bounds, room, s->count);
 }
 
+size_t npg_one_view_memory(void)
+{
+    return ((FEW_POINTS + MANY_POINTS) * 3 + MANY_POINTS * 2) * sizeof(float);
+}
+
 npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t n)
 {
     search few, many;

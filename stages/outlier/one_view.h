@@ -21,4 +21,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point
  * Cost: 25 000 points' pictures for a cloud of many views, 600 000 for one of one view.  NPG_MEMORY. */
 npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t point_count);
 
+/* Bytes that it takes. */
+size_t npg_one_view_memory(void);
+
 #endif

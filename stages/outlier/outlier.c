@@ -450,7 +450,8 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 60 * thinned + threads * npg_find_isolated_memory(thinned) + KEPT_RESULTS_MAX;
+    return 17 * points + 60 * thinned + (s->sensor_kind == SENSOR_FIND ? npg_one_view_memory() : 0) +
+           threads * npg_find_isolated_memory(thinned) + KEPT_RESULTS_MAX;
 }
 
 const npg_stage npg_stage_outlier = {.name = "outlier",
