@@ -26,8 +26,8 @@
 
 #define RAY_BYTES 64 /* of a sample of the surface, to tell whether a sensor sees it */
 
-/* Of a frame's points, as a reference that is one side of a body must have places for: frames beyond the first
- * one that has fewer are not followed while it grows. */
+/* Of a frame's points, as a reference that is one side of a body must have places for: frames beyond the
+ * first one that has fewer are not followed while it grows. */
 #define EXPLAINED 0.5
 
 /* A frame that waits for its window. */
@@ -271,8 +271,8 @@ static bool is_growing(const npg_worker *worker, size_t sensor_count)
     return npg_worker_pass(worker) == NPG_PASS_FUSE && sensor_count && npg_tracker_is_open(s->tracker);
 }
 
-/* A frame that a growing reference does not reach, nor those beyond it: a pose that is no number says so, in the
- * log, too. */
+/* A frame that a growing reference does not reach, nor those beyond it: a pose that is no number says so, in
+ * the log, too. */
 static void leave_past(waiting *w, npg_side *at)
 {
     at->is_past = true;

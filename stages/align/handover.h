@@ -1,7 +1,7 @@
 /* Handover: the poses that one pass over the frames leaves to the next, which has another reference.
  *
- * A fusing pass writes the pose of each frame (poses.h) and keeps its tracker; the pass that follows starts from
- * them, carried to its own nodes.  With a job folder they lie there, and a resumed run opens them again.
+ * A fusing pass writes the pose of each frame (poses.h) and keeps its tracker; the pass that follows starts
+ * from them, carried to its own nodes.  With a job folder they lie there, and a resumed run opens them again.
  * One thread at a time; errors are those of poses.h. */
 #ifndef NPG_HANDOVER_H
 #define NPG_HANDOVER_H
@@ -26,8 +26,8 @@ void npg_handover_close(npg_handover *handover);
 /* Fusing passes that have ended in this run. */
 int64_t npg_handover_passes(const npg_worker *worker);
 
-/* pose (K' x 12) becomes what the pass before found of the frame; where it has nothing, *is_known is false and
- * the pose stays. */
+/* pose (K' x 12) becomes what the pass before found of the frame; where it has nothing, *is_known is false
+ * and the pose stays. */
 npg_status npg_handover_start(const npg_handover *handover, const npg_tracker *tracker, int64_t index,
                               double *pose, bool *is_known);
 

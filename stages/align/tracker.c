@@ -271,8 +271,8 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
-/* Whether a point that a sensor saw can be of the surface that is nearest to it: a side that faces a sensor, and
- * not the border of what is known, beyond which the body goes on. */
+/* Whether a point that a sensor saw can be of the surface that is nearest to it: a side that faces a sensor,
+ * and not the border of what is known, beyond which the body goes on. */
 static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, const npg_surface_hit *hit,
                           const float *point, const double normal[3])
 {

@@ -16,14 +16,14 @@ typedef struct npg_visible {
 npg_status npg_visible_open(npg_visible *visible, size_t place_count);
 void npg_visible_close(npg_visible *visible);
 
-/* Whether a place with this unit normal faces one of the sensors (S x 3): the cosine to the way there is above
- * `least`.  A sensor that is not finite saw nothing. */
+/* Whether a place with this unit normal faces one of the sensors (S x 3): the cosine to the way there is
+ * above `least`.  A sensor that is not finite saw nothing. */
 bool npg_faces_sensor(const float *sensors, size_t sensor_count, const float place[3], const double normal[3],
                       double least);
 
 /* is_seen[i] (N): whether a sensor sees places[i] (N x 3) of the surface, with the normals of its vertices
- * (verts[i]: which one it is); all are where no sensor is known (sensor_count 0).  offset: surface nearer than
- * that hides nothing.  All in the same coordinates.  NPG_MEMORY. */
+ * (verts[i]: which one it is); all are where no sensor is known (sensor_count 0).  offset: surface nearer
+ * than that hides nothing.  All in the same coordinates.  NPG_MEMORY. */
 npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_surface *surface,
                             const float *sensors, size_t sensor_count, const float *places,
                             const uint32_t *verts, const float *vert_normals, size_t count, double offset);

@@ -5,10 +5,10 @@
  * (cells.h); stage mesh makes the next reference from what comes out.  Parts that touch in a frame are told
  * apart by the surface that each point belongs to, so one frame's contact joins nothing.
  *
- * Where sensors see a side of the body, the reference so far is that side, and open.  It then grows: points that
- * lie past its border are carried by the border's motion and added, frame by frame outward from the keyframe
- * for as long as the surface has a place for half of a frame's points (stage align).  The next pass follows what
- * came out and gets farther, until all frames are reached.
+ * Where sensors see a side of the body, the reference so far is that side, and open.  It then grows: points
+ * that lie past its border are carried by the border's motion and added, frame by frame outward from the
+ * keyframe for as long as the surface has a place for half of a frame's points (stage align).  The next pass
+ * follows what came out and gets farther, until all frames are reached.
  *
  * Not in the paper, whose reference is the surface of one frame. */
 #include <math.h>
@@ -255,7 +255,8 @@ static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 
 /* ---- the end of a pass ---- */
 
-/* What grows must hang together: single places past the border are of other parts, carried by a wrong motion. */
+/* What grows must hang together: single places past the border are of other parts, carried by a wrong motion.
+ */
 static npg_status drop_scattered(npg_fused *fused, double radius)
 {
     npg_kdtree *tree;
@@ -389,9 +390,9 @@ static npg_status growth_of(npg_worker *worker, growth **g)
     return NPG_OK;
 }
 
-/* A side of the body grows until all frames are reached, or two passes in a row have reached no more.  What has
- * grown is gathered once more: the last frames that were reached had nothing around them yet.  *counts: whether
- * the pass is one of those that the options ask for. */
+/* A side of the body grows until all frames are reached, or two passes in a row have reached no more.  What
+ * has grown is gathered once more: the last frames that were reached had nothing around them yet.  *counts:
+ * whether the pass is one of those that the options ask for. */
 static npg_status decide_growth(npg_worker *worker, bool *counts)
 {
     npg_facts *facts = npg_worker_facts(worker);

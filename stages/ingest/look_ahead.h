@@ -2,9 +2,10 @@
  * files; in the solving pass the source goes on behind them.
  *
  * The measuring pass brings them as they come, and one frame more: whether there is one decides whether the
- * source goes on.  That one waits for the solving pass, and behind it whatever the source holds back meanwhile
- * (files in a folder, a pipe that is full, a program that waits in npg_run_push()).  A run that is resumed has
- * no measuring pass: it takes the frames that it still needs of the look-ahead once more from the source.
+ * source goes on.  That one waits for the solving pass, and behind it whatever the source holds back
+ * meanwhile (files in a folder, a pipe that is full, a program that waits in npg_run_push()).  A run that is
+ * resumed has no measuring pass: it takes the frames that it still needs of the look-ahead once more from the
+ * source.
  *
  * Threads: that of stage ingest. */
 #ifndef NPG_LOOK_AHEAD_H

@@ -98,7 +98,8 @@ static npg_status set_targets(work *w, const float *points, const float *normals
     return status;
 }
 
-/* What a face asks of its vertices, onto their sums: to lie in the plane through its centre across its target. */
+/* What a face asks of its vertices, onto their sums: to lie in the plane through its centre across its
+ * target. */
 static void ask(work *w, size_t f)
 {
     const uint32_t *face = w->mesh->faces + 3 * f;

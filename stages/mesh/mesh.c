@@ -99,7 +99,9 @@ static const npg_option mesh_options[] = {
 #define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
 #define IN_EMPTY         0.5 /* value of the cubes above which a point lies in space that sensors saw to be empty */
 
-#define UNSEEN_IS_LEFT 0.05 /* of that of a reference that has grown: where the body goes on, out of sight */
+#define UNSEEN_IS_LEFT                                                                                       \
+    0.05 /* of that of a reference that has grown: where the body goes on, out of sight   \
+                             */
 
 typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
@@ -297,8 +299,8 @@ static npg_status judge_unseen(making *m, bool *trim_unseen)
     return NPG_OK;
 }
 
-/* Of a side that has grown to a body shreds are left along the border.  One that still grows needs all it has, and
- * of one frame half a limb is as narrow. */
+/* Of a side that has grown to a body shreds are left along the border.  One that still grows needs all it
+ * has, and of one frame half a limb is as narrow. */
 static npg_status drop_fringe(making *m)
 {
     const npg_facts *facts = npg_worker_facts(m->worker);
@@ -636,8 +638,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *frame, npg
 /* ---- the stage ---- */
 
 /* What all frames saw is one body only where the reference so far explains the capture to its ends: parts
- * that come, go or open belong to no common surface, and hiding them in one would silence the alarm.  A side of
- * the body that is growing explains what it has reached, and no more is gathered. */
+ * that come, go or open belong to no common surface, and hiding them in one would silence the alarm.  A side
+ * of the body that is growing explains what it has reached, and no more is gathered. */
 static void drop_if_changed(npg_worker *worker, npg_fused **fused)
 {
     const npg_facts *facts = npg_worker_facts(worker);

@@ -159,7 +159,8 @@ static void repair_directions(float *normals, size_t *bad, const float *estimate
     }
 }
 
-/* The one place that all points were seen from, given or found.  A rig's own normals face its sensors already. */
+/* The one place that all points were seen from, given or found.  A rig's own normals face its sensors
+ * already. */
 static bool find_sensor(const npg_frame *frame, double sensor[3])
 {
     if (frame->sensor_count != 1 || frame->sensors) return false;
@@ -309,9 +310,9 @@ static npg_status add_sensor(npg_worker *worker, npg_frame *frame, const double 
     return NPG_OK;
 }
 
-/* A depth camera's points are in its own coordinates, as a rule.  Isolated points are gone by now: they would make
- * any cloud look like one view.  Of clouds in other coordinates only the user knows that one sensor saw them: thin
- * bodies, and those that two sensors see, may look like one view. */
+/* A depth camera's points are in its own coordinates, as a rule.  Isolated points are gone by now: they would
+ * make any cloud look like one view.  Of clouds in other coordinates only the user knows that one sensor saw
+ * them: thin bodies, and those that two sensors see, may look like one view. */
 static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);

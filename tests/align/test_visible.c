@@ -1,5 +1,5 @@
-/* Visible: of a ball with a small one before it, what faces a sensor and is not behind the small one; two sensors
- * see more than one; one that is nowhere sees nothing; without any all is taken to be seen. */
+/* Visible: of a ball with a small one before it, what faces a sensor and is not behind the small one; two
+ * sensors see more than one; one that is nowhere sees nothing; without any all is taken to be seen. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

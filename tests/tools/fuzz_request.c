@@ -1,4 +1,5 @@
-/* Fuzz target of the requests to the server of neupig view --live, for libFuzzer: any bytes of a connection. */
+/* Fuzz target of the requests to the server of neupig view --live, for libFuzzer: any bytes of a connection.
+ */
 #include <string.h>
 
 #include "tests/support/fuzz_target.h"
