@@ -255,8 +255,7 @@ static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 
 /* ---- the end of a pass ---- */
 
-/* What grows must hang together: single places past the border are of other parts, carried by a wrong motion.
- */
+/* What grows must hang together: single places past the border are of other parts, wrongly carried. */
 static npg_status drop_scattered(npg_fused *fused, double radius)
 {
     npg_kdtree *tree;

@@ -27,8 +27,7 @@ void npg_mesh_neighbours_close(npg_mesh_neighbours *neighbours);
  * directions.  twin: F x 3. */
 npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count);
 
-/* is_border (V): whether each vertex lies on the border; *found (or NULL): whether there is one.  NPG_MEMORY.
- */
+/* is_border (V): whether a vertex lies on the border; *found (or NULL): whether there is one.  NPG_MEMORY. */
 npg_status npg_mesh_border(uint8_t *is_border, bool *found, const npg_mesh *mesh);
 
 /* Whether the closest point of the surface lies on its border: corners are those of the face that was hit. */

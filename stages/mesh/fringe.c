@@ -27,9 +27,8 @@ static void close_fringe(fringe *f)
 static npg_status measure(fringe *f, size_t *count, const uint8_t *mask)
 {
     const npg_mesh *mesh = f->mesh;
-    *count = 0;
-    for (size_t v = 0; v < mesh->vert_count; v++)
-        if (mask[v]) memcpy(f->places + 3 * (*count)++, mesh->vert_pos + 3 * v, 3 * sizeof *f->places);
+    memcpy(f->places, mesh->vert_pos, mesh->vert_count * 3 * sizeof *f->places);
+    *count = npg_points_keep(f->places, NULL, mesh->vert_count, mask);
     return *count ? npg_points_dist(f->dist, mesh->vert_pos, mesh->vert_count, f->places, *count) : NPG_OK;
 }
 

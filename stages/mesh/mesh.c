@@ -96,12 +96,9 @@ static const npg_option mesh_options[] = {
 
 #define GROWING_DEPTH 8 /* of the octree while the reference grows: it is to carry frames, no more */
 
-#define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw */
-#define IN_EMPTY         0.5 /* value of the cubes above which a point lies in space that sensors saw to be empty */
-
-#define UNSEEN_IS_LEFT                                                                                       \
-    0.05 /* of that of a reference that has grown: where the body goes on, out of sight   \
-                             */
+#define UNSEEN_IS_A_SIDE 0.25 /* of the area: more than holes, a side that no camera saw                   */
+#define UNSEEN_IS_LEFT   0.05 /* the same of one that has grown: where the body goes on, out of sight      */
+#define IN_EMPTY         0.5  /* value of the cubes above which sensors saw that a point's place is empty  */
 
 typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;

@@ -61,7 +61,6 @@ npg_status npg_cloud_spacing(double *spacing, const float *points, size_t n)
     return status;
 }
 
-/* Keep some faces; *share is the part of the area that goes. */
 npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face)
 {
     double total = 0, gone = 0;

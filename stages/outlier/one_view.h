@@ -18,7 +18,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point
  * of places all round it, the mean of those from which least is hidden.  Seen from the other side as little
  * is hidden; a body bulges toward its sensor, so there what lies along its outline is farther away, and a
  * cloud for which that does not tell the sides apart has none.  Known to about 15 degrees (a dancer).
- * Cost: 25 000 points' pictures for a cloud of many views, 600 000 for one of one view.  NPG_MEMORY. */
+ * Cost: 200 000 points drawn for a cloud of many views, about 700 000 for one of one view.  NPG_MEMORY. */
 npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t point_count);
 
 /* Bytes that it takes. */

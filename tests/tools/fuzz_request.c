@@ -1,5 +1,4 @@
-/* Fuzz target of the requests to the server of neupig view --live, for libFuzzer: any bytes of a connection.
- */
+/* Fuzz target of requests to the server of neupig view --live, for libFuzzer: any bytes of a connection. */
 #include <string.h>
 
 #include "tests/support/fuzz_target.h"
