@@ -16,14 +16,11 @@
 #include "export/forms/border_caps.h"
 #include "export/forms/corner_split.h"
 #include "export/forms/forms.h"
-#include "export/forms/latent_features.h"
 #include "export/forms/vdb_surface.h"
 #include "export/forms/writer.h"
-#include "export/forms/zip_store.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/rigid.h"
 #include "ingest/formats/reader.h"
-#include "kernels/sobolev.h"
 #include "tests/support/group_folder.h"
 
 enum { V = 5, F = 6 }; /* two tetrahedra on one base: closed */
@@ -389,46 +386,6 @@ static void level_sets_close_openings(void **state)
 
 /* ---- parts ---- */
 
-static void large_archives_get_zip64(void **state)
-{
-    (void)state;
-    for (uint64_t large = 1; large <= 4096; large *= 8) { /* in place of 4 GiB */
-        npg_zip_member members[3] = {
-            {.name = "a.bin", .size = 5}, {.name = "b.bin", .size = 300}, {.name = "c.bin", .size = 7}};
-        npg_zip zip;
-        char command[1200];
-        const char *path = in_folder(&folder, "large.zip");
-        assert_int_equal(npg_zip_open(&zip, path, members, 3, large), NPG_OK);
-        for (int i = 0; i < 300; i++) {
-            const char *text = "0123456789";
-            if (i < 5) assert_int_equal(npg_zip_put(&zip, 0, text + i, 1), NPG_OK);
-            if (i < 7) assert_int_equal(npg_zip_put(&zip, 2, text + i, 1), NPG_OK);
-            assert_int_equal(npg_zip_put(&zip, 1, text + i % 10, 1), NPG_OK);
-        }
-        assert_int_equal(npg_zip_commit(&zip), NPG_OK);
-        snprintf(command, sizeof command,
-                 "python3 -c \"import zipfile as z; f=z.ZipFile('%s'); assert f.testzip() is None; "
-                 "assert f.read('a.bin')==b'01234' and f.read('b.bin')==b'0123456789'*30 and "
-                 "f.read('c.bin')==b'0123456'\"",
-                 path);
-        assert_int_equal(system(command), 0);
-    }
-    assert_int_equal(npg_crc32(npg_crc32(0, "12345", 5), "6789", 4), 0xcbf43926); /* the known check value */
-}
-
-static void an_archive_that_is_not_full_is_no_file(void **state)
-{
-    npg_zip_member members[1] = {{.name = "a", .size = 5}};
-    npg_zip zip;
-    (void)state;
-    assert_int_equal(npg_zip_open(&zip, in_folder(&folder, "short.zip"), members, 1, NPG_ZIP_LARGE), NPG_OK);
-    assert_int_equal(npg_zip_put(&zip, 0, "123456", 6), NPG_USAGE);
-    assert_int_equal(npg_zip_put(&zip, 0, "1234", 4), NPG_OK);
-    assert_int_equal(npg_zip_commit(&zip), NPG_USAGE);
-    assert_false(exists(in_folder(&folder, "short.zip")));
-    assert_false(exists(in_folder(&folder, ".short.zip.part")));
-}
-
 static void a_rigid_motion_is_found(void **state)
 {
     float to[3 * V];
@@ -452,55 +409,6 @@ static void a_rigid_motion_is_found(void **state)
         det += rotation[0][a] * (rotation[1][(a + 1) % 3] * rotation[2][(a + 2) % 3] -
                                  rotation[1][(a + 2) % 3] * rotation[2][(a + 1) % 3]);
     assert_true(fabs(det - 1) < 1e-12);
-}
-
-/* What the solve gives back must be what the matrix takes to the unknowns. */
-static void features_invert_the_grid_matrix(void **state)
-{
-    (void)state;
-    static const double matrices[3][2] = {{1, 1}, {19, 1}, {1, 2}}; /* screen, degree */
-    for (int m = 0; m < 3; m++) {
-        double screen = matrices[m][0], degree = matrices[m][1];
-        npg_levels levels = {0};
-        npg_level level = {.kind = NPG_LEVEL_POSITION,
-                           .nodes = 5,
-                           .channel_end = 32,
-                           .lambda = 3,
-                           .screen = screen,
-                           .degree = degree};
-        npg_levels_add(&levels, level, 0);
-        size_t count = levels.row_count * NPG_LATENT_CHANNELS;
-        double *unknowns = calloc(count, sizeof *unknowns), *x = calloc(count, sizeof *x),
-               *again = calloc(count, sizeof *again);
-        for (size_t i = 0; i < count; i++) x[i] = unknowns[i] = sin(1.7 * (double)i) + (double)(i % 7);
-        assert_int_equal(npg_features_solve(x, 5, NPG_LATENT_CHANNELS, screen, degree, 3), NPG_OK);
-        npg_sobolev_apply_ref(again, x, &levels);
-        for (size_t i = 0; i < count; i++) assert_true(fabs(again[i] - unknowns[i]) < 1e-10);
-        free(unknowns);
-        free(x);
-        free(again);
-    }
-}
-
-static void the_first_component_is_the_widest(void **state)
-{
-    enum { N = 500 };
-    static double rows[3 * N], out[N];
-    double direction[3], share;
-    (void)state;
-    for (int i = 0; i < N; i++) { /* wide along (0.6, -0.8, 0), narrow along z */
-        double wide = sin(0.7 * i) * 5, narrow = cos(1.1 * i) * 0.5;
-        rows[3 * i] = 2 + 0.6 * wide;
-        rows[3 * i + 1] = -0.8 * wide;
-        rows[3 * i + 2] = 1 + narrow;
-    }
-    assert_int_equal(npg_features_component(out, direction, &share, rows, N, 3), NPG_OK);
-    assert_true(fabs(direction[0] + 0.6) < 1e-2 && fabs(direction[1] - 0.8) < 1e-2);
-    assert_true(share > 0.98 && share < 1);
-    for (int i = 0; i < N; i++) assert_true(fabs(out[i] + 5 * sin(0.7 * i)) < 0.1);
-    for (int i = 0; i < 3 * N; i++) rows[i] = 1;
-    assert_int_equal(npg_features_component(out, direction, &share, rows, N, 3), NPG_OK);
-    assert_true(share == 0 && out[7] == 0);
 }
 
 /* ---- failures ---- */
@@ -708,11 +616,7 @@ int main(void)
         cmocka_unit_test(colours_of_frames_come_along),
         cmocka_unit_test(colours_and_seams_come_along),
         cmocka_unit_test(level_sets_close_openings),
-        cmocka_unit_test(large_archives_get_zip64),
-        cmocka_unit_test(an_archive_that_is_not_full_is_no_file),
         cmocka_unit_test(a_rigid_motion_is_found),
-        cmocka_unit_test(features_invert_the_grid_matrix),
-        cmocka_unit_test(the_first_component_is_the_widest),
         cmocka_unit_test(a_changed_mesh_is_noticed),
         cmocka_unit_test(a_stop_leaves_nothing),
         cmocka_unit_test(a_full_disk_is_said),

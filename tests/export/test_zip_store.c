@@ -1,0 +1,58 @@
+/* Zip store: archives that are large, and those that are not full. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <stdlib.h>
+
+#include "export/forms/zip_store.h"
+#include "tests/support/group_folder.h"
+
+static void large_archives_get_zip64(void **state)
+{
+    (void)state;
+    for (uint64_t large = 1; large <= 4096; large *= 8) { /* in place of 4 GiB */
+        npg_zip_member members[3] = {
+            {.name = "a.bin", .size = 5}, {.name = "b.bin", .size = 300}, {.name = "c.bin", .size = 7}};
+        npg_zip zip;
+        char command[1200];
+        const char *path = in_folder(&folder, "large.zip");
+        assert_int_equal(npg_zip_open(&zip, path, members, 3, large), NPG_OK);
+        for (int i = 0; i < 300; i++) {
+            const char *text = "0123456789";
+            if (i < 5) assert_int_equal(npg_zip_put(&zip, 0, text + i, 1), NPG_OK);
+            if (i < 7) assert_int_equal(npg_zip_put(&zip, 2, text + i, 1), NPG_OK);
+            assert_int_equal(npg_zip_put(&zip, 1, text + i % 10, 1), NPG_OK);
+        }
+        assert_int_equal(npg_zip_commit(&zip), NPG_OK);
+        snprintf(command, sizeof command,
+                 "python3 -c \"import zipfile as z; f=z.ZipFile('%s'); assert f.testzip() is None; "
+                 "assert f.read('a.bin')==b'01234' and f.read('b.bin')==b'0123456789'*30 and "
+                 "f.read('c.bin')==b'0123456'\"",
+                 path);
+        assert_int_equal(system(command), 0);
+    }
+    assert_int_equal(npg_crc32(npg_crc32(0, "12345", 5), "6789", 4), 0xcbf43926); /* the known check value */
+}
+
+static void an_archive_that_is_not_full_is_no_file(void **state)
+{
+    npg_zip_member members[1] = {{.name = "a", .size = 5}};
+    npg_zip zip;
+    (void)state;
+    assert_int_equal(npg_zip_open(&zip, in_folder(&folder, "short.zip"), members, 1, NPG_ZIP_LARGE), NPG_OK);
+    assert_int_equal(npg_zip_put(&zip, 0, "123456", 6), NPG_USAGE);
+    assert_int_equal(npg_zip_put(&zip, 0, "1234", 4), NPG_OK);
+    assert_int_equal(npg_zip_commit(&zip), NPG_USAGE);
+    assert_false(exists(in_folder(&folder, "short.zip")));
+    assert_false(exists(in_folder(&folder, ".short.zip.part")));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(large_archives_get_zip64),
+                                       cmocka_unit_test(an_archive_that_is_not_full_is_no_file)};
+    return cmocka_run_group_tests(tests, open_folder, close_folder);
+}
