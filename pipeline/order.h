@@ -18,6 +18,14 @@ static inline int npg_order_uint64(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
+/* Pairs of uint32_t, ascending by the first, then by the second. */
+static inline int npg_order_pair(const void *left, const void *right)
+{
+    const uint32_t *a = left, *b = right;
+    if (a[0] != b[0]) return a[0] < b[0] ? -1 : 1;
+    return (a[1] > b[1]) - (a[1] < b[1]);
+}
+
 /* Ascending float.  Values without an order (NaN) equal all. */
 static inline int npg_order_float(const void *left, const void *right)
 {

@@ -11,6 +11,7 @@
 #include "align/handover.h"
 #include "align/recover.h"
 #include "align/sides.h"
+#include "align/sweep_back.h"
 #include "geometry/mesh_tools.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
@@ -24,7 +25,8 @@
 #define AGAIN_STIFFNESS 2    /* of the first step, in final stiffnesses      */
 #define AGAIN_WIDTH     0.02 /* of the first step's robust weight, in units  */
 
-#define RAY_BYTES 64 /* of a sample of the surface, to tell whether a sensor sees it */
+#define RAY_BYTES  64  /* of a sample of the surface, to tell whether a sensor sees it */
+#define HELD_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
 
 /* Of a frame's points, as a reference that is one side of a body must have places for: frames beyond the
  * first one that has fewer are not followed while it grows. */
@@ -37,6 +39,7 @@ typedef struct waiting {
     float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
     float *sensors;          /* unit; where they are not known NULL */
     npg_tracker_cloud cloud; /* all of these */
+    float *since;            /* K: frames since a sensor saw what a node carries; NULL: no sensor is known */
     npg_tracked tracked;
     bool is_known; /* starts from the pose that the pass before found */
 } waiting;
@@ -88,6 +91,7 @@ static void clear_waiting(waiting *w)
     npg_release(&w->points);
     npg_release(&w->normals);
     npg_release(&w->sensors);
+    npg_release(&w->since);
 }
 
 static void uninit(npg_worker *worker)
@@ -174,6 +178,13 @@ static bool closes_window(state *s, const npg_plan *plan, int64_t total)
     return s->closes_at == s->read;
 }
 
+/* Whether groups of frames do not end with the windows: the longer, the more of what is hidden has been seen
+ * on both sides in time; only what is solved has to wait for its window. */
+static bool ends_late(const npg_facts *facts, npg_pass pass)
+{
+    return pass == NPG_PASS_FUSE && facts->sensor_count_max;
+}
+
 /* ---- what is open for a pass ---- */
 
 /* What an earlier run of the same job followed before it was killed is read back. */
@@ -240,6 +251,19 @@ static npg_status take_points(const npg_worker *worker, waiting *w)
     return NPG_OK;
 }
 
+/* How long what sensors do not see of a frame has been hidden; in the keyframe nothing is, all is known. */
+static npg_status count_hidden(const npg_worker *worker, waiting *w, npg_side *at)
+{
+    const state *s = npg_worker_state(worker);
+    size_t nodes = nodes_of(s);
+    if (!w->cloud.sensor_count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&w->since, NPG_FOR_FIT, nodes, sizeof *w->since));
+    if (w->frame.index != npg_worker_facts(worker)->plan.key)
+        npg_tracker_since(s->tracker, w->since, at->since);
+    memcpy(at->since, w->since, nodes * sizeof *at->since);
+    return NPG_OK;
+}
+
 /* The pose that the motion so far leads to, fitted to the points; without any it stays. */
 static npg_status fit_pose(npg_worker *worker, waiting *w, npg_side *at)
 {
@@ -248,7 +272,10 @@ static npg_status fit_pose(npg_worker *worker, waiting *w, npg_side *at)
                                       AGAIN_WIDTH, 1};
     NPG_TRY(npg_handover_start(&s->handover, s->tracker, w->frame.index, at->now, &w->is_known));
     if (w->cloud.count) {
-        NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, w->is_known ? &again : NULL));
+        const npg_hold hold = {.pose = w->is_known || !at->has_before ? at->now : at->before};
+        NPG_TRY(
+            npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, &hold, w->is_known ? &again : NULL));
+        NPG_TRY(count_hidden(worker, w, at));
         npg_worker_log(worker, NPG_LOG_DEBUG, w->frame.number,
                        "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps",
                        w->tracked.point_dist_mean, w->tracked.chamfer, w->tracked.steps);
@@ -328,16 +355,16 @@ static size_t list_frames(const state *s, npg_recover_frame *frames)
     size_t count = 0;
     for (size_t i = 0; i < s->group_count; i++) {
         const waiting *w = &s->group[i];
-        frames[count++] = (npg_recover_frame){w->frame.index, w->pose, w->tracked, w->cloud, false};
+        frames[count++] = (npg_recover_frame){w->frame.index, w->pose, w->tracked, w->cloud, w->since, false};
     }
     for (int d = 0; d < 2; d++) {
         const npg_side *at = &s->sides[d];
         int64_t away = d ? 1 : -1;
         if (at->has_now) /* the key, which both sides begin with, once */
-            frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, known, true};
+            frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, known, NULL, true};
         if (at->has_now && at->has_before && at->before_tracked.steps)
             frames[count++] =
-                (npg_recover_frame){at->index + away, at->before, at->before_tracked, known, true};
+                (npg_recover_frame){at->index + away, at->before, at->before_tracked, known, NULL, true};
     }
     qsort(frames, count, sizeof *frames, by_index);
     size_t kept = 0;
@@ -386,14 +413,25 @@ static npg_status recover_group(npg_worker *worker, npg_recover_frame *frames, s
     state *s = npg_worker_state(worker);
     npg_recover_result result;
     NPG_TRY(npg_recover(s->tracker, &result, frames, count, should_stop, worker));
-    for (size_t i = 0; i < s->group_count; i++)
-        s->group[i].tracked = frame_of(frames, count, s->group[i].frame.index)->tracked;
     s->sum.lost += result.lost;
     s->sum.found += result.found;
     if (result.lost)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "of %zu frames %lld were lost, %lld of them found again in %lld fits", s->group_count,
                        (long long)result.lost, (long long)result.found, (long long)result.tried);
+    return NPG_OK;
+}
+
+/* Frames of which sensors saw a part are followed back from the group's ends, `frames` become what was found. */
+static npg_status sweep_group(npg_worker *worker, npg_recover_frame *frames, size_t count)
+{
+    state *s = npg_worker_state(worker);
+    npg_sweep_result result;
+    NPG_TRY(npg_sweep_back(s->tracker, &result, frames, count, npg_worker_facts(worker)->plan.key,
+                           should_stop, worker));
+    if (result.tried)
+        npg_worker_log(worker, NPG_LOG_INFO, -1, "of %lld frames followed back %lld are better, or as good",
+                       (long long)result.tried, (long long)result.taken);
     return NPG_OK;
 }
 
@@ -407,7 +445,10 @@ static npg_status finish_group(npg_worker *worker)
     npg_recover_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
     size_t count = list_frames(s, frames);
-    npg_status status = is_of_one_side ? NPG_OK : recover_group(worker, frames, count);
+    npg_status status = sweep_group(worker, frames, count);
+    if (!status && !is_of_one_side) status = recover_group(worker, frames, count);
+    for (size_t i = 0; i < s->group_count && !status; i++)
+        s->group[i].tracked = frame_of(frames, count, s->group[i].frame.index)->tracked;
     if (!status) move_sides(s, frames, count);
     npg_release(&frames);
     return status;
@@ -530,7 +571,8 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         int64_t total = npg_worker_pass(worker) == NPG_PASS_FUSE ? facts->planned_count : -1;
         bool is_window = closes_window(s, &facts->plan, total);
         bool with_state = is_window || npg_plan_is_open(&facts->plan);
-        if (is_window || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
+        bool is_done = is_window && !ends_late(facts, npg_worker_pass(worker));
+        if (is_done || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     npg_chunk_unref(chunk);
@@ -575,7 +617,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const npg_facts *facts = npg_worker_facts(worker);
     size_t verts = npg_worker_verts_at_most(worker), nodes = (size_t)s->nodes;
     npg_window window = npg_live_window(&facts->plan, 0, -1);
-    int64_t length = window.last - window.first + 1, most = length < GROUP_MOST ? length : GROUP_MOST;
+    int64_t length = ends_late(facts, NPG_PASS_FUSE) ? GROUP_MOST : window.last - window.first + 1;
+    int64_t most = length < GROUP_MOST ? length : GROUP_MOST;
     size_t group = (size_t)most, chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     size_t points = facts->point_count_max < POINTS_MOST * (size_t)s->samples
                         ? facts->point_count_max
@@ -584,11 +627,13 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t known = NPG_POSE_SIZE * (sizeof(double) + sizeof(float)) + NPG_GRAPH_BIND * 2 * sizeof(float) +
                    3 * sizeof(float);
     *chunks_held = (group + chunk - 1) / chunk + 1;
-    /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node; per vertex weights and
-     * the graph's search for them, positions, normals; the waiting frames' poses, once more for the log, and
-     * thinned points */
-    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + known) + verts * 320 +
-           group * (2 * nodes * NPG_POSE_SIZE * sizeof(double) + points * 6 * sizeof(float)) +
+    /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node, and how both ends hold
+     * them; per vertex weights and the graph's search for them, positions, normals; the waiting frames' poses,
+     * once more for the log, what they hide, and thinned points */
+    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + HELD_BYTES + known) +
+           verts * 320 +
+           group *
+               (nodes * (2 * NPG_POSE_SIZE * sizeof(double) + sizeof(float)) + points * 6 * sizeof(float)) +
            (size_t)s->samples * RAY_BYTES;
 }
 

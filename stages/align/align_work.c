@@ -69,7 +69,7 @@ static npg_status align_frame(void *user)
     npg_tracked tracked;
     npg_pose_rest(a->pose, npg_tracker_node_count(a->tracker));
     const npg_tracker_cloud cloud = {.points = a->points, .count = a->point_count};
-    return npg_tracker_fit(a->tracker, &tracked, a->pose, &cloud, NULL);
+    return npg_tracker_fit(a->tracker, &tracked, a->pose, &cloud, NULL, NULL);
 }
 
 npg_status npg_align_frame_work(npg_mesh *reference, const float *points, size_t point_count,

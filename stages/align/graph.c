@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
+#include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
 #define REACH 2.5 /* radii within which a node carries a vertex */
@@ -180,13 +181,6 @@ static npg_status choose_nodes(npg_graph *graph, float *beyond, walk *w, const n
     return status;
 }
 
-static int by_pair(const void *a, const void *b)
-{
-    const uint32_t *x = a, *y = b;
-    if (x[0] != y[0]) return x[0] < y[0] ? -1 : 1;
-    return x[1] < y[1] ? -1 : x[1] > y[1];
-}
-
 static npg_status connect_nodes(npg_graph *graph)
 {
     size_t count = 0, kept = 0, most = graph->vert_count * NPG_GRAPH_BIND * (NPG_GRAPH_BIND - 1) / 2;
@@ -200,9 +194,9 @@ static npg_status connect_nodes(npg_graph *graph)
                 graph->edges[count++][1] = n[i] < n[j] ? n[j] : n[i];
             }
     }
-    qsort(graph->edges, count, sizeof *graph->edges, by_pair);
+    qsort(graph->edges, count, sizeof *graph->edges, npg_order_pair);
     for (size_t e = 0; e < count; e++)
-        if (!kept || by_pair(graph->edges[e], graph->edges[kept - 1])) {
+        if (!kept || npg_order_pair(graph->edges[e], graph->edges[kept - 1])) {
             uint32_t a = graph->edges[e][0], b = graph->edges[e][1];
             graph->edges[kept][0] = a;
             graph->edges[kept++][1] = b;

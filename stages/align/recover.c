@@ -147,7 +147,8 @@ static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *
         npg_pose_extrapolate(r->trial, from->now, from->before, nodes);
     else
         memcpy(r->trial, from->now, bytes);
-    NPG_TRY(npg_tracker_fit(r->tracker, &tracked, r->trial, &frame->cloud, from->effort));
+    const npg_hold hold = {.pose = from->now};
+    NPG_TRY(npg_tracker_fit(r->tracker, &tracked, r->trial, &frame->cloud, &hold, from->effort));
     r->result->tried++;
     if (tracked.chamfer >= BETTER * frame->tracked.chamfer) return NPG_OK;
     frame->tracked = tracked;

@@ -23,7 +23,8 @@ typedef struct npg_recover_frame {
     double *pose; /* K x 12 */
     npg_tracked tracked;
     npg_tracker_cloud cloud; /* count 0: nothing is known of the frame, its pose is not started from either */
-    bool is_fixed;           /* of the group before: a place to start from, no more                         */
+    const float *since; /* K: frames since a sensor saw what a node carries, or NULL: not known          */
+    bool is_fixed;      /* of the group before: a place to start from, no more                         */
 } npg_recover_frame;
 
 /* What was done; frames. */

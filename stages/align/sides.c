@@ -7,6 +7,7 @@ npg_status npg_side_open(npg_side *side, size_t node_count)
 {
     NPG_TRY(npg_alloc(&side->now, NPG_FOR_FIT, npg_pose_bytes(node_count)));
     NPG_TRY(npg_alloc(&side->before, NPG_FOR_FIT, npg_pose_bytes(node_count)));
+    NPG_TRY(npg_alloc_array(&side->since, NPG_FOR_FIT, node_count, sizeof *side->since));
     npg_pose_rest(side->now, node_count);
     return NPG_OK;
 }
@@ -15,6 +16,7 @@ void npg_side_close(npg_side *side)
 {
     npg_release(&side->now);
     npg_release(&side->before);
+    npg_release(&side->since);
 }
 
 void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count)
@@ -22,8 +24,10 @@ void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count)
     npg_side copy = *from;
     copy.now = to->now;
     copy.before = to->before;
+    copy.since = to->since;
     memcpy(copy.now, from->now, npg_pose_bytes(node_count));
     memcpy(copy.before, from->before, npg_pose_bytes(node_count));
+    memcpy(copy.since, from->since, node_count * sizeof *copy.since);
     *to = copy;
 }
 
@@ -45,7 +49,7 @@ void npg_side_step_on(npg_side *side, size_t node_count, int64_t index)
 
 size_t npg_side_bytes(size_t node_count)
 {
-    return sizeof(npg_side) + 2 * npg_pose_bytes(node_count);
+    return sizeof(npg_side) + 2 * npg_pose_bytes(node_count) + node_count * sizeof(float);
 }
 
 /* A side without its arrays; no padding is left to chance. */
@@ -68,6 +72,7 @@ unsigned char *npg_side_pack(unsigned char *to, const npg_side *side, size_t nod
     memcpy(to, &plain, sizeof plain);
     memcpy(to + sizeof plain, side->now, bytes);
     memcpy(to + sizeof plain + bytes, side->before, bytes);
+    memcpy(to + sizeof plain + 2 * bytes, side->since, node_count * sizeof *side->since);
     return to + npg_side_bytes(node_count);
 }
 
@@ -78,8 +83,10 @@ const unsigned char *npg_side_unpack(npg_side *side, const unsigned char *from, 
     memcpy(&plain, from, sizeof plain);
     plain.now = side->now;
     plain.before = side->before;
+    plain.since = side->since;
     memcpy(plain.now, from + sizeof plain, bytes);
     memcpy(plain.before, from + sizeof plain + bytes, bytes);
+    memcpy(plain.since, from + sizeof plain + 2 * bytes, node_count * sizeof *plain.since);
     *side = plain;
     return from + npg_side_bytes(node_count);
 }

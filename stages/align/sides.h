@@ -6,7 +6,8 @@
 
 typedef struct npg_side {
     double *now, *before; /* K x 12, owned */
-    int64_t index;        /* of now        */
+    float *since;         /* K, owned: frames since a sensor saw what a node carries; of now */
+    int64_t index;        /* of now */
     bool has_now, has_before;
     bool is_past; /* what a growing reference reaches */
     npg_tracked now_tracked, before_tracked;

@@ -114,7 +114,7 @@ static npg_status follow_to(follower *f, const npg_sight *sight)
     const npg_tracker_cloud cloud = {.points = sight->points,
                                      .normals = f->with_normals ? sight->normals : NULL,
                                      .count = sight->point_count};
-    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL));
+    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL, NULL));
     npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
     return f->seen(f->user, sight, f->vert_unit, &tracked);
 }

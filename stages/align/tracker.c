@@ -65,6 +65,7 @@ struct npg_tracker {
     float *near_sq, *sample_pos;
     uint8_t *is_seen; /* samples: by a sensor, in the pose at work */
     npg_visible visible;
+    npg_held held; /* edges of what no sensor sees */
 };
 
 size_t npg_tracker_node_count(const npg_tracker *tracker)
@@ -101,6 +102,7 @@ void npg_tracker_close(npg_tracker **slot)
                    &t->rows,      &t->targets,  &t->target_normals, &t->hits,    &t->start_face,
                    &t->near,      &t->near_sq,  &t->sample_pos,     &t->is_seen};
     npg_visible_close(&t->visible);
+    npg_held_close(&t->held);
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -132,9 +134,9 @@ static npg_status find_border(npg_tracker *t)
 
 static npg_status open_system(npg_tracker *t)
 {
-    const npg_graph *graph = t->graph;
-    return npg_block_open(&t->system, graph->node_count, (const uint32_t(*)[2])graph->edges,
-                          graph->edge_count);
+    NPG_TRY(npg_held_open(&t->held, t->graph));
+    return npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->held.pairs,
+                          t->held.pair_count);
 }
 
 static double size_of(const npg_mesh *reference)
@@ -221,13 +223,21 @@ static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit
     for (int b = 0; b < NPG_GRAPH_BIND; b++) p->weights[b] /= sum;
 }
 
-/* rotation (point - node). */
-static void set_arm(double arm[3], const double *rotation, const float *point, const float *node)
+/* arm = rotation d. */
+static void turn_arm(double arm[3], const double *rotation, const double d[3])
 {
     for (int i = 0; i < 3; i++) {
         arm[i] = 0;
-        for (int c = 0; c < 3; c++) arm[i] += rotation[3 * i + c] * ((double)point[c] - (double)node[c]);
+        for (int c = 0; c < 3; c++) arm[i] += rotation[3 * i + c] * d[c];
     }
+}
+
+/* rotation (point - node). */
+static void set_arm(double arm[3], const double *rotation, const float *point, const float *node)
+{
+    const double d[3] = {(double)point[0] - (double)node[0], (double)point[1] - (double)node[1],
+                         (double)point[2] - (double)node[2]};
+    turn_arm(arm, rotation, d);
 }
 
 /* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
@@ -335,6 +345,18 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
     }
 }
 
+/* Add |R_j e_jk + x_j - x_k|^2, whose arm is R_j e_jk, to the equations. */
+static void add_edge(npg_tracker *t, npg_block_term *term, const double *pose, uint32_t j, uint32_t k)
+{
+    const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
+    const float *gj = t->graph->node_pos + 3 * (size_t)j, *gk = t->graph->node_pos + 3 * (size_t)k;
+    term->nodes[0] = j;
+    term->nodes[1] = k;
+    for (int i = 0; i < 3; i++)
+        term->right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term->arms[0][i];
+    npg_block_add(t->system, TO_POINTS, term);
+}
+
 /* Edges keep their length and direction in the frame of each end. */
 static void add_edges(npg_tracker *t, const double *pose, double stiffness)
 {
@@ -342,14 +364,22 @@ static void add_edges(npg_tracker *t, const double *pose, double stiffness)
     npg_block_term term = {.count = 2, .shares = {1, -1}, .along = stiffness / (double)graph->edge_count};
     for (size_t e = 0; e < 2 * graph->edge_count; e++) {
         uint32_t j = graph->edges[e / 2][e % 2], k = graph->edges[e / 2][1 - e % 2];
-        const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
-        const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
-        term.nodes[0] = j;
-        term.nodes[1] = k;
-        set_arm(term.arms[0], pj, gk, gj);
-        for (int i = 0; i < 3; i++)
-            term.right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term.arms[0][i];
-        npg_block_add(t->system, TO_POINTS, &term);
+        set_arm(term.arms[0], pose + j * NPG_POSE_SIZE, graph->node_pos + 3 * (size_t)k,
+                graph->node_pos + 3 * (size_t)j);
+        add_edge(t, &term, pose, j, k);
+    }
+}
+
+/* The same where sensors see a part: edges of what is hidden, and ties, keep what holds them. */
+static void add_held_edges(npg_tracker *t, const double *pose, double stiffness)
+{
+    npg_block_term term = {.count = 2, .shares = {1, -1}};
+    for (size_t e = 0; e < 2 * t->held.pair_count; e++) {
+        uint32_t j = t->held.pairs[e / 2][e % 2], k = t->held.pairs[e / 2][1 - e % 2];
+        double edge[3];
+        term.along = stiffness / (double)t->graph->edge_count * npg_held_edge(edge, &t->held, t->graph, e);
+        turn_arm(term.arms[0], pose + j * NPG_POSE_SIZE, edge);
+        add_edge(t, &term, pose, j, k);
     }
 }
 
@@ -467,7 +497,12 @@ static npg_status add_terms(void *user, size_t part)
                 is_lent ? lent : t->target_count, s->pose, s->cloud, normals != NULL, s->width);
     if (part == TO_SURFACE) return NPG_OK;
     add_samples(t, s->pose, s->cloud->points, normals, s->width);
-    add_edges(t, s->pose, s->stiffness);
+    if (s->cloud->sensor_count) {
+        npg_held_see(&t->held, t->graph, t->samples, t->is_seen, t->sample_count);
+        add_held_edges(t, s->pose, s->stiffness);
+    } else {
+        add_edges(t, s->pose, s->stiffness);
+    }
     return NPG_OK;
 }
 
@@ -529,7 +564,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 }
 
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_tracker_cloud *cloud,
-                           const npg_tracker_effort *effort)
+                           const npg_hold *hold, const npg_tracker_effort *effort)
 {
     const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START, 1};
     npg_kdtree *tree;
@@ -541,6 +576,8 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     npg_status status = NPG_OK;
     step s = {.t = t, .pose = pose, .tree = tree, .cloud = cloud};
     if (!effort) effort = &usual;
+    const npg_hold start = {.pose = pose};
+    if (cloud->sensor_count) npg_held_take(&t->held, t->graph, hold ? hold : &start);
     t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {
         set_schedule(&s, tracked, effort);
@@ -549,6 +586,11 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     }
     npg_kdtree_close(&tree);
     return status;
+}
+
+void npg_tracker_since(const npg_tracker *t, float *since, const float *before)
+{
+    npg_held_count(&t->held, since, before, t->graph->node_count);
 }
 
 /* ---- extrapolation ---- */

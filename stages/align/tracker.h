@@ -3,10 +3,10 @@
  * Gauss-Newton on the nodes of a deformation graph (graph.h):
  *
  *     E = mean_p rho(|x(c_p) - p|_W^2) + mean_s rho(|x(s) - p_s|_W^2)
- *         + stiffness * sum over edges |R_j (g_k - g_j) + g_j + t_j - (g_k + t_k)|^2 / radius^2 / edges
+ *         + stiffness * sum over edges |R_j e_jk + g_j + t_j - (g_k + t_k)|^2 / radius^2 / edges
  *
  * c_p: the point of the deformed surface closest to the target point p; p_s: the target point closest to the
- * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
+ * sample s; e_jk: the edge g_k - g_j at rest, or as it is held where no sensor sees it (held.h); W measures distances along the surface normal fully and along the surface by a small share; rho
  * is the robust weight of Geman and McClure, whose width shrinks step by step.  Few unknowns, second order:
  * it reaches what gradient descent needs hundreds of steps for; the joint fit then needs to find only what
  * the graph can't express.
@@ -15,7 +15,7 @@
 #ifndef NPG_TRACKER_H
 #define NPG_TRACKER_H
 
-#include "align/graph.h"
+#include "align/held.h"
 
 typedef struct npg_tracker npg_tracker;
 
@@ -67,9 +67,15 @@ typedef struct npg_tracker_effort {
 
 /* Improve pose (K x 12) to explain the points, of which there is one at least.  Where it is known where they
  * were seen from, they are compared with what can be seen of the surface from there (visible.h), and points
- * beyond its border do not pull; all else is carried by the edges.  effort: NULL for the usual one. */
+ * beyond its border do not pull; all else is carried by the edges, as `hold` has them (NULL: as the pose that
+ * the fit starts from).  effort: NULL for the usual one. */
 npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose,
-                           const npg_tracker_cloud *cloud, const npg_tracker_effort *effort);
+                           const npg_tracker_cloud *cloud, const npg_hold *hold,
+                           const npg_tracker_effort *effort);
+
+/* since (K) of the frame that was fitted last, from that of the frame before it: how many frames ago most of
+ * what a node carries was seen by a sensor. */
+void npg_tracker_since(const npg_tracker *tracker, float *since, const float *before);
 
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);

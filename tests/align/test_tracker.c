@@ -84,7 +84,7 @@ static void a_fine_reference_is_aligned_whole(void **state)
     pose_ball(truth, ball->vert_pos, v, 1);
     for (size_t i = 0; i < POINTS; i++) memcpy(points + 3 * i, truth + 3 * (i * 2311 % v), 3 * sizeof(float));
     const npg_tracker_cloud cloud = {.points = points, .count = POINTS};
-    assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL), NPG_OK);
+    assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL, NULL), NPG_OK);
     npg_tracker_vertices(tracker, found, pose);
     assert_true(tracked.point_dist_mean < 0.002);
     for (size_t i = 0; i < 3 * v; i++) assert_true(fabsf(found[i] - truth[i]) < 0.03f);

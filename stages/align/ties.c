@@ -1,0 +1,107 @@
+/* Ties: pieces join the first node's, nearest first. */
+#include "align/ties.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "geometry/sets.h"
+#include "geometry/vec3.h"
+#include "pipeline/memory.h"
+#include "pipeline/order.h"
+
+#define TIES_EACH 4 /* of a piece: they say how it is turned, too */
+#define NONE      UINT32_MAX
+
+typedef struct joining {
+    const float *node_pos;
+    size_t node_count;
+    uint32_t *piece;   /* K: the same for all nodes of a piece; owned                      */
+    uint32_t *nearest; /* K: the nearest node that has joined; owned                       */
+    float *dist_sq;    /* K: to it; infinite: none, -1: has joined or is tied itself; owned */
+    uint32_t (*ties)[2];
+    size_t tie_count, capacity;
+} joining;
+
+static void close_joining(joining *j)
+{
+    npg_release(&j->piece);
+    npg_release(&j->nearest);
+    npg_release(&j->dist_sq);
+}
+
+static npg_status open_joining(joining *j, const uint32_t (*edges)[2], size_t edge_count)
+{
+    NPG_TRY(npg_alloc_array(&j->piece, NPG_FOR_MESH, j->node_count, sizeof *j->piece));
+    NPG_TRY(npg_alloc_array(&j->nearest, NPG_FOR_MESH, j->node_count, sizeof *j->nearest));
+    NPG_TRY(npg_alloc_array(&j->dist_sq, NPG_FOR_MESH, j->node_count, sizeof *j->dist_sq));
+    for (size_t k = 0; k < j->node_count; k++) {
+        j->piece[k] = (uint32_t)k;
+        j->dist_sq[k] = INFINITY;
+    }
+    for (size_t e = 0; e < edge_count; e++) npg_set_join(j->piece, edges[e][0], edges[e][1]);
+    for (size_t k = 0; k < j->node_count; k++) j->piece[k] = npg_set_root(j->piece, (uint32_t)k);
+    return NPG_OK;
+}
+
+/* The others learn how far it is to a node that has joined. */
+static void offer(joining *j, uint32_t to)
+{
+    const float *b = j->node_pos + 3 * (size_t)to;
+    for (size_t k = 0; k < j->node_count; k++) {
+        const float *a = j->node_pos + 3 * k;
+        float dist_sq =
+            (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
+        if (dist_sq >= j->dist_sq[k]) continue;
+        j->dist_sq[k] = dist_sq;
+        j->nearest[k] = to;
+    }
+}
+
+static void join_piece(joining *j, uint32_t piece)
+{
+    for (size_t k = 0; k < j->node_count; k++)
+        if (j->piece[k] == piece) j->dist_sq[k] = -1;
+    for (size_t k = 0; k < j->node_count; k++)
+        if (j->piece[k] == piece) offer(j, (uint32_t)k);
+}
+
+/* The nearest node outside, of one piece or (NONE) of any. */
+static uint32_t nearest_outside(const joining *j, uint32_t piece)
+{
+    uint32_t best = NONE;
+    for (size_t k = 0; k < j->node_count; k++)
+        if (j->dist_sq[k] >= 0 && (piece == NONE || j->piece[k] == piece) &&
+            (best == NONE || j->dist_sq[k] < j->dist_sq[best]))
+            best = (uint32_t)k;
+    return best;
+}
+
+static npg_status tie_piece(joining *j, uint32_t node)
+{
+    uint32_t piece = j->piece[node];
+    for (int i = 0; i < TIES_EACH && node != NONE; i++) {
+        uint32_t to = j->nearest[node];
+        NPG_TRY(npg_grow(&j->ties, &j->capacity, j->tie_count + 1, sizeof *j->ties, NPG_FOR_MESH));
+        j->ties[j->tie_count][0] = node < to ? node : to;
+        j->ties[j->tie_count++][1] = node < to ? to : node;
+        j->dist_sq[node] = -1;
+        node = nearest_outside(j, piece);
+    }
+    join_piece(j, piece);
+    return NPG_OK;
+}
+
+npg_status npg_ties_find(uint32_t (**ties)[2], size_t *tie_count, const float *node_pos, size_t node_count,
+                         const uint32_t (*edges)[2], size_t edge_count)
+{
+    joining j = {.node_pos = node_pos, .node_count = node_count};
+    npg_status status = open_joining(&j, edges, edge_count);
+    if (!status) join_piece(&j, j.piece[0]);
+    for (uint32_t next; !status && (next = nearest_outside(&j, NONE)) != NONE;) status = tie_piece(&j, next);
+    close_joining(&j);
+    if (status) npg_release(&j.ties);
+    if (j.tie_count) qsort(j.ties, j.tie_count, sizeof *j.ties, npg_order_pair);
+    *ties = j.ties;
+    *tie_count = status ? 0 : j.tie_count;
+    return status;
+}
