@@ -422,7 +422,8 @@ static npg_status recover_group(npg_worker *worker, npg_recover_frame *frames, s
     return NPG_OK;
 }
 
-/* Frames of which sensors saw a part are followed back from the group's ends, `frames` become what was found. */
+/* Frames of which sensors saw a part are followed back from the group's ends, `frames` become what was
+ * found. */
 static npg_status sweep_group(npg_worker *worker, npg_recover_frame *frames, size_t count)
 {
     state *s = npg_worker_state(worker);
@@ -628,8 +629,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
                    3 * sizeof(float);
     *chunks_held = (group + chunk - 1) / chunk + 1;
     /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node, and how both ends hold
-     * them; per vertex weights and the graph's search for them, positions, normals; the waiting frames' poses,
-     * once more for the log, what they hide, and thinned points */
+     * them; per vertex weights and the graph's search for them, positions, normals; the waiting frames'
+     * poses, once more for the log, what they hide, and thinned points */
     return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + HELD_BYTES + known) +
            verts * 320 +
            group *

@@ -25,24 +25,16 @@
 static const npg_tracker_effort wide = {.steps = 40, .stiffness = 100, .width_unit = 0.2, .along = 10};
 static const npg_tracker_effort wider = {.steps = 80, .stiffness = 100, .width_unit = 0.4, .along = 10};
 
-typedef struct start {
-    const double *now, *before; /* before: NULL, or the motion since then goes on */
-    const npg_tracker_effort *effort;
-} start;
-
 typedef struct recovery {
-    npg_tracker *tracker;
+    npg_attempts attempts; /* its `trial` is owned */
     npg_recover_frame *frames;
     size_t count;
     double level;       /* Chamfer distance of the best quarter */
     double *sorted;     /* count, scratch; owned                */
-    double *trial;      /* K x 12; owned                        */
     float *looks;       /* count x LOOK_POINTS x 3; owned       */
     size_t *look_count; /* count; owned                         */
     size_t *lost;       /* count: which are lost; owned         */
     npg_recover_result *result;
-    bool (*should_stop)(void *user);
-    void *user;
 } recovery;
 
 static bool is_known(const npg_recover_frame *frame)
@@ -119,47 +111,39 @@ static const npg_recover_frame *frame_at(const recovery *r, size_t i, int away)
     return frame->index == r->frames[i].index + away && is_known(frame) ? frame : NULL;
 }
 
-static npg_status find_starts(start starts[STARTS_MOST], size_t *count, const recovery *r, size_t i,
+static npg_status find_starts(npg_start starts[STARTS_MOST], size_t *count, const recovery *r, size_t i,
                               int sweep)
 {
     size_t alike[ALIKE], found;
     *count = 0;
     NPG_TRY(find_alike(alike, &found, r, i));
-    for (size_t k = 0; k < found; k++) starts[(*count)++] = (start){r->frames[alike[k]].pose, NULL, NULL};
+    for (size_t k = 0; k < found; k++) starts[(*count)++] = (npg_start){r->frames[alike[k]].pose, NULL, NULL};
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way), *before = frame_at(r, i, 2 * way);
-        if (now && before && !is_lost(r, now)) starts[(*count)++] = (start){now->pose, before->pose, &wide};
+        if (now && before && !is_lost(r, now))
+            starts[(*count)++] = (npg_start){now->pose, before->pose, &wide};
     }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way);
-        if (now && !is_lost(r, now)) starts[(*count)++] = (start){now->pose, NULL, sweep ? &wider : &wide};
+        if (now && !is_lost(r, now))
+            starts[(*count)++] = (npg_start){now->pose, NULL, sweep ? &wider : &wide};
     }
     return NPG_OK;
 }
 
-static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *from)
+static npg_status try_start(recovery *r, npg_recover_frame *frame, const npg_start *from)
 {
-    size_t nodes = npg_tracker_node_count(r->tracker), bytes = npg_pose_bytes(nodes);
-    npg_tracked tracked;
-    if (r->should_stop && r->should_stop(r->user))
-        return npg_error(NPG_STOPPED, "stopped while lost frames were tried again");
-    if (from->before)
-        npg_pose_extrapolate(r->trial, from->now, from->before, nodes);
-    else
-        memcpy(r->trial, from->now, bytes);
     const npg_hold hold = {.pose = from->now};
-    NPG_TRY(npg_tracker_fit(r->tracker, &tracked, r->trial, &frame->cloud, &hold, from->effort));
+    bool taken;
+    NPG_TRY(npg_attempt(&r->attempts, &taken, frame, from, &hold, BETTER));
     r->result->tried++;
-    if (tracked.chamfer >= BETTER * frame->tracked.chamfer) return NPG_OK;
-    frame->tracked = tracked;
-    memcpy(frame->pose, r->trial, bytes);
     return NPG_OK;
 }
 
 static npg_status recover_frame(recovery *r, size_t i, int sweep)
 {
     npg_recover_frame *frame = &r->frames[i];
-    start starts[STARTS_MOST];
+    npg_start starts[STARTS_MOST];
     size_t count;
     NPG_TRY(find_starts(starts, &count, r, i, sweep));
     for (size_t k = 0; k < count && is_lost(r, frame); k++) NPG_TRY(try_start(r, frame, &starts[k]));
@@ -204,12 +188,12 @@ static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int
 
 static npg_status open_recovery(recovery *r)
 {
-    size_t nodes = npg_tracker_node_count(r->tracker);
     NPG_TRY(npg_alloc_array(&r->sorted, NPG_FOR_FIT, r->count, sizeof *r->sorted));
     NPG_TRY(npg_alloc_array(&r->lost, NPG_FOR_FIT, r->count, sizeof *r->lost));
     set_level(r);
     if (!list_lost(r)) return NPG_END;
-    NPG_TRY(npg_alloc(&r->trial, NPG_FOR_FIT, npg_pose_bytes(nodes)));
+    NPG_TRY(npg_alloc(&r->attempts.trial, NPG_FOR_FIT,
+                      npg_pose_bytes(npg_tracker_node_count(r->attempts.tracker))));
     NPG_TRY(npg_alloc_array(&r->looks, NPG_FOR_FIT, r->count * LOOK_POINTS, 3 * sizeof *r->looks));
     NPG_TRY(npg_alloc_array(&r->look_count, NPG_FOR_FIT, r->count, sizeof *r->look_count));
     for (size_t i = 0; i < r->count; i++) {
@@ -239,16 +223,14 @@ static npg_status run_sweeps(recovery *r)
 npg_status npg_recover(npg_tracker *tracker, npg_recover_result *result, npg_recover_frame *frames,
                        size_t count, bool (*should_stop)(void *user), void *user)
 {
-    recovery r = {.tracker = tracker,
+    recovery r = {.attempts = {tracker, NULL, "lost frames were tried again", should_stop, user},
                   .frames = frames,
                   .count = count,
-                  .result = result,
-                  .should_stop = should_stop,
-                  .user = user};
+                  .result = result};
     *result = (npg_recover_result){0};
     npg_status status = open_recovery(&r);
     if (!status) status = run_sweeps(&r);
-    void *all[] = {&r.sorted, &r.trial, &r.looks, &r.look_count, &r.lost};
+    void *all[] = {&r.sorted, &r.attempts.trial, &r.looks, &r.look_count, &r.lost};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     return status == NPG_END ? NPG_OK : status;
 }

@@ -14,18 +14,7 @@
 #ifndef NPG_RECOVER_H
 #define NPG_RECOVER_H
 
-#include "align/tracker.h"
-
-/* A frame of the group.  pose and points are the caller's; the pose is changed where a better one is
- * found. */
-typedef struct npg_recover_frame {
-    int64_t index;
-    double *pose; /* K x 12 */
-    npg_tracked tracked;
-    npg_tracker_cloud cloud; /* count 0: nothing is known of the frame, its pose is not started from either */
-    const float *since; /* K: frames since a sensor saw what a node carries, or NULL: not known          */
-    bool is_fixed;      /* of the group before: a place to start from, no more                         */
-} npg_recover_frame;
+#include "align/attempt.h"
 
 /* What was done; frames. */
 typedef struct npg_recover_result {

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 
 #include "geometry/sets.h"
-#include "geometry/vec3.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 

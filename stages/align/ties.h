@@ -1,14 +1,14 @@
 /* Ties: edges between the separate pieces of a surface.
  *
- * A piece that no sensor sees in a frame, an eye or what is known of a hand, has neither points nor an edge to
- * anything that has.  So each piece hangs on the nearest other one, by few edges that count where both ends
- * are hidden (held.h).  Based on Prim's minimal spanning tree, of pieces. */
+ * A piece that no sensor sees in a frame, an eye or what is known of a hand, has neither points nor an edge
+ * to anything that has.  So each piece hangs on the nearest other one, by few edges that count where both
+ * ends are hidden (held.h).  Based on Prim's minimal spanning tree, of pieces. */
 #ifndef NPG_TIES_H
 #define NPG_TIES_H
 
-#include "pipeline/status.h"
-
 #include <stdint.h>
+
+#include "pipeline/status.h"
 
 /* *ties: pairs (a < b) of nodes, sorted, owned by the caller; none where the edges join all nodes.  node_pos
  * (K x 3); edges (E) join the nodes of a piece.  Equal input gives equal bits.  O(K^2).  NPG_MEMORY: *ties is

@@ -345,41 +345,24 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
     }
 }
 
-/* Add |R_j e_jk + x_j - x_k|^2, whose arm is R_j e_jk, to the equations. */
-static void add_edge(npg_tracker *t, npg_block_term *term, const double *pose, uint32_t j, uint32_t k)
-{
-    const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
-    const float *gj = t->graph->node_pos + 3 * (size_t)j, *gk = t->graph->node_pos + 3 * (size_t)k;
-    term->nodes[0] = j;
-    term->nodes[1] = k;
-    for (int i = 0; i < 3; i++)
-        term->right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term->arms[0][i];
-    npg_block_add(t->system, TO_POINTS, term);
-}
-
-/* Edges keep their length and direction in the frame of each end. */
+/* Edges keep their length and direction in the frame of each end, those at rest or those that are held. */
 static void add_edges(npg_tracker *t, const double *pose, double stiffness)
 {
     const npg_graph *graph = t->graph;
-    npg_block_term term = {.count = 2, .shares = {1, -1}, .along = stiffness / (double)graph->edge_count};
-    for (size_t e = 0; e < 2 * graph->edge_count; e++) {
-        uint32_t j = graph->edges[e / 2][e % 2], k = graph->edges[e / 2][1 - e % 2];
-        set_arm(term.arms[0], pose + j * NPG_POSE_SIZE, graph->node_pos + 3 * (size_t)k,
-                graph->node_pos + 3 * (size_t)j);
-        add_edge(t, &term, pose, j, k);
-    }
-}
-
-/* The same where sensors see a part: edges of what is hidden, and ties, keep what holds them. */
-static void add_held_edges(npg_tracker *t, const double *pose, double stiffness)
-{
     npg_block_term term = {.count = 2, .shares = {1, -1}};
     for (size_t e = 0; e < 2 * t->held.pair_count; e++) {
         uint32_t j = t->held.pairs[e / 2][e % 2], k = t->held.pairs[e / 2][1 - e % 2];
+        const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
+        const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
         double edge[3];
-        term.along = stiffness / (double)t->graph->edge_count * npg_held_edge(edge, &t->held, t->graph, e);
-        turn_arm(term.arms[0], pose + j * NPG_POSE_SIZE, edge);
-        add_edge(t, &term, pose, j, k);
+        term.along = stiffness / (double)graph->edge_count * npg_held_edge(edge, &t->held, graph, e);
+        if (term.along == 0) continue; /* a tie of what is seen */
+        term.nodes[0] = j;
+        term.nodes[1] = k;
+        turn_arm(term.arms[0], pj, edge);
+        for (int i = 0; i < 3; i++)
+            term.right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term.arms[0][i];
+        npg_block_add(t->system, TO_POINTS, &term);
     }
 }
 
@@ -497,12 +480,8 @@ static npg_status add_terms(void *user, size_t part)
                 is_lent ? lent : t->target_count, s->pose, s->cloud, normals != NULL, s->width);
     if (part == TO_SURFACE) return NPG_OK;
     add_samples(t, s->pose, s->cloud->points, normals, s->width);
-    if (s->cloud->sensor_count) {
-        npg_held_see(&t->held, t->graph, t->samples, t->is_seen, t->sample_count);
-        add_held_edges(t, s->pose, s->stiffness);
-    } else {
-        add_edges(t, s->pose, s->stiffness);
-    }
+    npg_held_see(&t->held, t->graph, t->samples, t->is_seen, t->sample_count);
+    add_edges(t, s->pose, s->stiffness);
     return NPG_OK;
 }
 

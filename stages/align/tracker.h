@@ -6,10 +6,11 @@
  *         + stiffness * sum over edges |R_j e_jk + g_j + t_j - (g_k + t_k)|^2 / radius^2 / edges
  *
  * c_p: the point of the deformed surface closest to the target point p; p_s: the target point closest to the
- * sample s; e_jk: the edge g_k - g_j at rest, or as it is held where no sensor sees it (held.h); W measures distances along the surface normal fully and along the surface by a small share; rho
- * is the robust weight of Geman and McClure, whose width shrinks step by step.  Few unknowns, second order:
- * it reaches what gradient descent needs hundreds of steps for; the joint fit then needs to find only what
- * the graph can't express.
+ * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
+ * is the robust weight of Geman and McClure, whose width shrinks step by step; e_jk: the edge g_k - g_j at
+ * rest, or as it is held where no sensor sees it (held.h).  Few unknowns, second order: it reaches what
+ * gradient descent needs hundreds of steps for; the joint fit then needs to find only what the graph can't
+ * express.
  *
  * Not in the paper: it replaces the slow way from the identity (paper, "Deformation Loss", confidence). */
 #ifndef NPG_TRACKER_H

@@ -1,6 +1,6 @@
 /* Held: edges of what is hidden follow the pose that holds them, those of what is seen stay at rest; in a fit
- * a hidden part stays bent as it is held, and goes back to rest where rest holds it; from both sides in time a
- * hidden part moves evenly. */
+ * a hidden part stays bent as it is held, and goes back to rest where rest holds it; from both sides in time
+ * a hidden part moves evenly. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

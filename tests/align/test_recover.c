@@ -53,12 +53,6 @@ static void what_is_found_is_left_alone(void **state)
     close_capture(&c);
 }
 
-static bool stop_at_once(void *user)
-{
-    (void)user;
-    return true;
-}
-
 static void attempts_end(void **state)
 {
     static capture c;

@@ -62,12 +62,6 @@ static void what_is_right_is_not_led_astray(void **state)
     close_capture(&c);
 }
 
-static bool stop_at_once(void *user)
-{
-    (void)user;
-    return true;
-}
-
 static void others_are_left_alone(void **state)
 {
     static capture c;

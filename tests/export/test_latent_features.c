@@ -10,7 +10,6 @@
 
 #include "export/forms/latent_features.h"
 #include "kernels/sobolev.h"
-#include "tests/support/group_folder.h"
 
 /* What the solve gives back must be what the matrix takes to the unknowns. */
 static void features_invert_the_grid_matrix(void **state)
@@ -65,5 +64,5 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(features_invert_the_grid_matrix),
                                        cmocka_unit_test(the_first_component_is_the_widest)};
-    return cmocka_run_group_tests(tests, open_folder, close_folder);
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }

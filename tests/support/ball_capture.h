@@ -58,4 +58,10 @@ static inline void lose(capture *c, int t)
     frame->tracked.chamfer = 0.5;
 }
 
+static inline bool stop_at_once(void *user)
+{
+    (void)user;
+    return true;
+}
+
 #endif

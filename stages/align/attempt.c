@@ -1,0 +1,23 @@
+/* Attempt: one fit, compared. */
+#include "align/attempt.h"
+
+#include <string.h>
+
+npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *frame, const npg_start *from,
+                       const npg_hold *hold, double share)
+{
+    size_t nodes = npg_tracker_node_count(a->tracker), bytes = npg_pose_bytes(nodes);
+    npg_tracked tracked;
+    *taken = false;
+    if (a->should_stop && a->should_stop(a->user)) return npg_error(NPG_STOPPED, "stopped while %s", a->what);
+    if (from->before)
+        npg_pose_extrapolate(a->trial, from->now, from->before, nodes);
+    else
+        memcpy(a->trial, from->now, bytes);
+    NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, hold, from->effort));
+    if (tracked.chamfer > share * frame->tracked.chamfer) return NPG_OK;
+    *taken = true;
+    frame->tracked = tracked;
+    memcpy(frame->pose, a->trial, bytes);
+    return NPG_OK;
+}
