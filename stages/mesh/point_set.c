@@ -1,0 +1,86 @@
+/* Point set: the reference's points, out of a frame or out of all frames, and their measures. */
+#include "mesh/point_set.h"
+
+#include <math.h>
+
+#include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
+#include "mesh/mesh_clean.h"
+#include "mesh/report.h"
+#include "pipeline/cost.h"
+
+#define POINTS_MAX    80000
+#define SEEN_SPACINGS 2.0 /* a place is seen when a point is nearer than this many spacings */
+#define KEY_SPACINGS  0.5 /* of the keyframe's points: all frames lie closer, but not everywhere */
+#define IN_EMPTY      0.5 /* value of the cubes above which sensors saw that a point's place is empty */
+
+/* Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
+ * and Poisson's time goes with the points. */
+static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_frame *frame)
+{
+    size_t n = frame->point_count;
+    size_t most = npg_worker_pass(worker) == NPG_PASS_FUSE ? NPG_START_POINTS_MOST : POINTS_MAX;
+    set->given = n;
+    set->count = n < most ? n : most;
+    NPG_TRY(npg_alloc_array(&set->points, NPG_FOR_MESH, set->count, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&set->normals, NPG_FOR_MESH, set->count, 3 * sizeof(float)));
+    npg_points_spread(set->points, set->normals, set->count, frame->pos_local, frame->normals, n);
+    npg_box_local_to_unit(&npg_worker_facts(worker)->box, set->points, set->points, set->count);
+    return NPG_OK;
+}
+
+/* What has grown where most frames look through was carried there by a wrong motion. */
+static npg_status drop_empty(npg_point_set *set, npg_worker *worker)
+{
+    uint8_t *keep;
+    NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, set->count));
+    for (size_t i = 0; i < set->count; i++)
+        keep[i] = npg_cube_set_value(set->empty, set->points + 3 * i) <= IN_EMPTY;
+    size_t kept = npg_points_keep(set->points, set->normals, set->count, keep);
+    npg_release(&keep);
+    npg_mesh_note_count(worker, "points_in_empty_space", set->count - kept);
+    set->count = kept;
+    return NPG_OK;
+}
+
+/* Those of all frames are thinned already.  The set owns them from here on; `fused` keeps its figures. */
+static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *fused)
+{
+    set->is_fused = true;
+    set->given = set->count = fused->count;
+    set->points = fused->points;
+    set->normals = fused->normals;
+    set->key_spacing = fused->key_spacing_unit;
+    set->key_noise = fused->key_noise_unit;
+    fused->points = fused->normals = NULL;
+    if (!fused->empty) return NPG_OK;
+    NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
+    return npg_worker_facts(worker)->growing_passes ? drop_empty(set, worker) : NPG_OK;
+}
+
+static npg_status measure(npg_point_set *set, npg_worker *worker)
+{
+    set->diagonal = npg_points_diagonal(set->points, set->count);
+    npg_mesh_note_count(worker, "points", set->given);
+    npg_mesh_note_count(worker, "points_used", set->count);
+    NPG_TRY(npg_cloud_spacing(&set->spacing, set->points, set->count));
+    npg_mesh_note(worker, "point_spacing_unit", set->spacing);
+    set->seen_dist = SEEN_SPACINGS * fmax(set->spacing, KEY_SPACINGS * set->key_spacing);
+    return NPG_OK;
+}
+
+npg_status npg_point_set_open(npg_point_set *set, npg_worker *worker, const npg_frame *key, npg_fused *fused)
+{
+    *set = (npg_point_set){.key_number = key->number};
+    npg_status status = fused ? take_fused(set, worker, fused) : take_frame(set, worker, key);
+    if (!status) status = measure(set, worker);
+    if (status) npg_point_set_close(set);
+    return status;
+}
+
+void npg_point_set_close(npg_point_set *set)
+{
+    npg_release(&set->points);
+    npg_release(&set->normals);
+    npg_cube_set_close(&set->empty);
+}

@@ -1,0 +1,307 @@
+/* Reconstruct: the steps from a point set to a clean mesh, in the order in which they are taken. */
+#include "mesh/reconstruct.h"
+
+#include <math.h>
+
+#include "geometry/mesh_tools.h"
+#include "mesh/denoise.h"
+#include "mesh/flatten.h"
+#include "mesh/follow_normals.h"
+#include "mesh/fringe.h"
+#include "mesh/mesh_clean.h"
+#include "mesh/report.h"
+#include "mesh/resurface.h"
+#include "mesh/vdb.h"
+#include "pipeline/clock.h"
+
+#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
+#define FOLLOW_NOISE      0.08 /* of a frame's points, in spacings; curvature of few points is below */
+#define SMOOTH_NEIGHBOURS 24
+#define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
+#define GROWING_DEPTH     8    /* of the octree while the reference grows: it is to carry frames, no more */
+#define PIECE_SHARE       0.01 /* of the area */
+#define PIECE_DIST        0.1  /* in diagonals */
+#define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
+#define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
+#define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
+#define UNSEEN_IS_LEFT    0.05 /* the same of one that has grown: where the body goes on, out of sight */
+#define FLAT_SHARE        0.6  /* of seen_dist: surface farther than this from every point is drawn tight */
+#define REBUILD_AREA_MIN  0.8  /* of the area; less is not the same surface */
+#define REBUILD_VOXELS    384  /* along the longest side of the unit box */
+
+typedef struct reconstruction { /* what is known while the mesh is made */
+    npg_worker *worker;
+    const npg_reconstruct_settings *settings;
+    npg_point_set *set;
+    bool is_rough;         /* the points were smoothed, and a frame's are noisy beyond doubt */
+    double invented_share; /* of the mesh, once it is trimmed: what no point saw             */
+    npg_mesh *mesh;        /* so far; owned                                                  */
+} reconstruction;
+
+/* ---- points to a surface ---- */
+
+/* Noise would become bumps of the surface that every frame then carries. */
+static npg_status smooth(reconstruction *r)
+{
+    npg_point_set *p = r->set;
+    double sigma;
+    NPG_TRY(npg_cloud_noise(&sigma, p->points, p->count));
+    npg_mesh_note(r->worker, "noise_unit", sigma);
+    if (!r->settings->smooth || sigma < NOISE_MIN * p->spacing) return NPG_OK;
+    npg_worker_log(r->worker, NPG_LOG_INFO, p->key_number,
+                   "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
+                   p->is_fused ? "all frames" : "the keyframe", sigma);
+    double key_noise = p->is_fused ? p->key_noise : sigma;
+    r->is_rough = key_noise > FOLLOW_NOISE * (p->is_fused ? p->key_spacing : p->spacing);
+    return npg_cloud_smooth(p->points, p->normals, p->count,
+                            p->is_fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
+}
+
+static npg_status draw_surface(reconstruction *r)
+{
+    npg_point_set *p = r->set;
+    npg_poisson_settings settings = r->settings->poisson;
+    if (npg_worker_facts(r->worker)->is_growing && settings.depth > GROWING_DEPTH)
+        settings.depth = GROWING_DEPTH;
+    if (p->is_fused) settings.rounds_max = 1; /* the surface that carried them has told their sides */
+    if (!p->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
+    double since = npg_clock_s();
+    size_t turned, moved;
+    int rounds;
+    NPG_TRY(smooth(r));
+    NPG_TRY(npg_resurface_apart(&r->mesh, &moved, &turned, &rounds, p->normals, p->points, p->count,
+                                p->spacing, &settings));
+    npg_mesh_note_count(r->worker, "points_held_apart", moved);
+    npg_mesh_note_count(r->worker, "poisson_rounds", (size_t)rounds);
+    npg_mesh_note_count(r->worker, "normals_turned", turned);
+    npg_mesh_note(r->worker, "poisson_s", npg_clock_s() - since);
+    npg_mesh_note_count(r->worker, "faces_reconstructed", r->mesh->face_count);
+    return NPG_OK;
+}
+
+/* ---- its main pieces ---- */
+
+static npg_status keep_main(reconstruction *r, const char *when)
+{
+    npg_pieces pieces;
+    double dist_max = r->settings->pieces == NPG_PIECES_NEAR ? PIECE_DIST * r->set->diagonal : 0;
+    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, PIECE_SHARE, dist_max));
+    npg_mesh_note_count(r->worker, "components", pieces.kept);
+    if (pieces.kept > 1)
+        npg_mesh_warn(r->worker, false, r->set->key_number,
+                      "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
+    if (pieces.lost_share > LOST_TOLERATED)
+        npg_mesh_warn(r->worker, false, r->set->key_number,
+                      "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
+                      pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
+    return NPG_OK;
+}
+
+/* ---- what lies near the points ---- */
+
+/* What no point saw: measured on the closed surface, before anything is trimmed. */
+static npg_status judge_unseen(reconstruction *r, bool *trim_unseen)
+{
+    const npg_facts *facts = npg_worker_facts(r->worker);
+    const npg_point_set *p = r->set;
+    int way = r->settings->unseen;
+    double share, side = facts->growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
+    NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
+    *trim_unseen = way == NPG_UNSEEN_TRIM || facts->is_growing || (way == NPG_UNSEEN_AUTO && share > side);
+    npg_mesh_note(r->worker, "unseen_share", share);
+    json_object_set_new(npg_worker_report(r->worker), "unseen",
+                        json_string(*trim_unseen ? "trimmed" : "kept"));
+    if (share > UNSEEN_TOLERATED)
+        npg_mesh_warn(r->worker, false, p->key_number,
+                      "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
+                      100 * share, p->is_fused ? "all frames" : "the keyframe",
+                      *trim_unseen             ? "trimmed off"
+                      : way == NPG_UNSEEN_KEEP ? "kept as Poisson closed it"
+                                               : "closed tightly");
+    return NPG_OK;
+}
+
+/* Of a side that has grown to a body shreds are left along the border.  One that still grows needs all it
+ * has, and of one frame half a limb is as narrow. */
+static npg_status drop_fringe(reconstruction *r)
+{
+    const npg_facts *facts = npg_worker_facts(r->worker);
+    double share;
+    if (!facts->growing_passes || facts->is_growing) return NPG_OK;
+    NPG_TRY(npg_mesh_drop_fringe(&r->mesh, &share, r->set->seen_dist));
+    npg_mesh_note(r->worker, "fringe_share", share);
+    return NPG_OK;
+}
+
+static npg_status trim(reconstruction *r)
+{
+    const npg_point_set *p = r->set;
+    bool trim_unseen;
+    double limit = r->settings->trim * p->diagonal, share;
+    NPG_TRY(judge_unseen(r, &trim_unseen));
+    if (trim_unseen) limit = fmin(limit, p->seen_dist);
+    NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, limit));
+    npg_mesh_note(r->worker, "trimmed_share", share);
+    if (!r->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
+    if (trim_unseen) NPG_TRY(drop_fringe(r));
+    NPG_TRY(npg_mesh_unseen(&r->invented_share, r->mesh, p->points, p->count, p->seen_dist));
+    if (!trim_unseen && share > LOST_TOLERATED)
+        npg_mesh_warn(r->worker, false, p->key_number,
+                      "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
+                      "and was trimmed off",
+                      100 * share, r->settings->trim);
+    return share > 0 ? keep_main(r, "after trimming") : NPG_OK;
+}
+
+/* The closed balloon over what nobody saw becomes the least surface there, out of space that is empty. */
+static npg_status flatten(reconstruction *r)
+{
+    const npg_point_set *p = r->set;
+    npg_flattened done;
+    npg_mending mending;
+    if (r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
+    NPG_TRY(npg_mesh_flatten(r->mesh, &done, p->points, p->count, FLAT_SHARE * p->seen_dist, p->empty));
+    npg_mesh_note_count(r->worker, "vertices_flattened", done.moved);
+    if (p->empty) npg_mesh_note_count(r->worker, "vertices_pushed", done.pushed);
+    return done.moved ? npg_mesh_mend(&r->mesh, &mending) : NPG_OK;
+}
+
+/* Out of empty space while the faces are still small: the large ones that decimation leaves over nothing
+ * can't follow its border. */
+static npg_status leave_empty_space(reconstruction *r)
+{
+    if (!r->set->empty) return NPG_OK;
+    double share = npg_mesh_share_in(r->mesh, r->set->empty);
+    npg_mesh_note(r->worker, "seen_empty_share", share);
+    return share > 0 ? flatten(r) : NPG_OK;
+}
+
+/* ---- few faces, and sound ones ---- */
+
+static npg_status decimate(reconstruction *r)
+{
+    npg_mending mending;
+    size_t budget = NPG_FACES_PER_POINT * r->set->given;
+    if (budget > (size_t)r->settings->face_max) budget = (size_t)r->settings->face_max;
+    NPG_TRY(npg_mesh_mend(&r->mesh, &mending)); /* closes small holes before the faces are counted */
+    size_t holes = mending.holes;
+    for (int round = 0; round < 4 && (!round || r->mesh->face_count > budget); round++) {
+        NPG_TRY(npg_mesh_decimate(&r->mesh, budget - budget / 200 * (size_t)round));
+        NPG_TRY(npg_mesh_mend(&r->mesh, &mending));
+        holes += mending.holes;
+    }
+    npg_mesh_note_count(r->worker, "mended_degenerate", mending.degenerate);
+    npg_mesh_note_count(r->worker, "mended_duplicate", mending.duplicate);
+    npg_mesh_note_count(r->worker, "mended_vertices", mending.split_vertices);
+    npg_mesh_note_count(r->worker, "mended_holes", holes);
+    npg_mesh_note_count(r->worker, "mended_flipped", mending.flipped);
+    return keep_main(r, "after decimation");
+}
+
+/* Of clean points the surface is nearer the truth than their normals' means, and of few points, too. */
+static npg_status turn_faces(reconstruction *r)
+{
+    npg_mending mending;
+    if (!r->is_rough) return NPG_OK;
+    NPG_TRY(npg_mesh_follow_normals(r->mesh, r->set->points, r->set->normals, r->set->count));
+    return npg_mesh_mend(&r->mesh, &mending);
+}
+
+/* True where the mesh is one that can be deformed. */
+static npg_status is_sound(bool *sound, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    size_t flipped;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(npg_mesh_flipped(&flipped, NULL, mesh));
+    *sound = !manifold.crowded_edges && !manifold.misoriented_edges && !manifold.degenerate_faces && !flipped;
+    return NPG_OK;
+}
+
+static npg_status shape(reconstruction *r, bool *sound)
+{
+    NPG_TRY(trim(r));
+    NPG_TRY(leave_empty_space(r));
+    NPG_TRY(decimate(r));
+    NPG_TRY(turn_faces(r));
+    NPG_TRY(flatten(r));
+    if (r->set->empty)
+        npg_mesh_note(r->worker, "seen_empty_left_share", npg_mesh_share_in(r->mesh, r->set->empty));
+    return is_sound(sound, r->mesh);
+}
+
+/* ---- through a level set ---- */
+
+/* A level set knows inside from outside only where the surface is closed. */
+static npg_status is_closed(bool *closed, const npg_mesh *mesh)
+{
+    npg_manifold manifold;
+    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    *closed = !manifold.border_edges;
+    return NPG_OK;
+}
+
+static npg_status rebuild(reconstruction *r)
+{
+    double voxel = 2 * NPG_UNIT_EXTENT / REBUILD_VOXELS, area = npg_mesh_area(r->mesh);
+    NPG_TRY(npg_vdb_remesh(&r->mesh, voxel));
+    npg_mesh_note_count(r->worker, "faces_rebuilt", r->mesh->face_count);
+    double ratio = npg_mesh_area(r->mesh) / area;
+    if (ratio < REBUILD_AREA_MIN || ratio > 1 / REBUILD_AREA_MIN)
+        return npg_error(NPG_FAILED, "rebuilt through a level set, the surface has %.0f %% of its area",
+                         100 * ratio);
+    return NPG_OK;
+}
+
+static npg_status rebuild_on_request(reconstruction *r)
+{
+    bool closed;
+    npg_mending mending;
+    NPG_TRY(npg_mesh_mend(&r->mesh, &mending));
+    NPG_TRY(is_closed(&closed, r->mesh));
+    if (!closed)
+        return npg_error(NPG_FAILED,
+                         "mesher vdb takes a closed surface, but Poisson's is open (a single view?)");
+    return rebuild(r);
+}
+
+/* Try again from the whole surface, taken through a level set. */
+static npg_status shape_again(reconstruction *r, npg_mesh **whole, bool *sound)
+{
+    npg_mesh_unref(&r->mesh);
+    r->mesh = *whole;
+    *whole = NULL;
+    NPG_TRY(rebuild(r));
+    return shape(r, sound);
+}
+
+/* ---- the whole ---- */
+
+static npg_status make(reconstruction *r)
+{
+    npg_mesh *whole = NULL;
+    bool sound = false, closed = false;
+    NPG_TRY(draw_surface(r));
+    NPG_TRY(keep_main(r, "as reconstructed"));
+    if (r->settings->mesher == NPG_MESHER_VDB) NPG_TRY(rebuild_on_request(r));
+    NPG_TRY(npg_mesh_copy(&whole, r->mesh));
+    npg_status status = shape(r, &sound);
+    if (!status && !sound) status = is_closed(&closed, whole);
+    if (!status && !sound && closed) status = shape_again(r, &whole, &sound);
+    if (!status && !sound)
+        npg_mesh_warn(r->worker, false, r->set->key_number,
+                      "the reference mesh still has flipped or degenerate faces after all mending");
+    npg_mesh_unref(&whole);
+    return status;
+}
+
+npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *worker, npg_point_set *set,
+                           const npg_reconstruct_settings *settings)
+{
+    reconstruction r = {.worker = worker, .settings = settings, .set = set};
+    npg_status status = make(&r);
+    if (status) npg_mesh_unref(&r.mesh);
+    *mesh = r.mesh;
+    *invented_share = r.invented_share;
+    return status;
+}
