@@ -174,6 +174,7 @@ npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_
 {
     uint32_t *component_of;
     *pieces = (npg_pieces){0};
+    if (!(*mesh)->face_count) return NPG_OK;
     NPG_TRY(npg_alloc_array(&component_of, NPG_FOR_MESH, (*mesh)->vert_count, sizeof *component_of));
     npg_status status = npg_mesh_components(component_of, &pieces->found, (*mesh)->vert_count, (*mesh)->faces,
                                             (*mesh)->face_count);

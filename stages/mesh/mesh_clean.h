@@ -39,7 +39,7 @@ typedef struct npg_pieces {
 
 /* Keep the component of the largest area, and those with at least share_min of all area that come within
  * dist_max of it (a hand that a hole in the points cuts off belongs to the body; a ball beside it does not).
- * dist_max 0: the largest alone. */
+ * dist_max 0: the largest alone.  A mesh without faces stays as it is. */
 npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max);
 
 /* At most face_max faces, by edge collapse (meshoptimizer). */
@@ -51,7 +51,7 @@ typedef struct npg_mending {
 
 /* Drop faces that use a vertex twice, repeat another or lie back to back with another; give each fan around a
  * vertex its own vertex; close holes of up to 32 edges; smooth where faces are turned over or have no area,
- * and collapse them where that does not help. */
+ * and collapse them where that does not help.  Of shreds no face may be left. */
 npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done);
 
 /* Faces turned over against their surroundings: the normal points against the mean of the neighbours', or the

@@ -453,6 +453,7 @@ npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done)
     for (int round = 0; round < MEND_ROUNDS; round++) {
         size_t dropped, left;
         NPG_TRY(drop_faces(mesh, done));
+        if (!(*mesh)->face_count) break;
         NPG_TRY(split(mesh, done));
         NPG_TRY(drop_crowded(mesh, done, &dropped));
         if (dropped) NPG_TRY(split(mesh, done));

@@ -190,6 +190,7 @@ static npg_status decimate(reconstruction *r)
         NPG_TRY(npg_mesh_mend(&r->mesh, &mending));
         holes += mending.holes;
     }
+    if (!r->mesh->face_count) return npg_error(NPG_FAILED, "only shreds of the surface lie near the points");
     npg_mesh_note_count(r->worker, "mended_degenerate", mending.degenerate);
     npg_mesh_note_count(r->worker, "mended_duplicate", mending.duplicate);
     npg_mesh_note_count(r->worker, "mended_vertices", mending.split_vertices);

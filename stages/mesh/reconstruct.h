@@ -49,8 +49,8 @@ typedef struct npg_reconstruct_settings {
  * Figures and warnings go to the report and the log of the worker's stage; called on its thread.  It uses all
  * cores, and the same input gives the same mesh.
  * NPG_BAD_INPUT: the set has no normals, or is one that npg_poisson() refuses.  NPG_FAILED: npg_poisson()
- * failed, no surface lies near the points, or the surface can't be taken through a level set.  NPG_MEMORY,
- * NPG_STOPPED.  Faces that are still turned over after all mending are a warning. */
+ * failed, no surface lies near the points or nothing but shreds, or it can't be taken through a level set.
+ * NPG_MEMORY, NPG_STOPPED.  Faces that are still turned over after all mending are a warning. */
 npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *worker, npg_point_set *set,
                            const npg_reconstruct_settings *settings);
 

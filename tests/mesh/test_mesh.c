@@ -245,6 +245,23 @@ static void mending_closes_and_cleans(void **state)
     npg_mesh_unref(&mesh);
 }
 
+static void of_shreds_nothing_is_left(void **state)
+{
+    (void)state;
+    static const uint32_t back_to_back[6] = {0, 2, 1, 0, 1, 2};
+    npg_mending done;
+    npg_pieces pieces;
+    npg_mesh *mesh = mesh_of(cube_pos, 8, back_to_back, 2);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(npg_mesh_mend(&mesh, &done), NPG_OK);
+        assert_int_equal(done.duplicate, i ? 0 : 2);
+        assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 0.01, 0.1), NPG_OK);
+        assert_int_equal(pieces.found + pieces.kept, 0);
+        assert_int_equal(mesh->face_count, 0);
+    }
+    npg_mesh_unref(&mesh);
+}
+
 static void cubes_that_touch_are_parted(void **state)
 {
     (void)state;
@@ -529,6 +546,7 @@ int main(void)
         cmocka_unit_test(the_memory_limit_holds),
 #endif
         cmocka_unit_test(mending_closes_and_cleans),
+        cmocka_unit_test(of_shreds_nothing_is_left),
         cmocka_unit_test(cubes_that_touch_are_parted),
         cmocka_unit_test(pieces_near_the_main_one_stay),
         cmocka_unit_test(decimation_keeps_the_shape),
