@@ -213,7 +213,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     double per_frame = (double)POINTS_A_CELL / (double)facts->planned_count; /* of the points of one frame */
     s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
-    NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->count));
+    NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->normals, key->count));
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));
     NPG_TRY(npg_carry_back_open(&s->carry, facts->reference));

@@ -16,6 +16,7 @@
 #define NEAR        8
 #define WIDE        24
 #define ASKED_MAX   4000
+#define FLAT_LEAST  0.1 /* of the points, that are not of thin parts */
 #define TERMS       6
 #define SIDE_COS    0.3f /* neighbours whose normal is nearer than this belong to the same sheet */
 #define SUPPORT_MIN 9    /* neighbours of the same sheet that a quadric takes */
@@ -41,18 +42,29 @@ static double plane_residual(const float *points, const uint32_t *index, size_t 
     return sum / (double)(k - 3);
 }
 
+/* Whether a point has another side among its neighbours. */
+static bool is_thin(const float *normals, size_t point, const uint32_t *index)
+{
+    for (size_t k = 0; k < WIDE; k++)
+        if (npg_vec3_dotf(normals + 3 * point, normals + 3 * (size_t)index[k]) < -SIDE_COS) return true;
+    return false;
+}
+
 /* Residuals of the planes through few and through many neighbours, at `asked` points spread over the
- * cloud. */
-static npg_status measure_residuals(double *near, double *wide, size_t asked, const npg_kdtree *tree,
-                                    const float *points, size_t n)
+ * cloud; *count of them, without those of thin parts where normals are given. */
+static npg_status measure_residuals(double *near, double *wide, size_t *count, size_t asked,
+                                    const npg_kdtree *tree, const float *points, const float *normals,
+                                    size_t n)
 {
     uint32_t index[WIDE];
     float dist_sq[WIDE];
+    *count = 0;
     for (size_t i = 0; i < asked; i++) {
-        const float *p = points + 3 * (n * i / asked);
-        NPG_TRY(npg_kdtree_nearest(tree, index, dist_sq, p, 1, WIDE, 1));
-        near[i] = plane_residual(points, index, NEAR);
-        wide[i] = plane_residual(points, index, WIDE);
+        size_t point = n * i / asked;
+        NPG_TRY(npg_kdtree_nearest(tree, index, dist_sq, points + 3 * point, 1, WIDE, 1));
+        if (normals && is_thin(normals, point, index)) continue;
+        near[*count] = plane_residual(points, index, NEAR);
+        wide[(*count)++] = plane_residual(points, index, WIDE);
     }
     return NPG_OK;
 }
@@ -67,18 +79,20 @@ static double noise_of(double *near, double *wide, size_t count)
     return noise > 0 ? sqrt(noise) : 0;
 }
 
-npg_status npg_cloud_noise(double *sigma, const float *points, size_t n)
+npg_status npg_cloud_noise(double *sigma, const float *points, const float *normals, size_t n)
 {
     npg_kdtree *tree = NULL;
     double *near = NULL, *wide = NULL;
-    size_t asked = n < ASKED_MAX ? n : ASKED_MAX;
+    size_t asked = n < ASKED_MAX ? n : ASKED_MAX, count = 0;
     *sigma = 0;
     if (n < WIDE) return NPG_OK;
     npg_status status = npg_kdtree_open(&tree, points, n);
     if (!status) status = npg_alloc_array(&near, NPG_FOR_FRAMES, asked, sizeof *near);
     if (!status) status = npg_alloc_array(&wide, NPG_FOR_FRAMES, asked, sizeof *wide);
-    if (!status) status = measure_residuals(near, wide, asked, tree, points, n);
-    if (!status) *sigma = noise_of(near, wide, asked);
+    if (!status) status = measure_residuals(near, wide, &count, asked, tree, points, normals, n);
+    if (!status && (double)count < FLAT_LEAST * (double)asked)
+        status = measure_residuals(near, wide, &count, asked, tree, points, NULL, n);
+    if (!status) *sigma = noise_of(near, wide, count);
     npg_kdtree_close(&tree);
     npg_release(&near);
     npg_release(&wide);

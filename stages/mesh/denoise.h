@@ -6,8 +6,9 @@
 
 /* Standard deviation of the points across their surface.  Residuals to planes through 8 and through 24
  * neighbours are noise plus curvature, and only curvature grows with the neighbourhood (with its area): the
- * difference tells them apart. */
-npg_status npg_cloud_noise(double *sigma, const float *points, size_t point_count);
+ * difference tells them apart.  normals (outward) or NULL: with them, points of thin parts, which have another
+ * side among those neighbours, are not asked, unless nine in ten are; how far that side is is no noise. */
+npg_status npg_cloud_noise(double *sigma, const float *points, const float *normals, size_t point_count);
 
 /* Move every point onto the quadric z = a + bx + cy + dx^2 + exy + fy^2 fitted over its tangent plane to its
  * `neighbours` nearest points of the same side, weighted by distance; normals follow.  In place.  Points

@@ -2,9 +2,11 @@
 #include "mesh/reconstruct.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "geometry/mesh_tools.h"
 #include "mesh/denoise.h"
+#include "mesh/densify.h"
 #include "mesh/flatten.h"
 #include "mesh/follow_normals.h"
 #include "mesh/fringe.h"
@@ -45,7 +47,7 @@ static npg_status smooth(reconstruction *r)
 {
     npg_point_set *p = r->set;
     double sigma;
-    NPG_TRY(npg_cloud_noise(&sigma, p->points, p->count));
+    NPG_TRY(npg_cloud_noise(&sigma, p->points, p->normals, p->count));
     npg_mesh_note(r->worker, "noise_unit", sigma);
     if (!r->settings->smooth || sigma < NOISE_MIN * p->spacing) return NPG_OK;
     npg_worker_log(r->worker, NPG_LOG_INFO, p->key_number,
@@ -55,6 +57,26 @@ static npg_status smooth(reconstruction *r)
     r->is_rough = key_noise > FOLLOW_NOISE * (p->is_fused ? p->key_spacing : p->spacing);
     return npg_cloud_smooth(p->points, p->normals, p->count,
                             p->is_fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
+}
+
+/* Poisson through the points and what lies between those of thin parts. */
+static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned, int *rounds,
+                               const npg_poisson_settings *settings)
+{
+    npg_point_set *p = r->set;
+    float *points, *normals;
+    size_t count;
+    if (r->is_rough) /* noisy normals do not say what lies between */
+        return npg_resurface_apart(&r->mesh, moved, turned, rounds, p->normals, p->points, p->count,
+                                   p->spacing, settings);
+    NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
+    npg_mesh_note_count(r->worker, "points_between", count - p->count);
+    npg_status status =
+        npg_resurface_apart(&r->mesh, moved, turned, rounds, normals, points, count, p->spacing, settings);
+    if (!status) memcpy(p->normals, normals, 3 * p->count * sizeof *normals); /* their sides are mended */
+    npg_release(&points);
+    npg_release(&normals);
+    return status;
 }
 
 static npg_status draw_surface(reconstruction *r)
@@ -69,8 +91,7 @@ static npg_status draw_surface(reconstruction *r)
     size_t turned, moved;
     int rounds;
     NPG_TRY(smooth(r));
-    NPG_TRY(npg_resurface_apart(&r->mesh, &moved, &turned, &rounds, p->normals, p->points, p->count,
-                                p->spacing, &settings));
+    NPG_TRY(draw_through(r, &moved, &turned, &rounds, &settings));
     npg_mesh_note_count(r->worker, "points_held_apart", moved);
     npg_mesh_note_count(r->worker, "poisson_rounds", (size_t)rounds);
     npg_mesh_note_count(r->worker, "normals_turned", turned);

@@ -150,10 +150,10 @@ static void noise_is_told_from_curvature(void **state)
     double sigma, before = 0, after = 0;
     shape_random r = {17};
     shape_torus(points, truth, N, 1, 0.3, &r);
-    assert_int_equal(npg_cloud_noise(&sigma, points, N), NPG_OK);
+    assert_int_equal(npg_cloud_noise(&sigma, points, NULL, N), NPG_OK);
     assert_true(sigma < 0.002);
     for (size_t i = 0; i < 3 * N; i++) points[i] += (float)(0.01 * shape_gauss(&r));
-    assert_int_equal(npg_cloud_noise(&sigma, points, N), NPG_OK);
+    assert_int_equal(npg_cloud_noise(&sigma, points, NULL, N), NPG_OK);
     assert_true(sigma > 0.007 && sigma < 0.013);
     memcpy(normals, truth, sizeof truth);
     for (int pass = 0; pass < 2; pass++) {
