@@ -7,9 +7,9 @@
 #include "align/ties.h"
 #include "pipeline/order.h"
 
-/* What is hidden for long drifts by what each frame adds, so a tenth of each edge stays at rest: set by
+/* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest: set by
  * trial, samples/guide/why_these_defaults.md, one sensor and a body that turns. */
-#define HELD 0.9
+#define HELD 0.95
 
 /* Edges and ties, in their order. */
 static npg_status open_pairs(npg_held *held, const npg_graph *graph)
