@@ -1,11 +1,11 @@
 /* Mesh: the reference surface.  The stage says when one is made and from which points, takes the user's own
  * mesh instead, puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
-#include <stdio.h>
 
 #include "align/sights.h"
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/seen_share.h"
 #include "ingest/formats/reader.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
@@ -63,8 +63,8 @@ static const npg_option mesh_options[] = {
         "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
     NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
-        "that no point saw and that was kept, in per cent; "
-        "above it the run ends with exit code 7"),
+        "that no point saw and that was kept, or that was given, in per cent; "
+        "above it the run ends with exit code 7; of a given mesh half may be unseen where one sensor looked"),
     {0}};
 /* clang-format on */
 
@@ -90,7 +90,7 @@ typedef struct making { /* what is known while the reference is made */
     const npg_frame *key;
     const npg_fused *fused; /* what all frames saw, a loan; NULL: it is made of the keyframe alone */
     npg_point_set set;      /* the points of either, owned */
-    double invented_share;  /* of the area: what no point saw and was kept */
+    double invented_share;  /* of the area: what no point saw and was kept, or was given */
     npg_mesh *mesh;         /* owned */
 } making;
 
@@ -152,38 +152,39 @@ static npg_status cut_welds(making *m)
 
 /* ---- what nobody saw ---- */
 
-/* Where the largest part of it lies on the finished reference, for the report and in words. */
-static void note_place(making *m, const npg_patch *largest, char *text, size_t size)
+/* More than the bar of surface that no point saw is carried through all frames. */
+static void warn_of_invented(const making *m, const char *place)
 {
-    const npg_frame_box *box = &npg_worker_facts(m->worker)->box;
-    json_t *place = json_null();
-    if (largest->share > 0) {
-        double at[3], radius = largest->radius / box->scale;
-        npg_box_unit_to_world(box, at, largest->at, 1);
-        place =
-            json_pack("{sf s[fff] sf}", "share", largest->share, "at", at[0], at[1], at[2], "radius", radius);
-        snprintf(text, size, ", the largest part within %.3g of (%.4g, %.4g, %.4g)", radius, at[0], at[1],
-                 at[2]);
-    }
-    json_object_set_new(npg_worker_report(m->worker), "invented_at", place);
-}
-
-/* Surface that stays although nothing was seen there is the mesher's invention: a run that carries much of it
- * through all frames is not a good one.  What was trimmed off is reported and is not in the result. */
-static npg_status judge_invented(making *m)
-{
-    npg_patch largest;
-    char place[128] = "";
-    NPG_TRY(npg_mesh_mark_unseen(m->mesh, &largest, m->set.points, m->set.count, m->set.seen_dist));
-    npg_worker_facts(m->worker)->unseen_share = m->invented_share;
-    npg_mesh_note(m->worker, "invented_share", m->invented_share);
-    note_place(m, &largest, place, sizeof place);
-    if (100 * m->invented_share > m->state->invented_max)
+    const char *given = npg_worker_settings(m->worker)->reference;
+    if (given[0])
+        npg_mesh_warn(m->worker, true, m->key->number,
+                      "%.1f %% of %s has no point of the keyframe near it%s (the bar is %g %%)%s",
+                      100 * m->invented_share, given, place, m->state->invented_max,
+                      m->invented_share > 0.5 ? ": other units or another pose?" : "");
+    else
         npg_mesh_warn(m->worker, true, m->key->number,
                       "%.1f %% of the reference's surface is invented: no point of %s saw it, "
                       "and it was kept%s (the bar is %g %%; --unseen trim leaves it out)",
                       100 * m->invented_share, m->fused ? "any frame" : "the keyframe", place,
                       m->state->invented_max);
+}
+
+/* Surface that stays although nothing was seen there is the mesher's invention, or that of who gave the mesh:
+ * a run that carries much of it through all frames is not a good one.  What was trimmed off is reported and
+ * is not in the result.  Of a given mesh one sensor can see no more than a side. */
+static npg_status judge_invented(making *m)
+{
+    npg_patch largest;
+    char place[128] = "";
+    bool is_given = npg_worker_settings(m->worker)->reference[0];
+    double seen = is_given ? npg_seen_share(m->key->sensor_count) : 1;
+    const npg_frame_box *box = &npg_worker_facts(m->worker)->box;
+    NPG_TRY(npg_mesh_mark_unseen(m->mesh, &largest, m->set.points, m->set.count, m->set.seen_dist));
+    npg_worker_facts(m->worker)->unseen_share = m->invented_share;
+    npg_mesh_note(m->worker, "invented_share", m->invented_share);
+    json_object_set_new(npg_worker_report(m->worker), "invented_at",
+                        npg_unseen_place(&largest, box, place, sizeof place));
+    if (100 * m->invented_share > 100 - seen * (100 - m->state->invented_max)) warn_of_invented(m, place);
     return NPG_OK;
 }
 
@@ -197,12 +198,8 @@ static npg_status read_reference(making *m)
     NPG_TRY(npg_mesh_require_finite(m->mesh, path));
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
-    NPG_TRY(npg_mesh_unseen(&facts->unseen_share, m->mesh, m->set.points, m->set.count, m->set.seen_dist));
-    npg_mesh_note(m->worker, "unseen_share", facts->unseen_share);
-    if (facts->unseen_share > 0.5)
-        npg_mesh_warn(m->worker, false, m->key->number,
-                      "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
-                      100 * facts->unseen_share, path);
+    NPG_TRY(npg_mesh_unseen(&m->invented_share, m->mesh, m->set.points, m->set.count, m->set.seen_dist));
+    npg_mesh_note(m->worker, "unseen_share", m->invented_share);
     return NPG_OK;
 }
 
@@ -271,7 +268,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status) status = is_given ? read_reference(&m) : make(&m);
     if (!status && !is_given) status = cut_welds(&m);
-    if (!status && !is_given) status = judge_invented(&m);
+    if (!status) status = judge_invented(&m);
     if (!status) status = measure_reference(&m);
     if (!status) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);

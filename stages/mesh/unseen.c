@@ -1,6 +1,8 @@
 /* Unseen: the mask of the reference, and its largest patch. */
 #include "mesh/unseen.h"
 
+#include <stdio.h>
+
 #include "geometry/mesh_tools.h"
 #include "mesh/mesh_clean.h"
 
@@ -26,4 +28,14 @@ npg_status npg_mesh_mark_unseen(npg_mesh *mesh, npg_patch *largest, const float 
     for (size_t i = 0; i < v && !status; i++) mesh->vert_unseen[i] = (double)dist[i] > dist_max;
     npg_release(&dist);
     return status ? status : find_largest(largest, mesh);
+}
+
+json_t *npg_unseen_place(const npg_patch *largest, const npg_frame_box *box, char *text, size_t size)
+{
+    double at[3], radius = largest->radius / box->scale;
+    text[0] = '\0';
+    if (!(largest->share > 0)) return json_null();
+    npg_box_unit_to_world(box, at, largest->at, 1);
+    snprintf(text, size, ", the largest part within %.3g of (%.4g, %.4g, %.4g)", radius, at[0], at[1], at[2]);
+    return json_pack("{sf s[fff] sf}", "share", largest->share, "at", at[0], at[1], at[2], "radius", radius);
 }

@@ -2,11 +2,18 @@
 #ifndef NPG_UNSEEN_H
 #define NPG_UNSEEN_H
 
+#include <jansson.h>
+
 #include "geometry/patch.h"
+#include "pipeline/frame_box.h"
 
 /* Set mesh->vert_unseen: the vertices that are farther than dist_max from all N points (N x 3).
  * *largest: the largest connected part of them.  NPG_MEMORY. */
 npg_status npg_mesh_mark_unseen(npg_mesh *mesh, npg_patch *largest, const float *points, size_t point_count,
                                 double dist_max);
+
+/* Where that part lies, for the report: {share, at, radius} in world units, and in words into text; JSON null
+ * and "" where it has no area. */
+json_t *npg_unseen_place(const npg_patch *largest, const npg_frame_box *box, char *text, size_t size);
 
 #endif

@@ -151,6 +151,7 @@ enum { FRAMES = 3, POINTS = 2000 };
 typedef struct scene {
     double gap[FRAMES];   /* points lie this far outside the unit sphere            */
     double share[FRAMES]; /* of the sphere from the north pole down that has points */
+    double lost[FRAMES];  /* of the points, those farthest south: 0.07 outside the sphere */
     double vert_scale[FRAMES];
     bool skipped[FRAMES], broken[FRAMES];
     bool is_made;  /* the reference, from the points of all frames: it says what they did not see */
@@ -174,7 +175,8 @@ static void put_spiral(float *points, const scene *s, int64_t index)
 {
     for (int i = 0; i < POINTS; i++) {
         double z = 1 - 2 * s->share[index] * (i + 0.5) / POINTS, turn = i * pi * (3 - sqrt(5.0));
-        double radius = 1 + s->gap[index], flat = sqrt(1 - z * z);
+        double lost = i >= (1 - s->lost[index]) * POINTS ? 0.07 : 0; /* 2 % of the diagonal */
+        double radius = 1 + s->gap[index] + lost, flat = sqrt(1 - z * z);
         points[3 * i] = (float)(radius * flat * cos(turn));
         points[3 * i + 1] = (float)(radius * flat * sin(turn));
         points[3 * i + 2] = (float)(radius * z);
@@ -334,6 +336,22 @@ static void vertex_distances_agree_with_the_plain_way(void **state)
     npg_mesh_unref(&sphere);
 }
 
+/* A limb's share of the points is off the surface, where the median knows nothing of it. */
+static void nearly_all_points_must_be_near(void **state)
+{
+    (void)state;
+    scene s = plain_scene();
+    s.lost[1] = 0.03;
+    s.lost[2] = 0.07;
+    assert_int_equal(run_scene(&s, NULL), NPG_PARTIAL);
+    assert_true(s.figures[1].point_dist_p95 < 0.002 && s.figures[1].good);
+    assert_true(s.figures[2].point_dist_median < 0.002 && is_near(s.figures[2].point_dist_p95, 0.02, 0.002));
+    assert_false(s.figures[2].good);
+    assert_int_equal(s.bad_count, 1);
+    const char *const lenient[][2] = {{"max-residual", "1.2"}, {NULL, NULL}};
+    assert_int_equal(run_scene(&s, lenient), NPG_OK);
+}
+
 static void coverage_is_the_share_with_points(void **state)
 {
     (void)state;
@@ -382,7 +400,7 @@ static void what_another_frame_saw_has_support(void **state)
         assert_true(isnan(s.figures[t].unsupported_at[0]));
     }
     assert_true(s.figures[1].coverage < 0.85);
-    s.is_made = false; /* a mesh of the user's own: nothing is known */
+    s.is_made = false; /* no mask: nothing is known */
     assert_int_equal(run_scene(&s, NULL), NPG_OK);
     for (int t = 0; t < FRAMES; t++) assert_true(isnan(s.figures[t].unsupported_share));
 }
@@ -518,6 +536,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_flattened_face_is_stretched_not_flipped, open_shape, close_shape),
         cmocka_unit_test(distances_are_those_that_were_made),
         cmocka_unit_test(vertex_distances_agree_with_the_plain_way),
+        cmocka_unit_test(nearly_all_points_must_be_near),
         cmocka_unit_test(coverage_is_the_share_with_points),
         cmocka_unit_test(surface_without_support_is_measured_and_placed),
         cmocka_unit_test(what_another_frame_saw_has_support),

@@ -55,6 +55,30 @@ shares() {
     ! grep -q '"unsupported_at":\[[0-9-]' clean-out/frames.jsonl
 }
 
+# lumpy HEIGHT: the truth of frame 5 with three bulges on its flank, as high as that, in metres
+lumpy() {
+    awk -v height="$1" '$1 == "v" && $4 > 0.1 {
+            for (lump = -0.6; lump < 0.7; lump += 0.6) $4 += height * exp(-(($3 - lump) / 0.15) ^ 2)
+        } { print }' solid/truth/frame_0005.obj
+}
+
+@test "a mesh that is given with lumps on its flank: a figure with place for it and for every frame, exit code 7" {
+    "$NEUPIG" synth --body bar --frames 8 --points 2000 --cycles 0.3 --format obj -o solid >synth.log
+    for height in 0 0.3; do
+        lumpy $height >lumpy-$height.obj
+        code=0
+        "$NEUPIG" run solid/points -o lumpy-$height --reference lumpy-$height.obj "${small[@]}" >lumpy.log 2>&1 || code=$?
+        cat lumpy.log
+        echo "height $height: exit code $code"
+        [ $code -eq $([ $height = 0 ] && echo 0 || echo 7) ]
+    done
+    grep -q "lumpy-0.3.obj has no point of the keyframe near it, the largest part within .* of (" lumpy.log
+    grep -q "below the bar: share of the surface that no points support, in %, .*the largest part around (" lumpy.log
+    [ "$(shares lumpy-0 | sort -u)" = 0.0 ]
+    shares lumpy-0.3 | awk '{ print } $1 < 0.1 || $1 > 0.5 { exit 1 }'
+    sed -n '/"invented_at": {/,/}/p' lumpy-0.3/report.json | tr -d '[],\n' | awk '{ print } !($8 > 0.16) { exit 1 }' # off the flank
+}
+
 @test "a run that is killed resumes to the same figures" {
     "$NEUPIG" run one/points -o killed --unseen keep "${small[@]}" >killed.log 2>&1 &
     pid=$!
