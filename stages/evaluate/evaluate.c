@@ -13,7 +13,6 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/patch.h"
-#include "geometry/seen_share.h"
 #include "geometry/thin.h"
 #include "job/frame_log.h"
 #include "job/job.h"
@@ -333,6 +332,8 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 
 /* ---- the verdict ---- */
 
+#define ONE_SENSOR_SEES 0.5 /* of a body, at most: the bar on what points are near to is lower by that */
+
 /* Times the bar on the median, for 95 % of the points: good fits of noisy captures keep to half of it, a lost
  * limb and a surface that follows noise do not.  Set by trial. */
 #define NEARLY_ALL_WITHIN 2.0
@@ -340,12 +341,11 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 static const char unsupported_fault[] = "share of the surface that no points support, in %,";
 
 /* What is wrong with a frame, NULL when it is above the bar.  A comparison with NaN fails, as it should. */
-static const char *fault_of(const npg_worker *worker, const npg_frame *frame, double *value, double *bound)
+static const char *fault_of(const evaluate_state *state, const npg_frame *frame, double unseen_share,
+                            double *value, double *bound)
 {
-    const evaluate_state *state = npg_worker_state(worker);
     const npg_figures *f = &frame->figures;
-    bool is_given = npg_worker_settings(worker)->reference[0];
-    double unseen = npg_worker_facts(worker)->unseen_share, seen = npg_seen_share(frame->sensor_count);
+    double seen = frame->sensor_count == 1 ? ONE_SENSOR_SEES : 1;
     *value = 100 * f->point_dist_median;
     *bound = state->residual_max;
     if (!(*value <= *bound)) return "median distance of the points to the surface, in % of the diagonal,";
@@ -354,7 +354,7 @@ static const char *fault_of(const npg_worker *worker, const npg_frame *frame, do
     if (!(*value <= *bound))
         return "distance of 95 % of the points to the surface, at most, in % of the diagonal,";
     *value = 100 * f->coverage;
-    *bound = state->coverage_min * seen * (1 - unseen); /* of what the keyframe saw */
+    *bound = state->coverage_min * seen * (1 - unseen_share); /* of what the keyframe saw */
     if (!(*value >= *bound)) return "share of the surface with points near it, in %,";
     *value = 100 * f->flipped_share;
     *bound = state->flipped_max;
@@ -363,7 +363,7 @@ static const char *fault_of(const npg_worker *worker, const npg_frame *frame, do
     *bound = state->stretched_max;
     if (!(*value <= *bound)) return "share of stretched faces, in %,";
     *value = 100 * f->unsupported_share;
-    *bound = is_given ? 100 - seen * (100 - state->unsupported_max) : state->unsupported_max;
+    *bound = state->unsupported_max;
     if (*value > *bound) return unsupported_fault; /* NaN: not known which points the reference is of */
     return NULL;
 }
@@ -408,7 +408,7 @@ static npg_status judge_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     double value, bound;
-    const char *fault = fault_of(worker, frame, &value, &bound);
+    const char *fault = fault_of(state, frame, npg_worker_facts(worker)->unseen_share, &value, &bound);
     frame->figures.good = !fault && !frame->is_skipped;
     if (frame->is_shared) return NPG_OK;
     add_up(state, frame);
@@ -601,8 +601,8 @@ static const npg_option options[] = {
         "... and at most this share of its faces grew or shrank tenfold, in per cent"),
     NPG_ROW_REAL  ("max-unsupported", AT(unsupported_max),    "10",     0,     100,  "PERCENT",
         "... and at most this share of its surface has no points near it, "
-        "neither of the frames that the reference was made from (of a given mesh: of the keyframe) "
-        "nor of its own, in per cent; of a given mesh half may be unseen where one sensor looked"),
+        "neither of the frames that the reference was made from (of a given mesh: of the keyframe, "
+        "where its sensors could see it) nor of its own, in per cent"),
     NPG_ROW_REAL  ("cover-distance",  AT(cover_dist),         "1",      0,     100,  "PERCENT",
         "How near a point must be to cover the surface, in per cent of the diagonal"),
     NPG_ROW_INT   ("evaluate-points", AT(point_limit),        "100000", 0,     1e12, NULL,

@@ -5,7 +5,6 @@
 #include "align/sights.h"
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
-#include "geometry/seen_share.h"
 #include "ingest/formats/reader.h"
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
@@ -63,8 +62,8 @@ static const npg_option mesh_options[] = {
         "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
     NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
-        "that no point saw and that was kept, or that was given, in per cent; "
-        "above it the run ends with exit code 7; of a given mesh half may be unseen where one sensor looked"),
+        "that no point saw and that was kept, in per cent; above it the run ends with exit code 7. "
+        "Of a given mesh: that no point of the keyframe is near, where its sensors could see it"),
     {0}};
 /* clang-format on */
 
@@ -153,38 +152,53 @@ static npg_status cut_welds(making *m)
 /* ---- what nobody saw ---- */
 
 /* More than the bar of surface that no point saw is carried through all frames. */
-static void warn_of_invented(const making *m, const char *place)
+static void warn_of_invented(const making *m, double share, const char *place)
 {
     const char *given = npg_worker_settings(m->worker)->reference;
     if (given[0])
         npg_mesh_warn(m->worker, true, m->key->number,
-                      "%.1f %% of %s has no point of the keyframe near it%s (the bar is %g %%)%s",
-                      100 * m->invented_share, given, place, m->state->invented_max,
-                      m->invented_share > 0.5 ? ": other units or another pose?" : "");
+                      "%.1f %% of %s has no point of the keyframe near it%s%s (the bar is %g %%)",
+                      100 * share, given, m->key->sensor_count ? ", though a sensor faces it" : "", place,
+                      m->state->invented_max);
     else
         npg_mesh_warn(m->worker, true, m->key->number,
                       "%.1f %% of the reference's surface is invented: no point of %s saw it, "
                       "and it was kept%s (the bar is %g %%; --unseen trim leaves it out)",
-                      100 * m->invented_share, m->fused ? "any frame" : "the keyframe", place,
-                      m->state->invented_max);
+                      100 * share, m->fused ? "any frame" : "the keyframe", place, m->state->invented_max);
+}
+
+/* What no sensor could see of a given mesh the lack of points says nothing against. */
+static npg_status excuse_hidden(making *m)
+{
+    const npg_frame *key = m->key;
+    float *sensors;
+    if (!key->sensor_count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&sensors, NPG_FOR_MESH, key->sensor_count, 3 * sizeof *sensors));
+    npg_box_local_to_unit(&npg_worker_facts(m->worker)->box, sensors, key->sensor_local, key->sensor_count);
+    npg_status status = npg_unseen_excuse(m->mesh, sensors, key->sensor_count, m->set.spacing);
+    npg_release(&sensors);
+    return status;
 }
 
 /* Surface that stays although nothing was seen there is the mesher's invention, or that of who gave the mesh:
  * a run that carries much of it through all frames is not a good one.  What was trimmed off is reported and
- * is not in the result.  Of a given mesh one sensor can see no more than a side. */
+ * is not in the result.  The mesh has its normals. */
 static npg_status judge_invented(making *m)
 {
     npg_patch largest;
-    char place[128] = "";
+    char place[128];
+    double marked, share;
     bool is_given = npg_worker_settings(m->worker)->reference[0];
-    double seen = is_given ? npg_seen_share(m->key->sensor_count) : 1;
     const npg_frame_box *box = &npg_worker_facts(m->worker)->box;
-    NPG_TRY(npg_mesh_mark_unseen(m->mesh, &largest, m->set.points, m->set.count, m->set.seen_dist));
+    NPG_TRY(npg_mesh_mark_unseen(m->mesh, m->set.points, m->set.count, m->set.seen_dist));
+    if (is_given) NPG_TRY(excuse_hidden(m));
+    NPG_TRY(npg_unseen_measure(&marked, &largest, m->mesh));
     npg_worker_facts(m->worker)->unseen_share = m->invented_share;
-    npg_mesh_note(m->worker, "invented_share", m->invented_share);
+    share = is_given ? marked : m->invented_share;
+    npg_mesh_note(m->worker, "invented_share", share);
     json_object_set_new(npg_worker_report(m->worker), "invented_at",
                         npg_unseen_place(&largest, box, place, sizeof place));
-    if (100 * m->invented_share > 100 - seen * (100 - m->state->invented_max)) warn_of_invented(m, place);
+    if (100 * share > m->state->invented_max) warn_of_invented(m, share, place);
     return NPG_OK;
 }
 
@@ -200,6 +214,10 @@ static npg_status read_reference(making *m)
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
     NPG_TRY(npg_mesh_unseen(&m->invented_share, m->mesh, m->set.points, m->set.count, m->set.seen_dist));
     npg_mesh_note(m->worker, "unseen_share", m->invented_share);
+    if (m->invented_share > 0.5)
+        npg_mesh_warn(m->worker, false, m->key->number,
+                      "%.0f %% of %s has no point of the keyframe near it: other units or another pose?",
+                      100 * m->invented_share, path);
     return NPG_OK;
 }
 
@@ -268,8 +286,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status) status = is_given ? read_reference(&m) : make(&m);
     if (!status && !is_given) status = cut_welds(&m);
-    if (!status) status = judge_invented(&m);
     if (!status) status = measure_reference(&m);
+    if (!status) status = judge_invented(&m);
     if (!status) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);
     npg_point_set_close(&m.set);

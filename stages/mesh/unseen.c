@@ -3,21 +3,11 @@
 
 #include <stdio.h>
 
+#include "align/visible.h"
 #include "geometry/mesh_tools.h"
 #include "mesh/mesh_clean.h"
 
-static npg_status find_largest(npg_patch *largest, const npg_mesh *mesh)
-{
-    double *areas;
-    NPG_TRY(npg_alloc_array(&areas, NPG_FOR_MESH, mesh->vert_count, sizeof *areas));
-    npg_vertex_areas(areas, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
-    npg_status status = npg_patch_largest(largest, mesh->vert_unseen, mesh->vert_pos, areas, mesh);
-    npg_release(&areas);
-    return status;
-}
-
-npg_status npg_mesh_mark_unseen(npg_mesh *mesh, npg_patch *largest, const float *points, size_t point_count,
-                                double dist_max)
+npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t point_count, double dist_max)
 {
     float *dist;
     size_t v = mesh->vert_count;
@@ -27,7 +17,45 @@ npg_status npg_mesh_mark_unseen(npg_mesh *mesh, npg_patch *largest, const float 
     npg_status status = npg_mesh_point_dist(dist, mesh, points, point_count);
     for (size_t i = 0; i < v && !status; i++) mesh->vert_unseen[i] = (double)dist[i] > dist_max;
     npg_release(&dist);
-    return status ? status : find_largest(largest, mesh);
+    return status;
+}
+
+npg_status npg_unseen_excuse(npg_mesh *mesh, const float *sensors, size_t sensor_count, double offset)
+{
+    size_t v = mesh->vert_count;
+    npg_surface *surface;
+    npg_visible visible = {0};
+    uint8_t *is_seen = NULL;
+    uint32_t *verts = NULL;
+    NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, v, mesh->faces, mesh->face_count));
+    npg_status status = npg_visible_open(&visible, v);
+    if (!status) status = npg_alloc(&is_seen, NPG_FOR_MESH, v);
+    if (!status) status = npg_alloc_array(&verts, NPG_FOR_MESH, v, sizeof *verts);
+    for (size_t i = 0; i < v && !status; i++) verts[i] = (uint32_t)i;
+    if (!status)
+        status = npg_visible_find(&visible, is_seen, surface, sensors, sensor_count, mesh->vert_pos, verts,
+                                  mesh->vert_normals, v, offset);
+    for (size_t i = 0; i < v && !status; i++) mesh->vert_unseen[i] &= is_seen[i];
+    npg_release(&verts);
+    npg_release(&is_seen);
+    npg_visible_close(&visible);
+    npg_surface_close(&surface);
+    return status;
+}
+
+npg_status npg_unseen_measure(double *share, npg_patch *largest, const npg_mesh *mesh)
+{
+    double *areas, marked = 0, whole = 0;
+    NPG_TRY(npg_alloc_array(&areas, NPG_FOR_MESH, mesh->vert_count, sizeof *areas));
+    npg_vertex_areas(areas, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
+    for (size_t i = 0; i < mesh->vert_count; i++) {
+        whole += areas[i];
+        if (mesh->vert_unseen[i]) marked += areas[i];
+    }
+    *share = whole > 0 ? marked / whole : 0;
+    npg_status status = npg_patch_largest(largest, mesh->vert_unseen, mesh->vert_pos, areas, mesh);
+    npg_release(&areas);
+    return status;
 }
 
 json_t *npg_unseen_place(const npg_patch *largest, const npg_frame_box *box, char *text, size_t size)

@@ -199,11 +199,10 @@ static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *
 static npg_status mark_unseen(npg_facts *facts, const scene *s)
 {
     static float points[3 * FRAMES * POINTS];
-    npg_patch largest;
     size_t count = s->key_only ? POINTS : FRAMES * POINTS;
     for (int t = 0; t < FRAMES; t++) put_spiral(points + 3 * t * POINTS, s, t);
     npg_box_local_to_unit(&facts->box, points, points, count);
-    return npg_mesh_mark_unseen(facts->reference, &largest, points, count, 0.15 * facts->box.scale);
+    return npg_mesh_mark_unseen(facts->reference, points, count, 0.15 * facts->box.scale);
 }
 
 static npg_status give_mesh(npg_facts *facts, npg_frame *frame, const scene *s)
