@@ -13,10 +13,10 @@ typedef struct npg_mesh {
     float *vert_normals;           /* V x 3, owned, unit length, or NULL                                 */
     uint32_t *faces;               /* F x 3, owned; counter-clockwise seen from outside                  */
     uint8_t *vert_colours;         /* V x 4 RGBA, owned, or NULL                                         */
-    uint8_t *vert_unseen;          /* V, owned, or NULL; 1: no point that the mesh was made from is near */
-    float *vert_uvs;               /* V x 2, owned, or NULL                                              */
-    float *corner_uvs;             /* F x 3 x 2, owned, or NULL: where vertices have more than one uv    */
-    int references;                /* for npg_mesh_ref / unref alone                                     */
+    uint8_t *vert_unseen; /* V, owned, or NULL; 1: no point that the mesh was made or judged from is near */
+    float *vert_uvs;      /* V x 2, owned, or NULL                                              */
+    float *corner_uvs;    /* F x 3 x 2, owned, or NULL: where vertices have more than one uv    */
+    int references;       /* for npg_mesh_ref / unref alone                                     */
 } npg_mesh;
 
 /* A mesh with zeroed vertices and faces and one reference. */
