@@ -8,7 +8,8 @@
  *     m = (p_i + p_j) / 2 + ((d . n_j) n_j - (d . n_i) n_i) / 8,    d = p_j - p_i,
  *
  * with the normal n_i + n_j.  Points that have one of another side nearby get such points to their nearest
- * neighbours.  Based on: A. Vlachos et al., Curved PN Triangles, 2001 (the edge).  Not in the paper. */
+ * neighbours.  The normals must be measured ones: such as are estimated from points mix both sides.  Based
+ * on: A. Vlachos et al., Curved PN Triangles, 2001 (the edge).  Not in the paper. */
 #ifndef NPG_DENSIFY_H
 #define NPG_DENSIFY_H
 

@@ -71,7 +71,8 @@ static npg_status measure(npg_point_set *set, npg_worker *worker)
 
 npg_status npg_point_set_open(npg_point_set *set, npg_worker *worker, const npg_frame *key, npg_fused *fused)
 {
-    *set = (npg_point_set){.key_number = key->number};
+    *set = (npg_point_set){.key_number = key->number,
+                           .has_given_normals = key->cleaning.normals_given > key->point_count / 2};
     npg_status status = fused ? take_fused(set, worker, fused) : take_frame(set, worker, key);
     if (!status) status = measure(set, worker);
     if (status) npg_point_set_close(set);

@@ -66,7 +66,8 @@ static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned,
     npg_point_set *p = r->set;
     float *points, *normals;
     size_t count;
-    if (r->is_rough) /* noisy normals do not say what lies between */
+    /* noisy normals do not say what lies between, nor those that were estimated across both sides */
+    if (r->is_rough || !p->has_given_normals)
         return npg_resurface_apart(&r->mesh, moved, turned, rounds, p->normals, p->points, p->count,
                                    p->spacing, settings);
     NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
