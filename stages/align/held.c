@@ -7,9 +7,11 @@
 #include "align/ties.h"
 #include "pipeline/order.h"
 
-/* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest: set by
- * trial, samples/guide/why_these_defaults.md, one sensor and a body that turns. */
-#define HELD 0.95
+/* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest; more of
+ * it where several sensors leave little hidden, between parts that are seen.  By trial,
+ * samples/guide/why_these_defaults.md, one sensor and a body that turns. */
+#define HELD_ONE     0.95 /* before one sensor */
+#define HELD_SEVERAL 0.9
 
 /* Edges and ties, in their order. */
 static npg_status open_pairs(npg_held *held, const npg_graph *graph)
@@ -61,8 +63,9 @@ static void edge_in_pose(double edge[3], const npg_graph *graph, const double *p
     for (int i = 0; i < 3; i++) edge[i] = pj[i] * d[0] + pj[3 + i] * d[1] + pj[6 + i] * d[2];
 }
 
-void npg_held_take(npg_held *held, const npg_graph *graph, const npg_hold *hold)
+void npg_held_take(npg_held *held, const npg_graph *graph, const npg_hold *hold, size_t sensor_count)
 {
+    held->share = sensor_count == 1 ? HELD_ONE : HELD_SEVERAL;
     for (size_t e = 0; e < 2 * held->pair_count; e++) {
         uint32_t j = held->pairs[e / 2][e % 2], k = held->pairs[e / 2][1 - e % 2];
         double edge[3], far_edge[3] = {0}, far_weight = 0;
@@ -99,7 +102,7 @@ double npg_held_edge(double edge[3], const npg_held *held, const npg_graph *grap
     double hidden = 1 - 0.5 * (double)(held->seen[j] + held->seen[k]);
     for (size_t i = 0; i < 3; i++) {
         double rest = (double)graph->node_pos[3 * (size_t)k + i] - (double)graph->node_pos[3 * (size_t)j + i];
-        edge[i] = rest + HELD * hidden * ((double)held->edges[e][i] - rest);
+        edge[i] = rest + held->share * hidden * ((double)held->edges[e][i] - rest);
     }
     return held->is_tie[e / 2] ? hidden : 1;
 }

@@ -7,7 +7,7 @@
  *
  *     e_jk = (1 - HELD h) (g_k - g_j) + HELD h R_j^T (x_k - x_j)       x_k = g_k + t_k, of that pose
  *
- * h in 0..1: how much of what both ends carry is hidden.  Of a hidden part with a known pose on either side
+ * h in 0..1: how much of what both ends carry is hidden; HELD: held.c.  Of a hidden part with a known pose on either side
  * in time both have a say: s frames after a sensor saw it last, the pose on the far side has s times the
  * weight of the one on the near side.  Frame by frame from the far side that goes evenly in time from where
  * the part was seen last to where it is seen next.  Not in the paper. */
@@ -30,14 +30,15 @@ typedef struct npg_held {
     float (*edges)[3];    /* 2P: of each pair, from its first node and from its second; owned */
     float *seen;          /* K: share of what a node carries that is seen, 0..1; owned       */
     float *bound;         /* K, scratch; owned                                               */
+    double share;         /* HELD                                                            */
 } npg_held;
 
 /* Zeros become room for a graph's pairs and nodes; all is seen.  NPG_MEMORY: what was got is to be closed. */
 npg_status npg_held_open(npg_held *held, const npg_graph *graph);
 void npg_held_close(npg_held *held);
 
-/* The edges as they are in the poses that hold them. */
-void npg_held_take(npg_held *held, const npg_graph *graph, const npg_hold *hold);
+/* The edges as they are in the poses that hold them, of a frame that so many sensors saw. */
+void npg_held_take(npg_held *held, const npg_graph *graph, const npg_hold *hold, size_t sensor_count);
 
 /* Which nodes carry what is seen: is_seen (count) of these vertices of the graph. */
 void npg_held_see(npg_held *held, const npg_graph *graph, const uint32_t *verts, const uint8_t *is_seen,

@@ -556,7 +556,7 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     step s = {.t = t, .pose = pose, .tree = tree, .cloud = cloud};
     if (!effort) effort = &usual;
     const npg_hold start = {.pose = pose};
-    if (cloud->sensor_count) npg_held_take(&t->held, t->graph, hold ? hold : &start);
+    if (cloud->sensor_count) npg_held_take(&t->held, t->graph, hold ? hold : &start, cloud->sensor_count);
     t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {
         set_schedule(&s, tracked, effort);

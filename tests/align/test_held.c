@@ -93,13 +93,13 @@ static void hidden_edges_are_those_of_the_pose(void **state)
     scene s;
     (void)state;
     open_scene(&s);
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent});
+    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent}, 1);
     see(&s, true);
     assert_true(bend(&s) < 1e-9);
     see(&s, false);
     double bent = bend(&s);
     assert_true(bent > 0.1);
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.rest});
+    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.rest}, 1);
     assert_true(bend(&s) < 1e-3 * bent);
     /* turned and moved as a whole, a body is not bent */
     for (size_t k = 0; k < s.graph->node_count; k++) {
@@ -109,7 +109,7 @@ static void hidden_edges_are_those_of_the_pose(void **state)
             0, -1, 0, 1, 0, 0, 0, 0, 1, 0.3 - (double)g[1] - (double)g[0], (double)g[0] - (double)g[1]};
         memcpy(p, whole, sizeof whole);
     }
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent});
+    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent}, 1);
     assert_true(bend(&s) < 1e-3 * bent);
     close_scene(&s);
 }
@@ -122,12 +122,12 @@ static void both_sides_have_a_say(void **state)
     open_scene(&s);
     assert_true(s.graph->node_count <= sizeof since / sizeof *since);
     see(&s, false);
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent});
+    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent}, 1);
     double bent = bend(&s);
     for (size_t k = 0; k < s.graph->node_count; k++) since[k] = 3;
-    npg_held_take(&s.held, s.graph, &(npg_hold){s.rest, s.bent, since});
+    npg_held_take(&s.held, s.graph, &(npg_hold){s.rest, s.bent, since}, 1);
     assert_true(fabs(bend(&s) / bent - 0.75) < 0.01);
-    npg_held_take(&s.held, s.graph, &(npg_hold){s.bent, s.rest, since});
+    npg_held_take(&s.held, s.graph, &(npg_hold){s.bent, s.rest, since}, 1);
     assert_true(fabs(bend(&s) / bent - 0.25) < 0.01);
     /* what was hidden until now has been so for one more frame, what is seen for none */
     npg_held_count(&s.held, since, since, s.graph->node_count);
