@@ -71,10 +71,12 @@ programs() {
         cp "$file" broken
     done
     "$NEUPIG" doctor >log
-    for file in broken/*; do ! cmp -s "$file" "$(programs "$(basename "$file" .program)")"; done
+    for file in broken/*; do
+        if cmp -s "$file" "$(programs "$(basename "$file" .program)")"; then false; fi
+    done
     cp "$(programs adam- | head -n 1)" "$(programs isometry-)"
     "$NEUPIG" doctor >log
-    ! cmp -s "$(programs adam- | head -n 1)" "$(programs isometry-)"
+    if cmp -s "$(programs adam- | head -n 1)" "$(programs isometry-)"; then false; fi
 
     rm "$(programs isometry-)"
     LD_PRELOAD=$shim NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" bench --vertices 300 --points 300 \

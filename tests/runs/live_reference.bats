@@ -133,7 +133,7 @@ await() {
     await killed/job/followed_0.bin $pid 1000
     kill -KILL $pid
     wait $pid || true
-    ! ls killed/job/window*npg 2>/dev/null
+    [ -z "$(ls killed/job/window*npg 2>/dev/null)" ]
     cp -r killed other
     run "$NEUPIG" run --follow grows -o killed "${small[@]}" "${open[@]}"
     echo "$output"

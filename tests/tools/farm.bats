@@ -2,7 +2,7 @@
 
 load batch_helpers
 
-long='"epochs": 40, "window": 5, "overlap": 2'
+long='"epochs": 80, "window": 5, "overlap": 2'
 samples=$BATS_TEST_DIRNAME/../../samples
 
 setup_file() {
@@ -182,9 +182,13 @@ teardown() {
     has_state() { ls "farm/$1/job/window_000000.npg" || is_idle; }
     controller=$(cat "$slurm/slurmctld.pid")
     await "$controller" has_state a >/dev/null
-    scancel --batch --signal=TERM "${job}_1"
     await "$controller" has_state b >/dev/null
-    scontrol requeue "${job}_2"
+    scancel --batch --signal=TERM "${job}_2" # the one that has the job id of the array itself
+    is_queued_again() { grep -q 'stopped, queued again' "task-$1.log" || is_idle; }
+    await "$controller" is_queued_again 2
+    sleep 0.2
+    [ "$(grep -c 'stopping on request' task-1.log)" -eq 0 ] # the others go on
+    scontrol requeue "${job}_1"
     await "$controller" is_idle
     cat task-*.log
     [ "$(cat task-*.log | grep -c 'stopped, queued again')" -eq 2 ]
