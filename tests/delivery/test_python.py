@@ -85,13 +85,39 @@ class Files(unittest.TestCase):
     def test_ctrl_c_stops_a_run_in_good_order(self):
         words = ("import neupig, sys\n"
                  "neupig.run(sys.argv[1], sys.argv[2], align=\"no\", epochs=1000000, progress=lambda p: print(p.step, flush=True))\n")
-        child = subprocess.Popen([sys.executable, "-c", words, str(self.capture.points), str(WORK / "stopped")],
-                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        child.stdout.readline()
-        child.send_signal(signal.SIGINT)
-        _, said = child.communicate(timeout=60)
-        self.assertIn("KeyboardInterrupt", said)
-        self.assertFalse((WORK / "stopped" / "done.json").exists())
+        # the first two while the main thread has not begun to wait
+        for i, (delay, times) in enumerate([(0, 1), (0, 2), (0.01, 1), (0.3, 2)]):
+            output = WORK / f"stopped{i}"
+            child = subprocess.Popen([sys.executable, "-c", words, str(self.capture.points), str(output)],
+                                     stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            child.stdout.readline()
+            for _ in range(times):
+                time.sleep(delay)
+                child.send_signal(signal.SIGINT)
+            _, said = child.communicate(timeout=60)
+            self.assertEqual(child.returncode, -signal.SIGINT, said)
+            self.assertIn("KeyboardInterrupt", said)
+            self.assertFalse((output / "done.json").exists())
+
+    def test_a_run_closed_while_another_thread_waits(self):
+        run = neupig.Run(input=self.capture.points, output=WORK / "closed", align="no", epochs=1000000)
+        said = []
+
+        def wait():
+            try:
+                run.wait()
+            except neupig.Error as error:
+                said.append(error.status)
+
+        thread = threading.Thread(target=wait)
+        thread.start()
+        time.sleep(0.2)
+        run.close()
+        thread.join(60)
+        self.assertIn(said, ([], [neupig.Status.STOPPED], [neupig.Status.USAGE]))
+        self.assertFalse(thread.is_alive())
+        with self.assertRaises(neupig.Error):
+            run.wait()
 
 
 class Arrays(unittest.TestCase):

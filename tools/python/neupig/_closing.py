@@ -14,6 +14,9 @@ class Closing:
 
     def close(self) -> None:
         """Free everything; a second time does nothing."""
+        self._free()
+
+    def _free(self) -> None:
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -25,4 +28,4 @@ class Closing:
 
     def __del__(self) -> None:
         if getattr(self, "_handle", None):
-            self.close()
+            self._free()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import json
 import logging
 import os
 import pathlib
 import threading
+import weakref
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from ctypes import POINTER, byref, c_double, c_float, c_int64, c_ubyte, c_void_p, sizeof
 from dataclasses import dataclass
@@ -25,6 +27,7 @@ Path = Union[str, "os.PathLike[str]"]
 Result = TypeVar("Result")
 
 _log = logging.getLogger("neupig")
+_LOOK_S = 0.1
 _LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
 
 
@@ -133,6 +136,37 @@ def _rgba(colours: npt.ArrayLike, count: int) -> npt.NDArray[np.uint8]:
     return rgba
 
 
+def _aside(work: Callable[[], Result], interrupted: Callable[[], None]) -> Result:
+    """What work() returns or raises, done on a thread of its own if this is the main one: only that gets Ctrl-C, and gets
+    none while it is inside the library.  After Ctrl-C, interrupted() is called and work() goes on by itself."""
+    if threading.current_thread() is not threading.main_thread():
+        return work()
+    outcome: list[Result] = []
+    failure: list[BaseException] = []
+    is_over = threading.Lock()
+
+    def body() -> None:
+        try:
+            outcome.append(work())
+        except BaseException as error:  # handed to the caller's thread
+            failure.append(error)
+        finally:
+            is_over.release()
+
+    try:
+        is_over.acquire()
+        threading.Thread(target=body, daemon=True).start()
+        # a signal after Python's last look for one, before the wait, is seen only when that ends
+        while not is_over.acquire(timeout=_LOOK_S):
+            pass
+    except BaseException:
+        interrupted()
+        raise
+    if failure:
+        raise failure[0]
+    return outcome[0]
+
+
 class Run(Closing):
     """A run: frames come from files (``input``), or are pushed; results go to a folder (``output``), are pulled
     (``pull=True``), or both.
@@ -146,9 +180,11 @@ class Run(Closing):
 
     def __init__(self, *, progress: Callable[[Progress], None] | None = None, stages: Sequence[Stage] = (),
                  options: Options | None = None, **values: object) -> None:
+        self._closing = threading.Lock()
+        self._guard = threading.Condition()  # of _handle and _callers, and never taken by the main thread
+        self._callers = 0
         self._handle = c_void_p()
         self._failure: BaseException | None = None
-        self._closing = threading.Lock()
         chosen = options or Options()
         for name, value in values.items():
             chosen.set(name, value)
@@ -156,33 +192,26 @@ class Run(Closing):
         for stage in stages:
             self._add_stage(chosen, stage)
         self._hooks = self._make_hooks(progress)
+        _open_runs.add(self)
         check(lib.npg_run_open(byref(self._handle), chosen.handle, byref(self._hooks)))
 
-    def _patiently(self, work: Callable[[], Result]) -> Result:
-        """Call a function of the library that blocks so that Ctrl-C still reaches Python's main thread: it stops the run,
-        and the call is over before the exception goes on."""
-        if threading.current_thread() is not threading.main_thread():
-            return work()
-        outcome: list[Result] = []
-        failure: list[BaseException] = []
-
-        def body() -> None:
+    def _call(self, work: Callable[[c_void_p], Result]) -> Result:
+        """Call functions of the library that may block: Ctrl-C stops the run and goes on at once, close() waits until the
+        call is over."""
+        def counted() -> Result:
+            with self._guard:
+                handle = self._handle
+                if not handle:
+                    raise Error(Status.USAGE, "the run is closed")
+                self._callers += 1
             try:
-                outcome.append(work())
-            except BaseException as error:  # handed to the caller's thread
-                failure.append(error)
+                return work(handle)
+            finally:
+                with self._guard:
+                    self._callers -= 1
+                    self._guard.notify_all()
 
-        thread = threading.Thread(target=body, daemon=True)
-        thread.start()
-        try:
-            thread.join()
-        except BaseException:
-            self.stop()
-            thread.join()
-            raise
-        if failure:
-            raise failure[0]
-        return outcome[0]
+        return _aside(counted, self.stop)
 
     # ---- callbacks ----
 
@@ -225,11 +254,6 @@ class Run(Closing):
                 raise self._failure from error
             raise
 
-    def _open(self) -> c_void_p:
-        if not self._handle:
-            raise Error(Status.USAGE, "the run is closed")
-        return self._handle
-
     # ---- frames in, meshes out ----
 
     def push(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None,
@@ -245,26 +269,26 @@ class Run(Closing):
         cloud = native.CloudStruct(sizeof(native.CloudStruct), number, len(p), p.ctypes.data_as(POINTER(c_double)),
                                    None if n is None else n.ctypes.data_as(POINTER(c_float)),
                                    None if c is None else c.ctypes.data_as(POINTER(c_ubyte)))
-        handle = self._open()
-        self._patiently(lambda: self._check(lib.npg_run_push(handle, byref(cloud))))
+        self._call(lambda handle: self._check(lib.npg_run_push(handle, byref(cloud))))
 
     def wanted_number(self) -> int | None:
         """The number of the first frame that a run with ``output`` and without ``pull`` wants pushed: those with smaller
         numbers were solved by an earlier run of the same job that was broken off.  None: nothing was kept, push all."""
         number = c_int64()
-        handle = self._open()
-        self._patiently(lambda: self._check(lib.npg_run_wanted_number(handle, byref(number))))
+        self._call(lambda handle: self._check(lib.npg_run_wanted_number(handle, byref(number))))
         return None if number.value == -(1 << 63) else number.value
 
     def finish(self) -> None:
         """Say that no more frames will be pushed."""
-        self._check(lib.npg_run_finish(self._open()))
+        self._call(lambda handle: self._check(lib.npg_run_finish(handle)))
 
     def pull(self) -> Frame | None:
         """The next finished frame, None after the last.  Frames come as windows close, not in time order."""
-        handle = self._open()
+        return self._call(self._pull)
+
+    def _pull(self, handle: c_void_p) -> Frame | None:
         result = POINTER(native.ResultStruct)()
-        status = self._patiently(lambda: self._check(lib.npg_run_pull(handle, byref(result))))
+        status = self._check(lib.npg_run_pull(handle, byref(result)))
         if status is not Status.OK:
             if status is Status.STOPPED:
                 raise Error(status, "stopped on request")
@@ -285,8 +309,7 @@ class Run(Closing):
 
     def wait(self) -> Status:
         """Wait for the end: OK, PARTIAL or STOPPED; a failure is raised."""
-        handle = self._open()
-        return self._patiently(lambda: self._check(lib.npg_run_wait(handle)))
+        return self._call(lambda handle: self._check(lib.npg_run_wait(handle)))
 
     def stop(self) -> None:
         """Ask the run to stop soon; from any thread."""
@@ -294,10 +317,28 @@ class Run(Closing):
             lib.npg_run_stop(self._handle)
 
     def close(self) -> None:
-        """Stop the run if it is going on and free everything.  No other thread may be in push, pull or wait."""
-        with self._closing:
-            if self._handle:
-                lib.npg_run_close(byref(self._handle))
+        """Stop the run if it is going on and free everything, once calls that other threads are in have ended.  None may
+        be about to call stop."""
+        _aside(self._free, self.stop)
+
+    def _free(self) -> None:
+        with self._closing:  # a second one waits for the first
+            with self._guard:
+                handle, self._handle = self._handle, c_void_p()
+                if handle:
+                    lib.npg_run_stop(handle)
+                    self._guard.wait_for(lambda: not self._callers)
+            lib.npg_run_close(byref(handle))
+
+
+_open_runs: weakref.WeakSet[Run] = weakref.WeakSet()
+
+
+@atexit.register
+def _free_all() -> None:
+    """What Ctrl-C left open, before the interpreter is gone that a run's threads call back into."""
+    for run in list(_open_runs):
+        run._free()
 
 
 def _wait_for_files(run: Run, output: Path) -> Outcome:
@@ -377,8 +418,9 @@ def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None]
         raise failures[0]
     if not meshes:
         raise Error(Status.BAD_INPUT, "no frame got a mesh")
-    colours = meshes[0].colours
-    if colours is not None and any(not np.array_equal(m.colours, colours) for m in meshes):
-        colours = np.stack([m.colours for m in meshes])
+    all_colours = [m.colours for m in meshes if m.colours is not None]
+    colours = all_colours[0] if all_colours else None
+    if colours is not None and any(not np.array_equal(each, colours) for each in all_colours):
+        colours = np.stack(all_colours)
     return Motion(np.array([m.number for m in meshes], np.int64), np.stack([m.vertices for m in meshes]),
                   meshes[0].faces, np.array([m.residual for m in meshes]), np.array([m.coverage for m in meshes]), colours)

@@ -59,6 +59,6 @@ class Surface(Closing):
             raise Error(Status.USAGE, f"the surface has {self._count} vertices, not {len(v)}")
         check(lib.npg_surface_move(self._handle, v.ctypes.data_as(POINTER(c_float))))
 
-    def close(self) -> None:
+    def _free(self) -> None:
         if self._handle:
             lib.npg_surface_close(byref(self._handle))
