@@ -66,6 +66,8 @@ typedef struct npg_facts {
     size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
     int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */
     bool is_growing;        /* ... and goes on to: the next one is not closed                               */
+    double explained_least; /* share of a frame's points that a growing reference that bends must have places
+                               for: it is followed to the last frame before one of which it has fewer      */
     /* align, at the end of a fusing pass */
     int64_t past_count; /* frames that see too much that the reference does not have, and those beyond them */
     /* mesh */
@@ -194,6 +196,9 @@ npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk);
 
 /* True once the run should stop: long loops ask at least once a second and then return NPG_STOPPED. */
 bool npg_worker_stopping(const npg_worker *worker);
+
+/* The same of an npg_worker, as libraries and the parts of stages ask: their should_stop(user). */
+bool npg_worker_should_stop(void *worker);
 
 /* A line of the log; frame is the number of the frame it is about, -1 if none. */
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)

@@ -32,6 +32,10 @@ bool npg_worker_stopping(const npg_worker *worker)
 {
     return atomic_load(&worker->run->stop);
 }
+bool npg_worker_should_stop(void *worker)
+{
+    return npg_worker_stopping(worker);
+}
 json_t *npg_worker_report(npg_worker *worker)
 {
     return worker->report;

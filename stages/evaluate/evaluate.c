@@ -1,19 +1,13 @@
-/* Evaluate: says for every frame how well the deformed surface explains the points, and whether that is good
- * enough.  Flipped and stretched faces are counted on the whole reference, distances measured to a surface of
- * at most about NPG_THIN_SURFACE of its vertices. */
+/* Evaluate: says for every frame how well the deformed surface explains the points (measure.h), and whether
+ * that is good enough. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/evaluate_shape.h"
 #include "evaluate/evaluate_truth.h"
-#include "evaluate/misfit.h"
+#include "evaluate/measure.h"
 #include "evaluate/topology.h"
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/patch.h"
-#include "geometry/thin.h"
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "pipeline/file.h"
@@ -54,15 +48,12 @@ enum { SUMMED = sizeof summed / sizeof *summed };
 
 typedef struct evaluate_state {
     /* options; the shares in per cent */
-    double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max, cover_dist;
-    int64_t point_limit;
+    double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max;
+    npg_measure_settings measured;
     const char *truth_folder;
     npg_topology_settings watch;
     /* of the run */
-    npg_thin *thin;       /* W vertices of the reference: the surface that distances are to */
-    npg_surface *surface; /* moves from frame to frame */
-    npg_shape *shape;
-    npg_misfit_finder *finder;
+    npg_measure *measure; /* opened for the first frame that has a mesh */
     npg_topology *topology;
     npg_truth *truth;
     bool is_tied; /* the truth, in a frame */
@@ -70,166 +61,12 @@ typedef struct evaluate_state {
     float *tied_vert_unit;
     size_t tied_count;
     int64_t tied_number;
-    float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
-    npg_surface_hit *hits; /* N; owned */
-    float *vert_unit;      /* W x 3; owned */
-    uint32_t *nearest;     /* W; owned */
-    double *vert_areas;    /* W; owned */
-    uint8_t *unsupported;  /* W; owned */
-    size_t points_capacity, dists_capacity, hits_capacity;
     aggregate sums[SUMMED];
     int64_t *bad; /* numbers of the frames below the bar; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
 } evaluate_state;
 
-/* ---- points -> surface ---- */
-
-/* Every step-th point, so that no more than the limit are asked for. */
-static npg_status sample_points(evaluate_state *state, const npg_frame_box *box, const npg_frame *frame,
-                                size_t *taken)
-{
-    size_t limit = state->point_limit ? (size_t)state->point_limit : SIZE_MAX;
-    size_t step = frame->point_count > limit ? (frame->point_count + limit - 1) / limit : 1;
-    size_t count = (frame->point_count + step - 1) / step;
-    NPG_TRY(
-        npg_grow(&state->points, &state->points_capacity, count, 3 * sizeof *state->points, NPG_FOR_QUERY));
-    NPG_TRY(npg_grow(&state->hits, &state->hits_capacity, count, sizeof *state->hits, NPG_FOR_QUERY));
-    NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, count, sizeof *state->dists, NPG_FOR_QUERY));
-    *taken = 0;
-    for (size_t i = 0; i < frame->point_count; i += step) {
-        const float *p = frame->pos_local + 3 * i;
-        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) continue;
-        npg_box_local_to_unit(box, state->points + 3 * (*taken)++, p, 1);
-    }
-    return NPG_OK;
-}
-
-/* The value that a share of the sorted values does not pass. */
-static double quantile(const float *sorted, size_t count, double share)
-{
-    double at = share * (double)(count - 1);
-    size_t below = (size_t)at, above = below + 1 < count ? below + 1 : below;
-    double rest = at - (double)below;
-    return (double)sorted[below] * (1 - rest) + (double)sorted[above] * rest;
-}
-
-/* The distances of `count` points; the result in *mean_sq is in diagonals, squared. */
-static npg_status measure_points(evaluate_state *state, npg_figures *figures, size_t count, double per_unit,
-                                 double *mean_sq)
-{
-    double sum = 0, sum_sq = 0;
-    NPG_TRY(npg_surface_closest(state->surface, state->hits, state->points, count));
-    for (size_t i = 0; i < count; i++) {
-        double dist_sq = (double)state->hits[i].dist_sq;
-        sum_sq += dist_sq;
-        sum += sqrt(dist_sq);
-        state->dists[i] = (float)sqrt(dist_sq);
-    }
-    qsort(state->dists, count, sizeof *state->dists, npg_order_float);
-    figures->point_dist_median = quantile(state->dists, count, 0.5) * per_unit;
-    figures->point_dist_p95 = quantile(state->dists, count, 0.95) * per_unit;
-    figures->point_dist_mean = sum / (double)count * per_unit;
-    *mean_sq = sum_sq / (double)count * per_unit * per_unit;
-    return NPG_OK;
-}
-
-/* ---- surface -> points ---- */
-
-/* A vertex is covered when a point lies within cover-distance of it, or within twice the mean spacing of the
- * points on the surface where they are sparser than that. */
-static double cover_radius(const evaluate_state *state, double area, size_t point_count, double per_unit)
-{
-    double spacing = sqrt(area / (double)point_count); /* the side of a point's share of the surface */
-    return fmax(state->cover_dist / 100 / per_unit, 2 * spacing);
-}
-
-/* Misfits as they are written down, so that a run which reads them back decides as this one. */
-static void place_misfits(npg_figures *figures, const npg_frame_box *box)
-{
-    for (int i = 0; i < NPG_MISFITS; i++) {
-        npg_misfit *misfit = &figures->misfits[i];
-        float at[3] = {(float)misfit->at[0], (float)misfit->at[1], (float)misfit->at[2]};
-        double world[3];
-        npg_box_unit_to_world(box, world, at, 1);
-        misfit->share = (double)(float)misfit->share;
-        for (int a = 0; a < 3; a++) misfit->at[a] = (double)(float)world[a];
-    }
-}
-
-/* Vertices that no point of the reference's supports, and none of this frame within `radius` (in units). */
-static npg_status measure_unsupported(evaluate_state *state, npg_figures *figures, const npg_frame_box *box,
-                                      double radius, double whole)
-{
-    const npg_mesh *mesh = state->thin->mesh;
-    npg_patch patch;
-    double sum = 0;
-    if (!mesh->vert_unseen) return NPG_OK;
-    for (size_t i = 0; i < mesh->vert_count; i++) {
-        state->unsupported[i] = mesh->vert_unseen[i] && (double)state->dists[i] > radius * radius;
-        if (state->unsupported[i]) sum += state->vert_areas[i];
-    }
-    figures->unsupported_share = whole > 0 ? sum / whole : 0;
-    if (!(sum > 0)) return NPG_OK;
-    NPG_TRY(npg_patch_largest(&patch, state->unsupported, state->vert_unit, state->vert_areas, mesh));
-    npg_box_unit_to_world(box, figures->unsupported_at, patch.at, 1);
-    return NPG_OK;
-}
-
-/* After measure_points() of the same frame. */
-static npg_status measure_vertices(evaluate_state *state, npg_figures *figures, const npg_facts *facts,
-                                   size_t point_count, double per_unit, double *mean_sq)
-{
-    const npg_mesh *mesh = state->thin->mesh;
-    const float *vert_unit = state->vert_unit;
-    size_t v = mesh->vert_count;
-    npg_kdtree *tree;
-    NPG_TRY(npg_grow(&state->dists, &state->dists_capacity, v, sizeof *state->dists, NPG_FOR_QUERY));
-    NPG_TRY(npg_kdtree_open(&tree, state->points, point_count));
-    npg_status status = npg_kdtree_nearest(tree, state->nearest, state->dists, vert_unit, v, 1, 0);
-    npg_kdtree_close(&tree);
-    NPG_TRY(status);
-    double area = npg_vertex_areas(state->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
-    double radius = cover_radius(state, area, point_count, per_unit), covered = 0, whole = 0, sum = 0,
-           sum_sq = 0;
-    for (size_t i = 0; i < v; i++) {
-        double dist_sq = (double)state->dists[i];
-        sum_sq += dist_sq;
-        sum += sqrt(dist_sq);
-        whole += state->vert_areas[i];
-        if (dist_sq <= radius * radius) covered += state->vert_areas[i];
-    }
-    figures->coverage = whole > 0 ? covered / whole : 0;
-    figures->vertex_dist_mean = sum / (double)v * per_unit;
-    *mean_sq = sum_sq / (double)v * per_unit * per_unit;
-    NPG_TRY(measure_unsupported(state, figures, &facts->box, radius, whole));
-    npg_misfit_frame frame = {.points = state->points,
-                              .hits = state->hits,
-                              .point_count = point_count,
-                              .point_dist_median = figures->point_dist_median / per_unit,
-                              .vert_unit = vert_unit,
-                              .vert_dist_sq = state->dists,
-                              .vert_areas = state->vert_areas,
-                              .area = area};
-    NPG_TRY(npg_misfit_find(state->finder, figures->misfits, &frame));
-    place_misfits(figures, &facts->box);
-    return NPG_OK;
-}
-
 /* ---- one frame ---- */
-
-static npg_status open_for_reference(evaluate_state *state, const npg_mesh *reference, double unseen_share)
-{
-    NPG_TRY(npg_shape_open(&state->shape, reference));
-    NPG_TRY(npg_thin_open(&state->thin, reference, NPG_THIN_SURFACE));
-    npg_mesh *mesh = state->thin->mesh;
-    size_t w = mesh->vert_count;
-    NPG_TRY(npg_misfit_open(&state->finder, mesh, unseen_share));
-    NPG_TRY(npg_alloc_array(&state->vert_unit, NPG_FOR_QUERY, w, 3 * sizeof *state->vert_unit));
-    NPG_TRY(npg_alloc_array(&state->nearest, NPG_FOR_QUERY, w, sizeof *state->nearest));
-    NPG_TRY(npg_alloc_array(&state->vert_areas, NPG_FOR_QUERY, w, sizeof *state->vert_areas));
-    NPG_TRY(npg_alloc(&state->unsupported, NPG_FOR_QUERY, w));
-    return npg_surface_open(&state->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
-}
 
 static npg_status check_vertices(const npg_frame *frame, const npg_mesh *reference)
 {
@@ -313,21 +150,11 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    npg_figures *figures = &frame->figures;
-    double per_unit = 1 / (facts->box.scale * facts->box.diagonal), points_sq, vertices_sq;
-    size_t point_count = 0;
-    if (!state->surface) NPG_TRY(open_for_reference(state, facts->reference, facts->unseen_share));
+    if (!state->measure)
+        NPG_TRY(npg_measure_open(&state->measure, facts->reference, facts->unseen_share, &state->measured));
     NPG_TRY(check_vertices(frame, facts->reference));
-    npg_shape_measure(state->shape, figures, frame->vert_unit);
     if (state->truth) NPG_TRY(compare_truth(worker, frame));
-    if (!frame->is_skipped) NPG_TRY(sample_points(state, &facts->box, frame, &point_count));
-    if (!point_count) return NPG_OK;
-    npg_thin_gather(state->thin, state->vert_unit, frame->vert_unit);
-    NPG_TRY(npg_surface_move(state->surface, state->vert_unit));
-    NPG_TRY(measure_points(state, figures, point_count, per_unit, &points_sq));
-    NPG_TRY(measure_vertices(state, figures, facts, point_count, per_unit, &vertices_sq));
-    figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5; /* in the unit of the paper's tables */
-    return NPG_OK;
+    return npg_measure_frame(state->measure, frame, &facts->box);
 }
 
 /* ---- the verdict ---- */
@@ -553,35 +380,19 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 static void uninit(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
-    npg_surface_close(&state->surface);
-    npg_thin_close(&state->thin);
-    npg_shape_close(&state->shape);
-    npg_misfit_close(&state->finder);
+    npg_measure_close(&state->measure);
     npg_topology_close(&state->topology);
     npg_truth_close(&state->truth);
-    npg_release(&state->points);
-    npg_release(&state->dists);
-    npg_release(&state->hits);
-    npg_release(&state->vert_unit);
-    npg_release(&state->nearest);
-    npg_release(&state->vert_areas);
-    npg_release(&state->unsupported);
     npg_release(&state->bad);
     npg_release(&state->tied_vert_unit);
 }
 
-/* Points, hits and distances, with the k-d tree about as much again; per vertex of the reference the shape,
- * the surface and its search tree. */
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const evaluate_state *state = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    size_t points = facts->point_count_max, limit = (size_t)state->point_limit;
-    if (limit && points > limit) points = limit;
     *chunks_held = 1;
-    return points * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
-           points * 120 +                          /* misfits: were all points far, with their links */
-           760 * npg_worker_verts_at_most(worker); /* bytes per vertex, rounded up */
+    return npg_measure_memory(&state->measured, npg_worker_facts(worker)->point_count_max,
+                              npg_worker_verts_at_most(worker));
 }
 
 #define AT(member) offsetof(evaluate_state, member)
@@ -603,9 +414,9 @@ static const npg_option options[] = {
         "... and at most this share of its surface has no points near it, "
         "neither of the frames that the reference was made from (of a given mesh: of the keyframe, "
         "where its sensors could see it) nor of its own, in per cent"),
-    NPG_ROW_REAL  ("cover-distance",  AT(cover_dist),         "1",      0,     100,  "PERCENT",
+    NPG_ROW_REAL  ("cover-distance",  AT(measured.cover_dist),"1",      0,     100,  "PERCENT",
         "How near a point must be to cover the surface, in per cent of the diagonal"),
-    NPG_ROW_INT   ("evaluate-points", AT(point_limit),        "100000", 0,     1e12, NULL,
+    NPG_ROW_INT   ("evaluate-points", AT(measured.point_limit),"100000", 0,     1e12, NULL,
         "Points per frame that figures are taken from, evenly spread over the file; 0: all"),
     NPG_ROW_TEXT  ("truth",           AT(truth_folder),       "",       "DIR",
         "Folder with the true meshes, numbered as the frames: their figures go into the report"),

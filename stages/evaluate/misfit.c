@@ -175,11 +175,16 @@ static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_m
     return NPG_OK;
 }
 
-/* Flag the vertices that are further than `reach` from all points. */
+static bool is_in_sight(const npg_misfit_frame *frame, size_t v)
+{
+    return !frame->is_in_sight || frame->is_in_sight[v];
+}
+
+/* Flag the vertices that are further than `reach` from all points, though a sensor could see them. */
 static void flag_off(npg_misfit_finder *f, const npg_misfit_frame *frame, double reach)
 {
     for (size_t i = 0; i < f->reference->vert_count; i++)
-        f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach;
+        f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach && is_in_sight(frame, i);
 }
 
 static void join_flagged(npg_misfit_finder *f)
@@ -233,11 +238,15 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
     return NPG_OK;
 }
 
-/* Area, middle and points of every part as it lies in this frame. */
-static void sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
+/* Area, middle and points of every part as it lies in this frame, of what is in sight.  Returns all of that
+ * area. */
+static double sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
 {
+    double whole = 0;
     for (size_t i = 0; i < 5 * f->part_count; i++) f->part_sums[i] = 0;
     for (size_t v = 0; v < f->reference->vert_count; v++) {
+        if (!is_in_sight(frame, v)) continue;
+        whole += frame->vert_areas[v];
         double *sum = f->part_sums + 5 * (size_t)f->part_of[v];
         sum[0] += frame->vert_areas[v];
         for (size_t a = 0; a < 3; a++)
@@ -245,16 +254,18 @@ static void sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
     }
     for (size_t i = 0; i < frame->point_count; i++)
         f->part_sums[5 * (size_t)f->part_of[f->reference->faces[3 * (size_t)frame->hits[i].face]] + 4] += 1;
+    return whole;
 }
 
 static void find_deserted(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
 {
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!f->is_closed || f->part_count < 2 || !frame->point_count || !(frame->area > 0)) return;
-    sum_parts(f, frame);
+    if (!f->is_closed || f->part_count < 2 || !frame->point_count) return;
+    double whole = sum_parts(f, frame);
     for (size_t p = 0; p < f->part_count; p++) {
         const double *sum = f->part_sums + 5 * p;
-        double expected = (double)frame->point_count * sum[0] / frame->area, missing = expected - sum[4];
+        if (!(sum[0] > 0)) continue;
+        double expected = (double)frame->point_count * sum[0] / whole, missing = expected - sum[4];
         double share = missing / (double)frame->point_count;
         if (!(sum[4] < DESERTED_SHARE * expected) || missing < LEAST_MISSED || share <= misfit->share)
             continue;

@@ -18,7 +18,8 @@
  * What sampling can explain is nothing: a place of fewer than 12 points, and one on the surface
  * where fewer than 20 points would be expected or that has fewer than 6 vertices' share of the area.
  * A reference with a border, or one that saw only a part of its frame, is never bare, torn or deserted:
- * what cameras see differs. */
+ * what cameras see differs.  Where it is known what of the surface they could see in a frame, the rest of it
+ * is neither bare nor torn, and has no share of the points. */
 #ifndef NPG_MISFIT_H
 #define NPG_MISFIT_H
 
@@ -42,6 +43,7 @@ typedef struct npg_misfit_frame {
     const float *vert_dist_sq; /* V, to the nearest point         */
     const double *vert_areas;  /* V, in this frame, and their sum */
     double area;
+    const uint8_t *is_in_sight; /* V: of a sensor, or NULL: no sensor is known */
 } npg_misfit_frame;
 
 /* Fill misfits[NPG_MISFITS]; `at` in units.  far's share is of the points, the others'

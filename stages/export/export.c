@@ -387,11 +387,6 @@ static void report_settings(json_t *object, const export_state *state)
 
 /* ---- the other forms ---- */
 
-static bool should_stop(void *worker)
-{
-    return npg_worker_stopping(worker);
-}
-
 /* What of the reference is the same in all poses. */
 static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, float **rest, float **corners)
 {
@@ -419,7 +414,7 @@ static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, flo
 static npg_status write_forms(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    npg_form_watch watch = {.should_stop = should_stop, .user = worker};
+    npg_form_watch watch = {.should_stop = npg_worker_should_stop, .user = worker};
     float *rest = NULL, *corners = NULL;
     if (!npg_forms_any(&state->choice)) return NPG_OK;
     if (!state->faces) NPG_TRY(begin_meshes(worker));

@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "geometry/vec3.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
@@ -217,7 +218,7 @@ static void closest_of(const job *j, size_t i)
     search s = {j->surface, j->points + 3 * i, {UINT32_MAX, {0, 0, 0}, INFINITY}};
     npg_surface_hit *hit = &j->hits[i];
     float radius = INFINITY;
-    if (!isfinite(s.point[0]) || !isfinite(s.point[1]) || !isfinite(s.point[2])) {
+    if (!npg_vec3_is_finitef(s.point)) {
         *hit = s.best;
         return;
     }

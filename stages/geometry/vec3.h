@@ -30,6 +30,11 @@ static inline float npg_vec3_lengthf(const float a[3])
     return sqrtf(npg_vec3_dotf(a, a));
 }
 
+static inline bool npg_vec3_is_finitef(const float a[3])
+{
+    return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]);
+}
+
 /* out = a - b; out may be a or b. */
 static inline void npg_vec3_sub(double out[3], const double a[3], const double b[3])
 {

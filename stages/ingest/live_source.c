@@ -12,11 +12,6 @@
 
 /* ---- opening ---- */
 
-static bool wants_stop(void *user)
-{
-    return npg_worker_stopping(user);
-}
-
 static npg_status open_follow(npg_live_source *live)
 {
     const npg_live_settings *s = &live->settings;
@@ -26,7 +21,7 @@ static npg_status open_follow(npg_live_source *live)
                                           .idle_s = s->follow_idle_s,
                                           .settle_s = s->follow_settle_s,
                                           .finds_gaps = s->missing != NPG_MISSING_IGNORE,
-                                          .stopping = wants_stop,
+                                          .stopping = npg_worker_should_stop,
                                           .user = live->worker};
     if (!s->follow_end[0] && !(s->follow_idle_s > 0))
         return npg_error(NPG_USAGE, "options follow-end and follow-idle: nothing would ever end this run");
@@ -48,7 +43,7 @@ static npg_status open_source(npg_live_source *live)
                          frames);
     if (settings->follow[0]) return open_follow(live);
     NPG_TRY(npg_stream_open(&live->stream, STDIN_FILENO, "standard input"));
-    npg_stream_set_stop(live->stream, wants_stop, live->worker);
+    npg_stream_set_stop(live->stream, npg_worker_should_stop, live->worker);
     return NPG_OK;
 }
 

@@ -35,11 +35,6 @@ static void report_candidates(npg_worker *worker, const npg_draft_result *result
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }
 
-static bool should_stop(void *worker)
-{
-    return npg_worker_stopping(worker);
-}
-
 static npg_status compare(npg_worker *worker, npg_draft_result *result, const npg_sights *sights)
 {
     const npg_facts *facts = npg_worker_facts(worker);
@@ -47,7 +42,7 @@ static npg_status compare(npg_worker *worker, npg_draft_result *result, const np
     npg_draft_result results[NPG_CHOICE_MAX];
     size_t count, best;
     double since = npg_clock_s();
-    settings.should_stop = should_stop;
+    settings.should_stop = npg_worker_should_stop;
     settings.user = worker;
     NPG_TRY(npg_choose(results, &count, &best, sights, facts->plan.key, facts->frame_count, &settings));
     if (!count) return NPG_OK;

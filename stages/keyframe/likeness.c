@@ -5,6 +5,7 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/vec3.h"
 #include "ingest/formats/reader.h"
 
 #define LOOKED_AT 1000
@@ -22,7 +23,7 @@ static size_t spread_finite(float *out, size_t most, const float *points, size_t
     size_t spread = npg_points_spread(out, NULL, most, points, NULL, count), kept = 0;
     for (size_t i = 0; i < spread; i++) {
         const float *p = out + 3 * i;
-        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) continue;
+        if (!npg_vec3_is_finitef(p)) continue;
         for (int a = 0; a < 3; a++) out[3 * kept + (size_t)a] = p[a];
         kept++;
     }

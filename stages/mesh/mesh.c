@@ -93,18 +93,13 @@ typedef struct making { /* what is known while the reference is made */
     npg_mesh *mesh;         /* owned */
 } making;
 
-static bool should_stop(void *worker)
-{
-    return npg_worker_stopping(worker);
-}
-
 /* ---- from points ---- */
 
 static npg_status make(making *m)
 {
     npg_reconstruct_settings settings = m->state->surface;
     settings.poisson = poisson_settings(m->state);
-    settings.poisson.should_stop = should_stop;
+    settings.poisson.should_stop = npg_worker_should_stop;
     settings.poisson.user = m->worker;
     return npg_reconstruct(&m->mesh, &m->invented_share, m->worker, &m->set, &settings);
 }
@@ -136,7 +131,7 @@ static npg_status cut_welds(making *m)
     npg_sights *sights = is_last ? npg_worker_take_fact(m->worker, &npg_fact_sights)
                                  : npg_worker_fact(m->worker, &npg_fact_sights);
     npg_weld_settings settings = {
-        .spacing_unit = m->set.spacing, .should_stop = should_stop, .user = m->worker};
+        .spacing_unit = m->set.spacing, .should_stop = npg_worker_should_stop, .user = m->worker};
     npg_weld_cut done;
     if (!sights) return NPG_OK;
     size_t at = npg_sights_find(sights, m->key->index);

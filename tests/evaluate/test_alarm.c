@@ -334,6 +334,31 @@ static void bare_and_torn_surface_is_found(void **state)
     close_sheet(&s);
 }
 
+/* The same, but the sensors have only the left half in sight, and then nothing. */
+static void what_no_sensor_has_in_sight_is_not_missing(void **state)
+{
+    sheet s;
+    npg_misfit m[NPG_MISFITS];
+    uint8_t is_in_sight[VERTS] = {0};
+    (void)state;
+    open_sheet(&s, false);
+    for (size_t v = 0; v < VERTS; v++) {
+        is_in_sight[v] = v % (SIDE + 1) <= SIDE / 2;
+        if (is_in_sight[v]) continue;
+        s.vert_dist_sq[v] = 0.09f;
+        s.vert_unit[3 * v] = 0.5f + 3 * (s.vert_unit[3 * v] - 0.5f);
+    }
+    find(m, &s);
+    assert_true(m[NPG_MISFIT_BARE].share > 0.4 && m[NPG_MISFIT_TORN].share > 0.4);
+    s.frame.is_in_sight = is_in_sight;
+    find(m, &s);
+    for (int k = 0; k < NPG_MISFITS; k++) assert_true(m[k].share == 0);
+    memset(is_in_sight, 0, sizeof is_in_sight);
+    find(m, &s);
+    for (int k = 0; k < NPG_MISFITS; k++) assert_true(m[k].share == 0);
+    close_sheet(&s);
+}
+
 static void what_sampling_or_a_border_explains_is_not_bare(void **state)
 {
     sheet s;
@@ -392,6 +417,7 @@ int main(void)
         cmocka_unit_test(points_in_a_cluster_far_off_are_found_and_scattered_ones_not),
         cmocka_unit_test(what_lies_beyond_a_border_is_not_far),
         cmocka_unit_test(bare_and_torn_surface_is_found),
+        cmocka_unit_test(what_no_sensor_has_in_sight_is_not_missing),
         cmocka_unit_test(what_sampling_or_a_border_explains_is_not_bare),
         cmocka_unit_test(a_part_without_points_of_its_own_is_deserted)};
     return cmocka_run_group_tests(tests, NULL, NULL);

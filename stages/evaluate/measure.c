@@ -1,0 +1,261 @@
+/* Measure: see measure.h.  Flipped and stretched faces are counted on the whole reference, distances measured
+ * to a surface of at most about NPG_THIN_SURFACE of its vertices. */
+#include "evaluate/measure.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "align/visible.h"
+#include "evaluate/evaluate_shape.h"
+#include "evaluate/misfit.h"
+#include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
+#include "geometry/patch.h"
+#include "geometry/thin.h"
+#include "geometry/vec3.h"
+#include "pipeline/memory.h"
+#include "pipeline/order.h"
+
+struct npg_measure {
+    npg_measure_settings settings;
+    npg_thin *thin;       /* W vertices of the reference: the surface that distances are to */
+    npg_surface *surface; /* moves from frame to frame */
+    npg_shape *shape;
+    npg_misfit_finder *finder;
+    float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
+    npg_surface_hit *hits; /* N; owned */
+    size_t points_capacity, dists_capacity, hits_capacity;
+    float *vert_unit;     /* W x 3; owned */
+    uint32_t *nearest;    /* W; owned */
+    double *vert_areas;   /* W; owned */
+    uint8_t *unsupported; /* W; owned */
+    npg_visible visible;  /* of the sensors' rays: W */
+    float *normals;       /* W x 3, in the frame; owned */
+    uint8_t *is_in_sight; /* W; owned */
+};
+
+/* ---- the figures' room ---- */
+
+static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_share)
+{
+    NPG_TRY(npg_shape_open(&m->shape, reference));
+    NPG_TRY(npg_thin_open(&m->thin, reference, NPG_THIN_SURFACE));
+    npg_mesh *mesh = m->thin->mesh;
+    size_t w = mesh->vert_count;
+    NPG_TRY(npg_misfit_open(&m->finder, mesh, unseen_share));
+    NPG_TRY(npg_alloc_array(&m->vert_unit, NPG_FOR_QUERY, w, 3 * sizeof *m->vert_unit));
+    NPG_TRY(npg_alloc_array(&m->nearest, NPG_FOR_QUERY, w, sizeof *m->nearest));
+    NPG_TRY(npg_alloc_array(&m->vert_areas, NPG_FOR_QUERY, w, sizeof *m->vert_areas));
+    NPG_TRY(npg_alloc(&m->unsupported, NPG_FOR_QUERY, w));
+    NPG_TRY(npg_visible_open(&m->visible, w));
+    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_QUERY, w, 3 * sizeof *m->normals));
+    NPG_TRY(npg_alloc(&m->is_in_sight, NPG_FOR_QUERY, w));
+    return npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
+}
+
+npg_status npg_measure_open(npg_measure **measure, const npg_mesh *reference, double unseen_share,
+                            const npg_measure_settings *settings)
+{
+    npg_measure *m;
+    NPG_TRY(npg_alloc_array(&m, NPG_FOR_QUERY, 1, sizeof *m));
+    m->settings = *settings;
+    npg_status status = fill(m, reference, unseen_share);
+    if (status) npg_measure_close(&m);
+    *measure = m;
+    return status;
+}
+
+void npg_measure_close(npg_measure **measure)
+{
+    npg_measure *m = *measure;
+    if (!m) return;
+    npg_surface_close(&m->surface);
+    npg_thin_close(&m->thin);
+    npg_shape_close(&m->shape);
+    npg_misfit_close(&m->finder);
+    npg_release(&m->points);
+    npg_release(&m->dists);
+    npg_release(&m->hits);
+    npg_release(&m->vert_unit);
+    npg_release(&m->nearest);
+    npg_release(&m->vert_areas);
+    npg_release(&m->unsupported);
+    npg_visible_close(&m->visible);
+    npg_release(&m->normals);
+    npg_release(&m->is_in_sight);
+    npg_release(measure);
+}
+
+size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_count, size_t vert_count)
+{
+    size_t limit = (size_t)settings->point_limit;
+    if (limit && point_count > limit) point_count = limit;
+    return point_count * (3 * sizeof(float) + sizeof(npg_surface_hit) + 5 * sizeof(float)) +
+           point_count * 120 + /* misfits: were all points far, with their links */
+           840 * vert_count;   /* bytes per vertex, rounded up */
+}
+
+/* ---- points -> surface ---- */
+
+/* Every step-th point, so that no more than the limit are asked for. */
+static npg_status sample_points(npg_measure *m, const npg_frame_box *box, const npg_frame *frame,
+                                size_t *taken)
+{
+    size_t limit = m->settings.point_limit ? (size_t)m->settings.point_limit : SIZE_MAX;
+    size_t step = frame->point_count > limit ? (frame->point_count + limit - 1) / limit : 1;
+    size_t count = (frame->point_count + step - 1) / step;
+    NPG_TRY(npg_grow(&m->points, &m->points_capacity, count, 3 * sizeof *m->points, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&m->hits, &m->hits_capacity, count, sizeof *m->hits, NPG_FOR_QUERY));
+    NPG_TRY(npg_grow(&m->dists, &m->dists_capacity, count, sizeof *m->dists, NPG_FOR_QUERY));
+    *taken = 0;
+    for (size_t i = 0; i < frame->point_count; i += step) {
+        const float *p = frame->pos_local + 3 * i;
+        if (!npg_vec3_is_finitef(p)) continue;
+        npg_box_local_to_unit(box, m->points + 3 * (*taken)++, p, 1);
+    }
+    return NPG_OK;
+}
+
+/* The value that a share of the sorted values does not pass. */
+static double quantile(const float *sorted, size_t count, double share)
+{
+    double at = share * (double)(count - 1);
+    size_t below = (size_t)at, above = below + 1 < count ? below + 1 : below;
+    double rest = at - (double)below;
+    return (double)sorted[below] * (1 - rest) + (double)sorted[above] * rest;
+}
+
+/* The distances of `count` points; the result in *mean_sq is in diagonals, squared. */
+static npg_status measure_points(npg_measure *m, npg_figures *figures, size_t count, double per_unit,
+                                 double *mean_sq)
+{
+    double sum = 0, sum_sq = 0;
+    NPG_TRY(npg_surface_closest(m->surface, m->hits, m->points, count));
+    for (size_t i = 0; i < count; i++) {
+        double dist_sq = (double)m->hits[i].dist_sq;
+        sum_sq += dist_sq;
+        sum += sqrt(dist_sq);
+        m->dists[i] = (float)sqrt(dist_sq);
+    }
+    qsort(m->dists, count, sizeof *m->dists, npg_order_float);
+    figures->point_dist_median = quantile(m->dists, count, 0.5) * per_unit;
+    figures->point_dist_p95 = quantile(m->dists, count, 0.95) * per_unit;
+    figures->point_dist_mean = sum / (double)count * per_unit;
+    *mean_sq = sum_sq / (double)count * per_unit * per_unit;
+    return NPG_OK;
+}
+
+/* ---- surface -> points ---- */
+
+/* A vertex is covered when a point lies within cover-distance of it, or within twice the mean spacing of the
+ * points on the surface where they are sparser than that. */
+static double cover_radius(const npg_measure *m, double area, size_t point_count, double per_unit)
+{
+    double spacing = sqrt(area / (double)point_count); /* the side of a point's share of the surface */
+    return fmax(m->settings.cover_dist / 100 / per_unit, 2 * spacing);
+}
+
+/* Misfits as they are written down, so that a run which reads them back decides as this one. */
+static void place_misfits(npg_figures *figures, const npg_frame_box *box)
+{
+    for (int i = 0; i < NPG_MISFITS; i++) {
+        npg_misfit *misfit = &figures->misfits[i];
+        float at[3] = {(float)misfit->at[0], (float)misfit->at[1], (float)misfit->at[2]};
+        double world[3];
+        npg_box_unit_to_world(box, world, at, 1);
+        misfit->share = (double)(float)misfit->share;
+        for (int a = 0; a < 3; a++) misfit->at[a] = (double)(float)world[a];
+    }
+}
+
+/* Vertices that no point of the reference's supports, and none of this frame within `radius` (in units). */
+static npg_status measure_unsupported(npg_measure *m, npg_figures *figures, const npg_frame_box *box,
+                                      double radius, double whole)
+{
+    const npg_mesh *mesh = m->thin->mesh;
+    npg_patch patch;
+    double sum = 0;
+    if (!mesh->vert_unseen) return NPG_OK;
+    for (size_t i = 0; i < mesh->vert_count; i++) {
+        m->unsupported[i] = mesh->vert_unseen[i] && (double)m->dists[i] > radius * radius;
+        if (m->unsupported[i]) sum += m->vert_areas[i];
+    }
+    figures->unsupported_share = whole > 0 ? sum / whole : 0;
+    if (!(sum > 0)) return NPG_OK;
+    NPG_TRY(npg_patch_largest(&patch, m->unsupported, m->vert_unit, m->vert_areas, mesh));
+    npg_box_unit_to_world(box, figures->unsupported_at, patch.at, 1);
+    return NPG_OK;
+}
+
+/* What the frame's sensors could see of the surface as it lies there; it is all where none is known. */
+static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const npg_frame_box *box,
+                                double spacing)
+{
+    const npg_mesh *mesh = m->thin->mesh;
+    float sensors[3 * NPG_FRAME_SENSORS_MOST];
+    npg_box_local_to_unit(box, sensors, frame->sensor_local, frame->sensor_count);
+    npg_mesh_vertex_normals(m->normals, m->vert_unit, mesh->vert_count, mesh->faces, mesh->face_count);
+    return npg_visible_find(&m->visible, m->is_in_sight, m->surface, sensors, frame->sensor_count,
+                            m->vert_unit, NULL, m->normals, mesh->vert_count, spacing);
+}
+
+/* After measure_points() of the same frame. */
+static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_frame_box *box,
+                                   size_t point_count, double per_unit, double *mean_sq)
+{
+    const npg_mesh *mesh = m->thin->mesh;
+    npg_figures *figures = &frame->figures;
+    const float *vert_unit = m->vert_unit;
+    size_t v = mesh->vert_count;
+    npg_kdtree *tree;
+    NPG_TRY(npg_grow(&m->dists, &m->dists_capacity, v, sizeof *m->dists, NPG_FOR_QUERY));
+    NPG_TRY(npg_kdtree_open(&tree, m->points, point_count));
+    npg_status status = npg_kdtree_nearest(tree, m->nearest, m->dists, vert_unit, v, 1, 0);
+    npg_kdtree_close(&tree);
+    NPG_TRY(status);
+    double area = npg_vertex_areas(m->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
+    double radius = cover_radius(m, area, point_count, per_unit), covered = 0, whole = 0, sum = 0, sum_sq = 0;
+    for (size_t i = 0; i < v; i++) {
+        double dist_sq = (double)m->dists[i];
+        sum_sq += dist_sq;
+        sum += sqrt(dist_sq);
+        whole += m->vert_areas[i];
+        if (dist_sq <= radius * radius) covered += m->vert_areas[i];
+    }
+    figures->coverage = whole > 0 ? covered / whole : 0;
+    figures->vertex_dist_mean = sum / (double)v * per_unit;
+    *mean_sq = sum_sq / (double)v * per_unit * per_unit;
+    NPG_TRY(measure_unsupported(m, figures, box, radius, whole));
+    if (frame->sensor_count) NPG_TRY(find_in_sight(m, frame, box, sqrt(area / (double)point_count)));
+    npg_misfit_frame found = {.points = m->points,
+                              .hits = m->hits,
+                              .point_count = point_count,
+                              .point_dist_median = figures->point_dist_median / per_unit,
+                              .vert_unit = vert_unit,
+                              .vert_dist_sq = m->dists,
+                              .vert_areas = m->vert_areas,
+                              .area = area,
+                              .is_in_sight = frame->sensor_count ? m->is_in_sight : NULL};
+    NPG_TRY(npg_misfit_find(m->finder, figures->misfits, &found));
+    place_misfits(figures, box);
+    return NPG_OK;
+}
+
+/* ---- one frame ---- */
+
+npg_status npg_measure_frame(npg_measure *measure, npg_frame *frame, const npg_frame_box *box)
+{
+    npg_measure *m = measure;
+    npg_figures *figures = &frame->figures;
+    double per_unit = 1 / (box->scale * box->diagonal), points_sq, vertices_sq;
+    size_t point_count = 0;
+    npg_shape_measure(m->shape, figures, frame->vert_unit);
+    if (!frame->is_skipped) NPG_TRY(sample_points(m, box, frame, &point_count));
+    if (!point_count) return NPG_OK;
+    npg_thin_gather(m->thin, m->vert_unit, frame->vert_unit);
+    NPG_TRY(npg_surface_move(m->surface, m->vert_unit));
+    NPG_TRY(measure_points(m, figures, point_count, per_unit, &points_sq));
+    NPG_TRY(measure_vertices(m, frame, box, point_count, per_unit, &vertices_sq));
+    figures->chamfer = 0.5 * (points_sq + vertices_sq) * 1e5; /* in the unit of the paper's tables */
+    return NPG_OK;
+}
