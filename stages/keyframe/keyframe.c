@@ -5,16 +5,20 @@
  * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
  * surface, near the middle in time.
  *
- * Not in the paper: the score hardly tells frames apart, so the frame it finds is only the first of several
- * candidates (shortlist.h), of which the choosing pass takes the one whose surface fits best (choose.h).
+ * Not in the paper: such cells count points more than surface, which before several sensors differs from
+ * frame to frame.  There the cells are larger (extent.h) and the middle weighs less.  And the frame that is
+ * found is only the first of several candidates (shortlist.h), of which the choosing pass takes the one whose
+ * surface fits best (choose.h).
  * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
  * (likeness.h). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/vec3.h"
 #include "job/job.h"
 #include "keyframe/choose_pass.h"
+#include "keyframe/extent.h"
 #include "keyframe/likeness.h"
 #include "keyframe/outside.h"
 #include "keyframe/shortlist.h"
@@ -22,9 +26,6 @@
 #include "pipeline/live_plan.h"
 #include "pipeline/order.h"
 
-#define GRID         512 /* cells per axis */
-#define CELL_WORDS   ((size_t)GRID * GRID * GRID / 64)
-#define BLOCK        1024 /* points turned into unit coordinates at a time */
 #define SHOWN_SCORES 5
 #define NO_NUMBER    (-1)
 
@@ -42,7 +43,7 @@ typedef struct keyframe_state {
     int choice, welds;               /* options */
     npg_shortlist shortlist;
     double box_margin;            /* option */
-    uint64_t *cells;              /* CELL_WORDS, a bit per cell, all 0 between frames; owned */
+    npg_extent *extent;           /* from the first usable frame on; owned */
     candidate best[SHOWN_SCORES]; /* best first */
     size_t best_count;
     npg_likeness *likeness; /* of the user's own mesh; owned */
@@ -64,11 +65,6 @@ static bool is_open(const npg_facts *facts)
 
 /* ---- measuring ---- */
 
-static bool is_finite_point(const float *point)
-{
-    return isfinite(point[0]) && isfinite(point[1]) && isfinite(point[2]);
-}
-
 static npg_status note_diagonal(keyframe_state *state, double diagonal)
 {
     NPG_TRY(npg_grow(&state->diagonals, &state->diagonal_room, state->diagonal_count + 1,
@@ -87,7 +83,7 @@ static npg_status measure_frame(keyframe_state *state, npg_facts *facts, const n
     if (frame->is_skipped) return NPG_OK;
     state->usable_count++;
     for (size_t i = 0; i < frame->point_count; i++)
-        if (is_finite_point(frame->pos_local + 3 * i))
+        if (npg_vec3_is_finitef(frame->pos_local + 3 * i))
             npg_bounds_add_points(&bounds, frame->pos_local + 3 * i, 1);
     npg_bounds_add(&facts->bounds_local, &bounds);
     return bounds.lo[0] <= bounds.hi[0] ? note_diagonal(state, npg_bounds_diagonal(&bounds)) : NPG_OK;
@@ -156,35 +152,6 @@ static npg_status close_measuring(npg_worker *worker)
 
 /* ---- scoring ---- */
 
-static size_t cell_of(const float *unit)
-{
-    size_t cell = 0;
-    for (int a = 0; a < 3; a++) {
-        double at = floor(((double)unit[a] + 1) * (GRID / 2));
-        cell = cell * GRID + (size_t)fmin(fmax(at, 0), GRID - 1);
-    }
-    return cell;
-}
-
-/* Set or clear the cells of all finite points; the result is the number of bits that changed. */
-static size_t mark_cells(uint64_t *cells, const npg_frame_box *box, const npg_frame *frame, bool on)
-{
-    float unit[3 * BLOCK];
-    size_t changed = 0;
-    for (size_t first = 0; first < frame->point_count; first += BLOCK) {
-        size_t count = frame->point_count - first < BLOCK ? frame->point_count - first : BLOCK;
-        npg_box_local_to_unit(box, unit, frame->pos_local + 3 * first, count);
-        for (size_t i = 0; i < count; i++) {
-            if (!is_finite_point(unit + 3 * i)) continue;
-            size_t cell = cell_of(unit + 3 * i);
-            uint64_t bit = UINT64_C(1) << (cell % 64), *word = &cells[cell / 64];
-            changed += on ? !(*word & bit) : (*word & bit) != 0;
-            *word = on ? *word | bit : *word & ~bit;
-        }
-    }
-    return changed;
-}
-
 static bool is_better(const candidate *a, const candidate *b)
 {
     return a->score > b->score || (a->score == b->score && a->index < b->index);
@@ -232,10 +199,37 @@ static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_fram
 }
 
 /* The paper's: many cells, near the middle in time. */
-static double score_of(size_t cell_count, int64_t index, int64_t frame_count)
+static double score_of(size_t cell_count, double from_middle)
 {
-    double from_middle = (double)index - (double)frame_count / 2;
     return (double)cell_count * exp(-0.001 * from_middle * from_middle);
+}
+
+/* Areas differ by a few per cent only, so the middle weighs less among the frames that are remembered
+ * (shortlist.h). */
+static double area_score_of(size_t cell_count, double from_middle, int64_t frame_count)
+{
+    double share = from_middle / (double)frame_count;
+    double beyond = fmax(0, fabs(from_middle) - NPG_SHORTLIST_REACH);
+    return (double)cell_count / (1 + share * share) * exp(-0.001 * beyond * beyond);
+}
+
+/* What the frame shows: to several sensors bodies hide parts of themselves, the more the narrower they
+ * stand. */
+static npg_status measure_extent(npg_worker *worker, candidate *scored, const npg_frame *frame)
+{
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    double from_middle = (double)frame->index - (double)facts->planned_count / 2;
+    if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box, frame));
+    *scored = (candidate){.index = frame->index, .number = frame->number};
+    if (has_candidates(worker) && facts->sensor_count_max > 1) {
+        scored->cell_count = npg_extent_area(state->extent, frame);
+        scored->score = area_score_of(scored->cell_count, from_middle, facts->planned_count);
+    } else {
+        scored->cell_count = npg_extent_papers(state->extent, frame);
+        scored->score = score_of(scored->cell_count, from_middle);
+    }
+    return NPG_OK;
 }
 
 static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
@@ -246,18 +240,16 @@ static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
     bool is_named = frame->number == state->number && state->number != NO_NUMBER;
     if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
     if (frame->is_skipped) return NPG_OK;
-    size_t cell_count = mark_cells(state->cells, &facts->box, frame, true);
-    mark_cells(state->cells, &facts->box, frame, false);
-    candidate scored = {frame->index, frame->number, cell_count,
-                        score_of(cell_count, frame->index, frame_count)};
-    if (cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &scored, frame));
-    if (cell_count) offer(state, scored);
-    if (is_named && cell_count && !state->is_chosen) {
+    candidate scored;
+    NPG_TRY(measure_extent(worker, &scored, frame));
+    if (scored.cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &scored, frame));
+    if (scored.cell_count) offer(state, scored);
+    if (is_named && scored.cell_count && !state->is_chosen) {
         state->chosen = scored;
         state->is_chosen = true;
     }
     if (!has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count)) return NPG_OK;
-    return npg_shortlist_add(&state->shortlist, frame, cell_count);
+    return npg_shortlist_add(&state->shortlist, frame, scored.cell_count);
 }
 
 static json_t *json_of(const candidate *c, bool is_by_mesh)
@@ -425,8 +417,6 @@ static npg_status init(npg_worker *worker)
         facts->number_min = INT64_MAX;
         facts->number_max = INT64_MIN;
     }
-    if (pass == NPG_PASS_SCORE)
-        NPG_TRY(npg_alloc_array(&state->cells, NPG_FOR_RUN, CELL_WORDS, sizeof *state->cells));
     return NPG_OK;
 }
 
@@ -469,7 +459,7 @@ static void uninit(npg_worker *worker)
     npg_outside_close(&state->outside);
     npg_likeness_close(&state->likeness);
     npg_choose_pass_clear(&state->choosing);
-    npg_release(&state->cells);
+    npg_extent_close(&state->extent);
     npg_release(&state->diagonals);
 }
 
@@ -489,8 +479,8 @@ static const npg_option options[] = {
         "Number of the frame whose surface is the reference, as in the file names; "
         "-1: by score, or, with --reference, the frame that it is nearest to"),
     NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
-        "Take the frame with the best score (paper), "
-        "or the one of several good frames whose surface fares best in the others, "
+        "Take the frame with the paper's score (paper), "
+        "or the one of several that show most surface whose own fares best in the others, "
         "so that limbs which touch in one frame are not joined for the whole capture (apart)"),
     NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",
         "Surface of the reference that other frames stretch far from all points: "

@@ -119,9 +119,10 @@ static void the_figures_size_is_that_of_a_frame_not_of_its_way(void **state)
 
 static void equal_frames_give_the_middle(void **state)
 {
+    const char *const papers[][2] = {{"keyframe-choice", "paper"}, {NULL, NULL}};
     (void)state;
     scene s = scene_of(2);
-    assert_int_equal(run_scene(&s, NULL, NULL), NPG_OK);
+    assert_int_equal(run_scene(&s, papers, NULL), NPG_OK);
     assert_int_equal(s.key, 5); /* of 0..10: 5 and 6 are as far from 5.5, the lower index wins */
     assert_int_equal(s.key_count, 1);
     assert_int_equal(s.order[0], 5);
@@ -173,13 +174,14 @@ static size_t count_cells(const npg_frame *frame, const npg_frame_box *box)
 
 static void the_score_is_the_methods(void **state)
 {
+    const char *const papers[][2] = {{"keyframe-choice", "paper"}, {NULL, NULL}};
     (void)state;
     for (int variant = 0; variant < 2; variant++) {
         scene s = scene_of(3000);
         s.with_bad_points = variant == 1;
         s.point_counts[2] = 9000;
         s.point_counts[7] = 30;
-        assert_int_equal(run_scene(&s, NULL, NULL), NPG_OK);
+        assert_int_equal(run_scene(&s, papers, NULL), NPG_OK);
         int64_t best = -1;
         double best_score = -1;
         size_t best_cells = 0;
