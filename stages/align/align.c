@@ -8,11 +8,12 @@
 #include <string.h>
 
 #include "align/follow_log.h"
+#include "align/group.h"
 #include "align/handover.h"
-#include "align/recover.h"
-#include "align/sides.h"
+#include "align/pose.h"
 #include "align/sweep_back.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
@@ -28,21 +29,11 @@
 #define RAY_BYTES  64  /* of a sample of the surface, to tell whether a sensor sees it */
 #define HELD_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
 
-/* Of a frame's points, as a reference that is one side of a body must have places for: frames beyond the
- * first one that has fewer are not followed while it grows. */
-#define EXPLAINED 0.5
-
-/* A frame that waits for its window. */
-typedef struct waiting {
-    npg_frame frame;
-    double *pose;            /* K x 12 */
-    float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
-    float *sensors;          /* unit; where they are not known NULL */
-    npg_tracker_cloud cloud; /* all of these */
-    float *since;            /* K: frames since a sensor saw what a node carries; NULL: no sensor is known */
-    npg_tracked tracked;
-    bool is_known; /* starts from the pose that the pass before found */
-} waiting;
+/* While a reference that is one side of the body grows, points past its border are carried by the border's
+ * motion, which is theirs while the body moves as one piece: then it is followed as far as it has places for
+ * half of a frame's points, else as far as stage fuse says. */
+#define EXPLAINED_STIFF 0.5
+#define BENT            0.01 /* of its diagonal, what a rigid motion leaves; by trial, why_these_defaults.md */
 
 typedef struct state {
     bool is_on;
@@ -51,10 +42,7 @@ typedef struct state {
     npg_tracker *tracker;
     npg_handover handover; /* from the pass before, to the next */
     npg_follow_log *log;   /* of a fusing pass: what is found, and what an earlier run had; owned, or NULL */
-    npg_side sides[2];     /* forward, backward: of the frames that are passed on */
-    npg_side ways[2];      /* the same with those that wait                       */
-    waiting *group;        /* in order of arrival; owned, with what they own */
-    size_t group_count, group_capacity;
+    npg_group group;
     int64_t past_count;           /* frames that a growing reference does not reach */
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
@@ -84,28 +72,13 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
-static void clear_waiting(waiting *w)
-{
-    npg_frame_clear(&w->frame);
-    npg_release(&w->pose);
-    npg_release(&w->points);
-    npg_release(&w->normals);
-    npg_release(&w->sensors);
-    npg_release(&w->since);
-}
-
 static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_tracker_close(&s->tracker);
     npg_handover_close(&s->handover);
     npg_follow_log_close(&s->log);
-    for (int i = 0; i < 2; i++) {
-        npg_side_close(&s->sides[i]);
-        npg_side_close(&s->ways[i]);
-    }
-    for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
-    npg_release(&s->group);
+    npg_group_close(&s->group);
 }
 
 /* ---- what a resumed run needs: both sides and the figures so far ---- */
@@ -122,13 +95,12 @@ static size_t pose_bytes(const state *s)
 
 static size_t state_bytes(const state *s)
 {
-    return 2 * npg_side_bytes(nodes_of(s)) + sizeof s->sum;
+    return npg_group_bytes(&s->group) + sizeof s->sum;
 }
 
 static void pack_state(const state *s, unsigned char *to)
 {
-    for (int i = 0; i < 2; i++) to = npg_side_pack(to, &s->sides[i], nodes_of(s));
-    memcpy(to, &s->sum, sizeof s->sum);
+    memcpy(npg_group_pack(to, &s->group), &s->sum, sizeof s->sum);
 }
 
 /* The last frame that a window waits for takes it along: it comes to the stage that writes the state just
@@ -145,11 +117,7 @@ static npg_status attach_state(const state *s, npg_frame *frame)
 
 static void unpack_state(state *s, const unsigned char *from)
 {
-    for (int i = 0; i < 2; i++) {
-        from = npg_side_unpack(&s->sides[i], from, nodes_of(s));
-        npg_side_copy(&s->ways[i], &s->sides[i], nodes_of(s));
-    }
-    memcpy(&s->sum, from, sizeof s->sum);
+    memcpy(&s->sum, npg_group_unpack(&s->group, from), sizeof s->sum);
 }
 
 static npg_status restore_state(npg_worker *worker)
@@ -219,10 +187,7 @@ static npg_status open_tracker(npg_worker *worker)
                                            s->along};
     NPG_TRY(npg_tracker_open(&s->tracker, npg_worker_facts(worker)->reference, &settings));
     size_t nodes = nodes_of(s);
-    for (int i = 0; i < 2; i++) {
-        NPG_TRY(npg_side_open(&s->sides[i], nodes));
-        NPG_TRY(npg_side_open(&s->ways[i], nodes));
-    }
+    NPG_TRY(npg_group_open(&s->group, nodes));
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
     NPG_TRY(npg_handover_open(&s->handover, worker, s->tracker));
     NPG_TRY(open_log(worker));
@@ -231,7 +196,7 @@ static npg_status open_tracker(npg_worker *worker)
 
 /* ---- frame after frame ---- */
 
-static npg_status take_points(const npg_worker *worker, waiting *w)
+static npg_status take_points(const npg_worker *worker, npg_waiting *w)
 {
     const state *s = npg_worker_state(worker);
     const npg_frame *frame = &w->frame;
@@ -252,7 +217,7 @@ static npg_status take_points(const npg_worker *worker, waiting *w)
 }
 
 /* How long what sensors do not see of a frame has been hidden; in the keyframe nothing is, all is known. */
-static npg_status count_hidden(const npg_worker *worker, waiting *w, npg_side *at)
+static npg_status count_hidden(const npg_worker *worker, npg_waiting *w, npg_side *at)
 {
     const state *s = npg_worker_state(worker);
     size_t nodes = nodes_of(s);
@@ -265,7 +230,7 @@ static npg_status count_hidden(const npg_worker *worker, waiting *w, npg_side *a
 }
 
 /* The pose that the motion so far leads to, fitted to the points; without any it stays. */
-static npg_status fit_pose(npg_worker *worker, waiting *w, npg_side *at)
+static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
 {
     const state *s = npg_worker_state(worker);
     const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
@@ -298,9 +263,21 @@ static bool is_growing(const npg_worker *worker, size_t sensor_count)
     return npg_worker_pass(worker) == NPG_PASS_FUSE && sensor_count && npg_tracker_is_open(s->tracker);
 }
 
+/* Whether it has places for enough of the frame's points. */
+static npg_status reaches(bool *is_reached, const npg_worker *worker, const npg_waiting *w)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_mesh *reference = npg_tracker_reference(s->tracker);
+    double bend, size = npg_points_diagonal(reference->vert_pos, reference->vert_count);
+    NPG_TRY(npg_pose_bend(&bend, npg_tracker_graph(s->tracker), w->pose));
+    *is_reached = w->tracked.explained >=
+                  (bend > BENT * size ? npg_worker_facts(worker)->explained_least : EXPLAINED_STIFF);
+    return NPG_OK;
+}
+
 /* A frame that a growing reference does not reach, nor those beyond it: a pose that is no number says so, in
  * the log, too. */
-static void leave_past(waiting *w, npg_side *at)
+static void leave_past(npg_waiting *w, npg_side *at)
 {
     at->is_past = true;
     at->has_now = false;
@@ -308,7 +285,7 @@ static void leave_past(waiting *w, npg_side *at)
     w->cloud.count = 0;
 }
 
-static bool is_past(const waiting *w)
+static bool is_past(const npg_waiting *w)
 {
     return isnan(w->pose[0]);
 }
@@ -318,14 +295,11 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    NPG_TRY(npg_grow(&s->group, &s->group_capacity, s->group_count + 1, sizeof *s->group, NPG_FOR_FIT));
-    waiting *w = &s->group[s->group_count++];
-    *w = (waiting){.frame = *frame};
-    memset(frame, 0, sizeof *frame);
-    NPG_TRY(npg_alloc(&w->pose, NPG_FOR_FIT, pose_bytes(s)));
+    npg_waiting *w;
+    NPG_TRY(npg_group_add(&w, &s->group, frame));
     if (is_read_back(s)) return npg_follow_log_read(s->log, w->frame.index, w->pose);
     NPG_TRY(take_points(worker, w));
-    npg_side *at = &s->ways[w->frame.index < facts->plan.key];
+    npg_side *at = &s->group.ways[w->frame.index < facts->plan.key];
     bool is_key = w->frame.index == facts->plan.key;
     if (at->is_past) {
         leave_past(w, at);
@@ -333,91 +307,27 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     }
     if (!is_key) npg_side_step_on(at, nodes_of(s), w->frame.index);
     NPG_TRY(fit_pose(worker, w, at));
-    if (!is_key && is_growing(worker, w->cloud.sensor_count) && w->tracked.explained < EXPLAINED)
-        leave_past(w, at);
+    bool is_reached = true;
+    if (!is_key && is_growing(worker, w->cloud.sensor_count)) NPG_TRY(reaches(&is_reached, worker, w));
+    if (!is_reached) leave_past(w, at);
     at->index = w->frame.index;
-    if (is_key) npg_side_copy(&s->ways[1], at, nodes_of(s));
+    if (is_key) npg_side_copy(&s->group.ways[1], at, nodes_of(s));
     return NPG_OK;
 }
 
 /* ---- a group ---- */
-
-static int by_index(const void *a, const void *b)
-{
-    const npg_recover_frame *x = a, *y = b;
-    return (x->index > y->index) - (x->index < y->index);
-}
-
-/* The frames that wait and, as fixed ones, the last two of either side. */
-static size_t list_frames(const state *s, npg_recover_frame *frames)
-{
-    const npg_tracker_cloud known = {.count = 1};
-    size_t count = 0;
-    for (size_t i = 0; i < s->group_count; i++) {
-        const waiting *w = &s->group[i];
-        frames[count++] = (npg_recover_frame){w->frame.index, w->pose, w->tracked, w->cloud, w->since, false};
-    }
-    for (int d = 0; d < 2; d++) {
-        const npg_side *at = &s->sides[d];
-        int64_t away = d ? 1 : -1;
-        if (at->has_now) /* the key, which both sides begin with, once */
-            frames[count++] = (npg_recover_frame){at->index, at->now, at->now_tracked, known, NULL, true};
-        if (at->has_now && at->has_before && at->before_tracked.steps)
-            frames[count++] =
-                (npg_recover_frame){at->index + away, at->before, at->before_tracked, known, NULL, true};
-    }
-    qsort(frames, count, sizeof *frames, by_index);
-    size_t kept = 0;
-    for (size_t i = 0; i < count; i++)
-        if (!kept || frames[i].index != frames[kept - 1].index) frames[kept++] = frames[i];
-    return kept;
-}
-
-static npg_recover_frame *frame_of(npg_recover_frame *frames, size_t count, int64_t index)
-{
-    for (size_t i = 0; i < count; i++)
-        if (frames[i].index == index) return &frames[i];
-    return NULL;
-}
-
-/* The sides end with the group's outermost frames; what follows starts from there. */
-static void move_sides(state *s, npg_recover_frame *frames, size_t count)
-{
-    for (int d = 0; d < 2; d++) {
-        npg_side *to = &s->sides[d], next = s->ways[d];
-        int64_t away = d ? 1 : -1;
-        const npg_recover_frame *now = frame_of(frames, count, next.index);
-        const npg_recover_frame *before = frame_of(frames, count, next.index + away);
-        if (!now || now->is_fixed) continue;
-        double *now_pose = s->ways[d].now, *before_pose = s->ways[d].before;
-        memcpy(now_pose, now->pose, pose_bytes(s));
-        next.now_tracked = now->tracked;
-        next.has_before = next.has_before && before;
-        if (next.has_before) {
-            memcpy(before_pose, before->pose, pose_bytes(s));
-            next.before_tracked = before->tracked;
-        }
-        s->ways[d] = next;
-        npg_side_copy(to, &s->ways[d], nodes_of(s));
-    }
-}
-
-static bool should_stop(void *worker)
-{
-    return npg_worker_stopping(worker);
-}
 
 /* Lost frames are tried again, `frames` become what was found. */
 static npg_status recover_group(npg_worker *worker, npg_recover_frame *frames, size_t count)
 {
     state *s = npg_worker_state(worker);
     npg_recover_result result;
-    NPG_TRY(npg_recover(s->tracker, &result, frames, count, should_stop, worker));
+    NPG_TRY(npg_recover(s->tracker, &result, frames, count, npg_worker_should_stop, worker));
     s->sum.lost += result.lost;
     s->sum.found += result.found;
     if (result.lost)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
-                       "of %zu frames %lld were lost, %lld of them found again in %lld fits", s->group_count,
+                       "of %zu frames %lld were lost, %lld of them found again in %lld fits", s->group.count,
                        (long long)result.lost, (long long)result.found, (long long)result.tried);
     return NPG_OK;
 }
@@ -429,7 +339,7 @@ static npg_status sweep_group(npg_worker *worker, npg_recover_frame *frames, siz
     state *s = npg_worker_state(worker);
     npg_sweep_result result;
     NPG_TRY(npg_sweep_back(s->tracker, &result, frames, count, npg_worker_facts(worker)->plan.key,
-                           should_stop, worker));
+                           npg_worker_should_stop, worker));
     if (result.tried)
         npg_worker_log(worker, NPG_LOG_INFO, -1, "of %lld frames followed back %lld are better, or as good",
                        (long long)result.tried, (long long)result.taken);
@@ -444,18 +354,16 @@ static npg_status finish_group(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     bool is_of_one_side = facts->growing_passes || is_growing(worker, facts->sensor_count_max);
     npg_recover_frame *frames;
-    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group_count + 4, sizeof *frames));
-    size_t count = list_frames(s, frames);
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group.count + NPG_GROUP_FIXED, sizeof *frames));
+    size_t count = npg_group_list(&s->group, frames);
     npg_status status = sweep_group(worker, frames, count);
     if (!status && !is_of_one_side) status = recover_group(worker, frames, count);
-    for (size_t i = 0; i < s->group_count && !status; i++)
-        s->group[i].tracked = frame_of(frames, count, s->group[i].frame.index)->tracked;
-    if (!status) move_sides(s, frames, count);
+    if (!status) npg_group_take(&s->group, frames, count);
     npg_release(&frames);
     return status;
 }
 
-static void add_to_report(state *s, const waiting *w)
+static void add_to_report(state *s, const npg_waiting *w)
 {
     if (!w->cloud.count) return;
     s->sum.frames++;
@@ -465,7 +373,7 @@ static void add_to_report(state *s, const waiting *w)
     s->sum.worst_frame = w->frame.number;
 }
 
-static npg_status pass_on(npg_worker *worker, waiting *w)
+static npg_status pass_on(npg_worker *worker, npg_waiting *w)
 {
     state *s = npg_worker_state(worker);
     const npg_mesh *reference = npg_worker_facts(worker)->reference;
@@ -505,8 +413,8 @@ static npg_status log_group(state *s)
     NPG_TRY(npg_alloc(&packed, NPG_FOR_FIT, state_bytes(s)));
     pack_state(s, packed);
     npg_status status = NPG_OK;
-    for (size_t i = 0; i < s->group_count && !status; i++)
-        status = npg_follow_log_add(s->log, s->group[i].frame.index, s->group[i].pose);
+    for (size_t i = 0; i < s->group.count && !status; i++)
+        status = npg_follow_log_add(s->log, s->group.frames[i].frame.index, s->group.frames[i].pose);
     if (!status) status = npg_follow_log_commit_group(s->log, packed);
     npg_release(&packed);
     return status;
@@ -517,7 +425,7 @@ static npg_status follow_group(npg_worker *worker)
     state *s = npg_worker_state(worker);
     if (is_read_back(s)) return read_back_group(s);
     NPG_TRY(finish_group(worker));
-    for (size_t i = 0; i < s->group_count; i++) add_to_report(s, &s->group[i]);
+    for (size_t i = 0; i < s->group.count; i++) add_to_report(s, &s->group.frames[i]);
     return log_group(s);
 }
 
@@ -525,13 +433,12 @@ static npg_status follow_group(npg_worker *worker)
 static npg_status close_group(npg_worker *worker, bool with_state)
 {
     state *s = npg_worker_state(worker);
-    if (!s->group_count) return NPG_OK;
+    if (!s->group.count) return NPG_OK;
     NPG_TRY(follow_group(worker));
     if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE)
-        NPG_TRY(attach_state(s, &s->group[s->group_count - 1].frame));
-    for (size_t i = 0; i < s->group_count; i++) NPG_TRY(pass_on(worker, &s->group[i]));
-    for (size_t i = 0; i < s->group_count; i++) clear_waiting(&s->group[i]);
-    s->group_count = 0;
+        NPG_TRY(attach_state(s, &s->group.frames[s->group.count - 1].frame));
+    for (size_t i = 0; i < s->group.count; i++) NPG_TRY(pass_on(worker, &s->group.frames[i]));
+    npg_group_clear(&s->group);
     return NPG_OK;
 }
 
@@ -548,7 +455,7 @@ static void report_progress(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     double frames = (double)frames_of_pass(worker), followed = (double)s->read;
-    double passed_on = followed - (double)s->group_count;
+    double passed_on = followed - (double)s->group.count;
     if (frames > 0)
         npg_worker_step(worker, (FOLLOWED_COUNTS * followed + (1 - FOLLOWED_COUNTS) * passed_on) / frames,
                         s->read, (int64_t)frames);
@@ -573,7 +480,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         bool is_window = closes_window(s, &facts->plan, total);
         bool with_state = is_window || npg_plan_is_open(&facts->plan);
         bool is_done = is_window && !ends_late(facts, npg_worker_pass(worker));
-        if (is_done || s->group_count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
+        if (is_done || s->group.count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     npg_chunk_unref(chunk);

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "align/pose.h"
+
 npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *frame, const npg_start *from,
                        const npg_hold *hold, double share)
 {

@@ -9,7 +9,8 @@ typedef struct npg_recover_frame {
     int64_t index;
     double *pose; /* K x 12 */
     npg_tracked tracked;
-    npg_tracker_cloud cloud; /* count 0: nothing is known of the frame, its pose is not started from either */
+    npg_tracker_cloud cloud; /* count 0: nothing is known of the frame, its pose is not started from either;
+                                of a fixed frame the points may be NULL */
     const float *since;      /* K: frames since a sensor saw what a node carries, or NULL: not known        */
     bool is_fixed;           /* of the group before: a place to start from, no more                         */
 } npg_recover_frame;
@@ -29,9 +30,9 @@ typedef struct npg_start {
     const npg_tracker_effort *effort; /* NULL: the usual one */
 } npg_start;
 
-/* Fit the frame from there, hidden parts held by `hold`.  *taken: whether its pose and what was tracked become
- * the new ones, those of a Chamfer distance of at most `share` times the old one.  NPG_STOPPED, NPG_MEMORY,
- * NPG_DIVERGED. */
+/* Fit the frame from there, hidden parts held by `hold`.  *taken: whether its pose and what was tracked
+ * become the new ones, those of a Chamfer distance of at most `share` times the old one.  NPG_STOPPED,
+ * NPG_MEMORY, NPG_DIVERGED. */
 npg_status npg_attempt(const npg_attempts *attempts, bool *taken, npg_recover_frame *frame,
                        const npg_start *from, const npg_hold *hold, double share);
 

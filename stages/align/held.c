@@ -12,6 +12,9 @@
  * samples/guide/why_these_defaults.md, one sensor and a body that turns. */
 #define HELD_ONE     0.95 /* before one sensor */
 #define HELD_SEVERAL 0.9
+/* A tie counts little where both ends are seen: a piece that has points goes where they are, and one that the
+ * alignment has lost does not fly off. */
+#define TIE_SEEN 0.01
 
 /* Edges and ties, in their order. */
 static npg_status open_pairs(npg_held *held, const npg_graph *graph)
@@ -104,7 +107,7 @@ double npg_held_edge(double edge[3], const npg_held *held, const npg_graph *grap
         double rest = (double)graph->node_pos[3 * (size_t)k + i] - (double)graph->node_pos[3 * (size_t)j + i];
         edge[i] = rest + held->share * hidden * ((double)held->edges[e][i] - rest);
     }
-    return held->is_tie[e / 2] ? hidden : 1;
+    return held->is_tie[e / 2] ? fmax(TIE_SEEN, hidden) : 1;
 }
 
 void npg_held_count(const npg_held *held, float *since, const float *before, size_t node_count)

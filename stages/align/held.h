@@ -7,10 +7,10 @@
  *
  *     e_jk = (1 - HELD h) (g_k - g_j) + HELD h R_j^T (x_k - x_j)       x_k = g_k + t_k, of that pose
  *
- * h in 0..1: how much of what both ends carry is hidden; HELD: held.c.  Of a hidden part with a known pose on either side
- * in time both have a say: s frames after a sensor saw it last, the pose on the far side has s times the
- * weight of the one on the near side.  Frame by frame from the far side that goes evenly in time from where
- * the part was seen last to where it is seen next.  Not in the paper. */
+ * h in 0..1: how much of what both ends carry is hidden; HELD: held.c.  Of a hidden part with a known pose on
+ * either side in time both have a say: s frames after a sensor saw it last, the pose on the far side has s
+ * times the weight of the one on the near side.  Frame by frame from the far side that goes evenly in time
+ * from where the part was seen last to where it is seen next.  Not in the paper. */
 #ifndef NPG_HELD_H
 #define NPG_HELD_H
 
@@ -45,7 +45,7 @@ void npg_held_see(npg_held *held, const npg_graph *graph, const uint32_t *verts,
                   size_t count);
 
 /* e_jk of pair e / 2, from its second node to its first where e is odd.  Returns what it counts: 1, and of a
- * tie the share h. */
+ * tie the share h, a hundredth at least. */
 double npg_held_edge(double edge[3], const npg_held *held, const npg_graph *graph, size_t e);
 
 /* since (K) of a frame from that of the frame before it: 0 where most of what a node carries is seen. */

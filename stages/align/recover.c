@@ -5,8 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
+#include "align/stand.h"
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */
@@ -15,9 +14,9 @@
 #define BETTER      0.95 /* times a frame's Chamfer distance: what a new pose must reach                */
 #define SWEEPS      5    /* at most                                                                     */
 #define ALIKE       3    /* frames whose points look alike that are started from                        */
-#define LOOK_POINTS 500  /* of a frame, for that                                                        */
 #define VAIN_MOST   4    /* lost frames in a row that no start finds: the reference does not fit        */
-#define STARTS_MOST (ALIKE + 4)
+#define STARTS_MOST (ALIKE + 6)
+#define MOVED_MOST  (ALIKE + 2) /* of these from poses that are moved first */
 
 /* The usual fit begins ten times as stiff as it ends, and its weight is 0.08 wide.  A lost frame has moved
  * farther than that: more steps, a stiffer beginning that moves the body as a whole, and two, then four times
@@ -29,11 +28,11 @@ typedef struct recovery {
     npg_attempts attempts; /* its `trial` is owned */
     npg_recover_frame *frames;
     size_t count;
-    double level;       /* Chamfer distance of the best quarter */
-    double *sorted;     /* count, scratch; owned                */
-    float *looks;       /* count x LOOK_POINTS x 3; owned       */
-    size_t *look_count; /* count; owned                         */
-    size_t *lost;       /* count: which are lost; owned         */
+    double level;    /* Chamfer distance of the best quarter */
+    double *sorted;  /* count, scratch; owned                */
+    npg_look *looks; /* count; owned, with what they own     */
+    double *moved;   /* MOVED_MOST x K x 12, scratch; owned  */
+    size_t *lost;    /* count: which are lost; owned         */
     npg_recover_result *result;
 } recovery;
 
@@ -58,44 +57,38 @@ static void set_level(recovery *r)
 
 /* ---- frames that look alike ---- */
 
-/* Chamfer distance of the thinned points of two frames. */
-static npg_status unlikeness(double *sum, const recovery *r, size_t a, size_t b)
+typedef struct alike {
+    size_t frame;
+    npg_rigid motion; /* from there */
+    double unlike;
+} alike;
+
+/* How frame i stands against frame k.  Even a frame that is lost mostly has its body in place, if not its
+ * limbs, so its pose is a guess at that. */
+static npg_status compare(alike *found, const recovery *r, size_t k, size_t i)
 {
-    uint32_t near[LOOK_POINTS];
-    float dist_sq[LOOK_POINTS];
-    *sum = 0;
-    for (int way = 0; way < 2; way++) {
-        size_t of = way ? a : b, from = way ? b : a, count = r->look_count[from];
-        npg_kdtree *tree;
-        double part = 0;
-        NPG_TRY(npg_kdtree_open(&tree, r->looks + of * LOOK_POINTS * 3, r->look_count[of]));
-        npg_status status =
-            npg_kdtree_nearest(tree, near, dist_sq, r->looks + from * LOOK_POINTS * 3, count, 1, 1);
-        npg_kdtree_close(&tree);
-        NPG_TRY(status);
-        for (size_t i = 0; i < count; i++) part += (double)dist_sq[i];
-        *sum += part / (double)count;
-    }
-    return NPG_OK;
+    const npg_graph *graph = npg_tracker_graph(r->attempts.tracker);
+    npg_rigid guess;
+    found->frame = k;
+    NPG_TRY(npg_pose_between(&guess, graph, r->frames[k].pose, r->frames[i].pose));
+    return npg_stand_find(&found->motion, &found->unlike, &r->looks[k], &r->looks[i], &guess);
 }
 
 /* The frames most like frame i that its tracker explains better, the most alike first. */
-static npg_status find_alike(size_t alike[ALIKE], size_t *found, const recovery *r, size_t i)
+static npg_status find_alike(alike found[ALIKE], size_t *found_count, const recovery *r, size_t i)
 {
-    double sums[ALIKE];
-    *found = 0;
+    *found_count = 0;
     for (size_t k = 0; k < r->count; k++) {
         const npg_recover_frame *frame = &r->frames[k];
-        double sum;
-        if (k == i || !r->look_count[k] || frame->tracked.chamfer >= r->frames[i].tracked.chamfer) continue;
-        NPG_TRY(unlikeness(&sum, r, i, k));
-        size_t at = *found;
-        for (; at > 0 && sum < sums[at - 1]; at--)
-            if (at < ALIKE) sums[at] = sums[at - 1], alike[at] = alike[at - 1];
+        alike next;
+        if (k == i || !is_known(frame) || frame->tracked.chamfer >= r->frames[i].tracked.chamfer) continue;
+        NPG_TRY(compare(&next, r, k, i));
+        size_t at = *found_count;
+        for (; at > 0 && next.unlike < found[at - 1].unlike; at--)
+            if (at < ALIKE) found[at] = found[at - 1];
         if (at == ALIKE) continue;
-        sums[at] = sum;
-        alike[at] = k;
-        *found += *found < ALIKE;
+        found[at] = next;
+        *found_count += *found_count < ALIKE;
     }
     return NPG_OK;
 }
@@ -111,22 +104,40 @@ static const npg_recover_frame *frame_at(const recovery *r, size_t i, int away)
     return frame->index == r->frames[i].index + away && is_known(frame) ? frame : NULL;
 }
 
-static npg_status find_starts(npg_start starts[STARTS_MOST], size_t *count, const recovery *r, size_t i,
-                              int sweep)
+typedef struct starts {
+    npg_start list[STARTS_MOST];
+    size_t count, moved; /* moved: of them, in r->moved */
+} starts;
+
+static void add_moved(starts *s, const recovery *r, const alike *from, const npg_tracker_effort *effort)
 {
-    size_t alike[ALIKE], found;
-    *count = 0;
-    NPG_TRY(find_alike(alike, &found, r, i));
-    for (size_t k = 0; k < found; k++) starts[(*count)++] = (npg_start){r->frames[alike[k]].pose, NULL, NULL};
+    const npg_graph *graph = npg_tracker_graph(r->attempts.tracker);
+    double *pose = r->moved + s->moved++ * graph->node_count * NPG_POSE_SIZE;
+    npg_pose_move(pose, graph, r->frames[from->frame].pose, &from->motion);
+    s->list[s->count++] = (npg_start){pose, NULL, effort};
+}
+
+static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
+{
+    alike all[ALIKE], beside;
+    size_t found;
+    NPG_TRY(find_alike(all, &found, r, i));
+    for (size_t k = 0; k < found; k++) add_moved(s, r, &all[k], NULL);
+    for (int way = -1; way <= 1; way += 2) {
+        const npg_recover_frame *now = frame_at(r, i, way);
+        if (!now || is_lost(r, now)) continue;
+        NPG_TRY(compare(&beside, r, (size_t)(now - r->frames), i));
+        add_moved(s, r, &beside, &wide);
+    }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way), *before = frame_at(r, i, 2 * way);
         if (now && before && !is_lost(r, now))
-            starts[(*count)++] = (npg_start){now->pose, before->pose, &wide};
+            s->list[s->count++] = (npg_start){now->pose, before->pose, &wide};
     }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way);
         if (now && !is_lost(r, now))
-            starts[(*count)++] = (npg_start){now->pose, NULL, sweep ? &wider : &wide};
+            s->list[s->count++] = (npg_start){now->pose, NULL, sweep ? &wider : &wide};
     }
     return NPG_OK;
 }
@@ -143,10 +154,9 @@ static npg_status try_start(recovery *r, npg_recover_frame *frame, const npg_sta
 static npg_status recover_frame(recovery *r, size_t i, int sweep)
 {
     npg_recover_frame *frame = &r->frames[i];
-    npg_start starts[STARTS_MOST];
-    size_t count;
-    NPG_TRY(find_starts(starts, &count, r, i, sweep));
-    for (size_t k = 0; k < count && is_lost(r, frame); k++) NPG_TRY(try_start(r, frame, &starts[k]));
+    starts from = {.count = 0};
+    NPG_TRY(find_starts(&from, r, i, sweep));
+    for (size_t k = 0; k < from.count && is_lost(r, frame); k++) NPG_TRY(try_start(r, frame, &from.list[k]));
     return NPG_OK;
 }
 
@@ -186,22 +196,31 @@ static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int
     return NPG_OK;
 }
 
+/* Of a frame without points, of the group before, its pose says where the body was. */
+static npg_status open_look(npg_look *look, const recovery *r, const npg_recover_frame *frame)
+{
+    const npg_graph *graph = npg_tracker_graph(r->attempts.tracker);
+    float *places;
+    if (!is_known(frame)) return NPG_OK;
+    if (frame->cloud.points) return npg_look_open(look, frame->cloud.points, frame->cloud.count);
+    NPG_TRY(npg_alloc_array(&places, NPG_FOR_FIT, graph->node_count, 3 * sizeof *places));
+    npg_pose_places(places, graph, frame->pose);
+    npg_status status = npg_look_open(look, places, graph->node_count);
+    npg_release(&places);
+    return status;
+}
+
 static npg_status open_recovery(recovery *r)
 {
     NPG_TRY(npg_alloc_array(&r->sorted, NPG_FOR_FIT, r->count, sizeof *r->sorted));
     NPG_TRY(npg_alloc_array(&r->lost, NPG_FOR_FIT, r->count, sizeof *r->lost));
     set_level(r);
     if (!list_lost(r)) return NPG_END;
-    NPG_TRY(npg_alloc(&r->attempts.trial, NPG_FOR_FIT,
-                      npg_pose_bytes(npg_tracker_node_count(r->attempts.tracker))));
-    NPG_TRY(npg_alloc_array(&r->looks, NPG_FOR_FIT, r->count * LOOK_POINTS, 3 * sizeof *r->looks));
-    NPG_TRY(npg_alloc_array(&r->look_count, NPG_FOR_FIT, r->count, sizeof *r->look_count));
-    for (size_t i = 0; i < r->count; i++) {
-        const npg_recover_frame *frame = &r->frames[i];
-        if (frame->cloud.points)
-            r->look_count[i] = npg_points_spread(r->looks + i * LOOK_POINTS * 3, NULL, LOOK_POINTS,
-                                                 frame->cloud.points, NULL, frame->cloud.count);
-    }
+    size_t pose_bytes = npg_pose_bytes(npg_tracker_node_count(r->attempts.tracker));
+    NPG_TRY(npg_alloc(&r->attempts.trial, NPG_FOR_FIT, pose_bytes));
+    NPG_TRY(npg_alloc(&r->moved, NPG_FOR_FIT, MOVED_MOST * pose_bytes));
+    NPG_TRY(npg_alloc_array(&r->looks, NPG_FOR_FIT, r->count, sizeof *r->looks));
+    for (size_t i = 0; i < r->count; i++) NPG_TRY(open_look(&r->looks[i], r, &r->frames[i]));
     return NPG_OK;
 }
 
@@ -230,7 +249,8 @@ npg_status npg_recover(npg_tracker *tracker, npg_recover_result *result, npg_rec
     *result = (npg_recover_result){0};
     npg_status status = open_recovery(&r);
     if (!status) status = run_sweeps(&r);
-    void *all[] = {&r.sorted, &r.attempts.trial, &r.looks, &r.look_count, &r.lost};
+    for (size_t i = 0; r.looks && i < count; i++) npg_look_close(&r.looks[i]);
+    void *all[] = {&r.sorted, &r.attempts.trial, &r.looks, &r.moved, &r.lost};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     return status == NPG_END ? NPG_OK : status;
 }

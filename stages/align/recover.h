@@ -4,9 +4,11 @@
  * too fast for that, frames are lost and lead those after them astray.  But among the frames of a window some
  * are found, and each of them is a place to start from.  So a lost frame is tried again from
  *
- *     1  the poses of the frames whose points look most like its own, where those fit better: motion recurs
- *     2  the motion of the two frames before it, and of the two after it, taken on
- *     3  the poses of the frame before it and of the one after it
+ *     1  the poses of the frames whose points look most like its own, where those fit better: motion recurs;
+ *        moved to where the body stands in this frame (stand.h), as it seldom recurs in place
+ *     2  the poses of the frame before it and of the one after it, moved likewise
+ *     3  the motion of the two frames before it, and of the two after it, taken on
+ *     4  the poses of the frame before it and of the one after it
  *
  * and the pose that explains its points best stays.  What is found helps the frames around it, so this is
  * repeated until none is found.  A frame is lost when its Chamfer distance is well above that of the

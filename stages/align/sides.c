@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "align/pose.h"
+
 npg_status npg_side_open(npg_side *side, size_t node_count)
 {
     NPG_TRY(npg_alloc(&side->now, NPG_FOR_FIT, npg_pose_bytes(node_count)));

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/pose.h"
 #include "geometry/mesh_tools.h"
 
 #define FLIPPED_MOST                                                                                         \

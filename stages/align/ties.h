@@ -1,8 +1,10 @@
 /* Ties: edges between the separate pieces of a surface.
  *
  * A piece that no sensor sees in a frame, an eye or what is known of a hand, has neither points nor an edge
- * to anything that has.  So each piece hangs on the nearest other one, by few edges that count where both
- * ends are hidden (held.h).  Based on Prim's minimal spanning tree, of pieces. */
+ * to anything that has; and one that is seen but lost, a foot whose shin is too thin to be in the reference,
+ * has nothing that brings it back.  So each piece hangs on the nearest other one, by few edges that count
+ * where both ends are hidden, and little where they are seen (held.h).  Based on Prim's minimal spanning
+ * tree, of pieces. */
 #ifndef NPG_TIES_H
 #define NPG_TIES_H
 

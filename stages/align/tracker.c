@@ -356,7 +356,6 @@ static void add_edges(npg_tracker *t, const double *pose, double stiffness)
         const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
         double edge[3];
         term.along = stiffness / (double)graph->edge_count * npg_held_edge(edge, &t->held, graph, e);
-        if (term.along == 0) continue; /* a tie of what is seen */
         term.nodes[0] = j;
         term.nodes[1] = k;
         turn_arm(term.arms[0], pj, edge);
@@ -570,35 +569,4 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
 void npg_tracker_since(const npg_tracker *t, float *since, const float *before)
 {
     npg_held_count(&t->held, since, before, t->graph->node_count);
-}
-
-/* ---- extrapolation ---- */
-
-void npg_pose_straighten(double m[9])
-{
-    double *first = m, *second = m + 3, *third = m + 6;
-    npg_vec3_make_unit(first);
-    double along = npg_vec3_dot(first, second);
-    for (int i = 0; i < 3; i++) second[i] -= along * first[i];
-    npg_vec3_make_unit(second);
-    npg_vec3_cross(third, first, second);
-}
-
-void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)
-{
-    for (size_t k = 0; k < node_count;
-         k++, next += NPG_POSE_SIZE, now += NPG_POSE_SIZE, before += NPG_POSE_SIZE) {
-        double change[9];
-        for (int i = 0; i < 9; i++) { /* now before^T */
-            change[i] = 0;
-            for (int c = 0; c < 3; c++) change[i] += now[i / 3 * 3 + c] * before[i % 3 * 3 + c];
-        }
-        for (int i = 0; i < 9; i++) {
-            next[i] = 0;
-            for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
-        }
-        /* products of products would triple their rounding errors with every frame */
-        npg_pose_straighten(next);
-        for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
-    }
 }

@@ -81,11 +81,4 @@ void npg_tracker_since(const npg_tracker *tracker, float *since, const float *be
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
 
-/* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt). */
-void npg_pose_straighten(double rotation[9]);
-
-/* next = the pose after `now`, if the motion since `before` goes on:
- * next_k = now_k before_k^-1 now_k.  K x 12 each. */
-void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count);
-
 #endif

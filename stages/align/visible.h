@@ -22,8 +22,8 @@ bool npg_faces_sensor(const float *sensors, size_t sensor_count, const float pla
                       double least);
 
 /* is_seen[i] (N): whether a sensor sees places[i] (N x 3) of the surface, with the normals of its vertices
- * (verts[i]: which one it is); all are where no sensor is known (sensor_count 0).  offset: surface nearer
- * than that hides nothing.  All in the same coordinates.  NPG_MEMORY. */
+ * (verts[i]: which one it is; NULL: the i-th); all are where no sensor is known (sensor_count 0).  offset:
+ * surface nearer than that hides nothing.  All in the same coordinates.  NPG_MEMORY. */
 npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_surface *surface,
                             const float *sensors, size_t sensor_count, const float *places,
                             const uint32_t *verts, const float *vert_normals, size_t count, double offset);

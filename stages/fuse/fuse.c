@@ -7,8 +7,9 @@
  *
  * Where sensors see a side of the body, the reference so far is that side, and open.  It then grows: points
  * that lie past its border are carried by the border's motion and added, frame by frame outward from the
- * keyframe for as long as the surface has a place for half of a frame's points (stage align).  The next pass
- * follows what came out and gets farther, until all frames are reached.
+ * keyframe for as long as the surface has a place for most of a frame's points (stage align).  The next pass
+ * follows what came out and gets farther, until all frames are reached; where it gets no farther, less is
+ * asked for.
  *
  * Not in the paper, whose reference is the surface of one frame. */
 #include <math.h>
@@ -58,7 +59,10 @@
 /* While a reference that is one side of the body grows. */
 #define GROW_SIZE        0.1  /* of its diagonal: so far past its border points are taken to be of the body */
 #define GROW_WEIGHT      0.25 /* of such a point, one on the surface being 1                              */
-#define GROW_PASSES      20   /* at most                                                                  */
+#define GROW_PASSES      40   /* at most                                                                  */
+#define EXPLAINED_FIRST  0.8  /* of a frame's points must have a place: a frame that sees much more is ... */
+#define EXPLAINED_LAST   0.5  /* ... wrongly followed, and adds limbs where they are not; in the end half */
+#define EXPLAINED_STEP   0.1  /* less, after a pass that reached no more frames                           */
 #define DENSE_SPACINGS   1.5  /* of the keyframe's points, or ...                                         */
 #define DENSE_CELLS      4    /* ... sides of a cell, within which a place must have ...                  */
 #define DENSE_NEIGHBOURS 16   /* ... so many others, itself counted: single ones are of other parts       */
@@ -389,9 +393,9 @@ static npg_status growth_of(npg_worker *worker, growth **g)
     return NPG_OK;
 }
 
-/* A side of the body grows until all frames are reached, or two passes in a row have reached no more.  What
- * has grown is gathered once more: the last frames that were reached had nothing around them yet.  *counts:
- * whether the pass is one of those that the options ask for. */
+/* A side of the body grows until all frames are reached, or two passes in a row that ask for the least have
+ * reached no more.  What has grown is gathered once more: the last frames that were reached had nothing around
+ * them yet.  *counts: whether the pass is one of those that the options ask for. */
 static npg_status decide_growth(npg_worker *worker, bool *counts)
 {
     npg_facts *facts = npg_worker_facts(worker);
@@ -399,7 +403,9 @@ static npg_status decide_growth(npg_worker *worker, bool *counts)
     NPG_TRY(growth_of(worker, &g));
     bool has_gained = !facts->growing_passes || facts->past_count < g->past_before;
     bool is_whole_now = g->past_before && !facts->past_count;
-    g->in_vain = has_gained ? 0 : g->in_vain + 1;
+    bool asks_less = !has_gained && facts->explained_least > EXPLAINED_LAST + EXPLAINED_STEP / 2;
+    if (asks_less) facts->explained_least = fmax(facts->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
+    g->in_vain = has_gained || asks_less ? 0 : g->in_vain + 1;
     facts->is_growing = facts->past_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
     facts->growing_passes += facts->past_count > 0;
     g->past_before = facts->past_count;
@@ -418,6 +424,7 @@ static npg_status flush(npg_worker *worker)
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
         facts->fuse_left = s->usable > 1 ? s->rounds : 0;
         facts->sensor_count_max = s->sensors;
+        facts->explained_least = EXPLAINED_FIRST;
         return NPG_OK;
     }
     bool counts;

@@ -26,17 +26,13 @@ npg_status npg_unseen_excuse(npg_mesh *mesh, const float *sensors, size_t sensor
     npg_surface *surface;
     npg_visible visible = {0};
     uint8_t *is_seen = NULL;
-    uint32_t *verts = NULL;
     NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, v, mesh->faces, mesh->face_count));
     npg_status status = npg_visible_open(&visible, v);
     if (!status) status = npg_alloc(&is_seen, NPG_FOR_MESH, v);
-    if (!status) status = npg_alloc_array(&verts, NPG_FOR_MESH, v, sizeof *verts);
-    for (size_t i = 0; i < v && !status; i++) verts[i] = (uint32_t)i;
     if (!status)
-        status = npg_visible_find(&visible, is_seen, surface, sensors, sensor_count, mesh->vert_pos, verts,
+        status = npg_visible_find(&visible, is_seen, surface, sensors, sensor_count, mesh->vert_pos, NULL,
                                   mesh->vert_normals, v, offset);
     for (size_t i = 0; i < v && !status; i++) mesh->vert_unseen[i] &= is_seen[i];
-    npg_release(&verts);
     npg_release(&is_seen);
     npg_visible_close(&visible);
     npg_surface_close(&surface);

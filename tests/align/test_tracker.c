@@ -1,5 +1,5 @@
-/* Tracker: poses stay rotations, however many frames they are carried on; a fine reference is aligned by few
- * of its vertices, and all of them move. */
+/* Tracker: a fine reference is aligned by few of its vertices, and all of them move; a piece without points
+ * goes with the one beside it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,31 +12,6 @@
 #include "align/tracker.h"
 #include "geometry/thin.h"
 #include "tests/support/ball_mesh.h"
-
-static void turn_about_z(double *pose, double angle)
-{
-    npg_pose_rest(pose, 1);
-    pose[0] = pose[4] = cos(angle);
-    pose[1] = -sin(angle);
-    pose[3] = sin(angle);
-    pose[9] = angle;
-}
-
-static void extrapolation_goes_on_for_ever(void **state)
-{
-    enum { FRAMES = 2000 };
-    double poses[3][NPG_POSE_SIZE], wanted[NPG_POSE_SIZE];
-    (void)state;
-    turn_about_z(poses[0], 0.0);
-    turn_about_z(poses[1], 0.01);
-    for (int frame = 2; frame < FRAMES; frame++) {
-        npg_pose_extrapolate(poses[2], poses[1], poses[0], 1);
-        memcpy(poses[0], poses[1], sizeof poses[0]);
-        memcpy(poses[1], poses[2], sizeof poses[1]);
-    }
-    turn_about_z(wanted, 0.01 * (FRAMES - 1));
-    for (int i = 0; i < NPG_POSE_SIZE; i++) assert_true(fabs(poses[1][i] - wanted[i]) < 1e-6);
-}
 
 static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)
 {
@@ -95,10 +70,66 @@ static void a_fine_reference_is_aligned_whole(void **state)
     npg_mesh_unref(&ball);
 }
 
+/* Two balls as one mesh, the second a quarter as large and beside the first. */
+static npg_mesh *two_balls(size_t *first_count)
+{
+    npg_mesh *ball = ball_mesh(20, 30), *both;
+    size_t v = ball->vert_count, f = ball->face_count;
+    assert_int_equal(npg_mesh_open(&both, 2 * v, 2 * f), NPG_OK);
+    assert_int_equal(npg_alloc_array(&both->vert_normals, NPG_FOR_MESH, 2 * v, 3 * sizeof(float)), NPG_OK);
+    for (size_t i = 0; i < 3 * v; i++) {
+        both->vert_pos[i] = ball->vert_pos[i];
+        both->vert_pos[3 * v + i] = ball->vert_pos[i] / 4 + (i % 3 ? 0 : 0.7F);
+        both->vert_normals[i] = both->vert_normals[3 * v + i] = ball->vert_normals[i];
+    }
+    for (size_t i = 0; i < 3 * f; i++) {
+        both->faces[i] = ball->faces[i];
+        both->faces[3 * f + i] = ball->faces[i] + (uint32_t)v;
+    }
+    npg_mesh_unref(&ball);
+    *first_count = v;
+    return both;
+}
+
+static void a_piece_without_points_goes_along(void **state)
+{
+    static const npg_tracker_settings settings = {100, 1500, 15, 0.1, 0.02};
+    const double away = 0.05;
+    size_t v;
+    npg_mesh *both = two_balls(&v);
+    npg_tracker *tracker;
+    npg_tracked tracked;
+    float *points, *found;
+    double *pose;
+    (void)state;
+    assert_int_equal(npg_tracker_open(&tracker, both, &settings), NPG_OK);
+    size_t nodes = npg_tracker_node_count(tracker);
+    assert_int_equal(npg_alloc_array(&points, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&found, NPG_FOR_RUN, 2 * v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&pose, NPG_FOR_RUN, nodes, NPG_POSE_SIZE * sizeof(double)), NPG_OK);
+    npg_pose_rest(pose, nodes);
+    for (size_t i = 0; i < 3 * v; i++)
+        points[i] = both->vert_pos[i] + (i % 3 == 1 ? (float)away : 0); /* of the first ball alone */
+    const npg_tracker_cloud cloud = {.points = points, .count = v};
+    for (int frame = 0; frame < 5; frame++)
+        assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL, NULL), NPG_OK);
+    npg_tracker_vertices(tracker, found, pose);
+    double moved = 0;
+    for (size_t i = v; i < 2 * v; i++)
+        moved += ((double)found[3 * i + 1] - (double)both->vert_pos[3 * i + 1]) / (double)v;
+    print_message("the piece moved by %.4f of %.4f\n", moved, away);
+    assert_true(moved > 0.5 * away && moved < 1.5 * away);
+    npg_release(&points);
+    npg_release(&found);
+    npg_release(&pose);
+    npg_tracker_close(&tracker);
+    npg_mesh_unref(&both);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(extrapolation_goes_on_for_ever),
+        cmocka_unit_test(a_piece_without_points_goes_along),
         cmocka_unit_test(thin_meshes_are_made_of_the_whole_one_s_vertices),
         cmocka_unit_test(a_fine_reference_is_aligned_whole),
     };

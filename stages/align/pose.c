@@ -1,0 +1,87 @@
+/* Pose: products of the nodes' rotations. */
+#include "align/pose.h"
+
+#include <math.h>
+
+#include "geometry/rigid.h"
+#include "geometry/vec3.h"
+#include "pipeline/memory.h"
+
+void npg_pose_straighten(double m[9])
+{
+    double *first = m, *second = m + 3, *third = m + 6;
+    npg_vec3_make_unit(first);
+    double along = npg_vec3_dot(first, second);
+    for (int i = 0; i < 3; i++) second[i] -= along * first[i];
+    npg_vec3_make_unit(second);
+    npg_vec3_cross(third, first, second);
+}
+
+void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count)
+{
+    for (size_t k = 0; k < node_count;
+         k++, next += NPG_POSE_SIZE, now += NPG_POSE_SIZE, before += NPG_POSE_SIZE) {
+        double change[9];
+        for (int i = 0; i < 9; i++) { /* now before^T */
+            change[i] = 0;
+            for (int c = 0; c < 3; c++) change[i] += now[i / 3 * 3 + c] * before[i % 3 * 3 + c];
+        }
+        for (int i = 0; i < 9; i++) {
+            next[i] = 0;
+            for (int c = 0; c < 3; c++) next[i] += change[i / 3 * 3 + c] * now[3 * c + i % 3];
+        }
+        /* products of products would triple their rounding errors with every frame */
+        npg_pose_straighten(next);
+        for (int i = 9; i < 12; i++) next[i] = 2 * now[i] - before[i];
+    }
+}
+
+void npg_pose_move(double *moved, const npg_graph *graph, const double *pose, const npg_rigid *motion)
+{
+    for (size_t k = 0; k < graph->node_count; k++, moved += NPG_POSE_SIZE, pose += NPG_POSE_SIZE)
+        for (int row = 0; row < 3; row++) {
+            const double *r = motion->rotation[row];
+            double x = motion->translation[row];
+            for (int c = 0; c < 3; c++) {
+                x += r[c] * ((double)graph->node_pos[3 * k + (size_t)c] + pose[9 + c]);
+                moved[3 * row + c] = r[0] * pose[c] + r[1] * pose[3 + c] + r[2] * pose[6 + c];
+            }
+            moved[9 + row] = x - (double)graph->node_pos[3 * k + (size_t)row];
+        }
+}
+
+void npg_pose_places(float *places, const npg_graph *graph, const double *pose)
+{
+    for (size_t i = 0; i < 3 * graph->node_count; i++)
+        places[i] = (float)((double)graph->node_pos[i] + pose[i / 3 * NPG_POSE_SIZE + 9 + i % 3]);
+}
+
+npg_status npg_pose_between(npg_rigid *motion, const npg_graph *graph, const double *from, const double *to)
+{
+    size_t count = 3 * graph->node_count;
+    float *places;
+    NPG_TRY(npg_alloc_array(&places, NPG_FOR_FIT, 2 * count, sizeof *places));
+    npg_pose_places(places, graph, from);
+    npg_pose_places(places + count, graph, to);
+    npg_rigid_fit(motion->rotation, motion->translation, places, places + count, graph->node_count);
+    npg_release(&places);
+    return NPG_OK;
+}
+
+npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pose)
+{
+    double rotation[3][3], translation[3], sum = 0;
+    float *places;
+    NPG_TRY(npg_alloc_array(&places, NPG_FOR_FIT, 3 * graph->node_count, sizeof *places));
+    npg_pose_places(places, graph, pose);
+    npg_rigid_fit(rotation, translation, graph->node_pos, places, graph->node_count);
+    for (size_t k = 0; k < graph->node_count; k++)
+        for (int row = 0; row < 3; row++) {
+            double left = translation[row] - (double)places[3 * k + (size_t)row];
+            for (int c = 0; c < 3; c++) left += rotation[row][c] * (double)graph->node_pos[3 * k + (size_t)c];
+            sum += left * left;
+        }
+    npg_release(&places);
+    *bend = graph->node_count ? sqrt(sum / (double)graph->node_count) : 0;
+    return NPG_OK;
+}
