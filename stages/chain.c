@@ -68,8 +68,7 @@ static const npg_preset_value grids[] = {
     {"rounds",          "8"},
     {NULL, NULL}};
 static const npg_preset_value best[] = {
-    {"align-nodes",     "2400"},
-    {"align-steps",     "20"},
+    {"reference-rounds", "2"}, /* a finer graph gains nothing: samples/guide/why_these_defaults.md */
     {NULL, NULL}};
 static const npg_preset_value none[] = {
     {NULL, NULL}};
@@ -77,7 +76,7 @@ static const npg_preset_value none[] = {
 
 const npg_preset npg_presets[] = {
     {"default", "alignment frame by frame, then a joint fit of windows of frames", none},
-    {"best", "the same with a finer graph and more steps: slower, closer", best},
+    {"best", "the same, the points of all frames gathered twice for the reference: slower, closer", best},
     {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
      paper},
     {"paper-1000", "the same with its 1000 epochs", paper_1000},

@@ -316,12 +316,12 @@ static void quality_best_is_the_preset_unless_another_is_named(void **state)
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);
     char usual[32];
-    snprintf(usual, sizeof usual, "%s", npg_options_get(options, "align-nodes"));
+    snprintf(usual, sizeof usual, "%s", npg_options_get(options, "reference-rounds"));
     assert_int_equal(npg_options_set(options, "quality", "best"), NPG_OK);
-    assert_string_not_equal(npg_options_get(options, "align-nodes"), usual);
+    assert_string_not_equal(npg_options_get(options, "reference-rounds"), usual);
     assert_string_equal(npg_options_get(options, "preset"), "default");
     assert_int_equal(npg_options_set(options, "preset", "paper"), NPG_OK);
-    assert_string_equal(npg_options_get(options, "align-nodes"), usual);
+    assert_string_equal(npg_options_get(options, "reference-rounds"), usual);
     assert_string_equal(npg_options_get(options, "align"), "no");
     npg_options_close(&options);
 }
