@@ -9,7 +9,8 @@
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */
-#define LOST        1.4  /* times the Chamfer distance of the best quarter                              */
+#define LOST        1.4  /* times what the best quarter has: its Chamfer distance, and ...            */
+#define POINTS_LOST 1.1  /* ... its points' distances alone, which holes do not raise                 */
 #define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */
 #define BETTER      0.95 /* times a frame's Chamfer distance: what a new pose must reach                */
 #define SWEEPS      5    /* at most                                                                     */
@@ -28,11 +29,12 @@ typedef struct recovery {
     npg_attempts attempts; /* its `trial` is owned */
     npg_recover_frame *frames;
     size_t count;
-    double level;    /* Chamfer distance of the best quarter */
-    double *sorted;  /* count, scratch; owned                */
-    npg_look *looks; /* count; owned, with what they own     */
-    double *moved;   /* MOVED_MOST x K x 12, scratch; owned  */
-    size_t *lost;    /* count: which are lost; owned         */
+    double level;       /* Chamfer distance of the best quarter        */
+    double point_level; /* its part of the points, of the best quarter */
+    double *sorted;     /* count, scratch; owned                */
+    npg_look *looks;    /* count; owned, with what they own     */
+    double *moved;      /* MOVED_MOST x K x 12, scratch; owned  */
+    size_t *lost;       /* count: which are lost; owned         */
     npg_recover_result *result;
 } recovery;
 
@@ -41,18 +43,41 @@ static bool is_known(const npg_recover_frame *frame)
     return frame->cloud.count > 0;
 }
 
-static bool is_lost(const recovery *r, const npg_recover_frame *frame)
+static bool is_off(const recovery *r, const npg_recover_frame *frame)
 {
     return is_known(frame) && frame->tracked.chamfer > LOST * r->level;
 }
 
-static void set_level(recovery *r)
+/* Off because its surface has no points near it is not lost: a frame with fewer points, or with holes, has
+ * that, too. */
+static bool is_lost(const recovery *r, const npg_recover_frame *frame)
+{
+    return is_off(r, frame) && frame->tracked.point_dist_sq > POINTS_LOST * r->point_level;
+}
+
+static double chamfer_of(const npg_recover_frame *frame)
+{
+    return frame->tracked.chamfer;
+}
+
+static double point_dist_sq_of(const npg_recover_frame *frame)
+{
+    return frame->tracked.point_dist_sq;
+}
+
+static double best_quarter(const recovery *r, double (*figure)(const npg_recover_frame *frame))
 {
     size_t known = 0;
     for (size_t i = 0; i < r->count; i++)
-        if (is_known(&r->frames[i])) r->sorted[known++] = r->frames[i].tracked.chamfer;
+        if (is_known(&r->frames[i])) r->sorted[known++] = figure(&r->frames[i]);
     qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
-    r->level = fmax(LEVEL_LEAST, known ? r->sorted[known / 4] : 0);
+    return known ? r->sorted[known / 4] : 0;
+}
+
+static void set_levels(recovery *r)
+{
+    r->level = fmax(LEVEL_LEAST, best_quarter(r, chamfer_of));
+    r->point_level = best_quarter(r, point_dist_sq_of);
 }
 
 /* ---- frames that look alike ---- */
@@ -125,18 +150,18 @@ static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
     for (size_t k = 0; k < found; k++) add_moved(s, r, &all[k], NULL);
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way);
-        if (!now || is_lost(r, now)) continue;
+        if (!now || is_off(r, now)) continue;
         NPG_TRY(compare(&beside, r, (size_t)(now - r->frames), i));
         add_moved(s, r, &beside, &wide);
     }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way), *before = frame_at(r, i, 2 * way);
-        if (now && before && !is_lost(r, now))
+        if (now && before && !is_off(r, now))
             s->list[s->count++] = (npg_start){now->pose, before->pose, &wide};
     }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way);
-        if (now && !is_lost(r, now))
+        if (now && !is_off(r, now))
             s->list[s->count++] = (npg_start){now->pose, NULL, sweep ? &wider : &wide};
     }
     return NPG_OK;
@@ -156,7 +181,7 @@ static npg_status recover_frame(recovery *r, size_t i, int sweep)
     npg_recover_frame *frame = &r->frames[i];
     starts from = {.count = 0};
     NPG_TRY(find_starts(&from, r, i, sweep));
-    for (size_t k = 0; k < from.count && is_lost(r, frame); k++) NPG_TRY(try_start(r, frame, &from.list[k]));
+    for (size_t k = 0; k < from.count && is_off(r, frame); k++) NPG_TRY(try_start(r, frame, &from.list[k]));
     return NPG_OK;
 }
 
@@ -189,7 +214,7 @@ static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int
     *is_found = false;
     for (size_t k = 0; k < lost_count && vain < VAIN_MOST; k++) {
         NPG_TRY(recover_frame(r, r->lost[k], sweep));
-        bool is_this_found = !is_lost(r, &r->frames[r->lost[k]]);
+        bool is_this_found = !is_off(r, &r->frames[r->lost[k]]);
         vain = is_this_found ? 0 : vain + 1;
         *is_found |= is_this_found;
     }
@@ -214,7 +239,7 @@ static npg_status open_recovery(recovery *r)
 {
     NPG_TRY(npg_alloc_array(&r->sorted, NPG_FOR_FIT, r->count, sizeof *r->sorted));
     NPG_TRY(npg_alloc_array(&r->lost, NPG_FOR_FIT, r->count, sizeof *r->lost));
-    set_level(r);
+    set_levels(r);
     if (!list_lost(r)) return NPG_END;
     size_t pose_bytes = npg_pose_bytes(npg_tracker_node_count(r->attempts.tracker));
     NPG_TRY(npg_alloc(&r->attempts.trial, NPG_FOR_FIT, pose_bytes));
@@ -228,12 +253,12 @@ static npg_status run_sweeps(recovery *r)
 {
     bool is_found = true;
     for (int sweep = 0; sweep < SWEEPS && is_found; sweep++) {
-        set_level(r);
+        set_levels(r);
         size_t lost = list_lost(r);
         if (!sweep) r->result->lost = (int64_t)lost;
         NPG_TRY(sweep_once(&is_found, r, lost, sweep));
     }
-    set_level(r);
+    set_levels(r);
     r->result->found = r->result->lost - (int64_t)list_lost(r);
     if (r->result->found < 0) r->result->found = 0; /* the level has fallen: more count as lost now */
     return NPG_OK;

@@ -12,7 +12,8 @@
  *
  * and the pose that explains its points best stays.  What is found helps the frames around it, so this is
  * repeated until none is found.  A frame is lost when its Chamfer distance is well above that of the
- * window's best quarter.  Not in the paper. */
+ * window's best quarter, and so are its points' distances alone: a frame with fewer points or with holes has
+ * surface far from them, too, and what it is then found by is a worse pose.  Not in the paper. */
 #ifndef NPG_RECOVER_H
 #define NPG_RECOVER_H
 

@@ -290,8 +290,8 @@ static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, 
            npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, FACING_AWAY);
 }
 
-/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the Chamfer
- * distance; *compared_count: those of them that can be of the surface at all. */
+/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the mean of
+ * squares; *compared_count: those of them that can be of the surface at all. */
 static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t *compared_count,
                         size_t first, size_t last, const double *pose, const npg_tracker_cloud *cloud,
                         bool with_normals, double width)
@@ -316,7 +316,7 @@ static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_
         add_pull(t, part, &p, pose, share, width);
     }
     tracked->point_dist_mean = sum * share;
-    tracked->chamfer = squares * share;
+    tracked->point_dist_sq = squares * share;
     tracked->explained = (double)explained * share;
     *compared_count = compared;
 }
@@ -531,8 +531,9 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     tracked->point_dist_mean =
         scale * (s->tracked[TO_SURFACE].point_dist_mean + s->tracked[TO_POINTS].point_dist_mean);
     tracked->explained = s->tracked[TO_SURFACE].explained + s->tracked[TO_POINTS].explained;
-    tracked->chamfer =
-        scale * (s->tracked[TO_SURFACE].chamfer + s->tracked[TO_POINTS].chamfer) + samples_chamfer(t);
+    tracked->point_dist_sq =
+        scale * (s->tracked[TO_SURFACE].point_dist_sq + s->tracked[TO_POINTS].point_dist_sq);
+    tracked->chamfer = tracked->point_dist_sq + samples_chamfer(t);
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");

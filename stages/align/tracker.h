@@ -31,6 +31,7 @@ typedef struct npg_tracker_settings {
 /* How well it went, lengths in units. */
 typedef struct npg_tracked {
     double point_dist_mean; /* target points -> surface, mean of distances                        */
+    double point_dist_sq;   /* the same, mean of squares                                          */
     double chamfer;         /* mean of squared distances, points -> surface and surface -> points */
     double explained;       /* share of the target points that it has a place for                 */
     double change;          /* the last step's largest movement of a node                         */

@@ -97,6 +97,24 @@ static void what_is_found_is_left_alone(void **state)
     close_capture(&c);
 }
 
+/* As a frame with half the points, or with holes, has it: its surface is farther from them, but they are not
+ * from it. */
+static void surface_without_points_is_not_lost(void **state)
+{
+    static capture c;
+    npg_recover_result result;
+    (void)state;
+    open_capture(&c);
+    for (int t = 0; t < FRAMES; t++) c.frames[t].tracked.point_dist_sq = 1e-5;
+    c.frames[2].tracked.chamfer = 0.5;
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    assert_int_equal(result.lost + result.tried, 0);
+    c.frames[2].tracked.point_dist_sq = 0.25;
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    assert_int_equal(result.lost, 1);
+    close_capture(&c);
+}
+
 static void attempts_end(void **state)
 {
     static capture c;
@@ -108,6 +126,7 @@ static void attempts_end(void **state)
         for (int i = 0; i < 3 * VERTS; i++)
             c.points[t][i] = (float)((i * 7919 + t * 104729) % 2003) / 1001.5f - 1;
         c.frames[t].tracked.chamfer = t > 4 ? 1e-5 : 1e-3;
+        c.frames[t].tracked.point_dist_sq = c.frames[t].tracked.chamfer / 2;
     }
     assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
     print_message("%d lost, %d found in %d fits\n", (int)result.lost, (int)result.found, (int)result.tried);
@@ -123,6 +142,7 @@ int main(void)
                                        cmocka_unit_test(lost_frames_are_found_where_the_body_went),
                                        cmocka_unit_test(lost_frames_are_found_from_the_group_before),
                                        cmocka_unit_test(what_is_found_is_left_alone),
+                                       cmocka_unit_test(surface_without_points_is_not_lost),
                                        cmocka_unit_test(attempts_end)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
