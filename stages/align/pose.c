@@ -70,17 +70,16 @@ npg_status npg_pose_between(npg_rigid *motion, const npg_graph *graph, const dou
 
 npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pose)
 {
-    double rotation[3][3], translation[3], sum = 0;
+    npg_rigid motion;
     float *places;
+    double sum = 0;
     NPG_TRY(npg_alloc_array(&places, NPG_FOR_FIT, 3 * graph->node_count, sizeof *places));
     npg_pose_places(places, graph, pose);
-    npg_rigid_fit(rotation, translation, graph->node_pos, places, graph->node_count);
-    for (size_t k = 0; k < graph->node_count; k++)
-        for (int row = 0; row < 3; row++) {
-            double left = translation[row] - (double)places[3 * k + (size_t)row];
-            for (int c = 0; c < 3; c++) left += rotation[row][c] * (double)graph->node_pos[3 * k + (size_t)c];
-            sum += left * left;
-        }
+    npg_rigid_fit(motion.rotation, motion.translation, graph->node_pos, places, graph->node_count);
+    for (size_t i = 0; i < 3 * graph->node_count; i++) {
+        double left = npg_rigid_at(&motion, graph->node_pos + i / 3 * 3, (int)(i % 3)) - (double)places[i];
+        sum += left * left;
+    }
     npg_release(&places);
     *bend = graph->node_count ? sqrt(sum / (double)graph->node_count) : 0;
     return NPG_OK;

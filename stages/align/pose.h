@@ -9,6 +9,13 @@ typedef struct npg_rigid {
     double rotation[3][3], translation[3];
 } npg_rigid;
 
+/* Coordinate `row` of R x + t. */
+static inline double npg_rigid_at(const npg_rigid *m, const float x[3], int row)
+{
+    const double *r = m->rotation[row];
+    return r[0] * (double)x[0] + r[1] * (double)x[1] + r[2] * (double)x[2] + m->translation[row];
+}
+
 /* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt). */
 void npg_pose_straighten(double rotation[9]);
 

@@ -31,10 +31,10 @@ typedef struct recovery {
     size_t count;
     double level;       /* Chamfer distance of the best quarter        */
     double point_level; /* its part of the points, of the best quarter */
-    double *sorted;     /* count, scratch; owned                */
-    npg_look *looks;    /* count; owned, with what they own     */
-    double *moved;      /* MOVED_MOST x K x 12, scratch; owned  */
-    size_t *lost;       /* count: which are lost; owned         */
+    double *sorted;     /* count, scratch; owned                       */
+    npg_look *looks;    /* count; owned, with what they own            */
+    double *moved;      /* MOVED_MOST x K x 12, scratch; owned         */
+    size_t *lost;       /* count: which are lost; owned                */
     npg_recover_result *result;
 } recovery;
 

@@ -29,12 +29,8 @@ void npg_look_close(npg_look *look)
 
 static void move_points(float *moved, const npg_rigid *m, const float *points, size_t count)
 {
-    for (size_t i = 0; i < 3 * count; i++) {
-        const float *x = points + i / 3 * 3;
-        const double *r = m->rotation[i % 3];
-        moved[i] =
-            (float)(r[0] * (double)x[0] + r[1] * (double)x[1] + r[2] * (double)x[2] + m->translation[i % 3]);
-    }
+    for (size_t i = 0; i < 3 * count; i++)
+        moved[i] = (float)npg_rigid_at(m, points + i / 3 * 3, (int)(i % 3));
 }
 
 static npg_rigid inverse(const npg_rigid *m)

@@ -181,7 +181,7 @@ class Run(Closing):
     def __init__(self, *, progress: Callable[[Progress], None] | None = None, stages: Sequence[Stage] = (),
                  options: Options | None = None, **values: object) -> None:
         self._closing = threading.Lock()
-        self._guard = threading.Condition()  # of _handle and _callers, and never taken by the main thread
+        self._guard = threading.Condition()  # of _handle and _callers; not for the main thread, but at the end
         self._callers = 0
         self._handle = c_void_p()
         self._failure: BaseException | None = None
