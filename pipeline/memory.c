@@ -13,6 +13,7 @@
 typedef struct head { /* sits in the 64 bytes before every block */
     size_t size;
     npg_purpose purpose;
+    void *before; /* in an arena: the block taken before this one */
 } head;
 
 _Static_assert(sizeof(head) <= ALIGN, "the head must fit before the block");
@@ -123,7 +124,7 @@ npg_status npg_alloc(void *out, npg_purpose purpose, size_t size)
         return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, npg_purpose_name(purpose));
     }
     memset(block, 0, size + ALIGN);
-    *(head *)(void *)block = (head){size, purpose};
+    *(head *)(void *)block = (head){size, purpose, NULL};
     *result = block + ALIGN;
     return NPG_OK;
 }
@@ -160,13 +161,53 @@ npg_status npg_copy_text(char **out, const char *text)
     return NPG_OK;
 }
 
+static head *head_of(void *memory)
+{
+    return (head *)(void *)((unsigned char *)memory - ALIGN);
+}
+
 void npg_release(void *memory)
 {
     void **slot = memory;
     if (!*slot) return;
-    unsigned char *block = (unsigned char *)*slot - ALIGN;
-    head h = *(head *)(void *)block;
+    head h = *head_of(*slot);
+    allocator.release(allocator.user, head_of(*slot));
     *slot = NULL;
-    allocator.release(allocator.user, block);
     npg_memory_count(h.purpose, -(ptrdiff_t)h.size);
+}
+
+void *npg_arena_take(npg_arena *arena, size_t count, size_t size)
+{
+    void *taken;
+    if (!arena->status) arena->status = npg_alloc_array(&taken, arena->purpose, count, size);
+    if (arena->status || !taken) return NULL;
+    head_of(taken)->before = arena->last;
+    return arena->last = taken;
+}
+
+void *npg_arena_copy(npg_arena *arena, const void *from, size_t count, size_t size)
+{
+    void *taken = npg_arena_take(arena, count, size);
+    if (taken && from) memcpy(taken, from, count * size);
+    return taken;
+}
+
+char *npg_arena_text(npg_arena *arena, const char *text)
+{
+    return npg_arena_copy(arena, text, strlen(text) + 1, 1);
+}
+
+npg_status npg_arena_status(const npg_arena *arena)
+{
+    return arena->status;
+}
+
+void npg_arena_release(npg_arena *arena)
+{
+    while (arena->last) {
+        void *taken = arena->last;
+        arena->last = head_of(taken)->before;
+        npg_release(&taken);
+    }
+    arena->status = NPG_OK;
 }

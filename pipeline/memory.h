@@ -41,6 +41,30 @@ npg_status npg_copy_text(char **out, const char *text);
 /* Free *memory (what npg_alloc gave) and null it; NULL inside is fine. */
 void npg_release(void *memory);
 
+/* All memory of one object, or the scratch of one function: each array is taken from it, one call frees all.
+ * {.purpose = ...} is an empty arena that holds nothing.  It is sticky: after the first refusal every take
+ * gives NULL, so take all arrays, then ask once with npg_arena_status().  One thread at a time. */
+typedef struct npg_arena {
+    npg_purpose purpose;
+    npg_status status; /* of the first take that was refused */
+    void *last;        /* the array taken last; each knows the one before it */
+} npg_arena;
+
+/* count elements of `size` bytes as npg_alloc_array gives them; NULL for none, and on failure. */
+void *npg_arena_take(npg_arena *arena, size_t count, size_t size);
+
+/* The same, filled with a copy of what lies at `from` (NULL: zeroes). */
+void *npg_arena_copy(npg_arena *arena, const void *from, size_t count, size_t size);
+
+/* A copy of text. */
+char *npg_arena_text(npg_arena *arena, const char *text);
+
+/* NPG_OK, or NPG_MEMORY once a take was refused; the error text is the refusal's. */
+npg_status npg_arena_status(const npg_arena *arena);
+
+/* Free all that was taken; the arena is empty again and good, with the same purpose. */
+void npg_arena_release(npg_arena *arena);
+
 /* Count bytes that another library holds for us; negative gives them back.  NPG_MEMORY when the limit is
  * passed (the count is then unchanged). */
 npg_status npg_memory_count(npg_purpose purpose, ptrdiff_t bytes);

@@ -1,4 +1,4 @@
-/* Memory: alignment, zeroes, counting by purpose, the limit, growing, injected failures, a user allocator. */
+/* Memory: alignment, zeroes, counting by purpose, the limit, growing, injected failures, arenas, a user allocator. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -114,6 +114,43 @@ static void the_nth_request_fails(void **state)
     }
 }
 
+static void an_arena_frees_all_at_once(void **state)
+{
+    (void)state;
+    npg_arena arena = {.purpose = NPG_FOR_MESH};
+    int *numbers = npg_arena_take(&arena, 1000, sizeof *numbers);
+    assert_int_equal((uintptr_t)numbers % 64, 0);
+    for (int i = 0; i < 1000; i++) assert_int_equal(numbers[i], 0);
+    memset(numbers, 0xff, 1000 * sizeof *numbers);
+    assert_null(npg_arena_take(&arena, 0, 8)); /* nothing is no failure */
+    int *copy = npg_arena_copy(&arena, numbers, 1000, sizeof *copy);
+    assert_memory_equal(copy, numbers, 1000 * sizeof *copy);
+    assert_string_equal(npg_arena_text(&arena, "walker"), "walker");
+    assert_int_equal(npg_arena_status(&arena), NPG_OK);
+    assert_int_equal(npg_memory_used_for(NPG_FOR_MESH), 8007);
+    npg_arena_release(&arena);
+    assert_int_equal(npg_memory_used(), 0);
+    npg_arena_release(&arena); /* an empty one, too */
+}
+
+static void an_arena_remembers_the_first_refusal(void **state)
+{
+    (void)state;
+    npg_arena arena = {.purpose = NPG_FOR_FIT};
+    npg_memory_fail_at(2, false);
+    assert_non_null(npg_arena_take(&arena, 3, 8));
+    assert_null(npg_arena_take(&arena, 5, 8));
+    assert_null(npg_arena_take(&arena, 7, 8)); /* the system would give it again */
+    assert_int_equal(npg_arena_status(&arena), NPG_MEMORY);
+    assert_non_null(strstr(npg_error_text(), "40 bytes for fit"));
+    assert_int_equal(npg_memory_used(), 24);
+    npg_arena_release(&arena);
+    assert_int_equal(npg_arena_status(&arena), NPG_OK); /* a fresh start */
+    assert_null(npg_arena_take(&arena, SIZE_MAX / 2, 3));
+    assert_int_equal(npg_arena_status(&arena), NPG_MEMORY);
+    npg_arena_release(&arena);
+}
+
 /* ---- an allocator of the user's ---- */
 
 static size_t live_blocks;
@@ -184,6 +221,8 @@ int main(void)
         cmocka_unit_test_teardown(the_limit_holds, nothing_left),
         cmocka_unit_test_teardown(growing_keeps_the_content, nothing_left),
         cmocka_unit_test_teardown(the_nth_request_fails, nothing_left),
+        cmocka_unit_test_teardown(an_arena_frees_all_at_once, nothing_left),
+        cmocka_unit_test_teardown(an_arena_remembers_the_first_refusal, nothing_left),
         cmocka_unit_test_teardown(the_users_allocator_is_asked, nothing_left),
         cmocka_unit_test_teardown(counters_survive_threads, nothing_left),
     };
