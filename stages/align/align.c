@@ -7,11 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "align/backward.h"
 #include "align/follow_log.h"
 #include "align/group.h"
-#include "align/handover.h"
 #include "align/pose.h"
-#include "align/sweep_back.h"
+#include "align/pose_cache.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
 #include "job/job.h"
@@ -26,8 +26,8 @@
 #define AGAIN_STIFFNESS 2    /* of the first step, in final stiffnesses      */
 #define AGAIN_WIDTH     0.02 /* of the first step's robust weight, in units  */
 
-#define RAY_BYTES  64  /* of a sample of the surface, to tell whether a sensor sees it */
-#define HELD_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
+#define RAY_BYTES   64  /* of a sample of the surface, to tell whether a sensor sees it */
+#define PRIOR_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
 
 /* While a reference that is one side of the body grows, points past its border are carried by the border's
  * motion, which is theirs while the body moves as one piece: then it is followed as far as it has places for
@@ -40,8 +40,8 @@ typedef struct state {
     int64_t nodes, samples, steps;
     double stiffness, along;
     npg_tracker *tracker;
-    npg_handover handover; /* from the pass before, to the next */
-    npg_follow_log *log;   /* of a fusing pass: what is found, and what an earlier run had; owned, or NULL */
+    npg_pose_cache cache; /* from the pass before, to the next */
+    npg_follow_log *log;  /* of a fusing pass: what is found, and what an earlier run had; owned, or NULL */
     npg_group group;
     int64_t past_count;           /* frames that a growing reference does not reach */
     int64_t read;                 /* frames of the plan so far                           */
@@ -76,7 +76,7 @@ static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_tracker_close(&s->tracker);
-    npg_handover_close(&s->handover);
+    npg_pose_cache_close(&s->cache);
     npg_follow_log_close(&s->log);
     npg_group_close(&s->group);
 }
@@ -165,7 +165,7 @@ static npg_status open_log(npg_worker *worker)
     char *path;
     int64_t groups;
     NPG_TRY(npg_job_fusing_key(worker, &key.job));
-    NPG_TRY(npg_job_followed_path(job, &path, npg_handover_passes(worker)));
+    NPG_TRY(npg_job_followed_path(job, &path, npg_pose_cache_passes(worker)));
     npg_status status = npg_follow_log_open(&s->log, &groups, path, &key);
     npg_release(&path);
     if (!status && groups)
@@ -177,7 +177,7 @@ static npg_status open_log(npg_worker *worker)
 static npg_status save(const npg_worker *worker, npg_archive_writer *out)
 {
     const state *s = npg_worker_state(worker);
-    return npg_handover_save(&s->handover, out);
+    return npg_pose_cache_save(&s->cache, out);
 }
 
 static npg_status open_tracker(npg_worker *worker)
@@ -189,7 +189,7 @@ static npg_status open_tracker(npg_worker *worker)
     size_t nodes = nodes_of(s);
     NPG_TRY(npg_group_open(&s->group, nodes));
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
-    NPG_TRY(npg_handover_open(&s->handover, worker, s->tracker));
+    NPG_TRY(npg_pose_cache_open(&s->cache, worker, s->tracker));
     NPG_TRY(open_log(worker));
     return npg_worker_facts(worker)->is_resumed ? restore_state(worker) : NPG_OK;
 }
@@ -235,11 +235,11 @@ static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
     const state *s = npg_worker_state(worker);
     const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
                                       AGAIN_WIDTH, 1};
-    NPG_TRY(npg_handover_start(&s->handover, s->tracker, w->frame.index, at->now, &w->is_known));
+    NPG_TRY(npg_pose_cache_start(&s->cache, s->tracker, w->frame.index, at->now, &w->is_known));
     if (w->cloud.count) {
-        const npg_hold hold = {.pose = w->is_known || !at->has_before ? at->now : at->before};
-        NPG_TRY(
-            npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, &hold, w->is_known ? &again : NULL));
+        const npg_prior_poses prior = {.pose = w->is_known || !at->has_before ? at->now : at->before};
+        NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, &prior,
+                                w->is_known ? &again : NULL));
         NPG_TRY(count_hidden(worker, w, at));
         npg_worker_log(worker, NPG_LOG_DEBUG, w->frame.number,
                        "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps",
@@ -337,9 +337,9 @@ static npg_status recover_group(npg_worker *worker, npg_recover_frame *frames, s
 static npg_status sweep_group(npg_worker *worker, npg_recover_frame *frames, size_t count)
 {
     state *s = npg_worker_state(worker);
-    npg_sweep_result result;
-    NPG_TRY(npg_sweep_back(s->tracker, &result, frames, count, npg_worker_facts(worker)->plan.key,
-                           npg_worker_should_stop, worker));
+    npg_backward_result result;
+    NPG_TRY(npg_track_backward(s->tracker, &result, frames, count, npg_worker_facts(worker)->plan.key,
+                               npg_worker_should_stop, worker));
     if (result.tried)
         npg_worker_log(worker, NPG_LOG_INFO, -1, "of %lld frames followed back %lld are better, or as good",
                        (long long)result.tried, (long long)result.taken);
@@ -388,7 +388,7 @@ static npg_status pass_on(npg_worker *worker, npg_waiting *w)
         s->past_count++;
     } else {
         npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
-        NPG_TRY(npg_handover_put(&s->handover, frame->index, w->pose));
+        NPG_TRY(npg_pose_cache_put(&s->cache, frame->index, w->pose));
     }
     NPG_TRY(npg_chunk_open(&chunk, 1));
     npg_chunk_add(chunk, frame);
@@ -493,7 +493,7 @@ static npg_status flush(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     NPG_TRY(close_group(worker, npg_plan_is_open(&npg_worker_facts(worker)->plan)));
     report_progress(worker);
-    NPG_TRY(npg_handover_leave(&s->handover, worker, &s->tracker));
+    NPG_TRY(npg_pose_cache_leave(&s->cache, worker, &s->tracker));
     if (npg_worker_pass(worker) == NPG_PASS_FUSE) npg_worker_facts(worker)->past_count = s->past_count;
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
@@ -538,7 +538,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node, and how both ends hold
      * them; per vertex weights and the graph's search for them, positions, normals; the waiting frames'
      * poses, once more for the log, what they hide, and thinned points */
-    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + HELD_BYTES + known) +
+    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + PRIOR_BYTES + known) +
            verts * 320 +
            group *
                (nodes * (2 * NPG_POSE_SIZE * sizeof(double) + sizeof(float)) + points * 6 * sizeof(float)) +

@@ -6,7 +6,7 @@
 #include "align/pose.h"
 
 npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *frame, const npg_start *from,
-                       const npg_hold *hold, double share)
+                       const npg_prior_poses *poses, double share)
 {
     size_t nodes = npg_tracker_node_count(a->tracker), bytes = npg_pose_bytes(nodes);
     npg_tracked tracked;
@@ -16,7 +16,7 @@ npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *fr
         npg_pose_extrapolate(a->trial, from->now, from->before, nodes);
     else
         memcpy(a->trial, from->now, bytes);
-    NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, hold, from->effort));
+    NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, poses, from->effort));
     if (tracked.chamfer > share * frame->tracked.chamfer) return NPG_OK;
     *taken = true;
     frame->tracked = tracked;

@@ -30,10 +30,10 @@ typedef struct npg_start {
     const npg_tracker_effort *effort; /* NULL: the usual one */
 } npg_start;
 
-/* Fit the frame from there, hidden parts held by `hold`.  *taken: whether its pose and what was tracked
+/* Fit the frame from there, hidden parts held by `poses`.  *taken: whether its pose and what was tracked
  * become the new ones, those of a Chamfer distance of at most `share` times the old one.  NPG_STOPPED,
  * NPG_MEMORY, NPG_DIVERGED. */
 npg_status npg_attempt(const npg_attempts *attempts, bool *taken, npg_recover_frame *frame,
-                       const npg_start *from, const npg_hold *hold, double share);
+                       const npg_start *from, const npg_prior_poses *poses, double share);
 
 #endif

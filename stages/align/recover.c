@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/stand.h"
+#include "align/rigid_icp.h"
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */
@@ -96,7 +96,7 @@ static npg_status compare(alike *found, const recovery *r, size_t k, size_t i)
     npg_rigid guess;
     found->frame = k;
     NPG_TRY(npg_pose_between(&guess, graph, r->frames[k].pose, r->frames[i].pose));
-    return npg_stand_find(&found->motion, &found->unlike, &r->looks[k], &r->looks[i], &guess);
+    return npg_rigid_icp(&found->motion, &found->unlike, &r->looks[k], &r->looks[i], &guess);
 }
 
 /* The frames most like frame i that its tracker explains better, the most alike first. */
@@ -169,9 +169,9 @@ static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
 
 static npg_status try_start(recovery *r, npg_recover_frame *frame, const npg_start *from)
 {
-    const npg_hold hold = {.pose = from->now};
+    const npg_prior_poses prior = {.pose = from->now};
     bool taken;
-    NPG_TRY(npg_attempt(&r->attempts, &taken, frame, from, &hold, BETTER));
+    NPG_TRY(npg_attempt(&r->attempts, &taken, frame, from, &prior, BETTER));
     r->result->tried++;
     return NPG_OK;
 }

@@ -5,7 +5,7 @@
  * are found, and each of them is a place to start from.  So a lost frame is tried again from
  *
  *     1  the poses of the frames whose points look most like its own, where those fit better: motion recurs;
- *        moved to where the body stands in this frame (stand.h), as it seldom recurs in place
+ *        moved to where the body stands in this frame (rigid_icp.h), as it seldom recurs in place
  *     2  the poses of the frame before it and of the one after it, moved likewise
  *     3  the motion of the two frames before it, and of the two after it, taken on
  *     4  the poses of the frame before it and of the one after it

@@ -1,6 +1,6 @@
 /* Sides: the poses that the frames on one side of the keyframe start from, the last two that were found. */
-#ifndef NPG_SIDES_H
-#define NPG_SIDES_H
+#ifndef NPG_ALIGN_SIDES_H
+#define NPG_ALIGN_SIDES_H
 
 #include "align/tracker.h"
 

@@ -65,7 +65,7 @@ struct npg_tracker {
     float *near_sq, *sample_pos;
     uint8_t *is_seen; /* samples: by a sensor, in the pose at work */
     npg_visible visible;
-    npg_held held; /* edges of what no sensor sees */
+    npg_occlusion_prior prior; /* edges of what no sensor sees */
 };
 
 size_t npg_tracker_node_count(const npg_tracker *tracker)
@@ -102,7 +102,7 @@ void npg_tracker_close(npg_tracker **slot)
                    &t->rows,      &t->targets,  &t->target_normals, &t->hits,    &t->start_face,
                    &t->near,      &t->near_sq,  &t->sample_pos,     &t->is_seen};
     npg_visible_close(&t->visible);
-    npg_held_close(&t->held);
+    npg_prior_close(&t->prior);
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_release(slot);
 }
@@ -134,9 +134,9 @@ static npg_status find_border(npg_tracker *t)
 
 static npg_status open_system(npg_tracker *t)
 {
-    NPG_TRY(npg_held_open(&t->held, t->graph));
-    return npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->held.pairs,
-                          t->held.pair_count);
+    NPG_TRY(npg_prior_open(&t->prior, t->graph));
+    return npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->prior.pairs,
+                          t->prior.pair_count);
 }
 
 static double size_of(const npg_mesh *reference)
@@ -350,12 +350,12 @@ static void add_edges(npg_tracker *t, const double *pose, double stiffness)
 {
     const npg_graph *graph = t->graph;
     npg_block_term term = {.count = 2, .shares = {1, -1}};
-    for (size_t e = 0; e < 2 * t->held.pair_count; e++) {
-        uint32_t j = t->held.pairs[e / 2][e % 2], k = t->held.pairs[e / 2][1 - e % 2];
+    for (size_t e = 0; e < 2 * t->prior.pair_count; e++) {
+        uint32_t j = t->prior.pairs[e / 2][e % 2], k = t->prior.pairs[e / 2][1 - e % 2];
         const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
         const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
         double edge[3];
-        term.along = stiffness / (double)graph->edge_count * npg_held_edge(edge, &t->held, graph, e);
+        term.along = stiffness / (double)graph->edge_count * npg_prior_edge(edge, &t->prior, graph, e);
         term.nodes[0] = j;
         term.nodes[1] = k;
         turn_arm(term.arms[0], pj, edge);
@@ -479,7 +479,7 @@ static npg_status add_terms(void *user, size_t part)
                 is_lent ? lent : t->target_count, s->pose, s->cloud, normals != NULL, s->width);
     if (part == TO_SURFACE) return NPG_OK;
     add_samples(t, s->pose, s->cloud->points, normals, s->width);
-    npg_held_see(&t->held, t->graph, t->samples, t->is_seen, t->sample_count);
+    npg_prior_see(&t->prior, t->graph, t->samples, t->is_seen, t->sample_count);
     add_edges(t, s->pose, s->stiffness);
     return NPG_OK;
 }
@@ -543,7 +543,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 }
 
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_tracker_cloud *cloud,
-                           const npg_hold *hold, const npg_tracker_effort *effort)
+                           const npg_prior_poses *poses, const npg_tracker_effort *effort)
 {
     const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START, 1};
     npg_kdtree *tree;
@@ -555,8 +555,8 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     npg_status status = NPG_OK;
     step s = {.t = t, .pose = pose, .tree = tree, .cloud = cloud};
     if (!effort) effort = &usual;
-    const npg_hold start = {.pose = pose};
-    if (cloud->sensor_count) npg_held_take(&t->held, t->graph, hold ? hold : &start, cloud->sensor_count);
+    const npg_prior_poses start = {.pose = pose};
+    if (cloud->sensor_count) npg_prior_take(&t->prior, t->graph, poses ? poses : &start, cloud->sensor_count);
     t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {
         set_schedule(&s, tracked, effort);
@@ -569,5 +569,5 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
 
 void npg_tracker_since(const npg_tracker *t, float *since, const float *before)
 {
-    npg_held_count(&t->held, since, before, t->graph->node_count);
+    npg_prior_count(&t->prior, since, before, t->graph->node_count);
 }

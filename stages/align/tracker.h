@@ -8,7 +8,7 @@
  * c_p: the point of the deformed surface closest to the target point p; p_s: the target point closest to the
  * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
  * is the robust weight of Geman and McClure, whose width shrinks step by step; e_jk: the edge g_k - g_j at
- * rest, or as it is held where no sensor sees it (held.h).  Few unknowns, second order: it reaches what
+ * rest, or as it is held where no sensor sees it (occlusion_prior.h).  Few unknowns, second order: it reaches what
  * gradient descent needs hundreds of steps for; the joint fit then needs to find only what the graph can't
  * express.
  *
@@ -16,7 +16,7 @@
 #ifndef NPG_TRACKER_H
 #define NPG_TRACKER_H
 
-#include "align/held.h"
+#include "align/occlusion_prior.h"
 
 typedef struct npg_tracker npg_tracker;
 
@@ -69,10 +69,10 @@ typedef struct npg_tracker_effort {
 
 /* Improve pose (K x 12) to explain the points, of which there is one at least.  Where it is known where they
  * were seen from, they are compared with what can be seen of the surface from there (visible.h), and points
- * beyond its border do not pull; all else is carried by the edges, as `hold` has them (NULL: as the pose that
+ * beyond its border do not pull; all else is carried by the edges, as `poses` has them (NULL: as the pose that
  * the fit starts from).  effort: NULL for the usual one. */
 npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose,
-                           const npg_tracker_cloud *cloud, const npg_hold *hold,
+                           const npg_tracker_cloud *cloud, const npg_prior_poses *poses,
                            const npg_tracker_effort *effort);
 
 /* since (K) of the frame that was fitted last, from that of the frame before it: how many frames ago most of

@@ -28,16 +28,16 @@ static const npg_tracker_settings draft_tracking = {
 
 /* ---- the draft ---- */
 
-static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight *sight, float *normals,
-                             const npg_poisson_settings *settings)
+static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_candidate_cloud *cloud,
+                             float *normals, const npg_poisson_settings *settings)
 {
     size_t moved, turned;
     double spacing;
     npg_pieces pieces;
     int rounds;
     npg_mending mending;
-    NPG_TRY(npg_cloud_spacing(&spacing, sight->points, sight->point_count));
-    NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, sight->points, sight->point_count,
+    NPG_TRY(npg_cloud_spacing(&spacing, cloud->points, cloud->point_count));
+    NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, cloud->points, cloud->point_count,
                                 spacing, settings));
     NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
     NPG_TRY(npg_mesh_handles(handles, *mesh));
@@ -49,7 +49,7 @@ static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_sight 
     return NPG_OK;
 }
 
-static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight *sight,
+static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_candidate_cloud *cloud,
                              const npg_poisson_settings *settings)
 {
     npg_poisson_settings quick = *settings;
@@ -57,9 +57,9 @@ static npg_status make_draft(npg_mesh **mesh, int64_t *handles, const npg_sight 
     *mesh = NULL;
     if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
     quick.rounds_max = DRAFT_ROUNDS;
-    NPG_TRY(npg_alloc_array(&normals, NPG_FOR_MESH, sight->point_count, 3 * sizeof(float)));
-    for (size_t i = 0; i < 3 * sight->point_count; i++) normals[i] = sight->normals[i];
-    npg_status status = draft_from(mesh, handles, sight, normals, &quick);
+    NPG_TRY(npg_alloc_array(&normals, NPG_FOR_MESH, cloud->point_count, 3 * sizeof(float)));
+    for (size_t i = 0; i < 3 * cloud->point_count; i++) normals[i] = cloud->normals[i];
+    npg_status status = draft_from(mesh, handles, cloud, normals, &quick);
     npg_release(&normals);
     if (status) npg_mesh_unref(mesh);
     return status;
@@ -75,7 +75,8 @@ typedef struct result_sums {
     float *dist; /* V, owned */
 } result_sums;
 
-static npg_status see(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
+static npg_status see(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
+                      const npg_tracked *tracked)
 {
     result_sums *f = user;
     double area = 0, stretched = 0, dist = 0;
@@ -87,7 +88,7 @@ static npg_status see(void *user, const npg_sight *sight, const float *vert_unit
         area += now;
         if (now > STRETCHED * rest) stretched += now;
     }
-    NPG_TRY(npg_points_dist(f->dist, vert_unit, f->mesh->vert_count, sight->points, sight->point_count));
+    NPG_TRY(npg_points_dist(f->dist, vert_unit, f->mesh->vert_count, cloud->points, cloud->point_count));
     for (size_t v = 0; v < f->mesh->vert_count; v++) dist += (double)f->dist[v];
     f->vert_dist += dist / (double)f->mesh->vert_count;
     f->point_dist += tracked->point_dist_mean;
@@ -97,12 +98,12 @@ static npg_status see(void *user, const npg_sight *sight, const float *vert_unit
 }
 
 /* Follow the candidate's draft through the other frames. */
-static npg_status follow(npg_draft_result *result, const npg_sights *sights, size_t at, npg_mesh *draft,
-                         const npg_poisson_settings *settings)
+static npg_status follow(npg_draft_result *result, const npg_candidate_clouds *clouds, size_t at,
+                         npg_mesh *draft, const npg_poisson_settings *settings)
 {
     result_sums f = {.mesh = draft, .settings = settings};
     npg_status status = npg_alloc_array(&f.dist, NPG_FOR_MESH, draft->vert_count, sizeof *f.dist);
-    if (!status) status = npg_sights_follow(sights, at, draft, &draft_tracking, see, &f);
+    if (!status) status = npg_candidate_follow(clouds, at, draft, &draft_tracking, see, &f);
     npg_release(&f.dist);
     NPG_TRY(status);
     result->is_followed = true;
@@ -122,12 +123,12 @@ static bool is_fatal(npg_status status)
 
 typedef struct candidate {
     npg_draft_result *result;
-    size_t at;       /* in the sights */
+    size_t at;       /* in the clouds */
     npg_mesh *draft; /* NULL where none was needed or could be made; owned */
 } candidate;
 
 typedef struct choosing {
-    const npg_sights *sights;
+    const npg_candidate_clouds *clouds;
     const npg_poisson_settings *settings;
     candidate list[NPG_CHOICE_MAX];
     size_t count, scored; /* scored: place of the best-scored frame, count when it is not there */
@@ -147,12 +148,12 @@ static bool is_more_apart(const npg_draft_result *a, const npg_draft_result *b)
 
 static npg_status list_candidates(choosing *c, npg_draft_result *results, int64_t best_scored)
 {
-    for (size_t i = 0; i < c->sights->count && c->count < NPG_CHOICE_MAX; i++) {
-        const npg_sight *sight = &c->sights->list[i];
-        if (!sight->is_candidate || !sight->normals) continue;
+    for (size_t i = 0; i < c->clouds->count && c->count < NPG_CHOICE_MAX; i++) {
+        const npg_candidate_cloud *cloud = &c->clouds->list[i];
+        if (!cloud->is_candidate || !cloud->normals) continue;
         npg_draft_result *result = &results[c->count];
-        *result = (npg_draft_result){.index = sight->index, .number = sight->number};
-        NPG_TRY(npg_cloud_contact(&result->contact, sight->points, sight->normals, sight->point_count));
+        *result = (npg_draft_result){.index = cloud->index, .number = cloud->number};
+        NPG_TRY(npg_cloud_contact(&result->contact, cloud->points, cloud->normals, cloud->point_count));
         c->list[c->count++] = (candidate){.result = result, .at = i};
     }
     c->scored = 0;
@@ -170,12 +171,12 @@ typedef struct together {
 
 static npg_status draft_one(choosing *c, candidate *one)
 {
-    return make_draft(&one->draft, &one->result->handles, &c->sights->list[one->at], c->settings);
+    return make_draft(&one->draft, &one->result->handles, &c->clouds->list[one->at], c->settings);
 }
 
 static npg_status follow_one(choosing *c, candidate *one)
 {
-    return follow(one->result, c->sights, one->at, one->draft, c->settings);
+    return follow(one->result, c->clouds, one->at, one->draft, c->settings);
 }
 
 static npg_status act_for_one(void *user, size_t part)
@@ -253,10 +254,11 @@ static size_t cheapest(const npg_draft_result *results, size_t count, size_t sco
     return best;
 }
 
-npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best, const npg_sights *sights,
-                      int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings)
+npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best,
+                      const npg_candidate_clouds *clouds, int64_t best_scored, int64_t frame_count,
+                      const npg_poisson_settings *settings)
 {
-    choosing c = {.sights = sights, .settings = settings};
+    choosing c = {.clouds = clouds, .settings = settings};
     npg_status status = list_candidates(&c, results, best_scored);
     if (!status) status = make_drafts(&c);
     if (!status) status = compare(&c);

@@ -3,7 +3,7 @@
  *
  * The paper's score (keyframe.c) counts cells that hold a point; it hardly tells frames apart and knows
  * nothing of limbs that touch.  Here each candidate's points are made a draft surface, which the coarse
- * tracker follows through the other frames (sights.h).  The cost of a candidate is
+ * tracker follows through the other frames (candidate_clouds.h).  The cost of a candidate is
  *
  *     (mean distance of points from the surface + mean distance of the surface's vertices from points
  *      + 0.2 * share of its area stretched threefold + 0.1 * share of points in contact)
@@ -19,7 +19,7 @@
 #ifndef NPG_CHOOSE_H
 #define NPG_CHOOSE_H
 
-#include "align/sights.h"
+#include "align/candidate_clouds.h"
 #include "mesh/poisson.h"
 
 typedef struct npg_draft_result {
@@ -36,7 +36,8 @@ typedef struct npg_draft_result {
 /* frame_count: of the capture.  results: room for as many as there are candidates; *count gets how
  * many, *best which is chosen (its place in results).  best_scored: index of the frame to stay with.
  * NPG_MEMORY, NPG_STOPPED. */
-npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best, const npg_sights *sights,
-                      int64_t best_scored, int64_t frame_count, const npg_poisson_settings *settings);
+npg_status npg_choose(npg_draft_result *results, size_t *count, size_t *best,
+                      const npg_candidate_clouds *clouds, int64_t best_scored, int64_t frame_count,
+                      const npg_poisson_settings *settings);
 
 #endif

@@ -12,10 +12,11 @@ static bool is_candidate(const npg_choice *choice, int64_t index)
 
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk)
 {
-    if (!pass->sights) NPG_TRY(npg_sights_open(&pass->sights));
+    if (!pass->clouds) NPG_TRY(npg_candidate_clouds_open(&pass->clouds));
     for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
         const npg_frame *frame = npg_chunk_frame(chunk, i);
-        NPG_TRY(npg_sights_add(pass->sights, frame, &facts->box, is_candidate(&facts->choice, frame->index)));
+        NPG_TRY(npg_candidate_clouds_add(pass->clouds, frame, &facts->box,
+                                         is_candidate(&facts->choice, frame->index)));
     }
     return NPG_OK;
 }
@@ -35,7 +36,7 @@ static void report_candidates(npg_worker *worker, const npg_draft_result *result
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }
 
-static npg_status compare(npg_worker *worker, npg_draft_result *result, const npg_sights *sights)
+static npg_status compare(npg_worker *worker, npg_draft_result *result, const npg_candidate_clouds *clouds)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_poisson_settings settings = npg_poisson_settings_of(npg_worker_options(worker));
@@ -44,7 +45,7 @@ static npg_status compare(npg_worker *worker, npg_draft_result *result, const np
     double since = npg_clock_s();
     settings.should_stop = npg_worker_should_stop;
     settings.user = worker;
-    NPG_TRY(npg_choose(results, &count, &best, sights, facts->plan.key, facts->frame_count, &settings));
+    NPG_TRY(npg_choose(results, &count, &best, clouds, facts->plan.key, facts->frame_count, &settings));
     if (!count) return NPG_OK;
     *result = results[best];
     report_candidates(worker, results, count, npg_clock_s() - since);
@@ -57,16 +58,16 @@ static npg_status compare(npg_worker *worker, npg_draft_result *result, const np
 npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_draft_result *result)
 {
     const npg_choice *choice = &npg_worker_facts(worker)->choice;
-    npg_sights *sights = pass->sights;
+    npg_candidate_clouds *clouds = pass->clouds;
     *result = (npg_draft_result){.index = -1};
-    if (!sights) return NPG_OK;
-    if (choice->candidate_count > 1) NPG_TRY(compare(worker, result, sights));
+    if (!clouds) return NPG_OK;
+    if (choice->candidate_count > 1) NPG_TRY(compare(worker, result, clouds));
     if (!choice->cut_welds) return NPG_OK;
-    pass->sights = NULL; /* the run's, from here on */
-    return npg_worker_publish(worker, &npg_fact_sights, sights);
+    pass->clouds = NULL; /* the run's, from here on */
+    return npg_worker_publish(worker, &npg_fact_candidate_clouds, clouds);
 }
 
 void npg_choose_pass_clear(npg_choose_pass *pass)
 {
-    npg_sights_close(&pass->sights);
+    npg_candidate_clouds_close(&pass->clouds);
 }

@@ -2,7 +2,7 @@
  * mesh instead, puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
 
-#include "align/sights.h"
+#include "align/candidate_clouds.h"
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
@@ -128,19 +128,19 @@ static void report_welds(making *m, const npg_weld_cut *cut)
 static npg_status cut_welds(making *m)
 {
     bool is_last = npg_worker_pass(m->worker) == NPG_PASS_SOLVE;
-    npg_sights *sights = is_last ? npg_worker_take_fact(m->worker, &npg_fact_sights)
-                                 : npg_worker_fact(m->worker, &npg_fact_sights);
+    npg_candidate_clouds *clouds = is_last ? npg_worker_take_fact(m->worker, &npg_fact_candidate_clouds)
+                                           : npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
     npg_weld_settings settings = {
         .spacing_unit = m->set.spacing, .should_stop = npg_worker_should_stop, .user = m->worker};
     npg_weld_cut done;
-    if (!sights) return NPG_OK;
-    size_t at = npg_sights_find(sights, m->key->index);
+    if (!clouds) return NPG_OK;
+    size_t at = npg_candidate_clouds_find(clouds, m->key->index);
     double since = npg_clock_s();
     npg_status status =
-        at < sights->count ? npg_weld_cut_all(&m->mesh, &done, sights, at, &settings) : NPG_OK;
-    if (!status && at < sights->count) report_welds(m, &done);
+        at < clouds->count ? npg_weld_cut_all(&m->mesh, &done, clouds, at, &settings) : NPG_OK;
+    if (!status && at < clouds->count) report_welds(m, &done);
     npg_mesh_note(m->worker, "welds_s", npg_clock_s() - since);
-    if (is_last) npg_sights_close(&sights); /* a few MB that no later frame needs */
+    if (is_last) npg_candidate_clouds_close(&clouds); /* a few MB that no later frame needs */
     return status == NPG_DIVERGED ? NPG_OK : status;
 }
 

@@ -66,7 +66,8 @@ static void count_face(hearing *h, size_t f, const float *now)
     h->leaning[f] += growth >= LEAN_LONGER && dist > LEAN_SPACINGS;
 }
 
-static npg_status hear(void *user, const npg_sight *sight, const float *vert_unit, const npg_tracked *tracked)
+static npg_status hear(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
+                       const npg_tracked *tracked)
 {
     hearing *h = user;
     npg_kdtree *tree;
@@ -75,7 +76,7 @@ static npg_status hear(void *user, const npg_sight *sight, const float *vert_uni
         return npg_error(NPG_STOPPED, "stopped while welds were looked for");
     if (tracked->point_dist_mean > EXPLAINED * h->settings->spacing_unit || h->frames == h->room)
         return NPG_OK;
-    NPG_TRY(npg_kdtree_open(&tree, sight->points, sight->point_count));
+    NPG_TRY(npg_kdtree_open(&tree, cloud->points, cloud->point_count));
     npg_status status = npg_kdtree_nearest(tree, h->near, h->dist_sq, vert_unit, v, 1, 0);
     npg_kdtree_close(&tree);
     NPG_TRY(status);
@@ -503,13 +504,13 @@ static npg_status cut(npg_mesh **mesh, npg_weld_cut *done, const hearing *h)
     return status;
 }
 
-npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_sights *sights, size_t at,
-                            const npg_weld_settings *settings)
+npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_candidate_clouds *clouds,
+                            size_t at, const npg_weld_settings *settings)
 {
     npg_mesh *followed;
     hearing h = {.settings = settings};
     *done = (npg_weld_cut){0};
-    NPG_REQUIRE(at < sights->count && settings->spacing_unit > 0);
+    NPG_REQUIRE(at < clouds->count && settings->spacing_unit > 0);
     NPG_TRY(npg_mesh_handles(&done->handles, *mesh));
     if (done->handles < 1) return NPG_OK;
     NPG_TRY(npg_mesh_copy(&followed, *mesh));
@@ -520,9 +521,9 @@ npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_sight
     if (!status) {
         npg_mesh_vertex_normals(followed->vert_normals, followed->vert_pos, followed->vert_count,
                                 followed->faces, followed->face_count);
-        status = open_hearing(&h, sights->count);
+        status = open_hearing(&h, clouds->count);
     }
-    if (!status) status = npg_sights_follow(sights, at, followed, &weld_tracking, hear, &h);
+    if (!status) status = npg_candidate_follow(clouds, at, followed, &weld_tracking, hear, &h);
     done->frames = h.frames;
     if (!status && h.frames >= FRAMES_LEAST) status = cut(mesh, done, &h);
     close_hearing(&h);

@@ -1,6 +1,6 @@
 /* Weld: surface of the reference that joins what other frames hold apart, found and cut.
  *
- * The reference is followed through the other frames (sights.h).  A frame contradicts a face when
+ * The reference is followed through the other frames (candidate_clouds.h).  A frame contradicts a face when
  * it stretches the face's longest edge to twice its length and has the corners far from every point, though
  * the surface explains the frame on the whole; faces beside it that are nearly contradicted go with it.
  * Patches of faces that three frames or more contradict are cut where the surface around them lies on
@@ -12,7 +12,7 @@
 #ifndef NPG_WELD_H
 #define NPG_WELD_H
 
-#include "align/sights.h"
+#include "align/candidate_clouds.h"
 
 typedef struct npg_weld_cut {
     size_t patches, faces; /* cut                                                  */
@@ -28,9 +28,9 @@ typedef struct npg_weld_settings {
     void *user;
 } npg_weld_settings;
 
-/* mesh: unit coordinates, made from sights->list[at]; replaced when something was cut (without normals then),
+/* mesh: unit coordinates, made from clouds->list[at]; replaced when something was cut (without normals then),
  * left alone otherwise.  NPG_MEMORY, NPG_STOPPED, NPG_DIVERGED. */
-npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_sights *sights, size_t at,
-                            const npg_weld_settings *settings);
+npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_candidate_clouds *clouds,
+                            size_t at, const npg_weld_settings *settings);
 
 #endif

@@ -1,4 +1,4 @@
-/* Stand: a body that has gone elsewhere and turned is found there, also where a limb of it moved on its own,
+/* Rigid ICP: a body that has gone elsewhere and turned is found there, also where a limb of it moved on its own,
  * and also turned about where a guess says so; poses that differ are less alike than those that do not. */
 #include <math.h>
 #include <setjmp.h>
@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "align/stand.h"
+#include "align/rigid_icp.h"
 #include "pipeline/random.h"
 
 enum { POINTS = 2000 };
@@ -73,7 +73,7 @@ static double find(double *unlike, double angle, double lift, double guessed)
     move(second, &motion);
     assert_int_equal(npg_look_open(&from, first, POINTS), NPG_OK);
     assert_int_equal(npg_look_open(&to, second, POINTS), NPG_OK);
-    assert_int_equal(npg_stand_find(&found, unlike, &from, &to, &guess), NPG_OK);
+    assert_int_equal(npg_rigid_icp(&found, unlike, &from, &to, &guess), NPG_OK);
     npg_look_close(&from);
     npg_look_close(&to);
     double off = angle_between(&found, &motion);

@@ -1,4 +1,4 @@
-/* Held: edges of what is hidden follow the pose that holds them, those of what is seen stay at rest; in a fit
+/* Occlusion prior: edges of what is hidden follow the pose that holds them, those of what is seen stay at rest; in a fit
  * a hidden part stays bent as it is held, and goes back to rest where rest holds it; from both sides in time
  * a hidden part moves evenly. */
 #include <math.h>
@@ -20,7 +20,7 @@ enum { RINGS = 40, SPOKES = 60, NODES = 200 };
 typedef struct scene {
     npg_mesh *ball;
     npg_graph *graph;
-    npg_held held;
+    npg_occlusion_prior prior;
     double *rest, *bent; /* K x 12 */
     uint32_t *verts;     /* all     */
     uint8_t *is_seen;
@@ -47,7 +47,7 @@ static void open_scene(scene *s)
     *s = (scene){.ball = ball_mesh(RINGS, SPOKES)};
     size_t v = s->ball->vert_count;
     assert_int_equal(npg_graph_open(&s->graph, s->ball, NODES), NPG_OK);
-    assert_int_equal(npg_held_open(&s->held, s->graph), NPG_OK);
+    assert_int_equal(npg_prior_open(&s->prior, s->graph), NPG_OK);
     assert_int_equal(npg_alloc(&s->rest, NPG_FOR_RUN, npg_pose_bytes(s->graph->node_count)), NPG_OK);
     assert_int_equal(npg_alloc(&s->bent, NPG_FOR_RUN, npg_pose_bytes(s->graph->node_count)), NPG_OK);
     assert_int_equal(npg_alloc_array(&s->verts, NPG_FOR_RUN, v, sizeof *s->verts), NPG_OK);
@@ -59,7 +59,7 @@ static void open_scene(scene *s)
 
 static void close_scene(scene *s)
 {
-    npg_held_close(&s->held);
+    npg_prior_close(&s->prior);
     npg_graph_close(&s->graph);
     npg_mesh_unref(&s->ball);
     void *all[] = {&s->rest, &s->bent, &s->verts, &s->is_seen};
@@ -75,7 +75,7 @@ static double bend(const scene *s)
         const float *gj = s->graph->node_pos + 3 * (size_t)pair[e % 2],
                     *gk = s->graph->node_pos + 3 * (size_t)pair[1 - e % 2];
         double edge[3], off = 0;
-        assert_true(npg_held_edge(edge, &s->held, s->graph, e) == 1);
+        assert_true(npg_prior_edge(edge, &s->prior, s->graph, e) == 1);
         for (int i = 0; i < 3; i++) off += pow(edge[i] - (double)gk[i] + (double)gj[i], 2);
         sum += sqrt(off);
     }
@@ -85,7 +85,7 @@ static double bend(const scene *s)
 static void see(scene *s, bool all)
 {
     memset(s->is_seen, all, s->ball->vert_count);
-    npg_held_see(&s->held, s->graph, s->verts, s->is_seen, s->ball->vert_count);
+    npg_prior_see(&s->prior, s->graph, s->verts, s->is_seen, s->ball->vert_count);
 }
 
 static void hidden_edges_are_those_of_the_pose(void **state)
@@ -93,13 +93,13 @@ static void hidden_edges_are_those_of_the_pose(void **state)
     scene s;
     (void)state;
     open_scene(&s);
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent}, 1);
     see(&s, true);
     assert_true(bend(&s) < 1e-9);
     see(&s, false);
     double bent = bend(&s);
     assert_true(bent > 0.1);
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.rest}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.rest}, 1);
     assert_true(bend(&s) < 1e-3 * bent);
     /* turned and moved as a whole, a body is not bent */
     for (size_t k = 0; k < s.graph->node_count; k++) {
@@ -109,7 +109,7 @@ static void hidden_edges_are_those_of_the_pose(void **state)
             0, -1, 0, 1, 0, 0, 0, 0, 1, 0.3 - (double)g[1] - (double)g[0], (double)g[0] - (double)g[1]};
         memcpy(p, whole, sizeof whole);
     }
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent}, 1);
     assert_true(bend(&s) < 1e-3 * bent);
     close_scene(&s);
 }
@@ -122,18 +122,18 @@ static void both_sides_have_a_say(void **state)
     open_scene(&s);
     assert_true(s.graph->node_count <= sizeof since / sizeof *since);
     see(&s, false);
-    npg_held_take(&s.held, s.graph, &(npg_hold){.pose = s.bent}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent}, 1);
     double bent = bend(&s);
     for (size_t k = 0; k < s.graph->node_count; k++) since[k] = 3;
-    npg_held_take(&s.held, s.graph, &(npg_hold){s.rest, s.bent, since}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){s.rest, s.bent, since}, 1);
     assert_true(fabs(bend(&s) / bent - 0.75) < 0.01);
-    npg_held_take(&s.held, s.graph, &(npg_hold){s.bent, s.rest, since}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){s.bent, s.rest, since}, 1);
     assert_true(fabs(bend(&s) / bent - 0.25) < 0.01);
     /* what was hidden until now has been so for one more frame, what is seen for none */
-    npg_held_count(&s.held, since, since, s.graph->node_count);
+    npg_prior_count(&s.prior, since, since, s.graph->node_count);
     assert_true(since[0] == 4);
     see(&s, true);
-    npg_held_count(&s.held, since, since, s.graph->node_count);
+    npg_prior_count(&s.prior, since, since, s.graph->node_count);
     assert_true(since[0] == 0);
     close_scene(&s);
 }
@@ -182,7 +182,7 @@ static void a_fit_keeps_hidden_parts_as_they_are_held(void **state)
         if (s.ball->vert_pos[3 * v + 2] > 0.1f)
             memcpy(points + 3 * count++, s.ball->vert_pos + 3 * v, 3 * sizeof *points);
     const npg_tracker_cloud cloud = {.points = points, .count = count, .sensors = sensor, .sensor_count = 1};
-    const npg_hold holds[2] = {{.pose = s.bent}, {.pose = s.rest}};
+    const npg_prior_poses holds[2] = {{.pose = s.bent}, {.pose = s.rest}};
     for (int way = 0; way < 2; way++) {
         memcpy(pose, s.bent, bytes);
         assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, &holds[way], NULL), NPG_OK);

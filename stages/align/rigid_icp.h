@@ -1,4 +1,4 @@
-/* Stand: how a body stands in one frame against another, as far as it moved as a whole.
+/* Rigid ICP: how a body stands in one frame against another, as far as it moved as a whole.
  *
  * Motion recurs, but seldom in place: who walks comes back to a pose lengths away, who turns comes back to it
  * facing elsewhere.  So two frames are compared, and one is started from the pose of the other, after the
@@ -7,8 +7,8 @@
  * Based on: Besl and McKay, A method for registration of 3-D shapes, 1992 (iterated closest points), and
  * Chetverikov et al., The trimmed iterative closest point algorithm, 2002: the pairs that lie farthest apart,
  * of limbs that moved on their own, are left out. */
-#ifndef NPG_STAND_H
-#define NPG_STAND_H
+#ifndef NPG_RIGID_ICP_H
+#define NPG_RIGID_ICP_H
 
 #include "align/pose.h"
 #include "geometry/kdtree.h"
@@ -28,7 +28,7 @@ void npg_look_close(npg_look *look);
 
 /* motion: takes `from` onto `to`, found from where their middles meet and from `guess`; *unlike: what is left
  * between them then, the mean of squared distances, both ways.  NPG_MEMORY. */
-npg_status npg_stand_find(npg_rigid *motion, double *unlike, const npg_look *from, const npg_look *to,
-                          const npg_rigid *guess);
+npg_status npg_rigid_icp(npg_rigid *motion, double *unlike, const npg_look *from, const npg_look *to,
+                         const npg_rigid *guess);
 
 #endif

@@ -1,5 +1,5 @@
-/* Ties: pieces join the first node's, nearest first. */
-#include "align/ties.h"
+/* Component links: pieces join the first node's, nearest first. */
+#include "align/component_links.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@ typedef struct joining {
     uint32_t *piece;   /* K: the same for all nodes of a piece; owned                      */
     uint32_t *nearest; /* K: the nearest node that has joined; owned                       */
     float *dist_sq;    /* K: to it; infinite: none, -1: has joined or is tied itself; owned */
-    uint32_t (*ties)[2];
-    size_t tie_count, capacity;
+    uint32_t (*links)[2];
+    size_t link_count, capacity;
 } joining;
 
 static void close_joining(joining *j)
@@ -80,9 +80,9 @@ static npg_status tie_piece(joining *j, uint32_t node)
     uint32_t piece = j->piece[node];
     for (int i = 0; i < TIES_EACH && node != NONE; i++) {
         uint32_t to = j->nearest[node];
-        NPG_TRY(npg_grow(&j->ties, &j->capacity, j->tie_count + 1, sizeof *j->ties, NPG_FOR_MESH));
-        j->ties[j->tie_count][0] = node < to ? node : to;
-        j->ties[j->tie_count++][1] = node < to ? to : node;
+        NPG_TRY(npg_grow(&j->links, &j->capacity, j->link_count + 1, sizeof *j->links, NPG_FOR_MESH));
+        j->links[j->link_count][0] = node < to ? node : to;
+        j->links[j->link_count++][1] = node < to ? to : node;
         j->dist_sq[node] = -1;
         node = nearest_outside(j, piece);
     }
@@ -90,17 +90,17 @@ static npg_status tie_piece(joining *j, uint32_t node)
     return NPG_OK;
 }
 
-npg_status npg_ties_find(uint32_t (**ties)[2], size_t *tie_count, const float *node_pos, size_t node_count,
-                         const uint32_t (*edges)[2], size_t edge_count)
+npg_status npg_component_links_find(uint32_t (**links)[2], size_t *link_count, const float *node_pos,
+                                    size_t node_count, const uint32_t (*edges)[2], size_t edge_count)
 {
     joining j = {.node_pos = node_pos, .node_count = node_count};
     npg_status status = open_joining(&j, edges, edge_count);
     if (!status) join_piece(&j, j.piece[0]);
     for (uint32_t next; !status && (next = nearest_outside(&j, NONE)) != NONE;) status = tie_piece(&j, next);
     close_joining(&j);
-    if (status) npg_release(&j.ties);
-    if (j.tie_count) qsort(j.ties, j.tie_count, sizeof *j.ties, npg_order_pair);
-    *ties = j.ties;
-    *tie_count = status ? 0 : j.tie_count;
+    if (status) npg_release(&j.links);
+    if (j.link_count) qsort(j.links, j.link_count, sizeof *j.links, npg_order_pair);
+    *links = j.links;
+    *link_count = status ? 0 : j.link_count;
     return status;
 }

@@ -1,5 +1,5 @@
-/* Stand: trimmed iterated closest points between two looks. */
-#include "align/stand.h"
+/* Rigid ICP: trimmed iterated closest points between two looks. */
+#include "align/rigid_icp.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -116,8 +116,8 @@ static npg_status settle(npg_rigid *motion, double *unlike, const npg_look *from
     return NPG_OK;
 }
 
-npg_status npg_stand_find(npg_rigid *motion, double *unlike, const npg_look *from, const npg_look *to,
-                          const npg_rigid *guess)
+npg_status npg_rigid_icp(npg_rigid *motion, double *unlike, const npg_look *from, const npg_look *to,
+                         const npg_rigid *guess)
 {
     npg_rigid guessed = *guess;
     double unlike_guessed;

@@ -1,4 +1,4 @@
-/* Sweep back: frames that were lost on the way out are found on the way back; what the way back would spoil
+/* Backward tracking: frames that were lost on the way out are found on the way back; what the way back would spoil
  * stays; frames that are fixed, or of which nothing was hidden, are left alone. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "align/sweep_back.h"
+#include "align/backward.h"
 #include "tests/support/ball_capture.h"
 
 #define KEY 10 /* index of the first frame */
@@ -27,10 +27,10 @@ static void open_seen(capture *c)
     }
 }
 
-static npg_sweep_result sweep(capture *c)
+static npg_backward_result sweep(capture *c)
 {
-    npg_sweep_result result;
-    assert_int_equal(npg_sweep_back(c->tracker, &result, c->frames, FRAMES, KEY, NULL, NULL), NPG_OK);
+    npg_backward_result result;
+    assert_int_equal(npg_track_backward(c->tracker, &result, c->frames, FRAMES, KEY, NULL, NULL), NPG_OK);
     return result;
 }
 
@@ -42,7 +42,7 @@ static void lost_frames_are_found_on_the_way_back(void **state)
     open_seen(&c);
     for (int t = 0; t < FRAMES; t++) last[t] = c.frames[t].tracked.chamfer;
     for (int t = 3; t < 6; t++) lose(&c, t);
-    npg_sweep_result result = sweep(&c);
+    npg_backward_result result = sweep(&c);
     assert_int_equal(result.tried, FRAMES - 2); /* neither the key nor the outermost */
     assert_true(result.taken >= 3);
     for (int t = 0; t < FRAMES; t++) assert_true(c.frames[t].tracked.chamfer < 2 * last[t]);
@@ -65,14 +65,14 @@ static void what_is_right_is_not_led_astray(void **state)
 static void others_are_left_alone(void **state)
 {
     static capture c;
-    npg_sweep_result result;
+    npg_backward_result result;
     double *poses;
     (void)state;
     open_seen(&c);
     size_t bytes = FRAMES * c.size * sizeof *poses;
     assert_int_equal(npg_alloc(&poses, NPG_FOR_RUN, bytes), NPG_OK);
     memcpy(poses, c.poses, bytes);
-    assert_int_equal(npg_sweep_back(c.tracker, &result, c.frames, FRAMES, KEY, stop_at_once, NULL),
+    assert_int_equal(npg_track_backward(c.tracker, &result, c.frames, FRAMES, KEY, stop_at_once, NULL),
                      NPG_STOPPED);
     for (int t = 0; t < FRAMES; t += 2) c.frames[t].is_fixed = true;
     for (int t = 1; t < FRAMES; t += 2) c.frames[t].since = NULL;

@@ -1,5 +1,5 @@
-/* Handover: in memory between two passes, in the job's folder between two runs. */
-#include "align/handover.h"
+/* Pose cache: in memory between two passes, in the job's folder between two runs. */
+#include "align/pose_cache.h"
 
 #include "job/job.h"
 
@@ -18,18 +18,18 @@ static void release_between(void *thing)
     npg_release(&b);
 }
 
-int64_t npg_handover_passes(const npg_worker *worker)
+int64_t npg_pose_cache_passes(const npg_worker *worker)
 {
     const between *b = npg_worker_kept(worker);
     return b ? b->passes : 0;
 }
 
-void npg_handover_close(npg_handover *handover)
+void npg_pose_cache_close(npg_pose_cache *cache)
 {
-    npg_poses_close(&handover->known);
-    npg_poses_close(&handover->found);
-    npg_pose_map_close(&handover->map);
-    npg_release(&handover->known_pose);
+    npg_poses_close(&cache->known);
+    npg_poses_close(&cache->found);
+    npg_pose_map_close(&cache->map);
+    npg_release(&cache->known_pose);
 }
 
 /* Where poses are kept: NULL for a run without a job folder. */
@@ -46,7 +46,7 @@ static npg_status remove_new_poses(const npg_worker *worker)
     return job ? npg_job_remove_new_poses(job) : NPG_OK;
 }
 
-static npg_status restore_known(npg_handover *h, const npg_worker *worker, const npg_tracker *tracker)
+static npg_status restore_known(npg_pose_cache *h, const npg_worker *worker, const npg_tracker *tracker)
 {
     char *path;
     size_t size, nodes = npg_tracker_node_count(tracker);
@@ -74,7 +74,7 @@ static npg_status drop_if_changed(const npg_worker *worker, between *b)
 }
 
 /* The poses of the pass before, or of the run that is resumed. */
-static npg_status open_known(npg_handover *h, npg_worker *worker, const npg_tracker *tracker)
+static npg_status open_known(npg_pose_cache *h, npg_worker *worker, const npg_tracker *tracker)
 {
     between *b = npg_worker_kept(worker);
     NPG_TRY(drop_if_changed(worker, b));
@@ -92,56 +92,56 @@ static npg_status open_known(npg_handover *h, npg_worker *worker, const npg_trac
     return npg_alloc(&h->known_pose, NPG_FOR_FIT, npg_pose_bytes(npg_poses_nodes(h->known)));
 }
 
-npg_status npg_handover_open(npg_handover *handover, npg_worker *worker, const npg_tracker *tracker)
+npg_status npg_pose_cache_open(npg_pose_cache *cache, npg_worker *worker, const npg_tracker *tracker)
 {
     char *path;
-    NPG_TRY(open_known(handover, worker, tracker));
+    NPG_TRY(open_known(cache, worker, tracker));
     if (npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
     NPG_TRY(remove_new_poses(worker)); /* `known` still reads what had the name before */
     NPG_TRY(poses_path(worker, &path, true));
-    npg_status status = npg_poses_create(&handover->found, path, npg_tracker_node_count(tracker));
+    npg_status status = npg_poses_create(&cache->found, path, npg_tracker_node_count(tracker));
     npg_release(&path);
     return status;
 }
 
-npg_status npg_handover_start(const npg_handover *handover, const npg_tracker *tracker, int64_t index,
-                              double *pose, bool *is_known)
+npg_status npg_pose_cache_start(const npg_pose_cache *cache, const npg_tracker *tracker, int64_t index,
+                                double *pose, bool *is_known)
 {
     *is_known = false;
-    if (!handover->known) return NPG_OK;
-    NPG_TRY(npg_poses_get(handover->known, index, handover->known_pose, is_known));
-    if (*is_known) npg_pose_map_apply(&handover->map, tracker, pose, handover->known_pose);
+    if (!cache->known) return NPG_OK;
+    NPG_TRY(npg_poses_get(cache->known, index, cache->known_pose, is_known));
+    if (*is_known) npg_pose_map_apply(&cache->map, tracker, pose, cache->known_pose);
     return NPG_OK;
 }
 
-npg_status npg_handover_put(npg_handover *handover, int64_t index, const double *pose)
+npg_status npg_pose_cache_put(npg_pose_cache *cache, int64_t index, const double *pose)
 {
-    return handover->found ? npg_poses_put(handover->found, index, pose) : NPG_OK;
+    return cache->found ? npg_poses_put(cache->found, index, pose) : NPG_OK;
 }
 
-npg_status npg_handover_leave(npg_handover *handover, npg_worker *worker, npg_tracker **tracker)
+npg_status npg_pose_cache_leave(npg_pose_cache *cache, npg_worker *worker, npg_tracker **tracker)
 {
     between *b = npg_worker_kept(worker);
-    if (!handover->found) return NPG_OK;
-    NPG_TRY(npg_poses_sync(handover->found));
+    if (!cache->found) return NPG_OK;
+    NPG_TRY(npg_poses_sync(cache->found));
     if (!b) {
         NPG_TRY(npg_alloc(&b, NPG_FOR_FIT, sizeof *b));
         npg_worker_keep(worker, b, release_between);
     }
     b->tracker = *tracker;
-    b->poses = handover->found;
+    b->poses = cache->found;
     b->passes++;
     *tracker = NULL;
-    handover->found = NULL;
+    cache->found = NULL;
     return NPG_OK;
 }
 
-npg_status npg_handover_save(const npg_handover *handover, npg_archive_writer *out)
+npg_status npg_pose_cache_save(const npg_pose_cache *cache, npg_archive_writer *out)
 {
     unsigned char *bytes;
     size_t size;
-    if (!handover->known) return NPG_OK;
-    NPG_TRY(npg_pose_map_pack(&handover->map, &bytes, &size));
+    if (!cache->known) return NPG_OK;
+    NPG_TRY(npg_pose_map_pack(&cache->map, &bytes, &size));
     npg_status status = npg_archive_put(out, NPG_BLOCK_ALIGN_MAP, bytes, size);
     npg_release(&bytes);
     return status;

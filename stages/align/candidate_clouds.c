@@ -1,0 +1,138 @@
+/* Candidate clouds: thinned frames, and following a surface through them. */
+#include "align/candidate_clouds.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/pose.h"
+#include "geometry/mesh_tools.h"
+
+#define FLIPPED_MOST                                                                                         \
+    0.1 /* share of given normals on the wrong side, beyond which those of other frames are not used */
+
+/* ---- the list ---- */
+
+static npg_status copy_points(npg_candidate_cloud *cloud, const npg_frame *frame, const npg_frame_box *box)
+{
+    size_t count = frame->point_count < NPG_CANDIDATE_POINTS ? frame->point_count : NPG_CANDIDATE_POINTS;
+    NPG_TRY(npg_alloc_array(&cloud->points, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
+    if (frame->normals) NPG_TRY(npg_alloc_array(&cloud->normals, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
+    npg_points_spread(cloud->points, cloud->normals, count, frame->pos_local, frame->normals,
+                      frame->point_count);
+    npg_box_local_to_unit(box, cloud->points, cloud->points, count);
+    cloud->point_count = count;
+    return NPG_OK;
+}
+
+npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_frame *frame,
+                                    const npg_frame_box *box, bool is_candidate)
+{
+    if (frame->is_skipped || !frame->point_count) return NPG_OK;
+    NPG_TRY(
+        npg_grow(&clouds->list, &clouds->capacity, clouds->count + 1, sizeof *clouds->list, NPG_FOR_FRAMES));
+    npg_candidate_cloud *cloud = &clouds->list[clouds->count++];
+    *cloud =
+        (npg_candidate_cloud){.index = frame->index, .number = frame->number, .is_candidate = is_candidate};
+    if (is_candidate) {
+        clouds->given += frame->cleaning.normals_given;
+        clouds->flipped += frame->cleaning.normals_flipped;
+    }
+    return copy_points(cloud, frame, box);
+}
+
+static void release_clouds(void *value)
+{
+    npg_candidate_clouds *clouds = value;
+    npg_candidate_clouds_close(&clouds);
+}
+
+const npg_fact_kind npg_fact_candidate_clouds = {"candidate_clouds", "keyframe", release_clouds};
+
+npg_status npg_candidate_clouds_open(npg_candidate_clouds **clouds)
+{
+    return npg_alloc(clouds, NPG_FOR_RUN, sizeof **clouds);
+}
+
+void npg_candidate_clouds_close(npg_candidate_clouds **slot)
+{
+    npg_candidate_clouds *clouds = *slot;
+    if (!clouds) return;
+    for (size_t i = 0; i < clouds->count; i++) {
+        npg_release(&clouds->list[i].points);
+        npg_release(&clouds->list[i].normals);
+    }
+    npg_release(&clouds->list);
+    npg_release(slot);
+}
+
+size_t npg_candidate_clouds_find(const npg_candidate_clouds *clouds, int64_t index)
+{
+    size_t at = 0;
+    while (at < clouds->count && clouds->list[at].index != index) at++;
+    return at;
+}
+
+/* ---- following ---- */
+
+typedef struct follower {
+    const npg_candidate_clouds *clouds;
+    npg_tracker *tracker;
+    size_t node_count;
+    double *pose, *before, *next; /* K x 12 each, owned */
+    float *vert_unit;             /* V x 3, owned       */
+    bool with_normals;
+    npg_candidate_seen seen;
+    void *user;
+} follower;
+
+static void close_follower(follower *f)
+{
+    npg_tracker_close(&f->tracker);
+    npg_release(&f->pose);
+    npg_release(&f->before);
+    npg_release(&f->next);
+    npg_release(&f->vert_unit);
+}
+
+static npg_status open_follower(follower *f, npg_mesh *mesh, const npg_tracker_settings *settings)
+{
+    NPG_TRY(npg_tracker_open(&f->tracker, mesh, settings));
+    f->node_count = npg_tracker_node_count(f->tracker);
+    size_t size = NPG_POSE_SIZE * sizeof(double);
+    NPG_TRY(npg_alloc_array(&f->pose, NPG_FOR_FIT, f->node_count, size));
+    NPG_TRY(npg_alloc_array(&f->before, NPG_FOR_FIT, f->node_count, size));
+    NPG_TRY(npg_alloc_array(&f->next, NPG_FOR_FIT, f->node_count, size));
+    return npg_alloc_array(&f->vert_unit, NPG_FOR_FIT, mesh->vert_count, 3 * sizeof(float));
+}
+
+static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
+{
+    npg_tracked tracked;
+    npg_pose_extrapolate(f->next, f->pose, f->before, f->node_count);
+    double *oldest = f->before;
+    f->before = f->pose;
+    f->pose = f->next;
+    f->next = oldest;
+    const npg_tracker_cloud cloud = {.points = next->points,
+                                     .normals = f->with_normals ? next->normals : NULL,
+                                     .count = next->point_count};
+    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL, NULL));
+    npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
+    return f->seen(f->user, next, f->vert_unit, &tracked);
+}
+
+npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
+                                const npg_tracker_settings *settings, npg_candidate_seen seen, void *user)
+{
+    follower f = {.clouds = clouds, .seen = seen, .user = user};
+    f.with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
+    npg_status status = open_follower(&f, mesh, settings);
+    for (int step = -1; step <= 1 && !status; step += 2) {
+        npg_pose_rest(f.pose, f.node_count);
+        npg_pose_rest(f.before, f.node_count);
+        for (size_t i = from + (size_t)step; i < clouds->count && !status; i += (size_t)step)
+            status = follow_to(&f, &clouds->list[i]);
+    }
+    close_follower(&f);
+    return status;
+}
