@@ -52,8 +52,8 @@ struct npg_run {
     npg_options *options; /* owned */
     npg_settings settings;
     npg_hooks hooks;
-    npg_facts facts;
-    npg_busy begun; /* when it was opened */
+    npg_facts facts, nobodys; /* what a stage writes of another stage's facts goes nowhere */
+    npg_busy begun;           /* when it was opened */
 
     pthread_mutex_t lock; /* guards what follows up to the rings, and calls of the hooks */
     npg_status first_failure;

@@ -38,8 +38,9 @@ typedef struct npg_choice {
     bool cut_welds;                       /* cut from the reference what the other frames contradict */
 } npg_choice;
 
-/* What the stages find out about the capture as a whole.  A fact is written once, by the stage named, before
- * it passes on the first chunk (or ends the pass) that depends on it; the rings' locks publish it downstream.
+/* What the stages find out about the capture as a whole.  A fact is written by its owner, the stage named,
+ * and by nobody else (npg_own), before it passes on the first chunk (or ends the pass) that depends on it; the
+ * rings' locks publish it downstream.  A service that resumes a run writes all of them, before the passes.
  * Where a live source goes on behind the look-ahead, number_min, number_max, point_count_max and bounds_local
  * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h) in all passes. */
 typedef struct npg_facts {
@@ -156,7 +157,15 @@ const npg_service *const *npg_services_of(const npg_stage *const *chain);
 /* ---- what a stage may ask of its worker ---- */
 
 void *npg_worker_state(const npg_worker *worker);
-npg_facts *npg_worker_facts(const npg_worker *worker);
+const npg_facts *npg_worker_facts(const npg_worker *worker);
+
+/* A fact that the worker's stage owns, to be written: *npg_own(worker, past_count) = 3.  Of another's fact the
+ * caller gets one that nobody reads, and the run fails with NPG_USAGE. */
+#define npg_own(worker, fact) (&npg_worker_own_facts((worker), offsetof(npg_facts, fact), #fact)->fact)
+npg_facts *npg_worker_own_facts(npg_worker *worker, size_t offset, const char *fact);
+
+/* For a service: all facts as an earlier run had them. */
+npg_status npg_worker_restore_facts(npg_worker *worker, const npg_facts *facts);
 const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);
 npg_pass npg_worker_pass(const npg_worker *worker);

@@ -12,9 +12,40 @@ void *npg_worker_state(const npg_worker *worker)
 {
     return worker->state;
 }
-npg_facts *npg_worker_facts(const npg_worker *worker)
+const npg_facts *npg_worker_facts(const npg_worker *worker)
 {
     return &worker->run->facts;
+}
+
+/* Who owns the fact at an offset: they stand in the order of their owners. */
+static const char *owner_of(size_t offset)
+{
+    static const struct {
+        size_t end;
+        const char *name;
+    } owners[] = {
+        {offsetof(npg_facts, point_count_max), "ingest"}, {offsetof(npg_facts, fuse_left), "keyframe"},
+        {offsetof(npg_facts, past_count), "fuse"},        {offsetof(npg_facts, reference), "align"},
+        {offsetof(npg_facts, has_changed), "mesh"},       {offsetof(npg_facts, is_resumed), "evaluate"}};
+    for (size_t i = 0; i < sizeof owners / sizeof *owners; i++)
+        if (offset < owners[i].end) return owners[i].name;
+    return "job";
+}
+
+npg_facts *npg_worker_own_facts(npg_worker *worker, size_t offset, const char *fact)
+{
+    npg_run *run = worker->run;
+    if (worker->service || !strcmp(worker->name, owner_of(offset))) return &run->facts;
+    npg_run_fail(run, worker->name,
+                 npg_error(NPG_USAGE, "the fact %s is not stage %s's to write", fact, worker->name));
+    return &run->nobodys;
+}
+
+npg_status npg_worker_restore_facts(npg_worker *worker, const npg_facts *facts)
+{
+    NPG_REQUIRE(worker->service);
+    worker->run->facts = *facts;
+    return NPG_OK;
 }
 const npg_settings *npg_worker_settings(const npg_worker *worker)
 {

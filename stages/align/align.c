@@ -494,7 +494,7 @@ static npg_status flush(npg_worker *worker)
     NPG_TRY(close_group(worker, npg_plan_is_open(&npg_worker_facts(worker)->plan)));
     report_progress(worker);
     NPG_TRY(npg_pose_cache_leave(&s->cache, worker, &s->tracker));
-    if (npg_worker_pass(worker) == NPG_PASS_FUSE) npg_worker_facts(worker)->past_count = s->past_count;
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) *npg_own(worker, past_count) = s->past_count;
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
     json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));

@@ -105,14 +105,13 @@ npg_status npg_topology_add(npg_topology *t, npg_worker *worker, const npg_frame
 
 npg_status npg_topology_finish(npg_topology *t, npg_worker *worker)
 {
-    npg_facts *facts = npg_worker_facts(worker);
     json_t *record = json_object();
     npg_alarm_finish(t->alarm);
     for (int d = 0; d < NPG_DIRECTIONS; d++) {
         const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, d);
         json_object_set_new(record, directions[d], npg_alarm_json(cause));
-        facts->has_changed[d] = cause != NULL;
-        facts->changed_at[d] = cause ? cause->index : 0;
+        (*npg_own(worker, has_changed))[d] = cause != NULL;
+        (*npg_own(worker, changed_at))[d] = cause ? cause->index : 0;
     }
     json_object_set_new(npg_worker_report(worker), "topology", record);
     return report_both(t, worker);

@@ -398,16 +398,17 @@ static npg_status growth_of(npg_worker *worker, growth **g)
  * them yet.  *counts: whether the pass is one of those that the options ask for. */
 static npg_status decide_growth(npg_worker *worker, bool *counts)
 {
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     growth *g;
     NPG_TRY(growth_of(worker, &g));
     bool has_gained = !facts->growing_passes || facts->past_count < g->past_before;
     bool is_whole_now = g->past_before && !facts->past_count;
     bool asks_less = !has_gained && facts->explained_least > EXPLAINED_LAST + EXPLAINED_STEP / 2;
-    if (asks_less) facts->explained_least = fmax(facts->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
+    if (asks_less)
+        *npg_own(worker, explained_least) = fmax(facts->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
     g->in_vain = has_gained || asks_less ? 0 : g->in_vain + 1;
-    facts->is_growing = facts->past_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
-    facts->growing_passes += facts->past_count > 0;
+    *npg_own(worker, is_growing) = facts->past_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
+    *npg_own(worker, growing_passes) += facts->past_count > 0;
     g->past_before = facts->past_count;
     if (facts->past_count)
         npg_worker_log(
@@ -420,16 +421,15 @@ static npg_status decide_growth(npg_worker *worker, bool *counts)
 static npg_status flush(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
-        facts->fuse_left = s->usable > 1 ? s->rounds : 0;
-        facts->sensor_count_max = s->sensors;
-        facts->explained_least = EXPLAINED_FIRST;
+        *npg_own(worker, fuse_left) = s->usable > 1 ? s->rounds : 0;
+        *npg_own(worker, sensor_count_max) = s->sensors;
+        *npg_own(worker, explained_least) = EXPLAINED_FIRST;
         return NPG_OK;
     }
     bool counts;
     NPG_TRY(decide_growth(worker, &counts));
-    facts->fuse_left -= counts;
+    *npg_own(worker, fuse_left) -= counts;
     return publish(worker);
 }
 

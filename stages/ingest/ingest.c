@@ -199,9 +199,9 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(status);
     npg_worker_keep(worker, capture, release_capture);
     NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
-    npg_facts *facts = npg_worker_facts(worker);
     /* A resumed run has restored it. */
-    if (!facts->is_resumed) facts->frame_count = facts->planned_count = (int64_t)capture->list->count;
+    if (!npg_worker_facts(worker)->is_resumed)
+        *npg_own(worker, frame_count) = *npg_own(worker, planned_count) = (int64_t)capture->list->count;
     report_list(worker, capture->list);
     if (capture->list->rig) report_rig(worker, capture->list->rig);
     return capture->list->rig && s->align_sensors ? align_sensors(worker, capture->list) : NPG_OK;
@@ -209,16 +209,15 @@ static npg_status open_capture(npg_worker *worker)
 
 static npg_status read_frame(npg_worker *worker, npg_frame *frame, int64_t index)
 {
-    npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
-    npg_status status =
-        npg_capture_read(npg_worker_kept(worker), frame, index, &facts->origin, pass == NPG_PASS_SOLVE);
+    npg_status status = npg_capture_read(npg_worker_kept(worker), frame, index, npg_own(worker, origin),
+                                         pass == NPG_PASS_SOLVE);
     if (status == NPG_PARTIAL) {
         npg_worker_warn(worker, true, frame->number, "skipped: %s", npg_error_text());
         status = NPG_OK;
     }
     /* Each pass reads the frame again; only the first one counts it. */
-    if (pass == NPG_PASS_MEASURE && !status) facts->skipped_count += frame->is_skipped;
+    if (pass == NPG_PASS_MEASURE && !status) *npg_own(worker, skipped_count) += frame->is_skipped;
     return status;
 }
 

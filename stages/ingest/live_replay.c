@@ -83,7 +83,7 @@ static npg_status replay_followed(npg_live_source *live, const npg_input_entry *
         frame->path = path;
         return NPG_OK;
     }
-    npg_status status = npg_read_cloud(frame, path, &npg_worker_facts(live->worker)->origin);
+    npg_status status = npg_read_cloud(frame, path, npg_own(live->worker, origin));
     npg_release(&path);
     return status;
 }

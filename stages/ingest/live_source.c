@@ -91,7 +91,7 @@ npg_status npg_live_next_pushed(npg_live_source *live, npg_frame *frame)
 
 static npg_status next_followed(npg_live_source *live, npg_frame *frame)
 {
-    npg_status status = npg_follow_next(live->follow, frame, &npg_worker_facts(live->worker)->origin);
+    npg_status status = npg_follow_next(live->follow, frame, npg_own(live->worker, origin));
     if (status != NPG_PARTIAL) return status;
     if (!npg_worker_settings(live->worker)->keep_going) {
         npg_frame_clear(frame);
@@ -108,7 +108,7 @@ static npg_status next_followed(npg_live_source *live, npg_frame *frame)
  * there, and what came before is finished. */
 npg_status npg_live_next_streamed(npg_live_source *live, npg_frame *frame)
 {
-    npg_status status = npg_stream_next(live->stream, frame, &npg_worker_facts(live->worker)->origin);
+    npg_status status = npg_stream_next(live->stream, frame, npg_own(live->worker, origin));
     if (status != NPG_BAD_INPUT || !npg_worker_settings(live->worker)->keep_going || !live->next)
         return status;
     npg_worker_warn(live->worker, true, live->seen, "the stream is taken to end here: %s", npg_error_text());
@@ -274,22 +274,21 @@ static npg_status check_end(npg_live_source *live)
 
 static npg_status end_live(npg_live_source *live)
 {
-    npg_facts *facts = npg_worker_facts(live->worker);
     json_t *report = npg_worker_report(live->worker);
     size_t late_count = live->follow ? npg_follow_late_count(live->follow) : 0;
     const char *name = npg_live_source_name(live);
     if (!live->next) return npg_error(NPG_BAD_INPUT, "%s: no frame came", name);
     NPG_TRY(check_end(live));
-    facts->skipped_count = live->skipped_count;
-    if (facts->skipped_count == live->next)
+    *npg_own(live->worker, skipped_count) = live->skipped_count;
+    if (live->skipped_count == live->next)
         return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used", name,
                          (long long)live->next);
     if (late_count)
         npg_worker_warn(live->worker, true, -1,
                         "%zu files came after a later one had been taken and are left out", late_count);
-    facts->frame_count = live->next;
+    *npg_own(live->worker, frame_count) = live->next;
     json_object_set_new(report, "frames", json_integer((json_int_t)live->next));
-    json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
+    json_object_set_new(report, "skipped", json_integer((json_int_t)live->skipped_count));
     return NPG_END;
 }
 

@@ -49,7 +49,7 @@ npg_status npg_look_ahead_take(npg_look_ahead *l, npg_chunk *chunk, int64_t most
     npg_status status = l->source.next < most ? next_of_source(l, chunk) : NPG_END;
     if (!status) return npg_frame_store_put(l->store, npg_chunk_frame(chunk, 0), false);
     if (status != NPG_END) return status;
-    npg_worker_facts(l->source.worker)->planned_count = l->source.next;
+    *npg_own(l->source.worker, planned_count) = l->source.next;
     NPG_TRY(look_behind(l));
     return NPG_END;
 }

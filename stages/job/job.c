@@ -77,15 +77,15 @@ static npg_status remove_done(npg_worker *worker)
 /* Each step can be broken off and done again: job.json first says that there are more frames. */
 static npg_status begin_append(npg_worker *worker, npg_job *job)
 {
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     int64_t lines, bytes, frame_count = npg_job_frame_count(job);
     NPG_TRY(npg_job_open_forward(job));
     NPG_TRY(npg_job_restore_facts(worker, job));
     npg_plan plan = facts->plan;
     widen_plan(&plan, facts->window_asked, facts->overlap_asked);
-    facts->plan = npg_plan_append(&plan, frame_count);
-    facts->frame_count = frame_count;
-    facts->resumed_read = 0;
+    *npg_own(worker, plan) = npg_plan_append(&plan, frame_count);
+    *npg_own(worker, frame_count) = frame_count;
+    *npg_own(worker, resumed_read) = 0;
     NPG_TRY(npg_job_extend(job));
     NPG_TRY(remove_done(worker));
     NPG_TRY(npg_frame_log_shorten(npg_worker_settings(worker)->output, npg_plan_window(&facts->plan, 0).first,

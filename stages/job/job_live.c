@@ -128,7 +128,7 @@ static int64_t wanted_number(const npg_input_log *log, bool with_held)
 
 npg_status npg_job_resume_inputs(npg_worker *worker, npg_job *job)
 {
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     npg_input_place place;
     npg_input_log *log;
     char *path;
@@ -140,7 +140,7 @@ npg_status npg_job_resume_inputs(npg_worker *worker, npg_job *job)
     NPG_TRY(npg_worker_publish(worker, &npg_fact_input_log, log));
     mark_solved(facts, log);
     if (npg_job_source_of(npg_worker_settings(worker)) == NPG_JOB_PUSH)
-        facts->wanted_number = wanted_number(log, holds(worker));
+        *npg_own(worker, wanted_number) = wanted_number(log, holds(worker));
     return check_folder(worker, job, log);
 }
 

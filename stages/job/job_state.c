@@ -135,7 +135,7 @@ static npg_status get_reports(npg_worker *worker, const npg_archive *in)
 
 npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job)
 {
-    npg_facts *facts = npg_worker_facts(worker), restored;
+    npg_facts restored;
     const npg_archive *in = npg_job_archive(job);
     int64_t read;
     npg_job_log log;
@@ -144,9 +144,9 @@ npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job)
     NPG_TRY(npg_archive_get(in, "log", &log, sizeof log));
     NPG_TRY(get_reports(worker, in));
     NPG_TRY(npg_state_get_mesh(&restored.reference, in));
-    *facts = restored; /* the run owns the reference now */
-    facts->is_resumed = true;
-    facts->resumed_read = read;
+    restored.is_resumed = true;
+    restored.resumed_read = read;
+    NPG_TRY(npg_worker_restore_facts(worker, &restored)); /* the run owns the reference now */
     npg_job_set_exported(job, log.count, log.bytes);
     return NPG_OK;
 }

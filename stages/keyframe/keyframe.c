@@ -73,19 +73,21 @@ static npg_status note_diagonal(keyframe_state *state, double diagonal)
     return NPG_OK;
 }
 
-static npg_status measure_frame(keyframe_state *state, npg_facts *facts, const npg_frame *frame)
+static npg_status measure_frame(npg_worker *worker, const npg_frame *frame)
 {
+    keyframe_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     npg_bounds bounds = npg_bounds_empty();
-    if (frame->number < facts->number_min) facts->number_min = frame->number;
-    if (frame->number > facts->number_max) facts->number_max = frame->number;
-    if (frame->point_count > facts->point_count_max) facts->point_count_max = frame->point_count;
-    if (frame->point_count && !frame->normals) facts->has_normals = false;
+    if (frame->number < facts->number_min) *npg_own(worker, number_min) = frame->number;
+    if (frame->number > facts->number_max) *npg_own(worker, number_max) = frame->number;
+    if (frame->point_count > facts->point_count_max) *npg_own(worker, point_count_max) = frame->point_count;
+    if (frame->point_count && !frame->normals) *npg_own(worker, has_normals) = false;
     if (frame->is_skipped) return NPG_OK;
     state->usable_count++;
     for (size_t i = 0; i < frame->point_count; i++)
         if (npg_vec3_is_finitef(frame->pos_local + 3 * i))
             npg_bounds_add_points(&bounds, frame->pos_local + 3 * i, 1);
-    npg_bounds_add(&facts->bounds_local, &bounds);
+    npg_bounds_add(npg_own(worker, bounds_local), &bounds);
     return bounds.lo[0] <= bounds.hi[0] ? note_diagonal(state, npg_bounds_diagonal(&bounds)) : NPG_OK;
 }
 
@@ -139,13 +141,13 @@ static npg_status refuse_one_window(const npg_facts *facts)
 static npg_status close_measuring(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     if (is_open(facts) && !state->window) return refuse_one_window(facts);
     if (!state->usable_count)
         return npg_error(NPG_BAD_INPUT, "no frame is left: every frame was skipped or the input has none");
-    if (is_open(facts)) widen_box(state, &facts->bounds_local);
-    NPG_TRY(npg_frame_box_set(&facts->box, &facts->origin, &facts->bounds_local));
-    set_diagonal(state, &facts->box);
+    if (is_open(facts)) widen_box(state, npg_own(worker, bounds_local));
+    NPG_TRY(npg_frame_box_set(npg_own(worker, box), &facts->origin, &facts->bounds_local));
+    set_diagonal(state, npg_own(worker, box));
     report_box(npg_worker_report(worker), facts);
     return NPG_OK;
 }
@@ -187,10 +189,10 @@ static bool has_candidates(const npg_worker *worker)
 static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     if (!state->likeness) {
         NPG_TRY(npg_likeness_open(&state->likeness, own_mesh(worker), &facts->origin, &facts->box));
-        facts->own_verts = npg_likeness_vert_count(state->likeness);
+        *npg_own(worker, own_verts) = npg_likeness_vert_count(state->likeness);
     }
     double dist_unit;
     NPG_TRY(npg_likeness_dist(&dist_unit, state->likeness, frame, &facts->box));
@@ -296,11 +298,12 @@ static npg_plan plan_around(const keyframe_state *state, const npg_facts *facts,
 static void set_choice(npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker), chooses = has_candidates(worker);
     if (facts->planned_count < 2 || (!chooses && !cuts_welds)) return;
-    npg_shortlist_choose(&facts->choice, &state->shortlist, facts->plan.key, facts->planned_count, !chooses);
-    facts->choice.cut_welds = cuts_welds;
+    npg_shortlist_choose(npg_own(worker, choice), &state->shortlist, facts->plan.key, facts->planned_count,
+                         !chooses);
+    npg_own(worker, choice)->cut_welds = cuts_welds;
 }
 
 static void report_key(npg_worker *worker, const candidate *key)
@@ -325,15 +328,15 @@ static void report_key(npg_worker *worker, const candidate *key)
 static npg_status set_plan(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     candidate key = {0};
     npg_status status = choose(state, &key);
     if (status && is_open(facts))
         return npg_error_prefix(status, "look-ahead of %lld frames", (long long)facts->planned_count);
     NPG_TRY(status);
-    facts->plan = plan_around(state, facts, key.index);
-    facts->window_asked = npg_plan_window_asked(state->window, INT64_MAX);
-    facts->overlap_asked = state->overlap;
+    *npg_own(worker, plan) = plan_around(state, facts, key.index);
+    *npg_own(worker, window_asked) = npg_plan_window_asked(state->window, INT64_MAX);
+    *npg_own(worker, overlap_asked) = state->overlap;
     set_choice(worker);
     report_key(worker, &key);
     return NPG_OK;
@@ -344,13 +347,13 @@ static npg_status set_plan(npg_worker *worker)
 static npg_status close_choosing(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     json_t *report = npg_worker_report(worker), *by_score = json_object_get(report, "key");
     npg_draft_result result;
     NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &result));
     if (result.index < 0 || result.index == facts->plan.key) return NPG_OK;
     json_object_set(report, "key_by_score", by_score);
-    facts->plan.key = result.index;
+    npg_own(worker, plan)->key = result.index;
     json_object_set_new(report, "key",
                         json_pack("{sI sI sf}", "index", (json_int_t)result.index, "number",
                                   (json_int_t)result.number, "cost", result.cost));
@@ -401,7 +404,7 @@ static npg_status end_live(npg_worker *worker)
 static npg_status init(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
     int64_t window = npg_plan_window_asked(state->window, INT64_MAX);
     npg_outside_open(&state->outside);
@@ -411,11 +414,11 @@ static npg_status init(npg_worker *worker)
     if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed)
         return npg_outside_restore(&state->outside, npg_job_archive(npg_job_of(worker)), facts);
     if (pass == NPG_PASS_MEASURE) {
-        facts->bounds_local = npg_bounds_empty();
-        facts->point_count_max = 0;
-        facts->has_normals = true;
-        facts->number_min = INT64_MAX;
-        facts->number_max = INT64_MIN;
+        *npg_own(worker, bounds_local) = npg_bounds_empty();
+        *npg_own(worker, point_count_max) = 0;
+        *npg_own(worker, has_normals) = true;
+        *npg_own(worker, number_min) = INT64_MAX;
+        *npg_own(worker, number_max) = INT64_MIN;
     }
     return NPG_OK;
 }
@@ -423,13 +426,13 @@ static npg_status init(npg_worker *worker)
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
     keyframe_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
     if (pass == NPG_PASS_CHOOSE) return npg_choose_pass_add(&state->choosing, facts, *chunk);
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (pass == NPG_PASS_MEASURE)
-            NPG_TRY(measure_frame(state, facts, frame));
+            NPG_TRY(measure_frame(worker, frame));
         else if (pass == NPG_PASS_SCORE)
             NPG_TRY(score_frame(worker, frame));
         else

@@ -39,14 +39,15 @@ static npg_status take_mesh(npg_likeness *likeness, const npg_mesh *mesh, const 
     return npg_kdtree_open(&likeness->tree, likeness->verts, likeness->vert_count);
 }
 
-npg_status npg_likeness_open(npg_likeness **out, const char *path, npg_origin *origin,
+npg_status npg_likeness_open(npg_likeness **out, const char *path, const npg_origin *origin,
                              const npg_frame_box *box)
 {
     npg_likeness *likeness;
     npg_mesh *mesh = NULL;
     *out = NULL;
     NPG_TRY(npg_alloc(&likeness, NPG_FOR_RUN, sizeof *likeness));
-    npg_status status = npg_read_mesh(&mesh, path, origin);
+    npg_origin of_mesh = *origin;
+    npg_status status = npg_read_mesh(&mesh, path, &of_mesh);
     if (!status) status = take_mesh(likeness, mesh, box);
     if (!status && !likeness->vert_count) status = npg_error(NPG_BAD_INPUT, "%s: no vertex is finite", path);
     npg_mesh_unref(&mesh);

@@ -13,7 +13,7 @@
 typedef struct npg_likeness npg_likeness;
 
 /* Read the mesh (PLY or OBJ).  origin is known.  NPG_BAD_INPUT names the file. */
-npg_status npg_likeness_open(npg_likeness **likeness, const char *path, npg_origin *origin,
+npg_status npg_likeness_open(npg_likeness **likeness, const char *path, const npg_origin *origin,
                              const npg_frame_box *box);
 size_t npg_likeness_vert_count(const npg_likeness *likeness); /* of the whole mesh */
 void npg_likeness_close(npg_likeness **likeness);

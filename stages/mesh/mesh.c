@@ -188,7 +188,7 @@ static npg_status judge_invented(making *m)
     NPG_TRY(npg_mesh_mark_unseen(m->mesh, m->set.points, m->set.count, m->set.seen_dist));
     if (is_given) NPG_TRY(excuse_hidden(m));
     NPG_TRY(npg_unseen_measure(&marked, &largest, m->mesh));
-    npg_worker_facts(m->worker)->unseen_share = m->invented_share;
+    *npg_own(m->worker, unseen_share) = m->invented_share;
     share = is_given ? marked : m->invented_share;
     npg_mesh_note(m->worker, "invented_share", share);
     json_object_set_new(npg_worker_report(m->worker), "invented_at",
@@ -202,8 +202,9 @@ static npg_status judge_invented(making *m)
 static npg_status read_reference(making *m)
 {
     const char *path = npg_worker_settings(m->worker)->reference;
-    npg_facts *facts = npg_worker_facts(m->worker);
-    NPG_TRY(npg_read_mesh(&m->mesh, path, &facts->origin));
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    npg_origin origin = facts->origin;
+    NPG_TRY(npg_read_mesh(&m->mesh, path, &origin));
     NPG_TRY(npg_mesh_require_finite(m->mesh, path));
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
@@ -275,7 +276,6 @@ static npg_status colour_reference(making *m)
 static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_fused *fused)
 {
     making m = {.worker = worker, .state = npg_worker_state(worker), .key = key, .fused = fused};
-    npg_facts *facts = npg_worker_facts(worker);
     bool is_given = npg_worker_settings(worker)->reference[0];
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
@@ -287,8 +287,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);
     npg_point_set_close(&m.set);
     if (status) npg_mesh_unref(&m.mesh);
-    npg_mesh_unref(&facts->reference);
-    facts->reference = m.mesh;
+    npg_mesh_unref(npg_own(worker, reference));
+    *npg_own(worker, reference) = m.mesh;
     if (!status) npg_worker_close_report(worker);
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)key->number,
                             key->path ? key->path : "pushed");

@@ -228,7 +228,7 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
-        if (!frame->is_skipped) NPG_TRY(give_mesh(npg_worker_facts(worker), frame, script.user));
+        if (!frame->is_skipped) NPG_TRY(give_mesh(test_facts(worker), frame, script.user));
     }
     return NPG_OK;
 }

@@ -80,7 +80,7 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (frame->index == s->fail_at) return npg_error(NPG_DIVERGED, "frame %d failed", (int)frame->index);
-        if (!frame->is_skipped) NPG_TRY(give_mesh(npg_worker_facts(worker), frame));
+        if (!frame->is_skipped) NPG_TRY(give_mesh(test_facts(worker), frame));
     }
     return NPG_OK;
 }

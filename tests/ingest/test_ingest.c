@@ -42,7 +42,7 @@ static npg_status watch_process(npg_worker *worker, npg_chunk **chunk)
 
 static npg_status watch_flush(npg_worker *worker)
 {
-    npg_facts *facts = npg_worker_facts(worker);
+    npg_facts *facts = test_facts(worker);
     if (npg_worker_pass(worker) == NPG_PASS_SCORE) {
         facts->plan = wanted_plan;
         facts->plan.frame_count = facts->frame_count;

@@ -29,7 +29,7 @@ static npg_status make_number(int **value)
 /* ---- a stage that writes facts, one that reads them, one that sits out ---- */
 
 static struct {
-    bool writes_twice, writes_again, writes_foreign, takes, waits;
+    bool writes_plan, writes_twice, writes_again, writes_foreign, takes, waits;
     int seen, after_taking;
     bool had_pose;
     int sat_frames;
@@ -54,6 +54,11 @@ static npg_status write_fact(npg_worker *worker, npg_chunk **chunk)
 {
     int *value;
     (void)chunk;
+    if (scene.writes_plan) {
+        *npg_own(worker, window_asked) = 7;
+        scene.seen = (int)npg_worker_facts(worker)->window_asked;
+        return NPG_OK;
+    }
     if (npg_worker_fact(worker, &number) && !scene.writes_twice) return NPG_OK;
     if (scene.writes_again) return write_again(worker);
     NPG_TRY(make_number(&value));
@@ -156,6 +161,23 @@ static void nobody_writes_for_another(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
+static void a_fact_of_the_run_is_its_owners(void **state)
+{
+    static const npg_stage keyframe = {
+        .name = "keyframe", .help = "", .passes = NPG_PASS_SOLVE, .process = write_fact};
+    const npg_stage *const owner[] = {&test_source, &keyframe, &test_sink, NULL};
+    const npg_stage *const other[] = {&test_source, &writer, &test_sink, NULL};
+    char text[1024];
+    (void)state;
+    scene.writes_plan = true;
+    assert_int_equal(run_chain(owner, plain, NULL), NPG_OK);
+    assert_int_equal(scene.seen, 7);
+    assert_int_equal(run_chain(other, plain, text), NPG_USAGE);
+    assert_string_equal(text, "writer: the fact window_asked is not stage writer's to write");
+    assert_int_equal(scene.seen, 0);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 static void what_was_taken_is_gone(void **state)
 {
     (void)state;
@@ -222,6 +244,7 @@ int main(void)
         cmocka_unit_test_setup(a_fact_is_written_once_and_released_with_the_run, set_up),
         cmocka_unit_test_setup(a_second_word_is_refused, set_up),
         cmocka_unit_test_setup(nobody_writes_for_another, set_up),
+        cmocka_unit_test_setup(a_fact_of_the_run_is_its_owners, set_up),
         cmocka_unit_test_setup(what_was_taken_is_gone, set_up),
         cmocka_unit_test_setup(what_was_taken_can_be_written_again, set_up),
         cmocka_unit_test_setup(what_was_written_again_is_not_written_a_third_time, set_up),

@@ -213,7 +213,7 @@ static void misuse_is_refused(void **state)
 /* Gives every frame vertices: its own points, and a reference of one face. */
 static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
-    npg_facts *facts = npg_worker_facts(worker);
+    npg_facts *facts = test_facts(worker);
     npg_frame *frame = npg_chunk_frame(*chunk, 0);
     if (!facts->reference) {
         NPG_TRY(npg_mesh_open(&facts->reference, 3, 1));

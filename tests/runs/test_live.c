@@ -47,7 +47,7 @@ static npg_status open_reference(npg_facts *facts)
 static npg_status solve(npg_worker *worker, const npg_window *window)
 {
     windower_state *s = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     for (int64_t t = window->first; t <= window->last; t++) {
         npg_frame *frame = held_at(s, t);
         if (frame->vert_unit) continue;
@@ -99,9 +99,9 @@ static npg_status solve_complete(npg_worker *worker)
 static npg_status windower_process(npg_worker *worker, npg_chunk **chunk)
 {
     windower_state *s = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     s->total = -1;
-    if (!facts->reference) NPG_TRY(open_reference(facts));
+    if (!facts->reference) NPG_TRY(open_reference(test_facts(worker)));
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
         if (s->count == sizeof s->held / sizeof *s->held)
             return npg_error(NPG_FAILED, "more frames than two windows and a look-ahead");

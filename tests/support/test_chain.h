@@ -20,6 +20,12 @@ typedef struct test_script {
 
 static test_script script;
 
+/* A stage of a test plays all those that are not there, and writes their facts. */
+static inline npg_facts *test_facts(const npg_worker *worker)
+{
+    return (npg_facts *)npg_worker_facts(worker);
+}
+
 typedef struct source_state {
     int64_t next;
 } source_state;
@@ -30,13 +36,13 @@ static npg_status source_from_feed(npg_worker *worker, npg_chunk **chunk)
     NPG_TRY(npg_worker_feed(worker, chunk));
     npg_frame *frame = npg_chunk_frame(*chunk, 0);
     frame->index = state->next++;
-    return script.make ? script.make(frame, npg_worker_facts(worker), frame->index, script.user) : NPG_OK;
+    return script.make ? script.make(frame, test_facts(worker), frame->index, script.user) : NPG_OK;
 }
 
 static npg_status source_process(npg_worker *worker, npg_chunk **chunk)
 {
     source_state *state = npg_worker_state(worker);
-    npg_facts *facts = npg_worker_facts(worker);
+    npg_facts *facts = test_facts(worker);
     bool is_solving = npg_worker_pass(worker) == NPG_PASS_SOLVE;
     if (facts->is_live) return is_solving ? source_from_feed(worker, chunk) : NPG_END; /* no look-ahead */
     if (!state->next) /* written once, before the first chunk */
