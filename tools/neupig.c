@@ -48,8 +48,7 @@ const npg_verb npg_verbs[] = {
      "with its own faces, colours, texture coordinates and turned normals, and OUT/done.json last of all.  "
      "An OBJ file written as OBJ keeps all its other lines: seams, polygons, groups and material names "
      "(put the material files beside).  With --fps-scale K there are K steps from each frame to the next, "
-     "each made by the decoders of the saved windows (JOB/job/motion_*.npg) at that very time; "
-     "where JOB/meshes is gone the frames themselves come from there, too.  "
+     "those between on curves through the run's meshes.  "
      "Exit code 7 when points lie far from the reference.",
      npg_apply_options, false, npg_verb_apply},
     {"probe", "INPUT", 0, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",

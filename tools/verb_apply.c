@@ -16,23 +16,20 @@
 #include "pipeline/json_file.h"
 #include "pipeline/json_lines.h"
 #include "tools/cli.h"
-#include "tools/job_motion.h"
 #include "tools/listing.h"
 #include "tools/segments/segments.h"
 
 #define PATH_SIZE 4096
 
 typedef struct settings {
-    const char *mesh, *output, *prefix, *device;
+    const char *mesh, *output, *prefix;
     int64_t fps_scale;
-    int format, between;
+    int format;
     double far_share;
     bool overwrite;
 } settings;
 
 enum { AS_MESH, AS_PLY, AS_OBJ };
-enum { BY_ANY, BY_WINDOWS, BY_CURVE, BY_LINE }; /* words of --between */
-static const char *const between_words[] = {"auto", "windows", "curve", "line"};
 
 #define AT(member) offsetof(settings, member)
 
@@ -45,13 +42,7 @@ const npg_option npg_apply_options[] = {
         "Folder for the carried meshes (also -o)"),
     NPG_ROW_INT   ("fps-scale", AT(fps_scale), "1",     1,     1000, "K",
         "Steps from each frame to the next; "
-        "more than 1 adds in-between frames and numbers the files 0, 1, 2 ..."),
-    NPG_ROW_CHOICE("between",   AT(between),   "auto",  "auto|windows|curve|line",
-        "Where in-between frames come from: the saved windows, whose decoders know every time; "
-        "or the run's meshes, by Catmull-Rom curves or straight lines; "
-        "auto: the windows where the run has left them, else curves"),
-    NPG_ROW_TEXT  ("device",    AT(device),    "auto",  "DEVICE",
-        "OpenCL device for the windows' decoders: auto, cpu, gpu, a number or a part of its name"),
+        "more than 1 adds in-between frames, on curves through the run's, and numbers the files 0, 1, 2 ..."),
     NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
         "Points farther from the reference than this share of its diagonal are reported (exit code 7)"),
     NPG_ROW_CHOICE("format",    AT(format),    "mesh",  "mesh|ply|obj",
@@ -75,18 +66,16 @@ typedef struct applying {
     npg_origin origin;
     npg_mesh *reference, *carried;
     npg_attachment *attachment;
-    npg_job_motion *motion; /* where the saved windows are needed                                     */
-    moment window[4];       /* in time; [1] and [2] are the two frames that are being written between */
-    float *between;         /* reference's V x 3                                                      */
-    double *pos;            /* carried's V x 3                                                        */
-    float *pos_float;       /* the same, where normals are made from it                               */
-    float *normals;         /* carried's V x 3, or NULL                                               */
-    bool turns_normals;     /* they are the file's own                                                */
-    bool is_like;           /* OBJ from OBJ: the file's lines are kept                                */
+    moment window[4];   /* in time; [1] and [2] are the two frames that are being written between */
+    float *between;     /* reference's V x 3                                                      */
+    double *pos;        /* carried's V x 3                                                        */
+    float *pos_float;   /* the same, where normals are made from it                               */
+    float *normals;     /* carried's V x 3, or NULL                                               */
+    bool turns_normals; /* they are the file's own                                                */
+    bool is_like;       /* OBJ from OBJ: the file's lines are kept                                */
     npg_mesh_names names;
     npg_file *done; /* collects OUT/done.json; appears last */
-    size_t frame_count, written, far_count,
-        lost_count; /* lost: frames whose mesh file is not there any more */
+    size_t frame_count, written, far_count;
     int64_t number_max;
     int64_t first_index, last_index;
     double fps;
@@ -133,7 +122,9 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     const char *file = json_string_value(json_object_get(frame, "file"));
     (void)line, (void)size;
     if (!file) return NPG_OK;
-    if (npg_path_stays(file) && !npg_is_in_folder(a->job, file)) a->lost_count++;
+    if (npg_path_stays(file) && !npg_is_in_folder(a->job, file))
+        return npg_error(NPG_BAD_INPUT, "%s/%s is missing; apply needs the meshes of all frames", a->job,
+                         file);
     if (a->frame_count && index <= a->last_index)
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl: frame %lld is not after the one before it", a->job,
                          (long long)index);
@@ -150,30 +141,6 @@ static npg_status each_line(const applying *a, npg_json_line_visit *visit, void 
     return npg_json_lines_each(path, (int64_t)npg_file_bytes(path), visit, user);
 }
 
-/* The saved windows, where frames between frames or lost ones need them. */
-static npg_status open_motion(applying *a)
-{
-    bool makes_between = a->s.fps_scale > 1 && a->s.between <= BY_WINDOWS;
-    if (!makes_between && !a->lost_count) return NPG_OK;
-    npg_status status = npg_job_motion_open(&a->motion, a->job, a->reference, a->s.device);
-    if (status < 0) return npg_error_prefix(status, "%s", a->job);
-    if (status == NPG_END && a->lost_count)
-        return npg_error(NPG_BAD_INPUT,
-                         "%s: %zu of %zu meshes are missing, and job/ has no windows to make them from",
-                         a->job, a->lost_count, a->frame_count);
-    if (status == NPG_END && a->s.between == BY_WINDOWS)
-        return npg_error(
-            NPG_BAD_INPUT,
-            "%s: job/ has no windows (runs that are pulled from leave none); --between curve does without",
-            a->job);
-    if (a->lost_count)
-        fprintf(
-            stderr,
-            "neupig apply: %zu of %zu meshes of %s are missing; their frames come from the saved windows\n",
-            a->lost_count, a->frame_count, a->job);
-    return NPG_OK;
-}
-
 static npg_status open_job(applying *a)
 {
     char path[PATH_SIZE];
@@ -181,8 +148,7 @@ static npg_status open_job(applying *a)
     NPG_TRY(each_line(a, count_line, a));
     if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->job);
     NPG_TRY(path_of(path, a->job, "reference.ply"));
-    NPG_TRY(npg_read_mesh(&a->reference, path, &a->origin));
-    return open_motion(a);
+    return npg_read_mesh(&a->reference, path, &a->origin);
 }
 
 /* Check that a mesh is the reference moved, and copy its positions. */
@@ -208,8 +174,6 @@ static npg_status read_moment(const applying *a, moment *m, const char *file)
     if (!npg_path_stays(file))
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names %s, which is not in the job", a->job, file);
     NPG_TRY(npg_alloc_array(&m->vert_pos, NPG_FOR_MESH, a->reference->vert_count, 3 * sizeof *m->vert_pos));
-    if (!npg_is_in_folder(a->job, file) && a->motion)
-        return npg_job_motion_pose(a->motion, m->vert_pos, (double)m->index);
     NPG_TRY(path_of(path, a->job, file));
     NPG_TRY(npg_read_mesh(&mesh, path, &origin));
     npg_status status = copy_positions(a, m->vert_pos, mesh, path);
@@ -391,33 +355,6 @@ static void make_curve(applying *a, double share)
     }
 }
 
-static void make_line(applying *a, double share)
-{
-    const float *p = a->window[1].vert_pos, *q = a->window[2].vert_pos;
-    for (size_t i = 0; i < 3 * a->reference->vert_count; i++)
-        a->between[i] = (float)((1 - share) * (double)p[i] + share * (double)q[i]);
-}
-
-static int way_between(const applying *a)
-{
-    if (a->s.between != BY_ANY) return a->s.between;
-    return a->motion ? BY_WINDOWS : BY_CURVE;
-}
-
-/* The k-th of the steps from window[1] to window[2]. */
-static npg_status make_between(applying *a, int64_t k, int64_t steps)
-{
-    double share = (double)k / (double)steps, gap = (double)(a->window[2].index - a->window[1].index);
-    int way = way_between(a);
-    if (way == BY_WINDOWS)
-        return npg_job_motion_pose(a->motion, a->between, (double)a->window[1].index + share * gap);
-    if (way == BY_CURVE)
-        make_curve(a, share);
-    else
-        make_line(a, share);
-    return NPG_OK;
-}
-
 /* window[1], and the steps from it to window[2]. */
 static npg_status write_step(applying *a)
 {
@@ -428,7 +365,7 @@ static npg_status write_step(applying *a)
     if (!to->is_there || scale == 1) return NPG_OK;
     int64_t steps = (to->index - from->index) * scale;
     for (int64_t k = 1; k < steps; k++) {
-        NPG_TRY(make_between(a, k, steps));
+        make_curve(a, (double)k / (double)steps);
         NPG_TRY(write_pose(a, a->between, first + k));
     }
     return NPG_OK;
@@ -465,9 +402,6 @@ static npg_status write_done(applying *a)
                               (json_int_t)a->frame_count, "fps_scale", (json_int_t)a->s.fps_scale,
                               "points_far", (json_int_t)a->far_count, "fps", a->fps * (double)a->s.fps_scale,
                               "exit_code", npg_status_exit_code(a->far_count ? NPG_PARTIAL : NPG_OK));
-    if (a->s.fps_scale > 1) json_object_set_new(facts, "between", json_string(between_words[way_between(a)]));
-    if (a->lost_count)
-        json_object_set_new(facts, "frames_from_windows", json_integer((json_int_t)a->lost_count));
     json_object_set_new(facts, "job", npg_json_text(a->job));
     json_object_set_new(facts, "mesh", npg_json_text(a->s.mesh));
     char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
@@ -501,7 +435,6 @@ static npg_status apply(applying *a)
 static void close_applying(applying *a)
 {
     for (int i = 0; i < 4; i++) npg_release(&a->window[i].vert_pos);
-    npg_job_motion_close(&a->motion);
     npg_file_discard(&a->done);
     npg_attach_close(&a->attachment);
     npg_mesh_unref(&a->reference);

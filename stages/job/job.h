@@ -11,8 +11,6 @@
  *                                  stages need to be resumed, the optimiser, and the frames that the next
  *                                  windows share
  *     OUT/job/window_000012.vdb    the latent grids of the same moment (optimize/vdb_grids.h)
- *     OUT/job/motion_000012.npg    the motion of that window's frames at any time (optimize/record.h); those
- *                                  of all windows stay, for neupig apply
  *
  *     OUT/job/inside.npg           state inside the window at work, where that takes long: what a window's
  *                                  state has, the fit's progress, its grids; removed when it is solved
@@ -118,9 +116,6 @@ npg_status npg_job_save_inside(npg_worker *worker, const npg_job_moment *moment,
 
 /* Facts, reference, reports and warnings from the open archive; before the first pass.  NPG_BAD_INPUT. */
 npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job);
-
-/* Where the record of the next window goes (optimize/record.h); to npg_release(). */
-npg_status npg_job_motion_path(const npg_job *job, char **path);
 
 /* Where stage align keeps the poses of the last fusing pass (align/poses.h); to npg_release().  New ones have
  * another name until the solving pass begins: those of an earlier run belong to its states. */

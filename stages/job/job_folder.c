@@ -18,7 +18,6 @@
 #include "pipeline/file.h"
 
 #define STATE_NAME  "window_%06lld.%s"
-#define MOTION_NAME "motion_%06lld.npg"
 #define INSIDE_NAME "inside.npg"
 #define POSES_NAME  "poses.bin"
 #define POSES_NEW   "poses.new"
@@ -64,12 +63,6 @@ static int64_t serial_of(const char *name)
     int fields = sscanf(name, "window_%lld.%3[a-z]%7s", &serial, ending, rest);
     if (fields < 2 || serial < 0 || (strcmp(ending, "npg") != 0 && strcmp(ending, "vdb") != 0)) return -1;
     return fields == 2 || !strcmp(rest, ".part") ? serial : -1;
-}
-
-/* Records of windows, also their hidden, unfinished form. */
-static bool is_motion(const char *name)
-{
-    return !strncmp(name + (name[0] == '.'), "motion_", 7);
 }
 
 /* Call visit(job, name, serial) for every file of a state. */
@@ -561,7 +554,6 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
     if (job->forgets) {
         NPG_TRY(remove_file(job, "job.json"));
         NPG_TRY(each_state(job, remove_state));
-        NPG_TRY(remove_kind(job, is_motion));
         NPG_TRY(remove_file(job, INSIDE_NAME));
         NPG_TRY(remove_file(job, POSES_NAME));
         NPG_TRY(keep_inputs(job));
@@ -589,13 +581,6 @@ npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path
     npg_status status = state_path(grids_path, job, *serial, "vdb");
     if (status) npg_release(archive_path);
     return status;
-}
-
-npg_status npg_job_motion_path(const npg_job *job, char **path)
-{
-    char name[64];
-    snprintf(name, sizeof name, MOTION_NAME, (long long)job->serial + 1);
-    return npg_join_path(path, job->folder, name);
 }
 
 npg_status npg_job_commit(npg_job *job, bool is_forward_end)

@@ -10,7 +10,6 @@
 #include "kernels/mlp.h"
 #include "optimize/checkpoint.h"
 #include "optimize/fit_state.h"
-#include "optimize/record.h"
 #include "optimize/window.h"
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
@@ -388,25 +387,6 @@ static npg_status emit_done(npg_worker *worker)
 
 /* ---- states on disk ---- */
 
-/* The motion of the window for neupig apply, before the state says that the window is solved. */
-static npg_status save_record(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    const npg_record_source source = {s->solver,
-                                      &s->window_settings.fit,
-                                      facts,
-                                      &s->window,
-                                      s->held,
-                                      s->held_count,
-                                      (uint64_t)npg_worker_settings(worker)->seed};
-    char *path;
-    NPG_TRY(npg_job_motion_path(npg_job_of(worker), &path));
-    npg_status status = npg_record_save(path, &source);
-    npg_release(&path);
-    return status;
-}
-
 static npg_hand hand_of(state *s, int64_t window_at)
 {
     const npg_joint_result *joint = npg_window_result(s->solver);
@@ -421,7 +401,6 @@ static npg_status save_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     if (!npg_job_of(worker)) return NPG_OK;
-    NPG_TRY(save_record(worker));
     const npg_hand hand = hand_of(s, s->window_at);
     s->saved_s = npg_clock_s();
     return npg_checkpoint_save(worker, &hand, npg_window_fit(s->solver));

@@ -1,10 +1,8 @@
-/* Door of the optimize room: what tools use of it.
- *
- * replay.h: the motion of a finished run, also between frames (neupig apply). */
+/* Door of the optimize room: what tools use of it. */
 #ifndef NPG_OPTIMIZE_H
 #define NPG_OPTIMIZE_H
 
-#include "optimize/replay.h"
+#include "kernels/runtime/device.h"
 #include "pipeline/mesh.h"
 #include "pipeline/work.h"
 

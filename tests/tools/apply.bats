@@ -98,16 +98,28 @@ between_run() {
         --quiet --max-residual 100 --max-flipped 100 --window 4 --overlap 1 "${@:2}" >"$1.log" || [ $? -eq 7 ]
 }
 
-@test "in-between frames come from the saved windows, nearer the truth than lines between meshes" {
+# The midpoints of each two meshes of frames in $1 (made with two steps a frame), with the frames, in $2.
+lines_of() {
+    local k
+    mkdir -p "$2"
+    cp "$1"/frame_*[02468].obj "$2"
+    for k in $(seq 1 2 15); do
+        paste -d ' ' "$1/frame_$(printf %04d $((k - 1))).obj" "$1/frame_$(printf %04d $((k + 1))).obj" |
+            awk '$1 == "v" { print "v", ($2 + $6) / 2, ($3 + $7) / 2, ($4 + $8) / 2 } 
+                $1 == "f" { gsub(/\/[^ ]*/, ""); print $1, $2, $3, $4 }' \
+                >"$2/frame_$(printf %04d "$k").obj"
+    done
+}
+
+@test "in-between frames are nearer the truth than lines between meshes, and nothing leaps" {
     fine_and_coarse
     between_run wide
-    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-windows --fps-scale 2
-    grep -q '"between": "windows"' wide-windows/done.json
-    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-line --fps-scale 2 --between line
-    windows=$(odd_error wide-windows fine)
+    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-curves --fps-scale 2 --format obj
+    lines_of wide-curves wide-line
+    curves=$(odd_error wide-curves fine)
     line=$(odd_error wide-line fine)
-    echo "windows $windows, lines $line"
-    awk -v w="$windows" -v l="$line" 'BEGIN { exit !(w > 0 && w < 0.95 * l) }'
+    echo "curves $curves, lines $line"
+    awk -v w="$curves" -v l="$line" 'BEGIN { exit !(w > 0 && w < 0.95 * l) }'
     # nothing leaps where windows meet: a step of a 16th of a frame is never much longer than those beside it
     "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-steps --fps-scale 16 --format obj
     for step in wide-steps/*.obj; do grep '^v ' "$step" | awk '{ print $2, $3, $4 }' >"$step.v"; done
@@ -119,47 +131,11 @@ between_run() {
         END { exit bad > 0 || NR != 128 }' lengths
 }
 
-@test "the saved windows are enough: without meshes all frames are the same" {
-    fine_and_coarse
-    for run in wide paper deep; do
-        options=()
-        [ $run = wide ] || options=(--align=no --epochs 30 --axes xz-y --unit cm)
-        [ $run != deep ] || options+=(--hidden-layers 3)
-        [ -d $run ] || between_run $run "${options[@]}"
-        rm -rf $run-with $run-alone
-        "$NEUPIG" apply $run --mesh coarse/frame_0004.ply -o $run-with --fps-scale 2 --between windows --far 1000
-        mv $run/meshes $run-meshes
-        "$NEUPIG" apply $run --mesh coarse/frame_0004.ply -o $run-alone --fps-scale 2 --format obj --far 1000 2>$run.err
-        "$NEUPIG" apply $run --mesh $run/reference.ply -o $run-again --overwrite
-        mv $run-meshes $run/meshes
-        grep -q '9 of 9 meshes' $run.err
-        grep -q '"frames_from_windows": 9' $run-alone/done.json
-        run "$NEUPIG" eval $run-again $run/meshes --samples 1000
-        echo "$output"
-        [ "$(figure Corr)" = "0.00000" ]
-        [ "$(ls $run-alone | grep -c obj)" -eq 17 ]
-    done
-}
-
-@test "a damaged window is named; without windows there are curves" {
-    fine_and_coarse
-    [ -d wide ] || between_run wide
-    cp -r wide hurt
-    record=$(ls hurt/job/motion_*.npg | tail -1)
-    printf '\x5a\xa5' | dd of="$record" bs=1 seek=3000 conv=notrunc status=none
-    fail_with 3 "$(basename "$record")" hurt --mesh hurt/reference.ply --fps-scale 2
-    "$NEUPIG" apply hurt --mesh hurt/reference.ply -o hurt-curve --fps-scale 2 --between curve
-    rm "$record"
-    fail_with 3 "no record has frame" hurt --mesh hurt/reference.ply --fps-scale 2
-    rm hurt/job/motion_*
-    fail_with 3 "no windows" hurt --mesh hurt/reference.ply --fps-scale 2 --between windows
-    "$NEUPIG" apply hurt --mesh hurt/reference.ply -o hurt-auto --fps-scale 2
-    grep -q '"between": "curve"' hurt-auto/done.json
-    cmp hurt-auto/frame_0003.ply hurt-curve/frame_0003.ply
-    cp -r wide odd
-    cp odd/meshes/frame_0000.ply odd/reference.ply # not the one that the windows move
-    fail_with 3 "is not the reference" odd --mesh odd/reference.ply --fps-scale 2
-    fail_with 4 "no such device" wide --mesh wide/reference.ply --fps-scale 2 --device "no such device"
+@test "a mesh that is missing is named before anything is written" {
+    cp -r job lacking
+    rm lacking/meshes/frame_0002.ply
+    fail_with 3 "lacking/meshes/frame_0002.ply is missing" lacking --mesh lacking/reference.ply --fps-scale 2
+    [ -z "$(ls bad-out 2>/dev/null)" ]
 }
 
 @test "in-between frames lie on the curve through the frames, gaps or not" {

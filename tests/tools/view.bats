@@ -78,7 +78,7 @@ setup() {
     cp -r made cut && truncate -s 3000 cut/meshes/frame_0002.ply
     fails 3 "cut/meshes/frame_0002.ply" cut
     cp -r made gone && rm gone/meshes/frame_0002.ply
-    fails 3 "is missing, and job/ has no windows" gone
+    fails 3 "frame_0002.ply" gone
     cp -r made out-of && sed -i 's|"file": "meshes/frame_0001.ply"|"file": "../made/meshes/frame_0001.ply"|' out-of/frames.jsonl
     fails 3 "which is not in it" out-of
     cp -r made twice && head -n 1 made/frames.jsonl >>twice/frames.jsonl

@@ -26,7 +26,6 @@ npg_status npg_view_frames_open(npg_view_frames *frames, const npg_view_part *pa
 
 void npg_view_frames_close(npg_view_frames *frames)
 {
-    npg_job_motion_close(&frames->motion);
     npg_release(&frames->vert_pos);
     npg_release(&frames->points);
     npg_release(&frames->some);

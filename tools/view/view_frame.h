@@ -28,7 +28,6 @@
 #ifndef NPG_VIEW_FRAME_H
 #define NPG_VIEW_FRAME_H
 
-#include "tools/job_motion.h"
 #include "tools/view/view_result.h"
 
 #define NPG_VIEW_POINT_STEP 16
@@ -38,7 +37,6 @@
 typedef struct npg_view_frames {
     const npg_view_part *part; /* loan */
     size_t point_limit;        /* points of a frame that are shown; all are measured from */
-    npg_job_motion *motion;    /* where meshes are missing; owned                         */
     float *vert_pos;           /* V x 3 of the frame at hand, owned                       */
     float *points, *some;      /* N x 3, and those shown; owned                           */
     size_t point_count, point_capacity, some_capacity;

@@ -28,19 +28,6 @@ static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const
     return NPG_OK;
 }
 
-static npg_status mesh_of_windows(npg_view_frames *frames, const npg_view_frame *frame)
-{
-    const npg_view_part *part = frames->part;
-    if (!frames->motion) {
-        npg_status status = npg_job_motion_open(&frames->motion, part->folder, part->reference, "auto");
-        if (status == NPG_END)
-            return npg_error(NPG_BAD_INPUT, "%s/%s is missing, and job/ has no windows to make it from",
-                             part->folder, frame->file);
-        NPG_TRY(npg_error_prefix(status, "%s", part->folder));
-    }
-    return npg_job_motion_pose(frames->motion, frames->vert_pos, (double)frame->index);
-}
-
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame)
 {
     npg_origin origin = frames->part->origin;
@@ -51,12 +38,8 @@ npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *fra
         return npg_error(NPG_BAD_INPUT, "%s: its list of frames names %s, which is not in it",
                          frames->part->folder, frame->file);
     NPG_TRY(npg_join_path(&path, frames->part->folder, frame->file));
-    npg_status status;
-    if (access(path, F_OK))
-        status = mesh_of_windows(frames, frame);
-    else
-        status = npg_read_mesh(&mesh, path, &origin);
-    if (mesh && !status) status = take_mesh(frames, mesh, path);
+    npg_status status = npg_read_mesh(&mesh, path, &origin);
+    if (!status) status = take_mesh(frames, mesh, path);
     npg_mesh_unref(&mesh);
     npg_release(&path);
     return status;

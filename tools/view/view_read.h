@@ -4,8 +4,7 @@
 
 #include "tools/view/view_frame.h"
 
-/* Fill frames->vert_pos, relative to the part's origin: from the mesh's file, from the run's saved windows
- * where it is gone; without a mesh it stays. */
+/* Fill frames->vert_pos, relative to the part's origin: from the mesh's file; without one it stays. */
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame);
 
 /* Fill frames->points, in the coordinates of the meshes and relative to the part's origin.  None where the
