@@ -7,11 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/backward.h"
 #include "align/follow_log.h"
 #include "align/group.h"
 #include "align/pose.h"
 #include "align/pose_cache.h"
+#include "align/recover.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
 #include "job/job.h"
@@ -204,14 +204,13 @@ static npg_status take_points(const npg_worker *worker, npg_waiting *w)
     size_t most = POINTS_MOST * (size_t)s->samples;
     size_t count = frame->point_count < most ? frame->point_count : most;
     if (!count) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&w->points, NPG_FOR_FIT, count, 3 * sizeof(float)));
-    if (frame->normals) NPG_TRY(npg_alloc_array(&w->normals, NPG_FOR_FIT, count, 3 * sizeof(float)));
+    w->points = npg_arena_take(&w->arena, count, 3 * sizeof(float));
+    if (frame->normals) w->normals = npg_arena_take(&w->arena, count, 3 * sizeof(float));
+    if (frame->sensor_count) w->sensors = npg_arena_take(&w->arena, frame->sensor_count, 3 * sizeof(float));
+    NPG_TRY(npg_arena_status(&w->arena));
     npg_points_spread(w->points, w->normals, most, frame->pos_local, frame->normals, frame->point_count);
     npg_box_local_to_unit(box, w->points, w->points, count);
-    if (frame->sensor_count) {
-        NPG_TRY(npg_alloc_array(&w->sensors, NPG_FOR_FIT, frame->sensor_count, 3 * sizeof(float)));
-        npg_box_local_to_unit(box, w->sensors, frame->sensor_local, frame->sensor_count);
-    }
+    if (frame->sensor_count) npg_box_local_to_unit(box, w->sensors, frame->sensor_local, frame->sensor_count);
     w->cloud = (npg_tracker_cloud){w->points, w->normals, count, w->sensors, frame->sensor_count};
     return NPG_OK;
 }
@@ -222,7 +221,8 @@ static npg_status count_hidden(const npg_worker *worker, npg_waiting *w, npg_sid
     const state *s = npg_worker_state(worker);
     size_t nodes = nodes_of(s);
     if (!w->cloud.sensor_count) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&w->since, NPG_FOR_FIT, nodes, sizeof *w->since));
+    w->since = npg_arena_take(&w->arena, nodes, sizeof *w->since);
+    NPG_TRY(npg_arena_status(&w->arena));
     if (w->frame.index != npg_worker_facts(worker)->plan.key)
         npg_tracker_since(s->tracker, w->since, at->since);
     memcpy(at->since, w->since, nodes * sizeof *at->since);

@@ -23,8 +23,9 @@ typedef struct part {
 } part;
 
 struct npg_block_system {
+    npg_arena arena; /* of all arrays */
     size_t n, pair_count;
-    uint32_t (*pairs)[2]; /* owned, sorted                        */
+    uint32_t (*pairs)[2]; /* sorted                               */
     uint32_t *first;      /* n + 1: pairs[first[a]] .. have a = a */
     part parts[NPG_BLOCK_PARTS];
     /* of the solution */
@@ -39,38 +40,29 @@ struct npg_block_system {
 void npg_block_close(npg_block_system **slot)
 {
     if (!slot || !*slot) return;
-    npg_block_system *s = *slot;
-    void *all[] = {&s->pairs, &s->first,    &s->row_first, &s->other, &s->place,
-                   &s->cells, &s->diagonal, &s->inverse,   &s->work};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
-    for (size_t i = 0; i < NPG_BLOCK_PARTS; i++) {
-        npg_release(&s->parts[i].diagonal);
-        npg_release(&s->parts[i].off);
-        npg_release(&s->parts[i].right);
-    }
+    npg_arena_release(&(*slot)->arena);
     npg_release(slot);
-}
-
-static npg_status open_part(part *p, size_t n, size_t pair_count)
-{
-    NPG_TRY(npg_alloc_array(&p->diagonal, NPG_FOR_FIT, n, 36 * sizeof(double)));
-    NPG_TRY(npg_alloc_array(&p->off, NPG_FOR_FIT, pair_count + 1, 36 * sizeof(double)));
-    return npg_alloc_array(&p->right, NPG_FOR_FIT, n, 6 * sizeof(double));
 }
 
 static npg_status open_arrays(npg_block_system *s)
 {
+    npg_arena *arena = &s->arena;
     size_t n = s->n, pairs = s->pair_count;
-    for (size_t i = 0; i < NPG_BLOCK_PARTS; i++) NPG_TRY(open_part(&s->parts[i], n, pairs));
-    NPG_TRY(npg_alloc_array(&s->pairs, NPG_FOR_FIT, pairs + 1, sizeof *s->pairs));
-    NPG_TRY(npg_alloc_array(&s->first, NPG_FOR_FIT, n + 2, sizeof *s->first));
-    NPG_TRY(npg_alloc_array(&s->row_first, NPG_FOR_FIT, n + 2, sizeof *s->row_first));
-    NPG_TRY(npg_alloc_array(&s->other, NPG_FOR_FIT, 2 * pairs + 1, sizeof *s->other));
-    NPG_TRY(npg_alloc_array(&s->place, NPG_FOR_FIT, 2 * pairs + 1, sizeof *s->place));
-    NPG_TRY(npg_alloc_array(&s->cells, NPG_FOR_FIT, 2 * pairs + 1, CELL * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&s->diagonal, NPG_FOR_FIT, n, CELL * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&s->inverse, NPG_FOR_FIT, n, CELL * sizeof(float)));
-    return npg_alloc_array(&s->work, NPG_FOR_FIT, 5 * n, LANES * sizeof(float));
+    for (size_t i = 0; i < NPG_BLOCK_PARTS; i++) {
+        s->parts[i].diagonal = npg_arena_take(arena, n, 36 * sizeof(double));
+        s->parts[i].off = npg_arena_take(arena, pairs, 36 * sizeof(double));
+        s->parts[i].right = npg_arena_take(arena, n, 6 * sizeof(double));
+    }
+    s->pairs = npg_arena_take(arena, pairs, sizeof *s->pairs);
+    s->first = npg_arena_take(arena, n + 2, sizeof *s->first);
+    s->row_first = npg_arena_take(arena, n + 2, sizeof *s->row_first);
+    s->other = npg_arena_take(arena, 2 * pairs, sizeof *s->other);
+    s->place = npg_arena_take(arena, 2 * pairs, sizeof *s->place);
+    s->cells = npg_arena_take(arena, 2 * pairs, CELL * sizeof(float));
+    s->diagonal = npg_arena_take(arena, n, CELL * sizeof(float));
+    s->inverse = npg_arena_take(arena, n, CELL * sizeof(float));
+    s->work = npg_arena_take(arena, 5 * n, LANES * sizeof(float));
+    return npg_arena_status(arena);
 }
 
 /* Where each pair's two blocks lie among the rows. */
@@ -101,6 +93,7 @@ npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pai
     npg_block_system *s;
     *out = NULL;
     NPG_TRY(npg_alloc(&s, NPG_FOR_FIT, sizeof *s));
+    s->arena.purpose = NPG_FOR_FIT;
     s->n = n;
     s->pair_count = pair_count;
     npg_status status = open_arrays(s);

@@ -12,11 +12,13 @@
 
 /* ---- the list ---- */
 
-static npg_status copy_points(npg_candidate_cloud *cloud, const npg_frame *frame, const npg_frame_box *box)
+static npg_status copy_points(npg_candidate_cloud *cloud, npg_arena *arena, const npg_frame *frame,
+                              const npg_frame_box *box)
 {
     size_t count = frame->point_count < NPG_CANDIDATE_POINTS ? frame->point_count : NPG_CANDIDATE_POINTS;
-    NPG_TRY(npg_alloc_array(&cloud->points, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
-    if (frame->normals) NPG_TRY(npg_alloc_array(&cloud->normals, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
+    cloud->points = npg_arena_take(arena, count, 3 * sizeof(float));
+    if (frame->normals) cloud->normals = npg_arena_take(arena, count, 3 * sizeof(float));
+    NPG_TRY(npg_arena_status(arena));
     npg_points_spread(cloud->points, cloud->normals, count, frame->pos_local, frame->normals,
                       frame->point_count);
     npg_box_local_to_unit(box, cloud->points, cloud->points, count);
@@ -37,7 +39,7 @@ npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_fram
         clouds->given += frame->cleaning.normals_given;
         clouds->flipped += frame->cleaning.normals_flipped;
     }
-    return copy_points(cloud, frame, box);
+    return copy_points(cloud, &clouds->arena, frame, box);
 }
 
 static void release_clouds(void *value)
@@ -50,17 +52,16 @@ const npg_fact_kind npg_fact_candidate_clouds = {"candidate_clouds", "keyframe",
 
 npg_status npg_candidate_clouds_open(npg_candidate_clouds **clouds)
 {
-    return npg_alloc(clouds, NPG_FOR_RUN, sizeof **clouds);
+    NPG_TRY(npg_alloc(clouds, NPG_FOR_RUN, sizeof **clouds));
+    (*clouds)->arena.purpose = NPG_FOR_FRAMES;
+    return NPG_OK;
 }
 
 void npg_candidate_clouds_close(npg_candidate_clouds **slot)
 {
     npg_candidate_clouds *clouds = *slot;
     if (!clouds) return;
-    for (size_t i = 0; i < clouds->count; i++) {
-        npg_release(&clouds->list[i].points);
-        npg_release(&clouds->list[i].normals);
-    }
+    npg_arena_release(&clouds->arena);
     npg_release(&clouds->list);
     npg_release(slot);
 }
@@ -78,31 +79,24 @@ typedef struct follower {
     const npg_candidate_clouds *clouds;
     npg_tracker *tracker;
     size_t node_count;
-    double *pose, *before, *next; /* K x 12 each, owned */
-    float *vert_unit;             /* V x 3, owned       */
+    double *pose, *before, *next; /* K x 12 each */
+    float *vert_unit;             /* V x 3       */
     bool with_normals;
     npg_candidate_seen seen;
     void *user;
 } follower;
 
-static void close_follower(follower *f)
-{
-    npg_tracker_close(&f->tracker);
-    npg_release(&f->pose);
-    npg_release(&f->before);
-    npg_release(&f->next);
-    npg_release(&f->vert_unit);
-}
-
-static npg_status open_follower(follower *f, npg_mesh *mesh, const npg_tracker_settings *settings)
+static npg_status open_follower(follower *f, npg_arena *scratch, npg_mesh *mesh,
+                                const npg_tracker_settings *settings)
 {
     NPG_TRY(npg_tracker_open(&f->tracker, mesh, settings));
     f->node_count = npg_tracker_node_count(f->tracker);
-    size_t size = NPG_POSE_SIZE * sizeof(double);
-    NPG_TRY(npg_alloc_array(&f->pose, NPG_FOR_FIT, f->node_count, size));
-    NPG_TRY(npg_alloc_array(&f->before, NPG_FOR_FIT, f->node_count, size));
-    NPG_TRY(npg_alloc_array(&f->next, NPG_FOR_FIT, f->node_count, size));
-    return npg_alloc_array(&f->vert_unit, NPG_FOR_FIT, mesh->vert_count, 3 * sizeof(float));
+    size_t bytes = npg_pose_bytes(f->node_count);
+    f->pose = npg_arena_take(scratch, 1, bytes);
+    f->before = npg_arena_take(scratch, 1, bytes);
+    f->next = npg_arena_take(scratch, 1, bytes);
+    f->vert_unit = npg_arena_take(scratch, mesh->vert_count, 3 * sizeof(float));
+    return npg_arena_status(scratch);
 }
 
 static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
@@ -124,15 +118,17 @@ static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
 npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
                                 const npg_tracker_settings *settings, npg_candidate_seen seen, void *user)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
     follower f = {.clouds = clouds, .seen = seen, .user = user};
     f.with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
-    npg_status status = open_follower(&f, mesh, settings);
+    npg_status status = open_follower(&f, &scratch, mesh, settings);
     for (int step = -1; step <= 1 && !status; step += 2) {
         npg_pose_rest(f.pose, f.node_count);
         npg_pose_rest(f.before, f.node_count);
         for (size_t i = from + (size_t)step; i < clouds->count && !status; i += (size_t)step)
             status = follow_to(&f, &clouds->list[i]);
     }
-    close_follower(&f);
+    npg_tracker_close(&f.tracker);
+    npg_arena_release(&scratch);
     return status;
 }

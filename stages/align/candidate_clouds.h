@@ -18,10 +18,11 @@ typedef struct npg_candidate_cloud {
     int64_t index, number;
     bool is_candidate;
     size_t point_count;
-    float *points, *normals; /* N x 3 each, unit; normals may be NULL; owned */
+    float *points, *normals; /* N x 3 each, unit; normals may be NULL; the list's */
 } npg_candidate_cloud;
 
 typedef struct npg_candidate_clouds {
+    npg_arena arena; /* of all points and normals */
     size_t count, capacity;
     npg_candidate_cloud *list; /* in time order; owned                                */
     size_t given, flipped;     /* normals of candidates: given, and on the wrong side */

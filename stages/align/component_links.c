@@ -8,31 +8,25 @@
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 
-#define TIES_EACH 4 /* of a piece: they say how it is turned, too */
-#define NONE      UINT32_MAX
+#define LINKS_EACH 4 /* of a piece: they say how it is turned, too */
+#define NONE       UINT32_MAX
 
 typedef struct joining {
     const float *node_pos;
     size_t node_count;
-    uint32_t *piece;   /* K: the same for all nodes of a piece; owned                      */
-    uint32_t *nearest; /* K: the nearest node that has joined; owned                       */
-    float *dist_sq;    /* K: to it; infinite: none, -1: has joined or is tied itself; owned */
+    uint32_t *piece;   /* K: the same for all nodes of a piece */
+    uint32_t *nearest; /* K: the nearest node that has joined */
+    float *dist_sq;    /* K: to it; infinite: none, -1: has joined or is linked itself */
     uint32_t (*links)[2];
     size_t link_count, capacity;
 } joining;
 
-static void close_joining(joining *j)
+static npg_status open_joining(joining *j, npg_arena *scratch, const uint32_t (*edges)[2], size_t edge_count)
 {
-    npg_release(&j->piece);
-    npg_release(&j->nearest);
-    npg_release(&j->dist_sq);
-}
-
-static npg_status open_joining(joining *j, const uint32_t (*edges)[2], size_t edge_count)
-{
-    NPG_TRY(npg_alloc_array(&j->piece, NPG_FOR_MESH, j->node_count, sizeof *j->piece));
-    NPG_TRY(npg_alloc_array(&j->nearest, NPG_FOR_MESH, j->node_count, sizeof *j->nearest));
-    NPG_TRY(npg_alloc_array(&j->dist_sq, NPG_FOR_MESH, j->node_count, sizeof *j->dist_sq));
+    j->piece = npg_arena_take(scratch, j->node_count, sizeof *j->piece);
+    j->nearest = npg_arena_take(scratch, j->node_count, sizeof *j->nearest);
+    j->dist_sq = npg_arena_take(scratch, j->node_count, sizeof *j->dist_sq);
+    NPG_TRY(npg_arena_status(scratch));
     for (size_t k = 0; k < j->node_count; k++) {
         j->piece[k] = (uint32_t)k;
         j->dist_sq[k] = INFINITY;
@@ -75,10 +69,10 @@ static uint32_t nearest_outside(const joining *j, uint32_t piece)
     return best;
 }
 
-static npg_status tie_piece(joining *j, uint32_t node)
+static npg_status link_piece(joining *j, uint32_t node)
 {
     uint32_t piece = j->piece[node];
-    for (int i = 0; i < TIES_EACH && node != NONE; i++) {
+    for (int i = 0; i < LINKS_EACH && node != NONE; i++) {
         uint32_t to = j->nearest[node];
         NPG_TRY(npg_grow(&j->links, &j->capacity, j->link_count + 1, sizeof *j->links, NPG_FOR_MESH));
         j->links[j->link_count][0] = node < to ? node : to;
@@ -94,10 +88,11 @@ npg_status npg_component_links_find(uint32_t (**links)[2], size_t *link_count, c
                                     size_t node_count, const uint32_t (*edges)[2], size_t edge_count)
 {
     joining j = {.node_pos = node_pos, .node_count = node_count};
-    npg_status status = open_joining(&j, edges, edge_count);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_status status = open_joining(&j, &scratch, edges, edge_count);
     if (!status) join_piece(&j, j.piece[0]);
-    for (uint32_t next; !status && (next = nearest_outside(&j, NONE)) != NONE;) status = tie_piece(&j, next);
-    close_joining(&j);
+    for (uint32_t next; !status && (next = nearest_outside(&j, NONE)) != NONE;) status = link_piece(&j, next);
+    npg_arena_release(&scratch);
     if (status) npg_release(&j.links);
     if (j.link_count) qsort(j.links, j.link_count, sizeof *j.links, npg_order_pair);
     *links = j.links;

@@ -39,26 +39,19 @@ static void measure_edges(walk *w, const npg_mesh *mesh)
             w->length[k] = edge_length(mesh, (uint32_t)v, w->around.of[k]);
 }
 
-static void close_walk(walk *w)
-{
-    void *all[] = {&w->length, &w->dist, &w->heap, &w->where, &w->seen};
-    npg_mesh_neighbours_close(&w->around);
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
-}
-
-static npg_status open_walk(walk *w, const npg_mesh *mesh)
+static npg_status open_walk(walk *w, npg_arena *scratch, const npg_mesh *mesh)
 {
     size_t n = w->vert_count = mesh->vert_count;
-    npg_status status = npg_mesh_neighbours_open(&w->around, mesh);
-    if (!status)
-        status = npg_alloc_array(&w->length, NPG_FOR_MESH, (size_t)w->around.start[n] + 1, sizeof(float));
-    if (!status) status = npg_alloc_array(&w->dist, NPG_FOR_MESH, n, sizeof(float));
-    if (!status) status = npg_alloc_array(&w->heap, NPG_FOR_MESH, n, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&w->where, NPG_FOR_MESH, n, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&w->seen, NPG_FOR_MESH, n, sizeof(uint32_t));
-    if (!status) measure_edges(w, mesh);
-    for (size_t v = 0; v < n && !status; v++) w->dist[v] = INFINITY;
-    return status;
+    NPG_TRY(npg_mesh_neighbours_open(&w->around, mesh));
+    w->length = npg_arena_take(scratch, w->around.start[n], sizeof(float));
+    w->dist = npg_arena_take(scratch, n, sizeof(float));
+    w->heap = npg_arena_take(scratch, n, sizeof(uint32_t));
+    w->where = npg_arena_take(scratch, n, sizeof(uint32_t));
+    w->seen = npg_arena_take(scratch, n, sizeof(uint32_t));
+    NPG_TRY(npg_arena_status(scratch));
+    measure_edges(w, mesh);
+    for (size_t v = 0; v < n; v++) w->dist[v] = INFINITY;
+    return NPG_OK;
 }
 
 static bool heap_less(const walk *w, uint32_t a, uint32_t b)
@@ -157,18 +150,15 @@ static void turn_to_weights(npg_graph *graph, const float *beyond)
 
 /* Vertices in order become nodes unless an earlier node is within a radius;
  * every node then offers itself around. */
-static npg_status choose_nodes(npg_graph *graph, float *beyond, walk *w, const npg_mesh *mesh)
+static npg_status choose_nodes(npg_graph *graph, npg_arena *scratch, float *beyond, walk *w,
+                               const npg_mesh *mesh)
 {
-    size_t capacity = 0;
-    uint8_t *covered;
-    NPG_TRY(npg_alloc_array(&covered, NPG_FOR_MESH, mesh->vert_count, 1));
-    npg_status status = NPG_OK;
-    for (size_t v = 0; v < mesh->vert_count && !status; v++) {
+    uint8_t *covered = npg_arena_take(scratch, mesh->vert_count, 1);
+    float *places = npg_arena_take(scratch, mesh->vert_count, 3 * sizeof *places);
+    NPG_TRY(npg_arena_status(scratch));
+    for (size_t v = 0; v < mesh->vert_count; v++) {
         if (covered[v]) continue;
-        status =
-            npg_grow(&graph->node_pos, &capacity, graph->node_count + 1, 3 * sizeof(float), NPG_FOR_MESH);
-        if (status) break;
-        memcpy(graph->node_pos + 3 * graph->node_count, mesh->vert_pos + 3 * v, 3 * sizeof(float));
+        memcpy(places + 3 * graph->node_count, mesh->vert_pos + 3 * v, 3 * sizeof(float));
         walk_from(w, (uint32_t)v, (float)(REACH * graph->radius));
         for (size_t i = 0; i < w->seen_count; i++) {
             uint32_t u = w->seen[i];
@@ -177,95 +167,89 @@ static npg_status choose_nodes(npg_graph *graph, float *beyond, walk *w, const n
         }
         graph->node_count++;
     }
-    npg_release(&covered);
-    return status;
+    graph->node_pos = npg_arena_copy(&graph->arena, places, graph->node_count, 3 * sizeof *places);
+    return npg_arena_status(&graph->arena);
 }
 
-static npg_status connect_nodes(npg_graph *graph)
+static npg_status connect_nodes(npg_graph *graph, npg_arena *scratch)
 {
     size_t count = 0, kept = 0, most = graph->vert_count * NPG_GRAPH_BIND * (NPG_GRAPH_BIND - 1) / 2;
-    NPG_TRY(npg_alloc_array(&graph->edges, NPG_FOR_MESH, most + 1, sizeof *graph->edges));
+    uint32_t(*edges)[2] = npg_arena_take(scratch, most, sizeof *edges);
+    NPG_TRY(npg_arena_status(scratch));
     for (size_t v = 0; v < graph->vert_count; v++) {
         const uint32_t *n = graph->vert_node + v * NPG_GRAPH_BIND;
         for (int i = 0; i < NPG_GRAPH_BIND; i++)
             for (int j = i + 1; j < NPG_GRAPH_BIND; j++) {
                 if (n[i] == UINT32_MAX || n[j] == UINT32_MAX) continue;
-                graph->edges[count][0] = n[i] < n[j] ? n[i] : n[j];
-                graph->edges[count++][1] = n[i] < n[j] ? n[j] : n[i];
+                edges[count][0] = n[i] < n[j] ? n[i] : n[j];
+                edges[count++][1] = n[i] < n[j] ? n[j] : n[i];
             }
     }
-    qsort(graph->edges, count, sizeof *graph->edges, npg_order_pair);
+    if (count) qsort(edges, count, sizeof *edges, npg_order_pair);
     for (size_t e = 0; e < count; e++)
-        if (!kept || npg_order_pair(graph->edges[e], graph->edges[kept - 1])) {
-            uint32_t a = graph->edges[e][0], b = graph->edges[e][1];
-            graph->edges[kept][0] = a;
-            graph->edges[kept++][1] = b;
-        }
+        if (!kept || npg_order_pair(edges[e], edges[kept - 1]))
+            memmove(edges[kept++], edges[e], sizeof *edges);
     graph->edge_count = kept;
-    return NPG_OK;
+    graph->edges = npg_arena_copy(&graph->arena, edges, kept, sizeof *edges);
+    return npg_arena_status(&graph->arena);
+}
+
+/* A graph for so many vertices, which nothing carries yet. */
+static npg_status open_graph(npg_graph **graph, size_t vert_count)
+{
+    NPG_TRY(npg_alloc(graph, NPG_FOR_MESH, sizeof **graph));
+    npg_graph *g = *graph;
+    g->arena.purpose = NPG_FOR_MESH;
+    g->vert_count = vert_count;
+    g->vert_node = npg_arena_take(&g->arena, vert_count, NPG_GRAPH_BIND * sizeof *g->vert_node);
+    g->vert_weight = npg_arena_take(&g->arena, vert_count, NPG_GRAPH_BIND * sizeof *g->vert_weight);
+    return npg_arena_status(&g->arena);
 }
 
 npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_target)
 {
     npg_graph *graph;
-    float *beyond = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     walk w = {0};
     *out = NULL;
     NPG_REQUIRE(mesh && mesh->vert_count && node_target);
-    NPG_TRY(npg_alloc(&graph, NPG_FOR_MESH, sizeof *graph));
-    graph->vert_count = mesh->vert_count;
+    npg_status status = open_graph(&graph, mesh->vert_count);
     /* 0.7: set by trial, so that the greedy choice of nodes a radius apart ends near node_target of them. */
-    graph->radius = sqrt(npg_mesh_area(mesh) / (0.7 * (double)node_target));
-    size_t bound = mesh->vert_count * NPG_GRAPH_BIND;
-    npg_status status = npg_alloc_array(&graph->vert_node, NPG_FOR_MESH, bound, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&graph->vert_weight, NPG_FOR_MESH, bound, sizeof(float));
-    for (size_t i = 0; !status && i < bound; i++) graph->vert_node[i] = UINT32_MAX;
-    if (!status) status = open_walk(&w, mesh);
-    if (!status) status = npg_alloc_array(&beyond, NPG_FOR_MESH, mesh->vert_count, sizeof *beyond);
+    if (!status) graph->radius = sqrt(npg_mesh_area(mesh) / (0.7 * (double)node_target));
+    for (size_t i = 0; !status && i < mesh->vert_count * NPG_GRAPH_BIND; i++)
+        graph->vert_node[i] = UINT32_MAX;
+    float *beyond = npg_arena_take(&scratch, mesh->vert_count, sizeof *beyond);
+    if (!status) status = open_walk(&w, &scratch, mesh);
     for (size_t v = 0; !status && v < mesh->vert_count; v++) beyond[v] = (float)(REACH * graph->radius);
-    if (!status) status = choose_nodes(graph, beyond, &w, mesh);
-    if (!status) status = connect_nodes(graph);
+    if (!status) status = choose_nodes(graph, &scratch, beyond, &w, mesh);
+    if (!status) status = connect_nodes(graph, &scratch);
     if (!status) turn_to_weights(graph, beyond);
-    npg_release(&beyond);
-    close_walk(&w);
+    npg_mesh_neighbours_close(&w.around);
+    npg_arena_release(&scratch);
     if (status) npg_graph_close(&graph);
     *out = graph;
     return status;
 }
 
-static npg_status take_nodes(npg_graph *part, const npg_graph *whole)
-{
-    NPG_TRY(npg_alloc_array(&part->node_pos, NPG_FOR_MESH, whole->node_count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&part->edges, NPG_FOR_MESH, whole->edge_count + 1, sizeof *part->edges));
-    memcpy(part->node_pos, whole->node_pos, whole->node_count * 3 * sizeof(float));
-    memcpy(part->edges, whole->edges, whole->edge_count * sizeof *part->edges);
-    part->node_count = whole->node_count;
-    part->edge_count = whole->edge_count;
-    part->radius = whole->radius;
-    return NPG_OK;
-}
-
-static npg_status take_bindings(npg_graph *part, const npg_graph *whole, const uint32_t *verts, size_t count)
-{
-    const size_t size = NPG_GRAPH_BIND;
-    NPG_TRY(npg_alloc_array(&part->vert_node, NPG_FOR_MESH, count, size * sizeof *part->vert_node));
-    NPG_TRY(npg_alloc_array(&part->vert_weight, NPG_FOR_MESH, count, size * sizeof *part->vert_weight));
-    for (size_t i = 0; i < size * count; i++) {
-        size_t from = verts[i / size] * size + i % size;
-        part->vert_node[i] = whole->vert_node[from];
-        part->vert_weight[i] = whole->vert_weight[from];
-    }
-    part->vert_count = count;
-    return NPG_OK;
-}
-
 npg_status npg_graph_take(npg_graph **out, const npg_graph *whole, const uint32_t *verts, size_t count)
 {
     npg_graph *part;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&part, NPG_FOR_MESH, sizeof *part));
-    npg_status status = take_nodes(part, whole);
-    if (!status) status = take_bindings(part, whole, verts, count);
+    npg_status status = open_graph(&part, count);
+    if (!status) {
+        part->node_pos = npg_arena_copy(&part->arena, whole->node_pos, whole->node_count, 3 * sizeof(float));
+        part->edges = npg_arena_copy(&part->arena, whole->edges, whole->edge_count, sizeof *part->edges);
+        status = npg_arena_status(&part->arena);
+    }
+    for (size_t i = 0; i < NPG_GRAPH_BIND * count && !status; i++) {
+        size_t from = verts[i / NPG_GRAPH_BIND] * (size_t)NPG_GRAPH_BIND + i % NPG_GRAPH_BIND;
+        part->vert_node[i] = whole->vert_node[from];
+        part->vert_weight[i] = whole->vert_weight[from];
+    }
+    if (!status) {
+        part->node_count = whole->node_count;
+        part->edge_count = whole->edge_count;
+        part->radius = whole->radius;
+    }
     if (status) npg_graph_close(&part);
     *out = part;
     return status;
@@ -274,10 +258,7 @@ npg_status npg_graph_take(npg_graph **out, const npg_graph *whole, const uint32_
 void npg_graph_close(npg_graph **slot)
 {
     if (!slot || !*slot) return;
-    npg_release(&(*slot)->node_pos);
-    npg_release(&(*slot)->vert_node);
-    npg_release(&(*slot)->vert_weight);
-    npg_release(&(*slot)->edges);
+    npg_arena_release(&(*slot)->arena);
     npg_release(slot);
 }
 

@@ -9,11 +9,13 @@
 #ifndef NPG_GRAPH_H
 #define NPG_GRAPH_H
 
+#include "pipeline/memory.h"
 #include "pipeline/mesh.h"
 
 #define NPG_GRAPH_BIND 4 /* nodes that carry a vertex */
 
 typedef struct npg_graph {
+    npg_arena arena;                           /* of all arrays                                       */
     size_t node_count, vert_count, edge_count; /* K, V, E                                             */
     double radius;                             /* distance between nodes, about                       */
     float *node_pos;                           /* K x 3                                               */

@@ -7,27 +7,20 @@
 
 npg_status npg_group_open(npg_group *group, size_t node_count)
 {
-    *group = (npg_group){.node_count = node_count};
+    *group = (npg_group){.node_count = node_count, .arena = {.purpose = NPG_FOR_FIT}};
     for (int i = 0; i < 2; i++) {
-        NPG_TRY(npg_side_open(&group->sides[i], node_count));
-        NPG_TRY(npg_side_open(&group->ways[i], node_count));
+        NPG_TRY(npg_side_open(&group->sides[i], &group->arena, node_count));
+        NPG_TRY(npg_side_open(&group->ways[i], &group->arena, node_count));
     }
     return NPG_OK;
 }
 
-static void clear_waiting(npg_waiting *w)
-{
-    npg_frame_clear(&w->frame);
-    npg_release(&w->pose);
-    npg_release(&w->points);
-    npg_release(&w->normals);
-    npg_release(&w->sensors);
-    npg_release(&w->since);
-}
-
 void npg_group_clear(npg_group *group)
 {
-    for (size_t i = 0; i < group->count; i++) clear_waiting(&group->frames[i]);
+    for (size_t i = 0; i < group->count; i++) {
+        npg_frame_clear(&group->frames[i].frame);
+        npg_arena_release(&group->frames[i].arena);
+    }
     group->count = 0;
 }
 
@@ -35,19 +28,17 @@ void npg_group_close(npg_group *group)
 {
     npg_group_clear(group);
     npg_release(&group->frames);
-    for (int i = 0; i < 2; i++) {
-        npg_side_close(&group->sides[i]);
-        npg_side_close(&group->ways[i]);
-    }
+    npg_arena_release(&group->arena);
 }
 
 npg_status npg_group_add(npg_waiting **waiting, npg_group *group, npg_frame *frame)
 {
     NPG_TRY(npg_grow(&group->frames, &group->capacity, group->count + 1, sizeof *group->frames, NPG_FOR_FIT));
     npg_waiting *w = *waiting = &group->frames[group->count++];
-    *w = (npg_waiting){.frame = *frame};
+    *w = (npg_waiting){.frame = *frame, .arena = {.purpose = NPG_FOR_FIT}};
     memset(frame, 0, sizeof *frame);
-    return npg_alloc(&w->pose, NPG_FOR_FIT, npg_pose_bytes(group->node_count));
+    w->pose = npg_arena_take(&w->arena, 1, npg_pose_bytes(group->node_count));
+    return npg_arena_status(&w->arena);
 }
 
 /* ---- the sides as bytes ---- */

@@ -11,6 +11,7 @@
 /* A frame that waits; it owns all of it. */
 typedef struct npg_waiting {
     npg_frame frame;
+    npg_arena arena;         /* of the arrays below */
     double *pose;            /* K x 12 */
     float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
     float *sensors;          /* unit; where they are not known NULL */
@@ -21,6 +22,7 @@ typedef struct npg_waiting {
 } npg_waiting;
 
 typedef struct npg_group {
+    npg_arena arena;     /* of both sides and ways */
     size_t node_count;   /* K */
     npg_side sides[2];   /* forward, backward: of the frames that are passed on */
     npg_side ways[2];    /* the same with those that wait                       */

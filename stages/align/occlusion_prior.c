@@ -17,43 +17,35 @@
 #define LINK_SEEN 0.01
 
 /* Edges and links, in their order. */
-static npg_status open_pairs(npg_occlusion_prior *prior, const npg_graph *graph)
+static void fill_pairs(npg_occlusion_prior *prior, const npg_graph *graph, const uint32_t (*links)[2],
+                       size_t link_count)
 {
-    uint32_t(*links)[2];
-    size_t link_count, e = 0, link = 0;
     const uint32_t(*edges)[2] = (const uint32_t(*)[2])graph->edges;
-    NPG_TRY(npg_component_links_find(&links, &link_count, graph->node_pos, graph->node_count, edges,
-                                     graph->edge_count));
-    prior->pair_count = graph->edge_count + link_count;
-    npg_status status =
-        npg_alloc_array(&prior->pairs, NPG_FOR_FIT, prior->pair_count + 1, sizeof *prior->pairs);
-    if (!status) status = npg_alloc(&prior->is_link, NPG_FOR_FIT, prior->pair_count + 1);
-    for (size_t i = 0; i < prior->pair_count && !status; i++) {
+    size_t e = 0, link = 0;
+    for (size_t i = 0; i < prior->pair_count; i++) {
         prior->is_link[i] =
             e == graph->edge_count || (link < link_count && npg_order_pair(links[link], edges[e]) < 0);
         memcpy(prior->pairs[i], prior->is_link[i] ? links[link++] : edges[e++], sizeof prior->pairs[i]);
     }
+}
+
+npg_status npg_prior_open(npg_occlusion_prior *prior, npg_arena *arena, const npg_graph *graph)
+{
+    uint32_t(*links)[2];
+    size_t link_count, nodes = graph->node_count;
+    NPG_TRY(npg_component_links_find(&links, &link_count, graph->node_pos, nodes,
+                                     (const uint32_t(*)[2])graph->edges, graph->edge_count));
+    prior->pair_count = graph->edge_count + link_count;
+    prior->pairs = npg_arena_take(arena, prior->pair_count, sizeof *prior->pairs);
+    prior->is_link = npg_arena_take(arena, prior->pair_count, 1);
+    prior->edges = npg_arena_take(arena, 2 * prior->pair_count, sizeof *prior->edges);
+    prior->seen = npg_arena_take(arena, nodes, sizeof *prior->seen);
+    prior->bound = npg_arena_take(arena, nodes, sizeof *prior->bound);
+    npg_status status = npg_arena_status(arena);
+    if (!status) fill_pairs(prior, graph, (const uint32_t(*)[2])links, link_count);
+    for (size_t k = 0; k < nodes && !status; k++) prior->seen[k] = 1;
     npg_release(&links);
     return status;
-}
-
-npg_status npg_prior_open(npg_occlusion_prior *prior, const npg_graph *graph)
-{
-    NPG_TRY(open_pairs(prior, graph));
-    NPG_TRY(npg_alloc_array(&prior->edges, NPG_FOR_FIT, 2 * prior->pair_count + 1, sizeof *prior->edges));
-    NPG_TRY(npg_alloc_array(&prior->seen, NPG_FOR_FIT, graph->node_count, sizeof *prior->seen));
-    NPG_TRY(npg_alloc_array(&prior->bound, NPG_FOR_FIT, graph->node_count, sizeof *prior->bound));
-    for (size_t k = 0; k < graph->node_count; k++) prior->seen[k] = 1;
-    return NPG_OK;
-}
-
-void npg_prior_close(npg_occlusion_prior *prior)
-{
-    npg_release(&prior->pairs);
-    npg_release(&prior->is_link);
-    npg_release(&prior->edges);
-    npg_release(&prior->seen);
-    npg_release(&prior->bound);
 }
 
 /* R_j^T (x_k - x_j). */

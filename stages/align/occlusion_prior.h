@@ -18,25 +18,23 @@
 
 /* What hidden parts are held by; loans. */
 typedef struct npg_prior_poses {
-    const double *pose;     /* K x 12: of a frame nearby, or of this one as it was found before     */
-    const double *far_pose; /* K x 12: of the next frame on the other side, or NULL                 */
+    const double *pose;     /* K x 12: of a frame nearby, or of this one as it was found before */
+    const double *far_pose; /* K x 12: of the next frame on the other side, or NULL */
     const float *since;     /* K: frames since what a node carries was seen last; beside `far_pose` */
 } npg_prior_poses;
 
 typedef struct npg_occlusion_prior {
-    uint32_t (
-        *pairs)[2]; /* P: the graph's edges and the links of its pieces (component_links.h), sorted; owned */
-    uint8_t *is_link;  /* P; owned */
-    size_t pair_count; /* P */
-    float (*edges)[3]; /* 2P: of each pair, from its first node and from its second; owned */
-    float *seen;       /* K: share of what a node carries that is seen, 0..1; owned       */
-    float *bound;      /* K, scratch; owned                                               */
-    double share;      /* PRIOR                                                            */
+    uint32_t (*pairs)[2]; /* P: the graph's edges and the links of its pieces (component_links.h), sorted */
+    uint8_t *is_link;     /* P */
+    size_t pair_count;    /* P */
+    float (*edges)[3];    /* 2P: of each pair, from its first node and from its second */
+    float *seen;          /* K: share of what a node carries that is seen, 0..1 */
+    float *bound;         /* K, scratch */
+    double share;         /* PRIOR */
 } npg_occlusion_prior;
 
-/* Zeros become room for a graph's pairs and nodes; all is seen.  NPG_MEMORY: what was got is to be closed. */
-npg_status npg_prior_open(npg_occlusion_prior *prior, const npg_graph *graph);
-void npg_prior_close(npg_occlusion_prior *prior);
+/* Room for a graph's pairs and nodes, the arena's; all is seen.  NPG_MEMORY. */
+npg_status npg_prior_open(npg_occlusion_prior *prior, npg_arena *arena, const npg_graph *graph);
 
 /* The edges as they are in the poses that hold them, of a frame that so many sensors saw. */
 void npg_prior_take(npg_occlusion_prior *prior, const npg_graph *graph, const npg_prior_poses *poses,

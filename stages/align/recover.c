@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "align/pose.h"
 #include "align/rigid_icp.h"
 #include "pipeline/order.h"
 
@@ -16,6 +17,8 @@
 #define SWEEPS      5    /* at most                                                                     */
 #define ALIKE       3    /* frames whose points look alike that are started from                        */
 #define VAIN_MOST   4    /* lost frames in a row that no start finds: the reference does not fit        */
+#define WORSE                                                                                                \
+    1.05 /* times a frame's Chamfer distance: what the way back may have, for what it says of the rest */
 #define STARTS_MOST (ALIKE + 6)
 #define MOVED_MOST  (ALIKE + 2) /* of these from poses that are moved first */
 
@@ -25,16 +28,39 @@
 static const npg_tracker_effort wide = {.steps = 40, .stiffness = 100, .width_unit = 0.2, .along = 10};
 static const npg_tracker_effort wider = {.steps = 80, .stiffness = 100, .width_unit = 0.4, .along = 10};
 
+/* ---- one fit, compared ---- */
+
+npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *frame, const npg_start *from,
+                       const npg_prior_poses *poses, double share)
+{
+    size_t nodes = npg_tracker_node_count(a->tracker), bytes = npg_pose_bytes(nodes);
+    npg_tracked tracked;
+    *taken = false;
+    if (a->should_stop && a->should_stop(a->user)) return npg_error(NPG_STOPPED, "stopped while %s", a->what);
+    if (from->before)
+        npg_pose_extrapolate(a->trial, from->now, from->before, nodes);
+    else
+        memcpy(a->trial, from->now, bytes);
+    NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, poses, from->effort));
+    if (tracked.chamfer > share * frame->tracked.chamfer) return NPG_OK;
+    *taken = true;
+    frame->tracked = tracked;
+    memcpy(frame->pose, a->trial, bytes);
+    return NPG_OK;
+}
+
+/* ---- lost frames ---- */
+
 typedef struct recovery {
-    npg_attempts attempts; /* its `trial` is owned */
+    npg_attempts attempts;
     npg_recover_frame *frames;
     size_t count;
     double level;       /* Chamfer distance of the best quarter        */
     double point_level; /* its part of the points, of the best quarter */
-    double *sorted;     /* count, scratch; owned                       */
-    npg_look *looks;    /* count; owned, with what they own            */
-    double *moved;      /* MOVED_MOST x K x 12, scratch; owned         */
-    size_t *lost;       /* count: which are lost; owned                */
+    double *sorted;     /* count, scratch          */
+    npg_look *looks;    /* count; closed with the recovery             */
+    double *moved;      /* MOVED_MOST x K x 12, scratch                */
+    size_t *lost;       /* count: which are lost                       */
     npg_recover_result *result;
 } recovery;
 
@@ -235,16 +261,18 @@ static npg_status open_look(npg_look *look, const recovery *r, const npg_recover
     return status;
 }
 
-static npg_status open_recovery(recovery *r)
+static npg_status open_recovery(recovery *r, npg_arena *scratch)
 {
-    NPG_TRY(npg_alloc_array(&r->sorted, NPG_FOR_FIT, r->count, sizeof *r->sorted));
-    NPG_TRY(npg_alloc_array(&r->lost, NPG_FOR_FIT, r->count, sizeof *r->lost));
+    r->sorted = npg_arena_take(scratch, r->count, sizeof *r->sorted);
+    r->lost = npg_arena_take(scratch, r->count, sizeof *r->lost);
+    NPG_TRY(npg_arena_status(scratch));
     set_levels(r);
     if (!list_lost(r)) return NPG_END;
     size_t pose_bytes = npg_pose_bytes(npg_tracker_node_count(r->attempts.tracker));
-    NPG_TRY(npg_alloc(&r->attempts.trial, NPG_FOR_FIT, pose_bytes));
-    NPG_TRY(npg_alloc(&r->moved, NPG_FOR_FIT, MOVED_MOST * pose_bytes));
-    NPG_TRY(npg_alloc_array(&r->looks, NPG_FOR_FIT, r->count, sizeof *r->looks));
+    r->attempts.trial = npg_arena_take(scratch, 1, pose_bytes);
+    r->moved = npg_arena_take(scratch, MOVED_MOST, pose_bytes);
+    r->looks = npg_arena_take(scratch, r->count, sizeof *r->looks);
+    NPG_TRY(npg_arena_status(scratch));
     for (size_t i = 0; i < r->count; i++) NPG_TRY(open_look(&r->looks[i], r, &r->frames[i]));
     return NPG_OK;
 }
@@ -272,10 +300,46 @@ npg_status npg_recover(npg_tracker *tracker, npg_recover_result *result, npg_rec
                   .count = count,
                   .result = result};
     *result = (npg_recover_result){0};
-    npg_status status = open_recovery(&r);
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    npg_status status = open_recovery(&r, &scratch);
     if (!status) status = run_sweeps(&r);
     for (size_t i = 0; r.looks && i < count; i++) npg_look_close(&r.looks[i]);
-    void *all[] = {&r.sorted, &r.attempts.trial, &r.looks, &r.moved, &r.lost};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_arena_release(&scratch);
     return status == NPG_END ? NPG_OK : status;
+}
+
+/* ---- backward ---- */
+
+/* step: +1 from the first frame on, -1 from the last one. */
+static npg_status sweep_side(const npg_attempts *attempts, npg_backward_result *result,
+                             npg_recover_frame *frames, size_t count, int64_t key, int step)
+{
+    npg_start from = {0}; /* the poses of the two frames beyond */
+    for (size_t i = 0; i < count; i++) {
+        npg_recover_frame *frame = &frames[step > 0 ? i : count - 1 - i];
+        if (step > 0 ? frame->index >= key : frame->index <= key) break;
+        if (frame->is_fixed || !frame->cloud.count || !frame->since) continue;
+        if (from.now) {
+            const npg_prior_poses prior = {frame->pose, from.now, frame->since};
+            bool taken;
+            NPG_TRY(npg_attempt(attempts, &taken, frame, &from, &prior, WORSE));
+            result->tried++;
+            result->taken += taken;
+        }
+        from.before = from.now;
+        from.now = frame->pose;
+    }
+    return NPG_OK;
+}
+
+npg_status npg_track_backward(npg_tracker *tracker, npg_backward_result *result, npg_recover_frame *frames,
+                              size_t count, int64_t key, bool (*should_stop)(void *user), void *user)
+{
+    npg_attempts attempts = {tracker, NULL, "frames were followed back", should_stop, user};
+    *result = (npg_backward_result){0};
+    NPG_TRY(npg_alloc(&attempts.trial, NPG_FOR_FIT, npg_pose_bytes(npg_tracker_node_count(tracker))));
+    npg_status status = sweep_side(&attempts, result, frames, count, key, 1);
+    if (!status) status = sweep_side(&attempts, result, frames, count, key, -1);
+    npg_release(&attempts.trial);
+    return status;
 }

@@ -5,20 +5,14 @@
 
 #include "align/pose.h"
 
-npg_status npg_side_open(npg_side *side, size_t node_count)
+npg_status npg_side_open(npg_side *side, npg_arena *arena, size_t node_count)
 {
-    NPG_TRY(npg_alloc(&side->now, NPG_FOR_FIT, npg_pose_bytes(node_count)));
-    NPG_TRY(npg_alloc(&side->before, NPG_FOR_FIT, npg_pose_bytes(node_count)));
-    NPG_TRY(npg_alloc_array(&side->since, NPG_FOR_FIT, node_count, sizeof *side->since));
+    side->now = npg_arena_take(arena, node_count, NPG_POSE_SIZE * sizeof(double));
+    side->before = npg_arena_take(arena, node_count, NPG_POSE_SIZE * sizeof(double));
+    side->since = npg_arena_take(arena, node_count, sizeof *side->since);
+    NPG_TRY(npg_arena_status(arena));
     npg_pose_rest(side->now, node_count);
     return NPG_OK;
-}
-
-void npg_side_close(npg_side *side)
-{
-    npg_release(&side->now);
-    npg_release(&side->before);
-    npg_release(&side->since);
 }
 
 void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count)

@@ -5,18 +5,17 @@
 #include "align/tracker.h"
 
 typedef struct npg_side {
-    double *now, *before; /* K x 12, owned */
-    float *since;         /* K, owned: frames since a sensor saw what a node carries; of now */
+    double *now, *before; /* K x 12 */
+    float *since;         /* K: frames since a sensor saw what a node carries; of now */
     int64_t index;        /* of now */
     bool has_now, has_before;
     bool is_past; /* what a growing reference reaches */
     npg_tracked now_tracked, before_tracked;
 } npg_side;
 
-/* Zeros become a side at rest without any frame; K nodes, here and below.  NPG_MEMORY: what was got is the
- * side's, to be closed. */
-npg_status npg_side_open(npg_side *side, size_t node_count);
-void npg_side_close(npg_side *side);
+/* Zeros become a side at rest without any frame, its arrays the arena's; K nodes, here and below.
+ * NPG_MEMORY. */
+npg_status npg_side_open(npg_side *side, npg_arena *arena, size_t node_count);
 
 /* Content, not arrays. */
 void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count);

@@ -39,6 +39,7 @@
 enum { TO_SURFACE, TO_POINTS };
 
 struct npg_tracker {
+    npg_arena arena; /* of all arrays that are not said to be loans */
     npg_tracker_settings settings;
     npg_mesh *reference; /* counted reference; V vertices, which the whole graph carries */
     npg_graph *whole;
@@ -58,7 +59,7 @@ struct npg_tracker {
     double size;        /* longest side of the reference against that of the box of all frames */
     /* of the frame at work */
     float *targets, *target_normals; /* M x 3 */
-    size_t target_count, target_capacity;
+    size_t target_count;
     npg_surface_hit *hits; /* M */
     uint32_t *start_face;  /* M: where the step before found each point's nearest */
     uint32_t *near;        /* samples: nearest target */
@@ -98,21 +99,20 @@ void npg_tracker_close(npg_tracker **slot)
     npg_block_close(&t->system);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->reference);
-    void *all[] = {&t->is_border, &t->vert_pos, &t->vert_normals,   &t->samples, &t->step,
-                   &t->rows,      &t->targets,  &t->target_normals, &t->hits,    &t->start_face,
-                   &t->near,      &t->near_sq,  &t->sample_pos,     &t->is_seen};
-    npg_visible_close(&t->visible);
-    npg_prior_close(&t->prior);
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_arena_release(&t->arena);
     npg_release(slot);
 }
 
 /* Every n-th vertex: Poisson meshes have their vertices evenly over the surface,
  * and in no order that repeats. */
-static void choose_samples(npg_tracker *t)
+static npg_status choose_samples(npg_tracker *t)
 {
     size_t step = t->mesh->vert_count / t->settings.samples + 1;
-    for (size_t v = 0; v < t->mesh->vert_count; v += step) t->samples[t->sample_count++] = (uint32_t)v;
+    t->sample_count = (t->mesh->vert_count + step - 1) / step;
+    t->samples = npg_arena_take(&t->arena, t->sample_count, sizeof *t->samples);
+    NPG_TRY(npg_arena_status(&t->arena));
+    for (size_t s = 0; s < t->sample_count; s++) t->samples[s] = (uint32_t)(s * step);
+    return NPG_OK;
 }
 
 /* The graph, and the surface that it carries through the steps. */
@@ -126,15 +126,32 @@ static npg_status open_surface(npg_tracker *t)
                             t->mesh->face_count);
 }
 
-static npg_status find_border(npg_tracker *t)
+static npg_status open_arrays(npg_tracker *t)
 {
-    NPG_TRY(npg_alloc(&t->is_border, NPG_FOR_FIT, t->mesh->vert_count));
-    return npg_mesh_border(t->is_border, &t->is_open, t->mesh);
+    npg_arena *arena = &t->arena;
+    size_t w = t->mesh->vert_count, m = t->settings.samples, nodes = t->graph->node_count;
+    NPG_TRY(choose_samples(t));
+    size_t s = t->sample_count;
+    t->is_border = npg_arena_take(arena, w, 1);
+    t->vert_pos = npg_arena_take(arena, w, 3 * sizeof(float));
+    t->vert_normals = npg_arena_take(arena, w, 3 * sizeof(float));
+    t->step = npg_arena_take(arena, nodes, 6 * sizeof(double));
+    t->rows = npg_arena_take(arena, nodes, NPG_POSE_ROW * sizeof(float));
+    t->targets = npg_arena_take(arena, m, 3 * sizeof(float));
+    t->target_normals = npg_arena_take(arena, m, 3 * sizeof(float));
+    t->hits = npg_arena_take(arena, m, sizeof *t->hits);
+    t->start_face = npg_arena_take(arena, m, sizeof *t->start_face);
+    t->near = npg_arena_take(arena, s, sizeof *t->near);
+    t->near_sq = npg_arena_take(arena, s, sizeof *t->near_sq);
+    t->sample_pos = npg_arena_take(arena, s, 3 * sizeof(float));
+    t->is_seen = npg_arena_take(arena, s, 1);
+    npg_visible_open(&t->visible, arena, s);
+    return npg_arena_status(arena);
 }
 
 static npg_status open_system(npg_tracker *t)
 {
-    NPG_TRY(npg_prior_open(&t->prior, t->graph));
+    NPG_TRY(npg_prior_open(&t->prior, &t->arena, t->graph));
     return npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->prior.pairs,
                           t->prior.pair_count);
 }
@@ -152,29 +169,14 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     npg_tracker *t;
     *out = NULL;
     NPG_TRY(npg_alloc(&t, NPG_FOR_FIT, sizeof *t));
+    t->arena.purpose = NPG_FOR_FIT;
     t->settings = *settings;
     t->reference = npg_mesh_ref(reference);
     t->size = size_of(reference);
     npg_status status = open_surface(t);
-    size_t w = status ? 0 : t->mesh->vert_count, m = settings->samples;
-    if (!status) status = find_border(t);
+    if (!status) status = open_arrays(t);
+    if (!status) status = npg_mesh_border(t->is_border, &t->is_open, t->mesh);
     if (!status) status = open_system(t);
-    if (!status) status = npg_alloc_array(&t->vert_pos, NPG_FOR_FIT, w, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->vert_normals, NPG_FOR_FIT, w, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->samples, NPG_FOR_FIT, w, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&t->step, NPG_FOR_FIT, t->graph->node_count, 6 * sizeof(double));
-    if (!status)
-        status = npg_alloc_array(&t->rows, NPG_FOR_FIT, t->graph->node_count, NPG_POSE_ROW * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->targets, NPG_FOR_FIT, m, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->target_normals, NPG_FOR_FIT, m, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->hits, NPG_FOR_FIT, m, sizeof *t->hits);
-    if (!status) status = npg_alloc_array(&t->start_face, NPG_FOR_FIT, m, sizeof *t->start_face);
-    if (!status) choose_samples(t);
-    if (!status) status = npg_alloc_array(&t->near, NPG_FOR_FIT, t->sample_count, sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&t->near_sq, NPG_FOR_FIT, t->sample_count, sizeof(float));
-    if (!status) status = npg_alloc_array(&t->sample_pos, NPG_FOR_FIT, t->sample_count, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&t->is_seen, NPG_FOR_FIT, t->sample_count, 1);
-    if (!status) status = npg_visible_open(&t->visible, t->sample_count);
     if (status) npg_tracker_close(&t);
     *out = t;
     return status;

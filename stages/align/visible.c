@@ -8,16 +8,10 @@
 
 #define GRAZING 0.1 /* cosine below which a sensor sees a place too much from the side to have points of it */
 
-npg_status npg_visible_open(npg_visible *visible, size_t place_count)
+void npg_visible_open(npg_visible *visible, npg_arena *arena, size_t place_count)
 {
-    NPG_TRY(npg_alloc_array(&visible->rays, NPG_FOR_FIT, place_count, sizeof *visible->rays));
-    return npg_alloc_array(&visible->hits, NPG_FOR_FIT, place_count, sizeof *visible->hits);
-}
-
-void npg_visible_close(npg_visible *visible)
-{
-    npg_release(&visible->rays);
-    npg_release(&visible->hits);
+    visible->rays = npg_arena_take(arena, place_count, sizeof *visible->rays);
+    visible->hits = npg_arena_take(arena, place_count, sizeof *visible->hits);
 }
 
 bool npg_faces_sensor(const float *sensors, size_t sensor_count, const float place[3], const double normal[3],

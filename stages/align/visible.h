@@ -6,15 +6,15 @@
 #define NPG_VISIBLE_H
 
 #include "geometry/query.h"
+#include "pipeline/memory.h"
 
-/* Room for a number of places; NPG_MEMORY. */
+/* Room for a number of places; the arena's, which knows whether there was enough. */
 typedef struct npg_visible {
-    npg_ray *rays;     /* owned */
-    npg_ray_hit *hits; /* owned */
+    npg_ray *rays;
+    npg_ray_hit *hits;
 } npg_visible;
 
-npg_status npg_visible_open(npg_visible *visible, size_t place_count);
-void npg_visible_close(npg_visible *visible);
+void npg_visible_open(npg_visible *visible, npg_arena *arena, size_t place_count);
 
 /* Whether a place with this unit normal faces one of the sensors (S x 3): the cosine to the way there is
  * above `least`.  A sensor that is not finite saw nothing. */

@@ -29,6 +29,7 @@ struct npg_measure {
     uint32_t *nearest;    /* W; owned */
     double *vert_areas;   /* W; owned */
     uint8_t *unsupported; /* W; owned */
+    npg_arena arena;      /* of visible */
     npg_visible visible;  /* of the sensors' rays: W */
     float *normals;       /* W x 3, in the frame; owned */
     uint8_t *is_in_sight; /* W; owned */
@@ -47,7 +48,9 @@ static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_
     NPG_TRY(npg_alloc_array(&m->nearest, NPG_FOR_QUERY, w, sizeof *m->nearest));
     NPG_TRY(npg_alloc_array(&m->vert_areas, NPG_FOR_QUERY, w, sizeof *m->vert_areas));
     NPG_TRY(npg_alloc(&m->unsupported, NPG_FOR_QUERY, w));
-    NPG_TRY(npg_visible_open(&m->visible, w));
+    m->arena.purpose = NPG_FOR_QUERY;
+    npg_visible_open(&m->visible, &m->arena, w);
+    NPG_TRY(npg_arena_status(&m->arena));
     NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_QUERY, w, 3 * sizeof *m->normals));
     NPG_TRY(npg_alloc(&m->is_in_sight, NPG_FOR_QUERY, w));
     return npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
@@ -80,7 +83,7 @@ void npg_measure_close(npg_measure **measure)
     npg_release(&m->nearest);
     npg_release(&m->vert_areas);
     npg_release(&m->unsupported);
-    npg_visible_close(&m->visible);
+    npg_arena_release(&m->arena);
     npg_release(&m->normals);
     npg_release(&m->is_in_sight);
     npg_release(measure);

@@ -25,16 +25,16 @@ npg_status npg_unseen_excuse(npg_mesh *mesh, const float *sensors, size_t sensor
     size_t v = mesh->vert_count;
     npg_surface *surface;
     npg_visible visible = {0};
-    uint8_t *is_seen = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, v, mesh->faces, mesh->face_count));
-    npg_status status = npg_visible_open(&visible, v);
-    if (!status) status = npg_alloc(&is_seen, NPG_FOR_MESH, v);
+    npg_visible_open(&visible, &scratch, v);
+    uint8_t *is_seen = npg_arena_take(&scratch, v, 1);
+    npg_status status = npg_arena_status(&scratch);
     if (!status)
         status = npg_visible_find(&visible, is_seen, surface, sensors, sensor_count, mesh->vert_pos, NULL,
                                   mesh->vert_normals, v, offset);
     for (size_t i = 0; i < v && !status; i++) mesh->vert_unseen[i] &= is_seen[i];
-    npg_release(&is_seen);
-    npg_visible_close(&visible);
+    npg_arena_release(&scratch);
     npg_surface_close(&surface);
     return status;
 }

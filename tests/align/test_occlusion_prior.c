@@ -20,6 +20,7 @@ enum { RINGS = 40, SPOKES = 60, NODES = 200 };
 typedef struct scene {
     npg_mesh *ball;
     npg_graph *graph;
+    npg_arena arena; /* of prior */
     npg_occlusion_prior prior;
     double *rest, *bent; /* K x 12 */
     uint32_t *verts;     /* all     */
@@ -44,10 +45,10 @@ static void twist(double *pose, const npg_graph *graph, double share)
 
 static void open_scene(scene *s)
 {
-    *s = (scene){.ball = ball_mesh(RINGS, SPOKES)};
+    *s = (scene){.ball = ball_mesh(RINGS, SPOKES), .arena = {.purpose = NPG_FOR_RUN}};
     size_t v = s->ball->vert_count;
     assert_int_equal(npg_graph_open(&s->graph, s->ball, NODES), NPG_OK);
-    assert_int_equal(npg_prior_open(&s->prior, s->graph), NPG_OK);
+    assert_int_equal(npg_prior_open(&s->prior, &s->arena, s->graph), NPG_OK);
     assert_int_equal(npg_alloc(&s->rest, NPG_FOR_RUN, npg_pose_bytes(s->graph->node_count)), NPG_OK);
     assert_int_equal(npg_alloc(&s->bent, NPG_FOR_RUN, npg_pose_bytes(s->graph->node_count)), NPG_OK);
     assert_int_equal(npg_alloc_array(&s->verts, NPG_FOR_RUN, v, sizeof *s->verts), NPG_OK);
@@ -59,7 +60,7 @@ static void open_scene(scene *s)
 
 static void close_scene(scene *s)
 {
-    npg_prior_close(&s->prior);
+    npg_arena_release(&s->arena);
     npg_graph_close(&s->graph);
     npg_mesh_unref(&s->ball);
     void *all[] = {&s->rest, &s->bent, &s->verts, &s->is_seen};

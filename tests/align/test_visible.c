@@ -22,6 +22,7 @@ typedef struct scene {
     float verts[2 * 3 * VERTS], normals[2 * 3 * VERTS]; /* the ball's, then those of a small one above it */
     uint32_t *faces, order[2 * VERTS];
     npg_surface *surface;
+    npg_arena arena; /* of visible */
     npg_visible visible;
     uint8_t is_seen[2 * VERTS];
 } scene;
@@ -45,12 +46,14 @@ static void open_scene(scene *s)
         s->faces[3 * f + i] = s->ball->faces[i] + VERTS;
     }
     assert_int_equal(npg_surface_open(&s->surface, s->verts, 2 * VERTS, s->faces, 2 * f), NPG_OK);
-    assert_int_equal(npg_visible_open(&s->visible, 2 * VERTS), NPG_OK);
+    s->arena.purpose = NPG_FOR_RUN;
+    npg_visible_open(&s->visible, &s->arena, 2 * VERTS);
+    assert_int_equal(npg_arena_status(&s->arena), NPG_OK);
 }
 
 static void close_scene(scene *s)
 {
-    npg_visible_close(&s->visible);
+    npg_arena_release(&s->arena);
     npg_surface_close(&s->surface);
     npg_mesh_unref(&s->ball);
     free(s->faces);
