@@ -4,7 +4,7 @@
 
 packages_to_build="build-essential cmake ninja-build pkg-config pocl-opencl-icd ocl-icd-opencl-dev opencl-headers
 libpcl-dev libeigen3-dev libboost-dev libembree-dev libopenvdb-dev libtbb-dev libmeshoptimizer-dev libjansson-dev
-libpng-dev libjpeg62-turbo-dev zlib1g-dev libzstd-dev libxxhash-dev"
+libpng-dev libjpeg62-turbo-dev liblzf-dev zlib1g-dev libzstd-dev libxxhash-dev"
 
 packages_to_test="libcmocka-dev bats clang-format-14 clang-14 libclang-rt-14-dev zsh python3-numpy python3-venv python3-vtk9 blender
 file libxml2-utils parallel slurmctld slurmd slurm-client munge chromium"

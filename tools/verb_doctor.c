@@ -73,7 +73,7 @@ static json_t *list_libraries(void)
     set_text(list, "neupig", npg_version());
     set_version(list, "embree", version / 10000, version / 100 % 100, version % 100);
     if (embree) rtcReleaseDevice(embree);
-    set_text(list, "pcl", NPG_PCL_VERSION);
+    set_text(list, "pcl", NPG_PCL_VERSION); /* neupig-poisson has it */
     set_text(list, "openvdb", NPG_OPENVDB_VERSION);
     set_version(list, "meshoptimizer", MESHOPTIMIZER_VERSION / 1000, MESHOPTIMIZER_VERSION / 10 % 100,
                 MESHOPTIMIZER_VERSION % 10);

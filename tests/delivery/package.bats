@@ -37,6 +37,12 @@ setup() {
     [ -s out/view.html ]
 }
 
+@test "the command loads what it uses: PCL and what that brings are for neupig-poisson alone" {
+    ldd root/usr/bin/neupig >loaded
+    ! grep -i -e pcl -e vtk loaded
+    [ "$(wc -l <loaded)" -le 30 ]
+}
+
 @test "every library that its programs name belongs to a package it depends on" {
     dpkg-deb -f neupig_*.deb Depends | tr ',|' '\n\n' | awk '{ print $1 }' | sort -u >depends
     grep -qx pocl-opencl-icd depends

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <lzf.h>
 #include <math.h>
 #include <sys/wait.h>
 
@@ -265,6 +266,61 @@ static void pcd_in_bytes(void **state)
         put_bytes(&b, plain.data + at, run);
     }
     read_and_check(save("compressed.pcd", b.data, b.size), false);
+}
+
+/* A colour is the bits of a number of any type; what is packed has repeats, so that all of LZF is used. */
+static void pcd_with_colours(void **state)
+{
+    (void)state;
+    enum { POINTS = 400 };
+    static const char *const forms[] = {"ascii", "binary", "binary_compressed"};
+    for (size_t form = 0; form < 6; form++) {
+        static bytes b, plain;
+        static unsigned char packed[20 * POINTS];
+        bool is_float = form >= 3, is_packed = form % 3 == 2;
+        b.size = plain.size = 0;
+        put_text(&b, is_float ? "FIELDS x y z w rgb\nSIZE 4 4 4 2 4\nTYPE F F F I F\n"
+                              : "FIELDS x y z w rgb\nSIZE 4 4 4 2 4\nTYPE F F F I U\n");
+        put_text(&b, "COUNT 1 1 1 2 1\nWIDTH 200\nHEIGHT 2\nDATA ");
+        put_text(&b, forms[form % 3]);
+        put_text(&b, "\n");
+        for (size_t column = 0; column < (is_packed ? 5 : 1); column++)
+            for (unsigned i = 0; i < POINTS; i++) {
+                uint32_t colour = 0x3f0a0bu + (i % 7 << 4);
+                float as_float;
+                char text[100];
+                memcpy(&as_float, &colour, sizeof colour);
+                snprintf(text, sizeof text, "%u -1.5 0 %u 2 %.9g\n", i, i,
+                         is_float ? (double)as_float : (double)colour);
+                if (form % 3 == 0) put_text(&plain, text);
+                if (form % 3 == 0) continue;
+                if (!is_packed || column == 0) put_float(&plain, (float)i, false);
+                if (!is_packed || column == 1) put_float(&plain, -1.5f, false);
+                if (!is_packed || column == 2) put_float(&plain, 0, false);
+                if (!is_packed || column == 3) put_bits(&plain, i | 2u << 16, 4, false);
+                if (!is_packed || column == 4) put_bits(&plain, colour, 4, false);
+            }
+        if (is_packed) {
+            unsigned size = lzf_compress(plain.data, (unsigned)plain.size, packed, sizeof packed);
+            assert_in_range(size, 1, plain.size / 2);
+            put_bits(&b, size, 4, false);
+            put_bits(&b, plain.size, 4, false);
+            put_bytes(&b, packed, size);
+        } else {
+            put_bytes(&b, plain.data, plain.size);
+        }
+        npg_frame frame;
+        npg_origin origin = {.known = true};
+        if (read_within_bounds(&frame, save("colours.pcd", b.data, b.size), &origin))
+            fail_msg("%s", npg_error_text());
+        assert_int_equal(frame.point_count, POINTS);
+        for (size_t i = 0; i < POINTS; i++) {
+            const uint8_t wanted[4] = {0x3f, 0x0a, (uint8_t)(0x0b + (i % 7 << 4)), 255};
+            assert_memory_equal(frame.colours + 4 * i, wanted, 4);
+            assert_true(frame.pos_local[3 * i] == (float)i && frame.pos_local[3 * i + 1] == -1.5f);
+        }
+        npg_frame_clear(&frame);
+    }
 }
 
 /* ---- NPY ---- */
@@ -643,6 +699,7 @@ int main(void)
                                        cmocka_unit_test(a_name_that_lies_does_not_matter),
                                        cmocka_unit_test(texts_in_every_form),
                                        cmocka_unit_test(pcd_in_bytes),
+                                       cmocka_unit_test(pcd_with_colours),
                                        cmocka_unit_test(npy_of_every_kind),
                                        cmocka_unit_test(millimetres_at_a_million),
                                        cmocka_unit_test(a_first_point_at_zero_costs_no_detail),

@@ -22,7 +22,6 @@ npg_status npg_xyz_read_cloud(npg_frame *frame, npg_source *source, npg_origin *
 /* One NPY array; NPG_END and the rest as for PLY. */
 npg_status npg_npy_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin);
 
-/* The header is checked here, the data is read by PCL from source->name. */
 npg_status npg_pcd_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin);
 
 /* The format a name's ending stands for ("ply", "xyz", ...), NULL for none; the file is not read. */

@@ -1,13 +1,10 @@
 /* PLY header: what the elements of a PLY file are made of. */
 #include "ingest/formats/ply_header.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 /* Far above any header of real files (set by trial), so that damaged ones are refused and cost nothing. */
-#define HEADER_LINE_MAX  1023
 #define HEADER_LINES_MAX 10000
-#define WORDS_MAX        6 /* "property list <type> <type> <name>" has 5 */
 
 /* Each type has its name of the first PLY files and one that says its size. */
 /* clang-format off */
@@ -56,38 +53,7 @@ double npg_ply_value(const unsigned char *bytes, npg_ply_type type, npg_ply_form
     return 0;
 }
 
-/* ---- lines and words ---- */
-
-typedef struct header_line {
-    char text[HEADER_LINE_MAX + 1];
-    char *words[WORDS_MAX]; /* into text */
-    size_t word_count;      /* may be larger than WORDS_MAX */
-} header_line;
-
-static void split_words(header_line *line)
-{
-    char *rest = NULL;
-    line->word_count = 0;
-    for (char *word = strtok_r(line->text, " \t", &rest); word; word = strtok_r(NULL, " \t", &rest)) {
-        if (line->word_count < WORDS_MAX) line->words[line->word_count] = word;
-        line->word_count++;
-    }
-}
-
-static npg_status next_line(header_line *line, npg_source *source)
-{
-    const char *text;
-    size_t length;
-    npg_status status = npg_source_line(source, &text, &length);
-    if (status == NPG_END) return npg_source_bad_line(source, "the file ends inside the header");
-    if (status) return status;
-    if (length > HEADER_LINE_MAX) return npg_source_bad_line(source, "header line of %zu bytes", length);
-    if (memchr(text, 0, length)) return npg_source_bad_line(source, "zero byte in the header");
-    memcpy(line->text, text, length);
-    line->text[length] = 0;
-    split_words(line);
-    return NPG_OK;
-}
+/* ---- lines ---- */
 
 /* "ply" and what ends its line decide how all lines end. */
 static npg_status read_magic(npg_source *source)
@@ -107,10 +73,10 @@ static npg_status read_magic(npg_source *source)
 
 /* ---- the three kinds of line that matter ---- */
 
-static npg_status parse_format(npg_ply_header *header, const header_line *line, const npg_source *source)
+static npg_status parse_format(npg_ply_header *header, const npg_words *line, const npg_source *source)
 {
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-    if (line->word_count != 3) return npg_source_bad_line(source, "\"format\" needs a name and a version");
+    if (line->count != 3) return npg_source_bad_line(source, "\"format\" needs a name and a version");
     if (strcmp(line->words[2], "1.0") != 0)
         return npg_source_bad_line(source, "PLY version \"%.40s\" is not 1.0", line->words[2]);
     for (int i = 0; i < 3; i++)
@@ -121,17 +87,6 @@ static npg_status parse_format(npg_ply_header *header, const header_line *line, 
     return npg_source_bad_line(source, "unknown format \"%.40s\"", line->words[1]);
 }
 
-static npg_status parse_count(uint64_t *count, const char *text, const npg_source *source)
-{
-    if (*text == '-') return npg_source_bad_line(source, "negative count %.40s", text);
-    size_t digits = strspn(text, "0123456789");
-    if (!digits || text[digits]) return npg_source_bad_line(source, "\"%.40s\" is not a count", text);
-    if (digits > 15) /* so that counts times row sizes stay below 2^64 */
-        return npg_source_bad_line(source, "impossible count %.40s", text);
-    *count = strtoull(text, NULL, 10);
-    return NPG_OK;
-}
-
 static npg_status copy_name(char *out, const char *name, const npg_source *source)
 {
     if (strlen(name) >= NPG_PLY_NAME)
@@ -140,9 +95,9 @@ static npg_status copy_name(char *out, const char *name, const npg_source *sourc
     return NPG_OK;
 }
 
-static npg_status parse_element(npg_ply_header *header, const header_line *line, const npg_source *source)
+static npg_status parse_element(npg_ply_header *header, const npg_words *line, const npg_source *source)
 {
-    if (line->word_count != 3) return npg_source_bad_line(source, "\"element\" needs a name and a count");
+    if (line->count != 3) return npg_source_bad_line(source, "\"element\" needs a name and a count");
     if (header->element_count == NPG_PLY_ELEMENTS)
         return npg_source_bad_line(source, "more than %d elements", NPG_PLY_ELEMENTS);
     for (size_t i = 0; i < header->element_count; i++)
@@ -150,7 +105,7 @@ static npg_status parse_element(npg_ply_header *header, const header_line *line,
             return npg_source_bad_line(source, "second element \"%.40s\"", line->words[1]);
     npg_ply_element *element = &header->elements[header->element_count];
     NPG_TRY(copy_name(element->name, line->words[1], source));
-    NPG_TRY(parse_count(&element->count, line->words[2], source));
+    NPG_TRY(npg_source_count(source, &element->count, line->words[2]));
     header->element_count++;
     return NPG_OK;
 }
@@ -165,23 +120,23 @@ static npg_status parse_type(npg_ply_type *type, const char *name, const npg_sou
     return npg_source_bad_line(source, "unknown type \"%.40s\"", name);
 }
 
-static npg_status parse_property(npg_ply_header *header, const header_line *line, const npg_source *source)
+static npg_status parse_property(npg_ply_header *header, const npg_words *line, const npg_source *source)
 {
     if (!header->element_count) return npg_source_bad_line(source, "a property before the first element");
     npg_ply_element *element = &header->elements[header->element_count - 1];
-    bool is_list = line->word_count > 1 && !strcmp(line->words[1], "list");
-    if (line->word_count != (is_list ? 5u : 3u))
+    bool is_list = line->count > 1 && !strcmp(line->words[1], "list");
+    if (line->count != (is_list ? 5u : 3u))
         return npg_source_bad_line(source, "\"property\" needs %s",
                                    is_list ? "two types and a name after \"list\"" : "a type and a name");
     if (element->property_count == NPG_PLY_PROPERTIES)
         return npg_source_bad_line(source, "more than %d properties", NPG_PLY_PROPERTIES);
     npg_ply_property *property = &element->properties[element->property_count];
-    const char *name = line->words[line->word_count - 1];
+    const char *name = line->words[line->count - 1];
     for (size_t i = 0; i < element->property_count; i++)
         if (!strcmp(element->properties[i].name, name))
             return npg_source_bad_line(source, "second property \"%.40s\"", name);
     NPG_TRY(copy_name(property->name, name, source));
-    NPG_TRY(parse_type(&property->type, line->words[line->word_count - 2], source));
+    NPG_TRY(parse_type(&property->type, line->words[line->count - 2], source));
     if (is_list) NPG_TRY(parse_type(&property->count_type, line->words[2], source));
     if (is_list && property->count_type >= NPG_PLY_FLOAT)
         return npg_source_bad_line(source, "the length of list \"%s\" is not a whole number", name);
@@ -215,11 +170,11 @@ static npg_status check_counts(const npg_ply_header *header, const npg_source *s
 
 static npg_status read_lines(npg_ply_header *header, npg_source *source)
 {
-    header_line line;
+    npg_words line;
     bool has_format = false;
     for (int i = 0; i < HEADER_LINES_MAX; i++) {
-        NPG_TRY(next_line(&line, source));
-        const char *word = line.word_count ? line.words[0] : "comment";
+        NPG_TRY(npg_source_words(source, &line));
+        const char *word = line.count ? line.words[0] : "comment";
         if (!strcmp(word, "comment") || !strcmp(word, "obj_info")) continue;
         if (!strcmp(word, "end_header")) {
             if (!has_format) return npg_source_bad_line(source, "the header names no format");

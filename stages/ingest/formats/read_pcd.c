@@ -1,214 +1,226 @@
-/* PCD reader: checks the header and, in ascii files, every row; PCL then reads what has been found sound. */
+/* PCD reader: ascii, binary, and binary_compressed (columns packed with LZF). */
+#include <lzf.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "ingest/formats/bytes.h"
 #include "ingest/formats/formats.h"
-#include "ingest/formats/number.h"
-#include "ingest/formats/pcd.h"
+#include "ingest/formats/ply_header.h"
 #include "ingest/formats/point_list.h"
 
-/* Above any header of real files (set by trial): damaged ones are refused and cost nothing. */
-enum { FIELDS_MAX = 128, LINE_MAX_BYTES = 8191, WORDS_MAX = FIELDS_MAX + 1 };
+#define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
+#define NONE        UINT64_MAX         /* the header has no such line     */
+
+/* What a field can mean. */
+enum { X, Y, Z, NX, NY, NZ, RGB, SLOTS };
+
+typedef struct field {
+    char name[32], type;
+    size_t size, count;
+} field;
 
 typedef struct pcd_header {
     size_t field_count;
-    char names[FIELDS_MAX][32];
-    size_t sizes[FIELDS_MAX], counts[FIELDS_MAX];
-    char types[FIELDS_MAX];
-    bool has_sizes, has_types, has_counts;
+    field fields[NPG_WORDS_MAX - 1];
     uint64_t width, height, points;
-    bool has_width, has_height, has_points;
     char data[32];
 } pcd_header;
 
-typedef struct header_line {
-    char text[LINE_MAX_BYTES + 1];
-    char *words[WORDS_MAX];
-    size_t word_count;
-} header_line;
-
-static npg_status next_line(header_line *line, npg_source *source)
-{
-    const char *text;
-    size_t length;
-    char *rest = NULL;
-    npg_status status = npg_source_line(source, &text, &length);
-    if (status == NPG_END) return npg_source_bad_line(source, "the file ends inside the header");
-    if (status) return status;
-    if (length > LINE_MAX_BYTES || memchr(text, 0, length))
-        return npg_source_bad_line(source, "not a line of a PCD header");
-    memcpy(line->text, text, length);
-    line->text[length] = 0;
-    line->word_count = 0;
-    for (char *word = strtok_r(line->text, " \t", &rest); word; word = strtok_r(NULL, " \t", &rest)) {
-        if (line->word_count == WORDS_MAX)
-            return npg_source_bad_line(source, "more than %d fields", FIELDS_MAX);
-        line->words[line->word_count++] = word;
-    }
-    /* PCL 1.13 reads past its list of words in a line that has none but blanks. */
-    if (!line->word_count) return npg_source_bad_line(source, "an empty line in the header");
-    return NPG_OK;
-}
-
-static npg_status parse_count(uint64_t *value, const char *text, const npg_source *source)
-{
-    size_t digits = strspn(text, "0123456789");
-    if (!digits || text[digits] || digits > 15)
-        return npg_source_bad_line(source, "\"%.30s\" is not a count", text);
-    *value = strtoull(text, NULL, 10);
-    return NPG_OK;
-}
-
-static npg_status parse_names(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_names(pcd_header *h, const npg_words *line, const npg_source *source)
 {
     if (h->field_count) return npg_source_bad_line(source, "second line FIELDS");
-    for (size_t i = 1; i < line->word_count; i++) {
-        if (strlen(line->words[i]) >= sizeof h->names[0])
+    for (size_t i = 1; i < line->count; i++) {
+        field *f = &h->fields[h->field_count++];
+        if (strlen(line->words[i]) >= sizeof f->name)
             return npg_source_bad_line(source, "field name \"%.30s...\" is too long", line->words[i]);
-        strcpy(h->names[h->field_count++], line->words[i]);
+        strcpy(f->name, line->words[i]);
+        f->count = 1;
     }
     return NPG_OK;
 }
 
-static npg_status expect_fields(const pcd_header *h, const header_line *line, const npg_source *source)
+/* An entry of the lines SIZE, TYPE and COUNT. */
+static npg_status parse_entry(field *f, char kind, const char *text, const npg_source *source)
 {
-    if (line->word_count - 1 == h->field_count && h->field_count) return NPG_OK;
-    return npg_source_bad_line(source, "%s has %zu entries for %zu fields", line->words[0],
-                               line->word_count - 1, h->field_count);
-}
-
-static npg_status parse_sizes(pcd_header *h, const header_line *line, const npg_source *source)
-{
-    NPG_TRY(expect_fields(h, line, source));
-    for (size_t i = 0; i < h->field_count; i++) {
-        const char *text = line->words[i + 1];
-        if (strlen(text) != 1 || !strchr("1248", *text))
-            return npg_source_bad_line(source, "field \"%s\" has size %.30s", h->names[i], text);
-        h->sizes[i] = (size_t)(*text - '0');
-    }
-    h->has_sizes = true;
-    return NPG_OK;
-}
-
-static npg_status parse_types(pcd_header *h, const header_line *line, const npg_source *source)
-{
-    NPG_TRY(expect_fields(h, line, source));
-    for (size_t i = 0; i < h->field_count; i++) {
-        const char *text = line->words[i + 1];
-        if (strlen(text) != 1 || !strchr("IUF", *text))
-            return npg_source_bad_line(source, "field \"%s\" has the unknown type %.30s", h->names[i], text);
-        h->types[i] = *text;
-    }
-    h->has_types = true;
-    return NPG_OK;
-}
-
-static npg_status parse_field_counts(pcd_header *h, const header_line *line, const npg_source *source)
-{
-    NPG_TRY(expect_fields(h, line, source));
-    for (size_t i = 0; i < h->field_count; i++) {
-        uint64_t count = 0;
-        NPG_TRY(parse_count(&count, line->words[i + 1], source));
+    uint64_t count = 0;
+    bool is_one = strlen(text) == 1;
+    if (kind == 'S') {
+        if (!is_one || !strchr("1248", *text))
+            return npg_source_bad_line(source, "field \"%s\" has size %.30s", f->name, text);
+        f->size = (size_t)(*text - '0');
+    } else if (kind == 'T') {
+        if (!is_one || !strchr("IUF", *text))
+            return npg_source_bad_line(source, "field \"%s\" has the unknown type %.30s", f->name, text);
+        f->type = *text;
+    } else {
+        NPG_TRY(npg_source_count(source, &count, text));
         if (count < 1 || count > 65536) /* more is damage (set by trial) */
-            return npg_source_bad_line(source, "field \"%s\" has count %llu", h->names[i],
-                                       (unsigned long long)count);
-        h->counts[i] = (size_t)count;
+            return npg_source_bad_line(source, "field \"%s\" has count %s", f->name, text);
+        f->count = (size_t)count;
     }
-    h->has_counts = true;
     return NPG_OK;
 }
 
-static npg_status parse_size(uint64_t *value, bool *has, const header_line *line, const npg_source *source)
+static npg_status parse_entries(pcd_header *h, const npg_words *line, const npg_source *source)
 {
-    if (line->word_count != 2) return npg_source_bad_line(source, "%s needs one number", line->words[0]);
-    *has = true;
-    return parse_count(value, line->words[1], source);
+    if (line->count - 1 != h->field_count || !h->field_count)
+        return npg_source_bad_line(source, "%s has %zu entries for %zu fields", line->words[0],
+                                   line->count - 1, h->field_count);
+    for (size_t i = 0; i < h->field_count; i++)
+        NPG_TRY(parse_entry(&h->fields[i], line->words[0][0], line->words[i + 1], source));
+    return NPG_OK;
 }
 
-static npg_status parse_line(pcd_header *h, const header_line *line, const npg_source *source)
+static npg_status parse_line(pcd_header *h, const npg_words *line, const npg_source *source)
 {
     const char *word = line->words[0];
+    const struct {
+        const char *word;
+        uint64_t *count;
+    } sizes[] = {{"WIDTH", &h->width}, {"HEIGHT", &h->height}, {"POINTS", &h->points}};
     if (!strcmp(word, "VERSION") || !strcmp(word, "VIEWPOINT")) return NPG_OK;
     if (!strcmp(word, "FIELDS") || !strcmp(word, "COLUMNS")) return parse_names(h, line, source);
-    if (!strcmp(word, "SIZE")) return parse_sizes(h, line, source);
-    if (!strcmp(word, "TYPE")) return parse_types(h, line, source);
-    if (!strcmp(word, "COUNT")) return parse_field_counts(h, line, source);
-    if (!strcmp(word, "WIDTH")) return parse_size(&h->width, &h->has_width, line, source);
-    if (!strcmp(word, "HEIGHT")) return parse_size(&h->height, &h->has_height, line, source);
-    if (!strcmp(word, "POINTS")) return parse_size(&h->points, &h->has_points, line, source);
-    if (strcmp(word, "DATA") != 0) return npg_source_bad_line(source, "unknown word \"%.30s\"", word);
-    if (line->word_count != 2) return npg_source_bad_line(source, "DATA needs one word");
+    if (!strcmp(word, "SIZE") || !strcmp(word, "TYPE") || !strcmp(word, "COUNT"))
+        return parse_entries(h, line, source);
+    for (size_t i = 0; i < 3; i++)
+        if (!strcmp(word, sizes[i].word) && line->count == 2)
+            return npg_source_count(source, sizes[i].count, line->words[1]);
+    if (strcmp(word, "DATA") != 0 || line->count != 2)
+        return npg_source_bad_line(source, "not a line of a PCD header: \"%.30s\"", word);
     snprintf(h->data, sizeof h->data, "%s", line->words[1]);
     return NPG_OK;
 }
 
+/* The first field of that name; field_count where there is none. */
+static size_t find(const pcd_header *h, const char *name)
+{
+    size_t i = 0;
+    while (i < h->field_count && strcmp(h->fields[i].name, name) != 0) i++;
+    return i;
+}
+
 static npg_status check_axes(const pcd_header *h, const npg_source *source)
 {
-    for (const char *axis = "xyz"; *axis; axis++) {
-        size_t i = 0;
-        while (i < h->field_count && (h->names[i][0] != *axis || h->names[i][1])) i++;
-        if (i == h->field_count || h->counts[i] != 1)
-            return npg_source_bad_line(source, "the header has no single field %c", *axis);
-    }
-    return NPG_OK;
-}
-
-static bool is_used(const char *name)
-{
-    static const char *const names[] = {"x", "y", "z", "normal_x", "normal_y", "normal_z"};
-    size_t i = 0;
-    while (i < 6 && strcmp(name, names[i]) != 0) i++;
-    return i < 6;
-}
-
-/* PCL 1.13 knows no whole numbers of 8 bytes: it steps over such a field, but not in compressed files. */
-static npg_status check_types(const pcd_header *h, const npg_source *source)
-{
-    bool is_packed = !strcmp(h->data, "binary_compressed");
-    for (size_t i = 0; i < h->field_count; i++) {
-        bool is_float = h->types[i] == 'F';
-        if (is_float ? h->sizes[i] < 4 : h->sizes[i] > 4 && (is_packed || is_used(h->names[i])))
-            return npg_source_bad_line(source, "field \"%s\" is a %s of %zu bytes", h->names[i],
-                                       is_float ? "float" : "whole number", h->sizes[i]);
+    for (size_t axis = 0; axis < 3; axis++) {
+        size_t i = find(h, (const char *const[]){"x", "y", "z"}[axis]);
+        if (i == h->field_count || h->fields[i].count != 1)
+            return npg_source_bad_line(source, "the header has no single field %c", "xyz"[axis]);
     }
     return NPG_OK;
 }
 
 static npg_status check_header(pcd_header *h, const npg_source *source)
 {
-    if (!h->field_count || !h->has_sizes || !h->has_types)
+    if (!h->field_count || !h->fields[0].size || !h->fields[0].type)
         return npg_source_bad_line(source, "the header lacks FIELDS, SIZE or TYPE");
-    for (size_t i = 0; i < h->field_count && !h->has_counts; i++) h->counts[i] = 1;
-    if (!h->has_width || !h->has_height)
+    if (h->width == NONE || h->height == NONE)
         return npg_source_bad_line(source, "the header lacks WIDTH or HEIGHT");
     if (h->width > UINT32_MAX || h->height > UINT32_MAX)
         return npg_source_bad_line(source, "impossible size %llu x %llu", (unsigned long long)h->width,
                                    (unsigned long long)h->height);
-    if (!h->has_points) h->points = h->width * h->height;
+    if (h->points == NONE) h->points = h->width * h->height;
     if (h->width * h->height != h->points)
         return npg_source_bad_line(source, "%llu x %llu is not %llu points", (unsigned long long)h->width,
                                    (unsigned long long)h->height, (unsigned long long)h->points);
-    NPG_TRY(check_axes(h, source));
-    return check_types(h, source);
+    return check_axes(h, source);
 }
 
 static npg_status read_header(pcd_header *h, npg_source *source)
 {
-    header_line *line;
-    NPG_TRY(npg_alloc(&line, NPG_FOR_FILES, sizeof *line));
-    npg_status status = NPG_OK;
-    for (int i = 0; !status && !h->data[0]; i++) {
-        if (i == 1000) status = npg_source_bad_line(source, "no line DATA in the first 1000 lines");
-        if (!status) status = next_line(line, source);
-        if (!status && line->words[0][0] != '#') status = parse_line(h, line, source);
+    npg_words line;
+    h->width = h->height = h->points = NONE;
+    for (int i = 0; !h->data[0]; i++) {
+        if (i == 1000) return npg_source_bad_line(source, "no line DATA in the first 1000 lines");
+        NPG_TRY(npg_source_words(source, &line));
+        if (!line.count) return npg_source_bad_line(source, "an empty line in the header");
+        if (line.words[0][0] != '#') NPG_TRY(parse_line(h, &line, source));
     }
-    if (!status) status = check_header(h, source);
-    npg_release(&line);
-    return status;
+    return check_header(h, source);
 }
 
-/* ---- the body, before PCL sees it ---- */
+/* ---- columns: where the values of a point lie ---- */
+
+typedef struct column {
+    bool is_there;
+    npg_ply_type type;
+    size_t value;        /* its number in an ascii row                                  */
+    size_t offset, step; /* of a point's value from the block's beginning, and the next */
+} column;
+
+typedef struct body {
+    column slots[SLOTS];
+    size_t row_values, row_size;
+    bool is_packed;
+    npg_point_list points;
+} body;
+
+static npg_status set_column(column *c, const field *f, const npg_source *source)
+{
+    static const npg_ply_type whole[2][3] = {{NPG_PLY_INT8, NPG_PLY_INT16, NPG_PLY_INT32},
+                                             {NPG_PLY_UINT8, NPG_PLY_UINT16, NPG_PLY_UINT32}};
+    bool is_float = f->type == 'F';
+    if (is_float ? f->size < 4 : f->size > 4)
+        return npg_source_bad_line(source, "field \"%s\" is a %s of %zu bytes", f->name,
+                                   is_float ? "float" : "whole number", f->size);
+    c->is_there = true;
+    c->type = is_float ? f->size == 8 ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT : whole[f->type == 'U'][f->size / 2];
+    return NPG_OK;
+}
+
+/* "rgb" or "rgba": 0xAARRGGBB in four bytes, whatever type the header gives them. */
+static size_t find_colour(const pcd_header *h)
+{
+    size_t i = find(h, "rgb");
+    if (i == h->field_count) i = find(h, "rgba");
+    return i < h->field_count && h->fields[i].size == 4 && h->fields[i].count == 1 ? i : h->field_count;
+}
+
+static npg_status set_columns(body *b, const pcd_header *h, const npg_source *source)
+{
+    static const char *const names[] = {"x", "y", "z", "normal_x", "normal_y", "normal_z"};
+    for (size_t i = 0; i < h->field_count; i++) {
+        for (size_t slot = X; slot < SLOTS; slot++) {
+            column *c = &b->slots[slot];
+            if (i != (slot == RGB ? find_colour(h) : find(h, names[slot]))) continue;
+            NPG_TRY(set_column(c, &h->fields[i], source));
+            c->value = b->row_values;
+            c->offset = b->is_packed ? b->row_size * (size_t)h->points : b->row_size;
+            c->step = h->fields[i].size * h->fields[i].count; /* of packed columns */
+        }
+        b->row_size += h->fields[i].size * h->fields[i].count;
+        b->row_values += h->fields[i].count;
+    }
+    for (size_t slot = X; slot < SLOTS && !b->is_packed; slot++) b->slots[slot].step = b->row_size;
+    b->points.has_normals = b->slots[NX].is_there && b->slots[NY].is_there && b->slots[NZ].is_there;
+    b->points.has_colours = b->slots[RGB].is_there;
+    return NPG_OK;
+}
+
+static void add_point(body *b, const double values[SLOTS], uint32_t argb)
+{
+    npg_points_add(&b->points, values + X, values + NX);
+    if (!b->points.has_colours) return;
+    const uint8_t rgba[4] = {(uint8_t)(argb >> 16), (uint8_t)(argb >> 8), (uint8_t)argb, 255};
+    npg_points_colour(&b->points, rgba);
+}
+
+static void add_rows(body *b, const unsigned char *data, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        double values[SLOTS] = {0};
+        for (size_t slot = X; slot < SLOTS; slot++) {
+            const column *c = &b->slots[slot];
+            npg_ply_type type = slot == RGB ? NPG_PLY_UINT32 : c->type;
+            if (c->is_there)
+                values[slot] = npg_ply_value(data + c->offset + i * c->step, type, NPG_PLY_LITTLE);
+        }
+        add_point(b, values, (uint32_t)values[RGB]);
+    }
+}
+
+/* ---- the body ---- */
 
 static npg_status refuse_claim(const pcd_header *h, const npg_source *source, uint64_t need)
 {
@@ -217,99 +229,118 @@ static npg_status refuse_claim(const pcd_header *h, const npg_source *source, ui
                                (unsigned long long)npg_source_left(source));
 }
 
-static npg_status check_rows(const pcd_header *h, npg_source *source, size_t values_per_row)
+static npg_status read_row(body *b, const npg_source *source, const char *at, const char *end)
 {
-    const char *at;
-    size_t length;
-    npg_status status;
-    uint64_t rows = 0;
-    while (!(status = npg_source_line(source, &at, &length))) {
-        const char *end = at + length;
-        size_t values = 0;
+    double values[SLOTS] = {0};
+    size_t count = 0;
+    for (; at < end; count++) {
         double value;
-        at = npg_skip_blanks(at, end);
-        if (at == end) continue;
-        while (at < end) {
-            const char *after = npg_number_parse(at, end, &value);
-            int shown = end - at > 30 ? 30 : (int)(end - at);
-            if (!after) return npg_source_bad_line(source, "\"%.*s\" is not a number", shown, at);
-            at = npg_skip_blanks(after, end);
-            values++;
-        }
-        if (values != values_per_row)
-            return npg_source_bad_line(source, "%zu values where a point has %zu", values, values_per_row);
-        rows++;
+        NPG_TRY(npg_source_number(source, &value, &at, end));
+        for (size_t slot = X; slot < SLOTS; slot++)
+            if (b->slots[slot].is_there && b->slots[slot].value == count) values[slot] = value;
     }
-    if (status != NPG_END) return status;
-    if (rows != h->points)
-        return npg_source_bad_line(source, "the header claims %llu points, but %llu rows follow",
-                                   (unsigned long long)h->points, (unsigned long long)rows);
+    if (count != b->row_values)
+        return npg_source_bad_line(source, "%zu values where a point has %zu", count, b->row_values);
+    for (size_t slot = X; slot < RGB; slot++)
+        if (b->slots[slot].type == NPG_PLY_FLOAT) values[slot] = (double)(float)values[slot];
+    /* A colour is the bits of its number. */
+    uint32_t argb = 0;
+    if (b->slots[RGB].type == NPG_PLY_FLOAT)
+        argb = npg_float_bits((float)values[RGB]);
+    else if (fabs(values[RGB]) <= UINT32_MAX)
+        argb = (uint32_t)(int64_t)values[RGB];
+    NPG_TRY(npg_points_reserve(&b->points, 1));
+    add_point(b, values, argb);
     return NPG_OK;
 }
 
-static npg_status check_compressed(const pcd_header *h, npg_source *source, uint64_t need)
+static npg_status read_ascii(body *b, const pcd_header *h, npg_source *source)
+{
+    const char *at, *end;
+    npg_status status;
+    uint64_t rows = 0,
+             most = npg_source_left(source) / (2 * b->row_values) + 1; /* a digit and a blank each */
+    NPG_TRY(npg_points_reserve(&b->points, (size_t)(h->points < most ? h->points : most)));
+    while (!(status = npg_source_row(source, &at, &end)))
+        if (rows++ < h->points) NPG_TRY(read_row(b, source, at, end));
+    if (status != NPG_END) return status;
+    if (rows == h->points) return NPG_OK;
+    return npg_source_bad_line(source, "the header claims %llu points, but %llu rows follow",
+                               (unsigned long long)h->points, (unsigned long long)rows);
+}
+
+static npg_status read_binary(body *b, const pcd_header *h, npg_source *source)
+{
+    size_t count = (size_t)h->points, block = BLOCK_BYTES / b->row_size + 1, available;
+    if (h->points * b->row_size != npg_source_left(source))
+        return refuse_claim(h, source, h->points * b->row_size);
+    NPG_TRY(npg_points_reserve(&b->points, count));
+    for (size_t done = 0; done < count; done += block) {
+        size_t rows = count - done < block ? count - done : block;
+        NPG_TRY(npg_source_fill(source, rows * b->row_size, &available));
+        if (available < rows * b->row_size) return npg_source_bad_byte(source, "the file ends in the data");
+        add_rows(b, npg_source_data(source), rows);
+        npg_source_take(source, rows * b->row_size);
+    }
+    return NPG_OK;
+}
+
+static npg_status unpack(body *b, npg_arena *scratch, const pcd_header *h, npg_source *source,
+                         uint32_t packed_size)
+{
+    size_t need = (size_t)h->points * b->row_size, available;
+    unsigned char *data = npg_arena_take(scratch, need, 1);
+    NPG_TRY(npg_arena_status(scratch));
+    NPG_TRY(npg_source_fill(source, packed_size, &available));
+    if (available < packed_size ||
+        (need && lzf_decompress(npg_source_data(source), packed_size, data, (unsigned)need) != need))
+        return npg_source_bad_byte(source, "the compressed data is damaged");
+    NPG_TRY(npg_points_reserve(&b->points, (size_t)h->points));
+    add_rows(b, data, (size_t)h->points);
+    return NPG_OK;
+}
+
+static npg_status read_packed(body *b, const pcd_header *h, npg_source *source)
 {
     size_t available;
-    uint32_t sizes[2];
-    NPG_TRY(npg_source_fill(source, sizeof sizes, &available));
-    if (available < sizeof sizes) return npg_source_bad_byte(source, "the file ends before the data");
-    memcpy(sizes, npg_source_data(source), sizeof sizes);
-    npg_source_take(source, sizeof sizes);
-    if (sizes[1] != need) return refuse_claim(h, source, need);
+    uint64_t need = h->points * b->row_size;
+    NPG_TRY(npg_source_fill(source, 8, &available));
+    if (available < 8) return npg_source_bad_byte(source, "the file ends before the data");
+    uint32_t packed = (uint32_t)npg_ply_value(npg_source_data(source), NPG_PLY_UINT32, NPG_PLY_LITTLE);
+    uint32_t plain = (uint32_t)npg_ply_value(npg_source_data(source) + 4, NPG_PLY_UINT32, NPG_PLY_LITTLE);
+    npg_source_take(source, 8);
+    if (plain != need) return refuse_claim(h, source, need);
     /* LZF: no three bytes stand for more than 264. */
-    if (sizes[0] > npg_source_left(source) || need / 264 > sizes[0])
-        return npg_source_bad_byte(source, "%u compressed bytes can't be in the %llu that follow", sizes[0],
+    if (packed > npg_source_left(source) || need / 264 > packed)
+        return npg_source_bad_byte(source, "%u compressed bytes can't be in the %llu that follow", packed,
                                    (unsigned long long)npg_source_left(source));
-    return NPG_OK;
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    npg_status status = unpack(b, &scratch, h, source, packed);
+    npg_arena_release(&scratch);
+    return status;
 }
 
-static npg_status check_body(const pcd_header *h, npg_source *source)
+static npg_status read_body(body *b, const pcd_header *h, npg_source *source)
 {
-    uint64_t row = 0;
-    size_t values = 0;
-    for (size_t i = 0; i < h->field_count; i++) {
-        row += h->sizes[i] * h->counts[i];
-        values += h->counts[i];
-    }
     /* So that points times bytes of a row can't overflow. */
     if (h->points > (uint64_t)1 << 36) return refuse_claim(h, source, UINT64_MAX);
-    if (!strcmp(h->data, "ascii")) return check_rows(h, source, values);
-    uint64_t need = h->points * row;
-    if (!strcmp(h->data, "binary"))
-        return need == npg_source_left(source) ? NPG_OK : refuse_claim(h, source, need);
-    if (!strcmp(h->data, "binary_compressed")) return check_compressed(h, source, need);
+    b->is_packed = !strcmp(h->data, "binary_compressed");
+    NPG_TRY(set_columns(b, h, source));
+    if (b->is_packed) return read_packed(b, h, source);
+    if (!strcmp(h->data, "ascii")) return read_ascii(b, h, source);
+    if (!strcmp(h->data, "binary")) return read_binary(b, h, source);
     return npg_source_bad_line(source, "unknown DATA \"%s\"", h->data);
-}
-
-/* ---- the whole ---- */
-
-static npg_status begin_points(void *user, size_t point_count, bool has_normals, bool has_colours)
-{
-    npg_point_list *points = user;
-    points->has_normals = has_normals;
-    points->has_colours = has_colours;
-    return npg_points_reserve(points, point_count);
-}
-
-static void add_point(void *user, const double world[3], const double normal[3], const uint8_t rgba[4])
-{
-    npg_point_list *points = user;
-    npg_points_add(points, world, normal);
-    if (points->has_colours) npg_points_colour(points, rgba);
 }
 
 npg_status npg_pcd_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin)
 {
     pcd_header *header;
-    npg_point_list points = {.frame = frame, .origin = origin};
+    body b = {.points = {.frame = frame, .origin = origin}};
     if (!source->is_seekable)
         return npg_error(NPG_BAD_INPUT, "%s: PCD can't be read from a pipe", source->name);
     NPG_TRY(npg_alloc(&header, NPG_FOR_FILES, sizeof *header));
     npg_status status = read_header(header, source);
-    if (!status) status = check_body(header, source);
-    size_t count = (size_t)header->points;
+    if (!status) status = read_body(&b, header, source);
     npg_release(&header);
-    if (status || !count) return status;
-    npg_pcd_sink sink = {&points, begin_points, add_point};
-    return npg_pcd_load(source->name, count, &sink);
+    return status;
 }

@@ -6,7 +6,7 @@
  * their detail.  Points that are not finite are kept: the outlier stage counts and drops them.  Normals come
  * out with unit length; one without a direction is (0, 0, 0).
  * Failures are NPG_BAD_INPUT (with path, line or byte, and cause), NPG_MEMORY.  Memory while reading a cloud
- * stays below 4 x file size + 1 MiB, whatever the header claims (PCL's own for PCD aside).  Threads:
+ * stays below 4 x file size + 1 MiB, whatever the header claims (a compressed PCD: of what it unpacks to).  Threads:
  * different frames may be read at the same time; *origin is written only while it is not known. */
 #ifndef NPG_READER_H
 #define NPG_READER_H

@@ -5,10 +5,12 @@
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "ingest/formats/number.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 
@@ -186,6 +188,56 @@ npg_status npg_source_line(npg_source *source, const char **text, size_t *length
     while (*length && (*text)[*length - 1] == '\r') --*length; /* line ends of Windows */
     npg_source_take(source, taken);
     source->line++;
+    return NPG_OK;
+}
+
+npg_status npg_source_row(npg_source *source, const char **at, const char **end)
+{
+    size_t length;
+    do {
+        NPG_TRY(npg_source_line(source, at, &length));
+        *end = *at + length;
+        *at = npg_skip_blanks(*at, *end);
+    } while (*at == *end);
+    return NPG_OK;
+}
+
+npg_status npg_source_number(const npg_source *source, double *value, const char **at, const char *end)
+{
+    const char *after = npg_number_parse(*at, end, value);
+    int shown = end - *at > 30 ? 30 : (int)(end - *at);
+    if (!after) return npg_source_bad_line(source, "\"%.*s\" is not a number", shown, *at);
+    *at = npg_skip_blanks(after, end);
+    return NPG_OK;
+}
+
+npg_status npg_source_words(npg_source *source, npg_words *line)
+{
+    const char *text;
+    char *rest = NULL;
+    size_t length;
+    npg_status status = npg_source_line(source, &text, &length);
+    if (status == NPG_END) return npg_source_bad_line(source, "the file ends inside the header");
+    if (status) return status;
+    if (length > NPG_WORDS_LINE) return npg_source_bad_line(source, "header line of %zu bytes", length);
+    if (memchr(text, 0, length)) return npg_source_bad_line(source, "zero byte in the header");
+    memcpy(line->text, text, length);
+    line->text[length] = 0;
+    line->count = 0;
+    for (char *word = strtok_r(line->text, " \t", &rest); word; word = strtok_r(NULL, " \t", &rest)) {
+        if (line->count == NPG_WORDS_MAX)
+            return npg_source_bad_line(source, "header line of more than %d words", NPG_WORDS_MAX);
+        line->words[line->count++] = word;
+    }
+    return NPG_OK;
+}
+
+npg_status npg_source_count(const npg_source *source, uint64_t *count, const char *text)
+{
+    size_t digits = strspn(text, "0123456789");
+    if (!digits || text[digits]) return npg_source_bad_line(source, "\"%.40s\" is not a count", text);
+    if (digits > 15) return npg_source_bad_line(source, "impossible count %.40s", text);
+    *count = strtoull(text, NULL, 10);
     return NPG_OK;
 }
 

@@ -64,6 +64,26 @@ npg_status npg_source_read(npg_source *source, unsigned char **out, size_t size,
 /* The next line without its end, not terminated by 0; valid until the next call.  NPG_END. */
 npg_status npg_source_line(npg_source *source, const char **text, size_t *length);
 
+/* The next line that holds more than blanks, from its first word on; valid until the next call.  NPG_END. */
+npg_status npg_source_row(npg_source *source, const char **at, const char **end);
+
+/* The number that begins at *at, which then stands behind it and the blanks that follow; NPG_BAD_INPUT with the
+ * line where there is none. */
+npg_status npg_source_number(const npg_source *source, double *value, const char **at, const char *end);
+
+/* The words of a header's next line, blanks aside; maybe none.  NPG_BAD_INPUT where the file ends, or the line is
+ * no text of that size. */
+enum { NPG_WORDS_MAX = 129, NPG_WORDS_LINE = 8191 }; /* far above any header of real files (set by trial) */
+typedef struct npg_words {
+    char text[NPG_WORDS_LINE + 1];
+    char *words[NPG_WORDS_MAX]; /* into text */
+    size_t count;
+} npg_words;
+npg_status npg_source_words(npg_source *source, npg_words *line);
+
+/* A count in a header: digits, and so few that counts times row sizes stay below 2^64. */
+npg_status npg_source_count(const npg_source *source, uint64_t *count, const char *text);
+
 /* Look whether lines end with '\r' alone, from the first 64 KiB. */
 npg_status npg_source_find_line_end(npg_source *source);
 
