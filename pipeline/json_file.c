@@ -50,14 +50,20 @@ static npg_status read_text(char **text, const char *path, size_t limit)
     return status;
 }
 
-npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit)
+npg_status npg_json_parse(json_t **root, char *text, const char *place)
 {
     json_error_t error;
+    blank_comments(text);
+    *root = json_loads(text, JSON_REJECT_DUPLICATES, &error);
+    if (*root) return NPG_OK;
+    return npg_error(NPG_USAGE, "%s:%d:%d: %s", place, error.line, error.column, error.text);
+}
+
+npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit)
+{
     *root = NULL;
     NPG_TRY(read_text(text, path, limit));
-    blank_comments(*text);
-    *root = json_loads(*text, JSON_REJECT_DUPLICATES, &error);
-    if (*root) return NPG_OK;
-    npg_release(text);
-    return npg_error(NPG_USAGE, "%s:%d:%d: %s", path, error.line, error.column, error.text);
+    npg_status status = npg_json_parse(root, *text, path);
+    if (status) npg_release(text);
+    return status;
 }

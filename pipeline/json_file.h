@@ -12,6 +12,9 @@
  * owns the root (json_decref).  NPG_USAGE names the file, line, column and cause; both are then NULL. */
 npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit);
 
+/* The same for a text at hand, whose comments are blanked out in place; errors name it as `place`. */
+npg_status npg_json_parse(json_t **root, char *text, const char *place);
+
 /* A JSON string; bytes that are not UTF-8 (old file names) become '?', so the text is never
  * lost.  NULL gives null. */
 json_t *npg_json_text(const char *text);

@@ -117,22 +117,31 @@ typedef enum npg_option_type {
     NPG_OPTION_TEXT    /* any text                             */
 } npg_option_type;
 
+typedef enum npg_option_use {
+    NPG_USE_COMMON, /* of the command, too                                            */
+    NPG_USE_METHOD, /* a key of the method: programs set it, the command in --method  */
+    NPG_USE_PROGRAM /* for programs alone                                             */
+} npg_option_use;
+
 typedef struct npg_option_info {
     size_t struct_size;
     const char *stage; /* the stage it belongs to, "run" for the run itself */
     const char *name, *help, *default_text, *choices, *value_name;
     npg_option_type type;
     double min, max;
+    npg_option_use use;
 } npg_option_info;
 
 NPG_API npg_status npg_options_open(npg_options **options);
 NPG_API void npg_options_close(npg_options **options);
 
-/* Set one option by its name ("epochs", without dashes).  NPG_USAGE names the option and what it takes. */
+/* Set one option by its name ("epochs", without dashes).  NPG_USAGE names the option and what it takes.
+ * "method" is one of its names (default, best, paper ...), a JSON file, or a JSON object as text that sets
+ * options, keys of the method above all: {"preset": "paper", "epochs": 250}.  "preset" is the name that the
+ * others are added to.  Configurations of the paper's published code are read, too. */
 NPG_API npg_status npg_options_set(npg_options *options, const char *name, const char *value);
 
-/* Read options from a JSON object in a file: {"epochs": 250, "preset": "paper"}; // comments are allowed.
- * NPG_USAGE names file, line and option. */
+/* The method in a file; // comments are allowed.  NPG_USAGE names file, line and option. */
 NPG_API npg_status npg_options_load(npg_options *options, const char *path);
 
 /* The options that the job in the folder was begun with, its input and its output:

@@ -1,4 +1,4 @@
-/* Options: tables, one per stage; parser, help, configuration file and manual all come from them. */
+/* Options: tables, one per stage; parser, help, methods and manual all come from them. */
 #include "pipeline/options.h"
 
 #include <ctype.h>
@@ -12,8 +12,8 @@
 #include <string.h>
 
 #include "pipeline/custom_stage.h"
-#include "pipeline/json_file.h"
 #include "pipeline/memory.h"
+#include "pipeline/method.h"
 #include "pipeline/run_settings.h"
 #include "pipeline/struct_size.h"
 
@@ -23,6 +23,7 @@ struct npg_options {
     char **texts;                                   /* count of them: what the user set, or NULL; owned */
     npg_custom_stage custom[NPG_CUSTOM_STAGES_MAX]; /* custom_count of them, their texts owned */
     size_t custom_count;
+    char *ignored; /* owned, or NULL */
 };
 
 /* ---- the tables as one list ---- */
@@ -73,7 +74,7 @@ npg_status npg_options_describe(size_t i, npg_option_info *info)
     if (option)
         known = (npg_option_info){sizeof known,         stage,           option->name,       option->help,
                                   option->default_text, option->choices, option->value_name, option->type,
-                                  option->min,          option->max};
+                                  option->min,          option->max,     option->use};
     NPG_TRY(npg_struct_give(info, &known, sizeof known, NPG_SIZE_UP_TO(npg_option_info, max), "info"));
     return option ? NPG_OK : NPG_END;
 }
@@ -217,6 +218,7 @@ void npg_options_close(npg_options **slot)
     for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
     npg_release(&(*slot)->texts);
     for (size_t i = 0; i < (*slot)->custom_count; i++) release_custom(&(*slot)->custom[i]);
+    npg_release(&(*slot)->ignored);
     npg_release(slot);
 }
 
@@ -229,23 +231,84 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options)
         if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
     for (size_t i = 0; options && i < options->custom_count && !status; i++)
         status = copy_custom(copy, &options->custom[i]);
+    if (!status && options && options->ignored) status = npg_copy_text(&copy->ignored, options->ignored);
     if (status) npg_options_close(&copy);
     *out = copy;
     return status;
 }
 
-npg_status npg_options_set(npg_options *options, const char *name, const char *value)
+/* A word that names a method's base set among others is the same as the method itself. */
+static const char *plain_name(const char *name)
+{
+    return strcmp(name, "preset") != 0 ? name : "method";
+}
+
+static npg_status unknown(const char *name)
+{
+    const char *gone = npg_option_gone(name);
+    return gone ? npg_error(NPG_USAGE, "option %s went: %s", name, gone)
+                : npg_error(NPG_USAGE, "there is no option %s", name);
+}
+
+static npg_status set_text(npg_options *options, const char *name, const char *value)
 {
     size_t at;
     char *text;
-    NPG_REQUIRE(options && name && value);
-    const npg_option *option = find_option(options, name, &at);
-    if (!option) return npg_error(NPG_USAGE, "there is no option %s", name);
+    const npg_option *option = find_option(options, plain_name(name), &at);
+    if (!option) return unknown(name);
     NPG_TRY(npg_option_check(option, value));
     NPG_TRY(npg_copy_text(&text, value));
     npg_release(&options->texts[at]);
     options->texts[at] = text;
     return NPG_OK;
+}
+
+/* Whether a method's value is none of the names. */
+static bool is_method_text(const char *name, const char *value)
+{
+    if (strcmp(plain_name(name), "method") != 0) return false;
+    for (const npg_preset *preset = npg_presets; preset->name; preset++)
+        if (!strcmp(preset->name, value)) return false;
+    return true;
+}
+
+npg_status npg_options_set(npg_options *options, const char *name, const char *value)
+{
+    NPG_REQUIRE(options && name && value);
+    return is_method_text(name, value) ? npg_method_set(options, value) : set_text(options, name, value);
+}
+
+npg_status npg_options_set_key(npg_options *options, const char *name, const json_t *value)
+{
+    char number[64];
+    if (json_is_string(value)) return set_text(options, name, json_string_value(value));
+    if (json_is_boolean(value)) return set_text(options, name, json_is_true(value) ? "yes" : "no");
+    if (json_is_integer(value))
+        snprintf(number, sizeof number, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
+    else if (json_is_real(value))
+        snprintf(number, sizeof number, "%.17g", json_real_value(value));
+    else
+        return npg_error(NPG_USAGE, "option %s: neither text, number nor true/false", name);
+    return set_text(options, name, number);
+}
+
+npg_status npg_options_set_json(npg_options *options, const char *name, const json_t *value)
+{
+    if (strcmp(plain_name(name), "method") != 0) return npg_options_set_key(options, name, value);
+    if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
+    return npg_method_apply(options, value, name);
+}
+
+const char *npg_options_ignored(const npg_options *options)
+{
+    return options->ignored ? options->ignored : "";
+}
+
+void npg_options_ignore(npg_options *options, char **text)
+{
+    npg_release(&options->ignored);
+    options->ignored = *text;
+    *text = NULL;
 }
 
 bool npg_options_is_set(const npg_options *options, const char *name)
@@ -254,20 +317,11 @@ bool npg_options_is_set(const npg_options *options, const char *name)
     return find_option(options, name, &at) && options->texts[at];
 }
 
-/* The preset by name; quality best is one as well, where no other is named. */
-static const char *chosen_preset(const npg_options *options)
-{
-    size_t at, quality;
-    const npg_option *option = find_option(options, "preset", &at);
-    if (options->texts[at]) return options->texts[at];
-    bool is_best = find_option(options, "quality", &quality) && options->texts[quality] &&
-                   !strcmp(options->texts[quality], "best");
-    return is_best ? "best" : option->default_text;
-}
-
 static const char *text_of_preset(const npg_options *options, const char *name)
 {
-    const char *chosen = chosen_preset(options);
+    size_t at;
+    const npg_option *method = find_option(options, "method", &at);
+    const char *chosen = options->texts[at] ? options->texts[at] : method->default_text;
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
         if (strcmp(preset->name, chosen) != 0) continue;
         for (const npg_preset_value *value = preset->values; value->name; value++)
@@ -279,15 +333,14 @@ static const char *text_of_preset(const npg_options *options, const char *name)
 static const char *text_of(const npg_options *options, const npg_option *option, size_t at)
 {
     const char *text = options->texts[at];
-    bool is_chooser = !strcmp(option->name, "preset") || !strcmp(option->name, "quality");
-    if (!text && !is_chooser) text = text_of_preset(options, option->name);
+    if (!text) text = text_of_preset(options, option->name);
     return text ? text : option->default_text;
 }
 
 const char *npg_options_get(const npg_options *options, const char *name)
 {
     size_t at;
-    const npg_option *option = options && name ? find_option(options, name, &at) : NULL;
+    const npg_option *option = options && name ? find_option(options, plain_name(name), &at) : NULL;
     return option ? text_of(options, option, at) : NULL;
 }
 
@@ -310,65 +363,4 @@ void npg_options_fill(const npg_options *options, const npg_option *table, void 
         bool is_known = find_option(options, option->name, &at) == option;
         npg_option_store(option, is_known ? text_of(options, option, at) : option->default_text, state);
     }
-}
-
-/* ---- configuration file ---- */
-
-/* The line of the key `name` of the outermost object, in text that is known to be good JSON. */
-static int line_of_key(const char *text, const char *name)
-{
-    int line = 1, depth = 0;
-    size_t length = strlen(name);
-    for (const char *c = text; *c; c++) {
-        line += *c == '\n';
-        depth += (*c == '{' || *c == '[') - (*c == '}' || *c == ']');
-        if (*c != '"') continue;
-        const char *first = ++c;
-        for (; *c && *c != '"'; c++) c += *c == '\\' && c[1];
-        if (!*c) break;
-        bool is_key = c[1 + strspn(c + 1, " \t\r\n")] == ':';
-        if (depth == 1 && is_key && (size_t)(c - first) == length && !strncmp(first, name, length))
-            return line;
-    }
-    return 0;
-}
-
-npg_status npg_options_set_json(npg_options *options, const char *name, const json_t *value)
-{
-    char number[64];
-    if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
-    if (json_is_boolean(value)) return npg_options_set(options, name, json_is_true(value) ? "yes" : "no");
-    if (json_is_integer(value))
-        snprintf(number, sizeof number, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
-    else if (json_is_real(value))
-        snprintf(number, sizeof number, "%.17g", json_real_value(value));
-    else
-        return npg_error(NPG_USAGE, "option %s: neither text, number nor true/false", name);
-    return npg_options_set(options, name, number);
-}
-
-static npg_status set_all_from_json(npg_options *options, json_t *root, const char *path, const char *text)
-{
-    const char *name;
-    json_t *value;
-    if (!json_is_object(root)) return npg_error(NPG_USAGE, "%s: not a JSON object", path);
-    json_object_foreach(root, name, value)
-    {
-        npg_status status = npg_options_set_json(options, name, value);
-        if (status) return npg_error_prefix(status, "%s:%d", path, line_of_key(text, name));
-    }
-    return NPG_OK;
-}
-
-npg_status npg_options_load(npg_options *options, const char *path)
-{
-    enum { LIMIT = 1 << 20 }; /* bytes; all options together take a few thousand */
-    char *text;
-    json_t *root;
-    NPG_REQUIRE(options && path);
-    NPG_TRY(npg_json_read(&root, &text, path, LIMIT));
-    npg_status status = set_all_from_json(options, root, path, text);
-    npg_release(&text);
-    json_decref(root);
-    return status;
 }

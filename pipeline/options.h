@@ -17,6 +17,7 @@ typedef struct npg_option {
     double min, max;        /* INT and REAL, both inclusive                  */
     const char *choices;    /* CHOICE: "a|b|c"                               */
     const char *value_name; /* for the help: N, DIR, FILE; NULL: by the type */
+    npg_option_use use;
 } npg_option;
 
 /* The rows of a table, a macro for each type: name, place of the value, default, what the value may be, and
@@ -27,32 +28,52 @@ typedef struct npg_option {
  *     NPG_ROW_INT ("epochs", AT(epochs),  "10",    0,     1e6,  "N",
  *         "help"),
  */
-#define NPG_ROW_FLAG(word, place, initial, text)                                                             \
+#define NPG_ROW_FLAG(...)                                                                                    \
     {                                                                                                        \
-        .name = (word), .help = (text), .type = NPG_OPTION_FLAG, .offset = (place),                          \
-        .default_text = (initial)                                                                            \
+        NPG_FLAG_FIELDS(__VA_ARGS__)                                                                         \
     }
-#define NPG_ROW_INT(word, place, initial, least, most, shown, text)                                          \
-    NPG_ROW_NUMBER(NPG_OPTION_INT, word, place, initial, least, most, shown, text)
-#define NPG_ROW_REAL(word, place, initial, least, most, shown, text)                                         \
-    NPG_ROW_NUMBER(NPG_OPTION_REAL, word, place, initial, least, most, shown, text)
-#define NPG_ROW_NUMBER(kind, word, place, initial, least, most, shown, text)                                 \
+#define NPG_ROW_INT(...)                                                                                     \
     {                                                                                                        \
-        .name = (word), .help = (text), .type = (kind), .offset = (place), .default_text = (initial),        \
-        .min = (least), .max = (most), .value_name = (shown)                                                 \
+        NPG_INT_FIELDS(__VA_ARGS__)                                                                          \
     }
-#define NPG_ROW_CHOICE(word, place, initial, words, text)                                                    \
+#define NPG_ROW_REAL(...)                                                                                    \
     {                                                                                                        \
-        .name = (word), .help = (text), .type = NPG_OPTION_CHOICE, .offset = (place),                        \
-        .default_text = (initial), .choices = (words)                                                        \
+        NPG_REAL_FIELDS(__VA_ARGS__)                                                                         \
     }
-#define NPG_ROW_TEXT(word, place, initial, shown, text)                                                      \
+#define NPG_ROW_CHOICE(...)                                                                                  \
     {                                                                                                        \
-        .name = (word), .help = (text), .type = NPG_OPTION_TEXT, .offset = (place),                          \
-        .default_text = (initial), .value_name = (shown)                                                     \
+        NPG_CHOICE_FIELDS(__VA_ARGS__)                                                                       \
+    }
+#define NPG_ROW_TEXT(...)                                                                                    \
+    {                                                                                                        \
+        NPG_TEXT_FIELDS(__VA_ARGS__)                                                                         \
     }
 
-/* A named set of values; what the user sets himself wins.  The list ends with a name
+/* The same for keys of the method, and for what programs alone set: NPG_KEY(INT, "epochs", ...). */
+#define NPG_KEY(type, ...)                                                                                   \
+    {                                                                                                        \
+        NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_METHOD                                              \
+    }
+#define NPG_PROGRAM_ROW(type, ...)                                                                           \
+    {                                                                                                        \
+        NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_PROGRAM                                             \
+    }
+
+#define NPG_FLAG_FIELDS(word, place, initial, text)                                                          \
+    .name = (word), .help = (text), .type = NPG_OPTION_FLAG, .offset = (place), .default_text = (initial)
+#define NPG_INT_FIELDS(...)  NPG_NUMBER_FIELDS(NPG_OPTION_INT, __VA_ARGS__)
+#define NPG_REAL_FIELDS(...) NPG_NUMBER_FIELDS(NPG_OPTION_REAL, __VA_ARGS__)
+#define NPG_NUMBER_FIELDS(kind, word, place, initial, least, most, shown, text)                              \
+    .name = (word), .help = (text), .type = (kind), .offset = (place), .default_text = (initial),            \
+    .min = (least), .max = (most), .value_name = (shown)
+#define NPG_CHOICE_FIELDS(word, place, initial, words, text)                                                 \
+    .name = (word), .help = (text), .type = NPG_OPTION_CHOICE, .offset = (place), .default_text = (initial), \
+    .choices = (words)
+#define NPG_TEXT_FIELDS(word, place, initial, shown, text)                                                   \
+    .name = (word), .help = (text), .type = NPG_OPTION_TEXT, .offset = (place), .default_text = (initial),   \
+    .value_name = (shown)
+
+/* A named method: values of options; what the user sets himself wins.  The list ends with a name
  * of NULL, as does each set. */
 typedef struct npg_preset_value {
     const char *name, *value;
@@ -90,9 +111,20 @@ const npg_custom_stage *npg_options_custom_stage(const npg_options *options, siz
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
 
-/* npg_options_set() from a JSON text, number or true/false. */
+/* npg_options_set() from a JSON text, number or true/false; of "method" also an object of keys. */
 struct json_t;
 npg_status npg_options_set_json(npg_options *options, const char *name, const struct json_t *value);
+
+/* The same, where a method can only be one of the names: inside a method. */
+npg_status npg_options_set_key(npg_options *options, const char *name, const struct json_t *value);
+
+/* What a method of the published code asked for that has no counterpart here, separated by commas; "" when
+ * there is nothing.  The setter takes over the text. */
+const char *npg_options_ignored(const npg_options *options);
+void npg_options_ignore(npg_options *options, char **text);
+
+/* Why there is no option of this name, and what to do instead; NULL when there never was one. */
+const char *npg_option_gone(const char *name);
 
 /* Check `text` against an option; NPG_USAGE says what it takes. */
 npg_status npg_option_check(const npg_option *option, const char *text);

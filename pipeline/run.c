@@ -18,45 +18,45 @@
 
 /* clang-format off */
 const npg_option npg_run_options[] = {
-    /* type        name          place               default    least  most          shown as or words */
-    NPG_ROW_TEXT  ("input",      AT(input),          "",        "PATH",
+    /* type               name          place               default      least most  shown as or words */
+    NPG_ROW_TEXT(         "input",      AT(input),          "",          "PATH",
         "Folder, pattern (frame_%04d.ply), list file, a rig of depth sensors (rig.json, or a folder of depth "
         "images), or - for standard input; empty: frames are pushed"),
-    NPG_ROW_TEXT  ("follow",     AT(follow),         "",        "DIR",
+    NPG_ROW_TEXT(         "follow",     AT(follow),         "",          "DIR",
         "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): "
         "its files are frames as they are complete; takes the place of the input"),
-    NPG_ROW_TEXT  ("reference",  AT(reference),      "",        "FILE",
+    NPG_ROW_TEXT(         "reference",  AT(reference),      "",          "FILE",
         "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one"),
-    NPG_ROW_TEXT  ("output",     AT(output),         "",        "DIR",
+    NPG_ROW_TEXT(         "output",     AT(output),         "",          "DIR",
         "Folder for the results; empty: results are only pulled"),
-    NPG_ROW_CHOICE("colour",     AT(colour),         "reference", "reference|frames|no",
+    NPG_ROW_CHOICE(       "colour",     AT(colour),         "reference", "reference|frames|no",
         "Colours of points that have any: one per vertex, the robust mean of all frames that saw it "
         "(reference), as each frame saw it (frames), or none"),
-    NPG_ROW_CHOICE("preset",     AT(preset),         "default", "default|best|paper|paper-1000|grids",
-        "A named set of option values"),
-    NPG_ROW_CHOICE("quality",    AT(quality),        "usual",   "usual|best",
-        "usual, or best: the preset of that name, slower and closer"),
-    NPG_ROW_TEXT  ("device",     AT(device),         "auto",    "DEVICE",
+    NPG_ROW_CHOICE(       "method",     AT(method),         "default",
+        "default|best|paper|paper-1000|grids",
+        "How it is done: a name, a JSON file of its keys, or such an object itself, "
+        "'{\"preset\": \"paper\", \"epochs\": 100}'"),
+    NPG_ROW_TEXT(         "device",     AT(device),         "auto",      "DEVICE",
         "OpenCL device of fits without alignment: part of its name, its number, or auto (neupig doctor "
         "lists them)"),
-    NPG_ROW_TEXT  ("tuning",     AT(tuning),         "auto",    "SET",
+    NPG_KEY(TEXT,         "tuning",     AT(tuning),         "auto",      "SET",
         "parameters of its kernels: auto (what neupig tune found, else by device), "
         "wide, narrow, gpu, or a file"),
-    NPG_ROW_INT   ("seed",       AT(seed),           "0",       0,     4294967295.0, NULL,
+    NPG_ROW_INT(          "seed",       AT(seed),           "0",         0, 4294967295.0, NULL,
         "Seed of all random numbers"),
-    NPG_ROW_FLAG  ("keep-going", AT(keep_going),     "no",
+    NPG_ROW_FLAG(         "keep-going", AT(keep_going),     "no",
         "Skip frames that can't be used instead of stopping; ends with exit code 7"),
-    NPG_ROW_FLAG  ("confine",    AT(confine),        "no",
+    NPG_ROW_FLAG(         "confine",    AT(confine),        "no",
         "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), "
         "true meshes outside the truth's, and links in the place of the output's own folders; "
         "in a batch it is on unless the batch says otherwise"),
-    NPG_ROW_INT   ("ring",       AT(ring_capacity),  "2",       1,     1024,         NULL,
+    NPG_PROGRAM_ROW(INT,  "ring",       AT(ring_capacity),  "2",         1, 1024, NULL,
         "Chunks that may wait between two stages"),
-    NPG_ROW_INT   ("chunk",      AT(chunk_frames),   "4",       1,     1024,         NULL,
+    NPG_PROGRAM_ROW(INT,  "chunk",      AT(chunk_frames),   "4",         1, 1024, NULL,
         "Frames per chunk"),
-    NPG_ROW_INT   ("max-memory", AT(max_memory_mib), "0",       0,     1e9,          "MIB",
+    NPG_ROW_INT(          "max-memory", AT(max_memory_mib), "0",         0, 1e9,  "MIB",
         "Stop rather than use more than this, in MiB; 0: no limit"),
-    NPG_ROW_FLAG  ("pull",       AT(pull),           "no",
+    NPG_PROGRAM_ROW(FLAG, "pull",       AT(pull),           "no",
         "Finished frames are also pulled through the library"),
     {0}};
 /* clang-format on */
@@ -318,12 +318,24 @@ static npg_status begin(npg_run *run)
     return status;
 }
 
+/* Of a method of the published code. */
+static void warn_of_ignored(npg_run *run)
+{
+    char text[1024];
+    const char *ignored = npg_options_ignored(run->options);
+    if (!*ignored) return;
+    snprintf(text, sizeof text, "method: no counterpart here, so without effect: %s", ignored);
+    npg_run_log(run, NPG_LOG_WARNING, "run", -1, text);
+    json_object_set_new(run->report, "method_ignored", npg_json_text(ignored));
+}
+
 static npg_status do_passes(npg_run *run)
 {
     npg_status begun = begin(run);
     if (begun == NPG_END) npg_latch_abort(run->begun_latch); /* nobody waits for passes that never come */
     if (begun) return begun == NPG_END ? NPG_OK : begun;
     npg_latch_raise(run->begun_latch, 1);
+    warn_of_ignored(run);
     if (!run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));

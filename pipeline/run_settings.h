@@ -10,8 +10,7 @@ typedef enum npg_colour_mode { NPG_COLOUR_REFERENCE, NPG_COLOUR_FRAMES, NPG_COLO
 typedef struct npg_settings {
     const char *input, *follow, *output, *device, *tuning;
     const char *reference; /* the user's own mesh; "": one is to be made */
-    int preset, quality;   /* places of their words */
-    int colour;            /* npg_colour_mode       */
+    int method, colour;    /* place of its word; npg_colour_mode */
     int64_t seed;
     int64_t ring_capacity;  /* chunks per ring                       */
     int64_t chunk_frames;   /* frames per chunk                      */

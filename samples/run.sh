@@ -23,7 +23,7 @@ build/neupig synth -o "$out/capture" --frames "$frames" --points 5000 --noise 0.
 
 echo "== The main job"
 code=0
-build/neupig run "$out/capture/points" -o "$out/result" --epochs "$epochs" || code=$?
+build/neupig run "$out/capture/points" -o "$out/result" --method "{\"epochs\": $epochs}" || code=$?
 # 7: finished, with frames below the quality bar; the report says which
 [ "$code" -eq 0 ] || [ "$code" -eq 7 ] || exit "$code"
 

@@ -40,6 +40,7 @@ pcd() { # FIELDS SIZES TYPES COUNTS POINTS DATA
 
 printf '{"whole": 3, "real": 1.5e3, // a word\n "flag": true, "choice": "two", "text": "a\\u00e9\\n", "seed": 4294967295}\n' >config/all
 printf '{"preset": "paper", "input": "in/%%04d.ply", "keep-going": "no", "chunk": 1024}' >config/run
+printf '{"optimization": {"epochs": 2}, "grid": {"solver": "CG", "whole": 3}, "rotation_method": "x"}' >config/published
 printf '{"text": "// no comment \\" here", "whole": -5}//' >config/comment
 
 block() { # NAME SIZE BYTES: as in pipeline/archive.h
@@ -62,7 +63,7 @@ block() { # NAME SIZE BYTES: as in pipeline/archive.h
 printf '{"number":7,"index":0,"name":"a_07.ply","digits":0,"bytes":80,"xxh3":"00ff00ff00ff00ff"}\n{"number":8,"index":1,"missing":true,"held":true}\n{"number":9,"name":[97,255],"digits":1,"skipped":true}\n' >inputs/folder
 printf '{"number":-1,"index":0,"bytes":500,"xxh3":"1"}\n' >inputs/pushed
 mkdir -p manifest
-printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "config": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
+printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "method": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
 printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names
 mkdir -p request
 printf 'GET /frame-0-12 HTTP/1.1\r\nUser-Agent: a\r\nHost: 127.0.0.1:8080\r\n\r\n' >request/frame

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "pipeline/stage.h"
-#include "tools/method_config.h"
 
 enum { NAME_LIMIT = 64, HELP_INDENT = 28, HELP_WIDTH = 100 };
 
@@ -25,12 +24,13 @@ npg_status npg_cli_option(npg_option_info *info, const npg_verb *verb, size_t i)
         if (i-- == 0) {
             *info = (npg_option_info){sizeof *info,         verb->name,      option->name,       option->help,
                                       option->default_text, option->choices, option->value_name, option->type,
-                                      option->min,          option->max};
+                                      option->min,          option->max,     option->use};
             return NPG_OK;
         }
-    if (!verb->with_run_options) return NPG_END;
     info->struct_size = sizeof *info;
-    return npg_options_describe(i, info);
+    for (size_t j = 0; verb->with_run_options && npg_options_describe(j, info) == NPG_OK; j++)
+        if (info->use == NPG_USE_COMMON && i-- == 0) return NPG_OK;
+    return NPG_END;
 }
 
 static bool find_option(npg_option_info *info, const npg_verb *verb, const char *name)
@@ -59,9 +59,34 @@ static size_t edit_distance(const char *a, const char *b)
     return row[b_length];
 }
 
-static npg_status unknown_option(const npg_verb *verb, const char *name)
+/* An option of the library that is none of the command; value NULL: none was given. */
+static npg_status refuse_option(const npg_option_info *info, const char *value)
+{
+    bool is_bare = info->type != NPG_OPTION_TEXT && info->type != NPG_OPTION_CHOICE;
+    const char *quote = is_bare ? "" : "\"";
+    if (info->use == NPG_USE_PROGRAM)
+        return npg_error(NPG_USAGE, "option %s is for programs that use the library", info->name);
+    if (info->type == NPG_OPTION_FLAG) value = value && !strcmp(value, "no") ? "false" : "true";
+    return npg_error(NPG_USAGE, "option --%s is a key of the method now: --method '{\"%s\": %s%s%s}'",
+                     info->name, info->name, quote, value ? value : info->default_text, quote);
+}
+
+static bool find_in_run(npg_option_info *info, const npg_verb *verb, const char *name)
+{
+    info->struct_size = sizeof *info;
+    for (size_t i = 0; verb->with_run_options && npg_options_describe(i, info) == NPG_OK; i++)
+        if (!strcmp(info->name, name)) return true;
+    return false;
+}
+
+static npg_status unknown_option(const npg_verb *verb, const char *name, const char *value)
 {
     npg_option_info info;
+    const char *gone = verb->with_run_options ? npg_option_gone(name) : NULL;
+    bool is_no = !strncmp(name, "no-", 3);
+    if (gone) return npg_error(NPG_USAGE, "option --%s went: %s", name, gone);
+    if (find_in_run(&info, verb, name)) return refuse_option(&info, value);
+    if (is_no && find_in_run(&info, verb, name + 3)) return refuse_option(&info, "no");
     const char *nearest = NULL;
     size_t least = strlen(name) / 3 + 2; /* more edits than a third of the name: not a slip of the hand */
     for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
@@ -80,6 +105,7 @@ static npg_status unknown_option(const npg_verb *verb, const char *name)
 static npg_status set_option(npg_cli *cli, const char *name, const char *value)
 {
     const npg_option *own = own_option(cli->verb, name);
+    if (!own && !strcmp(name, "method")) return NPG_OK; /* read before the others */
     if (!own) return npg_options_set(cli->options, name, value);
     NPG_TRY(npg_option_check(own, value));
     npg_option_store(own, value, cli->values);
@@ -106,7 +132,7 @@ static npg_status parse_long_option(npg_cli *cli, int argc, char **argv, int *i)
         if (equals) return npg_error(NPG_USAGE, "option --%s takes no value", name);
         return set_option(cli, name + 3, "no");
     }
-    return unknown_option(cli->verb, name);
+    return unknown_option(cli->verb, name, equals ? equals + 1 : *i + 1 < argc ? argv[*i + 1] : NULL);
 }
 
 static npg_status parse_short_option(npg_cli *cli, int argc, char **argv, int *i)
@@ -114,7 +140,7 @@ static npg_status parse_short_option(npg_cli *cli, int argc, char **argv, int *i
     static const struct {
         char letter;
         const char *name;
-    } shorts[] = {{'o', "output"}, {'q', "quiet"}, {'v', "verbose"}, {'c', "config"}};
+    } shorts[] = {{'o', "output"}, {'q', "quiet"}, {'v', "verbose"}};
     const char *text = argv[*i];
     npg_option_info info;
     for (size_t s = 0; s < sizeof shorts / sizeof *shorts; s++) {
@@ -127,14 +153,14 @@ static npg_status parse_short_option(npg_cli *cli, int argc, char **argv, int *i
     return npg_error(NPG_USAGE, "there is no option %s (neupig help %s lists them)", text, cli->verb->name);
 }
 
-/* Load the file that --config names, before anything on the command line is set. */
-static npg_status load_config(npg_cli *cli, int argc, char **argv)
+/* Read what --method says, before anything else on the command line is set. */
+static npg_status read_methods(npg_cli *cli, int argc, char **argv)
 {
-    if (!cli->options || !own_option(cli->verb, "config")) return NPG_OK;
-    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
-        if (!strncmp(argv[i], "--config=", 9)) NPG_TRY(npg_config_load(cli->options, argv[i] + 9));
-        if (strcmp(argv[i], "--config") != 0 && strcmp(argv[i], "-c") != 0) continue;
-        if (i + 1 < argc) NPG_TRY(npg_config_load(cli->options, argv[i + 1]));
+    for (int i = 1; cli->options && i < argc && strcmp(argv[i], "--") != 0; i++) {
+        if (!strncmp(argv[i], "--method=", 9))
+            NPG_TRY(npg_options_set(cli->options, "method", argv[i] + 9));
+        else if (!strcmp(argv[i], "--method") && i + 1 < argc)
+            NPG_TRY(npg_options_set(cli->options, "method", argv[++i]));
     }
     return NPG_OK;
 }
@@ -174,7 +200,7 @@ npg_status npg_cli_parse(npg_cli *cli, const char *name, void *values, npg_optio
     }
     for (const npg_option *option = verb->options; option && option->name; option++)
         npg_option_store(option, option->default_text, values);
-    NPG_TRY(load_config(cli, argc, argv));
+    NPG_TRY(read_methods(cli, argc, argv));
     NPG_TRY(parse_all(cli, argc, argv));
     if (cli->operand_count < verb->operands_min)
         return npg_error(NPG_USAGE, "missing operand; usage: neupig %s %s", name, verb->operands);
@@ -243,7 +269,10 @@ static void print_wrapped(FILE *out, const char *text, int *column, int indent)
 static void print_option(FILE *out, const npg_option_info *option)
 {
     char spelled[NAME_LIMIT + 32], limits[256], bracketed[260];
-    npg_cli_spell(spelled, sizeof spelled, option);
+    if (option->use == NPG_USE_METHOD)
+        snprintf(spelled, sizeof spelled, "%s", option->name);
+    else
+        npg_cli_spell(spelled, sizeof spelled, option);
     npg_cli_limits(limits, sizeof limits, option);
     int column = fprintf(out, "  %s", spelled);
     if (column + 1 > HELP_INDENT) {
@@ -275,10 +304,19 @@ void npg_cli_print_verb(FILE *out, const npg_verb *verb)
         stage = info.stage;
         print_option(out, &info);
     }
-    for (const npg_preset *preset = verb->with_run_options ? npg_presets : NULL; preset && preset->name;
-         preset++)
-        fprintf(out, "%s  %-12s%s\n", preset == npg_presets ? "\nPresets:\n" : "", preset->name,
-                preset->help);
+}
+
+void npg_cli_print_method(FILE *out)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    fputs("--method NAME, --method FILE.json, or --method '{\"preset\": \"NAME\", \"KEY\": VALUE, ...}'; "
+          "several add up.\n\nNames:\n",
+          out);
+    for (const npg_preset *preset = npg_presets; preset->name; preset++)
+        fprintf(out, "  %-26s%s\n", preset->name, preset->help);
+    fputs("\nKeys, beside all options of neupig run:\n", out);
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        if (info.use == NPG_USE_METHOD) print_option(out, &info);
 }
 
 void npg_cli_print_verbs(FILE *out)

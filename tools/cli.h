@@ -14,8 +14,8 @@ typedef struct npg_cli {
     int operand_count;
 } npg_cli;
 
-/* Read argv: --name VALUE, --name=VALUE, --flag, --no-flag, -o DIR, --config FILE; "--" ends the options
- * and a lone "-" is an operand.  What stands on the command line wins over the configuration file.
+/* Read argv: --name VALUE, --name=VALUE, --flag, --no-flag, -o DIR; "--" ends the options
+ * and a lone "-" is an operand.  What stands on the command line wins over what --method says.
  * Fills cli, values and options.  NPG_END when help was asked for and has been printed; NPG_USAGE
  * names the nearest option. */
 npg_status npg_cli_parse(npg_cli *cli, const char *verb, void *values, npg_options *options, int argc,
@@ -27,6 +27,9 @@ int npg_cli_end(const char *verb, npg_status status);
 /* Help of one verb, and the list of all verbs. */
 void npg_cli_print_verb(FILE *out, const npg_verb *verb);
 void npg_cli_print_verbs(FILE *out);
+
+/* The methods, and the keys of their JSON. */
+void npg_cli_print_method(FILE *out);
 
 /* "--name VALUE" as the help shows it; size includes the closing zero. */
 void npg_cli_spell(char *out, size_t size, const npg_option_info *option);

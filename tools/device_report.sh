@@ -52,9 +52,9 @@ for count in $frames; do
     capture=$out/capture_$count result=$out/paper_$count
     [ -d "$capture" ] || "$neupig" synth --frames "$count" --points "${POINTS:-5000}" -o "$capture" >"$out/synth_$count.txt"
     epochs=()
-    [ -z "${EPOCHS:-}" ] || epochs=(--epochs "$EPOCHS")
+    [ -z "${EPOCHS:-}" ] || epochs=(--method "{\"epochs\": $EPOCHS}")
     code=0
-    "$neupig" run "$capture/points" -o "$result" --preset paper --device "$device" --tuning "$tuning" --restart --quiet \
+    "$neupig" run "$capture/points" -o "$result" --method "{\"preset\": \"paper\", \"tuning\": \"$tuning\"}" --device "$device" --restart --quiet \
         "${epochs[@]}" "${run_options[@]}" || code=$?
     [ "$code" -eq 0 ] || [ "$code" -eq 7 ] || exit "$code" # 7: below the bar of quality, which the figures show
     "$neupig" eval "$result/meshes" "$capture/truth" --json >"$out/eval_$count.json"

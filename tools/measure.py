@@ -56,11 +56,23 @@ def explains(folder):
     return {"point_dist_median": figures["point_dist_median"]["mean"], "coverage": figures["coverage"]["mean"]}
 
 
+def method_of(options):
+    """Options written as --name value or --no-name, as one object for --method: keys of the method may be among them."""
+    method, name = {}, ""
+    for word in (part for option in options for part in option.split("=", option.startswith("--"))):
+        if word.startswith("--"):
+            name = word[2:]
+            method[name.removeprefix("no-")] = not name.startswith("no-")
+        else:
+            method[name] = word
+    return ["--method", json.dumps(method)] if method else []
+
+
 def measure(neupig, points, truth, frames, options, folder):
     """One run into FOLDER and its figures; exit code 7 (below the quality bar) is a result too."""
     chosen = ["--frames", frames] if frames else []
     shutil.rmtree(folder, ignore_errors=True)
-    result = timed([neupig, "run", points, "-o", folder, "--quiet"] + chosen + options, folder + ".log")
+    result = timed([neupig, "run", points, "-o", folder, "--quiet"] + chosen + method_of(options), folder + ".log")
     if result["exit_code"] in (0, 7):
         result.update(explains(folder))
         if truth:

@@ -23,10 +23,10 @@ const npg_verb npg_verbs[] = {
      npg_append_options, false, npg_verb_append},
     {"batch", "MANIFEST|DIR [-o DIR]", 1, 1, "Run many captures, each in its own folder and process",
      "MANIFEST is a JSON file: {\"output\": \"results\", "
-     "\"defaults\": {\"epochs\": 60, \"max-time\": 7200}, "
+     "\"defaults\": {\"method\": \"best\", \"max-time\": 7200}, "
      "\"captures\": [{\"input\": \"dancer\"}, {\"input\": \"scan_%04d.ply\", \"name\": \"horse\"}]}; "
-     "what stands in defaults and captures are options of neupig run, "
-     "and \"config\", \"max-time\" and \"segments\"; paths are seen from the file; the command line wins.  "
+     "what stands in defaults and captures are options of neupig run and keys of its method, "
+     "and \"max-time\" and \"segments\"; paths are seen from the file; the command line wins.  "
      "Of a DIR every sub-folder is a capture; the folders of the paper's published code "
      "(point_clouds/ or gt/ in each) are understood, and what lies in truth/ or gt/ is compared with.  "
      "Each capture gets OUT/NAME with its results, log.jsonl and verdict.json; "
@@ -98,8 +98,10 @@ const npg_verb npg_verbs[] = {
      "every kernel on each device with its plain twin.  "
      "Exit code 4 when there is no device or one computes wrong.",
      npg_doctor_options, false, npg_verb_doctor},
-    {"help", "[VERB]", 0, 1, "Show the verbs, or the options of one",
-     "Without VERB, lists the verbs; with one, its usage and options.", NULL, false, npg_verb_help},
+    {"help", "[VERB|method]", 0, 1, "Show the verbs, the options of one, or the keys of the method",
+     "Without VERB, lists the verbs; with one, its usage and options.  "
+     "help method lists what --method of run takes.",
+     NULL, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page, or shell completion",
      "Prints the manual page in roff, made from the same tables as the help.  "
      "Read it with: neupig man | man -l -",
@@ -131,6 +133,10 @@ int npg_verb_help(int argc, char **argv)
         return 0;
     }
     const npg_verb *verb = npg_verb_find(cli.operands[0]);
+    if (!strcmp(cli.operands[0], "method")) {
+        npg_cli_print_method(stdout);
+        return 0;
+    }
     if (!verb) return unknown_verb(cli.operands[0]);
     npg_cli_print_verb(stdout, verb);
     return 0;

@@ -140,9 +140,13 @@ def unknown_options(options, known):
 
 def known_options(neupig):
     """Options and presets of neupig run; a row with one that it does not have is of another version, and not run."""
-    text = subprocess.run([neupig, "help", "run"], check=True, stdout=subprocess.PIPE, text=True).stdout
-    presets = [line.split()[0] for line in text.partition("Presets:\n")[2].splitlines() if line.strip()]
-    options = set(re.findall(r"--[a-z][a-z0-9-]*", text))
+    def shown(subject):
+        return subprocess.run([neupig, "help", subject], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+    text = shown("method")
+    presets = [line.split()[0] for line in text.partition("Names:\n")[2].partition("\n\n")[0].splitlines()]
+    options = {"--" + key for key in re.findall(r"^  ([a-z][a-z0-9-]*)", text.partition("Keys")[2], re.M)}
+    options |= set(re.findall(r"--[a-z][a-z0-9-]*", shown("run")))
     return options | {"--no-" + option[2:] for option in options} | {f"--preset {name}" for name in presets}
 
 

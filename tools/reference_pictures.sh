@@ -18,7 +18,7 @@ draw() {
     shift 3
     for from in key all; do
         code=0
-        "$neupig" run "$work/$name/points" -o "$work/$name-$from" --reference-from $from --keyframe "$((10#$key))" "$@" \
+        "$neupig" run "$work/$name/points" -o "$work/$name-$from" --method "{\"reference-from\": \"$from\"}" --keyframe "$((10#$key))" "$@" \
             >"$work/log" 2>&1 || code=$?
         # 7: finished, with frames below the quality bar
         [ $code -eq 0 ] || [ $code -eq 7 ] || { cat "$work/log" && exit $code; }

@@ -9,7 +9,6 @@
 #include "tools/cli.h"
 
 typedef struct settings {
-    const char *config;
     int progress, segments;
     bool quiet, verbose, dry_run, list, report, view;
     int64_t jobs, task_index, task_count;
@@ -21,9 +20,6 @@ typedef struct settings {
 /* clang-format off */
 const npg_option npg_batch_options[] = {
     /* type        name          place           default     least  most  shown as or words */
-    NPG_ROW_TEXT  ("config",     AT(config),     "",         "FILE",
-        "Options for all captures from a JSON object in FILE, "
-        "or a method configuration of the paper's published code (also -c)"),
     NPG_ROW_INT   ("jobs",       AT(jobs),       "1",        1,     256,  "N",
         "Captures at work at the same time; each uses all cores"),
     NPG_ROW_REAL  ("max-time",   AT(max_time_s), "-1",       -1,    1e9,  "SECONDS",
@@ -111,6 +107,7 @@ static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settin
                          "option task-index: %lld is not below the task-count of %lld; the first task is 0",
                          (long long)s->task_index, (long long)s->task_count);
     NPG_TRY(npg_batch_open(batch, cli->operands[0], &given));
+    npg_batch_warn_of_ignored(cli->options, "--method");
     (*batch)->has_views = s->view;
     (*batch)->task_index = (size_t)s->task_index;
     (*batch)->task_count = (size_t)s->task_count;

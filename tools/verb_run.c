@@ -15,7 +15,7 @@
 #include "tools/segments/segments.h"
 
 typedef struct settings {
-    const char *config, *log_file, *rig;
+    const char *log_file;
     int progress;
     bool quiet, verbose;
     int segments;
@@ -26,9 +26,6 @@ typedef struct settings {
 /* clang-format off */
 const npg_option npg_run_verb_options[] = {
     /* type        name        place         default  words or shown as */
-    NPG_ROW_TEXT  ("config",   AT(config),   "",      "FILE",
-        "Read options from a JSON object in FILE, "
-        "or take a method configuration of the paper's published code; the command line wins (also -c)"),
     NPG_ROW_CHOICE("progress", AT(progress), "auto",  "auto|bar|json|none",
         "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal"),
     NPG_ROW_TEXT  ("log-file", AT(log_file), "",      "FILE",
@@ -37,9 +34,6 @@ const npg_option npg_run_verb_options[] = {
         "Log warnings and errors only (also -q)"),
     NPG_ROW_FLAG  ("verbose",  AT(verbose),  "no",
         "Log everything (also -v)"),
-    NPG_ROW_TEXT  ("rig",      AT(rig),      "",      "PATH",
-        "Depth images instead of clouds: a rig.json, or a folder of TUM RGB-D, Redwood (Open3D) or OpenCV "
-        "files; the same as giving it as the input"),
     NPG_ROW_CHOICE("segments", AT(segments), "one",   "one|auto",
         "Where the topology changes: one reference all the same, with an alarm (one), "
         "or another reference from there on, each with its frames in OUT/segment_* (auto)"),
@@ -186,11 +180,8 @@ npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
     return status;
 }
 
-static npg_status check_paths(npg_options *options, const npg_cli *cli, const char *rig)
+static npg_status check_paths(npg_options *options, const npg_cli *cli)
 {
-    if (rig[0] && cli->operand_count)
-        return npg_error(NPG_USAGE, "frames come either from %s or from the rig %s", cli->operands[0], rig);
-    if (rig[0]) NPG_TRY(npg_options_set(options, "input", rig));
     if (cli->operand_count) NPG_TRY(npg_options_set(options, "input", cli->operands[0]));
     if (!npg_options_get(options, "input")[0] && !npg_options_get(options, "follow")[0])
         return npg_error(NPG_USAGE, "no input; usage: neupig run %s", cli->verb->operands);
@@ -217,7 +208,7 @@ int npg_verb_run(int argc, char **argv)
     npg_options *options = NULL;
     npg_status status = npg_options_open(&options);
     if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
-    if (!status) status = check_paths(options, &cli, s.rig);
+    if (!status) status = check_paths(options, &cli);
     if (!status) {
         npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
         status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));

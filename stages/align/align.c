@@ -56,18 +56,18 @@ typedef struct state {
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type      name               place          default  least  most   shown as */
-    NPG_ROW_FLAG("align",           AT(is_on),     "yes",
+    /* type       name               place          default  least most  shown as */
+    NPG_KEY(FLAG, "align",           AT(is_on),     "yes",
         "bring the reference coarsely into each frame before the joint fit"),
-    NPG_ROW_INT ("align-nodes",     AT(nodes),     "1600",  4,     20000, "N",
+    NPG_KEY(INT,  "align-nodes",     AT(nodes),     "1600",  4,   20000, "N",
         "nodes of the deformation graph, about"),
-    NPG_ROW_INT ("align-samples",   AT(samples),   "5000",  100,   1e6,   "N",
+    NPG_KEY(INT,  "align-samples",   AT(samples),   "5000",  100, 1e6,   "N",
         "points of a frame, and of the surface, that the coarse alignment looks at"),
-    NPG_ROW_INT ("align-steps",     AT(steps),     "12",    1,     1000,  "N",
+    NPG_KEY(INT,  "align-steps",     AT(steps),     "12",    1,   1000,  "N",
         "most Gauss-Newton steps of a frame"),
-    NPG_ROW_REAL("align-stiffness", AT(stiffness), "0.006", 0,     1e6,   NULL,
+    NPG_KEY(REAL, "align-stiffness", AT(stiffness), "0.006", 0,   1e6,   NULL,
         "weight of the graph's edges against the distances"),
-    NPG_ROW_REAL("align-along",     AT(along),     "0.001", 0,     1,     NULL,
+    NPG_KEY(REAL, "align-along",     AT(along),     "0.001", 0,   1,     NULL,
         "share of distances along the surface, 0 to 1"),
     {0}};
 /* clang-format on */

@@ -399,35 +399,35 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type        name               place                   default   least  most  shown as or words */
-    NPG_ROW_REAL  ("max-residual",    AT(residual_max),       "0.5",    0,     100,  "PERCENT",
+    /* type                 name               place                   default   least most  shown as or words */
+    NPG_ROW_REAL(           "max-residual",    AT(residual_max),       "0.5",    0, 100,  "PERCENT",
         "A frame is good when the median distance of its points to the surface is at most this, "
         "in per cent of the figure's diagonal, and 95 % of the points lie within twice that"),
-    NPG_ROW_REAL  ("min-coverage",    AT(coverage_min),       "50",     0,     100,  "PERCENT",
+    NPG_ROW_REAL(           "min-coverage",    AT(coverage_min),       "50",     0, 100,  "PERCENT",
         "... and at least this share of the surface that the keyframe saw has points near it, in per cent; "
         "half as much in frames that one sensor saw"),
-    NPG_ROW_REAL  ("max-flipped",     AT(flipped_max),        "1",      0,     100,  "PERCENT",
+    NPG_ROW_REAL(           "max-flipped",     AT(flipped_max),        "1",      0, 100,  "PERCENT",
         "... and at most this share of its faces is turned over, in per cent"),
-    NPG_ROW_REAL  ("max-stretched",   AT(stretched_max),      "5",      0,     100,  "PERCENT",
+    NPG_ROW_REAL(           "max-stretched",   AT(stretched_max),      "5",      0, 100,  "PERCENT",
         "... and at most this share of its faces grew or shrank tenfold, in per cent"),
-    NPG_ROW_REAL  ("max-unsupported", AT(unsupported_max),    "10",     0,     100,  "PERCENT",
+    NPG_ROW_REAL(           "max-unsupported", AT(unsupported_max),    "10",     0, 100,  "PERCENT",
         "... and at most this share of its surface has no points near it, "
         "neither of the frames that the reference was made from (of a given mesh: of the keyframe, "
         "where its sensors could see it) nor of its own, in per cent"),
-    NPG_ROW_REAL  ("cover-distance",  AT(measured.cover_dist),"1",      0,     100,  "PERCENT",
+    NPG_ROW_REAL(           "cover-distance",  AT(measured.cover_dist), "1",      0, 100,  "PERCENT",
         "How near a point must be to cover the surface, in per cent of the diagonal"),
-    NPG_ROW_INT   ("evaluate-points", AT(measured.point_limit),"100000", 0,     1e12, NULL,
+    NPG_KEY(INT,            "evaluate-points", AT(measured.point_limit), "100000", 0, 1e12, NULL,
         "Points per frame that figures are taken from, evenly spread over the file; 0: all"),
-    NPG_ROW_TEXT  ("truth",           AT(truth_folder),       "",       "DIR",
+    NPG_ROW_TEXT(           "truth",           AT(truth_folder),       "",       "DIR",
         "Folder with the true meshes, numbered as the frames: their figures go into the report"),
-    NPG_ROW_CHOICE("alarm",           AT(watch.mode),         "report", "report|split",
+    NPG_PROGRAM_ROW(CHOICE, "alarm",           AT(watch.mode),         "report", "report|split",
         "Where the reference no longer explains the points: "
         "say so and go on, or end there (what --segments auto asks for)"),
-    NPG_ROW_INT   ("segment-min",     AT(watch.segment_min),  "8",      1,     1e9,  NULL,
+    NPG_KEY(INT,            "segment-min",     AT(watch.segment_min),  "8",      1, 1e9,  NULL,
         "Frames that a segment has at least; shorter ones are left to their neighbour, with exit code 7"),
-    NPG_ROW_INT   ("shared-first",    AT(watch.shared_first), "0",      0,     1e9,  NULL,
+    NPG_PROGRAM_ROW(INT,    "shared-first",    AT(watch.shared_first), "0",      0, 1e9,  NULL,
         "Frames at the beginning that another segment explains: solved, but not judged"),
-    NPG_ROW_INT   ("shared-last",     AT(watch.shared_last),  "0",      0,     1e9,  NULL,
+    NPG_PROGRAM_ROW(INT,    "shared-last",     AT(watch.shared_last),  "0",      0, 1e9,  NULL,
         "The same at the end"),
     {0}};
 /* clang-format on */

@@ -560,34 +560,34 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type        name            place             default  least  most  shown as or words */
-    NPG_ROW_TEXT  ("export",       AT(exports),      "",      "LIST",
+    /* type         name            place             default  least  most  shown as or words */
+    NPG_ROW_TEXT(   "export",       AT(exports),      "",      "LIST",
         "What to write, any of ply, obj (sequences), pc2, mdd (point caches), "
         "glb, usda, npz, vdb, with commas; a sequence is always there (see format)"),
-    NPG_ROW_CHOICE("format",       AT(format),       "ply",   "ply|obj",
+    NPG_ROW_CHOICE( "format",       AT(format),       "ply",   "ply|obj",
         "Format of the mesh sequence where export names none"),
-    NPG_ROW_TEXT  ("prefix",       AT(prefix),       "frame", "NAME",
+    NPG_ROW_TEXT(   "prefix",       AT(prefix),       "frame", "NAME",
         "First part of the mesh files' names"),
-    NPG_ROW_CHOICE("numbering",    AT(numbering),    "file",  "file|index",
+    NPG_ROW_CHOICE( "numbering",    AT(numbering),    "file",  "file|index",
         "Number of a mesh file: as in the input's name, or the place in the sequence"),
-    NPG_ROW_REAL  ("scale",        AT(scale),        "1",     1e-12, 1e12, NULL,
+    NPG_ROW_REAL(   "scale",        AT(scale),        "1",     1e-12, 1e12, NULL,
         "Multiply all written coordinates by this"),
-    NPG_ROW_TEXT  ("axes",         AT(axes),         "xyz",   "AXES",
+    NPG_ROW_TEXT(   "axes",         AT(axes),         "xyz",   "AXES",
         "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up"),
-    NPG_ROW_REAL  ("fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
+    NPG_ROW_REAL(   "fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
         "Frames per second of the capture, for the report and formats that carry time"),
-    NPG_ROW_CHOICE("up",           AT(up),           "y",     "y|z",
+    NPG_ROW_CHOICE( "up",           AT(up),           "y",     "y|z",
         "Axis that points up in the written coordinates, for forms that record it"),
-    NPG_ROW_CHOICE("unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
+    NPG_ROW_CHOICE( "unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
         "Unit of the written coordinates, for forms that record it"),
-    NPG_ROW_FLAG  ("centre",       AT(is_centred),   "no",
+    NPG_ROW_FLAG(   "centre",       AT(is_centred),   "no",
         "Write coordinates relative to the middle of the capture's box, which done.json then names: "
         "for captures far from 0"),
-    NPG_ROW_REAL  ("vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
+    NPG_KEY(REAL,   "vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
         "Voxel of the level sets, as a share of the longest side of the capture's box"),
-    NPG_ROW_FLAG  ("mesh-normals", AT(with_normals), "no",
+    NPG_KEY(FLAG,   "mesh-normals", AT(with_normals), "no",
         "Write vertex normals into every mesh"),
-    NPG_ROW_FLAG  ("overwrite",    AT(overwrite),    "no",
+    NPG_ROW_FLAG(   "overwrite",    AT(overwrite),    "no",
         "Remove meshes that an earlier run left in the output folder"),
     {0}};
 /* clang-format on */

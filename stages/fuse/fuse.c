@@ -89,11 +89,11 @@ typedef struct state {
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type        name              place       default  least  most  shown as or words */
-    NPG_ROW_CHOICE("reference-from", AT(from),   "all",   "key|all",
+    /* type         name                place       default least most  shown as or words */
+    NPG_KEY(CHOICE, "reference-from",   AT(from),   "all", "key|all",
         "What the reference is made from: the keyframe's points alone, "
         "or those of all frames (of a live source those of the look-ahead), brought to its pose"),
-    NPG_ROW_INT   ("reference-rounds", AT(rounds), "1",   1,     20,   "N",
+    NPG_KEY(INT,    "reference-rounds", AT(rounds), "1",   1, 20, "N",
         "Times that the points of all frames are gathered with the reference so far"),
     {0}};
 /* clang-format on */

@@ -18,11 +18,11 @@ typedef struct job_state {
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type      name       place        default */
-    NPG_ROW_FLAG("restart", AT(restart), "no",
+    /* type               name       place        default */
+    NPG_ROW_FLAG(         "restart", AT(restart), "no",
         "Discard what an earlier run left in the output folder; "
         "without it a run of the same job resumes where that one was"),
-    NPG_ROW_FLAG("append",  AT(append),  "no",
+    NPG_PROGRAM_ROW(FLAG, "append",  AT(append),  "no",
         "Go on with frames that came since the job was done (neupig append)"),
     {0}};
 /* clang-format on */

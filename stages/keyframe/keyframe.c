@@ -477,23 +477,23 @@ static npg_status save(const npg_worker *worker, npg_archive_writer *out)
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type        name               place           default  least  most  shown as or words */
-    NPG_ROW_INT   ("keyframe",        AT(number),     "-1",    -1,    1e15, NULL,
+    /* type         name               place           default  least most  shown as or words */
+    NPG_ROW_INT(    "keyframe",        AT(number),     "-1",    -1, 1e15, NULL,
         "Number of the frame whose surface is the reference, as in the file names; "
         "-1: by score, or, with --reference, the frame that it is nearest to"),
-    NPG_ROW_CHOICE("keyframe-choice", AT(choice),     "apart", "paper|apart",
+    NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "apart", "paper|apart",
         "Take the frame with the paper's score (paper), "
         "or the one of several that show most surface whose own fares best in the others, "
         "so that limbs which touch in one frame are not joined for the whole capture (apart)"),
-    NPG_ROW_CHOICE("welds",           AT(welds),      "cut",   "keep|cut",
+    NPG_KEY(CHOICE, "welds",           AT(welds),      "cut",   "keep|cut",
         "Surface of the reference that other frames stretch far from all points: "
         "cut it and close the holes, or keep it"),
-    NPG_ROW_INT   ("window",          AT(window),     "24",    -1,    1e6,  NULL,
+    NPG_KEY(INT,    "window",          AT(window),     "24",    -1, 1e6,  NULL,
         "Frames that are solved together; 0: all of them in one window; "
         "-1: so up to 60 frames, and windows of 24 where there are more"),
-    NPG_ROW_INT   ("overlap",         AT(overlap),    "4",     0,     1e6,  NULL,
+    NPG_KEY(INT,    "overlap",         AT(overlap),    "4",     0,  1e6,  NULL,
         "Frames that a window shares with its neighbour"),
-    NPG_ROW_REAL  ("box-margin",      AT(box_margin), "10",    0,     1000, "PERCENT",
+    NPG_KEY(REAL,   "box-margin",      AT(box_margin), "10",    0,  1000, "PERCENT",
         "Live runs that go on behind the look-ahead: "
         "room left around its box, in per cent of its longest side"),
     {0}};

@@ -30,37 +30,37 @@ typedef struct mesh_state {
 
 /* clang-format off */
 static const npg_option mesh_options[] = {
-    /* type        name              place                 default    least  most  shown as or words */
-    NPG_ROW_CHOICE("mesher",         AT(surface.mesher),   "poisson", "poisson|vdb",
+    /* type         name              place                 default    least  most  shown as or words */
+    NPG_KEY(CHOICE, "mesher",         AT(surface.mesher),   "poisson", "poisson|vdb",
         "How the keyframe's surface is made: "
         "Poisson, or Poisson taken through an OpenVDB level set (even triangles, no self-contact)"),
-    NPG_ROW_INT   ("poisson-depth",  AT(depth),            "10",      4,     13,   NULL,
+    NPG_KEY(INT,    "poisson-depth",  AT(depth),            "10",      4,     13,   NULL,
         "Depth of the Poisson octree"),
-    NPG_ROW_REAL  ("poisson-weight", AT(point_weight),     "10",      0,     1000, NULL,
+    NPG_KEY(REAL,   "poisson-weight", AT(point_weight),     "10",      0,     1000, NULL,
         "How closely the Poisson surface follows the points"),
-    NPG_ROW_INT   ("poisson-time",   AT(time_limit_s),     "600",     1,     1e6,  "SECONDS",
+    NPG_KEY(INT,    "poisson-time",   AT(time_limit_s),     "600",     1,     1e6,  "SECONDS",
         "Stop the reconstruction after this many seconds"),
-    NPG_ROW_INT   ("poisson-memory", AT(memory_limit_mib), "8192",    64,    1e7,  "MIB",
+    NPG_KEY(INT,    "poisson-memory", AT(memory_limit_mib), "8192",    64,    1e7,  "MIB",
         "Address space the reconstruction may use"),
-    NPG_ROW_CHOICE("pieces",         AT(surface.pieces),   "near",    "near|main",
+    NPG_KEY(CHOICE, "pieces",         AT(surface.pieces),   "near",    "near|main",
         "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, "
         "within a tenth of the diagonal), or the main one alone"),
-    NPG_ROW_FLAG  ("smooth",         AT(surface.smooth),   "yes",
+    NPG_KEY(FLAG,   "smooth",         AT(surface.smooth),   "yes",
         "Smooth the keyframe's points for the reconstruction when they are noisy"),
-    NPG_ROW_CHOICE("hold-apart",     AT(apart),            "tight",   "tight|loose|no",
+    NPG_KEY(CHOICE, "hold-apart",     AT(apart),            "tight",   "tight|loose|no",
         "Hold parts that nearly touch apart while the surface is made, so that they are not joined; "
         "after that bring it back to its points (tight), "
         "or nearly so, which leaves a little of the gap (loose)"),
-    NPG_ROW_INT   ("faces",          AT(surface.face_max), "20000",   16,    1e8,  NULL,
+    NPG_ROW_INT(    "faces",          AT(surface.face_max), "20000",   16,    1e8,  NULL,
         "Faces of the reference mesh at most (and no more than 4 per point)"),
-    NPG_ROW_REAL  ("trim",           AT(surface.trim),     "0.15",    0.001, 100,  "SHARE",
+    NPG_KEY(REAL,   "trim",           AT(surface.trim),     "0.15",    0.001, 100,  "SHARE",
         "Drop surface farther than this from every point of the keyframe, "
         "in diagonals of the keyframe's box"),
-    NPG_ROW_CHOICE("unseen",         AT(surface.unseen),   "auto",    "auto|keep|trim",
+    NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",    "auto|keep|trim",
         "Surface without points near it (holes, the far side of a single view): "
         "keep it as the mesher closed it, trim it, or draw it tight between what was seen, "
         "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
-    NPG_ROW_REAL  ("max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
+    NPG_ROW_REAL(   "max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
         "The reference is good when at most this share of its area is surface "
         "that no point saw and that was kept, in per cent; above it the run ends with exit code 7. "
         "Of a given mesh: that no point of the keyframe is near, where its sensors could see it"),

@@ -44,24 +44,24 @@ typedef struct outlier_state {
 
 /* clang-format off */
 static const npg_option outlier_options[] = {
-    /* type        name                  place                  default   least  most  shown as or words */
-    NPG_ROW_FLAG  ("outliers",           AT(drop_isolated),     "yes",
+    /* type         name                  place                  default   least most  shown as or words */
+    NPG_ROW_FLAG(   "outliers",           AT(drop_isolated),     "yes",
         "Drop isolated points (the statistical filter that PCL has, too, repeated until it finds no more)"),
-    NPG_ROW_INT   ("outlier-neighbours", AT(neighbours),        "12",     2,     200,  NULL,
+    NPG_KEY(INT,    "outlier-neighbours", AT(neighbours),        "12",     2,    200,  NULL,
         "Neighbours whose mean distance tells whether a point is isolated"),
-    NPG_ROW_REAL  ("outlier-ratio",      AT(ratio),             "5",      0.5,   100,  NULL,
+    NPG_KEY(REAL,   "outlier-ratio",      AT(ratio),             "5",      0.5,  100,  NULL,
         "Standard deviations above the mean at which a point is isolated"),
-    NPG_ROW_REAL  ("voxel",              AT(voxel),             "0",      0,     1e12, "LENGTH",
+    NPG_KEY(REAL,   "voxel",              AT(voxel),             "0",      0,    1e12, "LENGTH",
         "Keep one point per cube of this side, in the capture's unit; 0: all"),
-    NPG_ROW_INT   ("points-max",         AT(point_max),         "250000", 1000,  4e9,  NULL,
+    NPG_KEY(INT,    "points-max",         AT(point_max),         "250000", 1000, 4e9,  NULL,
         "Thin frames with more points than this, with a warning"),
-    NPG_ROW_CHOICE("normals",            AT(normals),           "auto",   "auto|estimate|given",
+    NPG_ROW_CHOICE( "normals",            AT(normals),           "auto",   "auto|estimate|given",
         "Use given normals (checked and mended) or estimate them; auto: given where there are any"),
-    NPG_ROW_CHOICE("normals-for",        AT(normals_for),       "key",    "key|all",
+    NPG_KEY(CHOICE, "normals-for",        AT(normals_for),       "key",    "key|all",
         "Make and mend normals for the keyframe alone or for all frames"),
-    NPG_ROW_INT   ("normal-neighbours",  AT(normal_neighbours), "0",      0,     200,  NULL,
+    NPG_KEY(INT,    "normal-neighbours",  AT(normal_neighbours), "0",      0,    200,  NULL,
         "Points a normal is estimated from, 4 or more; 0: several numbers are tried"),
-    NPG_ROW_TEXT  ("sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
+    NPG_ROW_TEXT(   "sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
         "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file of a "
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, what lies before the points is empty, and surface that can't be seen from there waits for "

@@ -260,7 +260,7 @@ class Failures(unittest.TestCase):
 
     def test_every_option_is_listed(self):
         options = {option.name: option for option in neupig.options()}
-        self.assertEqual(options["preset"].choices, ("default", "best", "paper", "paper-1000", "grids"))
+        self.assertEqual(options["method"].choices, ("default", "best", "paper", "paper-1000", "grids"))
         self.assertEqual(options["seed"].type, "int")
         self.assertEqual(neupig.Options({"keep_going": True}).get("keep-going"), "yes")
 

@@ -1,6 +1,6 @@
 # Surface that no points support: measured and placed, for the reference and in every frame, with a bar for each.
 
-small=(--epochs 10 --faces 800 --poisson-depth 5 --window 5 --overlap 2 --align-nodes 60 --align-steps 10
+small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --keyframe 5 --max-residual 100 --min-coverage 0 --max-flipped 100 --max-stretched 100)
 
 setup_file() {

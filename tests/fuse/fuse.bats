@@ -1,6 +1,6 @@
 # The reference from the points of all frames: better than from one, resumed with the same bytes, left out on request.
 
-small=(--epochs 10 --faces 800 --poisson-depth 5 --window 5 --overlap 2 --align-nodes 60 --align-steps 10
+small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --keyframe 5 --max-residual 100 --max-flipped 100 --max-stretched 100 --max-invented 100)
 
 setup_file() {
@@ -11,7 +11,7 @@ setup_file() {
     "$NEUPIG" synth --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
     for capture in noisy noisy1 noisy2 parts; do
         for from in key all; do
-            "$NEUPIG" run $capture/points -o $capture-$from --reference-from $from "${small[@]}" >$capture-$from.log 2>&1
+            "$NEUPIG" run $capture/points -o $capture-$from --method "{\"reference-from\": \"$from\"}" "${small[@]}" >$capture-$from.log 2>&1
         done
     done
 }
@@ -58,11 +58,11 @@ better() {
     [ "$(fusing_passes noisy-all.log)" -eq 1 ]
 }
 
-@test "--reference-from key makes no fusing pass, --reference-rounds as many as it says" {
+@test "reference-from key makes no fusing pass, reference-rounds as many as it says" {
     [ "$(fusing_passes noisy-key.log)" -eq 0 ]
     [ -z "$(report noisy-key frames)" ]
     [ ! -e noisy-key/job/poses.bin ]
-    "$NEUPIG" run noisy/points -o rounds --reference-rounds 2 "${small[@]}" --frames 0:6 >rounds.log 2>&1
+    "$NEUPIG" run noisy/points -o rounds --method '{"reference-rounds": 2}' "${small[@]}" --frames 0:6 >rounds.log 2>&1
     [ "$(fusing_passes rounds.log)" -eq 2 ]
 }
 
@@ -137,7 +137,7 @@ kill_in_fusing() {
 @test "what another job followed is not taken, nor after --restart" {
     kill_in_fusing other followed_0.bin
     cp -r other anew
-    run "$NEUPIG" run noisy/points -o other "${small[@]}" --align-samples 300
+    run "$NEUPIG" run noisy/points -o other "${small[@]}" --method '{"align-samples": 300}'
     [ "$status" -eq 0 ]
     [[ "$output" != *"are read back"* ]]
     run "$NEUPIG" run noisy/points -o anew "${small[@]}" --restart
@@ -146,9 +146,9 @@ kill_in_fusing() {
 }
 
 @test "killed in the second of two fusing passes, both are read back" {
-    "$NEUPIG" run noisy/points -o two "${small[@]}" --frames 0:8 --reference-rounds 2 --quiet
-    kill_in_fusing second followed_1.bin --frames 0:8 --reference-rounds 2
-    run "$NEUPIG" run noisy/points -o second "${small[@]}" --frames 0:8 --reference-rounds 2
+    "$NEUPIG" run noisy/points -o two "${small[@]}" --frames 0:8 --method '{"reference-rounds": 2}' --quiet
+    kill_in_fusing second followed_1.bin --frames 0:8 --method '{"reference-rounds": 2}'
+    run "$NEUPIG" run noisy/points -o second "${small[@]}" --frames 0:8 --method '{"reference-rounds": 2}'
     [ "$(grep -c "are read back" <<<"$output")" -eq 2 ]
     cmp two/reference.ply second/reference.ply
     cmp two/frames.jsonl second/frames.jsonl
@@ -158,7 +158,7 @@ kill_in_fusing() {
 @test "a run that starts over and is killed while it gathers leaves the unfinished job as it was" {
     [ -d hurt ] || skip "needs the job that the test before left"
     cp -r hurt again
-    "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --align-steps 200 --align-nodes 500 >again.log 2>&1 &
+    "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --method '{"align-steps": 200, "align-nodes": 500}' >again.log 2>&1 &
     local pid=$!
     while kill -0 $pid 2>/dev/null && [ ! -e again/job/poses.new ]; do sleep 0.02; done
     kill -KILL $pid
@@ -186,7 +186,7 @@ kill_in_fusing() {
 }
 
 @test "progress begins before the fusing pass, never goes back and ends with all" {
-    "$NEUPIG" run noisy/points -o watched "${small[@]}" --frames 0:6 --reference-rounds 2 --progress json >progress 2>watched.log
+    "$NEUPIG" run noisy/points -o watched "${small[@]}" --frames 0:6 --method '{"reference-rounds": 2}' --progress json >progress 2>watched.log
     grep '"event":"progress"' progress | sed 's/.*"stage":"\([a-z]*\)","share":\([0-9.]*\).*/\1 \2/' >shares
     [ "$(head -n 1 shares | cut -d ' ' -f 1)" = keyframe ]
     [ "$(grep -c ^mesh shares)" -eq 3 ] # a reference for each walk

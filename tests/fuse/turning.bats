@@ -1,7 +1,7 @@
 # A body that turns before one sensor: the reference grows from the side that the keyframe
 # saw to the whole body, whose vertices turn with it.
 
-small=(--faces 3000 --align-nodes 200 --poisson-depth 7 --no-outliers --quiet --keyframe 6
+small=(--faces 3000 --method '{"align-nodes": 200, "poisson-depth": 7}' --no-outliers --quiet --keyframe 6
     --max-residual 100 --max-flipped 100 --max-stretched 100 --max-unsupported 100 --max-invented 100)
 
 setup_file() {
@@ -17,7 +17,7 @@ setup() {
 @test "the whole body is there, and its vertices turn with it" {
     read -r slide share < <(python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide grown 6)
     read -r slide_key share_key < <(
-        "$NEUPIG" run body/points -o key --sensor body/sensor.txt "${small[@]}" --reference-from key >/dev/null || true
+        "$NEUPIG" run body/points -o key --sensor body/sensor.txt "${small[@]}" --method '{"reference-from": "key"}' >/dev/null || true
         python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide key 6
     )
     echo "grown: slide $slide, share $share; from the keyframe: $slide_key, $share_key"

@@ -1,6 +1,6 @@
 # A folder of unknown origin: nothing outside the job is read or written, nothing hangs.
 
-small=(--epochs 2 --width-1 32 --width-2 32 --faces 200 --poisson-depth 5 --grid-levels 3 --quiet --max-residual 100
+small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "grid-levels": 3}' --faces 200 --quiet --max-residual 100
     --max-flipped 100 --max-stretched 100)
 
 setup_file() {
@@ -122,7 +122,7 @@ untouched() {
     refused 5 "$long" run in/frame_0000.ply -o "out/$deep" "${small[@]}"
     printf '%s\n' "$deep/frame_0000.ply" >in/list.txt
     refused 3 "list.txt: line 1" run in/list.txt -o out "${small[@]}"
-    refused 2 "$long" run in/frame_0000.ply -o out --config "$deep" "${small[@]}"
+    refused 2 "$long" run in/frame_0000.ply -o out --method "$deep" "${small[@]}"
     (for i in {1..17}; do mkdir "$long" && cd "$long"; done && cp "$BATS_TEST_TMPDIR/outside/frame.ply" f0.ply)
     refused 3 "$long" run "$long" -o out "${small[@]}"
 }

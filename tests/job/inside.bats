@@ -1,10 +1,11 @@
 # Runs without alignment that are killed inside a window: they continue there, with the same bytes.
 
-small=(--align=no --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --samples 100 --grid-levels 3 --max-residual 100
-    --max-flipped 100 --quiet --state-every 0)
-joint=(--window 0 --epochs 60 --deliver least)
-warm=(--window 5 --overlap 2 --epochs 30)
-surface=(--preset grids --window 5 --overlap 2 --epochs 6)
+small=(--method '{"align": false, "width-1": 32, "width-2": 32, "poisson-depth": 5, "samples": 100,
+                  "grid-levels": 3, "state-every": 0}' --faces 400 --max-residual 100
+    --max-flipped 100 --quiet)
+joint=(--method '{"window": 0, "epochs": 60, "deliver": "least"}')
+warm=(--method '{"window": 5, "overlap": 2, "epochs": 30}')
+surface=(--method '{"preset": "grids", "window": 5, "overlap": 2, "epochs": 6}')
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -61,7 +62,7 @@ check_killed() {
 }
 
 @test "a decoder of three hidden layers that is killed gives the same bytes" {
-    check_killed deep "4" "${joint[@]}" --hidden-layers 3
+    check_killed deep "4" "${joint[@]}" --method '{"hidden-layers": 3}'
     run "$NEUPIG" run capture/points -o deep "${small[@]}" "${joint[@]}"
     [ "$status" -eq 2 ]
     [[ "$output" == *'option hidden-layers was "3" and is "2"'* ]]
@@ -72,15 +73,15 @@ check_killed() {
 }
 
 @test "SIGTERM inside a window keeps what was done" {
-    kill_inside stopped TERM 3 "${joint[@]}" --epochs 5000
+    kill_inside stopped TERM 3 "${joint[@]}" --method '{"epochs": 5000}'
     [ $killed_status -eq 75 ]
     [ -e stopped/job/inside.npg ]
 }
 
 @test "a damaged state inside a window is said" {
-    kill_inside hurt KILL 3 "${joint[@]}" --epochs 5000
+    kill_inside hurt KILL 3 "${joint[@]}" --method '{"epochs": 5000}'
     truncate -s -100 hurt/job/inside.npg
-    run "$NEUPIG" run capture/points -o hurt "${small[@]}" "${joint[@]}" --epochs 5000 --restart=no --max-memory 1
+    run "$NEUPIG" run capture/points -o hurt "${small[@]}" "${joint[@]}" --method '{"epochs": 5000}' --restart=no --max-memory 1
     [[ "$output" == *inside.npg* ]]
 }
 

@@ -16,8 +16,9 @@ options=("$@")
 if [ -z "$capture" ]; then
     capture=$folder/capture/points
     "$neupig" synth --body bar --frames "$frames" --points 800 -o "$folder/capture" >"$folder/synth.log" || exit 1
-    options=(--epochs 12 --width-1 64 --width-2 64 --faces 600 --poisson-depth 6 --window 8 --overlap 2
-        --align-nodes 60 --max-residual 100 "${options[@]}")
+    options=(--method '{"epochs": 12, "width-1": 64, "width-2": 64, "poisson-depth": 6, "window": 8, "overlap": 2,
+                        "align-nodes": 60}' --faces 600
+    --max-residual 100 "${options[@]}")
 fi
 
 work() { # OUT

@@ -1,9 +1,10 @@
 # Live runs that are killed (-9) and started again: a folder that is followed, standard input.  Pushed frames:
 # test_push_resume.c.
 
-small=(--epochs 2 --width-1 32 --width-2 32 --faces 300 --poisson-depth 6 --quiet --max-residual 100
-       --min-coverage 0 --max-stretched 100 --max-flipped 100 --align-nodes 40 --align-steps 6 --grid-levels 3)
-open=(--window 6 --overlap 2 --look-ahead 10 --follow-idle 0)
+small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "align-nodes": 40,
+                  "align-steps": 6, "grid-levels": 3}' --faces 300 --quiet --max-residual 100
+       --min-coverage 0 --max-stretched 100 --max-flipped 100)
+open=(--method '{"window": 6, "overlap": 2}' --look-ahead 10 --follow-idle 0)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -84,9 +85,9 @@ check_killed() {
 }
 
 @test "windows before the keyframe, a source that ends inside the first window or inside the look-ahead" {
-    check_killed all "0 2" --window 6 --overlap 3 --look-ahead 18 --keyframe 13
-    check_killed all "0" --window 14 --overlap 3 --look-ahead 19 --keyframe 16
-    check_killed all "0 1" --window 6 --overlap 3 --look-ahead 40
+    check_killed all "0 2" --method '{"window": 6, "overlap": 3}' --look-ahead 18 --keyframe 13
+    check_killed all "0" --method '{"window": 14, "overlap": 3}' --look-ahead 19 --keyframe 16
+    check_killed all "0 1" --method '{"window": 6, "overlap": 3}' --look-ahead 40
 }
 
 @test "gaps, a file that can't be read, and a selection" {
@@ -96,13 +97,13 @@ check_killed() {
     head -c 2000 all/frame_0011.ply >gaps/frame_0011.ply
     touch gaps/capture.end
     for missing in hold skip; do
-        check_killed gaps "0 2" "${open[@]}" --follow-settle 0 --keep-going --missing $missing
+        check_killed gaps "0 2" "${open[@]}" --method '{"follow-settle": 0}' --keep-going --missing $missing
     done
-    check_killed gaps "0" "${open[@]}" --follow-settle 0 --keep-going --missing skip --frames 1::2 --window 4
+    check_killed gaps "0" "${open[@]}" --method '{"follow-settle": 0, "window": 4}' --keep-going --missing skip --frames 1::2
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--align=no --deliver last --samples 100 --state-every 0 --epochs 80)
+    local free=(--method '{"align": false, "deliver": "last", "samples": 100, "state-every": 0, "epochs": 80}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
     for place in 1 2; do
@@ -149,14 +150,14 @@ check_killed() {
 }
 
 @test "a changed option or file is named; a file that is gone matters where it is needed" {
-    local far=(--window 6 --overlap 3 --look-ahead 18 --keyframe 13 --follow-idle 0) # frame 0 is solved in window 4
+    local far=(--method '{"window": 6, "overlap": 3}' --look-ahead 18 --keyframe 13 --follow-idle 0) # frame 0 is solved in window 4
     "$NEUPIG" run --follow all -o far "${small[@]}" "${far[@]}" >far.log
     cp -r capture/points changing
     "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" >change.log 2>&1 &
     kill_at_state change 0 $!
     [ "$(newest change)" -lt 4 ]
     : >changing/capture.end
-    run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" --epochs 3
+    run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" --method '{"epochs": 3}'
     echo "$output"
     [ "$status" -eq 2 ]
     [[ "$output" == *'option epochs was "2" and is "3"'*--restart* ]]

@@ -1,7 +1,8 @@
 # Runs that are killed, stopped, damaged, out of room, changed, or continued with more frames.
 
-small=(--epochs 10 --width-1 32 --width-2 32 --faces 400 --poisson-depth 5 --window 5 --overlap 2
-    --align-nodes 40 --align-steps 6 --grid-levels 3 --max-residual 100 --max-flipped 100 --quiet)
+small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
+                  "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
+    --max-residual 100 --max-flipped 100 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -59,10 +60,10 @@ newest() {
 }
 
 @test "SIGTERM ends with 75 within 5 s, and the next run goes on" {
-    kill_at stopped TERM 1 --epochs 500
+    kill_at stopped TERM 1 --method '{"epochs": 500}'
     [ $killed_status -eq 75 ]
     grep -q "run again to resume" stopped.log
-    go_on stopped --epochs 500
+    go_on stopped --method '{"epochs": 500}'
     grep -q resumed_frames stopped/report.json
 }
 
@@ -88,10 +89,10 @@ newest() {
 }
 
 @test "damaged latent grids, of frames without alignment, are said likewise" {
-    "$NEUPIG" run capture/points -o free "${small[@]}" --no-align >free.log
-    kill_at grids KILL 2 --no-align
+    "$NEUPIG" run capture/points -o free "${small[@]}" --method '{"align": false}' >free.log
+    kill_at grids KILL 2 --method '{"align": false}'
     printf '\x5a\xa5' | dd of="$(newest grids vdb)" bs=1 seek=3000 conv=notrunc status=none
-    go_on grids --no-align
+    go_on grids --method '{"align": false}'
     [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
     diff -r free/meshes grids/meshes
 }
@@ -106,7 +107,7 @@ newest() {
 
 @test "a changed option, input or result is named, and --restart discards" {
     cp -r whole changed
-    run "$NEUPIG" run capture/points -o changed "${small[@]}" --epochs 11
+    run "$NEUPIG" run capture/points -o changed "${small[@]}" --method '{"epochs": 11}'
     echo "$output"
     [ "$status" -eq 2 ]
     [[ "$output" == *'option epochs was "10" and is "11"'*--restart* ]]

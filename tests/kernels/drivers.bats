@@ -10,7 +10,7 @@ setup() {
 expect_device_failure() { # WORDS COMMAND...
     local words=$1 status=0 call
     shift
-    for call in "$NEUPIG doctor" "$NEUPIG doctor --json" "$NEUPIG run capture/points -o out --no-align --quiet" \
+    for call in "$NEUPIG doctor" "$NEUPIG doctor --json" "$NEUPIG run capture/points -o out --method {\"align\":false} --quiet" \
         "$NEUPIG bench --only isometry --vertices 300 --points 300" "$(dirname "$NEUPIG")/sample_run_folder capture/points out ${small[*]}"; do
         echo "$call"
         # shellcheck disable=SC2086  # a command line
@@ -32,7 +32,7 @@ expect_device_failure() { # WORDS COMMAND...
     shim=$(dirname "$NEUPIG")/fault_shim.so
     [ -e "$shim" ] || skip "not under a sanitizer"
     run env LD_PRELOAD="$shim" NPG_FAULT_DRIVER="out of luck" "$NEUPIG" run capture/points -o aligned --faces 200 \
-        --poisson-depth 5 --quiet
+        --method '{"poisson-depth": 5}' --quiet
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     [ -e aligned/done.json ]

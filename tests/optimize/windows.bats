@@ -1,13 +1,13 @@
 # Windows against one joint window over the same short capture: as near the truth, and no seam between them.
 
-small=(--poisson-depth 6 --faces 1000 --width-1 64 --width-2 64 --align-nodes 120 --max-residual 100
+small=(--method '{"poisson-depth": 6, "width-1": 64, "width-2": 64, "align-nodes": 120}' --faces 1000 --max-residual 100
     --max-flipped 100 --export obj --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --frames 14 --points 2000 --cycles 0.6 -o capture >synth.log
-    "$NEUPIG" run capture/points -o joint "${small[@]}" --window 0
-    "$NEUPIG" run capture/points -o windows "${small[@]}" --window 5 --overlap 2
+    "$NEUPIG" run capture/points -o joint "${small[@]}" --method '{"window": 0}'
+    "$NEUPIG" run capture/points -o windows "${small[@]}" --method '{"window": 5, "overlap": 2}'
 }
 
 setup() {

@@ -171,6 +171,7 @@ static void all_options_are_described_and_sound(void **state)
         assert_int_equal(info.type == NPG_OPTION_CHOICE, info.choices != NULL);
         assert_int_equal(strspn(info.name, "abcdefghijklmnopqrstuvwxyz0123456789-"), strlen(info.name));
         assert_int_equal(npg_options_set(options, info.name, info.default_text), NPG_OK);
+        assert_null(npg_option_gone(info.name));
         for (size_t i = 0; i < count; i++) {
             assert_int_equal(npg_options_describe(i, &other), NPG_OK);
             assert_string_not_equal(info.name, other.name);
@@ -189,7 +190,7 @@ static void presets_hold_values_that_are_accepted(void **state)
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
-        assert_int_equal(npg_options_set(options, "preset", preset->name), NPG_OK);
+        assert_int_equal(npg_options_set(options, "method", preset->name), NPG_OK);
         for (const npg_preset_value *value = preset->values; value->name; value++) {
             assert_string_equal(npg_options_get(options, value->name), value->value);
             const char *own = npg_options_get(options, value->name);
@@ -200,7 +201,7 @@ static void presets_hold_values_that_are_accepted(void **state)
         npg_options_close(&options);
         assert_int_equal(npg_options_open(&options), NPG_OK);
     }
-    assert_int_equal(npg_options_set(options, "preset", "no-such-preset"), NPG_USAGE);
+    assert_int_equal(npg_options_set(options, "method", "no-such-preset"), NPG_USAGE);
     npg_options_close(&options);
 }
 
@@ -310,20 +311,73 @@ static void no_memory_is_said(void **state)
     assert_int_equal(status, NPG_OK);
 }
 
-static void quality_best_is_the_preset_unless_another_is_named(void **state)
+/* ---- the method ---- */
+
+static npg_options *open_all(void)
 {
-    (void)state;
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);
+    return options;
+}
+
+static void a_method_is_a_name_a_text_or_a_file(void **state)
+{
+    (void)state;
+    const char *path = in_folder(&folder, "method.json");
+    assert_int_equal(write_text_file(path, "{ // mine\n\"preset\": \"best\", \"epochs\": 7}"), 0);
+    npg_options *options = open_all();
     char usual[32];
     snprintf(usual, sizeof usual, "%s", npg_options_get(options, "reference-rounds"));
-    assert_int_equal(npg_options_set(options, "quality", "best"), NPG_OK);
+    assert_int_equal(npg_options_set(options, "method", "best"), NPG_OK);
     assert_string_not_equal(npg_options_get(options, "reference-rounds"), usual);
-    assert_string_equal(npg_options_get(options, "preset"), "default");
-    assert_int_equal(npg_options_set(options, "preset", "paper"), NPG_OK);
+    assert_int_equal(npg_options_set(options, "method", "paper"), NPG_OK);
     assert_string_equal(npg_options_get(options, "reference-rounds"), usual);
     assert_string_equal(npg_options_get(options, "align"), "no");
+    assert_string_equal(npg_options_get(options, "preset"), "paper");
+    assert_int_equal(npg_options_set(options, "method", " {\"epochs\": 5, \"faces\": 300}"), NPG_OK);
+    assert_string_equal(npg_options_get(options, "method"), "paper");
+    assert_string_equal(npg_options_get(options, "epochs"), "5");
+    assert_string_equal(npg_options_get(options, "faces"), "300");
+    assert_int_equal(npg_options_set(options, "method", path), NPG_OK);
+    assert_string_equal(npg_options_get(options, "method"), "best");
+    assert_string_equal(npg_options_get(options, "epochs"), "7");
     npg_options_close(&options);
+}
+
+static void a_bad_method_is_named(void **state)
+{
+    const char *const bad[][2] = {{"papr", "\"papr\""},
+                                  {"", "method"},
+                                  {"missing.json", "missing.json"},
+                                  {"{\"epochs\": 5", "method:1"},
+                                  {"{\n\"epochs\": -1}", "method:2: option epochs"},
+                                  {"{\"preset\": \"other.json\"}", "other.json"},
+                                  {"{\"method\": {\"epochs\": 1}}", "method"},
+                                  {"{\"quality\": \"best\"}", "--method best"},
+                                  {"{\"grid\": {\"n_level\": 99}}", "grid.n_level"},
+                                  {"[1]", "method"}};
+    (void)state;
+    npg_options *options = open_all();
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(npg_options_set(options, "method", bad[i][0]), NPG_USAGE);
+        assert_non_null(strstr(npg_error_text(), bad[i][1]));
+    }
+    npg_options_close(&options);
+}
+
+static void a_published_method_says_what_it_ignores(void **state)
+{
+    (void)state;
+    npg_options *options = open_all(), *copy;
+    assert_string_equal(npg_options_ignored(options), "");
+    const char *text = "{\"grid\": {\"n_level\": 3, \"solver\": \"CG\"}, \"rotation_method\": \"none\"}";
+    assert_int_equal(npg_options_set(options, "method", text), NPG_OK);
+    assert_string_equal(npg_options_get(options, "grid-levels"), "3");
+    assert_int_equal(npg_options_copy(&copy, options), NPG_OK);
+    assert_string_equal(npg_options_get(copy, "method"), "paper");
+    assert_string_equal(npg_options_ignored(copy), "rotation_method = \"none\", grid.solver");
+    npg_options_close(&options);
+    npg_options_close(&copy);
 }
 
 int main(void)
@@ -335,12 +389,14 @@ int main(void)
         cmocka_unit_test(a_table_outside_the_chain_gets_defaults),
         cmocka_unit_test(all_options_are_described_and_sound),
         cmocka_unit_test(presets_hold_values_that_are_accepted),
-        cmocka_unit_test(quality_best_is_the_preset_unless_another_is_named),
         cmocka_unit_test(numbers_do_not_depend_on_the_locale),
         cmocka_unit_test(a_file_sets_options),
         cmocka_unit_test(a_bad_file_is_named_with_its_line),
         cmocka_unit_test(a_huge_file_is_refused),
         cmocka_unit_test(no_memory_is_said),
+        cmocka_unit_test(a_method_is_a_name_a_text_or_a_file),
+        cmocka_unit_test(a_bad_method_is_named),
+        cmocka_unit_test(a_published_method_says_what_it_ignores),
     };
     return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

@@ -49,7 +49,7 @@ programs() {
     mkdir cache && export XDG_CACHE_HOME="$PWD/cache"
     "$NEUPIG" synth --body bar --frames 2 --points 300 -o capture >synth.log
     run env LD_PRELOAD="$shim" NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" run capture/points -o out --quiet \
-        --no-align
+        --method '{"align": false}'
     echo "$output"
     [ "$status" -eq 4 ]
     [[ "$output" == *"computes op isometry wrong"* ]]
@@ -92,8 +92,8 @@ programs() {
 @test "a clock that jumps an hour to and fro changes nothing" {
     needs_shim
     "$NEUPIG" synth --body bar --frames 3 --points 400 -o capture >synth.log
-    small=(--epochs 2 --width-1 32 --width-2 32 --faces 200 --poisson-depth 5 --quiet --max-residual 100
-        --max-flipped 100 --max-stretched 100 --window 2 --overlap 1)
+    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet --max-residual 100
+        --max-flipped 100 --max-stretched 100)
     "$NEUPIG" run capture/points -o plain "${small[@]}"
     LD_PRELOAD=$shim NPG_FAULT_CLOCK=3600 timeout 60 "$NEUPIG" run capture/points -o jumps "${small[@]}"
     diff -r plain/meshes jumps/meshes

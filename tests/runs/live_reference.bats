@@ -1,6 +1,6 @@
 # The reference of live runs: from all frames of the look-ahead, as from files; killed or stopped on the way.
 
-small=(--epochs 10 --faces 800 --poisson-depth 5 --window 5 --overlap 2 --align-nodes 60 --align-steps 10
+small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --max-residual 100 --max-flipped 100 --max-stretched 100 --max-invented 100)
 open=(--look-ahead 9 --keyframe 5)
 
@@ -13,7 +13,7 @@ setup_file() {
         : >$capture/points/capture.end
         for from in key all; do
             cat $capture/points/*.ply | "$NEUPIG" run - -o $capture-$from "${small[@]}" "${open[@]}" \
-                --reference-from $from >$capture-$from.log 2>&1
+                --method "{\"reference-from\": \"$from\"}" >$capture-$from.log 2>&1
         done
         "$NEUPIG" run $capture/points -o $capture-files "${small[@]}" --keyframe 5 -q
     done
@@ -74,7 +74,7 @@ report() {
         status=0
         "$NEUPIG" run gaps -o gaps-files-$missing "${more[@]}" || status=$?
         [ "$status" -eq 7 ]
-        "$NEUPIG" run --follow gaps -o gaps-live-$missing "${more[@]}" --follow-settle 0 --cache 0 || status=$?
+        "$NEUPIG" run --follow gaps -o gaps-live-$missing "${more[@]}" --method '{"follow-settle": 0}' --cache 0 || status=$?
         [ "$status" -eq 7 ]
         same gaps-files-$missing gaps-live-$missing
     done
@@ -100,7 +100,7 @@ has_colours() {
     cp -r noisy0/points coloured
     colour coloured frame_0005.ply
     "$NEUPIG" run --follow coloured -o bright "${small[@]}" "${open[@]}" -q
-    "$NEUPIG" run --follow coloured -o dull "${small[@]}" "${open[@]}" --reference-from key -q
+    "$NEUPIG" run --follow coloured -o dull "${small[@]}" "${open[@]}" --method '{"reference-from": "key"}' -q
     has_colours bright/reference.ply
     has_colours bright/meshes/frame_0013.ply
     ! has_colours dull/reference.ply
@@ -158,7 +158,8 @@ await() {
     kill -TERM $pid
     wait $pid || status=$?
     [ "$status" -eq 75 ]
-    "$NEUPIG" run --follow noisy0/points -o halted "${small[@]}" "${open[@]}" --align-steps 500 --align-nodes 600 >halted.log 2>&1 &
+    "$NEUPIG" run --follow noisy0/points -o halted "${small[@]}" "${open[@]}" --method '{"align-steps": 500,
+        "align-nodes": 600}' >halted.log 2>&1 &
     pid=$!
     status=0
     until [ -e halted/job/poses.new ]; do

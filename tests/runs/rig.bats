@@ -1,13 +1,13 @@
 # Rigs, the whole way: depth and colour images -> points -> a coloured moving mesh, against the truth of a synthetic body.
 # A real recording is used where NEUPIG_TEST_DATA names a folder that holds kinect-rig/ (OpenCV files per frame).
 
-small=(--faces 2000 --poisson-depth 6 --align-nodes 80 --align-steps 6 --quiet --max-residual 100 --max-flipped 100 --max-stretched 100)
+small=(--faces 2000 --method '{"poisson-depth": 6, "align-nodes": 80, "align-steps": 6}' --quiet --max-residual 100 --max-flipped 100 --max-stretched 100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.1 --width 240 --height 180 --cell 0.04 --depth-noise 2 \
         -o capture >synth.log
-    "$NEUPIG" run --rig capture/rig/rig.json -o out --export ply,glb,usda,npz,obj --truth capture/truth "${small[@]}"
+    "$NEUPIG" run capture/rig/rig.json -o out --export ply,glb,usda,npz,obj --truth capture/truth "${small[@]}"
 }
 
 setup() {
@@ -91,7 +91,7 @@ P
 }
 
 @test "a run that is killed and resumed gives the same coloured bytes" {
-    options=(capture/rig --colour frames --window 2 --overlap 1 --reference-from all "${small[@]}")
+    options=(capture/rig --colour frames --method '{"window": 2, "overlap": 1, "reference-from": "all"}' "${small[@]}")
     "$NEUPIG" run "${options[@]}" -o whole
     rm -rf killed
     "$NEUPIG" run "${options[@]}" -o killed &
@@ -182,11 +182,12 @@ before = [s["before"] for s in json.load(sys.stdin)["sensors"]]
 assert [s["pose"] == "off" for s in before] == [False, False, True, False], before
 assert abs(before[2]["shift"] - 0.012) < 0.002 and abs(before[2]["turn_deg"] - 0.7) < 0.2, before
 assert len(before[2]["correction"]) == 16'
-    fine=(--frames 0:2 --truth wide/truth "${small[@]}" --faces 8000 --poisson-depth 8 --align-nodes 150)
+    fine=(--frames 0:2 --truth wide/truth "${small[@]}" --faces 8000 --method '{"poisson-depth": 8,
+        "align-nodes": 150}')
     for poses in rig.json off.json; do
-        "$NEUPIG" run --rig wide/rig/$poses --align-sensors -o "wide_$poses" "${fine[@]}"
+        "$NEUPIG" run wide/rig/$poses --align-sensors -o "wide_$poses" "${fine[@]}"
     done
-    "$NEUPIG" run --rig wide/rig/off.json -o wide_wrong "${fine[@]}"
+    "$NEUPIG" run wide/rig/off.json -o wide_wrong "${fine[@]}"
     [ "$(report wide_off.json '["stages"]["ingest"]["rig"]["sensors"][2]["pose"]')" = off ]
     for out in wide_rig.json wide_off.json wide_wrong; do
         report $out '["stages"]["evaluate"]["figures"]["truth_cd"]["mean"]'
@@ -197,29 +198,30 @@ assert len(before[2]["correction"]) == 16'
 @test "bad rigs end with exit code 3, the file and the place" {
     cp -r capture/rig bad
     sed -i '0,/"fx"/s//"focal"/' bad/rig.json
-    run "$NEUPIG" run --rig bad -o out_bad "${small[@]}"
+    run "$NEUPIG" run bad -o out_bad "${small[@]}"
     echo "$output"
     [ "$status" -eq 3 ]
     [[ "$output" == *"bad/rig.json: sensors[0].camera.focal: unknown key"* ]]
     cp capture/rig/rig.json bad/rig.json
     head -c 2000 capture/rig/camera1/depth_0003.png >bad/camera1/depth_0003.png
-    run "$NEUPIG" run --rig bad -o out_bad "${small[@]}"
+    run "$NEUPIG" run bad -o out_bad "${small[@]}"
     echo "$output"
     [ "$status" -eq 3 ]
     [[ "$output" == *"camera1/depth_0003.png: byte"* ]]
     cp capture/rig/camera1/colour_0003.png bad/camera1/depth_0003.png
-    run "$NEUPIG" run --rig bad -o out_bad "${small[@]}"
+    run "$NEUPIG" run bad -o out_bad "${small[@]}"
     [ "$status" -eq 3 ]
     [[ "$output" == *"depth_0003.png: a 8-bit RGB PNG; a depth image must be 16-bit grey"* ]]
-    run "$NEUPIG" run --rig bad capture/rig -o out_bad
+    run "$NEUPIG" run --rig bad -o out_bad
     [ "$status" -eq 2 ]
+    [[ "$output" == *"the rig is the input"* ]]
 }
 
 @test "a confined rig may not lead out of its folder" {
     cp -r capture/rig led
     cp led/camera0/depth_0002.png outside.png
     ln -sf ../../outside.png led/camera0/depth_0002.png
-    run "$NEUPIG" run --rig led --confine -o out_led "${small[@]}"
+    run "$NEUPIG" run led --confine -o out_led "${small[@]}"
     echo "$output"
     [ "$status" -eq 3 ]
     [[ "$output" == *"depth_0002.png"* ]]
@@ -228,7 +230,7 @@ assert len(before[2]["correction"]) == 16'
 @test "a real recording: OpenCV files per frame" {
     data=${NEUPIG_TEST_DATA:-}/kinect-rig
     [ -d "$data" ] || skip "NEUPIG_TEST_DATA names no folder with kinect-rig"
-    run "$NEUPIG" run --rig "$data" --sensor-poses none --frames 0:4 -o kinect --faces 2000 --quiet
+    run "$NEUPIG" run "$data" --sensor-poses none --frames 0:4 -o kinect --faces 2000 --quiet
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     has_colours kinect/reference.ply

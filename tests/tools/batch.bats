@@ -136,7 +136,7 @@ setup() {
     check 2 ': captures[0]: the name x/../up has a slash' '{"captures": [{"input": "set/one", "name": "x/../up"}]}'
     check 2 ': captures[0]: the name .. begins' '{"captures": [{"input": "set/one", "name": ".."}]}'
     check 2 ': captures[0]: option follow is not for a batch' '{"captures": [{"input": "set/one", "follow": "set"}]}'
-    check 2 ': captures[0].config: ' '{"captures": [{"input": "set/one", "config": "nowhere.json"}]}'
+    check 2 ': captures[0].method: ' '{"captures": [{"input": "set/one", "method": "nowhere.json"}]}'
     run "$NEUPIG" batch nowhere.json -o bad-out
     [ "$status" -eq 3 ]
     [[ "$output" == *nowhere.json* ]]
@@ -244,13 +244,13 @@ setup() {
 CONFIG
     run "$NEUPIG" batch ama -o ama --list
     [ "$output" = $'crane\njump' ]
-    run "$NEUPIG" batch ama -o results --config fit.json --faces 200 --poisson-depth 5 --max-residual 100 \
+    run "$NEUPIG" batch ama -o results --method fit.json --faces 200 --method '{"poisson-depth": 5}' --max-residual 100 \
         --max-flipped 100 --max-stretched 100 --min-coverage 0 --keyframe 1
     echo "$output"
     [ "$status" -eq 0 ]
     [[ "$output" == *'no counterpart here'*'grid.neighbours, grid.solver'* ]]
     [[ "$output" == *'jump: warning: '*'their vertices are the points'* ]]
-    for option in '"preset": "paper"' '"epochs": "2"' '"isometry": "50"' '"confidence": "single"' '"catch-up": "root"' \
+    for option in '"method": "paper"' '"epochs": "2"' '"isometry": "50"' '"confidence": "single"' '"catch-up": "root"' \
         '"rotation": "cayley"' '"time-frequencies": "3"' '"grid-levels": "2"' '"lambda-growth": "1.25"' \
         '"lambda": "0.25"' '"normal-channels": "1"' '"grid-rate": "0.004"' '"width-1": "64"' '"width-2": "64"' \
         '"hidden-layers": "3"'; do
@@ -263,12 +263,12 @@ CONFIG
 
 @test "a method configuration with a value that makes no sense names file and key" {
     echo '{"grid": {"n_level": 99}}' >wrong.json
-    run "$NEUPIG" run set/one/points -o wrong --config wrong.json
+    run "$NEUPIG" run set/one/points -o wrong --method wrong.json
     echo "$output"
     [ "$status" -eq 2 ]
     [[ "$output" == *'wrong.json: grid.n_level: option grid-levels: 99 is outside'* ]]
     echo '{"mlp": {"hidden": "wide"}}' >wrong.json
-    run "$NEUPIG" run set/one/points -o wrong --config wrong.json
+    run "$NEUPIG" run set/one/points -o wrong --method wrong.json
     [ "$status" -eq 2 ]
     [[ "$output" == *'wrong.json: mlp.hidden: not a number'* ]]
 }

@@ -57,7 +57,7 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     [ "$status" -eq 0 ]
     file="$(sed -n 's/^written: //p' <<<"$output")"
     [ -f "$file" ]
-    settings=(--no-align --epochs 2 --width-1 64 --width-2 64 --faces 400 --poisson-depth 6 --max-residual 100 --max-flipped 100 --max-stretched 100 --quiet)
+    settings=(--method '{"align": false, "epochs": 2, "width-1": 64, "width-2": 64, "poisson-depth": 6}' --faces 400 --max-residual 100 --max-flipped 100 --max-stretched 100 --quiet)
     "$NEUPIG" run in/points -o tuned "${settings[@]}"
     grep -qF "$file" tuned/report.json
     echo '{"kind"' >"$file"
@@ -70,10 +70,10 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
         head -c 1000 "$program" >cut
         cp cut "$program"
     done
-    "$NEUPIG" run in/points -o wide "${settings[@]}" --tuning wide
+    "$NEUPIG" run in/points -o wide "${settings[@]}" --method '{"tuning": "wide"}'
     cmp wide/meshes/frame_0000.ply plain/meshes/frame_0000.ply
     [ "$(find cache -name '*.program' -size +3 | wc -l)" -gt 5 ]
-    run "$NEUPIG" run in/points -o named "${settings[@]}" --tuning "$file"
+    run "$NEUPIG" run in/points -o named "${settings[@]}" --method "{\"tuning\": \"$file\"}"
     [ "$status" -eq 3 ]
     [[ "$output" == *"$file"* ]]
 }

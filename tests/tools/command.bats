@@ -75,28 +75,61 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     [ "$status" -eq 1 ]
 }
 
-@test "a configuration file is read, its mistakes are named, and the command line wins" {
+@test "a method is a file or a text, its mistakes are named, and the command line wins" {
     echo '{"seed": 7, // a comment' >broken.json
-    run "$NEUPIG" run in -o out --config broken.json
+    run "$NEUPIG" run in -o out --method broken.json
     [ "$status" -eq 2 ]
     [[ "$output" == *"broken.json:"* ]]
     echo '{"no-such-option": 7}' >unknown.json
-    run "$NEUPIG" run in -o out --config unknown.json
+    run "$NEUPIG" run in -o out --method unknown.json
     [ "$status" -eq 2 ]
     [[ "$output" == *"unknown.json"*"no-such-option"* ]]
-    run "$NEUPIG" run in -o out --config missing.json
+    run "$NEUPIG" run in -o out --method missing.json
     [ "$status" -eq 2 ]
+    run "$NEUPIG" run in -o out --method papr
+    [ "$status" -eq 2 ]
+    [[ "$output" == *'"papr"'* ]]
     echo '{"ring": 0}' >range.json
-    run "$NEUPIG" run in -o out --config range.json
+    run "$NEUPIG" run in -o out --method range.json
     [ "$status" -eq 2 ]
+    run "$NEUPIG" run in -o out --method '{"epochs": -1}'
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"epochs"*"outside"* ]]
     # The file alone would be refused for its input; with the command line's input another one is named.
     echo '{"input": "from-file", "output": "out"}' >good.json
-    run "$NEUPIG" run --config good.json
+    run "$NEUPIG" run --method good.json
     [ "$status" -eq 3 ]
     [[ "$output" == *"from-file"* ]]
-    run "$NEUPIG" run from-line --config good.json
+    run "$NEUPIG" run from-line --method=good.json --method paper
     [ "$status" -eq 3 ]
     [[ "$output" == *"from-line"* ]]
+}
+
+@test "an option that went or moved says where to" {
+    run "$NEUPIG" run in -o out --quality best
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"went: --method best"* ]]
+    run "$NEUPIG" run in -o out --epochs 5
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"option --epochs is a key of the method now: --method '{\"epochs\": 5}'"* ]]
+    run "$NEUPIG" probe in --no-align
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"--method '{\"align\": false}'"* ]]
+    run "$NEUPIG" run in -o out --rotation=cayley
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"--method '{\"rotation\": \"cayley\"}'"* ]]
+    run "$NEUPIG" run in -o out --pull
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"for programs"* ]]
+    [ ! -e out ]
+}
+
+@test "help method lists names and keys, which are no options of run" {
+    "$NEUPIG" help method >method
+    for name in default best paper paper-1000 grids epochs align poisson-depth; do grep -q "^  $name " method; done
+    "$NEUPIG" help run >run
+    run grep -E '^  --(no-)?(epochs|align|ring|preset) ' run
+    [ "$status" -eq 1 ]
 }
 
 @test "an input that does not exist is bad input and leaves nothing under a final name" {
@@ -148,8 +181,8 @@ while (( $# )); do
     shift 2
 done
 EOF
-    timeout 30 zsh -f ask.zsh 'neupig syn' 'neupig synth ' 'neupig run --prese' 'neupig run --preset ' \
-        'neupig run --preset gri' 'neupig run --preset grids ' 'neupig eval --jso' 'neupig eval --json '
+    timeout 30 zsh -f ask.zsh 'neupig syn' 'neupig synth ' 'neupig run --metho' 'neupig run --method ' \
+        'neupig run --method gri' 'neupig run --method grids ' 'neupig eval --jso' 'neupig eval --json '
 }
 
 @test "output that can't be written is a disk failure" {

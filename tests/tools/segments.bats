@@ -1,8 +1,9 @@
 # Captures whose topology changes: the alarm, a reference per segment, their overlap, and going on after a kill.
 
-small=(--epochs 10 --width-1 64 --width-2 64 --faces 2000 --poisson-depth 6 --window 10 --overlap 2
-    --align-nodes 300 --align-steps 8 --grid-levels 4 --max-residual 100 --max-flipped 100 --min-coverage 0
-    --segment-min 4 --quiet)
+small=(--method '{"epochs": 10, "width-1": 64, "width-2": 64, "poisson-depth": 6, "window": 10, "overlap": 2,
+                  "align-nodes": 300, "align-steps": 8, "grid-levels": 4, "segment-min": 4}' --faces 2000
+    --max-residual 100 --max-flipped 100 --min-coverage 0
+    --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -149,7 +150,7 @@ END
 
 @test "a hand that leaves the hip raises the alarm, unless the weld was cut" {
     "$NEUPIG" synth --body hands --frames 14 --change 6 --points 1500 --cell 0.04 -o hands
-    run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --welds keep
+    run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --method '{"welds": "keep"}'
     echo "$output"
     [ "$status" -eq 7 ]
     within "$(alarm welded forward)" 6

@@ -63,6 +63,13 @@ static npg_status set_given(npg_options *options, const npg_options *given)
     return NPG_OK;
 }
 
+void npg_batch_warn_of_ignored(const npg_options *options, const char *place)
+{
+    const char *ignored = npg_options_ignored(options);
+    if (*ignored)
+        fprintf(stderr, "neupig: warning: %s: no counterpart here, so without effect: %s\n", place, ignored);
+}
+
 /* A run of a batch reads files and is alone with its output. */
 static npg_status check_options(const npg_options *options)
 {

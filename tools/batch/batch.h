@@ -61,6 +61,10 @@ bool npg_batch_is_mine(const npg_batch *batch, size_t i);
 npg_status npg_batch_read_manifest(npg_batch *batch, const npg_batch_given *given);
 npg_status npg_batch_read_folder(npg_batch *batch, const npg_batch_given *given);
 
+/* Say on standard error what a method of the published code asks for that has no counterpart here; place: where
+ * it was read. */
+void npg_batch_warn_of_ignored(const npg_options *options, const char *place);
+
 /* Add a capture with fresh options.  NPG_USAGE: a name that can't be a folder's or that another one has. */
 npg_status npg_batch_add(npg_batch *batch, npg_capture **capture, const char *name);
 

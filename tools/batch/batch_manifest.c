@@ -5,11 +5,11 @@
  *         "defaults": {"epochs": 60, "max-memory": 4000, "max-time": 7200},
  *         "captures": [
  *             {"input": "dancer"},
- *             {"input": "horse/scan_%04d.ply", "name": "horse", "config": "fit.json", "keep-going": true}
+ *             {"input": "horse/scan_%04d.ply", "name": "horse", "method": "fit.json", "keep-going": true}
  *         ]
  *     }
  *
- * Beside "input", "name", "config" (a file of options, read first), "max-time" and "segments" (as --segments
+ * Beside "input", "name", "method" (a name, a file, or an object of keys, read first), "max-time" and "segments" (as --segments
  * of neupig run) a capture's keys are options of neupig run; its own win over the defaults.  Paths are taken
  * from the manifest's folder. */
 #include <jansson.h>
@@ -21,7 +21,6 @@
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
 #include "tools/batch/batch.h"
-#include "tools/method_config.h"
 
 #define MANIFEST_LIMIT ((size_t)16 << 20) /* bytes: some hundred thousand captures */
 
@@ -70,7 +69,7 @@ static npg_status set_segments(npg_capture *capture, const json_t *value)
 
 static npg_status set_key(const manifest *m, npg_capture *capture, const char *key, const json_t *value)
 {
-    if (!strcmp(key, "input") || !strcmp(key, "name") || !strcmp(key, "config")) return NPG_OK;
+    if (!strcmp(key, "input") || !strcmp(key, "name") || !strcmp(key, "method")) return NPG_OK;
     if (!strcmp(key, "output")) return npg_error(NPG_USAGE, "captures go to folders of the batch's output");
     if (is_path(key)) return set_path(m, capture->options, key, value);
     if (!strcmp(key, "segments")) return set_segments(capture, value);
@@ -81,24 +80,27 @@ static npg_status set_key(const manifest *m, npg_capture *capture, const char *k
                : npg_error(NPG_USAGE, "not a number of seconds");
 }
 
-static npg_status load_config(const manifest *m, npg_capture *capture, const json_t *value)
+static npg_status set_method(const manifest *m, npg_capture *capture, const json_t *value)
 {
     char *path;
+    const char *text = json_string_value(value);
     if (!value) return NPG_OK;
-    if (!json_is_string(value)) return npg_error(NPG_USAGE, "not the path of a file");
-    NPG_TRY(npg_path_from(&path, m->folder, json_string_value(value)));
-    npg_status status = npg_config_load(capture->options, path);
+    if (!text || *text == '{' || !strpbrk(text, "./"))
+        return npg_options_set_json(capture->options, "method", value);
+    NPG_TRY(npg_path_from(&path, m->folder, text));
+    npg_status status = npg_options_set(capture->options, "method", path);
+    if (!status) npg_batch_warn_of_ignored(capture->options, path);
     npg_release(&path);
     return status;
 }
 
-/* All of an object, the file it names first. */
+/* All of an object, the method first. */
 static npg_status set_keys(const manifest *m, npg_capture *capture, json_t *object, const char *place)
 {
     const char *key;
     json_t *value;
-    npg_status status = load_config(m, capture, json_object_get(object, "config"));
-    if (status) return npg_error_prefix(status, "%s.config", place);
+    npg_status status = set_method(m, capture, json_object_get(object, "method"));
+    if (status) return npg_error_prefix(status, "%s.method", place);
     json_object_foreach(object, key, value)
     {
         status = set_key(m, capture, key, value);

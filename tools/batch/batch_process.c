@@ -49,21 +49,38 @@ static void clear_command(command *c)
     npg_release(&c->words);
 }
 
+/* What is set, as --<option>=<value>; the keys of the method as one object. */
+static npg_status add_options(command *c, const npg_options *options, json_t *method)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++) {
+        const char *value = npg_options_get(options, info.name);
+        if (!npg_options_is_set(options, info.name) || !*value || !strcmp(info.name, "input")) continue;
+        if (info.use == NPG_USE_COMMON)
+            NPG_TRY(add_word(c, info.name, value));
+        else
+            json_object_set_new(method, info.name, npg_json_text(value));
+    }
+    if (!json_object_size(method)) return NPG_OK;
+    char *text = json_dumps(method, JSON_COMPACT);
+    npg_status status = text ? add_word(c, "method", text) : npg_error(NPG_MEMORY, "no memory");
+    free(text);
+    return status;
+}
+
 /* neupig run --progress=json --quiet --log-file=OUT/log.jsonl --<option>=<value>... -- INPUT */
 static npg_status make_command(command *c, const npg_capture *capture, const char *log_path)
 {
-    npg_option_info info = {.struct_size = sizeof info};
     NPG_TRY(add_word(c, "neupig", ""));
     NPG_TRY(add_word(c, "run", ""));
     NPG_TRY(add_word(c, "progress", "json"));
     NPG_TRY(add_word(c, "quiet", "yes"));
     NPG_TRY(add_word(c, "log-file", log_path));
     if (capture->segments == NPG_BATCH_SEGMENTS_AUTO) NPG_TRY(add_word(c, "segments", "auto"));
-    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++) {
-        const char *value = npg_options_get(capture->options, info.name);
-        bool is_set = npg_options_is_set(capture->options, info.name) && strcmp(info.name, "input") != 0;
-        if (is_set && *value) NPG_TRY(add_word(c, info.name, value));
-    }
+    json_t *method = json_object();
+    npg_status status = add_options(c, capture->options, method);
+    json_decref(method);
+    NPG_TRY(status);
     NPG_TRY(add_word(c, "--", ""));
     return add_word(c, capture->input, "");
 }

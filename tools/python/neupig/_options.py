@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -40,6 +41,8 @@ def text_of(value: object) -> bytes:
     """A value as the option tables write it."""
     if isinstance(value, bool):
         return b"yes" if value else b"no"
+    if isinstance(value, Mapping):  # a method
+        return json.dumps(value).encode()
     if isinstance(value, os.PathLike):
         return os.fsencode(value)
     return value if isinstance(value, bytes) else os.fsencode(str(value))

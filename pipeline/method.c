@@ -1,8 +1,8 @@
-/* Method configurations of the paper's published code, as options of a run.
+/* Methods: a JSON object whose keys are options, or a configuration of the paper's published code.
  *
  * That code solves (I + lambda L) u = z by conjugate gradients and names the choice and its neighbourhood;
  * the solve is exact here, so these keys have no counterpart.  Features have a fixed width of 30 + 2. */
-#include "tools/method_config.h"
+#include "pipeline/method.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -10,9 +10,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pipeline/json_file.h"
+#include "pipeline/memory.h"
+#include "pipeline/options.h"
+
 typedef struct word {
     const char *published, *option, *own; /* option NULL: what is done anyway */
 } word;
+
+/* ---- the published code's configuration ---- */
 
 /* The published word, the option here, and its word. */
 /* clang-format off */
@@ -123,11 +129,11 @@ static const json_t *section_of(const json_t *root, const rule *r)
 }
 
 /* Everything in one object that no rule knows. */
-static void find_unknown(unmatched *u, json_t *object, const char *section)
+static void find_unknown(unmatched *u, const json_t *object, const char *section)
 {
     const char *key;
     const json_t *value;
-    json_object_foreach(object, key, value)
+    json_object_foreach((json_t *)object, key, value)
     {
         bool known = !section && json_is_object(value) &&
                      (!strcmp(key, "optimization") || !strcmp(key, "grid") || !strcmp(key, "mlp"));
@@ -139,39 +145,115 @@ static void find_unknown(unmatched *u, json_t *object, const char *section)
     }
 }
 
-static npg_status apply_all(npg_options *options, json_t *root, const char *path)
+static npg_status apply_published(npg_options *options, const json_t *root, const char *place)
 {
     unmatched u = {.count = 0};
+    char *ignored;
     NPG_TRY(npg_options_set(options, "preset", "paper"));
     for (size_t i = 0; i < RULES; i++) {
         const rule *r = &rules[i];
         const json_t *value = json_object_get(section_of(root, r), r->key);
         npg_status status = value ? apply(options, r, value, &u) : NPG_OK;
         if (status)
-            return npg_error_prefix(status, "%s: %s%s%s", path, r->section ? r->section : "",
+            return npg_error_prefix(status, "%s: %s%s%s", place, r->section ? r->section : "",
                                     r->section ? "." : "", r->key);
     }
     find_unknown(&u, root, NULL);
     find_unknown(&u, json_object_get(root, "optimization"), "optimization");
     find_unknown(&u, json_object_get(root, "grid"), "grid");
     find_unknown(&u, json_object_get(root, "mlp"), "mlp");
-    if (u.count)
-        fprintf(stderr, "neupig: warning: %s: no counterpart here, so without effect: %s\n", path, u.text);
+    NPG_TRY(npg_copy_text(&ignored, u.text));
+    npg_options_ignore(options, &ignored);
     return NPG_OK;
 }
 
-static bool is_method_config(const json_t *root)
+static bool is_published(const json_t *root)
 {
     return json_is_object(json_object_get(root, "optimization")) ||
            json_is_object(json_object_get(root, "grid")) || json_is_object(json_object_get(root, "mlp"));
 }
 
-npg_status npg_config_load(npg_options *options, const char *path)
+/* ---- our own ---- */
+
+/* The line of the key `name` of the outermost object, in text that is known to be good JSON. */
+static int line_of_key(const char *text, const char *name)
 {
-    json_error_t error;
-    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &error);
+    int line = 1, depth = 0;
+    size_t length = strlen(name);
+    for (const char *c = text; *c; c++) {
+        line += *c == '\n';
+        depth += (*c == '{' || *c == '[') - (*c == '}' || *c == ']');
+        if (*c != '"') continue;
+        const char *first = ++c;
+        for (; *c && *c != '"'; c++) c += *c == '\\' && c[1];
+        if (!*c) break;
+        bool is_key = c[1 + strspn(c + 1, " \t\r\n")] == ':';
+        if (depth == 1 && is_key && (size_t)(c - first) == length && !strncmp(first, name, length))
+            return line;
+    }
+    return 0;
+}
+
+/* text: what root was read from, or NULL; only then a line is known. */
+static npg_status apply_own(npg_options *options, const json_t *root, const char *place, const char *text)
+{
+    const char *name;
+    json_t *value;
+    if (!json_is_object(root)) return npg_error(NPG_USAGE, "%s: not a JSON object", place);
+    json_object_foreach((json_t *)root, name, value)
+    {
+        npg_status status = npg_options_set_key(options, name, value);
+        if (status && !text) return npg_error_prefix(status, "%s", place);
+        if (status) return npg_error_prefix(status, "%s:%d", place, line_of_key(text, name));
+    }
+    return NPG_OK;
+}
+
+npg_status npg_method_apply(npg_options *options, const json_t *root, const char *place)
+{
+    return is_published(root) ? apply_published(options, root, place) : apply_own(options, root, place, NULL);
+}
+
+/* ---- where it comes from ---- */
+
+/* Takes over root and text. */
+static npg_status apply_read(npg_options *options, json_t *root, char *text, const char *place)
+{
     npg_status status =
-        is_method_config(root) ? apply_all(options, root, path) : npg_options_load(options, path);
+        is_published(root) ? apply_published(options, root, place) : apply_own(options, root, place, text);
+    npg_release(&text);
     json_decref(root);
     return status;
+}
+
+npg_status npg_options_load(npg_options *options, const char *path)
+{
+    enum { LIMIT = 1 << 20 }; /* bytes; all options together take a few thousand */
+    char *text;
+    json_t *root;
+    NPG_REQUIRE(options && path);
+    NPG_TRY(npg_json_read(&root, &text, path, LIMIT));
+    return apply_read(options, root, text, path);
+}
+
+static npg_status apply_text(npg_options *options, const char *given)
+{
+    char *text;
+    json_t *root;
+    NPG_TRY(npg_copy_text(&text, given));
+    npg_status status = npg_json_parse(&root, text, "method");
+    if (!status) return apply_read(options, root, text, "method");
+    npg_release(&text);
+    return status;
+}
+
+/* A path has a slash or a dot in it; anything else was meant as a name. */
+npg_status npg_method_set(npg_options *options, const char *value)
+{
+    if (value[strspn(value, " \t\r\n")] == '{') return apply_text(options, value);
+    if (strpbrk(value, "./")) return npg_options_load(options, value);
+    return npg_error(NPG_USAGE,
+                     "option method: \"%s\" is no method (neupig help method lists them), no file.json and "
+                     "no JSON object",
+                     value);
 }

@@ -1,0 +1,19 @@
+/* Options that went, and what to do instead: the text of the error message. */
+#include <string.h>
+
+#include "pipeline/options.h"
+
+/* clang-format off */
+static const char *const gone[][2] = {
+    {"quality",        "--method best"},
+    {"config",         "--method FILE"},
+    {"rig",            "the rig is the input: neupig run rig.json"},
+};
+/* clang-format on */
+
+const char *npg_option_gone(const char *name)
+{
+    for (size_t i = 0; i < sizeof gone / sizeof *gone; i++)
+        if (!strcmp(gone[i][0], name)) return gone[i][1];
+    return NULL;
+}
