@@ -76,22 +76,20 @@ npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, si
                                    const float *points, size_t n, const int *neighbours, size_t count)
 {
     npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL, *queries = NULL;
     size_t most = (size_t)neighbours[count - 1];
     estimate e = {.normals = normals, .neighbours = neighbours, .count = count, .points = points};
-    npg_status status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_alloc_array(&queries, NPG_FOR_FRAMES, at_count, 3 * sizeof *queries);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, at_count, most * sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, at_count, most * sizeof *dist_sq);
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    float *queries = npg_arena_take(&scratch, at_count, 3 * sizeof *queries);
+    uint32_t *index = npg_arena_take(&scratch, at_count, most * sizeof *index);
+    float *dist_sq = npg_arena_take(&scratch, at_count, most * sizeof *dist_sq);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_kdtree_open(&tree, points, n);
     if (!status) npg_rows_gather(queries, points, at, at_count);
     if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, queries, at_count, most, 0);
     for (size_t i = 0; i < at_count && !status; i++)
         estimate_point(&e, (uint32_t)i, index + most * i, dist_sq + most * i);
     npg_kdtree_close(&tree);
-    npg_release(&queries);
-    npg_release(&index);
-    npg_release(&dist_sq);
+    npg_arena_release(&scratch);
     return status;
 }
 

@@ -50,27 +50,18 @@ static void set_areas(npg_sided_cloud *c, const float *dist_sq)
 
 static npg_status find_neighbours(npg_sided_cloud *c)
 {
-    npg_kdtree *tree = NULL;
-    float *dist_sq = NULL;
+    npg_kdtree *tree;
     size_t n = c->count;
-    npg_status status = npg_kdtree_open(&tree, c->points, n);
-    if (!status) status = npg_alloc_array(&c->index, NPG_FOR_FRAMES, n, NEIGHBOURS * sizeof *c->index);
-    if (!status) status = npg_alloc_array(&c->area, NPG_FOR_FRAMES, n, sizeof *c->area);
-    if (!status) status = npg_alloc_array(&c->winding, NPG_FOR_FRAMES, n, sizeof *c->winding);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, n, NEIGHBOURS * sizeof *dist_sq);
-    if (!status) status = npg_kdtree_nearest(tree, c->index, dist_sq, c->points, n, NEIGHBOURS, 0);
+    c->index = npg_arena_take(&c->arena, n, NEIGHBOURS * sizeof *c->index);
+    c->area = npg_arena_take(&c->arena, n, sizeof *c->area);
+    c->winding = npg_arena_take(&c->arena, n, sizeof *c->winding);
+    float *dist_sq = npg_arena_take(&c->arena, n, NEIGHBOURS * sizeof *dist_sq);
+    NPG_TRY(npg_arena_status(&c->arena));
+    NPG_TRY(npg_kdtree_open(&tree, c->points, n));
+    npg_status status = npg_kdtree_nearest(tree, c->index, dist_sq, c->points, n, NEIGHBOURS, 0);
     if (!status) set_areas(c, dist_sq);
     npg_kdtree_close(&tree);
-    npg_release(&dist_sq);
     return status;
-}
-
-static void close_cloud(npg_sided_cloud *c)
-{
-    npg_release(&c->index);
-    npg_release(&c->area);
-    npg_release(&c->winding);
-    npg_release(&c->links);
 }
 
 static int surest_first(const void *left, const void *right)
@@ -84,7 +75,8 @@ static int surest_first(const void *left, const void *right)
 
 static npg_status make_links(npg_sided_cloud *c)
 {
-    NPG_TRY(npg_alloc_array(&c->links, NPG_FOR_FRAMES, c->count, NEIGHBOURS * sizeof *c->links));
+    c->links = npg_arena_take(&c->arena, c->count, NEIGHBOURS * sizeof *c->links);
+    NPG_TRY(npg_arena_status(&c->arena));
     c->link_count = 0;
     for (uint32_t i = 0; i < c->count; i++)
         for (size_t k = 0; k < NEIGHBOURS; k++) {
@@ -157,20 +149,17 @@ static size_t list_turned(uint32_t *list, const uint8_t *was_turned, size_t n)
 /* Single points against their surroundings, and the sign of the whole. */
 static npg_status settle_points(npg_sided_cloud *c)
 {
-    uint8_t *was_turned = NULL;
-    uint32_t *list = NULL;
     size_t count = 1;
-    npg_status status = npg_sided_winding(c);
-    if (!status) status = npg_alloc(&was_turned, NPG_FOR_FRAMES, c->count);
-    if (!status) status = npg_alloc_array(&list, NPG_FOR_FRAMES, c->count, sizeof *list);
-    for (int round = 0; round < MEND_ROUNDS && count && !status; round++) {
+    uint8_t *was_turned = npg_arena_take(&c->arena, c->count, 1);
+    uint32_t *list = npg_arena_take(&c->arena, c->count, sizeof *list);
+    NPG_TRY(npg_arena_status(&c->arena));
+    NPG_TRY(npg_sided_winding(c));
+    for (int round = 0; round < MEND_ROUNDS && count; round++) {
         turn_points(c, was_turned);
         count = list_turned(list, was_turned, c->count);
-        if (count) status = npg_sided_rewind(c, list, count);
+        if (count) NPG_TRY(npg_sided_rewind(c, list, count));
     }
-    npg_release(&was_turned);
-    npg_release(&list);
-    return status ? status : face_out(c);
+    return face_out(c);
 }
 
 /* Sides from directions alone. */
@@ -178,18 +167,15 @@ static npg_status orient_from_nothing(npg_sided_cloud *c)
 {
     /* Of the agreement that holds a patch together: large patches first, then their parts; set by trial. */
     static const float sure[] = {0.3f, 0.6f, 0.8f, 0.92f};
-    uint32_t *patch_of;
-    NPG_TRY(npg_alloc_array(&patch_of, NPG_FOR_FRAMES, c->count, sizeof *patch_of));
-    npg_status status = make_links(c);
-    if (!status) status = npg_sided_grow_tree(c);
-    if (!status) status = face_out(c);
-    for (size_t i = 0; i < sizeof sure / sizeof *sure && !status; i++) {
-        status = npg_sided_patches(patch_of, c, NULL, sure[i]);
-        if (!status) status = npg_sided_turn_patches(c, patch_of, 0);
+    uint32_t *patch_of = npg_arena_take(&c->arena, c->count, sizeof *patch_of);
+    NPG_TRY(make_links(c));
+    NPG_TRY(npg_sided_grow_tree(c));
+    NPG_TRY(face_out(c));
+    for (size_t i = 0; i < sizeof sure / sizeof *sure; i++) {
+        NPG_TRY(npg_sided_patches(patch_of, c, NULL, sure[i]));
+        NPG_TRY(npg_sided_turn_patches(c, patch_of, 0));
     }
-    if (!status) status = settle_points(c);
-    npg_release(&patch_of);
-    return status;
+    return settle_points(c);
 }
 
 /* ---- given sides ---- */
@@ -211,22 +197,15 @@ static npg_status find_doubts(uint8_t *in_doubt, float *given, npg_sided_cloud *
  * side comes out differently when it is found from nothing are in doubt, and are turned in patches. */
 static npg_status orient_from_given(npg_sided_cloud *c)
 {
-    float *given = NULL;
-    uint8_t *in_doubt = NULL;
-    uint32_t *patch_of = NULL;
-    size_t n = c->count;
-    npg_status status = face_out(c);
-    if (!status) status = npg_alloc_array(&given, NPG_FOR_FRAMES, n, 3 * sizeof *given);
-    if (!status) status = npg_alloc_array(&patch_of, NPG_FOR_FRAMES, n, sizeof *patch_of);
-    if (!status) status = npg_alloc(&in_doubt, NPG_FOR_FRAMES, n);
-    if (!status) status = find_doubts(in_doubt, given, c);
-    if (!status) status = npg_sided_patches(patch_of, c, in_doubt, 0.5f);
-    if (!status) status = npg_sided_turn_patches(c, patch_of, GIVEN_TRUST);
-    if (!status) status = settle_points(c);
-    npg_release(&given);
-    npg_release(&in_doubt);
-    npg_release(&patch_of);
-    return status;
+    float *given = npg_arena_take(&c->arena, c->count, 3 * sizeof *given);
+    uint32_t *patch_of = npg_arena_take(&c->arena, c->count, sizeof *patch_of);
+    uint8_t *in_doubt = npg_arena_take(&c->arena, c->count, 1);
+    NPG_TRY(npg_arena_status(&c->arena));
+    NPG_TRY(face_out(c));
+    NPG_TRY(find_doubts(in_doubt, given, c));
+    NPG_TRY(npg_sided_patches(patch_of, c, in_doubt, 0.5f));
+    NPG_TRY(npg_sided_turn_patches(c, patch_of, GIVEN_TRUST));
+    return settle_points(c);
 }
 
 /* How well the sides fit together, larger is better: agreement of neighbours less the misfit of the winding
@@ -246,10 +225,11 @@ static npg_status score_of(double *score, npg_sided_cloud *c)
 
 static npg_status orient_core(npg_sided_cloud *c, bool from_given, double *score)
 {
+    c->arena.purpose = NPG_FOR_FRAMES;
     npg_status status = find_neighbours(c);
     if (!status) status = from_given ? orient_from_given(c) : orient_from_nothing(c);
     if (!status && score) status = score_of(score, c);
-    close_cloud(c);
+    npg_arena_release(&c->arena);
     return status;
 }
 
@@ -282,11 +262,11 @@ static npg_status follow_core(float *all_normals, const float *all_points, size_
 {
     enum { BATCH = 4096 };
     npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL;
-    npg_status status = npg_kdtree_open(&tree, points, core_count);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, FOLLOWED * sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, FOLLOWED * sizeof *dist_sq);
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    uint32_t *index = npg_arena_take(&scratch, BATCH, FOLLOWED * sizeof *index);
+    float *dist_sq = npg_arena_take(&scratch, BATCH, FOLLOWED * sizeof *dist_sq);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_kdtree_open(&tree, points, core_count);
     for (size_t first = 0; first < n && !status; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
         status = npg_kdtree_nearest(tree, index, dist_sq, all_points + 3 * first, count, FOLLOWED, 0);
@@ -295,30 +275,27 @@ static npg_status follow_core(float *all_normals, const float *all_points, size_
                               dist_sq + FOLLOWED * i);
     }
     npg_kdtree_close(&tree);
-    npg_release(&index);
-    npg_release(&dist_sq);
+    npg_arena_release(&scratch);
     return status;
 }
 
 static npg_status orient(float *normals, double *score, const float *points, size_t n, bool from_given)
 {
-    float *core_points = NULL, *core_normals = NULL;
-    uint32_t *from = NULL;
     npg_sided_cloud whole = {.count = n, .points = points, .normals = normals};
     if (n < 4) return NPG_OK; /* no closed surface has fewer */
     if (n <= CORE_MAX) return orient_core(&whole, from_given, score);
-    npg_status status = npg_alloc_array(&core_points, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&core_normals, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from);
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    float *core_points = npg_arena_take(&scratch, CORE_MAX, 3 * sizeof *core_points);
+    float *core_normals = npg_arena_take(&scratch, CORE_MAX, 3 * sizeof *core_normals);
+    uint32_t *from = npg_arena_take(&scratch, CORE_MAX, sizeof *from);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) list_core(from, n);
     if (!status) npg_rows_gather(core_points, points, from, CORE_MAX);
     if (!status) npg_rows_gather(core_normals, normals, from, CORE_MAX);
     npg_sided_cloud core = {.count = CORE_MAX, .points = core_points, .normals = core_normals};
     if (!status) status = orient_core(&core, from_given, score);
     if (!status) status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
-    npg_release(&core_points);
-    npg_release(&core_normals);
-    npg_release(&from);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -333,23 +310,17 @@ npg_status npg_normals_orient(float *normals, double *score, const float *points
 static const int trial_neighbours[TRIALS] = {10, 12, 16, 24}; /* see normals.h for what they trade */
 
 typedef struct trials {     /* of the same points with several numbers of neighbours */
-    float *normals[TRIALS]; /* count x 3 each, owned */
+    float *normals[TRIALS]; /* count x 3 each */
     double score[TRIALS];
     const float *points; /* count x 3 */
     size_t count, parts;
 } trials;
 
-static npg_status open_trials(trials *t, const float *points, size_t count)
+static npg_status open_trials(trials *t, npg_arena *scratch, const float *points, size_t count)
 {
     *t = (trials){.points = points, .count = count, .parts = npg_parallel_parts(TRIALS, 1, TRIALS)};
-    for (size_t i = 0; i < TRIALS; i++)
-        NPG_TRY(npg_alloc_array(&t->normals[i], NPG_FOR_FRAMES, count, 3 * sizeof(float)));
-    return NPG_OK;
-}
-
-static void close_trials(trials *t)
-{
-    for (size_t i = 0; i < TRIALS; i++) npg_release(&t->normals[i]);
+    for (size_t i = 0; i < TRIALS; i++) t->normals[i] = npg_arena_take(scratch, count, 3 * sizeof(float));
+    return npg_arena_status(scratch);
 }
 
 static npg_status orient_share(void *user, size_t part)
@@ -374,34 +345,33 @@ static npg_status make_small(float *normals, const float *points, size_t n)
 {
     trials t;
     size_t best;
-    npg_status status = open_trials(&t, points, n);
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    npg_status status = open_trials(&t, &scratch, points, n);
     if (!status) status = npg_normals_estimate_several(t.normals, points, n, trial_neighbours, TRIALS);
     if (!status) status = run_trials(&t, &best);
     if (!status) memcpy(normals, t.normals[best], n * 3 * sizeof *normals);
-    close_trials(&t);
+    npg_arena_release(&scratch);
     return status;
 }
 
 /* The core decides on the number of neighbours, and all others are estimated with that one alone. */
 static npg_status make_large(float *normals, const float *points, size_t n)
 {
-    trials t = {.count = 0};
-    float *core = NULL;
-    uint32_t *from = NULL;
+    trials t;
     size_t best;
-    npg_status status = npg_alloc_array(&core, NPG_FOR_FRAMES, CORE_MAX, 3 * sizeof *core);
-    if (!status) status = npg_alloc_array(&from, NPG_FOR_FRAMES, CORE_MAX, sizeof *from);
-    if (!status) list_core(from, n);
-    if (!status) npg_rows_gather(core, points, from, CORE_MAX);
-    if (!status) status = open_trials(&t, core, CORE_MAX);
-    if (!status)
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    float *core = npg_arena_take(&scratch, CORE_MAX, 3 * sizeof *core);
+    uint32_t *from = npg_arena_take(&scratch, CORE_MAX, sizeof *from);
+    npg_status status = open_trials(&t, &scratch, core, CORE_MAX);
+    if (!status) {
+        list_core(from, n);
+        npg_rows_gather(core, points, from, CORE_MAX);
         status = npg_normals_estimate_at(t.normals, from, CORE_MAX, points, n, trial_neighbours, TRIALS);
+    }
     if (!status) status = run_trials(&t, &best);
     if (!status) status = npg_normals_estimate(normals, points, n, trial_neighbours[best]);
     if (!status) status = follow_core(normals, points, n, core, t.normals[best], CORE_MAX);
-    close_trials(&t);
-    npg_release(&core);
-    npg_release(&from);
+    npg_arena_release(&scratch);
     return status;
 }
 

@@ -17,14 +17,15 @@
 
 /* Points and their normals times area, each coordinate by itself, filled up with points without area. */
 typedef struct panel {
-    float *x, *y, *z, *nx, *ny, *nz; /* in one allocation, x owns it */
+    float *x, *y, *z, *nx, *ny, *nz; /* in one allocation           */
     size_t padded;                   /* a multiple of LANES          */
 } panel;
 
-static npg_status open_panel(panel *p, size_t count_max)
+static npg_status open_panel(panel *p, npg_arena *arena, size_t count_max)
 {
     size_t room = (count_max + LANES - 1) / LANES * LANES;
-    NPG_TRY(npg_alloc_array(&p->x, NPG_FOR_FRAMES, room, 6 * sizeof(float)));
+    p->x = npg_arena_take(arena, room, 6 * sizeof(float));
+    NPG_TRY(npg_arena_status(arena));
     p->y = p->x + room;
     p->z = p->y + room;
     p->nx = p->z + room;
@@ -70,11 +71,10 @@ npg_status npg_sided_winding(npg_sided_cloud *c)
 {
     panel all;
     if (c->is_wound) return NPG_OK;
-    NPG_TRY(open_panel(&all, c->count));
+    NPG_TRY(open_panel(&all, &c->arena, c->count));
     fill_panel(&all, c, NULL, c->count);
     for (size_t i = 0; i < c->count; i++)
         c->winding[i] = sum_panel(&all, c->points + 3 * i, c->soft_sq) / FULL_ANGLE;
-    npg_release(&all.x);
     c->is_wound = true;
     return NPG_OK;
 }
@@ -82,17 +82,19 @@ npg_status npg_sided_winding(npg_sided_cloud *c)
 npg_status npg_sided_rewind(npg_sided_cloud *c, const uint32_t *turned, size_t count)
 {
     panel some;
-    NPG_TRY(open_panel(&some, count));
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    NPG_TRY(open_panel(&some, &scratch, count));
     fill_panel(&some, c, turned, count);
     for (size_t i = 0; i < c->count; i++)
         c->winding[i] += 2 * sum_panel(&some, c->points + 3 * i, c->soft_sq) / FULL_ANGLE;
-    npg_release(&some.x);
+    npg_arena_release(&scratch);
     return NPG_OK;
 }
 
 /* ---- spanning tree ---- */
 
 typedef struct forest { /* union-find whose members know their side relative to the root */
+    npg_arena arena;
     uint32_t *parent;
     uint8_t *is_turned; /* against the parent */
 } forest;
@@ -127,21 +129,16 @@ static void join(forest *f, const npg_link *l)
 
 static npg_status open_forest(forest *f, size_t count)
 {
-    f->is_turned = NULL;
-    NPG_TRY(npg_alloc_array(&f->parent, NPG_FOR_FRAMES, count, sizeof *f->parent));
-    for (uint32_t k = 0; k < count; k++) f->parent[k] = k;
-    return npg_alloc(&f->is_turned, NPG_FOR_FRAMES, count);
-}
-
-static void close_forest(forest *f)
-{
-    npg_release(&f->parent);
-    npg_release(&f->is_turned);
+    f->arena = (npg_arena){.purpose = NPG_FOR_FRAMES};
+    f->parent = npg_arena_take(&f->arena, count, sizeof *f->parent);
+    f->is_turned = npg_arena_take(&f->arena, count, 1);
+    for (uint32_t k = 0; k < count && f->parent; k++) f->parent[k] = k;
+    return npg_arena_status(&f->arena);
 }
 
 npg_status npg_sided_grow_tree(npg_sided_cloud *c)
 {
-    forest f = {NULL, NULL};
+    forest f;
     uint8_t turned;
     npg_status status = open_forest(&f, c->count);
     for (size_t i = 0; i < c->link_count && !status; i++) join(&f, &c->links[i]);
@@ -150,13 +147,13 @@ npg_status npg_sided_grow_tree(npg_sided_cloud *c)
         if (turned) turn_normal(c, k);
     }
     c->is_wound = false;
-    close_forest(&f);
+    npg_arena_release(&f.arena);
     return status;
 }
 
 npg_status npg_sided_patches(uint32_t *patch_of, const npg_sided_cloud *c, const uint8_t *among, float sure)
 {
-    forest f = {NULL, NULL};
+    forest f;
     uint8_t turned;
     npg_status status = open_forest(&f, c->count);
     for (uint32_t i = 0; i < c->count && !status; i++)
@@ -167,7 +164,7 @@ npg_status npg_sided_patches(uint32_t *patch_of, const npg_sided_cloud *c, const
         }
     for (uint32_t k = 0; k < c->count && !status; k++)
         patch_of[k] = !among || among[k] ? root_of(&f, k, &turned) : UINT32_MAX;
-    close_forest(&f);
+    npg_arena_release(&f.arena);
     return status;
 }
 
@@ -180,14 +177,6 @@ typedef struct patches { /* sets of points that can only be turned together */
     float *change; /* of the winding number at every point, room for one patch at a time */
     panel panel;   /* the members of one patch */
 } patches;
-
-static void close_patches(patches *p)
-{
-    npg_release(&p->members);
-    npg_release(&p->first);
-    npg_release(&p->change);
-    npg_release(&p->panel.x);
-}
 
 /* Sort the points by patch (counting sort); number: room for n. */
 static void fill_patches(patches *p, uint32_t *number, const uint32_t *patch_of, size_t n)
@@ -202,18 +191,15 @@ static void fill_patches(patches *p, uint32_t *number, const uint32_t *patch_of,
 }
 
 /* From the lowest member of each point's patch; points with UINT32_MAX belong to none. */
-static npg_status open_patches(patches *p, const uint32_t *patch_of, size_t n)
+static npg_status open_patches(patches *p, npg_arena *scratch, const uint32_t *patch_of, size_t n)
 {
-    uint32_t *number = NULL;
-    npg_status status = npg_alloc_array(&p->members, NPG_FOR_FRAMES, n, sizeof *p->members);
-    if (!status) status = npg_alloc_array(&p->first, NPG_FOR_FRAMES, n + 2, sizeof *p->first);
-    if (!status) status = npg_alloc_array(&p->change, NPG_FOR_FRAMES, n, sizeof *p->change);
-    if (!status) status = open_panel(&p->panel, n);
-    if (!status) status = npg_alloc_array(&number, NPG_FOR_FRAMES, n, sizeof *number);
-    if (!status) fill_patches(p, number, patch_of, n);
-    npg_release(&number);
-    if (status) close_patches(p);
-    return status;
+    p->members = npg_arena_take(scratch, n, sizeof *p->members);
+    p->first = npg_arena_take(scratch, n + 2, sizeof *p->first);
+    p->change = npg_arena_take(scratch, n, sizeof *p->change);
+    uint32_t *number = npg_arena_take(scratch, n, sizeof *number);
+    NPG_TRY(open_panel(&p->panel, scratch, n));
+    fill_patches(p, number, patch_of, n);
+    return NPG_OK;
 }
 
 /* p->change = what turning patch k over adds to the winding number everywhere.  Returns the change of the
@@ -250,8 +236,9 @@ npg_status npg_sided_turn_patches(npg_sided_cloud *c, const uint32_t *patch_of, 
 {
     patches p = {0};
     size_t turned = 1;
-    NPG_TRY(open_patches(&p, patch_of, c->count));
-    npg_status status = npg_sided_winding(c);
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    npg_status status = open_patches(&p, &scratch, patch_of, c->count);
+    if (!status) status = npg_sided_winding(c);
     for (int round = 0; round < PATCH_ROUNDS && turned && !status; round++) {
         turned = 0;
         for (size_t k = 0; k < p.count; k++) {
@@ -264,6 +251,6 @@ npg_status npg_sided_turn_patches(npg_sided_cloud *c, const uint32_t *patch_of, 
             turned++;
         }
     }
-    close_patches(&p);
+    npg_arena_release(&scratch);
     return status;
 }

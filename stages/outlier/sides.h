@@ -7,7 +7,7 @@
 #include <stdbool.h>
 
 #include "geometry/vec3.h"
-#include "pipeline/status.h"
+#include "pipeline/memory.h"
 
 #define NPG_SIDE_NEIGHBOURS 12 /* of a point, itself among them; set by trial */
 
@@ -17,14 +17,15 @@ typedef struct npg_link { /* two neighbours and how well their sides agree, -1..
 } npg_link;
 
 typedef struct npg_sided_cloud { /* the points that are oriented together */
+    npg_arena arena;             /* of what is said to be its own, and of all scratch until it is released */
     size_t count;
     const float *points;
     float *normals;
-    uint32_t *index;       /* count x NPG_SIDE_NEIGHBOURS, itself among them */
-    float *area, *winding; /* count */
+    uint32_t *index;       /* count x NPG_SIDE_NEIGHBOURS, itself among them; its own */
+    float *area, *winding; /* count; its own */
     bool is_wound;         /* winding is that of the normals as they are */
     float soft_sq;         /* squared length below which the winding number is softened */
-    npg_link *links;       /* link_count, owned */
+    npg_link *links;       /* link_count; its own */
     size_t link_count;
 } npg_sided_cloud;
 
