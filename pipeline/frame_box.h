@@ -15,7 +15,7 @@
 
 /* The longest side that a capture may have.  Cleaning and normals come before the box and are in local float:
  * below, squares and cubes of the points' spacing leave its range; above, points count as not
- * finite (cleaning.h). */
+ * finite. */
 #define NPG_SIDE_MIN 1e-13
 #define NPG_SIDE_MAX 1e12
 

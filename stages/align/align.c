@@ -2,16 +2,15 @@
  *
  * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They
  * wait until their window is complete: then those that were lost are tried again from what is known around
- * them (recover.h). The aligned positions are where the joint fit starts. */
+ * them (recover.c). The aligned positions are where the joint fit starts. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "align/align_internal.h"
 #include "align/follow_log.h"
-#include "align/group.h"
-#include "align/pose.h"
 #include "align/pose_cache.h"
-#include "align/recover.h"
+#include "align/tracker.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
 #include "job/job.h"

@@ -1,6 +1,5 @@
 /* Align as work to be timed: posing a dense surface, and aligning a frame. */
 #include "align/align.h"
-#include "align/graph.h"
 #include "align/tracker.h"
 
 enum { NODES = 1000 }; /* of the graph; how many there are makes no difference to the cost of a vertex */

@@ -1,10 +1,9 @@
 /* Candidate clouds: thinned frames, and following a surface through them. */
-#include "align/candidate_clouds.h"
+#include "align/tracker.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/pose.h"
 #include "geometry/mesh_tools.h"
 
 #define FLIPPED_MOST                                                                                         \

@@ -1,4 +1,4 @@
-#include "align/group.h"
+#include "align/align_internal.h"
 
 #include <stdlib.h>
 #include <string.h>

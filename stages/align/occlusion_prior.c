@@ -1,10 +1,10 @@
 /* Occlusion prior: edges in the frame of their first end. */
-#include "align/occlusion_prior.h"
+#include "align/tracker.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/component_links.h"
+#include "align/align_internal.h"
 #include "pipeline/order.h"
 
 /* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest; more of

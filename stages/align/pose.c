@@ -1,5 +1,5 @@
 /* Pose: products of the nodes' rotations. */
-#include "align/pose.h"
+#include "align/tracker.h"
 
 #include <math.h>
 

@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "align/pose.h"
+#include "align/tracker.h"
 #include "geometry/query.h"
 #include "geometry/vec3.h"
 #include "pipeline/file.h"

@@ -1,12 +1,11 @@
 /* Recover: which frames are lost, where they may start from, and the sweeps over them. */
-#include "align/recover.h"
+#include "align/align_internal.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/pose.h"
-#include "align/rigid_icp.h"
+#include "align/tracker.h"
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */

@@ -1,5 +1,5 @@
 /* Rigid ICP: trimmed iterated closest points between two looks. */
-#include "align/rigid_icp.h"
+#include "align/align_internal.h"
 
 #include <stdlib.h>
 #include <string.h>

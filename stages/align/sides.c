@@ -1,9 +1,9 @@
 /* Sides: two poses each, and their bytes. */
-#include "align/sides.h"
+#include "align/align_internal.h"
 
 #include <string.h>
 
-#include "align/pose.h"
+#include "align/tracker.h"
 
 npg_status npg_side_open(npg_side *side, npg_arena *arena, size_t node_count)
 {

@@ -4,8 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/block_system.h"
-#include "align/visible.h"
+#include "align/align_internal.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"

@@ -1,6 +1,177 @@
+/* Align: following a surface into frames. What other rooms may call; align_internal.h has the rest. */
+#ifndef NPG_ALIGN_TRACKER_H
+#define NPG_ALIGN_TRACKER_H
+
+#include "geometry/query.h"
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/memory.h"
+#include "pipeline/mesh.h"
+#include "pipeline/stage.h"
+
+/* Graph: a deformation graph over the reference surface; few nodes that carry all vertices along.
+ *
+ * Based on: Robert Sumner, Johannes Schmid, Mark Pauly, Embedded Deformation for Shape Manipulation, 2007.
+ *
+ *     x(v) = sum_k w_k(v) (R_k (v - g_k) + g_k + t_k)
+ *
+ * Nodes g_k lie on the surface, about a radius apart; the weights w_k(v) fall off with the distance along the
+ * surface, so that parts which only touch do not hold each other. */
+
+#define NPG_GRAPH_BIND 4 /* nodes that carry a vertex */
+
+typedef struct npg_graph {
+    npg_arena arena;                           /* of all arrays                                       */
+    size_t node_count, vert_count, edge_count; /* K, V, E                                             */
+    double radius;                             /* distance between nodes, about                       */
+    float *node_pos;                           /* K x 3                                               */
+    uint32_t *vert_node;                       /* V x 4, UINT32_MAX where there are fewer             */
+    float *vert_weight;                        /* V x 4, sum 1                                        */
+    uint32_t (*edges)[2];                      /* pairs of nodes that carry a vertex together, sorted */
+} npg_graph;
+
+/* About node_target nodes.  The mesh is a loan during the call. */
+npg_status npg_graph_open(npg_graph **graph, const npg_mesh *mesh, size_t node_target);
+void npg_graph_close(npg_graph **graph);
+
+/* The same nodes, carrying only these vertices of the whole (count). */
+npg_status npg_graph_take(npg_graph **part, const npg_graph *whole, const uint32_t *verts, size_t count);
+
+/* A pose: for each node the rotation (row-major 3 x 3) and the translation, 12 doubles. */
+#define NPG_POSE_SIZE 12
+static inline size_t npg_pose_bytes(size_t node_count)
+{
+    return node_count * NPG_POSE_SIZE * sizeof(double);
+}
+
+/* All nodes at rest.  pose: K x 12. */
+void npg_pose_rest(double *pose, size_t node_count);
+
+/* Where a point that the nodes carry goes. */
+void npg_pose_point(double out[3], const npg_graph *graph, const double *pose, const float rest[3],
+                    const uint32_t nodes[NPG_GRAPH_BIND], const float weights[NPG_GRAPH_BIND]);
+
+/* A pose as affine maps in single precision, for many points: rows (K x 16) holds each node's 3 x 4 matrix by
+ * columns of four, [R | g + t - R g], the fourth number of a column 0. */
+#define NPG_POSE_ROW 16
+void npg_pose_rows(float *rows, const npg_graph *graph, const double *pose);
+
+/* vert_pos (V x 3) of the vertices rest (V x 3) in a pose given by its rows. */
+void npg_pose_vertices(float *restrict vert_pos, const npg_graph *graph, const float *restrict rows,
+                       const float *restrict rest);
+
+/* Pose: what is done with a pose (graph.c) as such: taken on, moved as a whole, compared with another. */
+
+/* x -> rotation x + translation. */
+typedef struct npg_rigid {
+    double rotation[3][3], translation[3];
+} npg_rigid;
+
+/* Coordinate `row` of R x + t. */
+static inline double npg_rigid_at(const npg_rigid *m, const float x[3], int row)
+{
+    const double *r = m->rotation[row];
+    return r[0] * (double)x[0] + r[1] * (double)x[1] + r[2] * (double)x[2] + m->translation[row];
+}
+
+/* Make the rows of a matrix that is nearly a rotation orthonormal again (Gram and Schmidt). */
+void npg_pose_straighten(double rotation[9]);
+
+/* next = the pose after `now`, if the motion since `before` goes on:
+ * next_k = now_k before_k^-1 now_k.  K x 12 each. */
+void npg_pose_extrapolate(double *next, const double *now, const double *before, size_t node_count);
+
+/* moved = the pose (K x 12) as it is after the whole body has moved by `motion`:
+ * R_k' = R R_k,  g_k + t_k' = R (g_k + t_k) + t. */
+void npg_pose_move(double *moved, const npg_graph *graph, const double *pose, const npg_rigid *motion);
+
+/* Where the pose has the nodes (K x 3): g_k + t_k. */
+void npg_pose_places(float *places, const npg_graph *graph, const double *pose);
+
+/* The motion that takes the nodes of one pose closest to those of another, least squares.  NPG_MEMORY. */
+npg_status npg_pose_between(npg_rigid *motion, const npg_graph *graph, const double *from, const double *to);
+
+/* bend = sqrt(mean_k |R g_k + t - (g_k + t_k)|^2), in units, of the rigid motion (R, t) that makes it least:
+ * how far the pose is from moving the body as one piece.  NPG_MEMORY. */
+npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pose);
+
+/* Visible: which places of a surface sensors can see, in the pose at work.
+ *
+ * A sensor sees a place that faces it and has none of the surface before it.  What no sensor sees must not be
+ * drawn to the points: they are of another side of the body. */
+
+/* Room for a number of places; the arena's, which knows whether there was enough. */
+typedef struct npg_visible {
+    npg_ray *rays;
+    npg_ray_hit *hits;
+} npg_visible;
+
+void npg_visible_open(npg_visible *visible, npg_arena *arena, size_t place_count);
+
+/* Whether a place with this unit normal faces one of the sensors (S x 3): the cosine to the way there is
+ * above `least`.  A sensor that is not finite saw nothing. */
+bool npg_faces_sensor(const float *sensors, size_t sensor_count, const float place[3], const double normal[3],
+                      double least);
+
+/* is_seen[i] (N): whether a sensor sees places[i] (N x 3) of the surface, with the normals of its vertices
+ * (verts[i]: which one it is; NULL: the i-th); all are where no sensor is known (sensor_count 0).  offset:
+ * surface nearer than that hides nothing.  All in the same coordinates.  NPG_MEMORY. */
+npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_surface *surface,
+                            const float *sensors, size_t sensor_count, const float *places,
+                            const uint32_t *verts, const float *vert_normals, size_t count, double offset);
+
+/* Occlusion prior: how the parts of the body that no sensor sees in a frame are arranged.
+ *
+ * What is seen has points; all else has only the edges of the graph, and those draw it to the keyframe's
+ * pose: an arm that goes behind the body goes back to where it was in the keyframe.  So an edge from node j
+ * to node k of which nothing is seen has the direction that it had, in the frame of its end j, in a pose
+ * nearby, and not the one at rest:
+ *
+ *     e_jk = (1 - PRIOR h) (g_k - g_j) + PRIOR h R_j^T (x_k - x_j)       x_k = g_k + t_k, of that pose
+ *
+ * h in 0..1: how much of what both ends carry is hidden; PRIOR: occlusion_prior.c.  Of a hidden part with a known pose on
+ * either side in time both have a say: s frames after a sensor saw it last, the pose on the far side has s
+ * times the weight of the one on the near side.  Frame by frame from the far side that goes evenly in time
+ * from where the part was seen last to where it is seen next.  Not in the paper. */
+
+/* What hidden parts are held by; loans. */
+typedef struct npg_prior_poses {
+    const double *pose;     /* K x 12: of a frame nearby, or of this one as it was found before */
+    const double *far_pose; /* K x 12: of the next frame on the other side, or NULL */
+    const float *since;     /* K: frames since what a node carries was seen last; beside `far_pose` */
+} npg_prior_poses;
+
+typedef struct npg_occlusion_prior {
+    uint32_t (*pairs)[2]; /* P: the graph's edges and the links of its pieces (component_links.c), sorted */
+    uint8_t *is_link;     /* P */
+    size_t pair_count;    /* P */
+    float (*edges)[3];    /* 2P: of each pair, from its first node and from its second */
+    float *seen;          /* K: share of what a node carries that is seen, 0..1 */
+    float *bound;         /* K, scratch */
+    double share;         /* PRIOR */
+} npg_occlusion_prior;
+
+/* Room for a graph's pairs and nodes, the arena's; all is seen.  NPG_MEMORY. */
+npg_status npg_prior_open(npg_occlusion_prior *prior, npg_arena *arena, const npg_graph *graph);
+
+/* The edges as they are in the poses that hold them, of a frame that so many sensors saw. */
+void npg_prior_take(npg_occlusion_prior *prior, const npg_graph *graph, const npg_prior_poses *poses,
+                    size_t sensor_count);
+
+/* Which nodes carry what is seen: is_seen (count) of these vertices of the graph. */
+void npg_prior_see(npg_occlusion_prior *prior, const npg_graph *graph, const uint32_t *verts,
+                   const uint8_t *is_seen, size_t count);
+
+/* e_jk of pair e / 2, from its second node to its first where e is odd.  Returns what it counts: 1, and of a
+ * link the share h, a hundredth at least. */
+double npg_prior_edge(double edge[3], const npg_occlusion_prior *prior, const npg_graph *graph, size_t e);
+
+/* since (K) of a frame from that of the frame before it: 0 where most of what a node carries is seen. */
+void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float *before, size_t node_count);
+
 /* Tracker: a coarse alignment of the reference with one frame's points, from a nearby pose.
  *
- * Gauss-Newton on the nodes of a deformation graph (graph.h):
+ * Gauss-Newton on the nodes of a deformation graph (graph.c):
  *
  *     E = mean_p rho(|x(c_p) - p|_W^2) + mean_s rho(|x(s) - p_s|_W^2)
  *         + stiffness * sum over edges |R_j e_jk + g_j + t_j - (g_k + t_k)|^2 / radius^2 / edges
@@ -8,15 +179,11 @@
  * c_p: the point of the deformed surface closest to the target point p; p_s: the target point closest to the
  * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
  * is the robust weight of Geman and McClure, whose width shrinks step by step; e_jk: the edge g_k - g_j at
- * rest, or as it is held where no sensor sees it (occlusion_prior.h).  Few unknowns, second order: it reaches what
+ * rest, or as it is held where no sensor sees it (occlusion_prior.c).  Few unknowns, second order: it reaches what
  * gradient descent needs hundreds of steps for; the joint fit then needs to find only what the graph can't
  * express.
  *
  * Not in the paper: it replaces the slow way from the identity (paper, "Deformation Loss", confidence). */
-#ifndef NPG_TRACKER_H
-#define NPG_TRACKER_H
-
-#include "align/occlusion_prior.h"
 
 typedef struct npg_tracker npg_tracker;
 
@@ -68,7 +235,7 @@ typedef struct npg_tracker_effort {
 } npg_tracker_effort;
 
 /* Improve pose (K x 12) to explain the points, of which there is one at least.  Where it is known where they
- * were seen from, they are compared with what can be seen of the surface from there (visible.h), and points
+ * were seen from, they are compared with what can be seen of the surface from there (visible.c), and points
  * beyond its border do not pull; all else is carried by the edges, as `poses` has them (NULL: as the pose that
  * the fit starts from).  effort: NULL for the usual one. */
 npg_status npg_tracker_fit(npg_tracker *tracker, npg_tracked *tracked, double *pose,
@@ -81,5 +248,50 @@ void npg_tracker_since(const npg_tracker *tracker, float *since, const float *be
 
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
+
+/* Candidate clouds: the frames of the choosing pass, thinned, and how a surface made from one of them
+ * fares in the others.
+ *
+ * A surface from one frame is followed from frame to frame by the coarse tracker (tracker.h), outward in both
+ * directions.  Where limbs that touch in its frame were welded, the weld must either hold other frames' limbs
+ * together, away from their points, or stretch far: both can be seen. */
+
+#define NPG_CANDIDATE_POINTS 8000 /* of a frame, at most */
+
+typedef struct npg_candidate_cloud {
+    int64_t index, number;
+    bool is_candidate;
+    size_t point_count;
+    float *points, *normals; /* N x 3 each, unit; normals may be NULL; the list's */
+} npg_candidate_cloud;
+
+typedef struct npg_candidate_clouds {
+    npg_arena arena; /* of all points and normals */
+    size_t count, capacity;
+    npg_candidate_cloud *list; /* in time order; owned                                */
+    size_t given, flipped;     /* normals of candidates: given, and on the wrong side */
+} npg_candidate_clouds;
+
+/* Copy a cleaned frame's points, evenly thinned.  Skipped frames are left out.  NPG_MEMORY. */
+npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_frame *frame,
+                                    const npg_frame_box *box, bool is_candidate);
+/* What stage keyframe saw in the choosing pass, for the stage that cuts welds;
+ * not there where nothing is cut. */
+extern const npg_fact_kind npg_fact_candidate_clouds;
+
+npg_status npg_candidate_clouds_open(npg_candidate_clouds **clouds);
+void npg_candidate_clouds_close(npg_candidate_clouds **clouds);
+
+/* Where the frame with this index is in the list; count when it is not there. */
+size_t npg_candidate_clouds_find(const npg_candidate_clouds *clouds, int64_t index);
+
+/* Sees the surface in one frame: vert_unit (V x 3) is a loan. */
+typedef npg_status (*npg_candidate_seen)(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
+                                         const npg_tracked *tracked);
+
+/* Follow the surface (unit coordinates, with normals) of list[from] through all others; seen is called once
+ * for each of them.  NPG_MEMORY, NPG_DIVERGED, or what seen returns. */
+npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
+                                const npg_tracker_settings *settings, npg_candidate_seen seen, void *user);
 
 #endif

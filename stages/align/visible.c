@@ -1,5 +1,5 @@
 /* Visible: rays from the surface to the sensors. */
-#include "align/visible.h"
+#include "align/tracker.h"
 
 #include <math.h>
 #include <string.h>

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "align/visible.h"
+#include "align/tracker.h"
 #include "evaluate/evaluate_shape.h"
 #include "evaluate/misfit.h"
 #include "geometry/kdtree.h"

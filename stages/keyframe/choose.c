@@ -1,5 +1,5 @@
 /* Choose: drafts of the candidates and what becomes of them in the other frames. */
-#include "keyframe/choose.h"
+#include "keyframe/keyframe_internal.h"
 
 #include <math.h>
 

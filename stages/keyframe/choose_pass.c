@@ -1,5 +1,5 @@
 /* Choosing pass: what its frames show, and the candidate to take. */
-#include "keyframe/choose_pass.h"
+#include "keyframe/keyframe_internal.h"
 
 #include "pipeline/clock.h"
 

@@ -1,4 +1,4 @@
-#include "keyframe/extent.h"
+#include "keyframe/keyframe_internal.h"
 
 #include <math.h>
 

@@ -6,22 +6,18 @@
  * surface, near the middle in time.
  *
  * Not in the paper: such cells count points more than surface, which before several sensors differs from
- * frame to frame.  There the cells are larger (extent.h) and the middle weighs less.  And the frame that is
- * found is only the first of several candidates (shortlist.h), of which the choosing pass takes the one whose
- * surface fits best (choose.h).
+ * frame to frame.  There the cells are larger (extent.c) and the middle weighs less.  And the frame that is
+ * found is only the first of several candidates (shortlist.c), of which the choosing pass takes the one whose
+ * surface fits best (choose.c).
  * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
- * (likeness.h). */
+ * (likeness.c). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "geometry/vec3.h"
 #include "job/job.h"
-#include "keyframe/choose_pass.h"
-#include "keyframe/extent.h"
-#include "keyframe/likeness.h"
-#include "keyframe/outside.h"
-#include "keyframe/shortlist.h"
+#include "keyframe/keyframe_internal.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
 #include "pipeline/order.h"
@@ -207,7 +203,7 @@ static double score_of(size_t cell_count, double from_middle)
 }
 
 /* Areas differ by a few per cent only, so the middle weighs less among the frames that are remembered
- * (shortlist.h). */
+ * (shortlist.c). */
 static double area_score_of(size_t cell_count, double from_middle, int64_t frame_count)
 {
     double share = from_middle / (double)frame_count;

@@ -1,5 +1,5 @@
 /* Likeness: nearest neighbours, both ways. */
-#include "keyframe/likeness.h"
+#include "keyframe/keyframe_internal.h"
 
 #include <math.h>
 

@@ -1,5 +1,5 @@
 /* Outside: what leaves the box that the look-ahead gave. */
-#include "keyframe/outside.h"
+#include "keyframe/keyframe_internal.h"
 
 #include <math.h>
 #include <string.h>

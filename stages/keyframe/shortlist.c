@@ -1,5 +1,5 @@
 /* Shortlist: frames and candidates of the choosing pass. */
-#include "keyframe/shortlist.h"
+#include "keyframe/keyframe_internal.h"
 
 #include <stdlib.h>
 

@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-#include "align/visible.h"
+#include "align/tracker.h"
 #include "geometry/mesh_tools.h"
 #include "mesh/mesh_clean.h"
 

@@ -1,18 +1,18 @@
 /* Weld: surface of the reference that joins what other frames hold apart, found and cut.
  *
- * The reference is followed through the other frames (candidate_clouds.h).  A frame contradicts a face when
+ * The reference is followed through the other frames (candidate_clouds.c).  A frame contradicts a face when
  * it stretches the face's longest edge to twice its length and has the corners far from every point, though
  * the surface explains the frame on the whole; faces beside it that are nearly contradicted go with it.
  * Patches of faces that three frames or more contradict are cut where the surface around them lies on
  * the points, and the holes are closed in the pose that stretched the patch most, where its sides are apart.
  * Only tubes are cut, patches with two border loops or more, which takes a handle from the mesh:
  * a crease that was closed too far can't be told from a part that was followed badly, so it stays
- * (apart.h and choose.h see to those).  The result is closed and oriented where the mesh was; a cut that
+ * (apart.h and choose.c see to those).  The result is closed and oriented where the mesh was; a cut that
  * can't be closed so, that would save little area or that would leave the mesh in pieces, is not made. */
 #ifndef NPG_WELD_H
 #define NPG_WELD_H
 
-#include "align/candidate_clouds.h"
+#include "align/tracker.h"
 
 typedef struct npg_weld_cut {
     size_t patches, faces; /* cut                                                  */

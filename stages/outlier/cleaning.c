@@ -1,5 +1,5 @@
 /* Cleaning: from the points of a file to those worth using. */
-#include "outlier/cleaning.h"
+#include "outlier/outlier_internal.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,10 +1,9 @@
 /* Isolated: the statistical filter, asked once per frame. */
-#include "outlier/isolated.h"
+#include "outlier/outlier_internal.h"
 
 #include <inttypes.h>
 #include <xxhash.h>
 
-#include "outlier/outliers.h"
 #include "pipeline/parallel.h"
 
 typedef struct known_frame {

@@ -1,5 +1,5 @@
 /* One view: pictures of the cloud, cells of a pinhole camera's. */
-#include "outlier/one_view.h"
+#include "outlier/outlier_internal.h"
 
 #include <math.h>
 

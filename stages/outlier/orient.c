@@ -16,7 +16,7 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
 #include "outlier/normals.h"
-#include "outlier/sides.h"
+#include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 

@@ -10,12 +10,8 @@
 
 #include "geometry/vec3.h"
 #include "ingest/frame_store.h"
-#include "outlier/cleaning.h"
-#include "outlier/isolated.h"
 #include "outlier/normals.h"
-#include "outlier/one_view.h"
-#include "outlier/outliers.h"
-#include "outlier/sensors.h"
+#include "outlier/outlier_internal.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"

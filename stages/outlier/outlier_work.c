@@ -1,7 +1,7 @@
 /* Outlier as work to be timed: isolated points and normals of one cloud. */
 #include "outlier/normals.h"
 #include "outlier/outlier.h"
-#include "outlier/outliers.h"
+#include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"
 
 enum { NEIGHBOURS = 12, NORMAL_NEIGHBOURS = 16 }; /* the defaults of the options */

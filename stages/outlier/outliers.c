@@ -1,5 +1,5 @@
 /* Outliers: mean distances in one walk over a k-d tree, and rounds of taking away. */
-#include "outlier/outliers.h"
+#include "outlier/outlier_internal.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Sensors: the text of option sensor and its file. */
-#include "outlier/sensors.h"
+#include "outlier/outlier_internal.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Sides: spanning tree, patches and winding number of a npg_sided_cloud. */
-#include "outlier/sides.h"
+#include "outlier/outlier_internal.h"
 
 #include <string.h>
 

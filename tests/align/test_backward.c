@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "align/recover.h"
+#include "align/align_internal.h"
 #include "tests/support/ball_capture.h"
 
 #define KEY 10 /* index of the first frame */

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "align/component_links.h"
+#include "align/align_internal.h"
 #include "geometry/sets.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"

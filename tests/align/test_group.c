@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "align/group.h"
+#include "align/align_internal.h"
 
 enum { NODES = 2, KEY = 10 };
 

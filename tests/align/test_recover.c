@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "align/recover.h"
+#include "align/align_internal.h"
 #include "tests/support/ball_capture.h"
 
 /* Frames that were made to be lost are as good again as they were. */

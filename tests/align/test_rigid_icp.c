@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "align/rigid_icp.h"
+#include "align/align_internal.h"
 #include "pipeline/random.h"
 
 enum { POINTS = 2000 };

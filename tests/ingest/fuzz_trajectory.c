@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "ingest/rig/rig.h"
-#include "outlier/sensors.h"
+#include "outlier/outlier_internal.h"
 #include "tests/support/fuzz_target.h"
 
 static void read_list(const char *path, bool is_trajectory)

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "keyframe/extent.h"
+#include "keyframe/keyframe_internal.h"
 #include "pipeline/random.h"
 
 enum { POINTS = 4000 };

@@ -8,8 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "outlier/cleaning.h"
-#include "outlier/isolated.h"
+#include "outlier/outlier_internal.h"
 #include "tests/support/shapes.h"
 #include "tests/support/test_chain.h"
 

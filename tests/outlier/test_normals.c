@@ -10,7 +10,7 @@
 
 #include "mesh/denoise.h"
 #include "outlier/normals.h"
-#include "outlier/one_view.h"
+#include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/shapes.h"
 

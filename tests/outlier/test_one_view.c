@@ -10,7 +10,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
-#include "outlier/one_view.h"
+#include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/shapes.h"
 

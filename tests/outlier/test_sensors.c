@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "outlier/sensors.h"
+#include "outlier/outlier_internal.h"
 #include "tests/support/temp_folder.h"
 
 static const npg_origin origin = {true, {10, 20, 30}};

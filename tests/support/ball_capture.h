@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "align/recover.h"
+#include "align/align_internal.h"
 #include "pipeline/random.h"
 #include "tests/support/ball_mesh.h"
 

@@ -1,0 +1,247 @@
+/* Align: what the files of the room share. */
+#ifndef NPG_ALIGN_INTERNAL_H
+#define NPG_ALIGN_INTERNAL_H
+
+#include <stdint.h>
+
+#include "align/tracker.h"
+#include "geometry/kdtree.h"
+#include "pipeline/chunk.h"
+#include "pipeline/memory.h"
+#include "pipeline/status.h"
+
+/* Block system: the normal equations of a graph's nodes, 6 unknowns each (a turn and a move), and their
+ * solution by conjugate gradients.
+ *
+ * Symmetric and positive; one 6 x 6 block per node and per pair of nodes of a fixed set.  Terms are gathered
+ * in parts, so that threads can add at the same time; the solution adds the parts up in their order. */
+
+#define NPG_BLOCK_NODES 4 /* of a term, at most */
+#define NPG_BLOCK_PARTS 2
+
+typedef struct npg_block_system npg_block_system;
+
+/* |W^(1/2) (sum_k share_k (turn_k x arm_k + move_k) - right)|^2, W = across normal normal^T + along I. */
+typedef struct npg_block_term {
+    size_t count;
+    uint32_t nodes[NPG_BLOCK_NODES]; /* none twice */
+    double shares[NPG_BLOCK_NODES], arms[NPG_BLOCK_NODES][3];
+    double normal[3], across, along;
+    double right[3];
+} npg_block_term;
+
+/* n nodes; pairs (a < b, sorted) that may be coupled, beside each node with itself. */
+npg_status npg_block_open(npg_block_system **system, size_t node_count, const uint32_t (*pairs)[2],
+                          size_t pair_count);
+void npg_block_close(npg_block_system **system);
+
+/* A part becomes zero. */
+void npg_block_clear(npg_block_system *system, size_t part);
+
+/* Add a term to a part; one thread a part.  Couplings of pairs that are not in the set are left out. */
+void npg_block_add(npg_block_system *system, size_t part, const npg_block_term *term);
+
+/* x (n x 6: turn, move) so that the residual is at most `tolerance` (>= 1e-6: it works in single precision)
+ * of the right side, or after `iterations`.  `damping` times the identity is added first.  Returns the
+ * iterations taken. */
+int npg_block_solve(npg_block_system *system, double *x, double damping, double tolerance, int iterations);
+
+/* Component links: edges between the separate pieces of a surface.
+ *
+ * A piece that no sensor sees in a frame, an eye or what is known of a hand, has neither points nor an edge
+ * to anything that has; and one that is seen but lost, a foot whose shin is too thin to be in the reference,
+ * has nothing that brings it back.  So each piece hangs on the nearest other one, by few edges that count
+ * where both ends are hidden, and little where they are seen (occlusion_prior.c).  Based on Prim's minimal spanning
+ * tree, of pieces. */
+
+/* *links: pairs (a < b) of nodes, sorted, owned by the caller; none where the edges join all nodes.  node_pos
+ * (K x 3); edges (E) join the nodes of a piece.  Equal input gives equal bits.  O(K^2).  NPG_MEMORY: *links is
+ * then NULL. */
+npg_status npg_component_links_find(uint32_t (**links)[2], size_t *link_count, const float *node_pos,
+                                    size_t node_count, const uint32_t (*edges)[2], size_t edge_count);
+
+/* Rigid ICP: how a body stands in one frame against another, as far as it moved as a whole.
+ *
+ * Motion recurs, but seldom in place: who walks comes back to a pose lengths away, who turns comes back to it
+ * facing elsewhere.  So two frames are compared, and one is started from the pose of the other, after the
+ * rigid motion that brings their points together.
+ *
+ * Based on: Besl and McKay, A method for registration of 3-D shapes, 1992 (iterated closest points), and
+ * Chetverikov et al., The trimmed iterative closest point algorithm, 2002: the pairs that lie farthest apart,
+ * of limbs that moved on their own, are left out. */
+
+#define NPG_LOOK_POINTS 500 /* of a frame, at most */
+
+/* A few points of a frame. */
+typedef struct npg_look {
+    float *points; /* N x 3; owned */
+    size_t count;  /* N            */
+    npg_kdtree *tree;
+} npg_look;
+
+/* Spread over the points that are given, one at least.  NPG_MEMORY: what was got is to be closed. */
+npg_status npg_look_open(npg_look *look, const float *points, size_t point_count);
+void npg_look_close(npg_look *look);
+
+/* motion: takes `from` onto `to`, found from where their middles meet and from `guess`; *unlike: what is left
+ * between them then, the mean of squared distances, both ways.  NPG_MEMORY. */
+npg_status npg_rigid_icp(npg_rigid *motion, double *unlike, const npg_look *from, const npg_look *to,
+                         const npg_rigid *guess);
+
+/* Recover: frames that the tracker lost, tried again from what is known of the frames around them.
+ *
+ * Frame by frame, outward from the key, a pose can only start from the frames before it; where the motion is
+ * too fast for that, frames are lost and lead those after them astray.  But among the frames of a window some
+ * are found, and each of them is a place to start from.  So a lost frame is tried again from
+ *
+ *     1  the poses of the frames whose points look most like its own, where those fit better: motion recurs;
+ *        moved to where the body stands in this frame (rigid_icp.c), as it seldom recurs in place
+ *     2  the poses of the frame before it and of the one after it, moved likewise
+ *     3  the motion of the two frames before it, and of the two after it, taken on
+ *     4  the poses of the frame before it and of the one after it
+ *
+ * and the pose that explains its points best stays.  What is found helps the frames around it, so this is
+ * repeated until none is found.  A frame is lost when its Chamfer distance is well above that of the
+ * window's best quarter, and so are its points' distances alone: a frame with fewer points or with holes has
+ * surface far from them, too, and what it is then found by is a worse pose.  Not in the paper. */
+
+/* A frame of a group.  pose and points are the caller's; the pose is changed where a better one is found. */
+typedef struct npg_recover_frame {
+    int64_t index;
+    double *pose; /* K x 12 */
+    npg_tracked tracked;
+    npg_tracker_cloud cloud; /* count 0: nothing is known of the frame, its pose is not started from either;
+                                of a fixed frame the points may be NULL */
+    const float *since;      /* K: frames since a sensor saw what a node carries, or NULL: not known        */
+    bool is_fixed;           /* of the group before: a place to start from, no more                         */
+} npg_recover_frame;
+
+/* Who tries, and what for.  should_stop may be NULL; it is asked before each fit. */
+typedef struct npg_attempts {
+    npg_tracker *tracker;
+    double *trial;    /* K x 12, scratch; the caller's                     */
+    const char *what; /* is done with frames, for the error: "followed on" */
+    bool (*should_stop)(void *user);
+    void *user;
+} npg_attempts;
+
+/* Where an attempt starts. */
+typedef struct npg_start {
+    const double *now, *before;       /* K x 12; before: NULL, or the motion since then goes on */
+    const npg_tracker_effort *effort; /* NULL: the usual one */
+} npg_start;
+
+/* Fit the frame from there, hidden parts held by `poses`.  *taken: whether its pose and what was tracked
+ * become the new ones, those of a Chamfer distance of at most `share` times the old one.  NPG_STOPPED,
+ * NPG_MEMORY, NPG_DIVERGED. */
+npg_status npg_attempt(const npg_attempts *attempts, bool *taken, npg_recover_frame *frame,
+                       const npg_start *from, const npg_prior_poses *poses, double share);
+
+/* What was done; frames. */
+typedef struct npg_recover_result {
+    int64_t tried; /* fits                       */
+    int64_t lost;  /* frames that were lost      */
+    int64_t found; /* of those, lost no longer   */
+} npg_recover_result;
+
+/* Recover the frames (in order of their indices).  should_stop may be NULL; it is asked before each fit.
+ * Equal input gives equal bits.  NPG_MEMORY, NPG_DIVERGED, NPG_STOPPED. */
+npg_status npg_recover(npg_tracker *tracker, npg_recover_result *result, npg_recover_frame *frames,
+                       size_t count, bool (*should_stop)(void *user), void *user);
+
+/* Backward tracking: frames of which sensors saw a part each, followed once more from the outermost to the key.
+ *
+ * Outward from the key a limb that comes into sight again is not where the pose has it: what was hidden has
+ * moved meanwhile.  It is found some frames later, or only at the end.  From there the frames are followed
+ * back: each one from the motion of the two beyond it, what no sensor sees held between where it was seen
+ * last and where it is seen next (occlusion_prior.c).  A pose stays as it was where the way back explains the frame's
+ * points clearly worse.  Not in the paper. */
+/* What was done; frames. */
+typedef struct npg_backward_result {
+    int64_t tried; /* fits                              */
+    int64_t taken; /* whose pose is that of the way back */
+} npg_backward_result;
+
+/* Sweep both sides of the key over the frames (in order of their indices); those that are fixed, without
+ * points or without `since` keep their pose.  should_stop may be NULL; it is asked before each fit.  Equal
+ * input gives equal bits.  NPG_MEMORY, NPG_DIVERGED, NPG_STOPPED. */
+npg_status npg_track_backward(npg_tracker *tracker, npg_backward_result *result, npg_recover_frame *frames,
+                              size_t count, int64_t key, bool (*should_stop)(void *user), void *user);
+
+/* Sides: the poses that the frames on one side of the keyframe start from, the last two that were found. */
+
+typedef struct npg_side {
+    double *now, *before; /* K x 12 */
+    float *since;         /* K: frames since a sensor saw what a node carries; of now */
+    int64_t index;        /* of now */
+    bool has_now, has_before;
+    bool is_past; /* what a growing reference reaches */
+    npg_tracked now_tracked, before_tracked;
+} npg_side;
+
+/* Zeros become a side at rest without any frame, its arrays the arena's; K nodes, here and below.
+ * NPG_MEMORY. */
+npg_status npg_side_open(npg_side *side, npg_arena *arena, size_t node_count);
+
+/* Content, not arrays. */
+void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count);
+
+/* `now` becomes `before`, and the pose that the motion so far leads to becomes `now`, of frame `index`. */
+void npg_side_step_on(npg_side *side, size_t node_count, int64_t index);
+
+/* To npg_side_bytes() bytes, which are the same for equal sides, and back; both return where they end. */
+size_t npg_side_bytes(size_t node_count);
+unsigned char *npg_side_pack(unsigned char *to, const npg_side *side, size_t node_count);
+const unsigned char *npg_side_unpack(npg_side *side, const unsigned char *from, size_t node_count);
+
+/* Group: the frames that wait to be aligned together, and where the two ways outward from the key stand. */
+
+#define NPG_GROUP_FIXED 4 /* at most: frames of the group before that a list has beside those that wait */
+
+/* A frame that waits; it owns all of it. */
+typedef struct npg_waiting {
+    npg_frame frame;
+    npg_arena arena;         /* of the arrays below */
+    double *pose;            /* K x 12 */
+    float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
+    float *sensors;          /* unit; where they are not known NULL */
+    npg_tracker_cloud cloud; /* all of these */
+    float *since;            /* K: frames since a sensor saw what a node carries; NULL: no sensor is known */
+    npg_tracked tracked;
+    bool is_known; /* starts from the pose that the pass before found */
+} npg_waiting;
+
+typedef struct npg_group {
+    npg_arena arena;     /* of both sides and ways */
+    size_t node_count;   /* K */
+    npg_side sides[2];   /* forward, backward: of the frames that are passed on */
+    npg_side ways[2];    /* the same with those that wait                       */
+    npg_waiting *frames; /* in order of arrival; owned, with what they own      */
+    size_t count, capacity;
+} npg_group;
+
+/* Zeros become room for the poses of so many nodes.  NPG_MEMORY: what was got is to be closed. */
+npg_status npg_group_open(npg_group *group, size_t node_count);
+void npg_group_close(npg_group *group);
+
+/* *waiting: a loan until the next is added; its pose is not set, nor what is made of its points.  The frame's
+ * content moves there; where there is no room for that it stays.  NPG_MEMORY. */
+npg_status npg_group_add(npg_waiting **waiting, npg_group *group, npg_frame *frame);
+
+/* None waits any more. */
+void npg_group_clear(npg_group *group);
+
+/* Both sides as bytes.  unpack: the ways, too, begin where the sides are. */
+size_t npg_group_bytes(const npg_group *group);
+unsigned char *npg_group_pack(unsigned char *to, const npg_group *group);
+const unsigned char *npg_group_unpack(npg_group *group, const unsigned char *from);
+
+/* `frames` (count + NPG_GROUP_FIXED), in order of their indices: those that wait and, as fixed ones, the last
+ * two of either side.  Loans of the group.  Returns how many there are. */
+size_t npg_group_list(const npg_group *group, npg_recover_frame *frames);
+
+/* What was made of that list: the frames that wait are tracked so, and the sides end with the outermost of
+ * them; what follows starts from there. */
+void npg_group_take(npg_group *group, npg_recover_frame *frames, size_t count);
+
+#endif

@@ -1,0 +1,189 @@
+/* Outlier: what the files of the room share; outlier.h has what others may use. */
+#ifndef NPG_OUTLIER_INTERNAL_H
+#define NPG_OUTLIER_INTERNAL_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "geometry/vec3.h"
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/memory.h"
+#include "pipeline/status.h"
+
+/* Cleaning: from the points of a file to those worth using.
+ *
+ * The steps change a frame's pos_local and normals in place, keep the order of what stays, and count what
+ * goes in frame->cleaning.  Deterministic for every number of threads.  NPG_MEMORY. */
+
+#define NPG_COORDINATE_MAX 1e12f /* farther from the origin than this counts as not finite */
+
+/* Drop points with a coordinate that is not a usable number. */
+npg_status npg_clean_finite(npg_frame *frame);
+
+/* Of points at exactly one place keep the first. */
+npg_status npg_clean_duplicates(npg_frame *frame);
+
+/* Keep the first point of every cubic cell with this side (local units). */
+npg_status npg_clean_voxels(npg_frame *frame, double side);
+
+/* Thin by cells until at most point_max points are left (more than half of that, unless the cloud is stranger
+ * than a surface).  *side is the side of the cells, 0 when there was nothing to do. */
+npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max);
+
+/* NPG_BAD_INPUT when there are fewer than 16 points, or all lie in one place, on one line or on one plane. */
+npg_status npg_clean_check(const npg_frame *frame);
+
+/* Isolated: drops frames' isolated points, and keeps which they were for the later passes that bring the
+ * same frame again: the statistical filter is the costliest part of cleaning, and its answer does not
+ * change. */
+
+typedef struct npg_isolated npg_isolated;
+
+/* What is kept takes byte_max at most; frames beyond that are filtered in every pass. */
+npg_status npg_isolated_open(npg_isolated **isolated, size_t byte_max);
+void npg_isolated_close(npg_isolated **isolated);
+
+/* Drop the isolated points of frames that have been cleaned of all else, several at a time in
+ * threads; skipped and empty frames are left alone.  A frame is known by its index and the hash of its
+ * points.  NPG_MEMORY; errors name the frame. */
+npg_status npg_isolated_drop(npg_isolated *isolated, npg_frame *const *frames, size_t count, int neighbours,
+                             double ratio);
+
+/* Outliers: the points of a cloud that lie farther from their neighbours than others do.
+ *
+ * Based on: R. B. Rusu et al., Towards 3D Point Cloud Based Object Maps for Household Environments, 2008 (the
+ * filter that PCL has as StatisticalOutlierRemoval; the verdicts are the same). */
+
+/* keep[i] = 0 for the isolated ones of points (N x 3, finite, N > 0), else 1: those whose mean distance to
+ * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points.
+ * This is asked again of what is left until there are no more (8 rounds at most): far outliers raise mean
+ * and deviation and so hide the near ones from the first round.  A round searches only where the one before
+ * took a neighbour away.  Uses `threads` threads (0: one per core); the result does not depend on it.
+ * NPG_MEMORY. */
+npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t point_count, int neighbours,
+                             double ratio, int threads);
+
+/* Bytes that takes at most. */
+size_t npg_find_isolated_memory(size_t point_count);
+
+/* One view: whether one sensor saw all points of a cloud, and from where.
+ *
+ * points: N x 3, finite.  The same input gives the same result; any number of calls may run at once. */
+
+/* Whether the cloud looks like one view from a sensor: hardly a point is hidden behind another as seen from
+ * there, and the sensor is outside the cloud's box.  NPG_MEMORY. */
+npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point_count,
+                                    const double sensor[3]);
+
+/* A place from which the cloud looks like one view, at a distance of 1.5 times its size, where there is one:
+ * of places all round it, the mean of those from which least is hidden.  Seen from the other side as little
+ * is hidden; a body bulges toward its sensor, so there what lies along its outline is farther away, and a
+ * cloud for which that does not tell the sides apart has none.  Known to about 15 degrees (a dancer).
+ * Cost: 200 000 points drawn for a cloud of many views, about 700 000 for one of one view.  NPG_MEMORY. */
+npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t point_count);
+
+/* Bytes that it takes. */
+size_t npg_one_view_memory(void);
+
+/* Sensors: where they stood, by option sensor: the same places in all frames, or a file of places per frame.
+ *
+ *     X,Y,Z             one that stands still; several: X,Y,Z:X,Y,Z
+ *     FILE              lines "X Y Z": one sensor, a line per frame in order; or lines "NUMBER X Y Z": the
+ *                       frame's number, a line per sensor.  Empty lines and lines that begin with # are
+ *                       skipped. */
+
+#define NPG_SENSOR_LINES 4000000 /* of a file: 18 hours at 60 a second     */
+
+typedef struct npg_sensor_place {
+    int64_t frame; /* its number, or place in order */
+    size_t line;
+    double world[3];
+} npg_sensor_place;
+
+typedef struct npg_sensors {
+    const char *text; /* as given, a loan */
+    bool is_file, has_numbers;
+    npg_sensor_place *places; /* by frame; owned */
+    size_t count, capacity;
+} npg_sensors;
+
+/* NPG_USAGE for what is neither places nor a file; NPG_BAD_INPUT names the file and its line. */
+npg_status npg_sensors_open(npg_sensors *sensors, const char *text);
+void npg_sensors_close(npg_sensors *sensors);
+
+/* Give the frame its sensors, instead of those it had; which of them saw which point is left as it is.
+ * NPG_BAD_INPUT: the file has none for it. */
+npg_status npg_sensors_set(const npg_sensors *sensors, npg_frame *frame, const npg_origin *origin);
+
+/* Sides: what orient.c (the order of the steps) and sides.c (tree, patches, winding number) share: a
+ * npg_sided_cloud whose normals have a direction each, and are to be turned to the side that is out. */
+
+#define NPG_SIDE_NEIGHBOURS 12 /* of a point, itself among them; set by trial */
+
+typedef struct npg_link { /* two neighbours and how well their sides agree, -1..1 */
+    uint32_t a, b;
+    float agreement;
+} npg_link;
+
+typedef struct npg_sided_cloud { /* the points that are oriented together */
+    npg_arena arena;             /* of what is said to be its own, and of all scratch until it is released */
+    size_t count;
+    const float *points;
+    float *normals;
+    uint32_t *index;       /* count x NPG_SIDE_NEIGHBOURS, itself among them; its own */
+    float *area, *winding; /* count; its own */
+    bool is_wound;         /* winding is that of the normals as they are */
+    float soft_sq;         /* squared length below which the winding number is softened */
+    npg_link *links;       /* link_count; its own */
+    size_t link_count;
+} npg_sided_cloud;
+
+/* n_a . (n_b reflected at the plane halfway between the two points): 1 where the two lie on a circle and face
+ * the same way, -1 where one of them is turned over. */
+static inline float agreement(const npg_sided_cloud *c, uint32_t a, uint32_t b)
+{
+    const float *p = c->points + 3 * (size_t)a, *q = c->points + 3 * (size_t)b;
+    const float *m = c->normals + 3 * (size_t)a, *n = c->normals + 3 * (size_t)b;
+    float e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+    float length_sq = npg_vec3_dotf(e, e), mn = npg_vec3_dotf(m, n);
+    if (!(length_sq > 0)) return mn;
+    float me = npg_vec3_dotf(m, e), ne = npg_vec3_dotf(n, e);
+    return mn - 2 * me * ne / length_sq;
+}
+
+static inline void turn_normal(npg_sided_cloud *c, size_t i)
+{
+    for (size_t a = 0; a < 3; a++) c->normals[3 * i + a] = -c->normals[3 * i + a];
+}
+
+/* How far the winding number at a point is from that of a surface that faces out;
+ * spikes count no more than 2. */
+static inline double winding_misfit(float winding)
+{
+    double off = fmax(-2, fmin(2, (double)winding - 0.5));
+    return off * off;
+}
+
+/* The winding number at every point:
+ * w(p_i) = 1/4pi sum_j A_j (p_j - p_i) . n_j / (|p_j - p_i|^2 + soft^2)^(3/2): about +1/2 on a closed surface
+ * that faces out, -1/2 on one that faces in.  All pairs of points are summed, and only where c->is_wound says
+ * that it has to be.  NPG_MEMORY. */
+npg_status npg_sided_winding(npg_sided_cloud *c);
+
+/* The same after these points (ascending) were turned, from what it was before.  NPG_MEMORY. */
+npg_status npg_sided_rewind(npg_sided_cloud *c, const uint32_t *turned, size_t count);
+
+/* Sides by the spanning tree of c->links, the surest links first. */
+npg_status npg_sided_grow_tree(npg_sided_cloud *c);
+
+/* Patches: points whose sides, as they are now, agree with a neighbour's by more than `sure`; patch_of is the
+ * lowest point of the patch.  Only points of `among` (NULL: all), UINT32_MAX for the others. */
+npg_status npg_sided_patches(uint32_t *patch_of, const npg_sided_cloud *c, const uint8_t *among, float sure);
+
+/* Turn patch after patch where that brings the winding number nearer to that of a surface that faces out, by
+ * more than the bar. */
+npg_status npg_sided_turn_patches(npg_sided_cloud *c, const uint32_t *patch_of, double bar);
+
+#endif
