@@ -7,6 +7,9 @@
 static const char *const gone[][2] = {
     {"quality",        "--method best"},
     {"config",         "--method FILE"},
+    {"voxel",              "thin the capture before the run; points-max of the method thins what is too dense"},
+    {"outlier-neighbours", "always 12"},
+    {"normal-neighbours",  "several numbers are tried"},
     {"rig",            "the rig is the input: neupig run rig.json"},
 };
 /* clang-format on */

@@ -16,6 +16,9 @@
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
 
+#define ISOLATED_NEIGHBOURS 12 /* whose mean distance tells whether a point is isolated */
+#define NORMAL_NEIGHBOURS   16 /* of normals that a sensor turns; npg_normals_make() tries it, too */
+
 enum { NORMALS_AUTO, NORMALS_ESTIMATE, NORMALS_GIVEN };
 enum { FOR_KEY, FOR_ALL };
 
@@ -23,8 +26,8 @@ typedef struct outlier_state {
     const char *sensor_text;
     bool drop_isolated;
     int normals, normals_for;
-    int64_t neighbours, normal_neighbours, point_max;
-    double ratio, voxel;
+    int64_t point_max;
+    double ratio;
     /* what was found so far, over the pass */
     enum { SENSOR_AUTO, SENSOR_FIND, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
     bool has_found_sensor;
@@ -43,20 +46,14 @@ static const npg_option outlier_options[] = {
     /* type         name                  place                  default   least most  shown as or words */
     NPG_ROW_FLAG(   "outliers",           AT(drop_isolated),     "yes",
         "Drop isolated points (the statistical filter that PCL has, too, repeated until it finds no more)"),
-    NPG_KEY(INT,    "outlier-neighbours", AT(neighbours),        "12",     2,    200,  NULL,
-        "Neighbours whose mean distance tells whether a point is isolated"),
     NPG_KEY(REAL,   "outlier-ratio",      AT(ratio),             "5",      0.5,  100,  NULL,
         "Standard deviations above the mean at which a point is isolated"),
-    NPG_KEY(REAL,   "voxel",              AT(voxel),             "0",      0,    1e12, "LENGTH",
-        "Keep one point per cube of this side, in the capture's unit; 0: all"),
     NPG_KEY(INT,    "points-max",         AT(point_max),         "250000", 1000, 4e9,  NULL,
         "Thin frames with more points than this, with a warning"),
     NPG_ROW_CHOICE( "normals",            AT(normals),           "auto",   "auto|estimate|given",
         "Use given normals (checked and mended) or estimate them; auto: given where there are any"),
     NPG_KEY(CHOICE, "normals-for",        AT(normals_for),       "key",    "key|all",
         "Make and mend normals for the keyframe alone or for all frames"),
-    NPG_KEY(INT,    "normal-neighbours",  AT(normal_neighbours), "0",      0,    200,  NULL,
-        "Points a normal is estimated from, 4 or more; 0: several numbers are tried"),
     NPG_ROW_TEXT(   "sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
         "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file of a "
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
@@ -105,10 +102,6 @@ static npg_status open_isolated(npg_worker *worker)
 
 static npg_status outlier_init(npg_worker *worker)
 {
-    const outlier_state *s = npg_worker_state(worker);
-    if (s->normal_neighbours && s->normal_neighbours < 4)
-        return npg_error(NPG_USAGE, "option normal-neighbours: %lld is neither 0 nor at least 4",
-                         (long long)s->normal_neighbours);
     NPG_TRY(open_isolated(worker));
     return parse_sensor(npg_worker_state(worker));
 }
@@ -132,7 +125,6 @@ static npg_status clean_points(npg_worker *worker, npg_frame *frame)
     frame->cleaning = (npg_cleaning){.read = read};
     NPG_TRY(npg_clean_finite(frame));
     NPG_TRY(npg_clean_duplicates(frame));
-    if (s->voxel > 0) NPG_TRY(npg_clean_voxels(frame, s->voxel));
     NPG_TRY(npg_clean_cap(frame, &side, (size_t)s->point_max));
     if (side > 0 && comes_first(worker, frame))
         npg_worker_warn(worker, false, frame->number,
@@ -164,24 +156,14 @@ static bool find_sensor(const npg_frame *frame, double sensor[3])
     return true;
 }
 
-static int neighbours_of(const outlier_state *s)
+static npg_status make_normals(npg_frame *frame)
 {
-    return s->normal_neighbours ? (int)s->normal_neighbours : 16; /* as npg_normals_make() tries, too */
-}
-
-static npg_status make_normals(npg_worker *worker, npg_frame *frame)
-{
-    const outlier_state *s = npg_worker_state(worker);
-    size_t n = frame->point_count;
+    size_t n = frame->point_count, turned;
     double sensor[3];
-    bool has_sensor = find_sensor(frame, sensor);
     NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
     frame->cleaning.normals_estimated = n;
-    if (!has_sensor && !s->normal_neighbours) return npg_normals_make(frame->normals, frame->pos_local, n);
-    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, neighbours_of(s)));
-    double score;
-    if (!has_sensor) return npg_normals_orient(frame->normals, &score, frame->pos_local, n);
-    size_t turned;
+    if (!find_sensor(frame, sensor)) return npg_normals_make(frame->normals, frame->pos_local, n);
+    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, NORMAL_NEIGHBOURS));
     npg_normals_face_sensor(frame->normals, &turned, frame->pos_local, n, sensor);
     return NPG_OK;
 }
@@ -193,7 +175,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     float *estimate;
     double sensor[3];
     NPG_TRY(npg_alloc_array(&estimate, NPG_FOR_FRAMES, n, 3 * sizeof *estimate));
-    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, neighbours_of(s));
+    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, NORMAL_NEIGHBOURS);
     if (!status) repair_directions(frame->normals, &bad, estimate, n);
     npg_release(&estimate);
     NPG_TRY(status);
@@ -215,7 +197,7 @@ static npg_status make_or_mend_normals(npg_worker *worker, npg_frame *frame)
     if (s->normals == NORMALS_GIVEN && !frame->normals)
         return npg_error(NPG_BAD_INPUT, "there are no normals, but option normals is given");
     if (s->normals == NORMALS_ESTIMATE) npg_release(&frame->normals);
-    NPG_TRY(frame->normals ? mend_normals(worker, frame) : make_normals(worker, frame));
+    NPG_TRY(frame->normals ? mend_normals(worker, frame) : make_normals(frame));
     s->normals_s += npg_clock_s() - since;
     const npg_cleaning *c = &frame->cleaning;
     if (c->normals_given)
@@ -383,7 +365,7 @@ static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
     for (size_t i = 0; i < frame_count; i++)
         if (!is_done(npg_chunk_frame(chunk, i))) frames[count++] = npg_chunk_frame(chunk, i);
     npg_status status =
-        npg_isolated_drop(npg_worker_kept(worker), frames, count, (int)s->neighbours, s->ratio);
+        npg_isolated_drop(npg_worker_kept(worker), frames, count, ISOLATED_NEIGHBOURS, s->ratio);
     npg_release(&frames);
     return status;
 }
