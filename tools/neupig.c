@@ -33,11 +33,9 @@ const npg_verb npg_verbs[] = {
      "a capture that fails does not touch the others.  "
      "What links lead out of a capture's folder is not read "
      "unless the batch says --no-confine or \"confine\": false.  "
-     "--max-memory counts for a run with all it starts; "
-     "one that takes more, or longer than --max-time, is asked to stop and then killed.  "
+     "A run that takes longer than --max-time is asked to stop and then killed.  "
      "Started again, what is done is left alone and what was stopped is resumed.  "
-     "At the end OUT/batch.json and OUT/batch.html report on all captures, "
-     "with a page beside each result (OUT/NAME/view.html, see view).  "
+     "At the end OUT/batch.json and a table report on all captures.  "
      "Exit code 0 when all are done, 7 when all are done but some with frames skipped "
      "or below the quality bar, 1 when one is not done, 75 after a signal.",
      npg_batch_options, true, npg_verb_batch},

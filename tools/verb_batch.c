@@ -2,15 +2,12 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "tools/batch/batch_estimate.h"
-#include "tools/batch/batch_run.h"
-#include "tools/batch/batch_table.h"
-#include "tools/batch/batch_verdict.h"
+#include "tools/batch/batch.h"
 #include "tools/cli.h"
 
 typedef struct settings {
     int progress, segments;
-    bool quiet, verbose, dry_run, list, report, view;
+    bool quiet, verbose, list, report;
     int64_t jobs, task_index, task_count;
     double max_time_s;
 } settings;
@@ -28,15 +25,10 @@ const npg_option npg_batch_options[] = {
     NPG_ROW_CHOICE("segments",   AT(segments),   "manifest", "manifest|one|auto", /* NPG_BATCH_SEGMENTS_.. */
         "Where the topology of a capture changes: one reference all the same, "
         "with an alarm (one), another from there on (auto), or as the manifest says"),
-    NPG_ROW_FLAG  ("dry-run",    AT(dry_run),    "no",
-        "Only say what the captures hold and would take in memory, disk and time"),
     NPG_ROW_FLAG  ("list",       AT(list),       "no",
         "Only print the names of the captures, one per line"),
     NPG_ROW_FLAG  ("report",     AT(report),     "no",
-        "Only write batch.json and batch.html and print the table of what is there; "
-        "the exit code is that of all"),
-    NPG_ROW_FLAG  ("view",       AT(view),       "yes",
-        "Put a page beside each result (OUT/NAME/view.html, as neupig view makes it), linked from batch.html"),
+        "Only write batch.json and print the table of what is there; the exit code is that of all"),
     NPG_ROW_INT   ("task-index", AT(task_index), "0",        0,     1e6,  "I",
         "With several processes or machines: the number of this one, from 0"),
     NPG_ROW_INT   ("task-count", AT(task_count), "1",        1,     1e6,  "N",
@@ -64,7 +56,7 @@ static npg_status status_of(const npg_batch *batch, int exit_code)
         bad += npg_batch_is_mine(batch, i) && !npg_verdict_is_done(&batch->captures[i].verdict);
     }
     if (exit_code == 1)
-        return npg_error(NPG_FAILED, "%zu of %zu captures are not done; see %s/batch.html", bad, mine,
+        return npg_error(NPG_FAILED, "%zu of %zu captures are not done; see %s/batch.json", bad, mine,
                          batch->output);
     return exit_code == 7 ? NPG_PARTIAL : exit_code == 75 ? NPG_STOPPED : NPG_OK;
 }
@@ -83,7 +75,7 @@ static npg_status run(npg_batch *batch, const settings *s)
     if (status == NPG_PARTIAL)
         fprintf(stderr,
                 "neupig batch: finished, but with frames skipped, unexplained or below the quality bar; "
-                "see %s/batch.html\n",
+                "see %s/batch.json\n",
                 batch->output);
     return status;
 }
@@ -108,7 +100,6 @@ static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settin
                          (long long)s->task_index, (long long)s->task_count);
     NPG_TRY(npg_batch_open(batch, cli->operands[0], &given));
     npg_batch_warn_of_ignored(cli->options, "--method");
-    (*batch)->has_views = s->view;
     (*batch)->task_index = (size_t)s->task_index;
     (*batch)->task_count = (size_t)s->task_count;
     return NPG_OK;
@@ -120,17 +111,14 @@ int npg_verb_batch(int argc, char **argv)
     npg_cli cli;
     npg_batch *batch = NULL;
     npg_options *options = NULL;
-    int code = 0;
     npg_status status = npg_options_open(&options);
     if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
     if (!status) status = open_batch(&batch, &cli, &s);
     if (!status && s.list)
         print_names(batch);
-    else if (!status && s.dry_run)
-        status = npg_batch_estimate(batch, s.progress == NPG_SHOW_JSON, &code);
     else if (!status)
         status = s.report ? report(batch, &s) : run(batch, &s);
     npg_batch_close(&batch);
     npg_options_close(&options);
-    return status ? npg_cli_end(argv[0], status) : code;
+    return npg_cli_end(argv[0], status);
 }

@@ -225,10 +225,6 @@ held() {
     ln -s ../../in set/only/anything
     ln -s ../in set/link
     ln -s good set/same
-    night set --dry-run
-    [ "$status" -eq 1 ]
-    [ "$(grep -c 'would fail: .*leads out of ' <<<"$output")" -eq 5 ]
-    [ ! -e results ]
     night set
     [ "$status" -eq 1 ]
     [ "$(grep -Ec '^(good|same) +done ' <<<"$output")" -eq 2 ]
@@ -264,6 +260,6 @@ held() {
     [ "$(ls -d results/*/ | wc -l)" -eq 5 ]
     [ "$(grep -Ec ' done +1 of 1 ' <<<"$output")" -eq 3 ]
     held _rf 'a pipe or a device'
-    xmllint --noout results/batch.html
+    python3 -m json.tool results/batch.json >/dev/null
     [ "$(ls)" = $'in\nodd\noutside\nresults' ]
 }

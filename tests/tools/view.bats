@@ -191,25 +191,6 @@ begin_server() { # FOLDER
     kill $run_pid
 }
 
-@test "a batch puts a page beside each result and links it; --no-view leaves it out" {
-    load batch_helpers
-    mkdir set
-    "$NEUPIG" synth --body bar --frames 3 --points 300 -o "set/a <b>" >synth.log
-    echo "{\"output\": \"out\", \"defaults\": {$small}, \"captures\": [{\"input\": \"set/a <b>\"}]}" >one.json
-    "$NEUPIG" batch one.json --no-view >batch.log
-    [ ! -e "out/a <b>/view.html" ]
-    run grep -c view.html out/batch.html
-    [ "$output" = 0 ]
-    "$NEUPIG" batch one.json --report >batch.log
-    [ -s "out/a <b>/view.html" ]
-    grep -q '<a href="a%20%3Cb%3E/view.html">' out/batch.html
-    xmllint --noout out/batch.html
-    node "$check" "out/a <b>/view.html" "out/a <b>"
-    stat -c %Y "out/a <b>/view.html" >made-at
-    "$NEUPIG" batch one.json --report >batch.log
-    [ "$(stat -c %Y "out/a <b>/view.html")" = "$(cat made-at)" ]
-}
-
 @test "segments are parts of one time line" {
     mkdir parts
     python3 "$BATS_TEST_DIRNAME/view/made_result.py" capture parts/segment_0000 8

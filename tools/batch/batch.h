@@ -2,10 +2,13 @@
 #ifndef NPG_BATCH_H
 #define NPG_BATCH_H
 
+#include <jansson.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <sys/types.h>
 
 #include "pipeline/options.h"
+#include "tools/progress.h"
 
 /* How a capture ended, as OUT/<name>/verdict.json says it. */
 typedef struct npg_verdict {
@@ -37,7 +40,6 @@ typedef struct npg_batch {
     bool is_folder;        /* path is that of a folder of captures, not of a manifest */
     npg_capture *captures; /* owned */
     size_t count, capacity;
-    bool has_views;                /* a page is put beside each result */
     size_t task_index, task_count; /* this process does captures i with i mod task_count == task_index */
 } npg_batch;
 
@@ -82,5 +84,81 @@ npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *
 
 /* An absolute path of `text` seen from `folder`; to be given to npg_release(). */
 npg_status npg_path_from(char **path, const char *folder, const char *text);
+
+/* ---- run ---- */
+
+/* Run the captures that are this process's to do, at most `jobs` at a time, and fill in their verdicts;
+ * the others' are read.  A capture that fails does not touch the rest.  SIGINT, SIGTERM and SIGHUP
+ * are passed on; *stopped then becomes true, and nothing more is started.  NPG_MEMORY, NPG_FAILED: the
+ * batch itself can't continue. */
+npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, bool *stopped);
+
+/* Write OUT/batch.json with every capture of the batch, also those that other processes do, as far as they
+ * are now, and print the table to `out` unless it is NULL.  Processes of one batch take turns. */
+npg_status npg_batch_report(npg_batch *batch, FILE *out);
+
+/* ---- the process of one capture: neupig run in a child, its output, and how it is stopped ---- */
+
+/* Why a run was asked to end. */
+typedef enum npg_stop_cause { NPG_STOP_NONE, NPG_STOP_TIME, NPG_STOP_REQUEST } npg_stop_cause;
+
+typedef struct npg_process {
+    npg_capture *capture; /* loan; NULL: nothing runs in this place */
+    pid_t pid;
+    int out, err;                     /* this end of its standard output and error; -1: closed */
+    char line[4096], last_error[512]; /* the line that is coming in; its last whole line on standard error */
+    size_t line_length, err_length;
+    char err_line[512];
+    json_t *progress, *end;  /* its last records of these kinds, owned; may be NULL */
+    double begun_s, asked_s; /* asked_s: when it was first asked to end, 0 before that */
+    npg_stop_cause cause;
+    bool was_killed;
+    long long done_before[3]; /* device, inode and time of done.json before the start; 0: none */
+} npg_process;
+
+/* Start the run of a capture: its folder, its log, the child.  NPG_DISK, NPG_FAILED. */
+npg_status npg_process_start(npg_process *process, npg_capture *capture);
+
+/* Read what has come; *advanced: there is new progress. */
+void npg_process_read(npg_process *process, bool *advanced);
+
+/* Stop it when it takes too long, kill it when it does not end although asked. */
+void npg_process_watch(npg_process *process);
+
+/* Ask it to end (SIGTERM, once); the second time kills it and what it has started. */
+void npg_process_stop(npg_process *process, npg_stop_cause cause);
+
+/* Whether it has ended; then its verdict is judged, written and logged, and the place is free. */
+npg_status npg_process_reap(npg_process *process, bool *ended);
+
+/* ---- verdicts: how a run ended, in a word, and OUT/<name>/verdict.json ---- */
+
+/* From what waitpid() gave, with the cause; words: the run's own last ones. */
+void npg_verdict_judge(npg_verdict *verdict, const npg_capture *capture, int how, npg_stop_cause cause,
+                       const char *words);
+
+/* Of a capture that is not started because of its refusal: bad input.  In its folder, as any other. */
+npg_status npg_verdict_refuse(npg_capture *capture);
+
+/* Whether nothing is left to do, whatever the quality. */
+bool npg_verdict_is_done(const npg_verdict *verdict);
+
+/* What verdict.json says; is_known is false when there is none. */
+void npg_verdict_read(npg_verdict *verdict, const npg_capture *capture);
+npg_status npg_verdict_write(const npg_capture *capture);
+npg_status npg_verdict_remove(const npg_capture *capture);
+
+/* Exit code of a batch: 75 when it was stopped before its end, 1 when a capture has failed
+ * or is not done, 7 when one is done with frames skipped or below the quality bar, else 0.
+ * Captures of this process, or of all. */
+int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped);
+
+/* An object of name, input, output and what verdict.json says. */
+json_t *npg_verdict_json(const npg_capture *capture);
+
+/* Of a capture that is run with segments = auto an array of {folder, first_frame, last_frame, keyframe,
+ * status, cause}, in time order; cause: what cut it off, null for none.  A new reference; NULL when it has
+ * none yet. */
+json_t *npg_capture_segments(const npg_capture *capture);
 
 #endif

@@ -1,7 +1,6 @@
-/* Process of one capture: neupig run in a child, its output, its memory, and how it is stopped. */
-#include "tools/batch/batch_process.h"
+/* Process of one capture: neupig run in a child, its output, and how it is stopped. */
+#include "tools/batch/batch.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -258,48 +257,6 @@ static const char *failure_text(const npg_process *p)
 
 /* ---- limits ---- */
 
-static size_t resident_bytes(const char *pid)
-{
-    char path[80], text[128];
-    unsigned long long whole = 0, resident = 0;
-    snprintf(path, sizeof path, "/proc/%.20s/statm", pid);
-    FILE *file = fopen(path, "re");
-    if (!file) return 0;
-    if (!fgets(text, sizeof text, file) || sscanf(text, "%llu %llu", &whole, &resident) != 2) resident = 0;
-    fclose(file);
-    return (size_t)resident * (size_t)sysconf(_SC_PAGESIZE);
-}
-
-/* The helper processes that one of its threads has started. */
-static size_t children_bytes(const char *pid, const char *thread)
-{
-    char path[96], child[24];
-    size_t sum = 0;
-    snprintf(path, sizeof path, "/proc/%.20s/task/%.20s/children", pid, thread);
-    FILE *file = fopen(path, "re");
-    while (file && fscanf(file, "%23s", child) == 1) sum += resident_bytes(child);
-    if (file) fclose(file);
-    return sum;
-}
-
-static size_t memory_of(pid_t process)
-{
-    char pid[24], path[64];
-    snprintf(pid, sizeof pid, "%ld", (long)process);
-    snprintf(path, sizeof path, "/proc/%s/task", pid);
-    size_t sum = resident_bytes(pid);
-    DIR *threads = opendir(path);
-    for (struct dirent *entry; threads && (entry = readdir(threads));)
-        if (entry->d_name[0] != '.') sum += children_bytes(pid, entry->d_name);
-    if (threads) closedir(threads);
-    return sum;
-}
-
-static double limit_mib(const npg_capture *capture)
-{
-    return strtod(npg_options_get(capture->options, "max-memory"), NULL);
-}
-
 static void kill_all(npg_process *p)
 {
     kill(-p->pid, SIGKILL);
@@ -319,13 +276,9 @@ void npg_process_stop(npg_process *p, npg_stop_cause cause)
 
 void npg_process_watch(npg_process *p)
 {
-    double now_s = npg_clock_s(), most = 0x1p20 * limit_mib(p->capture), time = p->capture->max_time_s;
-    size_t bytes = memory_of(p->pid);
-    if (bytes > p->peak_bytes) p->peak_bytes = bytes;
+    double now_s = npg_clock_s(), time = p->capture->max_time_s;
     if (p->asked_s > 0) {
         if (now_s > p->asked_s + GRACE_SECONDS && !p->was_killed) kill_all(p);
-    } else if (most > 0 && (double)bytes > most) {
-        npg_process_stop(p, NPG_STOP_MEMORY);
     } else if (time > 0 && now_s > p->begun_s + time) {
         npg_process_stop(p, NPG_STOP_TIME);
     }
@@ -346,13 +299,12 @@ static npg_status conclude(npg_process *p, int how, const struct rusage *used)
 {
     npg_capture *capture = p->capture;
     npg_verdict *v = &capture->verdict, before;
-    size_t own = (size_t)used->ru_maxrss << 10;
     npg_verdict_read(&before, capture);
     npg_verdict_judge(v, capture, how, p->cause, failure_text(p));
     v->was_done = was_done(p, how);
     bool keeps = v->was_done && before.is_known;
     v->seconds = keeps ? before.seconds : npg_clock_s() - p->begun_s;
-    v->peak_bytes = keeps ? before.peak_bytes : own > p->peak_bytes ? own : p->peak_bytes;
+    v->peak_bytes = keeps ? before.peak_bytes : (size_t)used->ru_maxrss << 10;
     log_record(capture,
                json_pack("{s:s,s:s,s:i,s:o,s:f,s:I,s:b}", "event", "verdict", "verdict", v->word, "exit_code",
                          v->exit_code, "message", npg_json_text(v->message), "seconds", v->seconds,

@@ -1,5 +1,5 @@
 /* Run of a batch: which captures are at work, signals, progress. */
-#include "tools/batch/batch_run.h"
+#include "tools/batch/batch.h"
 
 #include <math.h>
 #include <poll.h>
@@ -14,7 +14,6 @@
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "tools/batch/batch_process.h"
 
 #define TICK_MS        200 /* between two looks at time and memory of the runs */
 #define AGAIN_SECONDS  1   /* a second signal sooner than that is the first on another way */

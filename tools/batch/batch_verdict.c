@@ -1,5 +1,5 @@
 /* Verdicts: how a capture's run ended, in a word, and OUT/<name>/verdict.json. */
-#include "tools/batch/batch_verdict.h"
+#include "tools/batch/batch.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -11,7 +11,6 @@
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "tools/batch/batch_segments.h"
 
 #define FILE_NAME "verdict.json"
 
@@ -72,10 +71,6 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
         snprintf(text, sizeof text, "not done after %g s (max-time)%s; started again it is resumed",
                  capture->max_time_s, code == 75 ? "" : " and had to be killed");
         set(v, "time", 75, text);
-    } else if (cause == NPG_STOP_MEMORY) {
-        snprintf(text, sizeof text, "took more than %s MiB (max-memory)%s",
-                 npg_options_get(capture->options, "max-memory"), code == 75 ? "" : " and had to be killed");
-        set(v, "memory", 6, text);
     } else if (cause == NPG_STOP_REQUEST || code == 75) {
         set(v, "stopped", code, "stopped on request; started again it is resumed");
     } else if (WIFSIGNALED(how)) {
@@ -114,6 +109,39 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
     return stopped && code == 1 ? npg_status_exit_code(NPG_STOPPED) : code;
 }
 
+/* ---- segments ---- */
+
+/* NULL: not what a run has written. */
+static json_t *json_of_segment(const json_t *entry)
+{
+    const char *folder = NULL, *status = NULL, *cause = NULL;
+    json_int_t first = 0, last = 0, keyframe = 0;
+    if (json_unpack((json_t *)entry, "{ss sI sI sI ss s?{s?s}}", "folder", &folder, "first_frame", &first,
+                    "last_frame", &last, "keyframe", &keyframe, "status", &status, "alarm", "cause",
+                    &cause) ||
+        strchr(folder, '/') || !strcmp(folder, ".."))
+        return NULL;
+    return json_pack("{ss sI sI sI ss ss?}", "folder", folder, "first_frame", first, "last_frame", last,
+                     "keyframe", keyframe, "status", status, "cause", cause);
+}
+
+json_t *npg_capture_segments(const npg_capture *capture)
+{
+    char *path;
+    if (capture->segments != NPG_BATCH_SEGMENTS_AUTO) return NULL;
+    if (npg_join_path(&path, capture->output, "segments.json")) return NULL;
+    json_t *saved = json_load_file(path, 0, NULL), *list = json_object_get(saved, "segments");
+    json_t *segments = json_array_size(list) ? json_array() : NULL;
+    for (size_t i = 0; segments && i < json_array_size(list); i++)
+        if (json_array_append_new(segments, json_of_segment(json_array_get(list, i)))) {
+            json_decref(segments);
+            segments = NULL;
+        }
+    json_decref(saved);
+    npg_release(&path);
+    return segments;
+}
+
 /* ---- the file ---- */
 
 json_t *npg_verdict_json(const npg_capture *capture)
@@ -127,7 +155,7 @@ json_t *npg_verdict_json(const npg_capture *capture)
     json_object_set_new(object, "message", npg_json_text(v->message));
     json_object_set_new(object, "seconds", npg_json_real(v->seconds));
     json_object_set_new(object, "peak_memory_bytes", json_integer((json_int_t)v->peak_bytes));
-    json_t *segments = npg_verdict_is_done(v) ? npg_batch_segments(capture) : NULL;
+    json_t *segments = npg_verdict_is_done(v) ? npg_capture_segments(capture) : NULL;
     if (segments) json_object_set_new(object, "segments", segments);
     return object;
 }
