@@ -65,10 +65,6 @@ printf '{"number":-1,"index":0,"bytes":500,"xxh3":"1"}\n' >inputs/pushed
 mkdir -p manifest
 printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "method": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
 printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names
-mkdir -p request
-printf 'GET /frame-0-12 HTTP/1.1\r\nUser-Agent: a\r\nHost: 127.0.0.1:8080\r\n\r\n' >request/frame
-printf 'GET / HTTP/1.0\r\nhost:  localhost:8080 \r\n\r\n' >request/old
-printf 'POST /../a%%20b?c HTTP/1.1\r\nHost: a\r\nHost: b\r\nContent-Length: 3\r\n\r\nabc' >request/other
 
 camera='"camera": {"width": 4, "height": 3, "fx": 5, "fy": 5, "cx": 1.5, "cy": 1, "distortion": [0.1, 0, 0, 0]}'
 pose='"pose": [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]'

@@ -73,7 +73,7 @@ const npg_verb npg_verbs[] = {
      "or in how many frames they were seen, "
      "the points of each frame, and a time line with the error and what the run reports.  "
      "Of two results the page shows both side by side, in one view and on one time line.  "
-     "With --live the page is served on this machine and follows a run that is at work.",
+     "With --live the page is written anew as the frames of a run that is at work come.",
      npg_view_options, false, npg_verb_view},
     {"bench", "[REPORT.json]", 0, 1, "Time the kernels and the fit on this machine",
      "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches "

@@ -1,16 +1,16 @@
-/* neupig view: a result, or two, as one page to look at; or a run at work, served on this machine. */
+/* neupig view: a result, or two, as one page to look at, also of a run that is at work. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "pipeline/file.h"
+#include "pipeline/memory.h"
 #include "tools/cli.h"
-#include "tools/view/view_live.h"
-#include "tools/view/view_page.h"
+#include "tools/view/view.h"
 
 typedef struct settings {
     const char *output;
-    int64_t points, every, port;
+    int64_t points, every;
     bool live;
 } settings;
 
@@ -26,9 +26,7 @@ const npg_option npg_view_options[] = {
     NPG_ROW_INT   ("every",  AT(every),  "1",     1,     1e6,   "K",
         "Only every K-th frame (and the keyframe): a smaller page of a long capture"),
     NPG_ROW_FLAG  ("live",   AT(live),   "no",
-        "Serve a page that follows the run which is at work in OUT, on 127.0.0.1 alone, until the run ends"),
-    NPG_ROW_INT   ("port",   AT(port),   "0",     0,     65535, "PORT",
-        "With --live: the port; 0: one that is free"),
+        "Follow the run which is at work in OUT: the page is written anew as frames come, until the run ends"),
     {0}};
 /* clang-format on */
 
@@ -43,13 +41,15 @@ static npg_status write_page(const settings *s, const npg_cli *cli)
 {
     npg_view_facts facts;
     char *output;
+    if (s->live && cli->operand_count != 1)
+        return npg_error(NPG_USAGE, "--live follows one run; %d folders were given", cli->operand_count);
     NPG_TRY(choose_output(&output, s, cli));
     const npg_view_order order = {.paths = (const char *const *)cli->operands,
                                   .path_count = (size_t)cli->operand_count,
                                   .output = output,
                                   .point_limit = (size_t)s->points,
                                   .every = s->every};
-    npg_status status = npg_view_page_write(&facts, &order);
+    npg_status status = s->live ? npg_view_follow(&facts, &order) : npg_view_page_write(&facts, &order);
     if (!status && facts.without_points)
         fprintf(stderr, "neupig view: warning: %zu of %zu frames without points (%s)\n", facts.without_points,
                 facts.frames, facts.why);
@@ -60,20 +60,11 @@ static npg_status write_page(const settings *s, const npg_cli *cli)
     return status;
 }
 
-static npg_status serve(const settings *s, const npg_cli *cli)
-{
-    if (cli->operand_count != 1)
-        return npg_error(NPG_USAGE, "--live follows one run; %d folders were given", cli->operand_count);
-    if (s->output[0])
-        return npg_error(NPG_USAGE, "--live writes no page; give -o without it when the run is done");
-    return npg_view_live(cli->operands[0], (size_t)s->points, (int)s->port);
-}
-
 int npg_verb_view(int argc, char **argv)
 {
     settings s;
     npg_cli cli;
     npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) status = s.live ? serve(&s, &cli) : write_page(&s, &cli);
+    if (!status) status = write_page(&s, &cli);
     return npg_cli_end(argv[0], status);
 }

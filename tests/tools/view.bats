@@ -1,4 +1,4 @@
-# view: pages of results, and the server that follows a run.  How the page behaves in a browser: view_page.bats.
+# view: pages of results, also of a run that is at work.  How the page behaves in a browser: view_page.bats.
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -149,46 +149,56 @@ begin_run() { # FOLDER
 end_run() { # FOLDER
     cp "$1/all.jsonl" "$1/frames.jsonl"
     cp "$1/done.later" "$1/done.json"
-    kill $run_pid
+    pkill -P $run_pid
 }
 
-begin_server() { # FOLDER
-    "$NEUPIG" view --live "$1" >server.log 2>server.err 3>&- &
-    server_pid=$!
-    until grep -q http server.log; do
-        kill -0 $server_pid
+begin_view() { # FOLDER
+    "$NEUPIG" view --live "$1" >view.log 2>view.err 3>&- &
+    view_pid=$!
+    until [ -s view.log ]; do
+        kill -0 $view_pid
         sleep 0.05
     done
-    port=$(sed -n 's|^http://127.0.0.1:\([0-9]*\)/$|\1|p' server.log)
 }
 
-@test "the server gives page, state and frames to this machine alone, writes nothing, and ends with the run" {
+facts_of() { # PAGE: frames, and whether it loads itself again
+    python3 - "$1" <<'END'
+import json, re, sys
+facts = json.loads(re.search('id="facts">(.*?)</script>', open(sys.argv[1]).read()).group(1))
+print(sum(len(part["frames"]) for part in facts["results"][0]["parts"]), facts["live"])
+END
+}
+
+@test "the page of a run at work has what is there, is written anew, touches nothing else, and ends with the run" {
     begin_run live
-    begin_server live
-    find live -type f -printf '%p %s %T@\n' | sort >before
-    python3 "$BATS_TEST_DIRNAME/view/ask_server.py" "$port" 3
-    find live -type f -printf '%p %s %T@\n' | sort >after
-    diff before after
-    # no other address is bound
-    hex=$(printf '%04X' "$port")
-    [ "$(awk -v p=":$hex" '$4 == "0A" && substr($2, length($2) - 4) == p { print $2 }' /proc/net/tcp /proc/net/tcp6)" = "0100007F:$hex" ]
+    find live -type f ! -name view.html -printf '%p %s %T@\n' | sort >before
+    begin_view live
+    [ "$(facts_of live/view.html)" = "2 True" ]
+    sed -n '2p' live/all.jsonl >line
+    sed -i '$d' live/frames.partial.jsonl
+    cat line >>live/frames.partial.jsonl
+    until [ "$(facts_of live/view.html)" = "3 True" ]; do
+        kill -0 $view_pid
+        sleep 0.1
+    done
+    find live -type f ! -name view.html ! -name frames.partial.jsonl -printf '%p %s %T@\n' | sort | diff - <(grep -v partial before)
     end_run live
-    wait $server_pid
-    grep -q 'the run is done' server.log
+    wait $view_pid
+    grep -q '^live/view.html: 6 frames' view.log
+    [ "$(facts_of live/view.html)" = "6 False" ]
 }
 
-@test "a run that stops before its end ends the server, too; so does a signal" {
+@test "before a frame is solved the page waits; a run that stops before its end ends it, too" {
     begin_run stopped
-    begin_server stopped
+    rm stopped/frames.partial.jsonl stopped/reference.ply
+    begin_view stopped
+    [ "$(facts_of stopped/view.html)" = "0 True" ]
     pkill -P $run_pid || true
     kill $run_pid || true
-    wait $server_pid
-    grep -q 'the run is stopped' server.log
-    begin_run again
-    begin_server again
-    kill -INT $server_pid
-    wait $server_pid
-    kill $run_pid
+    status=0
+    wait $view_pid || status=$?
+    [ "$status" -eq 3 ]
+    grep -q 'no frame is solved yet' view.err
 }
 
 @test "segments are parts of one time line" {

@@ -67,13 +67,13 @@ in_browser() { # TEST ARGUMENTS...
     touch live/job/lock
     flock live/job/lock sleep 100 3>&- &
     run_pid=$!
-    "$NEUPIG" view --live live >server.log 3>&- &
-    server_pid=$!
-    until grep -q http server.log; do
-        kill -0 $server_pid
+    "$NEUPIG" view --live live >view.log 3>&- &
+    view_pid=$!
+    until [ -s view.log ]; do
+        kill -0 $view_pid
         sleep 0.05
     done
-    in_browser live "$(cat server.log)" live
-    wait $server_pid
-    kill $run_pid
+    in_browser live live/view.html live $run_pid
+    wait $view_pid
+    kill $run_pid || true
 }

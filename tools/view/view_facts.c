@@ -4,7 +4,7 @@
 
 #include "pipeline/json_file.h"
 #include "pipeline/plan.h"
-#include "tools/view/view_result.h"
+#include "tools/view/view_internal.h"
 
 enum { WARNINGS_MAX = 50 };
 

@@ -1,10 +1,8 @@
 /* Frame: meshes and points of a result as blocks of bytes for the page. */
-#include "tools/view/view_frame.h"
+#include "tools/view/view_internal.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "tools/view/view_read.h"
 
 #define GRID_STEPS 65535 /* of the smallest frame's longest side, at least: 16 bits */
 

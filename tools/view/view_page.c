@@ -1,5 +1,5 @@
 /* Page: one HTML file that needs no other, of one result or of two side by side. */
-#include "tools/view/view_page.h"
+#include "tools/view/view_internal.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,9 @@
 
 /* ---- JSON inside of HTML ---- */
 
-char *npg_view_json_text(const json_t *value)
+/* JSON text for inside of a script element: ASCII, without "<", "&" and ">"; to be given to free(), NULL: no
+ * memory. */
+static char *json_text(const json_t *value)
 {
     size_t marks = 0;
     char *text = value ? json_dumps(value, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(17)) : NULL;
@@ -29,16 +31,11 @@ char *npg_view_json_text(const json_t *value)
     return safe;
 }
 
-json_t *npg_view_page_json(bool is_live, json_t *results)
+static npg_status write_json(npg_file *file, json_t *results, bool is_live)
 {
-    return json_pack("{si ss sb so}", "format", 1, "neupig", npg_version(), "live", is_live, "results",
-                     results);
-}
-
-static npg_status write_json(npg_file *file, json_t *results)
-{
-    json_t *page = npg_view_page_json(false, results);
-    char *text = npg_view_json_text(page);
+    json_t *page =
+        json_pack("{si ss sb so}", "format", 1, "neupig", npg_version(), "live", is_live, "results", results);
+    char *text = json_text(page);
     json_decref(page);
     if (!text) return npg_error(NPG_MEMORY, "no memory for the page");
     npg_file_print(file, "<script type=\"application/json\" id=\"facts\">");
@@ -102,13 +99,14 @@ static npg_status write_result(npg_file *file, npg_view_facts *facts, json_t *re
                                const npg_view_order *order)
 {
     npg_view_result result;
-    NPG_TRY(npg_view_result_open(&result, order->paths[place], order->every, false));
+    NPG_TRY(npg_view_result_open(&result, order->paths[place], order->every, order->is_live));
     json_t *json = npg_view_result_json(&result), *parts = json_object_get(json, "parts");
     npg_status status = json ? NPG_OK : npg_error(NPG_MEMORY, "no memory for the page");
     if (!status && order->every > 1)
         json_object_set_new(json, "every", json_integer((json_int_t)order->every));
     for (size_t i = 0; i < result.part_count && !status; i++) {
         char id[48];
+        if (!result.parts[i].reference) continue; /* not there yet */
         snprintf(id, sizeof id, "data-%zu-%zu", place, i);
         status = write_part(file, facts, json_array_get(parts, i), &result.parts[i], id, order->point_limit);
     }
@@ -130,7 +128,7 @@ static npg_status write_page(npg_file *file, npg_view_facts *facts, const npg_vi
     if (status)
         json_decref(results);
     else
-        status = write_json(file, results);
+        status = write_json(file, results, order->is_live);
     if (!status) status = npg_file_write(file, page->text + page->data, page->size - page->data);
     facts->bytes = npg_file_size(file);
     return status;

@@ -1,5 +1,5 @@
 /* Reading of one frame for a page. */
-#include "tools/view/view_read.h"
+#include "tools/view/view_internal.h"
 
 #include <math.h>
 #include <stdio.h>

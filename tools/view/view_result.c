@@ -1,5 +1,5 @@
 /* Result: lists and references of a run, or of its segments. */
-#include "tools/view/view_result.h"
+#include "tools/view/view_internal.h"
 
 #include <errno.h>
 #include <math.h>

@@ -6,7 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "tools/view/view_page.h"
+#include "tools/view/view_internal.h"
 
 #define NAME "view/page.html"
 #define MARK "<!--neupig-data-->"
@@ -27,12 +27,6 @@ static bool find_template(char path[PATH_MAX])
     }
     snprintf(path, PATH_MAX, "%s/%s", NPG_DATA_DIR, NAME);
     return access(path, R_OK) == 0;
-}
-
-bool npg_view_template_is_there(void)
-{
-    char path[PATH_MAX];
-    return find_template(path);
 }
 
 static npg_status read_all(npg_view_template *page, const char *path)

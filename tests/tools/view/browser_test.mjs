@@ -9,15 +9,16 @@
 //     compare PAGE            two results on one time line
 //     phone PAGE              at the width of a phone
 //     names PAGE              hostile names are shown as text
-//     live URL RUN            follows a run until it ends
+//     live PAGE RUN PID       the page of a run at work shows more and more of it, until process PID ends
 import fs from "node:fs";
 import path from "node:path";
+import { execFileSync } from "node:child_process";
 import { pathToFileURL } from "node:url";
 import { compare, openBrowser, openPage, pictureOf, ready, shows } from "./open_browser.mjs";
 import { readPly } from "./page_file.mjs";
 
 const [modules, program, name, where, ...rest] = process.argv.slice(2);
-const url = where.startsWith("http") ? where : pathToFileURL(path.resolve(where)).href;
+const url = pathToFileURL(path.resolve(where)).href;
 
 function expect(condition, text) {
     if (condition) return;
@@ -299,28 +300,29 @@ async function names(page) {
     expect((await page.locator("#notes b").count()) === 0, "an element came from the alarm");
 }
 
-async function live(page, [run]) {
-    await page.waitForFunction(() => window.neupig.capture.slots.length === 2 && window.neupig.shown, null, {
-        timeout: 30000,
-    });
-    expect(
-        (await page.locator("#progress-text").textContent()) === "solving: 2 of 6 frames",
-        await page.locator("#progress-text").textContent(),
-    );
+async function live(page, [run, pid]) {
+    const shown = (count) =>
+        page.waitForFunction(
+            (n) => window.neupig?.capture.slots.length === n && window.neupig.shown?.slot === n - 1,
+            count,
+            { timeout: 60000 },
+        );
+    await shown(2);
+    const progress = await page.locator("#progress-text").textContent();
+    expect(progress === "solving: 2 of 6 frames", progress);
     const before = await pictureOf(page);
     const lines = fs.readFileSync(path.join(run, "all.jsonl"), "utf8").trim().split("\n");
     fs.writeFileSync(
         path.join(run, "frames.partial.jsonl"),
         [3, 2, 1, 5].map((i) => `${lines[i]}\n`).join(""),
     );
-    await page.waitForFunction(() => window.neupig.capture.slots.length === 4, null, { timeout: 30000 });
-    await shows(page, 3); // it was at the last frame, and stays there
+    await shown(4); // it was at the last frame, and stays there
     expect((await pictureOf(page)) !== before, "the new frame is not shown");
     fs.copyFileSync(path.join(run, "all.jsonl"), path.join(run, "frames.jsonl"));
     fs.copyFileSync(path.join(run, "done.later"), path.join(run, "done.json"));
-    await page.waitForFunction(() => document.body.dataset.ended === "done", null, { timeout: 30000 });
-    expect((await page.locator("#progress-text").textContent()) === "done: 6 of 6 frames", "the end");
-    console.log("ended");
+    execFileSync("pkill", ["-P", pid]);
+    await page.waitForFunction(() => window.neupig?.capture.isLive === false, null, { timeout: 60000 });
+    expect(await page.locator("#progress").isHidden(), "the end");
 }
 
 const tests = { figures, looks, plays, picture, compare: compareResults, phone, names, live };

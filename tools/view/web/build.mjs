@@ -35,7 +35,6 @@ const policy = [
     `script-src ${hash(script)}`,
     `style-src 'unsafe-inline'`,
     "img-src data: blob:",
-    "connect-src 'self'",
     "base-uri 'none'",
     "form-action 'none'",
 ].join("; ");

@@ -1,27 +1,19 @@
 // What the page is of: results with their parts, and the frames of all of them on one time line.
-import { LiveSource, PageSource, PartStore } from "./store.js";
+import { PageSource, PartStore } from "./store.js";
 
 /** A result: its facts, and a store for each part. */
 class Result {
-    constructor(facts, place, origin, isLive, before) {
+    constructor(facts, place, origin) {
         this.facts = facts;
         this.place = place;
         this.stores = facts.parts.map((part, i) => {
-            const known = before?.stores[i];
-            if (isLive && known && known.facts.id === part.id) {
-                known.facts = known.source.facts = part;
-                return known;
-            }
-            const source = isLive ? new LiveSource(i, part) : new PageSource(place, i);
-            if (isLive) part.group = 1;
             const own = part.origin ?? [0, 0, 0];
             return new PartStore(
-                source,
+                new PageSource(place, i),
                 part,
                 own.map((x, a) => x - origin[a]),
             );
         });
-        for (const part of facts.parts) if (isLive) part.group = 1;
     }
 
     has(what) {
@@ -45,25 +37,13 @@ function slotsOf(results) {
 }
 
 export class Capture {
-    constructor() {
-        this.results = [];
-        this.slots = [];
-    }
-
-    /** Take over what a page or a server says; true where something is new. */
-    take(facts) {
+    constructor(facts) {
         this.isLive = facts.live;
-        this.phase = facts.phase ?? null;
-        this.problem = facts.problem ?? "";
         this.version = facts.neupig;
-        this.origin = facts.results?.[0]?.parts?.[0]?.origin ?? [0, 0, 0];
-        const shown = this.slots.length;
-        const before = this.results;
-        this.results = (facts.results ?? []).map(
-            (r, i) => new Result(r, i, this.origin, facts.live, before[i]),
-        );
-        this.slots = slotsOf(this.results.filter((r) => r.facts.parts.length));
-        return shown !== this.slots.length;
+        this.origin = facts.results[0]?.parts[0]?.origin ?? [0, 0, 0];
+        this.results = facts.results.map((r, i) => new Result(r, i, this.origin));
+        const hasReference = this.results.some((result) => result.has((part) => part.vertices));
+        this.slots = hasReference ? slotsOf(this.results) : [];
     }
 
     storeAt(slot, result) {

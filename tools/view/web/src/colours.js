@@ -27,12 +27,11 @@ export function lackOf(id, capture) {
     const parts = capture.results.flatMap((result) => result.facts.parts);
     const stores = capture.results.flatMap((result) => result.stores);
     const noPoints = parts.find((part) => part.no_points)?.no_points;
-    const withPoints = capture.isLive || parts.some((part) => part.with_points);
+    const withPoints = parts.some((part) => part.with_points);
     if (id === "vertex" && stores.every((store) => store.part && !store.part.colours))
         return "The meshes have no vertex colours.";
     if (["error", "coverage", "seen", "points"].includes(id) && !withPoints)
         return `The frames' points could not be read when the page was made${noPoints ? ` (${noPoints})` : ""}.`;
-    if (id === "seen" && capture.isLive) return "Counted once the run is done.";
     return "";
 }
 

@@ -68,7 +68,7 @@ export function showBadge(capture) {
     const hasAlarm = capture.results.some((result) =>
         result.has((part) => Object.values(part.alarm ?? {}).some(Boolean)),
     );
-    badge.hidden = !frames.length || (capture.isLive && !["done", "stopped"].includes(capture.phase));
+    badge.hidden = !frames.length || capture.isLive;
     badge.className = `badge ${hasAlarm ? "bad" : faults ? "warn" : "good"}`;
     const isOpen = capture.results.some((result) => !result.facts.done);
     badge.textContent = `${isOpen ? "not finished, " : ""}${hasAlarm ? "alarm, " : ""}${faults ? `${faults} frames to look at` : "all frames good"}`;

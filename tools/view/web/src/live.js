@@ -1,16 +1,7 @@
-// A run at work: ask its server how far it is, until it has ended.
-const EVERY_MS = 1000;
-const WORDS = {
-    preparing: "choosing the reference",
-    solving: "solving",
-    writing: "writing the last files",
-    done: "done",
-    stopped: "stopped before its end",
-};
+// A run at work: the page says how far it is, and loads itself again for what has come.
+const EVERY_MS = 4000;
 
 const element = (id) => document.getElementById(id);
-const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
-const hasEnded = (capture) => ["done", "stopped"].includes(capture.phase);
 
 function showProgress(capture) {
     const solved = capture.slots.length,
@@ -19,58 +10,44 @@ function showProgress(capture) {
     element("progress").hidden = false;
     element("progress-bar").firstChild.style.width = `${100 * share}%`;
     element("progress-bar").setAttribute("aria-valuenow", Math.round(100 * share));
-    element("progress-text").textContent =
-        `${WORDS[capture.phase] ?? ""}: ${solved}${total ? ` of ${total}` : ""} frames`;
+    element("progress-text").textContent = solved
+        ? `solving: ${solved}${total ? ` of ${total}` : ""} frames`
+        : "choosing the reference";
+    if (!solved) element("message").textContent = "No frame is solved yet.";
 }
 
-/** Take what is new; who looks at the last frame goes on looking at the last. */
-function take(app, state, showBadge) {
-    const { capture } = app;
-    const number = capture.slots[app.player?.slot]?.number;
-    const wasLast = app.player && app.player.slot === app.player.last;
-    const before = capture.slots.length;
-    capture.take(state);
-    showProgress(capture);
-    const hasReference = capture.results.some((result) => result.facts.parts.some((part) => part.vertices));
-    if (!hasReference || !capture.slots.length) {
-        element("message").textContent = capture.problem || "No frame is solved yet.";
-        return;
-    }
-    if (!app.stage) {
-        app.begin();
-        return app.seek(app.player.last);
-    }
-    app.refreshFacts();
-    showBadge(capture);
-    if (capture.slots.length === before || app.player.isPlaying) return;
-    const same = capture.slots.findIndex((slot) => slot.number === number);
-    app.seek(wasLast || same < 0 ? app.player.last : same);
+/** Where the page was before it was loaded again: its frame (null: the last), and where it was looked from. */
+function placeOf(app) {
+    const { player, stage } = app;
+    if (!player) return null;
+    return {
+        number: player.slot === player.last ? null : app.capture.slots[player.slot].number,
+        camera: stage.camera.position.toArray(),
+        target: stage.controls.target.toArray(),
+    };
 }
 
-/** Every frame, while the server is still there. */
-async function fetchAll(capture) {
-    for (const result of capture.results)
-        for (const store of result.stores)
-            for (let i = 0; i < store.facts.frames.length; i++) await store.source.groupBytes(i);
+function goTo(app, place) {
+    const slot = app.capture.slots.findIndex((one) => one.number === place?.number);
+    app.seek(slot < 0 ? app.player.last : slot);
+    app.lookFrom = place;
 }
 
-export async function follow(app, showBadge) {
-    const { capture } = app;
-    for (let failures = 0; failures < 5;) {
-        try {
-            const reply = await fetch("/state");
-            if (!reply.ok) throw new Error(`state: ${reply.status}`);
-            take(app, await reply.json(), showBadge);
-            failures = 0;
-        } catch (error) {
-            failures++;
-            if (failures === 5) element("progress-text").textContent = "the server has ended";
-        }
-        if (hasEnded(capture)) {
-            await fetchAll(capture);
-            document.body.dataset.ended = capture.phase;
-            return;
-        }
-        await wait(EVERY_MS);
+/** What this page left for itself; null where it was just opened. */
+function leftPlace() {
+    try {
+        return JSON.parse(window.name);
+    } catch {
+        return null;
     }
+}
+
+export function follow(app) {
+    showProgress(app.capture);
+    if (app.player) goTo(app, leftPlace());
+    setInterval(() => {
+        if (app.player?.isPlaying) return;
+        window.name = JSON.stringify(placeOf(app));
+        location.reload();
+    }, EVERY_MS);
 }

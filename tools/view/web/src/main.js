@@ -15,8 +15,7 @@ const SHADINGS = ["smooth", "flat", "wire"];
 
 class App {
     constructor(facts) {
-        this.capture = new Capture();
-        this.capture.take(facts);
+        this.capture = new Capture(facts);
         this.look = { shading: "smooth", colour: "plain", range: 1, points: false };
         this.pick = null;
         this.isDirty = true;
@@ -136,6 +135,7 @@ class App {
         this.look.range = errorRangeFor(errors);
         element("range").value = this.look.range;
         this.stage.fit([28, 14]);
+        if (this.lookFrom) this.stage.lookFrom(this.lookFrom);
         this.stage.placeGrid(this.stage.bounds());
         fillColours(this);
     }
@@ -370,13 +370,13 @@ function fail(error) {
     element("message").textContent = `This page can't be shown: ${error.message}`;
 }
 
-async function start() {
+function start() {
     const app = new App(JSON.parse(element("facts").textContent));
     window.neupig = app; // for tests and the curious
-    if (app.capture.isLive) await follow(app, showBadge);
-    else app.begin();
+    if (app.capture.slots.length || !app.capture.isLive) app.begin();
+    if (app.capture.isLive) follow(app);
 }
 
 addEventListener("unhandledrejection", (event) => fail(event.reason));
 if (typeof DecompressionStream === "undefined") fail(new Error("the browser is too old"));
-else start().catch(fail);
+else Promise.resolve().then(start).catch(fail);

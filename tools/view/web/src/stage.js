@@ -188,6 +188,13 @@ export class Stage {
         this.#aim(this.camera.aspect);
     }
 
+    /** Look from where the camera was, {camera, target}. */
+    lookFrom(place) {
+        this.camera.position.fromArray(place.camera);
+        this.controls.target.fromArray(place.target);
+        this.controls.update();
+    }
+
     #direction(azimuth, elevation) {
         const [a, e] = [azimuth, Math.min(elevation, 89.9)].map((degrees) => (degrees * Math.PI) / 180);
         const [side, ahead, above] = [Math.sin(a) * Math.cos(e), Math.cos(a) * Math.cos(e), Math.sin(e)];

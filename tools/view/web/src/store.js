@@ -21,31 +21,6 @@ export class PageSource {
     }
 }
 
-/** Blocks from the server of a run that is at work; what came stays, packed. */
-export class LiveSource {
-    constructor(part, facts) {
-        this.part = part;
-        this.facts = facts;
-        this.blocks = new Map();
-    }
-    partBytes() {
-        return this.#fetch(`/part-${this.part}`);
-    }
-    groupBytes(place) {
-        return this.#fetch(`/frame-${this.part}-${this.facts.frames[place].index}`);
-    }
-    #fetch(path) {
-        if (!this.blocks.has(path)) this.blocks.set(path, this.#load(path));
-        return this.blocks.get(path);
-    }
-    async #load(path) {
-        const reply = await fetch(path);
-        if (reply.ok) return new Uint8Array(await reply.arrayBuffer());
-        this.blocks.delete(path);
-        throw new Error(`${path}: ${reply.status}`);
-    }
-}
-
 const nextTask = () => new Promise((resolve) => setTimeout(resolve, 0));
 
 /** A pause once so many milliseconds are used, so that pictures come out in between. */

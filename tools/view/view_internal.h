@@ -1,0 +1,185 @@
+/* What the files of the page share: a result as it was read, and its meshes and points as blocks of bytes. */
+#ifndef NPG_VIEW_INTERNAL_H
+#define NPG_VIEW_INTERNAL_H
+
+#include <jansson.h>
+
+#include "export/export.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/mesh.h"
+#include "tools/view/view.h"
+
+/* Codec of the page's numbers: what changes little from frame to frame and from vertex to vertex takes
+ * little.
+ *
+ * A block is numbers (int32), made small by prediction, then packed:
+ *
+ *   predict  what is left of v[i] after the rounded mean of the values at lower vertices that share a face
+ *            with it: floor((2 sum + n) / (2 n)), each as often as faces have it; without any, after v[i - 1]
+ *   pack     zigzag (0, -1, 1, -2 ... become 0, 1, 2, 3 ...), four planes of bytes (all lowest bytes first,
+ *            then all second ones ...), zlib
+ *
+ * All of it is integers, so that the page (web/src/codec.js) has the very same numbers back.  On a dancer of
+ * 175 frames and 9971 vertices this takes 62 % of what meshoptimizer's vertex codec takes of the same
+ * differences, and the browser brings the decoder. */
+
+/* Bytes that grow; begins zeroed. */
+typedef struct npg_bytes {
+    uint8_t *data; /* owned: npg_release() */
+    size_t size, capacity;
+} npg_bytes;
+
+npg_status npg_bytes_add(npg_bytes *bytes, const void *data, size_t size);
+
+/* Of each vertex the lower ones that share a face with it: those of v are of[start[v]] up to, and without,
+ * of[start[v + 1]]. */
+typedef struct npg_view_links {
+    size_t vert_count;
+    uint32_t *start, *of; /* V + 1; owned */
+} npg_view_links;
+
+npg_status npg_view_links_open(npg_view_links *links, const npg_mesh *mesh);
+void npg_view_links_close(npg_view_links *links);
+
+/* left[i] for the V values; another array than values. */
+void npg_view_predict(const npg_view_links *links, int32_t *left, const int32_t *values);
+
+/* Append packed numbers.  *packed_size, where not NULL, gets the bytes they took.  NPG_MEMORY. */
+npg_status npg_view_pack(npg_bytes *out, size_t *packed_size, const int32_t *values, size_t count);
+
+/* The grid that positions are rounded to. */
+typedef struct npg_view_grid {
+    double origin[3], step;
+} npg_view_grid;
+
+#define NPG_VIEW_GRID_MAX (1 << 24) /* numbers on the grid, from 0 */
+
+/* grid = (p - origin) / step, rounded, within 0 .. NPG_VIEW_GRID_MAX.  p: count x 3, finite; out: 3 x count,
+ * the x of all points first. */
+void npg_view_round(const npg_view_grid *grid, int32_t *out, const float *points, size_t count);
+
+/* Result: what a run has left in its folder, or has so far, as a page shows it. */
+
+typedef struct npg_view_frame {
+    int64_t index, number;
+    json_t *line;              /* of frames.jsonl; owned                                      */
+    const char *file, *source; /* mesh, seen from the part's folder, and points: loans, NULL: none */
+} npg_view_frame;
+
+/* What has one reference: a run, or one of its segments. */
+typedef struct npg_view_part {
+    char *folder, *label;   /* owned; label: "." or the segment's folder */
+    npg_mesh *reference;    /* owned; NULL: not there yet                */
+    npg_view_links links;   /* of the reference                          */
+    npg_origin origin;      /* of reference.ply                          */
+    npg_view_frame *frames; /* in time order, owned                      */
+    size_t count, capacity;
+    size_t group;                /* frames that are packed together           */
+    json_t *report, *done, *job; /* report.json, done.json, job/job.json; owned, NULL: none */
+    npg_placement placement;     /* the capture's coordinates to the meshes'  */
+    double diagonal;             /* of the figure, in the meshes' unit      */
+    double cover_share;          /* points so near cover the surface, in diagonals */
+} npg_view_part;
+
+typedef struct npg_view_result {
+    char *path, *name; /* owned; name: the folder's own */
+    npg_view_part *parts;
+    size_t part_count, capacity;
+    json_t *segments; /* segments.json, owned; NULL: the run has one reference */
+    bool is_done;
+} npg_view_result;
+
+/* Read lists and references; every: of the frames only each so many-th (by index), and the keyframe.
+ * NPG_USAGE: no folder of a run.  NPG_BAD_INPUT: damaged, or (not may_be_empty) nothing solved yet. */
+npg_status npg_view_result_open(npg_view_result *result, const char *path, int64_t every, bool may_be_empty);
+void npg_view_result_close(npg_view_result *result);
+
+/* What the page knows of it beside meshes and points; a new reference, NULL: no memory (view_facts.c). */
+json_t *npg_view_result_json(const npg_view_result *result);
+
+/* A JSON file of a folder; NULL (and NPG_OK) where it is not there. */
+npg_status npg_view_load_json(json_t **out, const char *folder, const char *name);
+
+/* Frame: meshes and points of a result as blocks of bytes for the page.
+ *
+ * A group block (frames that are packed together), little-endian:
+ *
+ *     f64 origin[3], step        the grid of its positions; points lie on one NPG_VIEW_POINT_STEP times as
+ *     wide u32 frames, bytes of positions, of errors, of points
+ *     u32 points of each frame
+ *     positions                  per frame x of all vertices, then y, z: of the first frame, of later ones
+ *                                the change since the one before; predicted and packed (view_codec.h)
+ *     errors                     per frame 0 to 255, per vertex the distance to the nearest point:
+ *                                d = (value / 255)^2 x NPG_VIEW_ERROR_MAX diagonals; predicted and packed.
+ *                                255 is that or more, all of a frame is 0 without points
+ *     points                     per frame x, then y, z, in the order of a space-filling curve, each as the
+ *                                change since the point before; packed
+ *
+ * A frame without a mesh has the positions of the one before it.
+ *
+ * A part block, what is the same in all its frames:
+ *
+ *     u32 vertices, faces
+ *     f64 origin[3], step        of the reference
+ *     u32 bytes of faces, of the reference, of colours, of the counts
+ *     faces                      corners, each as the change since the one before; packed
+ *     reference                  as the positions of a first frame
+ *     colours                    red of all vertices, then green, blue; predicted and packed; 0 bytes: none
+ *     counts                     in how many frames a point covers the vertex; predicted and packed; 0 bytes:
+ *                                not known */
+
+#define NPG_VIEW_POINT_STEP 16
+#define NPG_VIEW_ERROR_MAX  0.05
+
+/* Works through the frames of a part. */
+typedef struct npg_view_frames {
+    const npg_view_part *part; /* loan */
+    size_t point_limit;        /* points of a frame that are shown; all are measured from */
+    float *vert_pos;           /* V x 3 of the frame at hand, owned                       */
+    float *points, *some;      /* N x 3, and those shown; owned                           */
+    size_t point_count, point_capacity, some_capacity;
+    int32_t *seen;         /* V, owned                                                */
+    uint8_t *colours;      /* V x 3 of the first mesh that has any, owned, or NULL    */
+    size_t without_points; /* frames whose points could not be read                   */
+    size_t with_points;
+    char why[512]; /* ... why not, of the first                               */
+} npg_view_frames;
+
+npg_status npg_view_frames_open(npg_view_frames *frames, const npg_view_part *part, size_t point_limit);
+void npg_view_frames_close(npg_view_frames *frames);
+
+/* Append the block of the frames first .. first + count - 1 of the part.  NPG_BAD_INPUT names a mesh that is
+ * damaged or not of the reference. */
+npg_status npg_view_group_block(npg_bytes *out, npg_view_frames *frames, size_t first, size_t count);
+
+/* Append the part's block; with_counts: all frames have been through npg_view_group_block(). */
+npg_status npg_view_part_block(npg_bytes *out, const npg_view_frames *frames, bool with_counts);
+
+/* Reading of one frame for a page: its mesh, its points, and how far they are from each other. */
+
+/* Fill frames->vert_pos, relative to the part's origin: from the mesh's file; without one it stays. */
+npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame);
+
+/* Fill frames->points, in the coordinates of the meshes and relative to the part's origin.  None where the
+ * file can't be read: noted in `frames`, no failure.  NPG_MEMORY. */
+npg_status npg_view_read_points(npg_view_frames *frames, const npg_view_frame *frame);
+
+/* errors (V, 0 to 255) of the frame at hand, and frames->seen. */
+npg_status npg_view_measure(npg_view_frames *frames, int32_t *errors);
+
+/* Copy at most frames->point_limit of the points to frames->some, in the order of a space-filling curve. */
+npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count);
+
+/* The page without data, as the build has bundled it: build/view/page.html, or share/neupig/view/page.html of
+ * what is installed. */
+typedef struct npg_view_template {
+    char *text;  /* owned */
+    size_t size; /* in bytes */
+    size_t data; /* where data go in */
+} npg_view_template;
+
+/* NPG_FAILED where it was not built, with what to install. */
+npg_status npg_view_template_open(npg_view_template *page);
+void npg_view_template_close(npg_view_template *page);
+
+#endif
