@@ -139,10 +139,10 @@ static json_t *json_of_capture(const npg_capture *capture, const figures *f)
     if (!capture->verdict.is_known) json_object_set_new(object, "verdict", json_string("not run"));
     json_object_set_new(object, "was_done", json_boolean(capture->verdict.was_done));
     if (f->frames)
-        json_object_update_new(object,
-                               json_pack("{sI sI sI so}", "frames", f->frames, "good", f->good, "skipped",
-                                         f->skipped, "error_percent",
-                                         npg_json_real(f->measured ? f->sum / (double)f->measured : (double)NAN)));
+        json_object_update_new(
+            object, json_pack("{sI sI sI so}", "frames", f->frames, "good", f->good, "skipped", f->skipped,
+                              "error_percent",
+                              npg_json_real(f->measured ? f->sum / (double)f->measured : (double)NAN)));
     if (f->measured)
         json_object_update_new(object, json_pack("{sI so}", "worst_frame", f->worst_number,
                                                  "worst_error_percent", npg_json_real(f->worst)));

@@ -114,11 +114,11 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
 /* NULL: not what a run has written. */
 static json_t *json_of_segment(const json_t *entry)
 {
-    const char *folder = NULL, *status = NULL, *cause = NULL;
+    const char *folder = NULL, *status = NULL;
+    const char *cause = json_string_value(json_object_get(json_object_get(entry, "alarm"), "cause"));
     json_int_t first = 0, last = 0, keyframe = 0;
-    if (json_unpack((json_t *)entry, "{ss sI sI sI ss s?{s?s}}", "folder", &folder, "first_frame", &first,
-                    "last_frame", &last, "keyframe", &keyframe, "status", &status, "alarm", "cause",
-                    &cause) ||
+    if (json_unpack((json_t *)entry, "{ss sI sI sI ss}", "folder", &folder, "first_frame", &first,
+                    "last_frame", &last, "keyframe", &keyframe, "status", &status) ||
         strchr(folder, '/') || !strcmp(folder, ".."))
         return NULL;
     return json_pack("{ss sI sI sI ss ss?}", "folder", folder, "first_frame", first, "last_frame", last,

@@ -189,8 +189,6 @@ static npg_status split_segment(npg_segments *s, size_t at, const npg_options *o
     json_t *topology;
     npg_segment *segment = &s->list[at];
     NPG_TRY(read_topology(&topology, s, segment));
-    json_decref(s->overlaps);
-    s->overlaps = NULL;
     int64_t key = segment->first - segment->shared_first +
                   (int64_t)json_integer_value(json_object_get(topology, "key_index"));
     NPG_TRY(npg_segment_remove(s, segment));
@@ -245,8 +243,6 @@ static npg_status load_or_begin(npg_segments *s, const npg_options *options)
     if (restarts && s->count) NPG_TRY(npg_segments_remove(s));
     if (s->count && !restarts) return NPG_OK;
     for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
-    json_decref(s->overlaps);
-    s->overlaps = NULL;
     s->count = 0;
     return npg_segments_insert(s, 0, &whole);
 }
@@ -268,21 +264,13 @@ static npg_status take_lock(int *fd, const char *output)
 
 static npg_status run_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
-    json_t *overlaps = NULL;
     bool is_partial = false;
     NPG_TRY(npg_capture_select(&s->frames, options, s->selection));
     NPG_TRY(load_or_begin(s, options));
-    NPG_TRY(refuse_link(s, options, "links"));
     NPG_TRY(solve_all(s, options, reporter));
     for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;
-    npg_status status = NPG_OK;
-    if (npg_segments_are_linked(s))
-        overlaps = json_incref(s->overlaps);
-    else
-        status = npg_segments_link(&overlaps, s);
-    if (!status) status = npg_segments_conclude(s, overlaps, is_partial);
-    json_decref(overlaps);
-    return status ? status : is_partial ? NPG_PARTIAL : NPG_OK;
+    NPG_TRY(npg_segments_conclude(s, is_partial));
+    return is_partial ? NPG_PARTIAL : NPG_OK;
 }
 
 npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter)

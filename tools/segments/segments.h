@@ -8,7 +8,6 @@
  * frames.jsonl).
  *
  *     OUT/segment_<number>/       a job like any other; the number is that of its first own frame
- *     OUT/links/<b>_on_<a>.csv    each vertex of segment b on the surface of segment a, in a frame of both
  *     OUT/segments.json           the segments, why and where they were cut, their overlaps
  *     OUT/segments.partial.json   the same while the run is at work, from which it is resumed
  *     OUT/done.json               last of all
@@ -57,7 +56,6 @@ typedef struct npg_segments {
     npg_frame_files *frames;        /* all that are selected; owned */
     npg_segment *list;              /* in time order; owned */
     size_t count, capacity;
-    json_t *overlaps; /* as an earlier run that came to its end wrote them, or NULL; owned */
 } npg_segments;
 
 void npg_segments_clear(npg_segments *s);
@@ -77,9 +75,6 @@ void npg_segment_name(npg_segment *segment, const npg_segments *s);
 npg_status npg_segments_load(npg_segments *s);
 npg_status npg_segments_save(const npg_segments *s);
 
-/* Whether the files of the overlaps that were loaded are there. */
-bool npg_segments_are_linked(const npg_segments *s);
-
 /* Whether OUT was done by a run without segments, which raised an alarm and continued. */
 bool npg_segments_was_alarmed(const npg_segments *s);
 
@@ -89,11 +84,7 @@ npg_status npg_segments_remove(const npg_segments *s);
 /* Remove a segment's results and its job. */
 npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment);
 
-/* The overlaps with their links, written to OUT/links; *overlaps is a new reference. */
-npg_status npg_segments_link(json_t **overlaps, const npg_segments *s);
-
-/* OUT/segments.json in place of the partial one, and with several segments OUT/done.json.
- * overlaps: a loan. */
-npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool is_partial);
+/* OUT/segments.json in place of the partial one, and with several segments OUT/done.json. */
+npg_status npg_segments_conclude(const npg_segments *s, bool is_partial);
 
 #endif

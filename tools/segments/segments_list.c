@@ -21,7 +21,6 @@
 void npg_segments_clear(npg_segments *s)
 {
     for (size_t i = 0; i < s->count; i++) json_decref(s->list[i].alarm);
-    json_decref(s->overlaps);
     npg_release(&s->list);
     npg_frame_files_close(&s->frames);
 }
@@ -102,8 +101,6 @@ static npg_status load(npg_segments *s, const char *name)
                            "%s holds segments of other frames; "
                            "give --restart to discard what is there, or choose another output folder",
                            s->output);
-    if (!status && s->count && !strcmp(name, WHOLE))
-        s->overlaps = json_incref(json_object_get(saved, "overlaps"));
     json_decref(saved);
     npg_release(&path);
     return status;
@@ -113,25 +110,6 @@ npg_status npg_segments_load(npg_segments *s)
 {
     NPG_TRY(load(s, PARTIAL));
     return s->count ? NPG_OK : load(s, WHOLE);
-}
-
-bool npg_segments_are_linked(const npg_segments *s)
-{
-    size_t i, k;
-    json_t *overlap, *link;
-    json_array_foreach(s->overlaps, i, overlap)
-    {
-        json_array_foreach(json_object_get(overlap, "links"), k, link)
-        {
-            char *path;
-            const char *name = json_string_value(json_object_get(link, "file"));
-            if (!name || npg_join_path(&path, s->output, name)) return false;
-            bool is_there = (int64_t)npg_file_bytes(path) == number_in(link, "bytes");
-            npg_release(&path);
-            if (!is_there) return false;
-        }
-    }
-    return s->overlaps != NULL;
 }
 
 /* NULL where there is none, or none that can be read. */
@@ -290,7 +268,6 @@ npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment)
 npg_status npg_segments_remove(const npg_segments *s)
 {
     NPG_TRY(remove_in(s->output, "done.json"));
-    NPG_TRY(remove_in(s->output, "links"));
     for (size_t i = 0; i < s->count; i++)
         if (strcmp(s->list[i].folder, ".") != 0) NPG_TRY(remove_in(s->output, s->list[i].folder));
     NPG_TRY(remove_in(s->output, WHOLE));
@@ -355,13 +332,28 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
     return status;
 }
 
-npg_status npg_segments_conclude(const npg_segments *s, json_t *overlaps, bool is_partial)
+/* The frames that each two neighbours share. */
+static json_t *json_of_overlaps(const npg_segments *s)
+{
+    json_t *overlaps = json_array();
+    for (size_t i = 1; i < s->count; i++) {
+        const npg_segment *a = &s->list[i - 1], *b = &s->list[i];
+        json_t *frames = json_array();
+        for (int64_t k = b->first - b->shared_first; k <= a->last + a->shared_last; k++)
+            json_array_append_new(frames, json_integer(npg_segment_number(s, k)));
+        json_array_append_new(overlaps,
+                              json_pack("{s[ss] so}", "between", a->folder, b->folder, "frames", frames));
+    }
+    return overlaps;
+}
+
+npg_status npg_segments_conclude(const npg_segments *s, bool is_partial)
 {
     json_t *saved = json_of_all(s), *list = json_object_get(saved, "segments");
     npg_status status = NPG_OK;
     for (size_t i = 0; i < s->count && !status; i++)
         status = add_report(json_array_get(list, i), s, &s->list[i]);
-    json_object_set(saved, "overlaps", overlaps);
+    json_object_set_new(saved, "overlaps", json_of_overlaps(s));
     json_object_set_new(saved, "status", json_string(is_partial ? "partial" : "ok"));
     if (!status) status = write_if_new(s, WHOLE, saved);
     json_decref(saved);
