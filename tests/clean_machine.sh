@@ -9,7 +9,7 @@
 #   --tests   then all of the tests, tests/run.sh, in the same root
 #
 # The clone in the root has what is committed.  Package sources, proxies and name servers are those of this machine.
-# Takes about 6 minutes and 5 GB below TMPDIR (/var/tmp), with --tests 45 minutes and 12 GB; needs root, or sudo that
+# Takes about 6 minutes and 5 GB below TMPDIR (/var/tmp), with --tests 30 minutes and 12 GB; needs root, or sudo that
 # asks for no password.  Ends with 0, with 1 where something fails in the root, with 77 where no root can be made.
 # Mounts and root are gone at the end however that comes, kill -9 included.
 set -euo pipefail

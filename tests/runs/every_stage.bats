@@ -1,0 +1,106 @@
+# Every stage, and every way that results take, once and as short as can be: what the sanitizers and tests/run.sh --fast
+# have of whole runs.  How good results are is for other tests; here a run ends as it should and leaves what it should.
+
+small=(--faces 500 --poisson-depth 5 --align-nodes 60 --align-steps 5 --max-residual 100 --max-flipped 100 --max-stretched 100
+    --max-unsupported 100 --max-invented 100 --quiet)
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth --body bar --frames 6 --cycles 0.3 --points 500 --cell 0.05 --noise 0.2 --outliers 0.5 --no-normals \
+        -o capture >synth.log
+    "$NEUPIG" run capture/points -o out --window 4 --overlap 1 --export ply,obj,pc2,glb,usda "${small[@]}"
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# ended CODE COMMAND...: with that exit code
+ended() {
+    local wanted=$1
+    shift
+    run "$@"
+    echo "$output"
+    [ "$status" -eq "$wanted" ]
+}
+
+meshes() { # OUT COUNT
+    [ -s "$1/done.json" ] && [ "$(ls "$1/meshes" | wc -l)" -eq "$2" ]
+}
+
+@test "points without normals, two windows, meshes in every form" {
+    meshes out 6
+    for name in motion.pc2 motion.glb motion.usda obj/frame_0005.obj reference.ply report.json frames.jsonl; do [ -s "out/$name" ]; done
+    ended 0 "$NEUPIG" run capture/points -o out --window 4 --overlap 1 --export ply,obj,pc2,glb,usda "${small[@]}" --no-quiet
+    [[ "$output" == *"done already"* ]]
+}
+
+@test "frames on standard input" {
+    cat capture/points/* | "$NEUPIG" run - -o live --look-ahead 3 "${small[@]}"
+    meshes live 6
+}
+
+@test "depth images of several sensors, with colours" {
+    "$NEUPIG" synth --body bar --rig --cameras 3 --frames 3 --cycles 0.1 --width 80 --height 60 --cell 0.06 -o seen >>synth.log
+    "$NEUPIG" run seen/rig -o rig --truth seen/truth "${small[@]}"
+    meshes rig 3
+    head -c 400 rig/reference.ply | grep -aq "property uchar red"
+}
+
+@test "a body that turns before one sensor" {
+    "$NEUPIG" synth --body bar --cameras 1 --frames 4 --cycles 0.2 --width 48 --cell 0.06 -o side >>synth.log
+    "$NEUPIG" run side/points -o grown "${small[@]}"
+    meshes grown 4
+}
+
+@test "grids on the device" {
+    "$NEUPIG" run capture/points -o grids --frames 0:3 --no-align --epochs 2 --width-1 32 --width-2 32 --grid-levels 3 --samples 100 \
+        "${small[@]}"
+    meshes grids 3
+}
+
+@test "an object that comes: segments" {
+    "$NEUPIG" synth --body two --frames 10 --change 5 --points 500 --cell 0.06 --seed 2 -o two >>synth.log
+    "$NEUPIG" run two/points -o two.out --segments auto --segment-min 3 --keyframe 2 "${small[@]}" --min-coverage 0 || [ $? -eq 7 ]
+    [ -s two.out/segments.json ] && [ -s two.out/done.json ]
+}
+
+@test "killed and started again it goes on" {
+    "$NEUPIG" run capture/points -o killed --window 2 --overlap 1 "${small[@]}" >killed.log 2>&1 &
+    local pid=$!
+    while kill -0 $pid 2>/dev/null && [ -z "$(ls killed/job/window* 2>/dev/null)" ]; do sleep 0.02; done
+    kill -KILL $pid 2>/dev/null || true
+    wait $pid || true
+    "$NEUPIG" run capture/points -o killed --window 2 --overlap 1 "${small[@]}"
+    meshes killed 6
+}
+
+@test "damaged, missing and impossible input is refused, or skipped on request" {
+    cp -r capture/points bad
+    truncate -s 2000 bad/frame_0001.ply
+    ended 3 "$NEUPIG" run bad -o bad.out "${small[@]}"
+    ended 7 "$NEUPIG" run bad -o bad.out --keep-going "${small[@]}"
+    rm bad/frame_0002.ply
+    ended 3 "$NEUPIG" run bad -o gap.out --keep-going "${small[@]}"
+    ended 2 "$NEUPIG" run capture/points -o none --keyframe 99 "${small[@]}"
+    ended 5 "$NEUPIG" run capture/points -o /proc/neupig "${small[@]}"
+    ended 6 "$NEUPIG" run capture/points -o none --max-memory 4 "${small[@]}"
+}
+
+@test "what takes a result: apply, append, eval, render, view, batch" {
+    "$NEUPIG" apply out --mesh out/reference.ply -o carried
+    ended 0 "$NEUPIG" eval carried out/meshes --samples 1000
+    [[ "$output" == *"Corr 0.00000"* ]]
+    ended 0 "$NEUPIG" eval out capture --samples 1000
+    "$NEUPIG" render out/meshes -o strip.png --count 3
+    "$NEUPIG" probe capture/points >probe.txt || [ $? -eq 7 ]
+    mkdir grows && cp capture/points/frame_000[0-3].ply grows
+    "$NEUPIG" run grows -o longer "${small[@]}"
+    cp capture/points/frame_000[45].ply grows
+    "$NEUPIG" append longer
+    meshes longer 6
+    echo '{"output": "night", "defaults": {"faces": 500, "poisson-depth": 5}, "captures": [
+        {"input": "capture/points", "name": "one"}, {"input": "nowhere", "name": "two"}]}' >night.json
+    ended 1 "$NEUPIG" batch night.json
+    [ -s night/one/done.json ] && [ -s night/batch.json ]
+}
