@@ -1,14 +1,14 @@
 # Every stage, and every way that results take, once and as short as can be: what the sanitizers and tests/run.sh --fast
 # have of whole runs.  How good results are is for other tests; here a run ends as it should and leaves what it should.
 
-small=(--faces 500 --poisson-depth 5 --align-nodes 60 --align-steps 5 --max-residual 100 --max-flipped 100 --max-stretched 100
-    --max-unsupported 100 --max-invented 100 --quiet)
+small=(--faces 500 --method '{"poisson-depth": 5, "align-nodes": 60, "align-steps": 5}' --max-residual 100
+    --max-flipped 100 --max-stretched 100 --max-unsupported 100 --max-invented 100 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --body bar --frames 6 --cycles 0.3 --points 500 --cell 0.05 --noise 0.2 --outliers 0.5 --no-normals \
         -o capture >synth.log
-    "$NEUPIG" run capture/points -o out --window 4 --overlap 1 --export ply,obj,pc2,glb,usda "${small[@]}"
+    "$NEUPIG" run capture/points -o out --method '{"window": 4, "overlap": 1}' --export ply,obj,pc2,glb,usda "${small[@]}"
 }
 
 setup() {
@@ -31,7 +31,7 @@ meshes() { # OUT COUNT
 @test "points without normals, two windows, meshes in every form" {
     meshes out 6
     for name in motion.pc2 motion.glb motion.usda obj/frame_0005.obj reference.ply report.json frames.jsonl; do [ -s "out/$name" ]; done
-    ended 0 "$NEUPIG" run capture/points -o out --window 4 --overlap 1 --export ply,obj,pc2,glb,usda "${small[@]}" --no-quiet
+    ended 0 "$NEUPIG" run capture/points -o out --method '{"window": 4, "overlap": 1}' --export ply,obj,pc2,glb,usda "${small[@]}" --no-quiet
     [[ "$output" == *"done already"* ]]
 }
 
@@ -54,24 +54,24 @@ meshes() { # OUT COUNT
 }
 
 @test "grids on the device" {
-    "$NEUPIG" run capture/points -o grids --frames 0:3 --no-align --epochs 2 --width-1 32 --width-2 32 --grid-levels 3 --samples 100 \
-        "${small[@]}"
+    "$NEUPIG" run capture/points -o grids --frames 0:3 "${small[@]}" \
+        --method '{"align": false, "epochs": 2, "width-1": 32, "width-2": 32, "grid-levels": 3, "samples": 100}'
     meshes grids 3
 }
 
 @test "an object that comes: segments" {
     "$NEUPIG" synth --body two --frames 10 --change 5 --points 500 --cell 0.06 --seed 2 -o two >>synth.log
-    "$NEUPIG" run two/points -o two.out --segments auto --segment-min 3 --keyframe 2 "${small[@]}" --min-coverage 0 || [ $? -eq 7 ]
+    "$NEUPIG" run two/points -o two.out --segments auto --method '{"segment-min": 3}' --keyframe 2 "${small[@]}" --min-coverage 0 || [ $? -eq 7 ]
     [ -s two.out/segments.json ] && [ -s two.out/done.json ]
 }
 
 @test "killed and started again it goes on" {
-    "$NEUPIG" run capture/points -o killed --window 2 --overlap 1 "${small[@]}" >killed.log 2>&1 &
+    "$NEUPIG" run capture/points -o killed --method '{"window": 2, "overlap": 1}' "${small[@]}" >killed.log 2>&1 &
     local pid=$!
     while kill -0 $pid 2>/dev/null && [ -z "$(ls killed/job/window* 2>/dev/null)" ]; do sleep 0.02; done
     kill -KILL $pid 2>/dev/null || true
     wait $pid || true
-    "$NEUPIG" run capture/points -o killed --window 2 --overlap 1 "${small[@]}"
+    "$NEUPIG" run capture/points -o killed --method '{"window": 2, "overlap": 1}' "${small[@]}"
     meshes killed 6
 }
 
@@ -99,7 +99,7 @@ meshes() { # OUT COUNT
     cp capture/points/frame_000[45].ply grows
     "$NEUPIG" append longer
     meshes longer 6
-    echo '{"output": "night", "defaults": {"faces": 500, "poisson-depth": 5}, "captures": [
+    echo '{"output": "night", "defaults": {"faces": 500}, "captures": [
         {"input": "capture/points", "name": "one"}, {"input": "nowhere", "name": "two"}]}' >night.json
     ended 1 "$NEUPIG" batch night.json
     [ -s night/one/done.json ] && [ -s night/batch.json ]
