@@ -1,11 +1,10 @@
 /* Door of the kernels: the table of ops, and the self-test that compares each with its plain twin.
  *
- * device.h: devices, their buffers, programs and tuning; workload.h: every op as work to be timed. */
+ * device.h: devices, their buffers, programs and tuning. */
 #ifndef NPG_KERNELS_H
 #define NPG_KERNELS_H
 
 #include "kernels/runtime/device.h"
-#include "kernels/workload.h"
 
 /* Run one op on the device and its twin on the host over random data of the given size (1 is small; the
  * figures of size 8 are large and odd) and give the largest error, relative to the largest value. */

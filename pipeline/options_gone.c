@@ -10,6 +10,7 @@ static const char *const gone[][2] = {
     {"voxel",              "thin the capture before the run; points-max of the method thins what is too dense"},
     {"outlier-neighbours", "always 12"},
     {"normal-neighbours",  "several numbers are tried"},
+    {"tuning",         "the set of kernel parameters is chosen by device"},
     {"rig",            "the rig is the input: neupig run rig.json"},
 };
 /* clang-format on */

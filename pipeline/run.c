@@ -39,9 +39,6 @@ const npg_option npg_run_options[] = {
     NPG_ROW_TEXT(         "device",     AT(device),         "auto",      "DEVICE",
         "OpenCL device of fits without alignment: part of its name, its number, or auto (neupig doctor "
         "lists them)"),
-    NPG_KEY(TEXT,         "tuning",     AT(tuning),         "auto",      "SET",
-        "parameters of its kernels: auto (what neupig tune found, else by device), "
-        "wide, narrow, gpu, or a file"),
     NPG_ROW_INT(          "seed",       AT(seed),           "0",         0, 4294967295.0, NULL,
         "Seed of all random numbers"),
     NPG_ROW_FLAG(         "keep-going", AT(keep_going),     "no",

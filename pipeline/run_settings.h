@@ -8,7 +8,7 @@
 typedef enum npg_colour_mode { NPG_COLOUR_REFERENCE, NPG_COLOUR_FRAMES, NPG_COLOUR_NO } npg_colour_mode;
 
 typedef struct npg_settings {
-    const char *input, *follow, *output, *device, *tuning;
+    const char *input, *follow, *output, *device;
     const char *reference; /* the user's own mesh; "": one is to be made */
     int method, colour;    /* place of its word; npg_colour_mode */
     int64_t seed;

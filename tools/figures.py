@@ -2,15 +2,13 @@
 """Every figure of the pages from one source: measures it, keeps it in samples/guide/figures.json, writes the tables.
 
     tools/figures.py --work DIR --capture dancer17=POINTS,TRUTH --capture horse17=POINTS,TRUTH ...
-    tools/figures.py --work DIR --bench
     tools/figures.py --write-pages
     tools/figures.py --check
 
 The first measures the runs that the tables below need and the file does not have yet, on the captures that are named and on
 made ones (walker...), and writes each into the file as it ends: stopped, it resumes.  --again measures those of --table or
---only anew.  The second adds what neupig bench says of the kernels.  The third puts the tables into the pages, between
-<!-- figures: NAME --> and <!-- end of figures -->, and the picture beside them; the fourth fails where a page and the file
-differ (exit code 1).  Needs Python 3 alone.
+--only anew.  The second puts the tables into the pages, between <!-- figures: NAME --> and <!-- end of figures -->, and the
+picture beside them; the third fails where a page and the file differ (exit code 1).  Needs Python 3 alone.
 """
 import argparse
 import json
@@ -196,8 +194,6 @@ def write_file(path, figures):
     lines = ["{", ' "about": "Measured by tools/figures.py; units as in neupig eval, lengths in diagonals of the box",']
     lines.append(f' "captures": {json.dumps({name: what[0] for name, what in CAPTURES.items()}, indent=1)},')
     lines.append(f' "published": {json.dumps(PUBLISHED)},')
-    if "bench" in figures:
-        lines.append(f' "bench": {json.dumps(figures["bench"])},')
     lines.append(' "runs": [\n  ' + ",\n  ".join(json.dumps(run) for run in runs) + "\n ]\n}\n")
     with open(path + ".part", "w", encoding="utf-8") as out:
         out.write("\n".join(lines))
@@ -273,17 +269,6 @@ def measure_all(arguments):
     return left != 0  # nothing more to do
 
 
-def measure_bench(arguments):
-    os.makedirs(arguments.work, exist_ok=True)
-    report = os.path.join(arguments.work, "bench.json")
-    subprocess.run([arguments.neupig, "bench", "-o", report], check=True, stdin=subprocess.DEVNULL)
-    with open(report, encoding="utf-8") as file:
-        told = json.load(file)
-    figures = read_file(arguments.file)
-    figures["bench"] = {"command": "neupig bench", **measure.source(arguments.neupig), "machine": measure.machine(), **told}
-    write_file(arguments.file, figures)
-
-
 # ---- the pages ----
 
 def alone(run):
@@ -327,22 +312,9 @@ def origin_lines(figures):
             for (version, commit, cores, vectors), dates in sorted(kinds.items())]
 
 
-def bench_lines(figures):
-    bench = figures.get("bench")
-    if not bench:
-        return ["Not measured."]
-    rows = [["kernel", "GFLOP/s", "GB/s", "share of its limit"]]
-    for name, kernel in bench["kernels"].items():
-        rows.append([f"`{name}`", f"{kernel['gflops']:.0f}", f"{kernel['gbytes']:.1f}",
-                     f"{100 * kernel['share_of_bound']:.0f} % of {kernel['bound_by']}"])
-    return markdown(rows, {})
-
-
 def block_of(name, figures, runs):
     if name == "origin":
         return origin_lines(figures)
-    if name == "kernels":
-        return bench_lines(figures)
     if name not in TABLES:
         fail(f"there is no table {name}")
     return markdown(TABLES[name], runs)
@@ -399,7 +371,6 @@ def parse_arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write-pages", action="store_true", help="put the tables into the pages")
     parser.add_argument("--check", action="store_true", help="exit code 1 where a page differs from the file")
-    parser.add_argument("--bench", action="store_true", help="measure the kernels")
     parser.add_argument("--capture", action="append", default=[], metavar="NAME=POINTS[,TRUTH[,FRAMES]]",
                         help="where a capture of the tables lies: " + ", ".join(n for n, c in CAPTURES.items() if not c[1]))
     parser.add_argument("--work", default="figures", metavar="DIR", help="for made captures, runs and logs (figures/)")
@@ -418,8 +389,6 @@ def main():
         return check(arguments)
     if arguments.write_pages:
         return write_pages(arguments)
-    if arguments.bench:
-        return measure_bench(arguments)
     return 0 if measure_all(arguments) else 3
 
 

@@ -75,22 +75,12 @@ const npg_verb npg_verbs[] = {
      "Of two results the page shows both side by side, in one view and on one time line.  "
      "With --live the page is written anew as the frames of a run that is at work come.",
      npg_view_options, false, npg_verb_view},
-    {"bench", "[REPORT.json]", 0, 1, "Time the kernels and the fit on this machine",
-     "Prints a roofline table: for every kernel its operations, bytes and time and the share it reaches "
-     "of the limit that binds it, which is measured right beside (multiply-adds, or bytes copied); "
-     "then how fast dense surfaces are carried and decoded, and the seconds of an epoch.  "
-     "On processors times are processor seconds, so that other programs disturb little.  "
-     "--compare says what is slower than in an earlier report, beyond noise, with exit code 7; "
-     "with REPORT.json that report is compared and nothing is measured.",
+    {"bench", "", 0, 0, "Time the kernels and the parts of a run",
+     "Times, on a walking figure: the kernels of fits without alignment (decoder forward and backward, "
+     "transform, nearest points, isometry; four frames a call), the closest points of a surface, "
+     "the alignment of one frame, the joint fit of a window of frames, and Poisson.  "
+     "Wall and processor time of one call, the median of several.",
      npg_bench_options, false, npg_verb_bench},
-    {"tune", "", 0, 0, "Find the kernels' parameters that suit this device",
-     "Tries register tiles, vector widths, work-groups and shares of work for each kernel on the device, "
-     "compares each with the plain twins, prints a table "
-     "and writes the fastest right set to a file of this device in the cache folder, which later runs take "
-     "(run --tuning wide, narrow or gpu leaves it alone; remove the file to be rid of it).  "
-     "The same set gives the same bytes; another set another order of sums.  "
-     "A file that is broken, or of other kernels or another device, is not used, and the run says so.",
-     npg_tune_options, false, npg_verb_tune},
     {"doctor", "", 0, 0, "Check devices and libraries on this machine",
      "Lists the OpenCL devices and the versions of the libraries in use and compares "
      "every kernel on each device with its plain twin.  "

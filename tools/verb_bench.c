@@ -1,22 +1,25 @@
-/* neupig bench: every kernel beside the peak that binds it, dense surfaces, and the whole fit; as a table, as
- * JSON, or against an earlier report. */
+/* neupig bench: how long the parts that a run spends its time in take on this machine, as a table or as JSON. */
 #include <jansson.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "optimize/optimize.h"
-#include "pipeline/clock.h"
-#include "pipeline/json_file.h"
-#include "tools/bench/bench_compare.h"
-#include "tools/bench/bench_rows.h"
+#include "align/tracker.h"
+#include "geometry/geometry.h"
+#include "kernels/mlp.h"
+#include "kernels/motion.h"
+#include "mesh/poisson.h"
+#include "optimize/joint.h"
+#include "pipeline/busy.h"
+#include "pipeline/order.h"
 #include "tools/cli.h"
+#include "tools/synth/synth_body.h"
+#include "tools/synth/synth_points.h"
 
 typedef struct settings {
-    int64_t vertices, points, frames, epochs, repeat, dense, cloud;
-    const char *device, *tuning, *only, *output, *compare;
-    double tolerance;
+    int64_t vertices, points, frames, repeat;
+    const char *device, *only;
     bool json;
 } settings;
 
@@ -24,242 +27,323 @@ typedef struct settings {
 
 /* clang-format off */
 const npg_option npg_bench_options[] = {
-    /* type      name         place          default   least  most   shown as */
-    NPG_ROW_FLAG("json",      AT(json),      "no",
-        "print the report as JSON instead of a table"),
-    NPG_ROW_TEXT("output",    AT(output),    "",       "FILE",
-        "write the report as JSON to this file"),
-    NPG_ROW_TEXT("compare",   AT(compare),   "",       "FILE",
-        "say what is slower than in this report, beyond noise: exit code 7 if anything is"),
-    NPG_ROW_REAL("tolerance", AT(tolerance), "0.05",   0,     10,    NULL,
-        "share by which the quartiles must lie apart for that"),
-    NPG_ROW_TEXT("only",      AT(only),      "",       "NAME",
-        "time only rows whose names begin with one of these words, separated by commas"),
-    NPG_ROW_INT ("vertices",  AT(vertices),  "10000",  16,    1e6,   NULL,
-        "vertices of the mesh"),
-    NPG_ROW_INT ("points",    AT(points),    "5000",   1,     1e6,   NULL,
+    /* type      name        place         default  least  most  shown as */
+    NPG_ROW_FLAG("json",     AT(json),     "no",
+        "print JSON instead of a table"),
+    NPG_ROW_TEXT("only",     AT(only),     "",      "NAME",
+        "time only rows whose names begin so"),
+    NPG_ROW_INT ("vertices", AT(vertices), "10000", 2500,  5e5,  NULL,
+        "vertices of the walking figure, about"),
+    NPG_ROW_INT ("points",   AT(points),   "5000",  50,    1e6,  NULL,
         "points of each frame"),
-    NPG_ROW_INT ("frames",    AT(frames),    "17",     1,     1000,  NULL,
-        "frames of the window"),
-    NPG_ROW_INT ("dense",     AT(dense),     "100000", 0,     1e7,   NULL,
-        "vertices of the dense surface that is carried and decoded, 0: none"),
-    NPG_ROW_INT ("cloud",     AT(cloud),     "200000", 0,     1e7,   NULL,
-        "points of the dense cloud that is cleaned and searched, 0: none"),
-    NPG_ROW_INT ("epochs",    AT(epochs),    "10",     1,     10000, NULL,
-        "epochs of the fit that is timed"),
-    NPG_ROW_INT ("repeat",    AT(repeat),    "9",      1,     1000,  NULL,
-        "times each row is taken; quartiles and median count"),
-    NPG_ROW_TEXT("device",    AT(device),    "auto",   "NAME",
+    NPG_ROW_INT ("frames",   AT(frames),   "24",    2,     1000, NULL,
+        "frames of the window that is solved at once"),
+    NPG_ROW_INT ("repeat",   AT(repeat),   "9",     1,     1000, NULL,
+        "times each row is taken; the median counts"),
+    NPG_ROW_TEXT("device",   AT(device),   "auto",  "NAME",
         "OpenCL device: auto, cpu, gpu, a number or a part of its name"),
-    NPG_ROW_TEXT("tuning",    AT(tuning),    "auto",   "SET",
-        "the kernels' parameters: auto, wide, narrow, gpu or a file of neupig tune"),
     {0}};
 /* clang-format on */
 
+/* All that the rows work on; what belongs to some of them is opened when the first of these is timed. */
 typedef struct bench {
     settings s;
-    npg_device *device;
-    npg_bench_body body;
-    npg_meter meter;
-    json_t *kernels; /* loan */
+    json_t *rows;
+    npg_arena arena;
+    npg_mesh *mesh;      /* the figure in the first frame, unit coordinates */
+    float **poses;       /* T: its vertices in each frame                   */
+    npg_scanned *clouds; /* T                                               */
+    npg_device *device;  /* kernels */
+    npg_mlp mlp;
+    npg_motion motion;
+    size_t batch;         /* frames that the kernels take at once */
+    npg_surface *surface; /* closest */
+    npg_surface_hit *hits;
+    npg_tracker *tracker; /* track */
+    npg_joint *joint;     /* joint */
+    npg_joint_frame *window;
 } bench;
 
-/* ---- rows ---- */
+/* ---- the figure ---- */
 
-static json_t *json_of_spread(npg_spread spread)
+static npg_status open_figure(bench *b)
 {
-    return json_pack("{s:f, s:f, s:f}", "low", spread.low, "median", spread.median, "high", spread.high);
-}
-
-/* How many such threads a device has room for: what runs in one thread of the host keeps one unit of a
- * processor busy. */
-static double units_of(const bench *b)
-{
-    const npg_device_info *info = npg_device_facts(b->device);
-    return info->is_cpu ? info->units : 1;
-}
-
-static npg_status visit_row(void *user, const npg_bench_row *row)
-{
-    bench *b = user;
-    bool by_bytes;
-    double share = npg_bench_share(row, &by_bytes), busy_s = row->timing.busy_s.median;
-    json_t *json = json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:s, s:f}", "flops", row->work.flops, "bytes",
-                             row->work.bytes, "wall_s", row->timing.wall_s, "gflops",
-                             row->work.flops / busy_s / 1e9, "gbytes", row->work.bytes / busy_s / 1e9,
-                             "share_of_multiply_add_peak", row->work.flops / row->timing.in_flops.median,
-                             "bound_by", by_bytes ? "memory" : "multiply-add", "share_of_bound", share);
-    json_object_set_new(json, "busy_s", json_of_spread(row->timing.busy_s));
-    json_object_set_new(json, "relative",
-                        json_of_spread(by_bytes ? row->timing.in_bytes : row->timing.in_flops));
-    if (row->work.vertex_frames > 0)
-        json_object_set_new(
-            json, "vertex_frames_per_busy_second",
-            json_real(row->work.vertex_frames / busy_s / (row->work.on_host ? units_of(b) : 1)));
-    if (row->work.points > 0)
-        json_object_set_new(json, "processor_us_per_point",
-                            json_real(1e6 * busy_s * units_of(b) / row->work.points));
-    json_object_set_new(b->kernels, row->work.name, json);
-    return NPG_OK;
-}
-
-/* ---- the fit ---- */
-
-typedef struct epochs {
-    double last_wall_s, last_cpu_s, *wall_s, *cpu_s;
-} epochs;
-
-/* An npg_epoch_visit. */
-static npg_status time_epoch(void *user, int64_t epoch)
-{
-    epochs *e = user;
-    double wall_s = npg_clock_s(), cpu_s = npg_clock_process_s();
-    if (epoch >= 0) {
-        e->wall_s[epoch] = wall_s - e->last_wall_s;
-        e->cpu_s[epoch] = cpu_s - e->last_cpu_s;
+    enum { SURFACE = 9 }; /* triangles' vertices in a square metre cell of the figure, measured */
+    const size_t count = (size_t)b->s.frames;
+    npg_body *body;
+    npg_scan scan = {.point_count = b->s.points, .noise = 0.1, .diagonal = 2};
+    NPG_TRY(npg_body_open(&body, NPG_BODY_WALKER, false, sqrt(SURFACE / (double)b->s.vertices)));
+    npg_status status = npg_mesh_copy(&b->mesh, npg_body_rest(body));
+    b->poses = npg_arena_take(&b->arena, count, sizeof *b->poses);
+    b->clouds = npg_arena_take(&b->arena, count, sizeof *b->clouds);
+    if (!status) status = npg_arena_status(&b->arena);
+    size_t verts = status ? 0 : b->mesh->vert_count;
+    if (!status) status = npg_alloc_array(&b->mesh->vert_normals, NPG_FOR_MESH, verts, 3 * sizeof(float));
+    for (size_t t = count; t-- && !status;) { /* the mesh stays as it is in the first frame */
+        const npg_moment moment = {.phase = (double)t / (double)count};
+        npg_mesh *m = b->mesh;
+        npg_body_pose(body, m->vert_pos, &moment);
+        for (size_t v = 0; v < verts; v++) m->vert_pos[3 * v + 1] -= 0.9f; /* its middle */
+        npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, verts, m->faces, m->face_count);
+        b->poses[t] = npg_arena_take(&b->arena, 3 * verts, sizeof(float));
+        status = npg_arena_status(&b->arena);
+        if (!status) memcpy(b->poses[t], m->vert_pos, 3 * verts * sizeof(float));
+        if (!status) status = npg_scan_frame(&b->clouds[t], &scan, m, t);
     }
-    e->last_wall_s = wall_s;
-    e->last_cpu_s = cpu_s;
-    return NPG_OK;
-}
-
-static npg_status bench_fit(bench *b, json_t *root)
-{
-    epochs e = {0};
-    size_t n = (size_t)b->s.epochs;
-    if (!npg_bench_wants(b->s.only, "fit")) return NPG_OK;
-    npg_status status = npg_alloc_array(&e.wall_s, NPG_FOR_RUN, 2 * n, sizeof *e.wall_s);
-    e.cpu_s = e.wall_s + n;
-    if (!status)
-        status = npg_fit_once(b->device, b->body.mesh, (const float *const *)b->body.points,
-                              b->body.point_count, b->body.frame_count, b->s.epochs, time_epoch, &e);
-    if (!status) {
-        double wall_s = npg_spread_of(e.wall_s, n).median, frames = (double)b->body.frame_count;
-        json_object_set_new(
-            root, "fit",
-            json_pack("{s:i, s:i, s:f, s:f, s:f, s:f}", "vertices", (int)b->body.mesh->vert_count, "frames",
-                      (int)b->body.frame_count, "seconds_per_epoch", wall_s, "cpu_seconds_per_epoch",
-                      npg_spread_of(e.cpu_s, n).median, "frame_epochs_per_second", frames / wall_s,
-                      "frames_per_second_at_250_epochs", frames / (250 * wall_s)));
-    }
-    npg_release(&e.wall_s);
+    npg_body_close(&body);
     return status;
+}
+
+/* ---- kernels: decoder, and what follows it, of one batch of frames ---- */
+
+static npg_status open_kernels(bench *b)
+{
+    enum { BATCH = 4 };
+    static const npg_mlp_shape decoder = {512, 512, 2, 8, 0.01f}; /* of the paper's preset */
+    npg_target targets[BATCH];
+    uint32_t(*edges)[2];
+    size_t edge_count;
+    const npg_mesh *m = b->mesh;
+    if (b->device) return NPG_OK;
+    b->batch = b->s.frames < BATCH ? (size_t)b->s.frames : BATCH;
+    for (size_t t = 0; t < b->batch; t++) targets[t] = (npg_target){b->clouds[t].pos, b->clouds[t].count};
+    NPG_TRY(npg_device_open(&b->device, b->s.device));
+    size_t rows = npg_mlp_rows(b->device, m->vert_count);
+    NPG_TRY(npg_mlp_open(&b->mlp, b->device, &decoder, rows, b->batch, b->batch));
+    NPG_TRY(npg_mlp_begin(&b->mlp));
+    NPG_TRY(npg_mesh_edges(&edges, &edge_count, m->faces, m->face_count));
+    npg_status status =
+        npg_motion_open(&b->motion, b->device, NPG_ROTATION_QUATERNION, m->vert_pos, m->vert_count, rows,
+                        (const uint32_t(*)[2])edges, edge_count, targets, b->batch);
+    npg_release(&edges);
+    return status;
+}
+
+static npg_status mlp_forward(bench *b)
+{
+    return npg_mlp_forward(&b->mlp, 0, b->batch);
+}
+static npg_status mlp_backward(bench *b)
+{
+    return npg_mlp_backward(&b->mlp, 0, b->batch);
+}
+static npg_status transform(bench *b)
+{
+    return npg_motion_apply(&b->motion, &b->mlp.out, 0, b->batch);
+}
+static npg_status nearest(bench *b)
+{
+    return npg_motion_chamfer(&b->motion, 0.3, 0, b->batch);
+}
+static npg_status isometry(bench *b)
+{
+    static const float gains[] = {1, 1, 1, 1};
+    return npg_motion_back(&b->motion, &b->mlp.dout, &b->mlp.out, gains, 100, 0, b->batch);
+}
+
+/* ---- the host's parts; their settings are the options' defaults ---- */
+
+static npg_status open_surface(bench *b)
+{
+    const npg_mesh *m = b->mesh;
+    b->hits = npg_arena_take(&b->arena, b->clouds[1].count, sizeof *b->hits);
+    NPG_TRY(npg_arena_status(&b->arena));
+    return npg_surface_open(&b->surface, m->vert_pos, m->vert_count, m->faces, m->face_count);
+}
+
+static npg_status closest(bench *b)
+{
+    return npg_surface_closest_near(b->surface, b->hits, b->clouds[1].pos, b->clouds[1].count, NULL, NULL, 0);
+}
+
+static npg_status open_tracker(bench *b)
+{
+    static const npg_tracker_settings usual = {1600, 5000, 12, 0.006, 0.001};
+    return npg_tracker_open(&b->tracker, b->mesh, &usual);
+}
+
+/* From the first frame's pose to the second. */
+static npg_status track(bench *b)
+{
+    npg_tracked tracked;
+    double *pose;
+    const npg_tracker_cloud cloud = {.points = b->clouds[1].pos, .count = b->clouds[1].count};
+    size_t nodes = npg_tracker_node_count(b->tracker);
+    NPG_TRY(npg_alloc(&pose, NPG_FOR_RUN, npg_pose_bytes(nodes)));
+    npg_pose_rest(pose, nodes);
+    npg_status status = npg_tracker_fit(b->tracker, &tracked, pose, &cloud, NULL, NULL);
+    npg_release(&pose);
+    return status;
+}
+
+static npg_status open_joint(bench *b)
+{
+    static const npg_joint_settings usual = {.points = 5000, .steps = 60, .shape = 0.1};
+    size_t verts = b->mesh->vert_count, count = (size_t)b->s.frames;
+    b->window = npg_arena_take(&b->arena, count, sizeof *b->window);
+    float *all = npg_arena_take(&b->arena, count * verts, 3 * sizeof *all);
+    NPG_TRY(npg_arena_status(&b->arena));
+    for (size_t t = 0; t < count; t++)
+        b->window[t] = (npg_joint_frame){.positions = all + t * 3 * verts,
+                                         .points = b->clouds[t].pos,
+                                         .normals = b->clouds[t].normals,
+                                         .point_count = b->clouds[t].count};
+    return npg_joint_open(&b->joint, b->mesh, &usual);
+}
+
+/* The whole window, always from the same poses. */
+static npg_status joint(bench *b)
+{
+    npg_joint_result result;
+    for (size_t t = 0; t < (size_t)b->s.frames; t++)
+        memcpy(b->window[t].positions, b->poses[t], b->mesh->vert_count * 3 * sizeof(float));
+    npg_joint_set_noise(b->joint, 0);
+    return npg_joint_solve(b->joint, &result, b->window, (size_t)b->s.frames, NULL, NULL);
+}
+
+static npg_status open_nothing(bench *b)
+{
+    (void)b;
+    return NPG_OK;
+}
+
+static npg_status poisson(bench *b)
+{
+    const npg_poisson_settings usual = {.depth = 8, .point_weight = 10, .time_limit_s = 600};
+    npg_mesh *mesh;
+    npg_status status =
+        npg_poisson(&mesh, b->clouds[0].pos, b->clouds[0].normals, b->clouds[0].count, &usual);
+    npg_mesh_unref(&mesh);
+    return status;
+}
+
+/* clang-format off */
+static const struct row {
+    const char *name;
+    npg_status (*open)(bench *), (*call)(bench *);
+} rows[] = {
+    {"mlp_forward",  open_kernels, mlp_forward},
+    {"mlp_backward", open_kernels, mlp_backward},
+    {"transform",    open_kernels, transform},
+    {"nearest",      open_kernels, nearest},
+    {"isometry",     open_kernels, isometry},
+    {"closest",      open_surface, closest},
+    {"track",        open_tracker, track},
+    {"joint",        open_joint,   joint},
+    {"poisson",      open_nothing, poisson},
+    {0}};
+/* clang-format on */
+
+/* ---- timing ---- */
+
+/* So many calls; what the device still has to do belongs to them. */
+static npg_status call_row(npg_busy *took, bench *b, const struct row *row, size_t calls)
+{
+    npg_status status = NPG_OK;
+    npg_busy start = npg_busy_now();
+    for (size_t i = 0; i < calls && !status; i++) status = row->call(b);
+    if (!status && b->device) status = npg_device_finish(b->device);
+    npg_busy end = npg_busy_now(); /* helper processes work for a row, too */
+    took->wall_s = (end.wall_s - start.wall_s) / (double)calls;
+    took->cpu_s = (end.cpu_s + end.children_s - start.cpu_s - start.children_s) / (double)calls;
+    return status;
+}
+
+static double median(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, npg_order_double);
+    return values[count / 2];
+}
+
+static npg_status time_row(bench *b, const struct row *row)
+{
+    const double least_s = 8e-3; /* shorter calls are taken several times for one figure */
+    size_t calls = 1, count = (size_t)b->s.repeat;
+    npg_busy took;
+    double *wall_s, *cpu_s;
+    NPG_TRY(row->open(b));
+    NPG_TRY(call_row(&took, b, row, 1)); /* the first may build */
+    NPG_TRY(call_row(&took, b, row, 1));
+    if (took.wall_s < least_s) calls = (size_t)(least_s / fmax(took.wall_s, 1e-6)) + 1;
+    NPG_TRY(npg_alloc_array(&wall_s, NPG_FOR_RUN, 2 * count, sizeof *wall_s));
+    cpu_s = wall_s + count;
+    npg_status status = NPG_OK;
+    for (size_t i = 0; i < count && !status; i++) {
+        status = call_row(&took, b, row, calls);
+        wall_s[i] = took.wall_s;
+        cpu_s[i] = took.cpu_s;
+    }
+    if (!status)
+        json_object_set_new(
+            b->rows, row->name,
+            json_pack("{s:f, s:f}", "wall_s", median(wall_s, count), "process_cpu_s", median(cpu_s, count)));
+    npg_release(&wall_s);
+    return status;
+}
+
+static npg_status measure(bench *b)
+{
+    NPG_TRY(open_figure(b));
+    for (const struct row *row = rows; row->name; row++)
+        if (!strncmp(row->name, b->s.only, strlen(b->s.only)))
+            NPG_TRY(npg_error_prefix(time_row(b, row), "%s", row->name));
+    if (json_object_size(b->rows)) return NPG_OK;
+    return npg_error(NPG_USAGE, "option only: no row's name begins with \"%s\"", b->s.only);
 }
 
 /* ---- the report ---- */
 
-static void describe(bench *b, json_t *root)
+static npg_status print_json(const bench *b)
 {
-    const npg_device_info *info = npg_device_facts(b->device);
-    json_object_set_new(root, "version", json_string(npg_version()));
-    json_object_set_new(
-        root, "device",
-        json_pack("{s:s, s:s, s:i}", "name", info->name, "platform", info->platform, "units", info->units));
-    json_object_set_new(root, "tuning", json_string(npg_device_tuning_source(b->device)));
-    json_object_set_new(root, "sizes",
-                        json_pack("{s:I, s:I, s:I, s:I, s:I}", "vertices", (json_int_t)b->s.vertices,
-                                  "points", (json_int_t)b->s.points, "frames", (json_int_t)b->s.frames,
-                                  "dense", (json_int_t)b->s.dense, "cloud", (json_int_t)b->s.cloud));
-    json_object_set(root, "kernels", b->kernels);
+    json_t *root = json_pack("{s:s, s:{s:I, s:I, s:I}, s:O}", "version", npg_version(), "sizes", "vertices",
+                             (json_int_t)b->mesh->vert_count, "points", (json_int_t)b->s.points, "frames",
+                             (json_int_t)b->s.frames, "rows", b->rows);
+    if (b->device)
+        json_object_set_new(root, "device",
+                            json_pack("{s:s, s:s}", "name", npg_device_facts(b->device)->name, "tuning",
+                                      npg_device_tuning(b->device)->name));
+    int failed = json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(6)) || puts("") < 0;
+    json_decref(root);
+    return failed ? npg_error(NPG_DISK, "standard output can't be written") : NPG_OK;
 }
 
-static npg_status measure(bench *b, json_t *root)
-{
-    NPG_TRY(npg_device_open_tuned(&b->device, b->s.device, b->s.tuning));
-    NPG_TRY(npg_bench_body_open(&b->body, (size_t)b->s.vertices, (size_t)b->s.points, (size_t)b->s.frames));
-    NPG_TRY(npg_meter_open(&b->meter, b->device, (size_t)b->s.repeat));
-    describe(b, root);
-    NPG_TRY(npg_bench_kernels(&b->meter, &b->body, b->s.only, visit_row, b));
-    if (b->s.dense) NPG_TRY(npg_bench_dense(&b->meter, b->s.only, (size_t)b->s.dense, visit_row, b));
-    if (b->s.cloud) NPG_TRY(npg_bench_clouds(&b->meter, b->s.only, (size_t)b->s.cloud, visit_row, b));
-    NPG_TRY(npg_bench_frame(&b->meter, b->s.only, visit_row, b));
-    NPG_TRY(bench_fit(b, root));
-    if (!json_object_size(b->kernels) && !json_object_get(root, "fit"))
-        return npg_error(NPG_USAGE, "option only: no row's name begins with \"%s\"", b->s.only);
-    json_object_set_new(root, "peak",
-                        json_pack("{s:f, s:f}", "multiply_add_gflops", b->meter.flops_per_s / 1e9,
-                                  "memory_gbytes", b->meter.bytes_per_s / 1e9));
-    return NPG_OK;
-}
-
-static double number_of(const json_t *object, const char *key)
-{
-    return json_number_value(json_object_get(object, key));
-}
-
-static void print_row(const char *name, const json_t *row)
-{
-    printf("%-28s %9.2f %9.2f %9.3f %9.3f %8.1f %8.2f %6.1f %% of %s\n", name, number_of(row, "flops") / 1e6,
-           number_of(row, "bytes") / 1e6, 1e3 * number_of(json_object_get(row, "busy_s"), "median"),
-           1e3 * number_of(row, "wall_s"), number_of(row, "gflops"), number_of(row, "gbytes"),
-           100 * number_of(row, "share_of_bound"), json_string_value(json_object_get(row, "bound_by")));
-    if (json_object_get(row, "vertex_frames_per_busy_second"))
-        printf("%-28s %.3g vertex-frames/s\n", "", number_of(row, "vertex_frames_per_busy_second"));
-    if (json_object_get(row, "processor_us_per_point"))
-        printf("%-28s %.3g us of a processor a point\n", "", number_of(row, "processor_us_per_point"));
-}
-
-static void print_table(const json_t *root)
+static void print_table(const bench *b)
 {
     const char *name;
     json_t *row;
-    const json_t *device = json_object_get(root, "device"), *peak = json_object_get(root, "peak");
-    const json_t *fit = json_object_get(root, "fit");
-    printf("%s, tuning %s\npeak: %.1f GFLOP/s of multiply-adds, %.1f GB/s of copying\n\n",
-           json_string_value(json_object_get(device, "name")),
-           json_string_value(json_object_get(root, "tuning")), number_of(peak, "multiply_add_gflops"),
-           number_of(peak, "memory_gbytes"));
-    printf("%-28s %9s %9s %9s %9s %8s %8s %s\n", "kernel", "MFLOP", "MB", "busy ms", "wall ms", "GFLOP/s",
-           "GB/s", "share of the limit");
-    json_object_foreach(json_object_get(root, "kernels"), name, row) print_row(name, row);
-    if (fit)
-        printf("\nfit of %g vertices in %g frames: %.4g s an epoch (%.4g processor seconds)\n",
-               number_of(fit, "vertices"), number_of(fit, "frames"), number_of(fit, "seconds_per_epoch"),
-               number_of(fit, "cpu_seconds_per_epoch"));
+    if (b->device)
+        printf("%s, tuning %s\n", npg_device_facts(b->device)->name, npg_device_tuning(b->device)->name);
+    printf("%zu vertices, %lld points, %lld frames\n\n%-14s %12s %14s\n", b->mesh->vert_count,
+           (long long)b->s.points, (long long)b->s.frames, "part", "wall ms", "processor ms");
+    json_object_foreach(b->rows, name, row)
+        printf("%-14s %12.3f %14.3f\n", name, 1e3 * json_number_value(json_object_get(row, "wall_s")),
+               1e3 * json_number_value(json_object_get(row, "process_cpu_s")));
 }
 
-static npg_status write_report(const settings *s, const json_t *root)
+static void close_bench(bench *b)
 {
-    if (*s->output) NPG_TRY(npg_json_save(s->output, root));
-    if (!s->json) {
-        print_table(root);
-        return NPG_OK;
-    }
-    if (json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(6)) || puts("") < 0)
-        return npg_error(NPG_DISK, "standard output can't be written");
-    return NPG_OK;
-}
-
-static npg_status compare_with_earlier(const settings *s, const json_t *root)
-{
-    json_t *before;
-    if (!*s->compare) return NPG_OK;
-    NPG_TRY(npg_bench_load(&before, s->compare));
-    npg_status status = npg_bench_compare(before, root, s->tolerance);
-    json_decref(before);
-    return status;
+    npg_joint_close(&b->joint);
+    npg_tracker_close(&b->tracker);
+    npg_surface_close(&b->surface);
+    npg_motion_close(&b->motion);
+    npg_mlp_close(&b->mlp);
+    npg_device_close(&b->device);
+    for (int64_t t = 0; b->clouds && t < b->s.frames; t++) npg_scanned_close(&b->clouds[t]);
+    npg_mesh_unref(&b->mesh);
+    npg_arena_release(&b->arena);
+    json_decref(b->rows);
 }
 
 int npg_verb_bench(int argc, char **argv)
 {
-    bench b = {0};
+    bench b = {.arena = {.purpose = NPG_FOR_RUN}};
     npg_cli cli;
-    json_t *root = NULL;
     npg_status status = npg_cli_parse(&cli, argv[0], &b.s, NULL, argc, argv);
     if (status) return npg_cli_end(argv[0], status);
-    b.kernels = json_object();
-    if (cli.operand_count) {
-        status = npg_bench_load(&root, cli.operands[0]);
-    } else {
-        root = json_object();
-        status = measure(&b, root);
-        if (!status) status = write_report(&b.s, root);
-    }
-    npg_meter_close(&b.meter);
-    npg_bench_body_close(&b.body);
-    npg_device_close(&b.device);
-    if (!status) status = compare_with_earlier(&b.s, root);
-    json_decref(b.kernels);
-    json_decref(root);
+    b.rows = json_object();
+    status = measure(&b);
+    if (!status && b.s.json) status = print_json(&b);
+    if (!status && !b.s.json) print_table(&b);
+    close_bench(&b);
     return npg_cli_end(argv[0], status);
 }

@@ -31,7 +31,6 @@ int npg_verb_synth(int argc, char **argv);
 int npg_verb_render(int argc, char **argv);
 int npg_verb_view(int argc, char **argv);
 int npg_verb_bench(int argc, char **argv);
-int npg_verb_tune(int argc, char **argv);
 int npg_verb_doctor(int argc, char **argv);
 int npg_verb_help(int argc, char **argv);
 int npg_verb_man(int argc, char **argv);
@@ -47,7 +46,6 @@ extern const npg_option npg_synth_options[];
 extern const npg_option npg_render_options[];
 extern const npg_option npg_view_options[];
 extern const npg_option npg_bench_options[];
-extern const npg_option npg_tune_options[];
 extern const npg_option npg_doctor_options[];
 extern const npg_option npg_man_options[];
 

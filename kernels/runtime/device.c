@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <xxhash.h>
 
 #include "kernels/runtime/cl_error.h"
 #include "kernels/runtime/device_internal.h"
@@ -107,105 +106,39 @@ static npg_status choose_device(npg_device *device, const char *spec)
     return npg_error(NPG_DEVICE, "no OpenCL device fits \"%s\"; there is:%s", spec, *list ? list : " none");
 }
 
-/* ---- tuning ---- */
-
-enum { WIDE, NARROW, GPU };
-
-static const struct {
-    const char *name;
-    const npg_tuning *tuning;
-} sets[] = {[WIDE] = {"wide", &npg_tuning_wide},
-            [NARROW] = {"narrow", &npg_tuning_narrow},
-            [GPU] = {"gpu", &npg_tuning_gpu}};
-
-static void use_named_set(npg_device *device, size_t i)
-{
-    device->tuning = *sets[i].tuning;
-    snprintf(device->tuning_source, sizeof device->tuning_source, "%s", sets[i].name);
-}
-
-npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *device)
-{
-    const npg_device_info *info = &device->info;
-    XXH64_hash_t hash = XXH64(info->platform, strlen(info->platform), (XXH64_hash_t)info->units);
-    char name[64];
-    hash = XXH64(info->driver, strlen(info->driver), XXH64(info->name, strlen(info->name), hash));
-    snprintf(name, sizeof name, "tuning-%016llx.json", (unsigned long long)hash);
-    if (npg_kernel_cache_path(out, size, name)) return NPG_OK;
-    return npg_error(NPG_DISK, "there is no folder for the cache (XDG_CACHE_HOME, HOME)");
-}
-
-/* The set of this kind of device, and over it what was tuned.  16 floats in a vector: AVX-512. */
-static void choose_set_by_kind(npg_device *device)
-{
-    char path[NPG_CACHE_PATH];
-    use_named_set(device, !device->info.is_cpu ? GPU : device->info.vector >= 16 ? WIDE : NARROW);
-    if (npg_device_tuning_path(path, sizeof path, device)) return;
-    npg_status status = npg_tuning_load(&device->tuning, path, device->info.name);
-    if (!status) snprintf(device->tuning_source, sizeof device->tuning_source, "%s", path);
-    if (status < 0) {
-        size_t used = strlen(device->tuning_source);
-        snprintf(device->tuning_source + used, sizeof device->tuning_source - used, " (not used: %.2000s)",
-                 npg_error_text());
-    }
-}
-
-static npg_status choose_tuning(npg_device *device, const char *tuning)
-{
-    for (size_t i = 0; i < sizeof sets / sizeof *sets; i++)
-        if (!strcmp(sets[i].name, tuning)) {
-            use_named_set(device, i);
-            return NPG_OK;
-        }
-    if (!*tuning || !strcmp(tuning, "auto")) {
-        choose_set_by_kind(device);
-        return NPG_OK;
-    }
-    npg_status status = npg_tuning_load(&device->tuning, tuning, device->info.name);
-    if (status == NPG_END) return npg_error(NPG_BAD_INPUT, "tuning %s: there is no such file or set", tuning);
-    snprintf(device->tuning_source, sizeof device->tuning_source, "%s", tuning);
-    return npg_error_prefix(status, "tuning");
-}
-
-const npg_tuning *npg_device_tuning(const npg_device *device)
-{
-    return &device->tuning;
-}
-
-const char *npg_device_tuning_source(const npg_device *device)
-{
-    return device->tuning_source;
-}
-
-npg_status npg_device_set_tuning(npg_device *device, const npg_tuning *tuning)
-{
-    NPG_TRY(npg_tuning_check(tuning));
-    device->tuning = *tuning;
-    snprintf(device->tuning_source, sizeof device->tuning_source, "given");
-    return NPG_OK;
-}
-
 /* ---- opening ---- */
 
 npg_status npg_device_open(npg_device **out, const char *spec)
 {
-    return npg_device_open_tuned(out, spec, "auto");
+    return npg_device_open_tuned(out, spec, NULL);
 }
 
-static npg_status fill_device(npg_device *device, const char *spec, const char *tuning)
+const npg_tuning *npg_device_tuning(const npg_device *device)
+{
+    return device->tuning;
+}
+
+/* 16 floats in a vector: AVX-512. */
+static const npg_tuning *tuning_of_kind(const npg_device_info *info)
+{
+    if (!info->is_cpu) return &npg_tuning_gpu;
+    return info->vector >= 16 ? &npg_tuning_wide : &npg_tuning_narrow;
+}
+
+static npg_status fill_device(npg_device *device, const char *spec, const npg_tuning *tuning)
 {
     cl_int code;
     NPG_TRY(npg_kernel_cache_enter());
     device->is_in_cache = true;
     NPG_TRY(choose_device(device, spec));
-    NPG_TRY(choose_tuning(device, tuning));
+    device->tuning = tuning ? tuning : tuning_of_kind(&device->info);
     device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
     NPG_TRY(npg_cl_status(code, "clCreateContext"));
     device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
     return npg_cl_status(code, "clCreateCommandQueue");
 }
 
-npg_status npg_device_open_tuned(npg_device **out, const char *spec, const char *tuning)
+npg_status npg_device_open_tuned(npg_device **out, const char *spec, const npg_tuning *tuning)
 {
     npg_device *device;
     *out = NULL;

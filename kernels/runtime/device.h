@@ -10,7 +10,7 @@
 #include "kernels/runtime/tuning.h"
 #include "pipeline/memory.h"
 
-/* Room for the path of a file in the kernel cache or of a tuning. */
+/* Room for the path of a file in the kernel cache. */
 #define NPG_CACHE_PATH 4400
 
 typedef struct npg_device npg_device;
@@ -34,24 +34,11 @@ npg_status npg_device_describe(size_t i, npg_device_info *info);
  * goes away at close. */
 npg_status npg_device_open(npg_device **device, const char *spec);
 
-/* The same with a choice of tuning: "auto" (the file that `neupig tune` made for this device and these
- * kernels if there is one, else by kind of device), "wide", "narrow", "gpu", or the path of a file.  A file
- * that can't be used: NPG_BAD_INPUT; with "auto" it is left alone and npg_device_tuning_source says so. */
-npg_status npg_device_open_tuned(npg_device **device, const char *spec, const char *tuning);
+/* The same with this tuning, not that for its kind of device; a loan, and NULL: by kind. */
+npg_status npg_device_open_tuned(npg_device **device, const char *spec, const npg_tuning *tuning);
 void npg_device_close(npg_device **device);
 const npg_device_info *npg_device_facts(const npg_device *device);
-
-/* The set in use, and where it comes from: "wide", "narrow", "gpu", a path, or what was
- * wrong with the file. */
 const npg_tuning *npg_device_tuning(const npg_device *device);
-const char *npg_device_tuning_source(const npg_device *device);
-
-/* Change the set for what is opened on the device from now on; nothing that was opened
- * before may be in use. */
-npg_status npg_device_set_tuning(npg_device *device, const npg_tuning *tuning);
-
-/* Where `neupig tune` keeps this device's set; NPG_DISK when no cache folder can be made. */
-npg_status npg_device_tuning_path(char *out, size_t size, const npg_device *device);
 
 /* Wait for everything launched so far; reports what failed on the device. */
 npg_status npg_device_finish(npg_device *device);

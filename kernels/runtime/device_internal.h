@@ -13,8 +13,7 @@
 
 struct npg_device {
     npg_device_info info;
-    npg_tuning tuning;
-    char tuning_source[NPG_CACHE_PATH]; /* "wide", "gpu", ... or a path */
+    const npg_tuning *tuning;
     cl_device_id id;
     cl_context context;
     cl_command_queue queue;

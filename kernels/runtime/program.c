@@ -194,7 +194,7 @@ npg_status npg_program_open(npg_program **out, npg_device *device, const char *n
     npg_program *program;
     *out = NULL;
     if (!source) return npg_error(NPG_USAGE, "there are no kernels named %s", name);
-    npg_tuning_constants(tuned, sizeof tuned, &device->tuning, name);
+    npg_tuning_constants(tuned, sizeof tuned, device->tuning, name);
     snprintf(all, sizeof all, "%s %s", tuned, constants);
     uint64_t key = key_of(&device->info, source->text, all);
     *out = find_program(device, key);
@@ -264,7 +264,7 @@ npg_status npg_launch_on(npg_program *program, const char *name, size_t x, size_
     for (cl_uint i = 0; i < argument_count; i++)
         NPG_TRY(npg_error_prefix(npg_cl_status(set_argument(kernel, i, arguments + i), "clSetKernelArg"),
                                  "kernel %s, argument %u", name, i));
-    if (!local) local = (size_t)program->device->tuning.local;
+    if (!local) local = (size_t)program->device->tuning->local;
     size_t global[2] = {(x + local - 1) / local * local, y}, groups[2] = {local, 1};
     cl_int code = clEnqueueNDRangeKernel(program->device->queue, kernel, y > 1 ? 2 : 1, NULL, global, groups,
                                          0, NULL, NULL);

@@ -8,9 +8,8 @@
 
 #include <stddef.h>
 
-#include "pipeline/status.h"
-
 typedef struct npg_tuning {
+    const char *name;
     int mlp_rows;         /* vertices in a block of the decoder                                  */
     int mlp_vector;       /* floats in a vector of the decoder: 4, 8, 16                         */
     int mlp_tile_vectors; /* vectors in a row of a register tile                                 */
@@ -25,30 +24,10 @@ typedef struct npg_tuning {
     int local;            /* work-group of the other kernels                                     */
 } npg_tuning;
 
-typedef struct npg_tuning_field {
-    const char *name, *help;
-    size_t offset;
-    int min, max;
-} npg_tuning_field;
-
-/* Every field of a set; ends with name NULL. */
-extern const npg_tuning_field npg_tuning_fields[];
-
 /* The sets for processors with vectors of 16 floats, of 8 or fewer, and for GPUs. */
 extern const npg_tuning npg_tuning_wide, npg_tuning_narrow, npg_tuning_gpu;
 
-int npg_tuning_get(const npg_tuning *tuning, const npg_tuning_field *field);
-void npg_tuning_put(npg_tuning *tuning, const npg_tuning_field *field, int value);
-
-/* NPG_USAGE names what does not go together. */
-npg_status npg_tuning_check(const npg_tuning *tuning);
-
 /* The build constants of kernels/<program>.cl. */
 void npg_tuning_constants(char *out, size_t size, const npg_tuning *tuning, const char *program);
-
-/* A set as a JSON file that belongs to one device and one text of the kernels.  Reading gives NPG_END when
- * there is no such file, NPG_INPUT with path and cause when it is broken or of something else. */
-npg_status npg_tuning_save(const npg_tuning *tuning, const char *path, const char *device);
-npg_status npg_tuning_load(npg_tuning *tuning, const char *path, const char *device);
 
 #endif

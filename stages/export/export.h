@@ -7,7 +7,6 @@
 
 #include "export/forms/placement.h"
 #include "export/forms/writer.h"
-#include "pipeline/work.h"
 
 typedef struct npg_mesh_names { /* how the mesh files of a run are called */
     const char *prefix, *ending;
@@ -28,9 +27,5 @@ npg_status npg_folder_probe(const char *output);
 /* Remove what an earlier run left: done.json first, so that what remains can't pass for a whole result, then
  * its other files and the mesh files (<word>_<digits>.ply or .obj).  Files that no run makes stay. */
 npg_status npg_folder_clear(const char *output);
-
-/* "export_ply": a mesh written as the stage writes that of each frame, to this path, which is there
- * afterwards.  The mesh is a loan during the call.  NPG_MEMORY, NPG_DISK, and the visit's failures. */
-npg_status npg_export_work(const npg_mesh *mesh, const char *path, npg_work_visit *visit, void *user);
 
 #endif

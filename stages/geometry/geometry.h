@@ -6,8 +6,7 @@
 #include "geometry/kdtree.h"     /* nearest points (view)                                      */
 #include "geometry/mesh_tools.h" /* normals, edges, areas, components, checks (synth, render) */
 #include "geometry/metrics.h"    /* measures against a ground truth, samples (eval, synth)    */
-#include "geometry/query.h"      /* rays (render)                                             */
-#include "geometry/query_work.h" /* closest points as work to be timed (bench)                    */
+#include "geometry/query.h"      /* rays (render), closest points (bench)                      */
 #include "geometry/rigid.h"      /* the rotation that fits best (eval)                        */
 #include "geometry/vec3.h"       /* dot and cross products, normals of faces                  */
 

@@ -168,16 +168,6 @@ static npg_status check_widths(const npg_fit_settings *s)
 
 static npg_status resume(npg_worker *worker);
 
-/* Which parameters the kernels have; a file that could not be used is a warning. */
-static void note_tuning(npg_worker *worker)
-{
-    state *s = npg_worker_state(worker);
-    const char *source = npg_device_tuning_source(s->device);
-    json_object_set_new(npg_worker_report(worker), "tuning", npg_json_text(source));
-    npg_worker_log(worker, strstr(source, "(not used") ? NPG_LOG_WARNING : NPG_LOG_INFO, -1, "tuning %s",
-                   source);
-}
-
 static bool is_resumed(const npg_worker *worker)
 {
     return npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_worker_facts(worker)->is_resumed;
@@ -190,15 +180,14 @@ static npg_status init(npg_worker *worker)
     s->total = -1;
     NPG_TRY(check_widths(&s->window_settings.fit));
     if (npg_worker_has_field(worker, NPG_FIELD_POSE)) return is_resumed(worker) ? resume(worker) : NPG_OK;
-    NPG_TRY(npg_device_open_tuned(&s->device, npg_worker_settings(worker)->device,
-                                  npg_worker_settings(worker)->tuning));
+    NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return npg_kernels_self_test(s->device);
     if (is_resumed(worker)) NPG_TRY(npg_kernels_self_test(s->device));
     const npg_device_info *info = npg_device_facts(s->device);
-    npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units", info->name, info->platform,
-                   info->units);
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "device %s (%s), %d units, tuning %s", info->name,
+                   info->platform, info->units, npg_device_tuning(s->device)->name);
     json_object_set_new(npg_worker_report(worker), "device", json_string(info->name));
-    note_tuning(worker);
+    json_object_set_new(npg_worker_report(worker), "tuning", json_string(npg_device_tuning(s->device)->name));
     return is_resumed(worker) ? resume(worker) : NPG_OK;
 }
 

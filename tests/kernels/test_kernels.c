@@ -37,47 +37,18 @@ static void ops_agree_with_their_twins(void **state)
  * other vectors and tiles. */
 static void ops_agree_with_the_parameters_of_other_devices(void **state)
 {
-    const char *const sets[] = {"wide", "narrow", "gpu"};
+    const npg_tuning *const sets[] = {&npg_tuning_wide, &npg_tuning_narrow, &npg_tuning_gpu};
     const int sizes[] = {1, 3, 8};
     (void)state;
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         npg_device *other;
-        if (npg_device_open_tuned(&other, "auto", sets[i])) fail_msg("%s: %s", sets[i], npg_error_text());
-        assert_string_equal(npg_device_tuning_source(other), sets[i]);
-        print_message("%s:\n", sets[i]);
+        if (npg_device_open_tuned(&other, "auto", sets[i]))
+            fail_msg("%s: %s", sets[i]->name, npg_error_text());
+        assert_ptr_equal(npg_device_tuning(other), sets[i]);
+        print_message("%s:\n", sets[i]->name);
         check_all(other, sizes, 3);
         npg_device_close(&other);
     }
-}
-
-/* A set of parameters on disk: read back whole, refused when broken, foreign or senseless. */
-static void tuning_files_are_checked(void **state)
-{
-    const char *path = "test_kernels_tuning.json";
-    npg_tuning set = npg_tuning_gpu, read;
-    (void)state;
-    remove(path);
-    assert_int_equal(npg_tuning_load(&read, path, "a device"), NPG_END);
-    set.mlp_groups = 3;
-    assert_int_equal(npg_tuning_save(&set, path, "a device"), 0);
-    assert_int_equal(npg_tuning_load(&read, path, "a device"), 0);
-    assert_memory_equal(&read, &set, sizeof set);
-    assert_int_equal(npg_tuning_load(&read, path, "another device"), NPG_BAD_INPUT);
-    assert_non_null(strstr(npg_error_text(), "another device"));
-    set.mlp_tile_rows = 7; /* does not divide the block */
-    assert_int_equal(npg_tuning_check(&set), NPG_USAGE);
-    assert_int_equal(npg_tuning_save(&set, path, "a device"), 0);
-    assert_int_equal(npg_tuning_load(&read, path, "a device"), NPG_BAD_INPUT);
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs("{\"kind\": \"neupig tun", file);
-    fclose(file);
-    assert_int_equal(npg_tuning_load(&read, path, "a device"), NPG_BAD_INPUT);
-    assert_non_null(strstr(npg_error_text(), path));
-    npg_device *none;
-    assert_int_equal(npg_device_open_tuned(&none, "auto", path), NPG_BAD_INPUT);
-    assert_null(none);
-    remove(path);
 }
 
 static void gradients_of_twins_are_slopes(void **state)
@@ -159,7 +130,6 @@ int main(void)
         cmocka_unit_test(self_test_passes),
         cmocka_unit_test(ops_agree_with_their_twins),
         cmocka_unit_test(ops_agree_with_the_parameters_of_other_devices),
-        cmocka_unit_test(tuning_files_are_checked),
         cmocka_unit_test(gradients_of_twins_are_slopes),
         cmocka_unit_test(sampling_gives_equal_bytes),
         cmocka_unit_test(unknown_device_is_named),

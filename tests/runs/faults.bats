@@ -79,7 +79,7 @@ programs() {
     if cmp -s "$(programs adam- | head -n 1)" "$(programs isometry-)"; then false; fi
 
     rm "$(programs isometry-)"
-    LD_PRELOAD=$shim NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" bench --vertices 300 --points 300 \
+    LD_PRELOAD=$shim NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" bench --vertices 2500 --points 300 \
         --only isometry >log
     [ -s "$(programs isometry-)" ]
     run "$NEUPIG" doctor

@@ -15,7 +15,7 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
 }
 
 @test "every verb shows its own help in both ways" {
-    for verb in run probe eval synth render view bench tune doctor help man version; do
+    for verb in run probe eval synth render view bench doctor help man version; do
         run "$NEUPIG" "$verb" --help
         [ "$status" -eq 0 ]
         [[ "${lines[0]}" == "Usage: neupig $verb"* ]]

@@ -14,7 +14,7 @@ struct npg_body {
     npg_mesh *rest;
     float *weights; /* V x NPG_BONES, rows sum to 1; walking figures only */
     bool is_welded; /* the surface at rest lies in the pose `weld`        */
-    npg_rigid weld[NPG_BONES];
+    npg_bone_pose weld[NPG_BONES];
     size_t bar_verts; /* the ball's come after them */
 };
 
@@ -72,11 +72,11 @@ static double share_at_hip(const npg_body *body, double since)
 
 static void pose_walker(const npg_body *body, float *vert_pos, const npg_moment *moment)
 {
-    npg_rigid bones[NPG_BONES];
+    npg_bone_pose bones[NPG_BONES];
     npg_walker_pose(bones, moment->phase, moment->travel, share_at_hip(body, moment->since));
     for (int b = 0; b < NPG_BONES && body->is_welded; b++) {
-        const npg_rigid motion = bones[b];
-        npg_rigid_between(&bones[b], &body->weld[b], &motion);
+        const npg_bone_pose motion = bones[b];
+        npg_bone_between(&bones[b], &body->weld[b], &motion);
     }
     for (size_t v = 0; v < body->rest->vert_count; v++) {
         const float *p = body->rest->vert_pos + 3 * v, *weights = body->weights + v * NPG_BONES;

@@ -46,18 +46,18 @@ npg_status npg_body_mesh(npg_mesh **mesh, npg_distance_fn *distance, const void 
 enum { NPG_BONES = 13 };
 
 /* Rotation (row-major) and shift of every bone from rest to a pose: p' = R p + t. */
-typedef struct npg_rigid {
+typedef struct npg_bone_pose {
     double rotation[9], shift[3];
-} npg_rigid;
+} npg_bone_pose;
 
-/* user: the pose the distance is of, NPG_BONES of npg_rigid; NULL: at rest. */
+/* user: the pose the distance is of, NPG_BONES of npg_bone_pose; NULL: at rest. */
 double npg_walker_distance(const double p[3], const void *user);
-int npg_walker_nearest_bone(const double p[3], const npg_rigid *pose);
+int npg_walker_nearest_bone(const double p[3], const npg_bone_pose *pose);
 
 /* The walker's gait; with at_hip >= 0 that of the body HANDS, its right hand on the hip by that share. */
-void npg_walker_pose(npg_rigid bones[NPG_BONES], double phase, double travel, double at_hip);
+void npg_walker_pose(npg_bone_pose bones[NPG_BONES], double phase, double travel, double at_hip);
 
 /* at = motion after the inverse of `rest`: what takes a surface that lies in the pose `rest` to `motion`. */
-void npg_rigid_between(npg_rigid *at, const npg_rigid *rest, const npg_rigid *motion);
+void npg_bone_between(npg_bone_pose *at, const npg_bone_pose *rest, const npg_bone_pose *motion);
 
 #endif

@@ -32,7 +32,7 @@ static const bone bones[NPG_BONES] = {
 
 /* ---- shape ---- */
 
-static void move(double out[3], const npg_rigid *pose, const double p[3])
+static void move(double out[3], const npg_bone_pose *pose, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
         const double *row = pose->rotation + 3 * k;
@@ -40,7 +40,7 @@ static void move(double out[3], const npg_rigid *pose, const double p[3])
     }
 }
 
-static double bone_distance(const bone *rest, const npg_rigid *pose, const double p[3])
+static double bone_distance(const bone *rest, const npg_bone_pose *pose, const double p[3])
 {
     double along = 0, length_sq = 0, dist_sq = 0;
     bone moved = *rest, *b = &moved;
@@ -63,14 +63,14 @@ double npg_walker_distance(const double p[3], const void *user)
 {
     const double softness = 0.018; /* metres: how round limbs join; set by eye */
     double sum = 0, distances[NPG_BONES], least = INFINITY;
-    const npg_rigid *pose = user;
+    const npg_bone_pose *pose = user;
     for (int b = 0; b < NPG_BONES; b++)
         least = fmin(least, distances[b] = bone_distance(&bones[b], pose ? &pose[b] : NULL, p));
     for (int b = 0; b < NPG_BONES; b++) sum += exp((least - distances[b]) / softness);
     return least - softness * log(sum);
 }
 
-int npg_walker_nearest_bone(const double p[3], const npg_rigid *pose)
+int npg_walker_nearest_bone(const double p[3], const npg_bone_pose *pose)
 {
     int nearest = 0;
     double least = INFINITY;
@@ -143,7 +143,7 @@ static void hands_angles(double angles[3], int b, double phase, double at_hip)
     if (b == 6) angles[2] = turned_in * at_hip;
 }
 
-void npg_rigid_between(npg_rigid *at, const npg_rigid *rest, const npg_rigid *motion)
+void npg_bone_between(npg_bone_pose *at, const npg_bone_pose *rest, const npg_bone_pose *motion)
 {
     double back[9];
     for (int i = 0; i < 3; i++)
@@ -156,7 +156,7 @@ void npg_rigid_between(npg_rigid *at, const npg_rigid *rest, const npg_rigid *mo
     }
 }
 
-void npg_walker_pose(npg_rigid out[NPG_BONES], double phase, double travel, double at_hip)
+void npg_walker_pose(npg_bone_pose out[NPG_BONES], double phase, double travel, double at_hip)
 {
     for (int b = 0; b < NPG_BONES; b++) {
         const bone *it = &bones[b];
@@ -170,7 +170,7 @@ void npg_walker_pose(npg_rigid out[NPG_BONES], double phase, double travel, doub
             turn_about(turn, axis, angles[axis]);
             multiply(local, turn, local);
         }
-        const npg_rigid *parent = it->parent < 0 ? NULL : &out[it->parent];
+        const npg_bone_pose *parent = it->parent < 0 ? NULL : &out[it->parent];
         for (int k = 0; k < 3; k++) {
             moved_joint[k] = it->joint[k];
             if (!parent) continue;
