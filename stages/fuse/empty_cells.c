@@ -136,7 +136,6 @@ typedef struct looking {
     npg_empty_cells *c;
     const npg_carry_back *carry;
     const npg_depth_map *map;
-    bool has_outline; /* what lies beside all that a sensor saw is empty */
     size_t parts;
 } looking;
 
@@ -164,7 +163,7 @@ static npg_status look_part(void *user, size_t part)
         if (*says == FILLED) continue;
         npg_sight_kind kind = npg_depth_map_look(l->map, l->c->now + 3 * i);
         if (kind == NPG_SEEN_AT) *says = FILLED;
-        if (kind == NPG_SEEN_EMPTY || (kind == NPG_SEEN_BESIDE && l->has_outline)) *says = EMPTY;
+        if (kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE) *says = EMPTY;
     }
     return NPG_OK;
 }
@@ -181,14 +180,13 @@ static void count_frame(npg_empty_cells *c)
 /* One map at a time: they are large. */
 npg_status npg_empty_cells_see(npg_empty_cells *c, const npg_carry_back *carry, const npg_seen *seen)
 {
-    looking l = {c, carry, NULL, !seen->which, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
+    looking l = {c, carry, NULL, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
     npg_status status = npg_parallel(move_part, &l, l.parts);
     for (size_t i = 0; i < seen->sensor_count && !status; i++) {
         const float *sensor = seen->sensors + 3 * i;
         npg_depth_map *map;
         if (!isfinite(sensor[0] + sensor[1] + sensor[2])) continue;
-        status = npg_depth_map_open(&map, sensor, seen->points, seen->which, (uint8_t)i, seen->point_count,
-                                    seen->bin, seen->margin);
+        status = npg_depth_map_open(&map, sensor, seen->points, seen->point_count, seen->bin, seen->margin);
         l.map = map;
         if (!status) status = npg_parallel(look_part, &l, l.parts);
         npg_depth_map_close(&map);

@@ -5,8 +5,7 @@
  * the depth map of every sensor (depth_map.h).  A frame says
  *
  *     filled   where a sensor saw something there, within the margin
- *     empty    else, where a sensor saw past it: to something behind it, or beside all that it saw (but for
- *              depth images, whose pixels at outlines are left out: beside what is left is the body, too)
+ *     empty    else, where a sensor saw past it: to something behind it, or beside all that it saw
  *     nothing  else: hidden, or too near to an edge
  *
  * and a cell is empty where most frames that say anything say so.  Not in the paper. */
@@ -27,8 +26,7 @@ void npg_empty_cells_close(npg_empty_cells **cells);
 typedef struct npg_seen {
     const float *sensors; /* S x 3, not finite where one saw nothing */
     size_t sensor_count;
-    const float *points;  /* N x 3                                                         */
-    const uint8_t *which; /* N: the sensor of each, or NULL: not known, all count for each */
+    const float *points; /* N x 3; which sensor saw one is not known: all count for each */
     size_t point_count;
     double bin, margin; /* of the depth maps */
 } npg_seen;

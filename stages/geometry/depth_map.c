@@ -76,38 +76,28 @@ static size_t bin_at(const npg_depth_map *m, int x, int y)
 
 /* ---- making ---- */
 
-static bool counts(const uint8_t *of, uint8_t index, size_t i)
-{
-    return !of || of[i] == index;
-}
-
 /* Mean direction and distance of the sensor's points. */
-static size_t aim(npg_depth_map *m, double *mean_dist, const float *points, const uint8_t *of, uint8_t index,
-                  size_t n)
+static void aim(npg_depth_map *m, double *mean_dist, const float *points, size_t n)
 {
     double middle[3] = {0, 0, 0}, sum = 0;
-    size_t count = 0;
     for (size_t i = 0; i < n; i++) {
         double way[3];
-        if (!counts(of, index, i)) continue;
         npg_vec3_between(way, m->sensor, points + 3 * i);
         for (int a = 0; a < 3; a++) middle[a] += way[a];
         sum += npg_vec3_length(way);
-        count++;
     }
     memcpy(m->axes[2], middle, sizeof middle);
     if (!npg_vec3_make_unit(m->axes[2])) m->axes[2][2] = 1;
     set_axes(m->axes);
-    *mean_dist = count ? sum / (double)count : 0;
-    return count;
+    *mean_dist = n ? sum / (double)n : 0;
 }
 
-static void add_points(npg_depth_map *m, const float *points, const uint8_t *of, uint8_t index, size_t n)
+static void add_points(npg_depth_map *m, const float *points, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         int at[2];
         double dist;
-        if (!counts(of, index, i) || !find_bin(m, at, &dist, points + 3 * i)) continue;
+        if (!find_bin(m, at, &dist, points + 3 * i)) continue;
         float *near = &m->near[bin_at(m, at[0], at[1])];
         if ((float)dist < *near) *near = (float)dist;
     }
@@ -144,8 +134,8 @@ static npg_status find_outside(npg_depth_map *m)
     return NPG_OK;
 }
 
-npg_status npg_depth_map_open(npg_depth_map **out, const float sensor[3], const float *points,
-                              const uint8_t *of, uint8_t index, size_t n, double side, double margin)
+npg_status npg_depth_map_open(npg_depth_map **out, const float sensor[3], const float *points, size_t n,
+                              double side, double margin)
 {
     npg_depth_map *m;
     double mean_dist;
@@ -154,14 +144,14 @@ npg_status npg_depth_map_open(npg_depth_map **out, const float sensor[3], const 
     NPG_TRY(npg_alloc(&m, NPG_FOR_MESH, sizeof *m));
     memcpy(m->sensor, sensor, sizeof m->sensor);
     m->margin = margin;
-    size_t seen = aim(m, &mean_dist, points, of, index, n);
+    aim(m, &mean_dist, points, n);
     m->bins = (int)fmin(BINS_MOST, fmax(BINS_LEAST, ceil(SPHERE_SIDE * mean_dist / side)));
     size_t count = (size_t)m->bins * (size_t)m->bins;
     npg_status status = npg_alloc_array(&m->near, NPG_FOR_MESH, count, sizeof *m->near);
     if (!status) status = npg_alloc_array(&m->outside, NPG_FOR_MESH, count, sizeof *m->outside);
     for (size_t i = 0; i < count && !status; i++) m->near[i] = INFINITY;
-    if (!status) add_points(m, points, of, index, n);
-    if (!status && seen) status = find_outside(m);
+    if (!status) add_points(m, points, n);
+    if (!status && n) status = find_outside(m);
     if (status) npg_depth_map_close(&m);
     *out = m;
     return status;

@@ -17,9 +17,13 @@
 #include "pipeline/cost.h"
 #include "pipeline/stage.h"
 
+/* Limits of the reconstruction's process: one that hangs or that points of a strange kind have blown up ends. */
+#define POISSON_TIME_S     600
+#define POISSON_MEMORY_MIB 8192 /* of address space, or what --max-memory says, if that is more */
+
 typedef struct mesh_state {
-    npg_reconstruct_settings surface; /* but for `poisson`, which is made of the next five */
-    int64_t depth, time_limit_s, memory_limit_mib;
+    npg_reconstruct_settings surface; /* but for `poisson`, which is made of the next three */
+    int64_t depth;
     double point_weight;
     int apart; /* npg_apart_way */
     double invented_max;
@@ -31,20 +35,10 @@ typedef struct mesh_state {
 /* clang-format off */
 static const npg_option mesh_options[] = {
     /* type         name              place                 default    least  most  shown as or words */
-    NPG_KEY(CHOICE, "mesher",         AT(surface.mesher),   "poisson", "poisson|vdb",
-        "How the keyframe's surface is made: "
-        "Poisson, or Poisson taken through an OpenVDB level set (even triangles, no self-contact)"),
     NPG_KEY(INT,    "poisson-depth",  AT(depth),            "10",      4,     13,   NULL,
         "Depth of the Poisson octree"),
     NPG_KEY(REAL,   "poisson-weight", AT(point_weight),     "10",      0,     1000, NULL,
         "How closely the Poisson surface follows the points"),
-    NPG_KEY(INT,    "poisson-time",   AT(time_limit_s),     "600",     1,     1e6,  "SECONDS",
-        "Stop the reconstruction after this many seconds"),
-    NPG_KEY(INT,    "poisson-memory", AT(memory_limit_mib), "8192",    64,    1e7,  "MIB",
-        "Address space the reconstruction may use"),
-    NPG_KEY(CHOICE, "pieces",         AT(surface.pieces),   "near",    "near|main",
-        "Of a surface in pieces keep the main one and what lies near it (1 % of the area or more, "
-        "within a tenth of the diagonal), or the main one alone"),
     NPG_KEY(FLAG,   "smooth",         AT(surface.smooth),   "yes",
         "Smooth the keyframe's points for the reconstruction when they are noisy"),
     NPG_KEY(CHOICE, "hold-apart",     AT(apart),            "tight",   "tight|loose|no",
@@ -53,9 +47,6 @@ static const npg_option mesh_options[] = {
         "or nearly so, which leaves a little of the gap (loose)"),
     NPG_ROW_INT(    "faces",          AT(surface.face_max), "20000",   16,    1e8,  NULL,
         "Faces of the reference mesh at most (and no more than 4 per point)"),
-    NPG_KEY(REAL,   "trim",           AT(surface.trim),     "0.15",    0.001, 100,  "SHARE",
-        "Drop surface farther than this from every point of the keyframe, "
-        "in diagonals of the keyframe's box"),
     NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",    "auto|keep|trim",
         "Surface without points near it (holes, the far side of a single view): "
         "keep it as the mesher closed it, trim it, or draw it tight between what was seen, "
@@ -72,8 +63,8 @@ static npg_poisson_settings poisson_settings(const mesh_state *s)
     return (npg_poisson_settings){.depth = (int)s->depth,
                                   .point_weight = s->point_weight,
                                   .apart = (npg_apart_way)s->apart,
-                                  .time_limit_s = (double)s->time_limit_s,
-                                  .memory_limit = (size_t)s->memory_limit_mib << 20};
+                                  .time_limit_s = POISSON_TIME_S,
+                                  .memory_limit = (size_t)POISSON_MEMORY_MIB << 20};
 }
 
 npg_poisson_settings npg_poisson_settings_of(const npg_options *options)
@@ -98,7 +89,9 @@ typedef struct making { /* what is known while the reference is made */
 static npg_status make(making *m)
 {
     npg_reconstruct_settings settings = m->state->surface;
+    int64_t may_use = npg_worker_settings(m->worker)->max_memory_mib;
     settings.poisson = poisson_settings(m->state);
+    if (may_use > POISSON_MEMORY_MIB) settings.poisson.memory_limit = (size_t)may_use << 20;
     settings.poisson.should_stop = npg_worker_should_stop;
     settings.poisson.user = m->worker;
     return npg_reconstruct(&m->mesh, &m->invented_share, m->worker, &m->set, &settings);

@@ -23,6 +23,7 @@
 #define GROWING_DEPTH     8    /* of the octree while the reference grows: it is to carry frames, no more */
 #define PIECE_SHARE       0.01 /* of the area */
 #define PIECE_DIST        0.1  /* in diagonals */
+#define TRIM_DIST         0.15 /* in diagonals: surface farther from every point is none of the body's */
 #define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
 #define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
 #define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
@@ -106,8 +107,7 @@ static npg_status draw_surface(reconstruction *r)
 static npg_status keep_main(reconstruction *r, const char *when)
 {
     npg_pieces pieces;
-    double dist_max = r->settings->pieces == NPG_PIECES_NEAR ? PIECE_DIST * r->set->diagonal : 0;
-    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, PIECE_SHARE, dist_max));
+    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, PIECE_SHARE, PIECE_DIST * r->set->diagonal));
     npg_mesh_note_count(r->worker, "components", pieces.kept);
     if (pieces.kept > 1)
         npg_mesh_warn(r->worker, false, r->set->key_number,
@@ -159,7 +159,7 @@ static npg_status trim(reconstruction *r)
 {
     const npg_point_set *p = r->set;
     bool trim_unseen;
-    double limit = r->settings->trim * p->diagonal, share;
+    double limit = TRIM_DIST * p->diagonal, share;
     NPG_TRY(judge_unseen(r, &trim_unseen));
     if (trim_unseen) limit = fmin(limit, p->seen_dist);
     NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, limit));
@@ -171,7 +171,7 @@ static npg_status trim(reconstruction *r)
         npg_mesh_warn(r->worker, false, p->key_number,
                       "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
                       "and was trimmed off",
-                      100 * share, r->settings->trim);
+                      100 * share, TRIM_DIST);
     return share > 0 ? keep_main(r, "after trimming") : NPG_OK;
 }
 
@@ -276,18 +276,6 @@ static npg_status rebuild(reconstruction *r)
     return NPG_OK;
 }
 
-static npg_status rebuild_on_request(reconstruction *r)
-{
-    bool closed;
-    npg_mending mending;
-    NPG_TRY(npg_mesh_mend(&r->mesh, &mending));
-    NPG_TRY(is_closed(&closed, r->mesh));
-    if (!closed)
-        return npg_error(NPG_FAILED,
-                         "mesher vdb takes a closed surface, but Poisson's is open (a single view?)");
-    return rebuild(r);
-}
-
 /* Try again from the whole surface, taken through a level set. */
 static npg_status shape_again(reconstruction *r, npg_mesh **whole, bool *sound)
 {
@@ -306,7 +294,6 @@ static npg_status make(reconstruction *r)
     bool sound = false, closed = false;
     NPG_TRY(draw_surface(r));
     NPG_TRY(keep_main(r, "as reconstructed"));
-    if (r->settings->mesher == NPG_MESHER_VDB) NPG_TRY(rebuild_on_request(r));
     NPG_TRY(npg_mesh_copy(&whole, r->mesh));
     npg_status status = shape(r, &sound);
     if (!status && !sound) status = is_closed(&closed, whole);

@@ -18,26 +18,16 @@
 #include "mesh/point_set.h"
 #include "mesh/poisson.h"
 
-/* The words of the options --mesher, --pieces and --unseen, in their order. */
-
-typedef enum npg_mesher { NPG_MESHER_POISSON, NPG_MESHER_VDB } npg_mesher;
-
-/* Of a surface in pieces: the main one and what lies near it, or the main one alone. */
-typedef enum npg_pieces_kept { NPG_PIECES_NEAR, NPG_PIECES_MAIN } npg_pieces_kept;
-
-/* Surface that no point saw: drawn tight, or trimmed where it is a whole side; kept as the mesher closed it;
- * trimmed. */
+/* Surface that no point saw: drawn tight, or trimmed where it is a whole side; kept as Poisson closed it;
+ * trimmed.  The words of --unseen, in their order. */
 typedef enum npg_unseen_way { NPG_UNSEEN_AUTO, NPG_UNSEEN_KEEP, NPG_UNSEEN_TRIM } npg_unseen_way;
 
 #define NPG_FACES_PER_POINT 4 /* at most: more would be the mesher's, not the points' */
 
 typedef struct npg_reconstruct_settings {
-    int mesher;                   /* npg_mesher: Poisson's surface, or that through a level set in any case */
-    int pieces;                   /* npg_pieces_kept                                                        */
     int unseen;                   /* npg_unseen_way                                                         */
     bool smooth;                  /* the points, where they are noisy                                       */
     int64_t face_max;             /* and no more faces than NPG_FACES_PER_POINT for each point given        */
-    double trim;                  /* in diagonals of the points: surface farther from all of them goes      */
     npg_poisson_settings poisson; /* with whom to ask for a stop                                            */
 } npg_reconstruct_settings;
 
