@@ -14,10 +14,11 @@ struct npg_shape {
     const npg_mesh *reference; /* loan */
     uint32_t (*edges)[2];      /* E x 2; owned */
     size_t edge_count;
-    double *areas;     /* F, of the reference; owned */
-    double *cosines;   /* F, each face against its neighbourhood in the reference; owned */
-    double *normals;   /* F x 3 scratch; owned */
-    double *vert_sums; /* V x 3 scratch; owned */
+    npg_arena arena;
+    double *areas;     /* F, of the reference                                     */
+    double *cosines;   /* F, each face against its neighbourhood in the reference */
+    double *normals;   /* F x 3 scratch                                           */
+    double *vert_sums; /* V x 3 scratch                                           */
 };
 
 /* Sums of the faces' normals around each vertex, weighted by reference area. */
@@ -51,11 +52,13 @@ static npg_status measure_reference(npg_shape *shape)
 {
     const npg_mesh *mesh = shape->reference;
     size_t v = mesh->vert_count, f = mesh->face_count;
+    shape->arena.purpose = NPG_FOR_MESH;
+    shape->areas = npg_arena_take(&shape->arena, f, sizeof *shape->areas);
+    shape->cosines = npg_arena_take(&shape->arena, f, sizeof *shape->cosines);
+    shape->normals = npg_arena_take(&shape->arena, f, 3 * sizeof *shape->normals);
+    shape->vert_sums = npg_arena_take(&shape->arena, v, 3 * sizeof *shape->vert_sums);
+    NPG_TRY(npg_arena_status(&shape->arena));
     NPG_TRY(npg_mesh_edges(&shape->edges, &shape->edge_count, mesh->faces, f));
-    NPG_TRY(npg_alloc_array(&shape->areas, NPG_FOR_MESH, f, sizeof *shape->areas));
-    NPG_TRY(npg_alloc_array(&shape->cosines, NPG_FOR_MESH, f, sizeof *shape->cosines));
-    NPG_TRY(npg_alloc_array(&shape->normals, NPG_FOR_MESH, f, 3 * sizeof *shape->normals));
-    NPG_TRY(npg_alloc_array(&shape->vert_sums, NPG_FOR_MESH, v, 3 * sizeof *shape->vert_sums));
     for (size_t i = 0; i < f; i++)
         shape->areas[i] = npg_face_normal(shape->normals + 3 * i, mesh->vert_pos, mesh->faces + 3 * i);
     sum_normals(shape);
@@ -76,13 +79,9 @@ npg_status npg_shape_open(npg_shape **out, const npg_mesh *reference)
 
 void npg_shape_close(npg_shape **slot)
 {
-    npg_shape *shape = *slot;
-    if (!shape) return;
-    npg_release(&shape->edges);
-    npg_release(&shape->areas);
-    npg_release(&shape->cosines);
-    npg_release(&shape->normals);
-    npg_release(&shape->vert_sums);
+    if (!*slot) return;
+    npg_release(&(*slot)->edges);
+    npg_arena_release(&(*slot)->arena);
     npg_release(slot);
 }
 

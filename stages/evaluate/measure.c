@@ -25,14 +25,14 @@ struct npg_measure {
     float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
     npg_surface_hit *hits; /* N; owned */
     size_t points_capacity, dists_capacity, hits_capacity;
-    float *vert_unit;     /* W x 3; owned */
-    uint32_t *nearest;    /* W; owned */
-    double *vert_areas;   /* W; owned */
-    uint8_t *unsupported; /* W; owned */
-    npg_arena arena;      /* of visible */
+    npg_arena arena;      /* has all that follow */
     npg_visible visible;  /* of the sensors' rays: W */
-    float *normals;       /* W x 3, in the frame; owned */
-    uint8_t *is_in_sight; /* W; owned */
+    float *vert_unit;     /* W x 3               */
+    uint32_t *nearest;    /* W                   */
+    double *vert_areas;   /* W                   */
+    uint8_t *unsupported; /* W                   */
+    float *normals;       /* W x 3, in the frame */
+    uint8_t *is_in_sight; /* W                   */
 };
 
 /* ---- the figures' room ---- */
@@ -44,15 +44,15 @@ static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_
     npg_mesh *mesh = m->thin->mesh;
     size_t w = mesh->vert_count;
     NPG_TRY(npg_misfit_open(&m->finder, mesh, unseen_share));
-    NPG_TRY(npg_alloc_array(&m->vert_unit, NPG_FOR_QUERY, w, 3 * sizeof *m->vert_unit));
-    NPG_TRY(npg_alloc_array(&m->nearest, NPG_FOR_QUERY, w, sizeof *m->nearest));
-    NPG_TRY(npg_alloc_array(&m->vert_areas, NPG_FOR_QUERY, w, sizeof *m->vert_areas));
-    NPG_TRY(npg_alloc(&m->unsupported, NPG_FOR_QUERY, w));
     m->arena.purpose = NPG_FOR_QUERY;
     npg_visible_open(&m->visible, &m->arena, w);
+    m->vert_unit = npg_arena_take(&m->arena, w, 3 * sizeof *m->vert_unit);
+    m->nearest = npg_arena_take(&m->arena, w, sizeof *m->nearest);
+    m->vert_areas = npg_arena_take(&m->arena, w, sizeof *m->vert_areas);
+    m->unsupported = npg_arena_take(&m->arena, w, 1);
+    m->normals = npg_arena_take(&m->arena, w, 3 * sizeof *m->normals);
+    m->is_in_sight = npg_arena_take(&m->arena, w, 1);
     NPG_TRY(npg_arena_status(&m->arena));
-    NPG_TRY(npg_alloc_array(&m->normals, NPG_FOR_QUERY, w, 3 * sizeof *m->normals));
-    NPG_TRY(npg_alloc(&m->is_in_sight, NPG_FOR_QUERY, w));
     return npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
 }
 
@@ -79,13 +79,7 @@ void npg_measure_close(npg_measure **measure)
     npg_release(&m->points);
     npg_release(&m->dists);
     npg_release(&m->hits);
-    npg_release(&m->vert_unit);
-    npg_release(&m->nearest);
-    npg_release(&m->vert_areas);
-    npg_release(&m->unsupported);
     npg_arena_release(&m->arena);
-    npg_release(&m->normals);
-    npg_release(&m->is_in_sight);
     npg_release(measure);
 }
 
@@ -210,12 +204,8 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     npg_figures *figures = &frame->figures;
     const float *vert_unit = m->vert_unit;
     size_t v = mesh->vert_count;
-    npg_kdtree *tree;
     NPG_TRY(npg_grow(&m->dists, &m->dists_capacity, v, sizeof *m->dists, NPG_FOR_QUERY));
-    NPG_TRY(npg_kdtree_open(&tree, m->points, point_count));
-    npg_status status = npg_kdtree_nearest(tree, m->nearest, m->dists, vert_unit, v, 1, 0);
-    npg_kdtree_close(&tree);
-    NPG_TRY(status);
+    NPG_TRY(npg_points_nearest(m->nearest, m->dists, m->points, point_count, vert_unit, v, 1));
     double area = npg_vertex_areas(m->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
     double radius = cover_radius(m, area, point_count, per_unit), covered = 0, whole = 0, sum = 0, sum_sq = 0;
     for (size_t i = 0; i < v; i++) {

@@ -30,21 +30,18 @@ struct npg_misfit_finder {
     const npg_mesh *reference; /* loan                                          */
     double size;               /* its diagonal                                  */
     bool is_closed;            /* has no border, and its frame saw all of it    */
-    uint8_t *is_border;        /* V: on the border of what its frame saw; owned */
+    npg_arena arena;           /* of all below, but for the edges and scratch   */
+    uint8_t *is_border;        /* V: on the border of what its frame saw        */
     uint32_t (*edges)[2];      /* E x 2; owned                                  */
     size_t edge_count;
-    float *edge_lengths; /* E, of the reference; owned */
-    uint32_t *part_of;   /* V: which part of the reference; owned */
+    float *edge_lengths; /* E, of the reference            */
+    uint32_t *part_of;   /* V: which part of the reference */
     size_t part_count;
-    double *part_sums; /* of each part: area, area x position, points; x 5; owned */
-    /* scratch, owned */
-    uint32_t *parents; /* of the places so far: max(N, V)     */
-    double *sums;      /* their size and weighted middle: x 4 */
-    uint8_t *flags;    /* V                                   */
-    float *far;        /* far points x 3                      */
-    uint32_t *links;   /* far points x LINKS                  */
-    float *link_sq;
-    size_t parents_room, sums_room, far_room, links_room, link_sq_room;
+    double *part_sums; /* of each part: area, area x position, points; x 5 */
+    uint8_t *flags;    /* V                                                */
+    npg_arena scratch; /* of a frame                                       */
+    uint32_t *parents; /* of the places so far: max(N, V)                  */
+    double *sums;      /* their size and weighted middle: x 4              */
 };
 
 static double length_of(const float *vert_pos, const uint32_t edge[2])
@@ -55,25 +52,22 @@ static double length_of(const float *vert_pos, const uint32_t edge[2])
 static npg_status measure_reference(npg_misfit_finder *f)
 {
     const npg_mesh *mesh = f->reference;
-    f->size = npg_points_diagonal(mesh->vert_pos, mesh->vert_count);
-    NPG_TRY(npg_alloc_array(&f->part_of, NPG_FOR_MESH, mesh->vert_count, sizeof *f->part_of));
-    NPG_TRY(npg_mesh_components(f->part_of, &f->part_count, mesh->vert_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_alloc_array(&f->part_sums, NPG_FOR_MESH, f->part_count, 5 * sizeof *f->part_sums));
-    NPG_TRY(npg_mesh_edges(&f->edges, &f->edge_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_alloc_array(&f->edge_lengths, NPG_FOR_MESH, f->edge_count, sizeof *f->edge_lengths));
-    NPG_TRY(npg_alloc_array(&f->flags, NPG_FOR_MESH, mesh->vert_count, sizeof *f->flags));
-    for (size_t e = 0; e < f->edge_count; e++)
-        f->edge_lengths[e] = (float)length_of(mesh->vert_pos, f->edges[e]);
-    return NPG_OK;
-}
-
-static npg_status find_borders(npg_misfit_finder *f)
-{
-    const npg_mesh *mesh = f->reference;
+    size_t v = mesh->vert_count;
     bool is_open;
-    NPG_TRY(npg_alloc_array(&f->is_border, NPG_FOR_MESH, mesh->vert_count, sizeof *f->is_border));
+    f->size = npg_points_diagonal(mesh->vert_pos, v);
+    f->part_of = npg_arena_take(&f->arena, v, sizeof *f->part_of);
+    f->is_border = npg_arena_take(&f->arena, v, 1);
+    f->flags = npg_arena_take(&f->arena, v, 1);
+    NPG_TRY(npg_arena_status(&f->arena));
     NPG_TRY(npg_mesh_border(f->is_border, &is_open, mesh));
     if (is_open) f->is_closed = false;
+    NPG_TRY(npg_mesh_components(f->part_of, &f->part_count, v, mesh->faces, mesh->face_count));
+    NPG_TRY(npg_mesh_edges(&f->edges, &f->edge_count, mesh->faces, mesh->face_count));
+    f->part_sums = npg_arena_take(&f->arena, f->part_count, 5 * sizeof *f->part_sums);
+    f->edge_lengths = npg_arena_take(&f->arena, f->edge_count, sizeof *f->edge_lengths);
+    NPG_TRY(npg_arena_status(&f->arena));
+    for (size_t e = 0; e < f->edge_count; e++)
+        f->edge_lengths[e] = (float)length_of(mesh->vert_pos, f->edges[e]);
     return NPG_OK;
 }
 
@@ -83,8 +77,9 @@ npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, d
     NPG_TRY(npg_alloc(&finder, NPG_FOR_MESH, sizeof *finder));
     finder->reference = reference;
     finder->is_closed = unseen_share <= UNSEEN_MOST;
+    finder->arena.purpose = NPG_FOR_MESH;
+    finder->scratch.purpose = NPG_FOR_QUERY;
     npg_status status = measure_reference(finder);
-    if (!status) status = find_borders(finder);
     if (status) npg_misfit_close(&finder);
     *out = finder;
     return status;
@@ -92,23 +87,18 @@ npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, d
 
 void npg_misfit_close(npg_misfit_finder **slot)
 {
-    npg_misfit_finder *f = *slot;
-    if (!f) return;
-    void *all[] = {&f->is_border, &f->edges, &f->edge_lengths, &f->parents, &f->sums,     &f->flags,
-                   &f->far,       &f->links, &f->link_sq,      &f->part_of, &f->part_sums};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    if (!*slot) return;
+    npg_release(&(*slot)->edges);
+    npg_arena_release(&(*slot)->arena);
     npg_release(slot);
 }
 
 /* ---- places: sets of things that belong together ---- */
 
-static npg_status begin_places(npg_misfit_finder *f, size_t count)
+static void begin_places(npg_misfit_finder *f, size_t count)
 {
-    NPG_TRY(npg_grow(&f->parents, &f->parents_room, count, sizeof *f->parents, NPG_FOR_QUERY));
-    NPG_TRY(npg_grow(&f->sums, &f->sums_room, count, 4 * sizeof *f->sums, NPG_FOR_QUERY));
     for (size_t i = 0; i < count; i++) f->parents[i] = (uint32_t)i;
     for (size_t i = 0; i < 4 * count; i++) f->sums[i] = 0;
-    return NPG_OK;
 }
 
 static void add_to_place(npg_misfit_finder *f, uint32_t i, const float *pos, double weight)
@@ -131,18 +121,14 @@ static void largest_place(npg_misfit *misfit, const npg_misfit_finder *f, size_t
 
 /* ---- the four kinds ---- */
 
-static npg_status link_far(npg_misfit_finder *f, size_t count, double link)
+static npg_status link_far(npg_misfit_finder *f, const float *far, size_t count, double link)
 {
-    npg_kdtree *tree;
-    NPG_TRY(npg_grow(&f->links, &f->links_room, count, LINKS * sizeof *f->links, NPG_FOR_QUERY));
-    NPG_TRY(npg_grow(&f->link_sq, &f->link_sq_room, count, LINKS * sizeof *f->link_sq, NPG_FOR_QUERY));
-    NPG_TRY(npg_kdtree_open(&tree, f->far, count));
-    npg_status status = npg_kdtree_nearest(tree, f->links, f->link_sq, f->far, count, LINKS, 1);
-    npg_kdtree_close(&tree);
-    for (size_t i = 0; i < LINKS * count && !status; i++)
-        if ((double)f->link_sq[i] <= link * link)
-            npg_set_join(f->parents, (uint32_t)(i / LINKS), f->links[i]);
-    return status;
+    npg_neighbours near;
+    NPG_TRY(npg_neighbours_take(&near, &f->scratch, far, count, far, count, LINKS));
+    for (size_t i = 0; i < LINKS * count; i++)
+        if ((double)near.dist_sq[i] <= link * link)
+            npg_set_join(f->parents, (uint32_t)(i / LINKS), near.index[i]);
+    return NPG_OK;
 }
 
 /* Points beyond the border of a reference that its frame saw in part are of what it did not see. */
@@ -161,16 +147,17 @@ static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_m
     for (size_t i = 0; i < frame->point_count; i++) count += is_far(f, &frame->hits[i], reach);
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
     if (!count) return NPG_OK;
-    NPG_TRY(npg_grow(&f->far, &f->far_room, count, 3 * sizeof *f->far, NPG_FOR_QUERY));
-    NPG_TRY(begin_places(f, count));
+    float *far = npg_arena_take(&f->scratch, count, 3 * sizeof *far);
+    NPG_TRY(npg_arena_status(&f->scratch));
+    begin_places(f, count);
     count = 0;
     for (size_t i = 0; i < frame->point_count; i++) {
         if (!is_far(f, &frame->hits[i], reach)) continue;
-        for (size_t a = 0; a < 3; a++) f->far[3 * count + a] = frame->points[3 * i + a];
+        for (size_t a = 0; a < 3; a++) far[3 * count + a] = frame->points[3 * i + a];
         count++;
     }
-    NPG_TRY(link_far(f, count, link));
-    for (size_t i = 0; i < count; i++) add_to_place(f, (uint32_t)i, f->far + 3 * i, 1);
+    NPG_TRY(link_far(f, far, count, link));
+    for (size_t i = 0; i < count; i++) add_to_place(f, (uint32_t)i, far + 3 * i, 1);
     largest_place(misfit, f, count, (double)frame->point_count, LEAST_FAR);
     return NPG_OK;
 }
@@ -203,27 +190,24 @@ static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misf
     largest_place(misfit, f, v, frame->area, least * frame->area);
 }
 
-static npg_status find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
-                            double reach)
+static void find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame, double reach)
 {
-    NPG_TRY(begin_places(f, f->reference->vert_count));
+    begin_places(f, f->reference->vert_count);
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!f->is_closed) return NPG_OK;
+    if (!f->is_closed) return;
     flag_off(f, frame, reach);
     join_flagged(f);
     add_flagged(f, misfit, frame);
-    return NPG_OK;
 }
 
 /* Of the surface that is off the points only what is torn stays flagged. */
-static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
-                            double reach)
+static void find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame, double reach)
 {
     enum { OFF = 1, ENDS_TORN = 2 };
     size_t v = f->reference->vert_count;
-    NPG_TRY(begin_places(f, v));
+    begin_places(f, v);
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!f->is_closed) return NPG_OK;
+    if (!f->is_closed) return;
     flag_off(f, frame, reach);
     for (size_t e = 0; e < f->edge_count; e++) {
         uint32_t a = f->edges[e][0], b = f->edges[e][1];
@@ -235,7 +219,6 @@ static npg_status find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_
     for (size_t i = 0; i < v; i++) f->flags[i] &= ENDS_TORN;
     join_flagged(f);
     add_flagged(f, misfit, frame);
-    return NPG_OK;
 }
 
 /* Area, middle and points of every part as it lies in this frame, of what is in sight.  Returns all of that
@@ -280,8 +263,16 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
     double least = fmax(REACH_SPACINGS * spacing, REACH_SIZE * f->size);
     double reach = fmin(fmax(least, REACH_MEDIANS * frame->point_dist_median), REACH_MOST * least);
     double link = fmax(LINK_SPACINGS * spacing, REACH_SIZE * f->size);
-    NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
-    NPG_TRY(find_bare(f, &misfits[NPG_MISFIT_BARE], frame, reach));
-    find_deserted(f, &misfits[NPG_MISFIT_DESERTED], frame);
-    return find_torn(f, &misfits[NPG_MISFIT_TORN], frame, OFF_SHARE * reach);
+    size_t v = f->reference->vert_count, most = frame->point_count > v ? frame->point_count : v;
+    f->parents = npg_arena_take(&f->scratch, most, sizeof *f->parents);
+    f->sums = npg_arena_take(&f->scratch, most, 4 * sizeof *f->sums);
+    npg_status status = npg_arena_status(&f->scratch);
+    if (!status) status = find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link);
+    if (!status) {
+        find_bare(f, &misfits[NPG_MISFIT_BARE], frame, reach);
+        find_deserted(f, &misfits[NPG_MISFIT_DESERTED], frame);
+        find_torn(f, &misfits[NPG_MISFIT_TORN], frame, OFF_SHARE * reach);
+    }
+    npg_arena_release(&f->scratch);
+    return status;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "geometry/depth_map.h"
+#include "geometry/query.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 
@@ -23,9 +24,10 @@ typedef struct cell {
 struct npg_empty_cells {
     double side;
     size_t count;
-    cell *cells;           /* owned */
-    npg_surface_hit *hits; /* of their places, at rest; owned */
-    float *now;            /* where they are in the frame at work; owned */
+    npg_arena arena;
+    cell *cells;
+    npg_surface_hit *hits; /* of their places, at rest               */
+    float *now;            /* where they are in the frame at work    */
 };
 
 /* ---- the band ---- */
@@ -73,9 +75,11 @@ static size_t mark_around(grid *g, const float vertex[3], double reach)
 
 static npg_status take_cells(npg_empty_cells *c, const grid *g, size_t count)
 {
-    NPG_TRY(npg_alloc_array(&c->cells, NPG_FOR_MESH, count, sizeof *c->cells));
-    NPG_TRY(npg_alloc_array(&c->hits, NPG_FOR_MESH, count, sizeof *c->hits));
-    NPG_TRY(npg_alloc_array(&c->now, NPG_FOR_MESH, count, 3 * sizeof *c->now));
+    c->arena.purpose = NPG_FOR_MESH;
+    c->cells = npg_arena_take(&c->arena, count, sizeof *c->cells);
+    c->hits = npg_arena_take(&c->arena, count, sizeof *c->hits);
+    c->now = npg_arena_take(&c->arena, count, 3 * sizeof *c->now);
+    NPG_TRY(npg_arena_status(&c->arena));
     for (size_t at = 0; at < g->size[0] * g->size[1] * g->size[2]; at++) {
         if (!(g->bits[at / 8] >> at % 8 & 1)) continue;
         const size_t i[3] = {at % g->size[0], at / g->size[0] % g->size[1], at / g->size[0] / g->size[1]};
@@ -89,12 +93,8 @@ static npg_status take_cells(npg_empty_cells *c, const grid *g, size_t count)
 /* The points of the surface that the cells hang on. */
 static npg_status bind(npg_empty_cells *c, const npg_mesh *mesh)
 {
-    npg_surface *surface;
-    NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
     for (size_t i = 0; i < c->count; i++) memcpy(c->now + 3 * i, c->cells[i].place, sizeof c->cells[i].place);
-    npg_status status = npg_surface_closest(surface, c->hits, c->now, c->count);
-    npg_surface_close(&surface);
-    return status;
+    return npg_mesh_closest(c->hits, mesh, c->now, c->count);
 }
 
 npg_status npg_empty_cells_open(npg_empty_cells **out, const npg_mesh *mesh, double side, double band,
@@ -124,9 +124,7 @@ npg_status npg_empty_cells_open(npg_empty_cells **out, const npg_mesh *mesh, dou
 void npg_empty_cells_close(npg_empty_cells **cells)
 {
     if (!cells || !*cells) return;
-    npg_release(&(*cells)->cells);
-    npg_release(&(*cells)->hits);
-    npg_release(&(*cells)->now);
+    npg_arena_release(&(*cells)->arena);
     npg_release(cells);
 }
 

@@ -101,26 +101,21 @@ static const npg_option options[] = {
 /* ---- a frame ---- */
 
 typedef struct cloud {
-    float *points, *normals; /* unit; owned */
+    npg_arena arena;
+    float *points, *normals; /* unit */
     npg_carried *carried;
     size_t count;
     const uint8_t *colours; /* of the frame, a loan, or NULL ... */
     size_t of;              /* ... and how many points it has    */
 } cloud;
 
-static void close_cloud(cloud *c)
-{
-    npg_release(&c->points);
-    npg_release(&c->normals);
-    npg_release(&c->carried);
-}
-
 static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame *frame)
 {
     size_t most = frame->point_count < NPG_FUSED_FRAME_MOST ? frame->point_count : NPG_FUSED_FRAME_MOST;
-    NPG_TRY(npg_alloc_array(&c->points, NPG_FOR_MESH, most, 3 * sizeof(float)));
-    if (frame->normals) NPG_TRY(npg_alloc_array(&c->normals, NPG_FOR_MESH, most, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&c->carried, NPG_FOR_MESH, most, sizeof *c->carried));
+    c->points = npg_arena_take(&c->arena, most, 3 * sizeof *c->points);
+    if (frame->normals) c->normals = npg_arena_take(&c->arena, most, 3 * sizeof *c->normals);
+    c->carried = npg_arena_take(&c->arena, most, sizeof *c->carried);
+    NPG_TRY(npg_arena_status(&c->arena));
     c->count =
         npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
     c->colours = npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? NULL : frame->colours;
@@ -250,10 +245,10 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
 
 static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 {
-    cloud c = {0};
+    cloud c = {.arena.purpose = NPG_FOR_MESH};
     if (frame->is_skipped || !frame->point_count) return NPG_OK;
     npg_status status = gather(worker, &c, frame);
-    close_cloud(&c);
+    npg_arena_release(&c.arena);
     return npg_error_prefix(status, "frame %lld", (long long)frame->number);
 }
 
@@ -262,24 +257,17 @@ static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 /* What grows must hang together: single places past the border are of other parts, wrongly carried. */
 static npg_status drop_scattered(npg_fused *fused, double radius)
 {
-    npg_kdtree *tree;
-    uint32_t *near;
-    float *dist_sq = NULL;
-    uint8_t *keep = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_neighbours near;
     size_t n = fused->count;
     if (n < DENSE_NEIGHBOURS) return NPG_OK;
-    NPG_TRY(npg_kdtree_open(&tree, fused->points, n));
-    npg_status status = npg_alloc_array(&near, NPG_FOR_MESH, n, DENSE_NEIGHBOURS * sizeof *near);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, DENSE_NEIGHBOURS * sizeof *dist_sq);
-    if (!status) status = npg_alloc(&keep, NPG_FOR_MESH, n);
-    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, fused->points, n, DENSE_NEIGHBOURS, 0);
+    uint8_t *keep = npg_arena_take(&scratch, n, 1);
+    npg_status status =
+        npg_neighbours_take(&near, &scratch, fused->points, n, fused->points, n, DENSE_NEIGHBOURS);
     for (size_t i = 0; i < n && !status; i++)
-        keep[i] = (double)dist_sq[(i + 1) * DENSE_NEIGHBOURS - 1] <= radius * radius;
+        keep[i] = (double)near.dist_sq[(i + 1) * DENSE_NEIGHBOURS - 1] <= radius * radius;
     if (!status) fused->count = npg_points_keep(fused->points, fused->normals, n, keep);
-    npg_kdtree_close(&tree);
-    npg_release(&keep);
-    npg_release(&near);
-    npg_release(&dist_sq);
+    npg_arena_release(&scratch);
     return status;
 }
 

@@ -53,31 +53,20 @@ bool npg_colour_mean(uint8_t rgb[3], const npg_colour_sums *sums)
 /* ---- from points to vertices ---- */
 
 typedef struct colouring {
-    float *points, *normals; /* M x 3 of the points with a colour; owned; normals may be NULL */
-    const uint8_t **of;      /* M: their colours, loans; owned                                */
+    npg_arena arena;
+    float *points, *normals; /* M x 3 of the points with a colour; normals may be NULL */
+    const uint8_t **of;      /* M: their colours, loans                                */
     size_t count;
-    npg_kdtree *tree;
-    uint32_t *index; /* V x NEAREST; owned */
-    float *dist_sq;  /* V x NEAREST; owned */
 } colouring;
-
-static void close_colouring(colouring *c)
-{
-    npg_kdtree_close(&c->tree);
-    npg_release(&c->points);
-    npg_release(&c->normals);
-    npg_release(&c->of);
-    npg_release(&c->index);
-    npg_release(&c->dist_sq);
-}
 
 static npg_status take_points(colouring *c, const npg_coloured *cloud)
 {
     size_t most = 0;
     for (size_t i = 0; i < cloud->count; i++) most += cloud->colours[4 * i + 3] > 0;
-    NPG_TRY(npg_alloc_array(&c->points, NPG_FOR_QUERY, most, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&c->of, NPG_FOR_QUERY, most, sizeof *c->of));
-    if (cloud->normals) NPG_TRY(npg_alloc_array(&c->normals, NPG_FOR_QUERY, most, 3 * sizeof(float)));
+    c->points = npg_arena_take(&c->arena, most, 3 * sizeof *c->points);
+    c->of = npg_arena_take(&c->arena, most, sizeof *c->of);
+    if (cloud->normals) c->normals = npg_arena_take(&c->arena, most, 3 * sizeof *c->normals);
+    NPG_TRY(npg_arena_status(&c->arena));
     for (size_t i = 0; i < cloud->count; i++) {
         if (!cloud->colours[4 * i + 3]) continue;
         memcpy(c->points + 3 * c->count, cloud->points + 3 * i, 3 * sizeof(float));
@@ -95,7 +84,7 @@ static npg_status spacing_of(const colouring *c, double *spacing)
     size_t step = c->count / SAMPLE + 1, count = 0, used = 0;
     for (size_t i = 0; i < c->count && count < SAMPLE; i += step, count++)
         memcpy(samples + 3 * count, c->points + 3 * i, 3 * sizeof(float));
-    NPG_TRY(npg_kdtree_nearest(c->tree, index, dist_sq, samples, count, 2, 0));
+    NPG_TRY(npg_points_nearest(index, dist_sq, c->points, c->count, samples, count, 2));
     *spacing = 0;
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(dist_sq[2 * i + 1])) continue;
@@ -130,15 +119,13 @@ static void colour_vertex(uint8_t out[4], const colouring *c, const float *norma
 static npg_status colour_all(uint8_t *out, colouring *c, const float *verts, const float *normals, size_t v,
                              double reach)
 {
+    npg_neighbours near;
     double spacing;
-    NPG_TRY(npg_kdtree_open(&c->tree, c->points, c->count));
     NPG_TRY(spacing_of(c, &spacing));
-    NPG_TRY(npg_alloc_array(&c->index, NPG_FOR_QUERY, v, NEAREST * sizeof *c->index));
-    NPG_TRY(npg_alloc_array(&c->dist_sq, NPG_FOR_QUERY, v, NEAREST * sizeof *c->dist_sq));
-    NPG_TRY(npg_kdtree_nearest(c->tree, c->index, c->dist_sq, verts, v, NEAREST, 0));
+    NPG_TRY(npg_neighbours_take(&near, &c->arena, c->points, c->count, verts, v, NEAREST));
     reach = fmax(reach, SPACINGS * spacing);
     for (size_t i = 0; i < v; i++)
-        colour_vertex(out + 4 * i, c, normals + 3 * i, c->index + NEAREST * i, c->dist_sq + NEAREST * i,
+        colour_vertex(out + 4 * i, c, normals + 3 * i, near.index + NEAREST * i, near.dist_sq + NEAREST * i,
                       reach, spacing);
     return NPG_OK;
 }
@@ -146,11 +133,11 @@ static npg_status colour_all(uint8_t *out, colouring *c, const float *verts, con
 npg_status npg_colour_vertices(uint8_t *out, const float *verts, const float *normals, size_t vert_count,
                                const npg_coloured *cloud, double reach)
 {
-    colouring c = {0};
+    colouring c = {.arena.purpose = NPG_FOR_QUERY};
     memset(out, 0, 4 * vert_count);
     npg_status status = take_points(&c, cloud);
     if (!status && c.count) status = colour_all(out, &c, verts, normals, vert_count, reach);
-    close_colouring(&c);
+    npg_arena_release(&c.arena);
     return status;
 }
 

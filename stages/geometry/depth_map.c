@@ -17,8 +17,9 @@ struct npg_depth_map {
     double axes[3][3]; /* the third looks at the points' middle */
     int bins;          /* along a side */
     double margin;
-    float *near;      /* bins x bins: distance, infinity where there is none; owned */
-    uint8_t *outside; /* bins x bins: reached from behind without crossing the outline; owned */
+    npg_arena arena;
+    float *near;      /* bins x bins: distance, infinity where there is none                 */
+    uint8_t *outside; /* bins x bins: reached from behind without crossing the outline        */
 };
 
 /* ---- directions ---- */
@@ -147,8 +148,10 @@ npg_status npg_depth_map_open(npg_depth_map **out, const float sensor[3], const 
     aim(m, &mean_dist, points, n);
     m->bins = (int)fmin(BINS_MOST, fmax(BINS_LEAST, ceil(SPHERE_SIDE * mean_dist / side)));
     size_t count = (size_t)m->bins * (size_t)m->bins;
-    npg_status status = npg_alloc_array(&m->near, NPG_FOR_MESH, count, sizeof *m->near);
-    if (!status) status = npg_alloc_array(&m->outside, NPG_FOR_MESH, count, sizeof *m->outside);
+    m->arena.purpose = NPG_FOR_MESH;
+    m->near = npg_arena_take(&m->arena, count, sizeof *m->near);
+    m->outside = npg_arena_take(&m->arena, count, sizeof *m->outside);
+    npg_status status = npg_arena_status(&m->arena);
     for (size_t i = 0; i < count && !status; i++) m->near[i] = INFINITY;
     if (!status) add_points(m, points, n);
     if (!status && n) status = find_outside(m);
@@ -160,8 +163,7 @@ npg_status npg_depth_map_open(npg_depth_map **out, const float sensor[3], const 
 void npg_depth_map_close(npg_depth_map **map)
 {
     if (!map || !*map) return;
-    npg_release(&(*map)->near);
-    npg_release(&(*map)->outside);
+    npg_arena_release(&(*map)->arena);
     npg_release(map);
 }
 

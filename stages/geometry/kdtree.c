@@ -540,6 +540,25 @@ npg_status npg_kdtree_nearest(const npg_kdtree *tree, uint32_t *index, float *di
     return npg_parallel(nearest_share, &s, s.parts);
 }
 
+npg_status npg_points_nearest(uint32_t *index, float *dist_sq, const float *points, size_t point_count,
+                              const float *queries, size_t query_count, size_t k)
+{
+    npg_kdtree *tree;
+    NPG_TRY(npg_kdtree_open(&tree, points, point_count));
+    npg_status status = npg_kdtree_nearest(tree, index, dist_sq, queries, query_count, k, 0);
+    npg_kdtree_close(&tree);
+    return status;
+}
+
+npg_status npg_neighbours_take(npg_neighbours *out, npg_arena *arena, const float *points, size_t point_count,
+                               const float *queries, size_t query_count, size_t k)
+{
+    out->index = npg_arena_take(arena, query_count, k * sizeof *out->index);
+    out->dist_sq = npg_arena_take(arena, query_count, k * sizeof *out->dist_sq);
+    NPG_TRY(npg_arena_status(arena));
+    return npg_points_nearest(out->index, out->dist_sq, points, point_count, queries, query_count, k);
+}
+
 NPG_WIDE static void search_count(const search *s, size_t first, size_t end)
 {
     float dist_sq[LANES];

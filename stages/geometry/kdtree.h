@@ -7,7 +7,7 @@
 #ifndef NPG_KDTREE_H
 #define NPG_KDTREE_H
 
-#include "pipeline/status.h"
+#include "pipeline/memory.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -29,6 +29,18 @@ size_t npg_kdtree_memory(size_t point_count);
  * threads (0: one per core); the result does not depend on it.  NPG_MEMORY. */
 npg_status npg_kdtree_nearest(const npg_kdtree *tree, uint32_t *index, float *dist_sq, const float *queries,
                               size_t query_count, size_t k, int threads);
+
+/* The k nearest of N points (N x 3) of each query, by a tree that lives no longer than the call, on all cores. */
+npg_status npg_points_nearest(uint32_t *index, float *dist_sq, const float *points, size_t point_count,
+                              const float *queries, size_t query_count, size_t k);
+
+/* The same in arrays of the arena's, M x k each; fails as well where an earlier take from it was refused. */
+typedef struct npg_neighbours {
+    uint32_t *index;
+    float *dist_sq;
+} npg_neighbours;
+npg_status npg_neighbours_take(npg_neighbours *out, npg_arena *arena, const float *points, size_t point_count,
+                               const float *queries, size_t query_count, size_t k);
 
 /* The number of points within a radius of each query, counted up to `enough` (0: all). */
 npg_status npg_kdtree_count(const npg_kdtree *tree, uint32_t *count, const float *queries, size_t query_count,

@@ -27,6 +27,15 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
     }
 }
 
+npg_status npg_mesh_make_normals(npg_mesh *mesh)
+{
+    npg_release(&mesh->vert_normals);
+    NPG_TRY(npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
+    npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
+                            mesh->face_count);
+    return NPG_OK;
+}
+
 /* A directed edge of a face, ordered by its undirected key. */
 typedef struct half_edge {
     uint32_t lo, hi, at; /* at: the number of its corner, 3 f + k */
@@ -233,12 +242,13 @@ npg_status npg_mesh_border(uint8_t *is_border, bool *found, const npg_mesh *mesh
 /* Border loops: components of the border's edges, each taken as a face with two equal corners. */
 static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
 {
-    uint32_t *twin = NULL, *flat = NULL, *component = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     size_t count = 0, pieces, n = mesh->vert_count;
+    uint32_t *twin = npg_arena_take(&scratch, mesh->face_count, 3 * sizeof *twin);
+    uint32_t *flat = npg_arena_take(&scratch, 3 * mesh->face_count, 3 * sizeof *flat);
+    uint32_t *component = npg_arena_take(&scratch, n, sizeof *component);
     *loops = 0;
-    npg_status status = npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin);
-    if (!status) status = npg_alloc_array(&flat, NPG_FOR_MESH, 3 * mesh->face_count, 3 * sizeof *flat);
-    if (!status) status = npg_alloc_array(&component, NPG_FOR_MESH, n, sizeof *component);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = npg_mesh_twins(twin, mesh->faces, mesh->face_count);
     for (size_t i = 0; i < 3 * mesh->face_count && !status; i++) {
         if (twin[i] != UINT32_MAX) continue;
@@ -248,8 +258,16 @@ static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
     if (!status) status = npg_mesh_components(component, &pieces, n, flat, count);
     /* every vertex off the border is a component of its own */
     if (!status) *loops = pieces + count_distinct(flat, 3 * count, component, n) - n;
-    npg_release(&twin);
-    npg_release(&flat);
+    npg_arena_release(&scratch);
+    return status;
+}
+
+npg_status npg_mesh_count_components(size_t *count, const npg_mesh *mesh)
+{
+    uint32_t *component;
+    NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
+    npg_status status =
+        npg_mesh_components(component, count, mesh->vert_count, mesh->faces, mesh->face_count);
     npg_release(&component);
     return status;
 }
@@ -257,15 +275,10 @@ static npg_status count_border_loops(size_t *loops, const npg_mesh *mesh)
 npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh)
 {
     npg_manifold manifold;
-    uint32_t *component;
     size_t components, loops;
     NPG_TRY(npg_mesh_manifold(&manifold, mesh));
     NPG_TRY(count_border_loops(&loops, mesh));
-    NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component));
-    npg_status status =
-        npg_mesh_components(component, &components, mesh->vert_count, mesh->faces, mesh->face_count);
-    npg_release(&component);
-    NPG_TRY(status);
+    NPG_TRY(npg_mesh_count_components(&components, mesh));
     int64_t unused = (int64_t)manifold.unused_vertices;
     int64_t euler =
         (int64_t)mesh->vert_count - unused - (int64_t)manifold.edge_count + (int64_t)mesh->face_count;

@@ -9,6 +9,9 @@
 void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
                              size_t face_count);
 
+/* Give a mesh new vertex normals, of these.  NPG_MEMORY. */
+npg_status npg_mesh_make_normals(npg_mesh *mesh);
+
 /* The E distinct undirected edges as vertex pairs (lower index first), sorted; *edges
  * is owned by the caller. */
 npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces,
@@ -44,6 +47,9 @@ static inline bool npg_hit_on_border(const npg_surface_hit *hit, const uint32_t 
  * without a face are components of their own. */
 npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, size_t vert_count,
                                const uint32_t *faces, size_t face_count);
+
+/* How many those are. */
+npg_status npg_mesh_count_components(size_t *count, const npg_mesh *mesh);
 
 /* Area of one face, and signed volume and area of all (positive volume: faces look outward). */
 double npg_face_area(const float *vert_pos, const uint32_t face[3]);

@@ -65,38 +65,26 @@ npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const 
 /* One side of a comparison. */
 typedef struct side {
     size_t count;
-    const float *pos, *normals; /* loans; normals may be NULL */
-    float *own_pos, *own_normals;
-    uint32_t *nearest; /* of the other side */
+    const float *pos, *normals; /* normals may be NULL */
+    uint32_t *nearest;          /* of the other side   */
     float *dist_sq;
 } side;
 
-static void close_side(side *s)
+static npg_status open_side(side *s, npg_arena *arena, const npg_mesh *mesh,
+                            const npg_metrics_settings *settings, uint64_t frame, uint64_t purpose)
 {
-    npg_release(&s->own_pos);
-    npg_release(&s->own_normals);
-    npg_release(&s->nearest);
-    npg_release(&s->dist_sq);
-}
-
-static npg_status open_side(side *s, const npg_mesh *mesh, const npg_metrics_settings *settings,
-                            uint64_t frame, uint64_t purpose)
-{
-    *s = (side){.count = mesh->face_count ? settings->sample_count : mesh->vert_count};
-    if (!s->count) return npg_error(NPG_BAD_INPUT, "the ground truth has no points");
-    if (mesh->face_count) {
-        NPG_TRY(npg_alloc_array(&s->own_pos, NPG_FOR_QUERY, s->count, 3 * sizeof(float)));
-        NPG_TRY(npg_alloc_array(&s->own_normals, NPG_FOR_QUERY, s->count, 3 * sizeof(float)));
-        NPG_TRY(npg_mesh_sample(s->own_pos, s->own_normals, NULL, mesh, s->count, settings->seed, frame,
-                                purpose));
-        s->pos = s->own_pos;
-        s->normals = s->own_normals;
-    } else {
-        s->pos = mesh->vert_pos;
-        s->normals = mesh->vert_normals;
-    }
-    NPG_TRY(npg_alloc_array(&s->nearest, NPG_FOR_QUERY, s->count, sizeof *s->nearest));
-    return npg_alloc_array(&s->dist_sq, NPG_FOR_QUERY, s->count, sizeof *s->dist_sq);
+    size_t n = mesh->face_count ? settings->sample_count : mesh->vert_count;
+    if (!n) return npg_error(NPG_BAD_INPUT, "the ground truth has no points");
+    *s = (side){.count = n, .pos = mesh->vert_pos, .normals = mesh->vert_normals};
+    s->nearest = npg_arena_take(arena, n, sizeof *s->nearest);
+    s->dist_sq = npg_arena_take(arena, n, sizeof *s->dist_sq);
+    if (!mesh->face_count) return npg_arena_status(arena);
+    float *pos = npg_arena_take(arena, n, 3 * sizeof *pos);
+    float *normals = npg_arena_take(arena, n, 3 * sizeof *normals);
+    s->pos = pos;
+    s->normals = normals;
+    NPG_TRY(npg_arena_status(arena));
+    return npg_mesh_sample(pos, normals, NULL, mesh, n, settings->seed, frame, purpose);
 }
 
 static npg_status find_nearest(side *from, const side *to, int threads)
@@ -154,29 +142,27 @@ static void measure(npg_frame_metrics *out, const side *predicted, const side *t
 npg_status npg_metrics_compare(npg_frame_metrics *out, const npg_mesh *predicted, const npg_mesh *truth,
                                const npg_metrics_settings *settings, uint64_t frame)
 {
-    side a = {0}, b = {0};
+    npg_arena scratch = {.purpose = NPG_FOR_QUERY};
+    side a, b;
     NPG_REQUIRE(settings->diagonal > 0 && settings->sample_count > 0 && predicted->face_count > 0);
-    npg_status status = open_side(&a, predicted, settings, frame, SIDE_PREDICTED);
-    if (!status) status = open_side(&b, truth, settings, frame, SIDE_TRUTH);
+    npg_status status = open_side(&a, &scratch, predicted, settings, frame, SIDE_PREDICTED);
+    if (!status) status = open_side(&b, &scratch, truth, settings, frame, SIDE_TRUTH);
     if (!status) status = find_nearest(&a, &b, settings->threads);
     if (!status) status = find_nearest(&b, &a, settings->threads);
     if (!status) measure(out, &a, &b, settings);
-    close_side(&a);
-    close_side(&b);
+    npg_arena_release(&scratch);
     return status;
 }
 
 npg_status npg_metrics_tie(uint32_t **truth_of, const npg_mesh *predicted, const npg_mesh *truth)
 {
-    npg_kdtree *tree = NULL;
     float *dist_sq = NULL;
-    npg_status status = npg_alloc_array(truth_of, NPG_FOR_QUERY, predicted->vert_count, sizeof **truth_of);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, predicted->vert_count, sizeof *dist_sq);
-    if (!status) status = npg_kdtree_open(&tree, truth->vert_pos, truth->vert_count);
+    size_t v = predicted->vert_count;
+    npg_status status = npg_alloc_array(truth_of, NPG_FOR_QUERY, v, sizeof **truth_of);
+    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, v, sizeof *dist_sq);
     if (!status)
-        status =
-            npg_kdtree_nearest(tree, *truth_of, dist_sq, predicted->vert_pos, predicted->vert_count, 1, 0);
-    npg_kdtree_close(&tree);
+        status = npg_points_nearest(*truth_of, dist_sq, truth->vert_pos, truth->vert_count,
+                                    predicted->vert_pos, v, 1);
     npg_release(&dist_sq);
     if (status) npg_release(truth_of);
     return status;

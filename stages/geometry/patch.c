@@ -48,12 +48,13 @@ static double farthest(const float at[3], uint32_t *parents, size_t root, const 
 npg_status npg_patch_largest(npg_patch *patch, const uint8_t *is_marked, const float *vert_pos,
                              const double *vert_areas, const npg_mesh *mesh)
 {
-    uint32_t *parents = NULL;
-    double *sums = NULL, whole;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     size_t v = mesh->vert_count, best = v;
+    double whole;
+    uint32_t *parents = npg_arena_take(&scratch, v, sizeof *parents);
+    double *sums = npg_arena_take(&scratch, v, 4 * sizeof *sums);
     *patch = (npg_patch){0, {NAN, NAN, NAN}, 0};
-    npg_status status = npg_alloc_array(&parents, NPG_FOR_MESH, v, sizeof *parents);
-    if (!status) status = npg_alloc_array(&sums, NPG_FOR_MESH, v, 4 * sizeof *sums);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) {
         join_marked(parents, is_marked, mesh);
         best = sum_sets(sums, &whole, parents, is_marked, vert_pos, vert_areas, v);
@@ -63,7 +64,6 @@ npg_status npg_patch_largest(npg_patch *patch, const uint8_t *is_marked, const f
         for (size_t a = 0; a < 3; a++) patch->at[a] = (float)(sums[4 * best + 1 + a] / sums[4 * best]);
         patch->radius = farthest(patch->at, parents, best, is_marked, vert_pos, v);
     }
-    npg_release(&parents);
-    npg_release(&sums);
+    npg_arena_release(&scratch);
     return status;
 }

@@ -258,6 +258,16 @@ npg_status npg_surface_closest(const npg_surface *surface, npg_surface_hit *hits
     return npg_surface_closest_near(surface, hits, points, point_count, NULL, NULL, 1);
 }
 
+npg_status npg_mesh_closest(npg_surface_hit *hits, const npg_mesh *mesh, const float *points,
+                            size_t point_count)
+{
+    npg_surface *surface;
+    NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
+    npg_status status = npg_surface_closest_near(surface, hits, points, point_count, NULL, NULL, 0);
+    npg_surface_close(&surface);
+    return status;
+}
+
 /* ---- rays ---- */
 
 static void cast_ray(const job *j, size_t i)

@@ -8,7 +8,7 @@
 
 #include <stdbool.h>
 
-#include "pipeline/status.h"
+#include "pipeline/mesh.h"
 
 /* The closest surface point (closest face: the smallest squared distance as float, ties to the lower face
  * index).  hits[i] for points[i] (N x 3).  start_face (N, or NULL) names a face that is likely near; the
@@ -18,6 +18,10 @@
 npg_status npg_surface_closest_near(const npg_surface *surface, npg_surface_hit *hits, const float *points,
                                     size_t point_count, const uint32_t *start_face, const float *start_dist,
                                     int threads);
+
+/* The same of a mesh as it lies, without hints, on all cores. */
+npg_status npg_mesh_closest(npg_surface_hit *hits, const npg_mesh *mesh, const float *points,
+                            size_t point_count);
 
 typedef struct npg_ray {
     float origin[3], direction[3]; /* any length; t is measured in lengths of the direction */

@@ -59,54 +59,50 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
 
 static npg_status measure_pushes(float *push, const npg_apart *apart)
 {
-    npg_kdtree *tree = NULL;
-    float *dist_sq = NULL, *smoothed = NULL;
-    uint32_t *near = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_neighbours near;
     const float *points = apart->points, *normals = apart->normals;
     size_t n = apart->count;
-    npg_status status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof(float));
-    if (!status) status = npg_alloc_array(&near, NPG_FOR_MESH, n, NEIGHBOURS * sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&smoothed, NPG_FOR_MESH, n, sizeof(float));
-    if (!status) status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, points, n, NEIGHBOURS, 0);
+    float *smoothed = npg_arena_take(&scratch, n, sizeof *smoothed);
+    npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NEIGHBOURS);
     for (size_t i = 0; i < n && !status; i++)
-        push[i] = push_of(i, near + NEIGHBOURS * i, dist_sq + NEIGHBOURS * i, points, normals, n,
+        push[i] = push_of(i, near.index + NEIGHBOURS * i, near.dist_sq + NEIGHBOURS * i, points, normals, n,
                           manners[apart->way].wide * apart->spacing);
     for (int round = 0; round < SMOOTH_ROUNDS && !status; round++) {
-        smooth(smoothed, push, near, normals, n);
+        smooth(smoothed, push, near.index, normals, n);
         memcpy(push, smoothed, n * sizeof(float));
     }
-    npg_kdtree_close(&tree);
-    npg_release(&dist_sq);
-    npg_release(&near);
-    npg_release(&smoothed);
+    npg_arena_release(&scratch);
     return status;
 }
 
 npg_status npg_apart_open(npg_apart *apart, const float *points, const float *normals, size_t n,
                           double spacing, npg_apart_way way)
 {
-    float *push = NULL;
     NPG_REQUIRE(n && spacing > 0 && way != NPG_APART_NOT);
-    *apart = (npg_apart){.points = points, .normals = normals, .count = n, .spacing = spacing, .way = way};
-    npg_status status = npg_alloc_array(&apart->shift, NPG_FOR_MESH, n, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&apart->shifted, NPG_FOR_MESH, n, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&push, NPG_FOR_MESH, n, sizeof(float));
+    *apart = (npg_apart){.points = points,
+                         .normals = normals,
+                         .count = n,
+                         .spacing = spacing,
+                         .way = way,
+                         .arena.purpose = NPG_FOR_MESH};
+    float *push = npg_arena_take(&apart->arena, n, sizeof *push);
+    apart->shift = npg_arena_take(&apart->arena, n, 3 * sizeof *apart->shift);
+    apart->shifted = npg_arena_take(&apart->arena, n, 3 * sizeof *apart->shifted);
+    npg_status status = npg_arena_status(&apart->arena);
     if (!status) status = measure_pushes(push, apart);
-    for (size_t i = 0; i < n && !status; i++) apart->moved += push[i] > 0;
     for (size_t i = 0; i < 3 * n && !status; i++) {
+        apart->moved += i % 3 == 0 && push[i / 3] > 0;
         apart->shift[i] = -push[i / 3] * normals[i];
         apart->shifted[i] = points[i] + apart->shift[i];
     }
-    npg_release(&push);
     if (status) npg_apart_close(apart);
     return status;
 }
 
 void npg_apart_close(npg_apart *apart)
 {
-    npg_release(&apart->shift);
-    npg_release(&apart->shifted);
+    npg_arena_release(&apart->arena);
 }
 
 /* ---- back ---- */
@@ -121,9 +117,9 @@ typedef struct around {
 typedef struct way_back {
     const npg_apart *apart;
     npg_mesh *mesh;
-    around *of;            /* V, owned */
-    npg_surface_hit *hits; /* N, owned */
-    float *gaps;           /* N x 3, owned: from the surface to each point, along its normal */
+    around *of;            /* V */
+    npg_surface_hit *hits; /* N */
+    float *gaps;           /* N x 3: from the surface to each point, along its normal */
 } way_back;
 
 static void choose_around(around *to, const float *vert_normal, const uint32_t *near, const float *dist_sq,
@@ -141,23 +137,18 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
 
 static npg_status find_around(way_back *w)
 {
-    npg_kdtree *tree = NULL;
-    float *dist_sq = NULL, *normals = NULL;
-    uint32_t *near = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_neighbours near;
     const npg_mesh *m = w->mesh;
     size_t v = m->vert_count;
-    npg_status status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, v, BACK_AMONG * sizeof(float));
-    if (!status) status = npg_alloc_array(&near, NPG_FOR_MESH, v, BACK_AMONG * sizeof(uint32_t));
-    if (!status) status = npg_alloc_array(&normals, NPG_FOR_MESH, v, 3 * sizeof(float));
-    if (!status) status = npg_kdtree_open(&tree, w->apart->shifted, w->apart->count);
-    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, m->vert_pos, v, BACK_AMONG, 0);
+    float *normals = npg_arena_take(&scratch, v, 3 * sizeof *normals);
+    npg_status status =
+        npg_neighbours_take(&near, &scratch, w->apart->shifted, w->apart->count, m->vert_pos, v, BACK_AMONG);
     if (!status) npg_mesh_vertex_normals(normals, m->vert_pos, v, m->faces, m->face_count);
     for (size_t i = 0; i < v && !status; i++)
-        choose_around(&w->of[i], normals + 3 * i, near + BACK_AMONG * i, dist_sq + BACK_AMONG * i, w->apart);
-    npg_kdtree_close(&tree);
-    npg_release(&dist_sq);
-    npg_release(&near);
-    npg_release(&normals);
+        choose_around(&w->of[i], normals + 3 * i, near.index + BACK_AMONG * i, near.dist_sq + BACK_AMONG * i,
+                      w->apart);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -190,12 +181,8 @@ static npg_status measure_gaps(way_back *w)
 {
     const npg_mesh *m = w->mesh;
     const npg_apart *apart = w->apart;
-    npg_surface *surface;
-    NPG_TRY(npg_surface_open(&surface, m->vert_pos, m->vert_count, m->faces, m->face_count));
-    npg_status status =
-        npg_surface_closest_near(surface, w->hits, apart->points, apart->count, NULL, NULL, 0);
-    npg_surface_close(&surface);
-    for (size_t i = 0; i < apart->count && !status; i++) {
+    NPG_TRY(npg_mesh_closest(w->hits, m, apart->points, apart->count));
+    for (size_t i = 0; i < apart->count; i++) {
         const npg_surface_hit *hit = &w->hits[i];
         const uint32_t *corner = m->faces + 3 * (size_t)hit->face;
         const float *point = apart->points + 3 * i, *normal = apart->normals + 3 * i;
@@ -208,25 +195,24 @@ static npg_status measure_gaps(way_back *w)
         bool is_of_it = (double)hit->dist_sq < apart->spacing * apart->spacing;
         for (size_t a = 0; a < 3; a++) w->gaps[3 * i + a] = is_of_it ? along * normal[a] : 0;
     }
-    return status;
+    return NPG_OK;
 }
 
 npg_status npg_apart_bring_back(const npg_apart *apart, npg_mesh *mesh)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     way_back w = {.apart = apart, .mesh = mesh};
-    size_t n = apart->count;
     if (!apart->moved) return NPG_OK;
-    npg_status status = npg_alloc_array(&w.of, NPG_FOR_MESH, mesh->vert_count, sizeof *w.of);
-    if (!status) status = npg_alloc_array(&w.hits, NPG_FOR_MESH, n, sizeof *w.hits);
-    if (!status) status = npg_alloc_array(&w.gaps, NPG_FOR_MESH, n, 3 * sizeof(float));
+    w.of = npg_arena_take(&scratch, mesh->vert_count, sizeof *w.of);
+    w.hits = npg_arena_take(&scratch, apart->count, sizeof *w.hits);
+    w.gaps = npg_arena_take(&scratch, apart->count, 3 * sizeof *w.gaps);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = find_around(&w);
     if (!status) move(&w, apart->shift, -1);
     for (int round = 0; round < manners[apart->way].rounds && !status; round++) {
         status = measure_gaps(&w);
         if (!status) move(&w, w.gaps, 1);
     }
-    npg_release(&w.of);
-    npg_release(&w.hits);
-    npg_release(&w.gaps);
+    npg_arena_release(&scratch);
     return status;
 }

@@ -26,8 +26,9 @@ typedef struct npg_apart {
     size_t count;                  /* N                                                   */
     double spacing;                /* h, as npg_cloud_spacing() gives it                  */
     npg_apart_way way;             /* tight or loose                                      */
-    float *shift, *shifted;        /* N x 3, owned: how far each point goes, and to where */
+    float *shift, *shifted;        /* N x 3: how far each point goes, and to where        */
     size_t moved;                  /* points that go at all                               */
+    npg_arena arena;
 } npg_apart;
 
 /* NPG_MEMORY. */

@@ -6,7 +6,6 @@
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
-#include "pipeline/memory.h"
 
 #define POINTS_MOST 5000
 #define NEIGHBOURS  24
@@ -45,24 +44,17 @@ static size_t count_facing(const float *p, const float *n, const uint32_t *near,
 
 npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count)
 {
-    npg_kdtree *tree = NULL;
-    float *p = NULL, *n = NULL, *dist_sq = NULL;
-    uint32_t *near = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_QUERY};
+    npg_neighbours near;
     size_t count = point_count < POINTS_MOST ? point_count : POINTS_MOST;
     *share = 0;
     NPG_REQUIRE(count);
-    npg_status status = npg_alloc_array(&p, NPG_FOR_QUERY, count, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&n, NPG_FOR_QUERY, count, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(float));
-    if (!status) status = npg_alloc_array(&near, NPG_FOR_QUERY, count, NEIGHBOURS * sizeof(uint32_t));
+    float *p = npg_arena_take(&scratch, count, 3 * sizeof *p);
+    float *n = npg_arena_take(&scratch, count, 3 * sizeof *n);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) npg_points_spread(p, n, count, points, normals, point_count);
-    if (!status) status = npg_kdtree_open(&tree, p, count);
-    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, p, count, NEIGHBOURS, 0);
-    if (!status) *share = (double)count_facing(p, n, near, count) / (double)count;
-    npg_kdtree_close(&tree);
-    npg_release(&p);
-    npg_release(&n);
-    npg_release(&dist_sq);
-    npg_release(&near);
+    if (!status) status = npg_neighbours_take(&near, &scratch, p, count, p, count, NEIGHBOURS);
+    if (!status) *share = (double)count_facing(p, n, near.index, count) / (double)count;
+    npg_arena_release(&scratch);
     return status;
 }

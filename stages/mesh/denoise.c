@@ -81,21 +81,21 @@ static double noise_of(double *near, double *wide, size_t count)
 
 npg_status npg_cloud_noise(double *sigma, const float *points, const float *normals, size_t n)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
     npg_kdtree *tree = NULL;
-    double *near = NULL, *wide = NULL;
     size_t asked = n < ASKED_MAX ? n : ASKED_MAX, count = 0;
     *sigma = 0;
     if (n < WIDE) return NPG_OK;
-    npg_status status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_alloc_array(&near, NPG_FOR_FRAMES, asked, sizeof *near);
-    if (!status) status = npg_alloc_array(&wide, NPG_FOR_FRAMES, asked, sizeof *wide);
+    double *near = npg_arena_take(&scratch, asked, sizeof *near);
+    double *wide = npg_arena_take(&scratch, asked, sizeof *wide);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_kdtree_open(&tree, points, n);
     if (!status) status = measure_residuals(near, wide, &count, asked, tree, points, normals, n);
     if (!status && (double)count < FLAT_LEAST * (double)asked)
         status = measure_residuals(near, wide, &count, asked, tree, points, NULL, n);
     if (!status) *sigma = noise_of(near, wide, count);
     npg_kdtree_close(&tree);
-    npg_release(&near);
-    npg_release(&wide);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -174,15 +174,15 @@ static void fit(float *out_point, float *out_normal, size_t i, const float *poin
 
 npg_status npg_cloud_smooth(float *points, float *normals, size_t n, int neighbours)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
     npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL, *new_points = NULL, *new_normals = NULL;
     size_t k = (size_t)neighbours < n ? (size_t)neighbours : n;
-    npg_status status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_FRAMES, BATCH, k * sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_FRAMES, BATCH, k * sizeof *dist_sq);
-    if (!status) status = npg_alloc_array(&new_points, NPG_FOR_FRAMES, n, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&new_normals, NPG_FOR_FRAMES, n, 3 * sizeof(float));
+    uint32_t *index = npg_arena_take(&scratch, BATCH, k * sizeof *index);
+    float *dist_sq = npg_arena_take(&scratch, BATCH, k * sizeof *dist_sq);
+    float *new_points = npg_arena_take(&scratch, n, 3 * sizeof *new_points);
+    float *new_normals = npg_arena_take(&scratch, n, 3 * sizeof *new_normals);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_kdtree_open(&tree, points, n);
     for (size_t first = 0; first < n && !status; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
         status = npg_kdtree_nearest(tree, index, dist_sq, points + 3 * first, count, k, 0);
@@ -193,9 +193,6 @@ npg_status npg_cloud_smooth(float *points, float *normals, size_t n, int neighbo
     if (!status) memcpy(points, new_points, n * 3 * sizeof *points);
     if (!status) memcpy(normals, new_normals, n * 3 * sizeof *normals);
     npg_kdtree_close(&tree);
-    npg_release(&index);
-    npg_release(&dist_sq);
-    npg_release(&new_points);
-    npg_release(&new_normals);
+    npg_arena_release(&scratch);
     return status;
 }

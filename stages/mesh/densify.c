@@ -105,17 +105,13 @@ static npg_status add_middles(float **dense_points, float **dense_normals, const
 npg_status npg_cloud_densify(float **dense_points, float **dense_normals, size_t *dense_count,
                              const float *points, const float *normals, size_t count, double spacing)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *near = NULL, (*edges)[2] = NULL;
-    float *dist_sq = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_neighbours near;
     size_t edge_count = 0;
     *dense_points = *dense_normals = NULL;
-    npg_status status = npg_alloc_array(&near, NPG_FOR_MESH, count, NEAR * sizeof *near);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, count, NEAR * sizeof *dist_sq);
-    if (!status) status = npg_alloc_array(&edges, NPG_FOR_MESH, count, PAIRS * sizeof *edges);
-    if (!status) status = npg_kdtree_open(&tree, points, count);
-    if (!status) status = npg_kdtree_nearest(tree, near, dist_sq, points, count, NEAR, 0);
-    if (!status) edge_count = find_edges(edges, points, normals, count, near, dist_sq, spacing);
+    uint32_t(*edges)[2] = npg_arena_take(&scratch, count, PAIRS * sizeof *edges);
+    npg_status status = npg_neighbours_take(&near, &scratch, points, count, points, count, NEAR);
+    if (!status) edge_count = find_edges(edges, points, normals, count, near.index, near.dist_sq, spacing);
     if (!status)
         status = add_middles(dense_points, dense_normals, points, normals, count, (const uint32_t(*)[2])edges,
                              edge_count);
@@ -124,9 +120,6 @@ npg_status npg_cloud_densify(float **dense_points, float **dense_normals, size_t
         npg_release(dense_points);
         npg_release(dense_normals);
     }
-    npg_kdtree_close(&tree);
-    npg_release(&near);
-    npg_release(&dist_sq);
-    npg_release(&edges);
+    npg_arena_release(&scratch);
     return status;
 }

@@ -55,9 +55,9 @@ static size_t reach(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r,
 typedef struct moving {
     npg_mesh *mesh;
     npg_mesh_neighbours r;
-    uint8_t *kind;             /* V, owned */
+    uint8_t *kind;             /* V */
     const npg_cube_set *empty; /* or NULL */
-    float *normals;            /* V x 3, where there is an empty space; owned */
+    float *normals;            /* V x 3, where there is an empty space */
 } moving;
 
 /* A vertex in empty space goes inward, out of it; how far. */
@@ -110,23 +110,22 @@ static npg_status find_unseen(uint8_t *kind, size_t *unseen, const npg_mesh *mes
 npg_status npg_mesh_flatten(npg_mesh *mesh, npg_flattened *done, const float *points, size_t point_count,
                             double seen_dist, const npg_cube_set *empty)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     moving m = {.mesh = mesh, .empty = empty};
-    uint32_t *ends = NULL;
     size_t n = mesh->vert_count, unseen = 0;
     *done = (npg_flattened){0};
-    npg_status status = npg_alloc_array(&m.kind, NPG_FOR_MESH, n, sizeof *m.kind);
+    m.kind = npg_arena_take(&scratch, n, sizeof *m.kind);
+    m.normals = npg_arena_take(&scratch, empty ? n : 0, 3 * sizeof *m.normals);
+    uint32_t *ends = npg_arena_take(&scratch, n, sizeof *ends);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = find_unseen(m.kind, &unseen, mesh, points, point_count, seen_dist);
     if (!status && unseen) status = npg_mesh_neighbours_open(&m.r, mesh);
-    if (!status && unseen) status = npg_alloc_array(&ends, NPG_FOR_MESH, n, sizeof *ends);
-    if (!status && empty) status = npg_alloc_array(&m.normals, NPG_FOR_MESH, n, 3 * sizeof *m.normals);
     if (!status && unseen) done->moved = reach(m.kind, ends, &m.r, n);
     if (done->moved) sweep(&m, SWEEPS_MOST, false);
     if (done->moved && empty) push_out(&m);
     for (size_t v = 0; v < n && done->moved; v++) done->pushed += m.kind[v] == PUSHED;
     npg_mesh_neighbours_close(&m.r);
-    npg_release(&ends);
-    npg_release(&m.normals);
-    npg_release(&m.kind);
+    npg_arena_release(&scratch);
     return status;
 }
 

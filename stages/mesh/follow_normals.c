@@ -16,41 +16,15 @@
 #define WEIGHT_MIN 1e-3 /* of all points that a face asks: below, it has none near it   */
 
 typedef struct work {
-    npg_mesh *mesh;         /* loan                                       */
+    npg_mesh *mesh; /* loan                                       */
+    npg_arena arena;
     float *centres;         /* F x 3                                      */
-    uint32_t *index;        /* F x NEAR                                   */
-    float *dist_sq;         /* F x NEAR                                   */
+    npg_neighbours near;    /* F x NEAR                                   */
     double *targets;        /* F x 3                                      */
     double *sums, *moved;   /* V x 3 each; moved: since the start         */
     double *smooth;         /* V x 3                                      */
     uint32_t *faces_around; /* V: how many                                */
 } work;
-
-static npg_status open_work(work *w, npg_mesh *mesh)
-{
-    size_t v = mesh->vert_count, f = mesh->face_count;
-    w->mesh = mesh;
-    NPG_TRY(npg_alloc_array(&w->centres, NPG_FOR_MESH, f, 3 * sizeof *w->centres));
-    NPG_TRY(npg_alloc_array(&w->index, NPG_FOR_MESH, f, NEAR * sizeof *w->index));
-    NPG_TRY(npg_alloc_array(&w->dist_sq, NPG_FOR_MESH, f, NEAR * sizeof *w->dist_sq));
-    NPG_TRY(npg_alloc_array(&w->targets, NPG_FOR_MESH, f, 3 * sizeof *w->targets));
-    NPG_TRY(npg_alloc_array(&w->sums, NPG_FOR_MESH, v, 3 * sizeof *w->sums));
-    NPG_TRY(npg_alloc_array(&w->moved, NPG_FOR_MESH, v, 3 * sizeof *w->moved));
-    NPG_TRY(npg_alloc_array(&w->smooth, NPG_FOR_MESH, v, 3 * sizeof *w->smooth));
-    return npg_alloc_array(&w->faces_around, NPG_FOR_MESH, v, sizeof *w->faces_around);
-}
-
-static void close_work(work *w)
-{
-    npg_release(&w->centres);
-    npg_release(&w->index);
-    npg_release(&w->dist_sq);
-    npg_release(&w->targets);
-    npg_release(&w->sums);
-    npg_release(&w->moved);
-    npg_release(&w->smooth);
-    npg_release(&w->faces_around);
-}
 
 /* Centres of all faces and the mean length of their edges. */
 static double place_centres(work *w)
@@ -74,11 +48,11 @@ static void set_target(work *w, size_t f, const float *normals, double width)
 {
     double own[3], sum[3] = {0}, weights = 0, *target = w->targets + 3 * f;
     npg_face_normal(own, w->mesh->vert_pos, w->mesh->faces + 3 * f);
-    for (size_t i = NEAR * f; i < NEAR * (f + 1) && w->index[i] != UINT32_MAX; i++) {
-        const float *n = normals + 3 * (size_t)w->index[i];
+    for (size_t i = NEAR * f; i < NEAR * (f + 1) && w->near.index[i] != UINT32_MAX; i++) {
+        const float *n = normals + 3 * (size_t)w->near.index[i];
         double facing = own[0] * (double)n[0] + own[1] * (double)n[1] + own[2] * (double)n[2];
         if (!(facing > 0)) continue;
-        double weight = facing * facing * exp(-(double)w->dist_sq[i] / (2 * width * width));
+        double weight = facing * facing * exp(-(double)w->near.dist_sq[i] / (2 * width * width));
         for (int a = 0; a < 3; a++) sum[a] += weight * (double)n[a];
         weights += weight;
     }
@@ -88,14 +62,11 @@ static void set_target(work *w, size_t f, const float *normals, double width)
 
 static npg_status set_targets(work *w, const float *points, const float *normals, size_t point_count)
 {
-    npg_kdtree *tree;
+    size_t face_count = w->mesh->face_count;
     double width = WIDTH * place_centres(w);
-    NPG_TRY(npg_kdtree_open(&tree, points, point_count));
-    npg_status status =
-        npg_kdtree_nearest(tree, w->index, w->dist_sq, w->centres, w->mesh->face_count, NEAR, 0);
-    for (size_t f = 0; f < w->mesh->face_count && !status; f++) set_target(w, f, normals, width);
-    npg_kdtree_close(&tree);
-    return status;
+    NPG_TRY(npg_neighbours_take(&w->near, &w->arena, points, point_count, w->centres, face_count, NEAR));
+    for (size_t f = 0; f < face_count; f++) set_target(w, f, normals, width);
+    return NPG_OK;
 }
 
 /* What a face asks of its vertices, onto their sums: to lie in the plane through its centre across its
@@ -158,12 +129,19 @@ static void take_back(work *w)
 npg_status npg_mesh_follow_normals(npg_mesh *mesh, const float *points, const float *normals,
                                    size_t point_count)
 {
-    work w = {0};
-    if (!mesh->face_count) return NPG_OK;
-    npg_status status = open_work(&w, mesh);
+    size_t v = mesh->vert_count, f = mesh->face_count;
+    work w = {.mesh = mesh, .arena.purpose = NPG_FOR_MESH};
+    if (!f) return NPG_OK;
+    w.centres = npg_arena_take(&w.arena, f, 3 * sizeof *w.centres);
+    w.targets = npg_arena_take(&w.arena, f, 3 * sizeof *w.targets);
+    w.sums = npg_arena_take(&w.arena, v, 3 * sizeof *w.sums);
+    w.moved = npg_arena_take(&w.arena, v, 3 * sizeof *w.moved);
+    w.smooth = npg_arena_take(&w.arena, v, 3 * sizeof *w.smooth);
+    w.faces_around = npg_arena_take(&w.arena, v, sizeof *w.faces_around);
+    npg_status status = npg_arena_status(&w.arena);
     if (!status) status = set_targets(&w, points, normals, point_count);
     for (int i = 0; i < STEPS && !status; i++) step(&w);
     if (!status) take_back(&w);
-    close_work(&w);
+    npg_arena_release(&w.arena);
     return status;
 }

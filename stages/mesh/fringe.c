@@ -1,7 +1,6 @@
 /* Fringe: distances to the border, then to what is far from it. */
 #include "mesh/fringe.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
@@ -11,17 +10,11 @@
 
 typedef struct fringe {
     const npg_mesh *mesh;
+    npg_arena arena;
     uint8_t *is_border; /* V */
     float *places;      /* V x 3: those that distances are taken to */
     float *dist;        /* V */
 } fringe;
-
-static void close_fringe(fringe *f)
-{
-    npg_release(&f->is_border);
-    npg_release(&f->places);
-    npg_release(&f->dist);
-}
 
 /* Distances of all vertices to those whose mask is not 0; *count: how many these are. */
 static npg_status measure(fringe *f, size_t *count, const uint8_t *mask)
@@ -36,9 +29,10 @@ static npg_status measure(fringe *f, size_t *count, const uint8_t *mask)
 static npg_status find_core(fringe *f, bool *found, double width)
 {
     size_t n = f->mesh->vert_count, count;
-    NPG_TRY(npg_alloc(&f->is_border, NPG_FOR_MESH, n));
-    NPG_TRY(npg_alloc_array(&f->places, NPG_FOR_MESH, n, 3 * sizeof *f->places));
-    NPG_TRY(npg_alloc_array(&f->dist, NPG_FOR_MESH, n, sizeof *f->dist));
+    f->is_border = npg_arena_take(&f->arena, n, 1);
+    f->places = npg_arena_take(&f->arena, n, 3 * sizeof *f->places);
+    f->dist = npg_arena_take(&f->arena, n, sizeof *f->dist);
+    NPG_TRY(npg_arena_status(&f->arena));
     NPG_TRY(npg_mesh_border(f->is_border, found, f->mesh));
     if (!*found) return NPG_OK;
     NPG_TRY(measure(f, &count, f->is_border));
@@ -51,19 +45,14 @@ static npg_status find_core(fringe *f, bool *found, double width)
 
 npg_status npg_mesh_drop_fringe(npg_mesh **mesh, double *share, double width)
 {
-    fringe f = {.mesh = *mesh};
-    uint8_t *keep_face = NULL;
+    fringe f = {.mesh = *mesh, .arena.purpose = NPG_FOR_MESH};
+    uint8_t *keep_face = npg_arena_take(&f.arena, (*mesh)->face_count, 1);
     bool found = false;
     *share = 0;
     npg_status status = find_core(&f, &found, width);
-    if (!status && found) status = npg_alloc(&keep_face, NPG_FOR_MESH, (*mesh)->face_count);
-    for (size_t i = 0; i < (*mesh)->face_count && !status && found; i++) {
-        const uint32_t *face = (*mesh)->faces + 3 * i;
-        float farthest = fmaxf(f.dist[face[0]], fmaxf(f.dist[face[1]], f.dist[face[2]]));
-        keep_face[i] = (double)farthest <= BACK * width;
-    }
+    for (size_t i = 0; i < (*mesh)->face_count && !status && found; i++)
+        keep_face[i] = (double)npg_farthest_corner(f.dist, (*mesh)->faces + 3 * i) <= BACK * width;
     if (!status && found) status = npg_mesh_keep_share(mesh, share, keep_face);
-    npg_release(&keep_face);
-    close_fringe(&f);
+    npg_arena_release(&f.arena);
     return status;
 }

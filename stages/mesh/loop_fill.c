@@ -11,8 +11,8 @@ typedef struct filling {
     const float *vert_pos;
     const uint32_t (*edges)[2];
     size_t edge_count;
-    double *area;    /* n x n: least area of the part of the loop from i to j; owned */
-    uint16_t *third; /* n x n: the corner of the triangle on i and j; owned          */
+    double *area;    /* n x n: least area of the part of the loop from i to j */
+    uint16_t *third; /* n x n: the corner of the triangle on i and j          */
 } filling;
 
 static int by_pair(const void *a, const void *b)
@@ -82,20 +82,21 @@ static void emit(uint32_t *faces, const filling *f)
 npg_status npg_loop_fill(uint32_t *faces, double *area, bool *is_filled, npg_loop loop, const float *vert_pos,
                          const uint32_t (*edges)[2], size_t edge_count)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     filling f = {.loop = loop, .vert_pos = vert_pos, .edges = edges, .edge_count = edge_count};
     size_t n = loop.count;
     *is_filled = false;
     *area = 0;
     if (n < 3 || n > NPG_LOOP_MOST) return NPG_OK;
-    npg_status status = npg_alloc_array(&f.area, NPG_FOR_MESH, n * n, sizeof *f.area);
-    if (!status) status = npg_alloc_array(&f.third, NPG_FOR_MESH, n * n, sizeof *f.third);
+    f.area = npg_arena_take(&scratch, n * n, sizeof *f.area);
+    f.third = npg_arena_take(&scratch, n * n, sizeof *f.third);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) {
         find_all(&f);
         *area = f.area[n - 1];
         *is_filled = isfinite(*area);
         if (*is_filled) emit(faces, &f);
     }
-    npg_release(&f.area);
-    npg_release(&f.third);
+    npg_arena_release(&scratch);
     return status;
 }

@@ -217,10 +217,7 @@ static npg_status measure_reference(making *m)
     npg_manifold manifold;
     npg_mesh *mesh = m->mesh;
     NPG_TRY(npg_mesh_manifold(&manifold, mesh));
-    npg_release(&mesh->vert_normals);
-    NPG_TRY(npg_alloc_array(&mesh->vert_normals, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
-    npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
-                            mesh->face_count);
+    NPG_TRY(npg_mesh_make_normals(mesh));
     npg_mesh_note_count(m->worker, "vertices", mesh->vert_count);
     npg_mesh_note_count(m->worker, "faces", mesh->face_count);
     npg_mesh_note_count(m->worker, "border_edges", manifold.border_edges);

@@ -16,13 +16,10 @@
 npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
                            size_t point_count)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    npg_status status = npg_kdtree_open(&tree, points, point_count);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, query_count, sizeof *index);
-    if (!status) status = npg_kdtree_nearest(tree, index, dist, queries, query_count, 1, 0);
+    uint32_t *index;
+    NPG_TRY(npg_alloc_array(&index, NPG_FOR_MESH, query_count, sizeof *index));
+    npg_status status = npg_points_nearest(index, dist, points, point_count, queries, query_count, 1);
     for (size_t i = 0; i < query_count && !status; i++) dist[i] = sqrtf(dist[i]);
-    npg_kdtree_close(&tree);
     npg_release(&index);
     return status;
 }
@@ -42,22 +39,14 @@ static float median_farthest(float *dist_sq, size_t count, size_t k)
 
 npg_status npg_cloud_spacing(double *spacing, const float *points, size_t n)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL, *queries = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_neighbours near;
     size_t k = SPACING_NEIGHBOUR + 1, asked = n < SPACING_ASKED ? n : SPACING_ASKED;
-    npg_status status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_alloc_array(&queries, NPG_FOR_MESH, asked, 3 * sizeof *queries);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, asked, k * sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, asked, k * sizeof *dist_sq);
-    for (size_t i = 0; i < asked && !status; i++)
-        memcpy(queries + 3 * i, points + 3 * (n * i / asked), 3 * sizeof *queries);
-    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, queries, asked, k, 0);
-    if (!status) *spacing = sqrt((double)median_farthest(dist_sq, asked, k));
-    npg_kdtree_close(&tree);
-    npg_release(&queries);
-    npg_release(&index);
-    npg_release(&dist_sq);
+    float *queries = npg_arena_take(&scratch, asked, 3 * sizeof *queries);
+    if (queries) npg_points_spread(queries, NULL, asked, points, NULL, n);
+    npg_status status = npg_neighbours_take(&near, &scratch, points, n, queries, asked, k);
+    if (!status) *spacing = sqrt((double)median_farthest(near.dist_sq, asked, k));
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -73,22 +62,24 @@ npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *ke
     return npg_mesh_keep_faces(mesh, keep_face);
 }
 
+float npg_farthest_corner(const float *dist, const uint32_t face[3])
+{
+    return fmaxf(dist[face[0]], fmaxf(dist[face[1]], dist[face[2]]));
+}
+
 npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, size_t point_count,
                          double dist_max)
 {
-    float *dist = NULL;
-    uint8_t *keep_face = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     size_t face_count = (*mesh)->face_count;
-    npg_status status = npg_alloc_array(&dist, NPG_FOR_MESH, (*mesh)->vert_count, sizeof *dist);
-    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
+    float *dist = npg_arena_take(&scratch, (*mesh)->vert_count, sizeof *dist);
+    uint8_t *keep_face = npg_arena_take(&scratch, face_count, 1);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = npg_mesh_point_dist(dist, *mesh, points, point_count);
-    for (size_t f = 0; f < face_count && !status; f++) {
-        const uint32_t *face = (*mesh)->faces + 3 * f;
-        keep_face[f] = (double)fmaxf(dist[face[0]], fmaxf(dist[face[1]], dist[face[2]])) <= dist_max;
-    }
+    for (size_t f = 0; f < face_count && !status; f++)
+        keep_face[f] = (double)npg_farthest_corner(dist, (*mesh)->faces + 3 * f) <= dist_max;
     if (!status) status = npg_mesh_keep_share(mesh, share, keep_face);
-    npg_release(&dist);
-    npg_release(&keep_face);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -114,18 +105,18 @@ npg_status npg_mesh_unseen(double *share, const npg_mesh *mesh, const float *poi
 static npg_status find_near(uint8_t *is_near, const npg_mesh *mesh, const uint32_t *component_of,
                             const double *area, size_t largest, double area_min, double dist_max)
 {
-    float *main_pos = NULL, *dist = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    float *main_pos = npg_arena_take(&scratch, mesh->vert_count, 3 * sizeof *main_pos);
+    float *dist = npg_arena_take(&scratch, mesh->vert_count, sizeof *dist);
     size_t main_count = 0;
-    npg_status status = npg_alloc_array(&main_pos, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *main_pos);
-    if (!status) status = npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist);
+    npg_status status = npg_arena_status(&scratch);
     for (size_t i = 0; i < mesh->vert_count && !status; i++)
         if (component_of[i] == largest)
             memcpy(main_pos + 3 * main_count++, mesh->vert_pos + 3 * i, 3 * sizeof *main_pos);
     if (!status) status = npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, main_pos, main_count);
     for (size_t i = 0; i < mesh->vert_count && !status; i++)
         if ((double)dist[i] <= dist_max && area[component_of[i]] >= area_min) is_near[component_of[i]] = 1;
-    npg_release(&main_pos);
-    npg_release(&dist);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -149,37 +140,26 @@ static npg_status choose_pieces(uint8_t *is_kept, double *area, const npg_mesh *
     return NPG_OK;
 }
 
-static npg_status keep_pieces(npg_mesh **mesh, npg_pieces *pieces, const uint32_t *component_of,
-                              double share_min, double dist_max)
+npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max)
 {
-    double *area = NULL;
-    uint8_t *keep_face = NULL, *is_kept = NULL;
-    size_t face_count = (*mesh)->face_count;
-    npg_status status = npg_alloc_array(&area, NPG_FOR_MESH, pieces->found, sizeof *area);
-    if (!status) status = npg_alloc(&is_kept, NPG_FOR_MESH, pieces->found);
-    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    size_t v = (*mesh)->vert_count, face_count = (*mesh)->face_count;
+    *pieces = (npg_pieces){0};
+    if (!face_count) return NPG_OK;
+    uint32_t *component_of = npg_arena_take(&scratch, v, sizeof *component_of);
+    uint8_t *keep_face = npg_arena_take(&scratch, face_count, 1);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_mesh_components(component_of, &pieces->found, v, (*mesh)->faces, face_count);
+    double *area = npg_arena_take(&scratch, pieces->found, sizeof *area);
+    uint8_t *is_kept = npg_arena_take(&scratch, pieces->found, 1);
+    if (!status) status = npg_arena_status(&scratch);
     if (!status)
         status = choose_pieces(is_kept, area, *mesh, pieces->found, component_of, share_min, dist_max);
     for (size_t i = 0; i < pieces->found && !status; i++) pieces->kept += is_kept[i];
     for (size_t f = 0; f < face_count && !status; f++)
         keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];
     if (!status) status = npg_mesh_keep_share(mesh, &pieces->lost_share, keep_face);
-    npg_release(&area);
-    npg_release(&is_kept);
-    npg_release(&keep_face);
-    return status;
-}
-
-npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max)
-{
-    uint32_t *component_of;
-    *pieces = (npg_pieces){0};
-    if (!(*mesh)->face_count) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&component_of, NPG_FOR_MESH, (*mesh)->vert_count, sizeof *component_of));
-    npg_status status = npg_mesh_components(component_of, &pieces->found, (*mesh)->vert_count, (*mesh)->faces,
-                                            (*mesh)->face_count);
-    if (!status) status = keep_pieces(mesh, pieces, component_of, share_min, dist_max);
-    npg_release(&component_of);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -201,20 +181,19 @@ static npg_status simplify(uint32_t *indices, size_t *count, const npg_mesh *mes
 
 npg_status npg_mesh_decimate(npg_mesh **mesh, size_t face_max)
 {
-    uint32_t *indices = NULL;
-    uint8_t *keep_face = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     size_t old_count = (*mesh)->face_count, count = 0;
     if (old_count <= face_max) return NPG_OK;
-    npg_status status = npg_alloc_array(&indices, NPG_FOR_MESH, old_count, 3 * sizeof *indices);
+    uint32_t *indices = npg_arena_take(&scratch, old_count, 3 * sizeof *indices);
+    uint8_t *keep_face = npg_arena_take(&scratch, old_count, 1);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = simplify(indices, &count, *mesh, face_max);
-    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, old_count);
     if (!status) {
         memcpy((*mesh)->faces, indices, count * sizeof *indices);
         memset(keep_face, 1, count / 3);
         (*mesh)->face_count = count / 3;
         status = npg_mesh_keep_faces(mesh, keep_face); /* drops the vertices that no face uses any more */
     }
-    npg_release(&indices);
-    npg_release(&keep_face);
+    npg_arena_release(&scratch);
     return status;
 }

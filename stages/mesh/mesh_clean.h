@@ -23,6 +23,9 @@ npg_status npg_cloud_spacing(double *spacing, const float *points, size_t point_
 /* Keep the faces whose keep_face (F) is not 0.  *share gets the share of the area that went. */
 npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face);
 
+/* The largest of three vertices' distances. */
+float npg_farthest_corner(const float *dist, const uint32_t face[3]);
+
 /* Drop the faces of which a vertex is farther than dist_max from every point.  *share gets the share of the
  * area that went. */
 npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, size_t point_count,

@@ -80,15 +80,14 @@ static void choose_faces(uint8_t *keep_face, face_key *keys, const npg_mesh *mes
 
 static npg_status drop_faces(npg_mesh **mesh, npg_mending *done)
 {
-    face_key *keys = NULL;
-    uint8_t *keep_face = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     size_t count = (*mesh)->face_count, before = done->degenerate + done->duplicate;
-    npg_status status = npg_alloc_array(&keys, NPG_FOR_MESH, count, sizeof *keys);
-    if (!status) status = npg_alloc(&keep_face, NPG_FOR_MESH, count);
+    face_key *keys = npg_arena_take(&scratch, count, sizeof *keys);
+    uint8_t *keep_face = npg_arena_take(&scratch, count, 1);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) choose_faces(keep_face, keys, *mesh, done);
     if (!status && done->degenerate + done->duplicate > before) status = npg_mesh_keep_faces(mesh, keep_face);
-    npg_release(&keys);
-    npg_release(&keep_face);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -196,19 +195,18 @@ static npg_status copy_fans(npg_mesh **slot, const uint32_t *number, uint32_t *p
 /* The corners of each fan become one vertex; the first fan of a vertex keeps it, others get a copy. */
 static npg_status split(npg_mesh **slot, npg_mending *done)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     const npg_mesh *mesh = *slot;
-    uint32_t *parent = NULL, *number = NULL, *first = NULL;
     size_t corners = 3 * mesh->face_count, extra = 0;
-    npg_status status = npg_alloc_array(&parent, NPG_FOR_MESH, corners, sizeof *parent);
-    if (!status) status = npg_alloc_array(&number, NPG_FOR_MESH, corners, sizeof *number);
-    if (!status) status = npg_alloc_array(&first, NPG_FOR_MESH, mesh->vert_count, sizeof *first);
+    uint32_t *parent = npg_arena_take(&scratch, corners, sizeof *parent);
+    uint32_t *number = npg_arena_take(&scratch, corners, sizeof *number);
+    uint32_t *first = npg_arena_take(&scratch, mesh->vert_count, sizeof *first);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = join_corners(parent, mesh);
     if (!status) extra = number_fans(number, first, parent, mesh);
     if (!status && extra) status = copy_fans(slot, number, parent, extra);
     if (!status) done->split_vertices += extra;
-    npg_release(&parent);
-    npg_release(&number);
-    npg_release(&first);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -402,23 +400,19 @@ static void collapse_flipped(npg_mesh *mesh, const uint8_t *is_flipped)
 /* *left is the number of faces that are still turned; their shortest edges are then collapsed. */
 static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
 {
-    double *sum = NULL;
-    uint8_t *is_flipped = NULL;
-    uint32_t *weight = NULL;
-    *left = 0;
-    npg_status status = npg_alloc_array(&sum, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof *sum);
-    if (!status) status = npg_alloc_array(&weight, NPG_FOR_MESH, mesh->vert_count, sizeof *weight);
-    if (!status) status = npg_alloc(&is_flipped, NPG_FOR_MESH, mesh->face_count);
-    if (!status) *left = find_flipped(is_flipped, sum, mesh);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    double *sum = npg_arena_take(&scratch, mesh->vert_count, 3 * sizeof *sum);
+    uint32_t *weight = npg_arena_take(&scratch, mesh->vert_count, sizeof *weight);
+    uint8_t *is_flipped = npg_arena_take(&scratch, mesh->face_count, 1);
+    npg_status status = npg_arena_status(&scratch);
+    *left = status ? 0 : find_flipped(is_flipped, sum, mesh);
     done->flipped += *left;
     for (int round = 0; round < SMOOTH_ROUNDS && *left; round++) {
         smooth_round(mesh, is_flipped, sum, weight);
         *left = find_flipped(is_flipped, sum, mesh);
     }
     if (*left) collapse_flipped(mesh, is_flipped);
-    npg_release(&sum);
-    npg_release(&weight);
-    npg_release(&is_flipped);
+    npg_arena_release(&scratch);
     return status;
 }
 

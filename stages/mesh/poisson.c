@@ -76,17 +76,11 @@ static size_t count_against(const float *normals, const uint32_t *index, size_t 
 
 npg_status npg_normals_disagreement(double *share, const float *points, const float *normals, size_t n)
 {
-    npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL;
-    npg_status status = npg_kdtree_open(&tree, points, n);
-    if (!status) status = npg_alloc_array(&index, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_MESH, n, NEIGHBOURS * sizeof *dist_sq);
-    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, points, n, NEIGHBOURS, 0);
-    if (!status) *share = (double)count_against(normals, index, n) / (double)n;
-    npg_kdtree_close(&tree);
-    npg_release(&index);
-    npg_release(&dist_sq);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_neighbours near;
+    npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NEIGHBOURS);
+    if (!status) *share = (double)count_against(normals, near.index, n) / (double)n;
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -177,21 +171,20 @@ static npg_status check_box(const npg_mesh *mesh, const float *points, size_t po
 /* Area share of the largest component: garbage comes in many pieces. */
 static npg_status check_pieces(const npg_mesh *mesh)
 {
-    uint32_t *component_of;
-    double *area = NULL, total = 0, largest = 0;
-    size_t count = 0;
-    NPG_TRY(npg_alloc_array(&component_of, NPG_FOR_MESH, mesh->vert_count, sizeof *component_of));
-    npg_status status =
-        npg_mesh_components(component_of, &count, mesh->vert_count, mesh->faces, mesh->face_count);
-    if (!status) status = npg_alloc_array(&area, NPG_FOR_MESH, count, sizeof *area);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    double total = 0, largest = 0;
+    size_t count = 0, v = mesh->vert_count;
+    uint32_t *component_of = npg_arena_take(&scratch, v, sizeof *component_of);
+    double *area = npg_arena_take(&scratch, v, sizeof *area); /* there are no more pieces than vertices */
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_mesh_components(component_of, &count, v, mesh->faces, mesh->face_count);
     for (size_t f = 0; f < mesh->face_count && !status; f++) {
         double face_area = npg_face_area(mesh->vert_pos, mesh->faces + 3 * f);
         total += face_area;
         area[component_of[mesh->faces[3 * f]]] += face_area;
     }
     for (size_t i = 0; i < count && !status; i++) largest = fmax(largest, area[i]);
-    npg_release(&component_of);
-    npg_release(&area);
+    npg_arena_release(&scratch);
     if (status) return status;
     if (!(total > 0)) return npg_error(NPG_FAILED, "Poisson: the mesh has no area");
     if (largest < MAIN_SHARE_MIN * total)

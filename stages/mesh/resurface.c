@@ -31,19 +31,15 @@ static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const flo
 static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh *mesh, const float *points,
                                   size_t n)
 {
-    npg_surface *surface = NULL;
-    npg_surface_hit *hits = NULL;
+    npg_surface_hit *hits;
     *turned = 0;
-    npg_status status = npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits);
-    if (!status)
-        status = npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
-    if (!status) status = npg_surface_closest_near(surface, hits, points, n, NULL, NULL, 0);
+    NPG_TRY(npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits));
+    npg_status status = npg_mesh_closest(hits, mesh, points, n);
     for (size_t i = 0; i < n && !status; i++) {
         if (side_at(mesh, &hits[i], normals + 3 * i) >= CLEARLY) continue;
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
         ++*turned;
     }
-    npg_surface_close(&surface);
     npg_release(&hits);
     return status;
 }
@@ -55,13 +51,9 @@ static npg_status draft(npg_mesh **mesh, size_t *turned, float *normals, const f
     npg_poisson_settings quick = *settings;
     if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
     NPG_TRY(npg_poisson(mesh, points, normals, n, &quick));
-    npg_mesh *m = *mesh;
-    npg_status status = npg_alloc_array(&m->vert_normals, NPG_FOR_MESH, m->vert_count, 3 * sizeof(float));
-    if (!status) {
-        npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
-        status = turn_to_surface(turned, normals, m, points, n);
-    }
-    npg_release(&m->vert_normals);
+    npg_status status = npg_mesh_make_normals(*mesh);
+    if (!status) status = turn_to_surface(turned, normals, *mesh, points, n);
+    npg_release(&(*mesh)->vert_normals);
     if (status) npg_mesh_unref(mesh);
     return status;
 }

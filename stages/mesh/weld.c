@@ -36,6 +36,7 @@ typedef struct hearing {
     size_t frames, room;
     float *dist_sq; /* V */
     uint32_t *near; /* V */
+    npg_arena arena;
 } hearing;
 
 /* ---- what a frame says ---- */
@@ -70,16 +71,12 @@ static npg_status hear(void *user, const npg_candidate_cloud *cloud, const float
                        const npg_tracked *tracked)
 {
     hearing *h = user;
-    npg_kdtree *tree;
     size_t v = h->mesh->vert_count;
     if (h->settings->should_stop && h->settings->should_stop(h->settings->user))
         return npg_error(NPG_STOPPED, "stopped while welds were looked for");
     if (tracked->point_dist_mean > EXPLAINED * h->settings->spacing_unit || h->frames == h->room)
         return NPG_OK;
-    NPG_TRY(npg_kdtree_open(&tree, cloud->points, cloud->point_count));
-    npg_status status = npg_kdtree_nearest(tree, h->near, h->dist_sq, vert_unit, v, 1, 0);
-    npg_kdtree_close(&tree);
-    NPG_TRY(status);
+    NPG_TRY(npg_points_nearest(h->near, h->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
     for (size_t i = 0; i < v; i++) h->dist_sum[i] += sqrt((double)h->dist_sq[i]);
     for (size_t f = 0; f < h->mesh->face_count; f++) count_face(h, f, vert_unit);
     memcpy(h->poses + h->frames++ * v * 3, vert_unit, v * 3 * sizeof(float));
@@ -90,22 +87,13 @@ static npg_status open_hearing(hearing *h, size_t room)
 {
     size_t v = h->mesh->vert_count;
     h->room = room;
-    NPG_TRY(npg_alloc_array(&h->against, NPG_FOR_MESH, h->mesh->face_count, 1));
-    NPG_TRY(npg_alloc_array(&h->leaning, NPG_FOR_MESH, h->mesh->face_count, 1));
-    NPG_TRY(npg_alloc_array(&h->dist_sum, NPG_FOR_MESH, v, sizeof *h->dist_sum));
-    NPG_TRY(npg_alloc_array(&h->dist_sq, NPG_FOR_MESH, v, sizeof *h->dist_sq));
-    NPG_TRY(npg_alloc_array(&h->near, NPG_FOR_MESH, v, sizeof *h->near));
-    return npg_alloc_array(&h->poses, NPG_FOR_MESH, room * v, 3 * sizeof(float));
-}
-
-static void close_hearing(hearing *h)
-{
-    npg_release(&h->against);
-    npg_release(&h->leaning);
-    npg_release(&h->dist_sum);
-    npg_release(&h->dist_sq);
-    npg_release(&h->near);
-    npg_release(&h->poses);
+    h->against = npg_arena_take(&h->arena, h->mesh->face_count, 1);
+    h->leaning = npg_arena_take(&h->arena, h->mesh->face_count, 1);
+    h->dist_sum = npg_arena_take(&h->arena, v, sizeof *h->dist_sum);
+    h->dist_sq = npg_arena_take(&h->arena, v, sizeof *h->dist_sq);
+    h->near = npg_arena_take(&h->arena, v, sizeof *h->near);
+    h->poses = npg_arena_take(&h->arena, room * v, 3 * sizeof *h->poses);
+    return npg_arena_status(&h->arena);
 }
 
 /* ---- patches ---- */
@@ -118,15 +106,8 @@ typedef struct patches {
     uint32_t *of_vert; /* V: patch of a vertex of such faces, NO_PATCH      */
     uint32_t *of_face; /* F                                                 */
     size_t count;
+    npg_arena arena;
 } patches;
-
-static void close_patches(patches *p)
-{
-    npg_release(&p->is_in);
-    npg_release(&p->is_near);
-    npg_release(&p->of_vert);
-    npg_release(&p->of_face);
-}
 
 /* Take in all faces that share a vertex with those that are in. */
 static void widen(patches *p, const npg_mesh *mesh)
@@ -173,34 +154,32 @@ static void set_patches(patches *p, const npg_mesh *mesh, const uint32_t *some, 
 /* Number the patches: faces that are in and connected by vertices. */
 static npg_status number_patches(patches *p, const npg_mesh *mesh)
 {
-    uint32_t *some = NULL, *component = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    uint32_t *some = npg_arena_take(&scratch, mesh->face_count, 3 * sizeof *some);
+    uint32_t *component = npg_arena_take(&scratch, mesh->vert_count, sizeof *component);
     size_t count;
-    npg_status status = npg_alloc_array(&some, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *some);
-    if (!status) status = npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = join_faces(some, component, &count, p, mesh, true);
     if (!status) set_patches(p, mesh, some, count, component);
-    npg_release(&some);
-    npg_release(&component);
+    npg_arena_release(&scratch);
     return status;
 }
 
 /* Take in what is left inside a patch: pieces of the rest that are small. */
 static npg_status take_islands(patches *p, const npg_mesh *mesh)
 {
-    uint32_t *rest = NULL, *component = NULL;
-    size_t *size = NULL, count = 0;
-    npg_status status = npg_alloc_array(&rest, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *rest);
-    if (!status) status = npg_alloc_array(&component, NPG_FOR_MESH, mesh->vert_count, sizeof *component);
-    if (!status) status = npg_alloc_array(&size, NPG_FOR_MESH, mesh->vert_count, sizeof *size);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    uint32_t *rest = npg_arena_take(&scratch, mesh->face_count, 3 * sizeof *rest);
+    uint32_t *component = npg_arena_take(&scratch, mesh->vert_count, sizeof *component);
+    size_t *size = npg_arena_take(&scratch, mesh->vert_count, sizeof *size), count = 0;
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = join_faces(rest, component, &count, p, mesh, false);
     for (size_t f = 0; f < count && !status; f++) size[component[rest[3 * f]]]++;
     for (size_t f = 0; f < mesh->face_count && !status; f++)
         if (!p->is_in[f] &&
             (double)size[component[mesh->faces[3 * f]]] < ISLAND_MOST * (double)mesh->face_count)
             p->is_in[f] = 1;
-    npg_release(&rest);
-    npg_release(&component);
-    npg_release(&size);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -238,10 +217,11 @@ static npg_status gather(patches *p, const hearing *h)
 {
     const npg_mesh *mesh = h->mesh;
     size_t seeds = 0;
-    NPG_TRY(npg_alloc(&p->is_in, NPG_FOR_MESH, mesh->face_count));
-    NPG_TRY(npg_alloc(&p->is_near, NPG_FOR_MESH, mesh->vert_count));
-    NPG_TRY(npg_alloc_array(&p->of_vert, NPG_FOR_MESH, mesh->vert_count, sizeof *p->of_vert));
-    NPG_TRY(npg_alloc_array(&p->of_face, NPG_FOR_MESH, mesh->face_count, sizeof *p->of_face));
+    p->is_in = npg_arena_take(&p->arena, mesh->face_count, 1);
+    p->is_near = npg_arena_take(&p->arena, mesh->vert_count, 1);
+    p->of_vert = npg_arena_take(&p->arena, mesh->vert_count, sizeof *p->of_vert);
+    p->of_face = npg_arena_take(&p->arena, mesh->face_count, sizeof *p->of_face);
+    NPG_TRY(npg_arena_status(&p->arena));
     for (size_t f = 0; f < mesh->face_count; f++) {
         seeds += h->against[f] >= FRAMES_LEAST;
         p->is_in[f] = h->leaning[f] >= FRAMES_LEAST;
@@ -291,12 +271,13 @@ static bool link_border(uint32_t *next, size_t *border_count, const npg_mesh *me
 typedef struct cutting {
     const hearing *hearing;
     const patches *patches;
-    uint32_t *twin, *next, *loop; /* 3 F, V, V; owned */
-    uint32_t (*edges)[2];         /* owned            */
+    npg_arena arena;
+    uint32_t *twin, *next, *loop; /* 3 F, V, V */
+    uint8_t *is_cut;              /* F         */
+    uint32_t (*edges)[2];         /* owned     */
     size_t edge_count;
     uint32_t *new_faces; /* owned */
     size_t new_count, new_capacity;
-    uint8_t *is_cut; /* F; owned */
 } cutting;
 
 /* Fill every loop of the border; *area of all. */
@@ -358,18 +339,13 @@ static bool is_worth(const cutting *c, uint32_t patch)
 static npg_status open_cutting(cutting *c)
 {
     const npg_mesh *mesh = c->hearing->mesh;
-    NPG_TRY(npg_alloc_array(&c->twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *c->twin));
-    NPG_TRY(npg_alloc_array(&c->next, NPG_FOR_MESH, mesh->vert_count, sizeof *c->next));
-    NPG_TRY(npg_alloc_array(&c->loop, NPG_FOR_MESH, mesh->vert_count, sizeof *c->loop));
-    NPG_TRY(npg_alloc(&c->is_cut, NPG_FOR_MESH, mesh->face_count));
+    c->twin = npg_arena_take(&c->arena, mesh->face_count, 3 * sizeof *c->twin);
+    c->next = npg_arena_take(&c->arena, mesh->vert_count, sizeof *c->next);
+    c->loop = npg_arena_take(&c->arena, mesh->vert_count, sizeof *c->loop);
+    c->is_cut = npg_arena_take(&c->arena, mesh->face_count, 1);
+    NPG_TRY(npg_arena_status(&c->arena));
     NPG_TRY(npg_mesh_edges(&c->edges, &c->edge_count, mesh->faces, mesh->face_count));
     return npg_mesh_twins(c->twin, mesh->faces, mesh->face_count);
-}
-
-static void close_cutting(cutting *c)
-{
-    void *all[] = {&c->twin, &c->next, &c->loop, &c->edges, &c->new_faces, &c->is_cut};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 
 /* The mesh without the cut faces and with the new ones. */
@@ -397,21 +373,14 @@ static npg_status rebuild(npg_mesh **out, const cutting *c, size_t cut_count)
 static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *after)
 {
     npg_manifold was, now;
-    const npg_mesh *both[2] = {before, after};
-    size_t pieces[2];
+    size_t pieces_before, pieces_after;
     NPG_TRY(npg_mesh_manifold(&was, before));
     NPG_TRY(npg_mesh_manifold(&now, after));
-    for (int i = 0; i < 2; i++) {
-        uint32_t *component;
-        NPG_TRY(npg_alloc_array(&component, NPG_FOR_MESH, both[i]->vert_count, sizeof *component));
-        npg_status status = npg_mesh_components(component, &pieces[i], both[i]->vert_count, both[i]->faces,
-                                                both[i]->face_count);
-        npg_release(&component);
-        NPG_TRY(status);
-    }
+    NPG_TRY(npg_mesh_count_components(&pieces_before, before));
+    NPG_TRY(npg_mesh_count_components(&pieces_after, after));
     *yes = now.crowded_edges <= was.crowded_edges && now.misoriented_edges <= was.misoriented_edges &&
            now.border_edges <= was.border_edges && now.degenerate_faces <= was.degenerate_faces &&
-           pieces[1] <= pieces[0];
+           pieces_after <= pieces_before;
     return NPG_OK;
 }
 
@@ -493,14 +462,16 @@ static npg_status replace(npg_mesh **mesh, npg_weld_cut *done, const cutting *c)
 
 static npg_status cut(npg_mesh **mesh, npg_weld_cut *done, const hearing *h)
 {
-    patches p = {0};
-    cutting c = {.hearing = h, .patches = &p};
+    patches p = {.arena.purpose = NPG_FOR_MESH};
+    cutting c = {.hearing = h, .patches = &p, .arena.purpose = NPG_FOR_MESH};
     npg_status status = gather(&p, h);
     if (!status && p.count) status = open_cutting(&c);
     for (size_t i = 0; i < p.count && !status; i++) status = cut_patch(&c, done, (uint32_t)i);
     if (!status) status = replace(mesh, done, &c);
-    close_cutting(&c);
-    close_patches(&p);
+    npg_release(&c.edges);
+    npg_release(&c.new_faces);
+    npg_arena_release(&c.arena);
+    npg_arena_release(&p.arena);
     return status;
 }
 
@@ -508,25 +479,19 @@ npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_candi
                             size_t at, const npg_weld_settings *settings)
 {
     npg_mesh *followed;
-    hearing h = {.settings = settings};
+    hearing h = {.settings = settings, .arena.purpose = NPG_FOR_MESH};
     *done = (npg_weld_cut){0};
     NPG_REQUIRE(at < clouds->count && settings->spacing_unit > 0);
     NPG_TRY(npg_mesh_handles(&done->handles, *mesh));
     if (done->handles < 1) return NPG_OK;
     NPG_TRY(npg_mesh_copy(&followed, *mesh));
     h.mesh = followed;
-    npg_release(&followed->vert_normals);
-    npg_status status =
-        npg_alloc_array(&followed->vert_normals, NPG_FOR_MESH, followed->vert_count, 3 * sizeof(float));
-    if (!status) {
-        npg_mesh_vertex_normals(followed->vert_normals, followed->vert_pos, followed->vert_count,
-                                followed->faces, followed->face_count);
-        status = open_hearing(&h, clouds->count);
-    }
+    npg_status status = npg_mesh_make_normals(followed);
+    if (!status) status = open_hearing(&h, clouds->count);
     if (!status) status = npg_candidate_follow(clouds, at, followed, &weld_tracking, hear, &h);
     done->frames = h.frames;
     if (!status && h.frames >= FRAMES_LEAST) status = cut(mesh, done, &h);
-    close_hearing(&h);
+    npg_arena_release(&h.arena);
     npg_mesh_unref(&followed);
     return status;
 }
