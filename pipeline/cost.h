@@ -1,6 +1,6 @@
 /* Cost: what the parts of a run take in processor seconds, on a machine whose core makes NPG_COST_CORE_FLOPS
  * multiply-adds x 2 a second.  One model for two uses: the share of a run that is done, where only ratios
- * matter (timeline.c), and the estimate before it.  Fitted to the runs in samples/guide/tuning.md. */
+ * matter (timeline.c), and the estimate of neupig probe.  Fitted to the runs in samples/guide/tuning.md. */
 #ifndef NPG_COST_H
 #define NPG_COST_H
 
@@ -17,7 +17,6 @@
 #define NPG_FUSED_FRAME_MOST  40000 /* points of a frame: more add time, and nothing that cells could hold */
 
 #define NPG_COST_FUSED_POINTS 45000 /* fused points of a capture, as a rule; 34 000 to 62 000 were seen */
-#define NPG_COST_EASY_STEP    0.02  /* of the figure's diagonal: a limb that moves more is searched     */
 
 /* The choice of the keyframe: drafts of the candidates' surfaces, and their normals where they have none. */
 static inline double npg_cost_choice_s(double points, bool has_normals)
@@ -32,11 +31,10 @@ static inline double npg_cost_surface_s(double points)
 }
 
 /* One pass that follows frames of so many points each, with all that is done to a frame beside it: reading,
- * fusion, fit and figures.  step: how far limbs move, in diagonals; 0 where nobody knows. */
-static inline double npg_cost_pass_s(double frames, double points, double step)
+ * fusion, fit and figures, where motion is easy to follow. */
+static inline double npg_cost_pass_s(double frames, double points)
 {
-    double searching = 1 + 2.3 * fmax(0, step / NPG_COST_EASY_STEP - 1);
-    return 0.5 * frames * (0.62 * searching + 36e-6 * fmin(points, NPG_FUSED_FRAME_MOST));
+    return 0.5 * frames * (0.62 + 36e-6 * fmin(points, NPG_FUSED_FRAME_MOST));
 }
 
 /* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and twice as many backward.  40

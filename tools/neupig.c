@@ -49,9 +49,11 @@ const npg_verb npg_verbs[] = {
      "those between on curves through the run's meshes.  "
      "Exit code 7 when points lie far from the reference.",
      npg_apply_options, false, npg_verb_apply},
-    {"probe", "INPUT", 0, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
+    {"probe", "INPUT", 1, 1, "Look at a capture: counts, boxes, gaps, faults, estimates",
      "Reads every frame of INPUT and says what is in it, what a run would trip over, "
-     "and what it would cost in memory, disk and time.  Exit code 7 when something needs attention.",
+     "and what it would cost in memory, disk and time.  Exit code 7 when something needs attention.  "
+     "Of depth images: also, per sensor, how many it has, how much it sees of what others see, how far it lies "
+     "from theirs, and how far its pose is off (with --align-sensors: was off, and what is left).",
      npg_probe_options, true, npg_verb_probe},
     {"eval", "PREDICTED TRUTH", 2, 2, "Measure a mesh sequence against a ground truth",
      "Compares the meshes of PREDICTED (a folder of meshes, or the output folder of a run) "
@@ -90,10 +92,10 @@ const npg_verb npg_verbs[] = {
      "Without VERB, lists the verbs; with one, its usage and options.  "
      "help method lists what --method of run takes.",
      NULL, false, npg_verb_help},
-    {"man", "", 0, 0, "Print the manual page, or shell completion",
+    {"man", "", 0, 0, "Print the manual page",
      "Prints the manual page in roff, made from the same tables as the help.  "
      "Read it with: neupig man | man -l -",
-     npg_man_options, false, npg_verb_man},
+     NULL, false, npg_verb_man},
     {"version", "", 0, 0, "Print the version", "Prints the version of neupig.", NULL, false,
      npg_verb_version},
     {0}};

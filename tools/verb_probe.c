@@ -4,15 +4,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "ingest/ingest.h"
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
 #include "tools/cli.h"
-#include "tools/probe/probe_capture.h"
+#include "tools/probe/probe.h"
 
 typedef struct settings {
     bool json;
-    const char *rig;
 } settings;
 
 #define AT(member) offsetof(settings, member)
@@ -22,10 +20,6 @@ const npg_option npg_probe_options[] = {
     /* type      name    place     default  shown as */
     NPG_ROW_FLAG("json", AT(json), "no",
         "Print one JSON object instead of text"),
-    NPG_ROW_TEXT("rig",  AT(rig),  "",      "PATH",
-        "Depth images instead of clouds, the same as giving them as INPUT: also says per sensor how many "
-        "frames and points it has, how much it sees of what others see, how far it lies from theirs, and "
-        "how far its pose is off (with --align-sensors: was off, and what is left)"),
     {0}};
 /* clang-format on */
 
@@ -200,16 +194,15 @@ static void print_json(job *j, const npg_estimate *e)
                                       origin[2] + hi[2], "diagonal", npg_bounds_diagonal(&p->bounds))
                           : json_null();
     json_t *all = json_pack(
-        "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:f,s:O,s:{s:I,s:I,s:I,s:f,s:f,s:f},s:O}",
+        "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:O,s:{s:I,s:I,s:f,s:f,s:f},s:O}",
         "input", j->input, "frames", (json_int_t)p->frames, "gaps",
         (json_int_t)(j->list ? j->list->gap_count : 0), "unreadable", (json_int_t)p->unreadable, "formats",
         p->formats, "points", "least", (json_int_t)counts.least, "median", (json_int_t)counts.median, "most",
         (json_int_t)counts.most, "total", (json_int_t)p->point_total, "not_finite", (json_int_t)p->not_finite,
         "frames_with_normals", (json_int_t)p->with_normals, "box", box, "bytes", (json_int_t)p->bytes,
-        "read_s", p->read_s, "step", npg_probe_step(p), "attention", p->attention, "estimate", "vertices",
-        (json_int_t)e->basis.vertices, "epochs", (json_int_t)e->basis.epochs, "window",
-        (json_int_t)e->basis.window, "memory_bytes", e->memory_bytes, "disk_bytes", e->disk_bytes, "time_s",
-        e->time_s, "per_frame", p->per_frame);
+        "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
+        "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes, "disk_bytes", e->disk_bytes,
+        "time_s", e->time_s, "per_frame", p->per_frame);
     if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     puts(text ? text : "{}");
@@ -236,13 +229,9 @@ static void print_text(job *j, const npg_estimate *e)
                o[2] + lo[2], o[0] + hi[0], o[1] + hi[1], o[2] + hi[2], npg_bounds_diagonal(&p->bounds));
     }
     printf("files     %.1f MiB, read in %.2f s\n", (double)p->bytes / 0x1p20, p->read_s);
-    if (p->motion.pairs)
-        printf("motion    limbs move by %.2g %% of the figure from frame to frame (90th percentile)\n",
-               100 * npg_probe_step(p));
     printf("estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s "
-           "(%zu vertices, %zu epochs, windows of %zu frames; usually within a third)\n",
-           e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->basis.vertices, e->basis.epochs,
-           e->basis.window < p->frames ? e->basis.window : p->frames);
+           "(%zu vertices, windows of %zu frames; bodies that move fast take twice the time)\n",
+           e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->window);
     print_sensors(j);
     json_array_foreach(p->attention, i, value) printf("attention %s\n", json_string_value(value));
 }
@@ -257,10 +246,9 @@ static npg_status status_of(const job *j)
 
 static npg_status do_probe(job *j)
 {
-    npg_estimate estimate;
     NPG_TRY(read_all(j));
     npg_probe_warn_of_all(&j->probe);
-    npg_probe_estimate_run(&estimate, &j->probe, j->options);
+    npg_estimate estimate = npg_probe_estimate(&j->probe, j->options);
     if (j->s.json)
         print_json(j, &estimate);
     else
@@ -278,10 +266,8 @@ int npg_verb_probe(int argc, char **argv)
     if (!status) status = npg_cli_parse(&cli, argv[0], &j.s, options, argc, argv);
     if (!status) {
         j.options = options;
-        j.input = cli.operand_count ? cli.operands[0] : j.s.rig;
-        if (!j.input[0] || (cli.operand_count && j.s.rig[0]))
-            status = npg_error(NPG_USAGE, "needs one INPUT; usage: neupig probe %s", cli.verb->operands);
-        if (!status) status = npg_options_set(options, "input", j.input);
+        j.input = cli.operands[0];
+        status = npg_options_set(options, "input", j.input);
         if (!status) status = do_probe(&j);
     }
     npg_release(&j.views);

@@ -47,6 +47,5 @@ extern const npg_option npg_render_options[];
 extern const npg_option npg_view_options[];
 extern const npg_option npg_bench_options[];
 extern const npg_option npg_doctor_options[];
-extern const npg_option npg_man_options[];
 
 #endif

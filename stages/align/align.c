@@ -509,7 +509,7 @@ static double expects(const npg_worker *worker, npg_pass pass)
     const npg_facts *facts = npg_worker_facts(worker);
     return pass == NPG_PASS_CHOOSE
                ? 0
-               : npg_cost_pass_s((double)facts->frame_count, (double)facts->point_count_max, 0);
+               : npg_cost_pass_s((double)facts->frame_count, (double)facts->point_count_max);
 }
 
 static bool takes_part(const npg_worker *worker)

@@ -123,7 +123,7 @@ P
 }
 
 @test "probe says what each sensor sees, and that one is off" {
-    run "$NEUPIG" probe --rig capture/rig/rig.json
+    run "$NEUPIG" probe capture/rig/rig.json
     echo "$output"
     [ "$status" -eq 0 ]
     [ "$(grep -c '^sensor ' <<<"$output")" -eq 4 ]
@@ -149,7 +149,7 @@ assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.02 and s[
     numpy
     "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.1 --width 640 --height 480 --cell 0.03 --depth-noise 2 \
         -o wide >synth.log
-    run "$NEUPIG" probe --rig wide/rig
+    run "$NEUPIG" probe wide/rig
     echo "$output"
     [ "$status" -eq 0 ]
     [ "$(grep -c '^pose .* aligned: ' <<<"$output")" -eq 3 ]
@@ -167,16 +167,16 @@ pose[:3, 3] += 0.012 * np.array([6, -2, -3]) / 7
 rig["sensors"][2]["pose"] = pose.ravel().tolist()
 json.dump(rig, open(sys.argv[1] + "/off.json", "w"))
 P
-    run "$NEUPIG" probe --rig wide/rig/off.json
+    run "$NEUPIG" probe wide/rig/off.json
     echo "$output"
     [ "$status" -eq 7 ]
     [ "$(grep -c '^attention' <<<"$output")" -eq 1 ]
     [[ "$output" == *"attention sensor camera2: its pose is off by 1"*"--align-sensors corrects it"* ]]
-    run "$NEUPIG" probe --rig wide/rig/off.json --align-sensors
+    run "$NEUPIG" probe wide/rig/off.json --align-sensors
     echo "$output"
     [ "$status" -eq 0 ]
     [[ "$output" == *", corrected; then"* ]]
-    "$NEUPIG" probe --rig wide/rig/off.json --align-sensors --json | python3 -c '
+    "$NEUPIG" probe wide/rig/off.json --align-sensors --json | python3 -c '
 import json, sys
 before = [s["before"] for s in json.load(sys.stdin)["sensors"]]
 assert [s["pose"] == "off" for s in before] == [False, False, True, False], before

@@ -1,0 +1,266 @@
+/* Probe: what a capture holds, and what a run of it would take. */
+#include "tools/probe/probe.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "pipeline/cost.h"
+#include "pipeline/plan.h"
+#include "tools/listing.h"
+
+void npg_probe_init(npg_probe *probe)
+{
+    *probe = (npg_probe){.bounds = npg_bounds_empty(),
+                         .last = npg_bounds_empty(),
+                         .formats = json_object(),
+                         .attention = json_array(),
+                         .per_frame = json_array()};
+}
+
+void npg_probe_uninit(npg_probe *probe)
+{
+    npg_release(&probe->counts);
+    json_decref(probe->formats);
+    json_decref(probe->attention);
+    json_decref(probe->per_frame);
+}
+
+void npg_probe_warn(npg_probe *probe, const char *format, ...)
+{
+    char text[1200];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    json_array_append_new(probe->attention, json_string(text));
+}
+
+/* ---- frames ---- */
+
+/* When a frame is worth a warning; set by trial. */
+#define USABLE_LEAST  4    /* points: no closed surface has fewer                   */
+#define JUMP_MOST     0.25 /* of the box's middle from frame to frame, in diagonals */
+#define GROWTH_MOST   1.5  /* of the box's diagonal from frame to frame, up or down */
+#define COUNTS_DIFFER 10   /* times between the least and the most points of a frame */
+
+typedef struct cloud_facts {
+    size_t not_finite, zero_normals;
+    npg_bounds bounds;
+} cloud_facts;
+
+static cloud_facts measure_cloud(const npg_frame *frame)
+{
+    cloud_facts facts = {.bounds = npg_bounds_empty()};
+    for (size_t i = 0; i < frame->point_count; i++) {
+        const float *p = frame->pos_local + 3 * i, *n = frame->normals ? frame->normals + 3 * i : NULL;
+        if (isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]))
+            npg_bounds_add_points(&facts.bounds, p, 1);
+        else
+            facts.not_finite++;
+        /* readers give unit length, or 0 where there is no direction */
+        if (n && !(fabsf(n[0]) + fabsf(n[1]) + fabsf(n[2]) > 0.5f)) facts.zero_normals++;
+    }
+    return facts;
+}
+
+static bool is_empty(const npg_bounds *bounds)
+{
+    return !(bounds->lo[0] <= bounds->hi[0]);
+}
+
+static void warn_of_frame(npg_probe *probe, const cloud_facts *facts, const npg_frame *frame, int64_t number)
+{
+    size_t usable = frame->point_count - facts->not_finite;
+    if (usable < USABLE_LEAST)
+        npg_probe_warn(probe, "frame %lld has only %zu usable points", (long long)number, usable);
+    if (is_empty(&facts->bounds)) return;
+    double size = npg_bounds_diagonal(&facts->bounds);
+    if (usable >= USABLE_LEAST && !(size > 0))
+        npg_probe_warn(probe, "frame %lld: all points are equal", (long long)number);
+    if (!is_empty(&probe->last)) {
+        double before = npg_bounds_diagonal(&probe->last), moved_sq = 0;
+        for (int k = 0; k < 3; k++) {
+            double moved =
+                0.5 * (facts->bounds.lo[k] + facts->bounds.hi[k] - probe->last.lo[k] - probe->last.hi[k]);
+            moved_sq += moved * moved;
+        }
+        if (sqrt(moved_sq) > JUMP_MOST * fmax(before, size))
+            npg_probe_warn(probe, "frame %lld: the box's middle jumps by %.0f %% of its diagonal",
+                           (long long)number, 100 * sqrt(moved_sq) / fmax(before, size));
+        if (fmax(before, size) > GROWTH_MOST * fmin(before, size))
+            npg_probe_warn(probe, "frame %lld: the box's diagonal changes from %.4g to %.4g",
+                           (long long)number, before, size);
+    }
+    probe->last = facts->bounds;
+}
+
+static npg_status add_frame(npg_probe *probe, const npg_frame *frame, const char *format, int64_t number)
+{
+    cloud_facts facts = measure_cloud(frame);
+    NPG_TRY(npg_grow(&probe->counts, &probe->count_room, probe->frames - probe->unreadable + 1,
+                     sizeof *probe->counts, NPG_FOR_FILES));
+    probe->counts[probe->frames - probe->unreadable] = frame->point_count;
+    probe->frames++;
+    probe->with_normals += frame->normals != NULL;
+    probe->point_total += frame->point_count;
+    probe->not_finite += facts.not_finite;
+    probe->zero_normals += facts.zero_normals;
+    if (!is_empty(&facts.bounds)) npg_bounds_add(&probe->bounds, &facts.bounds);
+    json_int_t seen = json_integer_value(json_object_get(probe->formats, format));
+    json_object_set_new(probe->formats, format, json_integer(seen + 1));
+    warn_of_frame(probe, &facts, frame, number);
+    json_array_append_new(probe->per_frame,
+                          json_pack("{s:I,s:I,s:I,s:b}", "number", (json_int_t)number, "points",
+                                    (json_int_t)frame->point_count, "not_finite",
+                                    (json_int_t)facts.not_finite, "normals", frame->normals != NULL));
+    return NPG_OK;
+}
+
+static void add_fault(npg_probe *probe, int64_t number)
+{
+    const char *text = npg_error_text();
+    if (!probe->unreadable) snprintf(probe->first_fault, sizeof probe->first_fault, "%s", text);
+    probe->frames++;
+    probe->unreadable++;
+    npg_probe_warn(probe, "%s", text);
+    json_array_append_new(probe->per_frame,
+                          json_pack("{s:I,s:s}", "number", (json_int_t)number, "error", text));
+}
+
+npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
+                           int64_t number)
+{
+    if (status == NPG_BAD_INPUT) {
+        add_fault(probe, number);
+        status = NPG_OK;
+    } else if (!status) {
+        status = add_frame(probe, frame, format, number);
+    }
+    npg_frame_clear(frame);
+    return status;
+}
+
+static npg_status add_bytes(void *user, const char *path)
+{
+    npg_probe *probe = user;
+    probe->bytes += npg_file_bytes(path);
+    return NPG_OK;
+}
+
+npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
+{
+    for (size_t i = 0; i < list->count; i++) {
+        const npg_frame_slot *slot = &list->slots[i];
+        npg_frame frame = {0};
+        if (!slot->path) continue;
+        const char *format = list->rig ? list->rig->layout : npg_reader_for(slot->path);
+        NPG_TRY(npg_frame_files_each(list, i, add_bytes, probe));
+        npg_status status = npg_frame_files_read(list, i, &frame, &probe->origin);
+        NPG_TRY(npg_probe_count(probe, status, &frame, format ? format : "unknown", slot->number));
+    }
+    if (list->gap_count) {
+        char gaps[256];
+        npg_frame_files_gaps(gaps, sizeof gaps, list);
+        npg_probe_warn(probe, "%zu frames are missing in the numbering: %s", list->gap_count, gaps);
+    }
+    if (list->left_out) npg_probe_warn(probe, "%zu files with other endings were left out", list->left_out);
+    return NPG_OK;
+}
+
+static int compare_sizes(const void *a, const void *b)
+{
+    size_t x = *(const size_t *)a, y = *(const size_t *)b;
+    return (x > y) - (x < y);
+}
+
+npg_probe_spread npg_probe_counts(npg_probe *probe)
+{
+    size_t count = probe->frames - probe->unreadable;
+    if (!count) return (npg_probe_spread){0};
+    qsort(probe->counts, count, sizeof *probe->counts, compare_sizes);
+    return (npg_probe_spread){probe->counts[0], probe->counts[count / 2], probe->counts[count - 1]};
+}
+
+void npg_probe_warn_of_all(npg_probe *probe)
+{
+    size_t readable = probe->frames - probe->unreadable;
+    npg_probe_spread counts = npg_probe_counts(probe);
+    npg_frame_box box;
+    bool has_points = probe->bounds.lo[0] <= probe->bounds.hi[0];
+    if (has_points && npg_frame_box_set(&box, &probe->origin, &probe->bounds))
+        npg_probe_warn(probe, "%s", npg_error_text());
+    if (probe->not_finite)
+        npg_probe_warn(probe, "%zu points have coordinates that are not finite", probe->not_finite);
+    if (probe->zero_normals) npg_probe_warn(probe, "%zu normals have no direction", probe->zero_normals);
+    if (probe->with_normals && probe->with_normals < readable)
+        npg_probe_warn(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
+    if (counts.most > COUNTS_DIFFER * counts.least)
+        npg_probe_warn(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
+                       counts.most);
+}
+
+/* ---- what a run would take ---- */
+
+/* The value of a run's option as a number, or `otherwise` where it is none. */
+static double number_of(const npg_options *options, const char *name, double otherwise)
+{
+    const char *text = npg_options_get(options, name);
+    char *end = NULL;
+    double value = text ? strtod(text, &end) : 0;
+    return text && end != text ? value : otherwise;
+}
+
+static bool is_set_to(const npg_options *options, const char *name, const char *word)
+{
+    const char *text = npg_options_get(options, name);
+    return !text || !strcmp(text, word);
+}
+
+/* Processor seconds of a run that aligns its frames. */
+static double aligned_s(const npg_probe *probe, const npg_options *options, double most)
+{
+    const double per_read_point = 2e-6, frames = (double)probe->frames, points = (double)probe->point_total;
+    double pass_s = npg_cost_pass_s(frames, points / fmax(frames, 1));
+    double work_s = per_read_point * points + npg_cost_choice_s(most, probe->with_normals == probe->frames) +
+                    npg_cost_surface_s(fmin(most, NPG_START_POINTS_MOST)) + pass_s;
+    if (!is_set_to(options, "reference-from", "all") || !is_set_to(options, "reference", "")) return work_s;
+    return work_s + pass_s + npg_cost_surface_s(fmin(points, NPG_COST_FUSED_POINTS));
+}
+
+/* The same of one that fits them by the network alone. */
+static double network_s(const npg_options *options, double vertex_frames, double cores)
+{
+    double flops =
+        npg_cost_decoder_flops(number_of(options, "width-1", 512), number_of(options, "width-2", 512),
+                               number_of(options, "hidden-layers", 2));
+    return npg_cost_network_s(vertex_frames * number_of(options, "epochs", 250) * flops,
+                              cores * NPG_COST_CORE_FLOPS);
+}
+
+npg_estimate npg_probe_estimate(npg_probe *probe, const npg_options *options)
+{
+    const double decoder_bytes = 1.4e6, poisson_bytes = 125e6 + 2e3 * NPG_COST_FUSED_POINTS;
+    const double frames = (double)probe->frames, most = (double)npg_probe_counts(probe).most;
+    const double cores = fmax((double)sysconf(_SC_NPROCESSORS_ONLN), 1);
+    /* a closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point */
+    const double vertices = fmin(number_of(options, "faces", 20000), 4 * most) / 2;
+    const bool is_aligned = is_set_to(options, "align", "yes");
+    double window = (double)npg_plan_window_asked((int64_t)number_of(options, "window", 0), probe->frames);
+    if (!(window > 0 && window < frames)) window = frames;
+    npg_estimate e = {.vertices = (size_t)vertices, .window = (size_t)window};
+    if (is_aligned) {
+        /* the second core waits while Poisson and the chain's serial parts run */
+        e.time_s = probe->read_s + aligned_s(probe, options, most) / (cores < 2 ? 1 : NPG_COST_BUSY);
+        e.memory_bytes = 100e6 + window * vertices * 200 + 40 * 24 * most + poisson_bytes;
+    } else { /* all samples and activations of a window's frames */
+        e.time_s = 3 * probe->read_s + network_s(options, frames * vertices, cores);
+        e.memory_bytes = 320e6 + window * (vertices * 2400 + 48 * most) + 40 * 24 * most;
+    }
+    /* a mesh, and in job/ the alignment, of every frame; the decoder of every window */
+    e.disk_bytes = frames * vertices * (24 + 2 * 13 + 12) + frames / window * decoder_bytes;
+    return e;
+}
