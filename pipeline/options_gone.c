@@ -11,6 +11,12 @@ static const char *const gone[][2] = {
     {"outlier-neighbours", "always 12"},
     {"normal-neighbours",  "several numbers are tried"},
     {"tuning",         "the set of kernel parameters is chosen by device"},
+    {"rotation",       "rotations are quaternions: others made no difference"},
+    {"hidden-layers",  "the decoder has two, as the published code's; --method '{\"width-1\": 128}' is a smaller one"},
+    {"slope",          "it is 0.01"},
+    {"deliver",        "a fit's result is its last state"},
+    {"warm-start",     "windows without alignment always start warm"},
+    {"fit-batch",      "it is 4"},
     {"rig",            "the rig is the input: neupig run rig.json"},
 };
 /* clang-format on */

@@ -115,9 +115,12 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     run "$NEUPIG" probe in --no-align
     [ "$status" -eq 2 ]
     [[ "$output" == *"--method '{\"align\": false}'"* ]]
+    run "$NEUPIG" run in -o out --catch-up=linear
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"--method '{\"catch-up\": \"linear\"}'"* ]]
     run "$NEUPIG" run in -o out --rotation=cayley
     [ "$status" -eq 2 ]
-    [[ "$output" == *"--method '{\"rotation\": \"cayley\"}'"* ]]
+    [[ "$output" == *"went: "*quaternion* ]]
     run "$NEUPIG" run in -o out --pull
     [ "$status" -eq 2 ]
     [[ "$output" == *"for programs"* ]]
