@@ -17,6 +17,7 @@ static const char *const gone[][2] = {
     {"deliver",        "a fit's result is its last state"},
     {"warm-start",     "windows without alignment always start warm"},
     {"fit-batch",      "it is 4"},
+    {"truth",          "neupig eval OUT TRUTH, after the run"},
     {"rig",            "the rig is the input: neupig run rig.json"},
 };
 /* clang-format on */

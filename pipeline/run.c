@@ -45,7 +45,7 @@ const npg_option npg_run_options[] = {
         "Skip frames that can't be used instead of stopping; ends with exit code 7"),
     NPG_ROW_FLAG(         "confine",    AT(confine),        "no",
         "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), "
-        "true meshes outside the truth's, and links in the place of the output's own folders; "
+        "and links in the place of the output's own folders; "
         "in a batch it is on unless the batch says otherwise"),
     NPG_PROGRAM_ROW(INT,  "ring",       AT(ring_capacity),  "2",         1, 1024, NULL,
         "Chunks that may wait between two stages"),
