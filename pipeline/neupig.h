@@ -120,6 +120,7 @@ typedef enum npg_option_type {
 typedef enum npg_option_use {
     NPG_USE_COMMON, /* of the command, too                                            */
     NPG_USE_METHOD, /* a key of the method: programs set it, the command in --method  */
+    NPG_USE_PART,   /* "LIST.part": programs set it, the command in --LIST part=value */
     NPG_USE_PROGRAM /* for programs alone                                             */
 } npg_option_use;
 
@@ -138,7 +139,9 @@ NPG_API void npg_options_close(npg_options **options);
 /* Set one option by its name ("epochs", without dashes).  NPG_USAGE names the option and what it takes.
  * "method" is one of its names (default, best, paper ...), a JSON file, or a JSON object as text that sets
  * options, keys of the method above all: {"preset": "paper", "epochs": 250}.  "preset" is the name that the
- * others are added to.  Configurations of the paper's published code are read, too. */
+ * others are added to.  Configurations of the paper's published code are read, too.  "bars", "depth-range" and
+ * "follow-end" are lists that set their parts, as in "residual=1,coverage=0" for "bars.residual" and
+ * "bars.coverage". */
 NPG_API npg_status npg_options_set(npg_options *options, const char *name, const char *value);
 
 /* The method in a file; // comments are allowed.  NPG_USAGE names file, line and option. */

@@ -14,6 +14,7 @@
 #include "pipeline/custom_stage.h"
 #include "pipeline/memory.h"
 #include "pipeline/method.h"
+#include "pipeline/nearest.h"
 #include "pipeline/run_settings.h"
 #include "pipeline/struct_size.h"
 
@@ -243,11 +244,16 @@ static const char *plain_name(const char *name)
     return strcmp(name, "preset") != 0 ? name : "method";
 }
 
-static npg_status unknown(const char *name)
+static npg_status unknown(const npg_options *options, const char *name)
 {
     const char *gone = npg_option_gone(name);
-    return gone ? npg_error(NPG_USAGE, "option %s went: %s", name, gone)
-                : npg_error(NPG_USAGE, "there is no option %s", name);
+    const npg_option *option;
+    npg_nearest nearest = npg_nearest_to(name);
+    if (gone) return npg_error(NPG_USAGE, "option %s went: %s", name, gone);
+    for (size_t i = 0; (option = option_at(options->chain, i, NULL)); i++)
+        npg_nearest_offer(&nearest, option->name);
+    return npg_error(NPG_USAGE, "there is no option %s%s%s", name, nearest.word ? "; did you mean " : "",
+                     nearest.word ? nearest.word : "");
 }
 
 static npg_status set_text(npg_options *options, const char *name, const char *value)
@@ -255,12 +261,73 @@ static npg_status set_text(npg_options *options, const char *name, const char *v
     size_t at;
     char *text;
     const npg_option *option = find_option(options, plain_name(name), &at);
-    if (!option) return unknown(name);
+    if (!option) return unknown(options, name);
     NPG_TRY(npg_option_check(option, value));
     NPG_TRY(npg_copy_text(&text, value));
     npg_release(&options->texts[at]);
     options->texts[at] = text;
     return NPG_OK;
+}
+
+/* ---- lists ---- */
+
+const npg_option_list npg_option_lists[] = {
+    {"bars", "LIST", "What a good frame, and a good reference, keeps to, as in residual=1,coverage=20", ',',
+     true},
+    {"depth-range", "A:B", "Depths that are used, in the rig's unit", ':', false},
+    {"follow-end", "NAME|SECONDS", "What ends a folder that is followed", ',', false},
+    {0}};
+
+const npg_option_list *npg_option_list_of(const char *name)
+{
+    size_t length = strcspn(name, ".");
+    for (const npg_option_list *list = npg_option_lists; list->name; list++)
+        if (!strncmp(list->name, name, length) && !list->name[length]) return list;
+    return NULL;
+}
+
+/* The part that a piece sets, from the i-th option on: the named one, or the next that accepts it. */
+static npg_status find_part(const npg_options *options, const npg_option_list *list, const char *piece,
+                            size_t *i, const npg_option **part)
+{
+    const char *equals = strchr(piece, '=');
+    size_t length = equals ? (size_t)(equals - piece) : 0;
+    bool can_be = equals || !list->needs_names;
+    for (size_t at = equals ? 0 : *i; can_be && (*part = option_at(options->chain, at, NULL)); at++) {
+        if ((*part)->use != NPG_USE_PART || npg_option_list_of((*part)->name) != list) continue;
+        const char *name = (*part)->name + strlen(list->name) + 1;
+        *i = at + 1;
+        if (equals ? strlen(name) == length && !strncmp(name, piece, length)
+                   : !*piece || !npg_option_check(*part, piece))
+            return NPG_OK;
+    }
+    return npg_error(NPG_USAGE, "option %s: \"%s\" is none of its parts (neupig help run --help-all)",
+                     list->name, piece);
+}
+
+static npg_status set_list(npg_options *options, const npg_option_list *list, char *text)
+{
+    size_t i = 0;
+    for (char *piece = text, *end = text; end; piece = end + 1) {
+        const npg_option *part;
+        end = strchr(piece, list->separator);
+        if (end) *end = 0;
+        NPG_TRY(find_part(options, list, piece, &i, &part));
+        const char *equals = strchr(piece, '=');
+        if (equals || *piece) NPG_TRY(set_text(options, part->name, equals ? equals + 1 : piece));
+    }
+    return NPG_OK;
+}
+
+static npg_status set_list_or_text(npg_options *options, const char *name, const char *value)
+{
+    char *text;
+    const npg_option_list *list = strchr(name, '.') ? NULL : npg_option_list_of(name);
+    if (!list) return set_text(options, name, value);
+    NPG_TRY(npg_copy_text(&text, value));
+    npg_status status = set_list(options, list, text);
+    npg_release(&text);
+    return status;
 }
 
 /* Whether a method's value is none of the names. */
@@ -275,21 +342,22 @@ static bool is_method_text(const char *name, const char *value)
 npg_status npg_options_set(npg_options *options, const char *name, const char *value)
 {
     NPG_REQUIRE(options && name && value);
-    return is_method_text(name, value) ? npg_method_set(options, value) : set_text(options, name, value);
+    return is_method_text(name, value) ? npg_method_set(options, value)
+                                       : set_list_or_text(options, name, value);
 }
 
 npg_status npg_options_set_key(npg_options *options, const char *name, const json_t *value)
 {
     char number[64];
-    if (json_is_string(value)) return set_text(options, name, json_string_value(value));
-    if (json_is_boolean(value)) return set_text(options, name, json_is_true(value) ? "yes" : "no");
+    if (json_is_string(value)) return set_list_or_text(options, name, json_string_value(value));
+    if (json_is_boolean(value)) return set_list_or_text(options, name, json_is_true(value) ? "yes" : "no");
     if (json_is_integer(value))
         snprintf(number, sizeof number, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
     else if (json_is_real(value))
         snprintf(number, sizeof number, "%.17g", json_real_value(value));
     else
         return npg_error(NPG_USAGE, "option %s: neither text, number nor true/false", name);
-    return set_text(options, name, number);
+    return set_list_or_text(options, name, number);
 }
 
 npg_status npg_options_set_json(npg_options *options, const char *name, const json_t *value)

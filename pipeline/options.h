@@ -49,10 +49,15 @@ typedef struct npg_option {
         NPG_TEXT_FIELDS(__VA_ARGS__)                                                                         \
     }
 
-/* The same for keys of the method, and for what programs alone set: NPG_KEY(INT, "epochs", ...). */
+/* The same for keys of the method, for parts of a list, and for what programs alone set:
+ * NPG_KEY(INT, "epochs", ...), NPG_PART(REAL, "bars.residual", ...). */
 #define NPG_KEY(type, ...)                                                                                   \
     {                                                                                                        \
         NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_METHOD                                              \
+    }
+#define NPG_PART(type, ...)                                                                                  \
+    {                                                                                                        \
+        NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_PART                                                \
     }
 #define NPG_PROGRAM_ROW(type, ...)                                                                           \
     {                                                                                                        \
@@ -72,6 +77,21 @@ typedef struct npg_option {
 #define NPG_TEXT_FIELDS(word, place, initial, shown, text)                                                   \
     .name = (word), .help = (text), .type = NPG_OPTION_TEXT, .offset = (place), .default_text = (initial),   \
     .value_name = (shown)
+
+/* Several options, "NAME.part" each, as one of the command: pieces "part=value" or "value", parted by a
+ * character.  Unless all need their names, a piece without one is the next part that accepts it; an empty one
+ * leaves that as it is. */
+typedef struct npg_option_list {
+    const char *name, *value_name, *help;
+    char separator;
+    bool needs_names;
+} npg_option_list;
+
+/* Ends with a name of NULL. */
+extern const npg_option_list npg_option_lists[];
+
+/* The list of this name, or whose part this is; NULL: none. */
+const npg_option_list *npg_option_list_of(const char *name);
 
 /* A named method: values of options; what the user sets himself wins.  The list ends with a name
  * of NULL, as does each set. */

@@ -19,40 +19,42 @@
 /* clang-format off */
 const npg_option npg_run_options[] = {
     /* type               name          place               default      least most  shown as or words */
-    NPG_ROW_TEXT(         "input",      AT(input),          "",          "PATH",
-        "Folder, pattern (frame_%04d.ply), list file, a rig of depth sensors (rig.json, or a folder of depth "
-        "images), or - for standard input; empty: frames are pushed"),
+    NPG_PROGRAM_ROW(TEXT, "input",      AT(input),          "",          "PATH",
+        "Folder, pattern (frame_%04d.ply), list file, a rig of depth sensors (rig.json, or a folder of "
+        "depth images), or - for standard input; empty: frames are pushed"),
     NPG_ROW_TEXT(         "follow",     AT(follow),         "",          "DIR",
-        "Folder that grows, or a pattern of file names in it (DIR/scan_*.ply): "
-        "its files are frames as they are complete; takes the place of the input"),
+        "A folder that grows: its files are frames as they are complete. Or a pattern of file names in it "
+        "(DIR/scan_*.ply); takes the place of INPUT"),
     NPG_ROW_TEXT(         "reference",  AT(reference),      "",          "FILE",
-        "Use this mesh (PLY or OBJ, in the capture's units) instead of reconstructing one"),
+        "Your own mesh instead of a reconstructed one. PLY or OBJ, in the capture's units and the pose of a "
+        "frame"),
     NPG_ROW_TEXT(         "output",     AT(output),         "",          "DIR",
-        "Folder for the results; empty: results are only pulled"),
+        "Folder for the results (also -o). In the library empty: results are only pulled"),
     NPG_ROW_CHOICE(       "colour",     AT(colour),         "reference", "reference|frames|no",
-        "Colours of points that have any: one per vertex, the robust mean of all frames that saw it "
-        "(reference), as each frame saw it (frames), or none"),
+        "Colours of points that have any. One per vertex, the robust mean of all frames that saw it "
+        "(reference), as each frame saw it (frames), or none (no)"),
     NPG_ROW_CHOICE(       "method",     AT(method),         "default",
         "default|best|paper|paper-1000|grids",
-        "How it is done: a name, a JSON file of its keys, or such an object itself, "
-        "'{\"preset\": \"paper\", \"epochs\": 100}'"),
+        "How it is done: a name, a JSON file, or '{\"KEY\": VALUE}'. Several add up; neupig help method "
+        "lists names and keys"),
     NPG_ROW_TEXT(         "device",     AT(device),         "auto",      "DEVICE",
-        "OpenCL device of fits without alignment: part of its name, its number, or auto (neupig doctor "
-        "lists them)"),
+        "OpenCL device, for the methods paper and grids. Part of its name, its number, or auto (neupig "
+        "doctor lists them)"),
     NPG_ROW_INT(          "seed",       AT(seed),           "0",         0, 4294967295.0, NULL,
         "Seed of all random numbers"),
     NPG_ROW_FLAG(         "keep-going", AT(keep_going),     "no",
-        "Skip frames that can't be used instead of stopping; ends with exit code 7"),
+        "Leave out frames that can't be used. Without it they stop the run; with it there is exit code 7 at "
+        "the end"),
     NPG_ROW_FLAG(         "confine",    AT(confine),        "no",
-        "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), "
-        "and links in the place of the output's own folders; "
-        "in a batch it is on unless the batch says otherwise"),
+        "For folders of unknown origin: follow no link out of them. Frames outside the input's folder "
+        "(links, paths in a list) and links in the place of the output's own folders are refused; in a "
+        "batch it is on unless the batch says otherwise"),
     NPG_PROGRAM_ROW(INT,  "ring",       AT(ring_capacity),  "2",         1, 1024, NULL,
         "Chunks that may wait between two stages"),
     NPG_PROGRAM_ROW(INT,  "chunk",      AT(chunk_frames),   "4",         1, 1024, NULL,
         "Frames per chunk"),
     NPG_ROW_INT(          "max-memory", AT(max_memory_mib), "0",         0, 1e9,  "MIB",
-        "Stop rather than use more than this, in MiB; 0: no limit"),
+        "Stop rather than use more memory than this. 0: no limit"),
     NPG_PROGRAM_ROW(FLAG, "pull",       AT(pull),           "no",
         "Finished frames are also pulled through the library"),
     {0}};

@@ -37,6 +37,7 @@ static const npg_preset_value paper[] = {
     {"rate-end",        "1"},
     {"feature-start",   "0"},
     {"time-span",       "1"},
+    {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
     {"align",           "no"},
@@ -53,6 +54,7 @@ static const npg_preset_value paper_1000[] = {
     {"rate-end",        "1"},
     {"feature-start",   "0"},
     {"time-span",       "1"},
+    {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {
     {"align",           "no"},         /* grids and decoder alone carry the motion */

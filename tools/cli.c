@@ -1,14 +1,31 @@
-/* Command line: options from tables, operands, help, and how a verb ends. */
+/* Command line: options from tables, operands, and how a verb ends. */
 #include "tools/cli.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+#include "pipeline/nearest.h"
 #include "pipeline/stage.h"
+#include "tools/help.h"
 
-enum { NAME_LIMIT = 64, HELP_INDENT = 28, HELP_WIDTH = 100 };
+enum { NAME_LIMIT = 64 };
 
 /* ---- options of a verb ---- */
+
+static npg_option_info info_of(const npg_option *option, const char *group)
+{
+    return (npg_option_info){sizeof(npg_option_info),
+                             group,
+                             option->name,
+                             option->help,
+                             option->default_text,
+                             option->choices,
+                             option->value_name,
+                             option->type,
+                             option->min,
+                             option->max,
+                             option->use};
+}
 
 static const npg_option *own_option(const npg_verb *verb, const char *name)
 {
@@ -17,46 +34,81 @@ static const npg_option *own_option(const npg_verb *verb, const char *name)
     return NULL;
 }
 
-npg_status npg_cli_option(npg_option_info *info, const npg_verb *verb, size_t i)
+/* An option of the library, whoever may set it; a list as one. */
+static bool find_in_run(npg_option_info *info, const char *name)
 {
-    const npg_option *option = verb->options;
-    for (; option && option->name; option++)
-        if (i-- == 0) {
-            *info = (npg_option_info){sizeof *info,         verb->name,      option->name,       option->help,
-                                      option->default_text, option->choices, option->value_name, option->type,
-                                      option->min,          option->max,     option->use};
-            return NPG_OK;
+    for (const npg_option_list *list = npg_option_lists; list->name; list++)
+        if (!strcmp(list->name, name)) {
+            *info = (npg_option_info){.struct_size = sizeof *info,
+                                      .name = list->name,
+                                      .help = list->help,
+                                      .default_text = "",
+                                      .value_name = list->value_name,
+                                      .type = NPG_OPTION_TEXT};
+            return true;
         }
     info->struct_size = sizeof *info;
-    for (size_t j = 0; verb->with_run_options && npg_options_describe(j, info) == NPG_OK; j++)
-        if (info->use == NPG_USE_COMMON && i-- == 0) return NPG_OK;
-    return NPG_END;
-}
-
-static bool find_option(npg_option_info *info, const npg_verb *verb, const char *name)
-{
-    for (size_t i = 0; npg_cli_option(info, verb, i) == NPG_OK; i++)
+    for (size_t i = 0; npg_options_describe(i, info) == NPG_OK; i++)
         if (!strcmp(info->name, name)) return true;
     return false;
 }
 
-/* Edits (insert, delete, replace) that lead from a to b; both shorter than NAME_LIMIT. */
-static size_t edit_distance(const char *a, const char *b)
+static bool find_option(npg_option_info *info, const npg_verb *verb, const char *name)
 {
-    size_t row[NAME_LIMIT + 1], b_length = strlen(b);
-    for (size_t j = 0; j <= b_length; j++) row[j] = j;
-    for (size_t i = 1; a[i - 1]; i++) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= b_length; j++) {
-            size_t above = row[j], best = diagonal + (a[i - 1] != b[j - 1]);
-            if (above + 1 < best) best = above + 1;
-            if (row[j - 1] + 1 < best) best = row[j - 1] + 1;
-            row[j] = best;
-            diagonal = above;
+    const npg_option *own = own_option(verb, name);
+    if (own) *info = info_of(own, verb->name);
+    return own || (verb->with_run_options && find_in_run(info, name) && info->use == NPG_USE_COMMON);
+}
+
+/* Options of a run by what a user does; * marks those that the short help shows. */
+static const struct {
+    const char *title, *names;
+} groups[] = {
+    {"Frames", "*frames missing keep-going confine cache *follow follow-end look-ahead"},
+    {"Sensors", "*sensor sensor-poses align-sensors depth-range"},
+    {"Points", "outliers normals"},
+    {"Reference", "*reference keyframe *faces unseen colour"},
+    {"Method", "*method device seed"},
+    {"Result", "*output *export prefix numbering scale axes up unit centre fps overwrite *restart"},
+    {"Judged", "bars *segments"},
+    {"Machine", "*max-memory progress log-file quiet verbose"},
+};
+
+/* The i-th name of the groups. */
+static bool grouped(char *name, size_t size, const char **title, bool *is_short, size_t i)
+{
+    for (size_t g = 0; g < sizeof groups / sizeof *groups; g++)
+        for (const char *word = groups[g].names; *word; word += strspn(word, " ")) {
+            size_t length = strcspn(word, " ");
+            if (i-- == 0) {
+                *is_short = *word == '*';
+                *title = groups[g].title;
+                snprintf(name, size, "%.*s", (int)(length - *is_short), word + *is_short);
+                return true;
+            }
+            word += length;
         }
+    return false;
+}
+
+npg_status npg_cli_option(npg_option_info *info, bool *is_short, const npg_verb *verb, size_t i)
+{
+    char name[NAME_LIMIT];
+    const char *title;
+    bool unused;
+    if (verb->main == npg_verb_run) {
+        if (!grouped(name, sizeof name, &title, is_short ? is_short : &unused, i)) return NPG_END;
+        if (!find_option(info, verb, name)) return npg_error(NPG_FAILED, "help: no option %s", name);
+        info->stage = title;
+        return NPG_OK;
     }
-    return row[b_length];
+    for (const npg_option *option = verb->options; option && option->name; option++)
+        if (i-- == 0) {
+            *info = info_of(option, verb->name);
+            if (is_short) *is_short = true;
+            return NPG_OK;
+        }
+    return NPG_END;
 }
 
 /* An option of the library that is none of the command; value NULL: none was given. */
@@ -66,17 +118,26 @@ static npg_status refuse_option(const npg_option_info *info, const char *value)
     const char *quote = is_bare ? "" : "\"";
     if (info->use == NPG_USE_PROGRAM)
         return npg_error(NPG_USAGE, "option %s is for programs that use the library", info->name);
+    if (info->use == NPG_USE_PART)
+        return npg_error(NPG_USAGE, "option %s is a part of --%s", info->name,
+                         npg_option_list_of(info->name)->name);
     if (info->type == NPG_OPTION_FLAG) value = value && !strcmp(value, "no") ? "false" : "true";
     return npg_error(NPG_USAGE, "option --%s is a key of the method now: --method '{\"%s\": %s%s%s}'",
                      info->name, info->name, quote, value ? value : info->default_text, quote);
 }
 
-static bool find_in_run(npg_option_info *info, const npg_verb *verb, const char *name)
+/* The option that was meant, of all that the verb takes. */
+static npg_status no_such_option(const npg_verb *verb, const char *name)
 {
-    info->struct_size = sizeof *info;
-    for (size_t i = 0; verb->with_run_options && npg_options_describe(i, info) == NPG_OK; i++)
-        if (!strcmp(info->name, name)) return true;
-    return false;
+    npg_option_info info;
+    npg_nearest nearest = npg_nearest_to(name);
+    for (size_t i = 0; npg_cli_option(&info, NULL, verb, i) == NPG_OK; i++)
+        npg_nearest_offer(&nearest, info.name);
+    for (size_t i = 0; verb->with_run_options && npg_options_describe(i, &info) == NPG_OK; i++)
+        if (info.use == NPG_USE_COMMON) npg_nearest_offer(&nearest, info.name);
+    if (nearest.word)
+        return npg_error(NPG_USAGE, "there is no option --%s; did you mean --%s?", name, nearest.word);
+    return npg_error(NPG_USAGE, "there is no option --%s (neupig help %s lists them)", name, verb->name);
 }
 
 static npg_status unknown_option(const npg_verb *verb, const char *name, const char *value)
@@ -85,19 +146,10 @@ static npg_status unknown_option(const npg_verb *verb, const char *name, const c
     const char *gone = verb->with_run_options ? npg_option_gone(name) : NULL;
     bool is_no = !strncmp(name, "no-", 3);
     if (gone) return npg_error(NPG_USAGE, "option --%s went: %s", name, gone);
-    if (find_in_run(&info, verb, name)) return refuse_option(&info, value);
-    if (is_no && find_in_run(&info, verb, name + 3)) return refuse_option(&info, "no");
-    const char *nearest = NULL;
-    size_t least = strlen(name) / 3 + 2; /* more edits than a third of the name: not a slip of the hand */
-    for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
-        size_t edits = edit_distance(name, info.name);
-        if (edits < least) {
-            least = edits;
-            nearest = info.name;
-        }
-    }
-    if (nearest) return npg_error(NPG_USAGE, "there is no option --%s; did you mean --%s?", name, nearest);
-    return npg_error(NPG_USAGE, "there is no option --%s (neupig help %s lists them)", name, verb->name);
+    if (!verb->with_run_options) return no_such_option(verb, name);
+    if (find_in_run(&info, name)) return refuse_option(&info, value);
+    if (is_no && find_in_run(&info, name + 3)) return refuse_option(&info, "no");
+    return no_such_option(verb, name);
 }
 
 /* ---- parsing ---- */
@@ -182,11 +234,14 @@ static npg_status parse_all(npg_cli *cli, int argc, char **argv)
     return NPG_OK;
 }
 
-static bool asks_for_help(int argc, char **argv)
+/* 0: no, 1: the short help, 2: all of it. */
+static int asks_for_help(int argc, char **argv)
 {
-    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
-        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return true;
-    return false;
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
+        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return 1;
+        if (!strcmp(argv[i], "--help-all")) return 2;
+    }
+    return 0;
 }
 
 npg_status npg_cli_parse(npg_cli *cli, const char *name, void *values, npg_options *options, int argc,
@@ -194,8 +249,10 @@ npg_status npg_cli_parse(npg_cli *cli, const char *name, void *values, npg_optio
 {
     const npg_verb *verb = npg_verb_find(name);
     *cli = (npg_cli){verb, values, options, argv + 1, 0};
-    if (asks_for_help(argc, argv)) {
-        npg_cli_print_verb(stdout, verb);
+    int help = asks_for_help(argc, argv);
+    if (help == 2 && own_option(verb, "help-all")) help = 0; /* of another verb */
+    if (help) {
+        npg_help_verb(stdout, verb, help == 2);
         return NPG_END;
     }
     for (const npg_option *option = verb->options; option && option->name; option++)
@@ -215,119 +272,4 @@ int npg_cli_end(const char *verb, npg_status status)
     if (status == NPG_END) status = NPG_OK;
     if (status < 0) fprintf(stderr, "neupig %s: %s\n", verb, npg_error_text());
     return npg_status_exit_code(status);
-}
-
-/* ---- help ---- */
-
-void npg_cli_spell(char *out, size_t size, const npg_option_info *option)
-{
-    static const char *const by_type[] = {"", "N", "X", "WORD", "TEXT"};
-    const char *value = option->value_name ? option->value_name : by_type[option->type];
-    bool on = option->type == NPG_OPTION_FLAG && !strcmp(option->default_text, "yes");
-    if (option->type == NPG_OPTION_FLAG)
-        snprintf(out, size, "--%s%s", on ? "no-" : "", option->name);
-    else
-        snprintf(out, size, "--%s %s", option->name, value);
-}
-
-void npg_cli_limits(char *out, size_t size, const npg_option_info *option)
-{
-    const char *given = option->default_text;
-    out[0] = 0;
-    switch (option->type) {
-    case NPG_OPTION_FLAG: snprintf(out, size, "default: %s", given); break;
-    case NPG_OPTION_CHOICE: snprintf(out, size, "%s; default: %s", option->choices, given); break;
-    case NPG_OPTION_INT:
-    case NPG_OPTION_REAL:
-        snprintf(out, size, "%.10g .. %.10g; default: %s", option->min, option->max, given);
-        break;
-    case NPG_OPTION_TEXT:
-        if (given && given[0]) snprintf(out, size, "default: %s", given);
-        break;
-    }
-}
-
-/* Print text in words, wrapped; the cursor stands at *column. */
-static void print_wrapped(FILE *out, const char *text, int *column, int indent)
-{
-    while (*text) {
-        int length = (int)strcspn(text, " ");
-        if (*column + 1 + length > HELP_WIDTH) {
-            fprintf(out, "\n%*s", indent, "");
-            *column = indent;
-        } else if (*column > indent) {
-            fputc(' ', out);
-            ++*column;
-        }
-        fprintf(out, "%.*s", length, text);
-        *column += length;
-        text += length;
-        text += strspn(text, " ");
-    }
-}
-
-static void print_option(FILE *out, const npg_option_info *option)
-{
-    char spelled[NAME_LIMIT + 32], limits[256], bracketed[260];
-    if (option->use == NPG_USE_METHOD)
-        snprintf(spelled, sizeof spelled, "%s", option->name);
-    else
-        npg_cli_spell(spelled, sizeof spelled, option);
-    npg_cli_limits(limits, sizeof limits, option);
-    int column = fprintf(out, "  %s", spelled);
-    if (column + 1 > HELP_INDENT) {
-        fputc('\n', out);
-        column = 0;
-    }
-    fprintf(out, "%*s", HELP_INDENT - column, "");
-    column = HELP_INDENT;
-    print_wrapped(out, option->help, &column, HELP_INDENT);
-    if (limits[0]) {
-        snprintf(bracketed, sizeof bracketed, "(%s)", limits);
-        print_wrapped(out, bracketed, &column, HELP_INDENT);
-    }
-    fputc('\n', out);
-}
-
-void npg_cli_print_verb(FILE *out, const npg_verb *verb)
-{
-    npg_option_info info;
-    const char *stage = "";
-    int column = 0;
-    fprintf(out, "Usage: neupig %s %s%s%s\n\n", verb->name, verb->options ? "[options]" : "",
-            verb->options && verb->operands[0] ? " " : "", verb->operands);
-    print_wrapped(out, verb->text, &column, 0);
-    fputs("\n", out);
-    for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
-        if (strcmp(stage, info.stage) != 0)
-            fprintf(out, "\n%s%s:\n", i ? "Options of " : "Options of neupig ", info.stage);
-        stage = info.stage;
-        print_option(out, &info);
-    }
-}
-
-void npg_cli_print_method(FILE *out)
-{
-    npg_option_info info = {.struct_size = sizeof info};
-    fputs("--method NAME, --method FILE.json, or --method '{\"preset\": \"NAME\", \"KEY\": VALUE, ...}'; "
-          "several add up.\n\nNames:\n",
-          out);
-    for (const npg_preset *preset = npg_presets; preset->name; preset++)
-        fprintf(out, "  %-26s%s\n", preset->name, preset->help);
-    fputs("\nKeys, beside all options of neupig run:\n", out);
-    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
-        if (info.use == NPG_USE_METHOD) print_option(out, &info);
-}
-
-void npg_cli_print_verbs(FILE *out)
-{
-    fputs("Usage: neupig VERB [options] [operands]\n\n"
-          "Turns a long sequence of point clouds into one mesh that moves.\n\n",
-          out);
-    for (const npg_verb *verb = npg_verbs; verb->name; verb++)
-        fprintf(out, "  %-10s%s\n", verb->name, verb->help);
-    fputs("\nneupig help VERB, or neupig VERB --help, shows the options of one verb.\n"
-          "Exit codes: 0 done, 1 failed, 2 usage, 3 bad input, 4 device, 5 disk, 6 memory,\n"
-          "7 finished with frames skipped or below the quality bar, 75 stopped by a signal.\n",
-          out);
 }

@@ -1,7 +1,8 @@
-/* Command line: options from tables, operands, help, and how a verb ends. */
+/* Command line: options from tables, operands, and how a verb ends. */
 #ifndef NPG_CLI_H
 #define NPG_CLI_H
 
+#include <stdbool.h>
 #include <stdio.h>
 
 #include "tools/verbs.h"
@@ -24,20 +25,8 @@ npg_status npg_cli_parse(npg_cli *cli, const char *verb, void *values, npg_optio
 /* Print to stderr how it failed, and return the exit code of the status.  NPG_END counts as success. */
 int npg_cli_end(const char *verb, npg_status status);
 
-/* Help of one verb, and the list of all verbs. */
-void npg_cli_print_verb(FILE *out, const npg_verb *verb);
-void npg_cli_print_verbs(FILE *out);
-
-/* The methods, and the keys of their JSON. */
-void npg_cli_print_method(FILE *out);
-
-/* "--name VALUE" as the help shows it; size includes the closing zero. */
-void npg_cli_spell(char *out, size_t size, const npg_option_info *option);
-
-/* What an option takes: default, range and words, in one line; "" when there are none. */
-void npg_cli_limits(char *out, size_t size, const npg_option_info *option);
-
-/* The i-th option of a verb, its own first, then those of the run; NPG_END after the last. */
-npg_status npg_cli_option(npg_option_info *info, const npg_verb *verb, size_t i);
+/* The i-th option of a verb, as its help lists them: of run in groups (the group is info->stage), of others their
+ * own.  is_short (may be NULL): whether the short help shows it.  NPG_END after the last. */
+npg_status npg_cli_option(npg_option_info *info, bool *is_short, const npg_verb *verb, size_t i);
 
 #endif

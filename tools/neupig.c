@@ -1,16 +1,18 @@
 /* neupig: the command.  One verb per file; this one holds their table and the small verbs. */
 #include <malloc.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "tools/cli.h"
+#include "pipeline/nearest.h"
+#include "tools/help.h"
 
 const npg_verb npg_verbs[] = {
     {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",
-     "Reads the point clouds of INPUT (a folder, a pattern like frame_%04d.ply, "
-     "a list file, or - for standard input; or --follow a folder that grows) "
-     "in time order and writes one mesh per frame, all with the same faces, to DIR/meshes, "
-     "with reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.  "
+     "INPUT (a folder, a pattern like frame_%04d.ply, a list file, a rig.json, or - for standard input) becomes "
+     "one moving mesh in DIR.  "
+     "Its point clouds are read in time order, and one mesh per frame is written, all with the same faces, to "
+     "DIR/meshes, with reference.ply, report.json, frames.jsonl and, last of all, done.json beside them.  "
      "A run that was stopped or killed is resumed when it is started again.  "
      "With --segments auto, where the topology changes another reference takes over: DIR/segment_* are then "
      "runs by themselves, and DIR/segments.json lists their frames, why they were cut, and their overlaps.",
@@ -28,7 +30,7 @@ const npg_verb npg_verbs[] = {
      "what stands in defaults and captures are options of neupig run and keys of its method, "
      "and \"max-time\" and \"segments\"; paths are seen from the file; the command line wins.  "
      "Of a DIR every sub-folder is a capture; the folders of the paper's published code "
-     "(point_clouds/ or gt/ in each) are understood.  "
+     "(point_clouds/ or gt/ in each) are understood, and what lies in truth/ or gt/ is compared with.  "
      "Each capture gets OUT/NAME with its results, log.jsonl and verdict.json; "
      "a capture that fails does not touch the others.  "
      "What links lead out of a capture's folder is not read "
@@ -91,7 +93,7 @@ const npg_verb npg_verbs[] = {
     {"help", "[VERB|method]", 0, 1, "Show the verbs, the options of one, or the keys of the method",
      "Without VERB, lists the verbs; with one, its usage and options.  "
      "help method lists what --method of run takes.",
-     NULL, false, npg_verb_help},
+     npg_help_options, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page",
      "Prints the manual page in roff, made from the same tables as the help.  "
      "Read it with: neupig man | man -l -",
@@ -109,26 +111,45 @@ const npg_verb *npg_verb_find(const char *name)
 
 static int unknown_verb(const char *name)
 {
-    fprintf(stderr, "neupig: there is no verb \"%s\"; neupig help lists them\n", name);
+    npg_nearest nearest = npg_nearest_to(name);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) npg_nearest_offer(&nearest, verb->name);
+    if (nearest.word)
+        fprintf(stderr, "neupig: there is no verb \"%s\"; did you mean %s?\n", name, nearest.word);
+    else
+        fprintf(stderr, "neupig: there is no verb \"%s\"; neupig help lists them\n", name);
     return npg_status_exit_code(NPG_USAGE);
 }
+
+typedef struct help_settings {
+    bool all, json;
+} help_settings;
+
+/* clang-format off */
+const npg_option npg_help_options[] = {
+    /* type       name        place                         default */
+    NPG_ROW_FLAG("help-all", offsetof(help_settings, all),  "no",
+        "All options of neupig run, not only those that most need"),
+    NPG_ROW_FLAG("json",     offsetof(help_settings, json), "no",
+        "The same as JSON; of method a JSON schema of what it takes"),
+    {0}};
+/* clang-format on */
 
 int npg_verb_help(int argc, char **argv)
 {
     npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], NULL, NULL, argc, argv);
+    help_settings s;
+    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
     if (status) return npg_cli_end(argv[0], status);
-    if (!cli.operand_count) {
-        npg_cli_print_verbs(stdout);
-        return 0;
-    }
-    const npg_verb *verb = npg_verb_find(cli.operands[0]);
-    if (!strcmp(cli.operands[0], "method")) {
-        npg_cli_print_method(stdout);
-        return 0;
-    }
-    if (!verb) return unknown_verb(cli.operands[0]);
-    npg_cli_print_verb(stdout, verb);
+    const char *subject = cli.operand_count ? cli.operands[0] : "";
+    bool is_method = !strcmp(subject, "method");
+    const npg_verb *verb = npg_verb_find(subject);
+    if (!verb && !is_method && *subject) return unknown_verb(subject);
+    if (!*subject)
+        npg_help_verbs(stdout);
+    else if (is_method)
+        s.json ? npg_help_method_json(stdout) : npg_help_method(stdout);
+    else
+        s.json ? npg_help_verb_json(stdout, verb) : npg_help_verb(stdout, verb, s.all);
     return 0;
 }
 
@@ -167,7 +188,7 @@ int main(int argc, char **argv)
 {
     set_heap();
     if (argc < 2) {
-        npg_cli_print_verbs(stderr);
+        npg_help_verbs(stderr);
         return npg_status_exit_code(NPG_USAGE);
     }
     static char help[] = "help", version[] = "version";

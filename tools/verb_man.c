@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "pipeline/stage.h"
-#include "tools/cli.h"
+#include "tools/help.h"
 
 /* Text as roff shows it letter by letter. */
 static void put_text(const char *text)
@@ -21,8 +21,8 @@ static void put_text(const char *text)
 static void put_option(const npg_option_info *option)
 {
     char spelled[128], limits[256];
-    npg_cli_spell(spelled, sizeof spelled, option);
-    npg_cli_limits(limits, sizeof limits, option);
+    npg_help_spell(spelled, sizeof spelled, option);
+    npg_help_limits(limits, sizeof limits, option);
     fputs(".TP\n.B ", stdout);
     put_text(spelled);
     putchar('\n');
@@ -35,6 +35,14 @@ static void put_option(const npg_option_info *option)
     putchar('\n');
 }
 
+/* Keys of the method, or the parts of a list. */
+static void put_rows(npg_option_use use, const npg_option_list *list)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        if (info.use == use && npg_option_list_of(info.name) == list) put_option(&info);
+}
+
 static void put_verb(const npg_verb *verb)
 {
     npg_option_info info;
@@ -45,21 +53,28 @@ static void put_verb(const npg_verb *verb)
     putchar('\n');
     put_text(verb->text);
     putchar('\n');
-    for (size_t i = 0; npg_cli_option(&info, verb, i) == NPG_OK; i++) {
-        if (strcmp(stage, info.stage) != 0) printf(".PP\nOptions of %s:\n", info.stage);
+    for (size_t i = 0; npg_cli_option(&info, NULL, verb, i) == NPG_OK; i++) {
+        if (strcmp(stage, info.stage) != 0)
+            printf(".PP\n%s%s:\n", verb->with_run_options ? "" : "Options of ", info.stage);
         stage = info.stage;
         put_option(&info);
+        const npg_option_list *list = npg_option_list_of(info.name);
+        if (!list) continue;
+        fputs(".RS\n", stdout);
+        put_rows(NPG_USE_PART, list);
+        fputs(".RE\n", stdout);
     }
 }
 
-static void put_presets(void)
+static void put_methods(void)
 {
-    fputs(".SH PRESETS\n", stdout);
+    fputs(".SH METHODS\nNames and keys of the option method.\n", stdout);
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
         printf(".TP\n.B %s\n", preset->name);
         put_text(preset->help);
         putchar('\n');
     }
+    put_rows(NPG_USE_METHOD, NULL);
 }
 
 static void print_manual(void)
@@ -84,7 +99,7 @@ static void print_manual(void)
           ".SH VERBS\n",
           stdout);
     for (const npg_verb *verb = npg_verbs; verb->name; verb++) put_verb(verb);
-    put_presets();
+    put_methods();
     fputs(".SH EXIT STATUS\n", stdout);
     for (size_t i = 0; i < sizeof codes / sizeof *codes; i++)
         printf(".TP\n.B %s\n%s\n", codes[i][0], codes[i][1]);

@@ -27,7 +27,7 @@ typedef struct settings {
 const npg_option npg_run_verb_options[] = {
     /* type        name        place         default  words or shown as */
     NPG_ROW_CHOICE("progress", AT(progress), "auto",  "auto|bar|json|none",
-        "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal"),
+        "How to show progress. json writes one line per step to standard output; auto: a bar on a terminal"),
     NPG_ROW_TEXT  ("log-file", AT(log_file), "",      "FILE",
         "Append the log to FILE, one JSON object per line"),
     NPG_ROW_FLAG  ("quiet",    AT(quiet),    "no",
@@ -35,8 +35,8 @@ const npg_option npg_run_verb_options[] = {
     NPG_ROW_FLAG  ("verbose",  AT(verbose),  "no",
         "Log everything (also -v)"),
     NPG_ROW_CHOICE("segments", AT(segments), "one",   "one|auto",
-        "Where the topology changes: one reference all the same, with an alarm (one), "
-        "or another reference from there on, each with its frames in OUT/segment_* (auto)"),
+        "Where the topology changes: one reference, or others from there on. With one an alarm says from "
+        "where; with auto each has its frames in OUT/segment_*"),
     {0}};
 /* clang-format on */
 

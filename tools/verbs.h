@@ -47,5 +47,6 @@ extern const npg_option npg_render_options[];
 extern const npg_option npg_view_options[];
 extern const npg_option npg_bench_options[];
 extern const npg_option npg_doctor_options[];
+extern const npg_option npg_help_options[];
 
 #endif

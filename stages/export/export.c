@@ -21,7 +21,7 @@ typedef enum numbering { NUMBER_OF_FILE, NUMBER_OF_INDEX } numbering;
 
 typedef struct export_state {
     /* options */
-    int format, numbering, up, unit;
+    int numbering, up, unit;
     const char *prefix, *axes, *exports;
     double scale, fps, voxel_share;
     bool overwrite, with_normals, is_centred;
@@ -65,7 +65,7 @@ static npg_status read_options(npg_worker *worker)
     NPG_TRY(npg_placement_parse(&state->map, state->axes));
     state->map.scale = state->scale;
     NPG_TRY(check_prefix(state->prefix));
-    NPG_TRY(npg_forms_choose(&state->choice, state->exports, state->format));
+    NPG_TRY(npg_forms_choose(&state->choice, state->exports, false));
     if (reference[0]) format = npg_reader_for(reference);
     state->like = format && !strcmp(format, "obj") ? reference : NULL;
     state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
@@ -560,35 +560,33 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type         name            place             default  least  most  shown as or words */
-    NPG_ROW_TEXT(   "export",       AT(exports),      "",      "LIST",
-        "What to write, any of ply, obj (sequences), pc2, mdd (point caches), "
-        "glb, usda, npz, vdb, with commas; a sequence is always there (see format)"),
-    NPG_ROW_CHOICE( "format",       AT(format),       "ply",   "ply|obj",
-        "Format of the mesh sequence where export names none"),
-    NPG_ROW_TEXT(   "prefix",       AT(prefix),       "frame", "NAME",
+    /* type               name            place             default  least  most  shown as or words */
+    NPG_ROW_TEXT(         "export",       AT(exports),      "",      "LIST",
+        "What to write: ply, obj, pc2, mdd, glb, usda, npz, vdb, with commas. A sequence is always there: "
+        "PLY, or OBJ where the list has obj without ply"),
+    NPG_ROW_TEXT(         "prefix",       AT(prefix),       "frame", "NAME",
         "First part of the mesh files' names"),
-    NPG_ROW_CHOICE( "numbering",    AT(numbering),    "file",  "file|index",
-        "Number of a mesh file: as in the input's name, or the place in the sequence"),
-    NPG_ROW_REAL(   "scale",        AT(scale),        "1",     1e-12, 1e12, NULL,
+    NPG_ROW_CHOICE(       "numbering",    AT(numbering),    "file",  "file|index",
+        "Number of a mesh file. As in the input's name, or the place in the sequence"),
+    NPG_ROW_REAL(         "scale",        AT(scale),        "1",     1e-12, 1e12, NULL,
         "Multiply all written coordinates by this"),
-    NPG_ROW_TEXT(   "axes",         AT(axes),         "xyz",   "AXES",
-        "Which input axis becomes x, y and z, with signs: xz-y turns z up into y up"),
-    NPG_ROW_REAL(   "fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
-        "Frames per second of the capture, for the report and formats that carry time"),
-    NPG_ROW_CHOICE( "up",           AT(up),           "y",     "y|z",
-        "Axis that points up in the written coordinates, for forms that record it"),
-    NPG_ROW_CHOICE( "unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
-        "Unit of the written coordinates, for forms that record it"),
-    NPG_ROW_FLAG(   "centre",       AT(is_centred),   "no",
-        "Write coordinates relative to the middle of the capture's box, which done.json then names: "
-        "for captures far from 0"),
-    NPG_KEY(REAL,   "vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
+    NPG_ROW_TEXT(         "axes",         AT(axes),         "xyz",   "AXES",
+        "Which input axis becomes x, y and z, with signs. xz-y turns z up into y up"),
+    NPG_ROW_REAL(         "fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
+        "Frames per second of the capture. For the report and formats that carry time"),
+    NPG_ROW_CHOICE(       "up",           AT(up),           "y",     "y|z",
+        "Axis that points up in the written coordinates. For exporters that record it"),
+    NPG_ROW_CHOICE(       "unit",         AT(unit),         "m",     "m|dm|cm|mm|km|in|ft",
+        "Unit of the written coordinates. For exporters that record it"),
+    NPG_ROW_FLAG(         "centre",       AT(is_centred),   "no",
+        "Write coordinates from the middle of the capture's box. done.json then names it: for captures far "
+        "from 0"),
+    NPG_PROGRAM_ROW(REAL, "vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
         "Voxel of the level sets, as a share of the longest side of the capture's box"),
-    NPG_KEY(FLAG,   "mesh-normals", AT(with_normals), "no",
+    NPG_PROGRAM_ROW(FLAG, "mesh-normals", AT(with_normals), "no",
         "Write vertex normals into every mesh"),
-    NPG_ROW_FLAG(   "overwrite",    AT(overwrite),    "no",
-        "Remove meshes that an earlier run left in the output folder"),
+    NPG_ROW_FLAG(         "overwrite",    AT(overwrite),    "no",
+        "Remove meshes that another run left in the output folder"),
     {0}};
 /* clang-format on */
 

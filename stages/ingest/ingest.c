@@ -22,47 +22,49 @@ typedef struct state {
 
 /* clang-format off */
 static const npg_option ingest_options[] = {
-    /* type         name                place                default        least most  shown as or words */
-    NPG_ROW_TEXT(   "frames",           AT(frames),          "",            "SELECTION",
-        "Which frames: a:b:step are positions in time as Python counts them (from 0, without b, "
-        "negative from the end); 1-5,8 are the numbers in the file names, both ends included; empty: all"),
-    NPG_ROW_CHOICE( "missing",          AT(missing),         "error",       "error|skip|hold|ignore",
-        "What to do about gaps in the numbering: error refuses, skip leaves the frame without points, "
-        "hold repeats the points of the frame before it, ignore takes numbers for mere names"),
-    NPG_ROW_INT(    "cache",            AT(cache_mib),       "256",         0,    1048576, "MIB",
-        "Memory for frames that were read and cleaned, so that later passes need not do that again; "
-        "what does not fit goes to a file in OUT/job that has no name, and is gone with the run; "
-        "0: nothing is kept, neither in memory nor on disk, but for the look-ahead of a live run"),
-    NPG_ROW_INT(    "look-ahead",       AT(look_ahead),      "64",          1,    1e6,     NULL,
-        "Live runs: frames that are kept first: box, keyframe and reference are made from them as from a "
-        "capture of that many frames"),
-    NPG_ROW_TEXT(   "follow-end",       AT(follow_end),      "capture.end", "NAME",
-        "Name of the file that ends a folder that is followed, once it is there; empty: none does"),
-    NPG_ROW_REAL(   "follow-idle",      AT(follow_idle_s),   "30",          0,    1e9,     "SECONDS",
-        "Seconds without any change that end a folder that is followed; 0: wait for the end file"),
-    NPG_KEY(REAL,   "follow-settle",    AT(follow_settle_s), "2",           0,    1e6,     "SECONDS",
+    /* type               name                place                default        least most  shown as or words */
+    NPG_ROW_TEXT(         "frames",           AT(frames),          "",            "SELECTION",
+        "Which frames, in order or by number. a:b:step are positions in time as Python counts them (from 0, "
+        "without b, negative from the end); 1-5,8 are the numbers in the file names, both ends included; "
+        "empty: all"),
+    NPG_ROW_CHOICE(       "missing",          AT(missing),         "error",       "error|skip|hold|ignore",
+        "What to do about gaps in the numbering. error refuses, skip leaves the frame without points, hold "
+        "repeats the points of the frame before it, ignore takes numbers for mere names"),
+    NPG_ROW_INT(          "cache",            AT(cache_mib),       "256",         0,    1048576, "MIB",
+        "Memory for frames that were read and cleaned. Later passes need not do that again; what does not "
+        "fit goes to a file in OUT/job that has no name, and is gone with the run; 0: nothing is kept, "
+        "neither in memory nor on disk, but for the look-ahead of a live run"),
+    NPG_ROW_INT(          "look-ahead",       AT(look_ahead),      "64",          1,    1e6,     NULL,
+        "Live: frames that the reference is made from. They are kept first: box, keyframe and reference are "
+        "made from them as from a capture of that many frames"),
+    NPG_PART(REAL,        "follow-end.idle",  AT(follow_idle_s),   "30",          0,    1e9,     "SECONDS",
+        "... or so many seconds without any change; 0: only the file"),
+    NPG_PART(TEXT,        "follow-end.name",  AT(follow_end),      "capture.end", "NAME",
+        "A file of this name, once it is there; empty: none does"),
+    NPG_PROGRAM_ROW(REAL, "follow-settle",    AT(follow_settle_s), "2",           0,    1e6,     "SECONDS",
         "Seconds without a change after which a file that can't be read, "
         "and that others follow, is given up"),
-    NPG_ROW_CHOICE( "sensor-poses",     AT(rig.poses),       "file",        "file|inverse|none",
-        "Poses of a rig's sensors: as its files say (sensor to world), the other way round (world to "
-        "sensor), or none: every sensor stands at the origin, for a body that moves before one sensor"),
-    NPG_KEY(REAL,   "sensor-tolerance", AT(rig.tolerance_s), "0.02",        0,    3600,    "SECONDS",
+    NPG_ROW_CHOICE(       "sensor-poses",     AT(rig.poses),       "file",        "file|inverse|none",
+        "How the poses of a rig's sensors are meant. As its files say (sensor to world), the other way "
+        "round (world to sensor), or none: every sensor stands at the origin, for a body that moves before "
+        "one sensor"),
+    NPG_KEY(REAL,         "sensor-tolerance", AT(rig.tolerance_s), "0.02",        0,    3600,    "SECONDS",
         "Images of a rig with time stamps belong together when they are no further apart"),
-    NPG_ROW_FLAG(   "align-sensors",    AT(align_sensors),   "no",
-        "Correct the poses of a rig's sensors that are off, by what they see together with the others in "
+    NPG_ROW_FLAG(         "align-sensors",    AT(align_sensors),   "no",
+        "Correct the poses of a rig's sensors that are off. By what they see together with the others in "
         "these frames; one correction for each sensor, the same in all frames. What the surfaces do not "
         "determine stays as it is"),
-    NPG_KEY(REAL,   "depth-step",       AT(rig.step_share),  "0.02",        1e-5, 10,      "SHARE",
+    NPG_KEY(REAL,         "depth-step",       AT(rig.step_share),  "0.02",        1e-5, 10,      "SHARE",
         "Neighbouring pixels of a depth image are one surface while their depths differ by less "
         "than this share"),
-    NPG_KEY(INT,    "depth-margin",     AT(rig.margin),      "1",           0,    64,      "PIXELS",
+    NPG_KEY(INT,          "depth-margin",     AT(rig.margin),      "1",           0,    64,      "PIXELS",
         "Pixels beside depth steps, missing depth and the mask's border, where sensors mix the body with "
         "what is behind it: they are dropped, but for those beside the others that continue their surface; "
         "0: all are used"),
-    NPG_ROW_REAL(   "depth-near",       AT(rig.near_m),      "0",           0,    1e12,    "LENGTH",
-        "Depths below this are not used, in the rig's unit"),
-    NPG_ROW_REAL(   "depth-far",        AT(rig.far_m),       "0",           0,    1e12,    "LENGTH",
-        "Depths above this are not used, in the rig's unit; 0: no limit"),
+    NPG_PART(REAL,        "depth-range.near", AT(rig.near_m),      "0",           0,    1e12,    "LENGTH",
+        "The least depth that is used"),
+    NPG_PART(REAL,        "depth-range.far",  AT(rig.far_m),       "0",           0,    1e12,    "LENGTH",
+        "The largest depth that is used; 0: no limit"),
     {0}};
 /* clang-format on */
 

@@ -24,7 +24,7 @@ static npg_status open_follow(npg_live_source *live)
                                           .stopping = npg_worker_should_stop,
                                           .user = live->worker};
     if (!s->follow_end[0] && !(s->follow_idle_s > 0))
-        return npg_error(NPG_USAGE, "options follow-end and follow-idle: nothing would ever end this run");
+        return npg_error(NPG_USAGE, "option follow-end: nothing would ever end this run");
     return npg_follow_open(&live->follow, &settings);
 }
 

@@ -20,8 +20,8 @@ typedef struct job_state {
 static const npg_option options[] = {
     /* type               name       place        default */
     NPG_ROW_FLAG(         "restart", AT(restart), "no",
-        "Discard what an earlier run left in the output folder; "
-        "without it a run of the same job resumes where that one was"),
+        "Forget what an earlier run of this job left. Without it a run of the same job goes on where that "
+        "one was"),
     NPG_PROGRAM_ROW(FLAG, "append",  AT(append),  "no",
         "Go on with frames that came since the job was done (neupig append)"),
     {0}};

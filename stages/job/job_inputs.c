@@ -16,7 +16,7 @@ static const char *const free_options[] = {
     "input",   "output",  "ring",   "chunk", "max-memory",  "pull",        "cache",  "overwrite",
     "confine", "restart", "append", "alarm", "segment-min", "state-every", "follow", NULL};
 /* Of a live source: what ends it.  Kept for npg_options_load_job(), not compared. */
-static const char *const end_options[] = {"follow-end", "follow-idle", NULL};
+static const char *const end_options[] = {"follow-end.name", "follow-end.idle", NULL};
 
 static bool is_one_of(const char *const *names, const char *name)
 {

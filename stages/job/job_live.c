@@ -43,7 +43,7 @@ static npg_status open_folder(npg_follow **follow, const npg_worker *worker)
     const npg_follow_settings of_folder = {.where = settings->follow,
                                            .confine = settings->confine,
                                            .end_name =
-                                               npg_options_get(npg_worker_options(worker), "follow-end")};
+                                               npg_options_get(npg_worker_options(worker), "follow-end.name")};
     return npg_follow_open(follow, &of_folder);
 }
 

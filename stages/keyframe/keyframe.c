@@ -475,8 +475,8 @@ static npg_status save(const npg_worker *worker, npg_archive_writer *out)
 static const npg_option options[] = {
     /* type         name               place           default  least most  shown as or words */
     NPG_ROW_INT(    "keyframe",        AT(number),     "-1",    -1, 1e15, NULL,
-        "Number of the frame whose surface is the reference, as in the file names; "
-        "-1: by score, or, with --reference, the frame that it is nearest to"),
+        "Number of the frame that the reference is made around. As in the file names; -1: chosen, or, with "
+        "--reference, the frame that it is nearest to"),
     NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "apart", "paper|apart",
         "Take the frame with the paper's score (paper), "
         "or the one of several that show most surface whose own fares best in the others, "

@@ -34,27 +34,26 @@ typedef struct mesh_state {
 
 /* clang-format off */
 static const npg_option mesh_options[] = {
-    /* type         name              place                 default    least  most  shown as or words */
-    NPG_KEY(INT,    "poisson-depth",  AT(depth),            "10",      4,     13,   NULL,
+    /* type         name              place                 default  least most  shown as or words */
+    NPG_KEY(INT,    "poisson-depth",  AT(depth),            "10",    4,  13,   NULL,
         "Depth of the Poisson octree"),
-    NPG_KEY(REAL,   "poisson-weight", AT(point_weight),     "10",      0,     1000, NULL,
+    NPG_KEY(REAL,   "poisson-weight", AT(point_weight),     "10",    0,  1000, NULL,
         "How closely the Poisson surface follows the points"),
     NPG_KEY(FLAG,   "smooth",         AT(surface.smooth),   "yes",
         "Smooth the keyframe's points for the reconstruction when they are noisy"),
-    NPG_KEY(CHOICE, "hold-apart",     AT(apart),            "tight",   "tight|loose|no",
+    NPG_KEY(CHOICE, "hold-apart",     AT(apart),            "tight", "tight|loose|no",
         "Hold parts that nearly touch apart while the surface is made, so that they are not joined; "
         "after that bring it back to its points (tight), "
         "or nearly so, which leaves a little of the gap (loose)"),
-    NPG_ROW_INT(    "faces",          AT(surface.face_max), "20000",   16,    1e8,  NULL,
-        "Faces of the reference mesh at most (and no more than 4 per point)"),
-    NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",    "auto|keep|trim",
-        "Surface without points near it (holes, the far side of a single view): "
-        "keep it as the mesher closed it, trim it, or draw it tight between what was seen, "
-        "and trim it when it is more than a quarter of the area (auto); it is reported in any case"),
-    NPG_ROW_REAL(   "max-invented",   AT(invented_max),     "10",      0,     100,  "PERCENT",
-        "The reference is good when at most this share of its area is surface "
-        "that no point saw and that was kept, in per cent; above it the run ends with exit code 7. "
-        "Of a given mesh: that no point of the keyframe is near, where its sensors could see it"),
+    NPG_ROW_INT(    "faces",          AT(surface.face_max), "20000", 16, 1e8,  NULL,
+        "Faces of the reference mesh at most. And no more than 4 per point"),
+    NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",  "auto|keep|trim",
+        "What becomes of surface that no frame saw. Holes, the far side of a single view: keep it as "
+        "Poisson closed it, trim it, or draw it tight between what was seen, and trim it when it is more "
+        "than a quarter of the area (auto); it is reported in any case"),
+    NPG_PART(REAL,  "bars.invented",  AT(invented_max),     "10",    0,  100,  "PERCENT",
+        "most of the reference's area that no point saw and that was kept, in per cent; of a given mesh: "
+        "that no point of the keyframe is near, where its sensors could see it"),
     {0}};
 /* clang-format on */
 

@@ -37,7 +37,7 @@ typedef struct state {
 
 #define WINDOW(member) offsetof(state, window_settings.member)
 #define FIT(member)    WINDOW(fit.member)
-#define MATCH(member)  WINDOW(warm.match.member)
+#define MATCH(member)  WINDOW(match.member)
 #define JOINT(member)  WINDOW(joint.member)
 
 /* clang-format off */
@@ -49,6 +49,9 @@ static const npg_option options[] = {
         "most points of an aligned frame that pull at the surface"),
     NPG_KEY(REAL,   "joint-shape",       JOINT(shape),           "0.1",        0,    1e6,  NULL,
         "weight of the change of the surface's edges against the distance of a point, of aligned frames"),
+    NPG_KEY(CHOICE, "rotation",          FIT(rotation),          "quaternion",
+        "quaternion|cayley|exponential",
+        "how the decoder's output becomes a rotation"),
     NPG_KEY(CHOICE, "time-code",         FIT(time_code),         "fourier",
         "fourier|polynomial|gaussian|learned",
         "what the decoder is told about time"),
@@ -87,9 +90,13 @@ static const npg_option options[] = {
     NPG_KEY(INT,    "width-1",           FIT(width_1),           "512",        32,   4096, "N",
         "units of the first hidden layer"),
     NPG_KEY(INT,    "width-2",           FIT(width_2),           "512",        32,   4096, "N",
-        "units of the second"),
+        "units of each of the hidden layers after it"),
+    NPG_KEY(INT,    "hidden-layers",     FIT(hidden_layers),     "2",          1,    NPG_MLP_LAYERS_MAX, "N",
+        "hidden layers of the decoder, before the one that gives the motion"),
     NPG_KEY(REAL,   "mlp-rate",          FIT(mlp_rate),          "0.001",      0,    1,    NULL,
         "learning rate of the decoder"),
+    NPG_KEY(REAL,   "slope",             FIT(slope),             "0.01",       0,    1,    NULL,
+        "slope of the leaky rectifier below 0"),
     NPG_KEY(REAL,   "isometry",          FIT(isometry),          "5",          0,    1e6,  NULL,
         "weight of the change of edge lengths"),
     NPG_KEY(REAL,   "welsch",            FIT(alpha),             "0.3",        0,    1e3,  NULL,
@@ -104,13 +111,19 @@ static const npg_option options[] = {
         "grid features begin spread over +- this; 0 as in the paper"),
     NPG_KEY(REAL,   "rate-end",          FIT(rate_end),          "0.1",        0,    1,    NULL,
         "learning rates at the last epoch as a share; they fall by half a cosine"),
+    NPG_KEY(CHOICE, "deliver",           FIT(deliver),           "least",      "least|last",
+        "result of a joint fit by Chamfer distance: "
+        "of all the states between its steps the one with the least loss, or the last"),
     NPG_KEY(CHOICE, "distance",          WINDOW(warm.distance),  "vertices",   "vertices|surface",
         "without alignment: the paper's distance between all vertices and the points, "
         "or that between points and surface, over --samples vertices"),
-    NPG_KEY(INT,    "samples",           WINDOW(warm.samples),   "1500",       0,    1e6,  "N",
+    NPG_KEY(FLAG,   "warm-start",        WINDOW(warm.is_on),     "yes",
+        "without alignment: bring a window's new frames near their pose from those that are solved, "
+        "before all are fitted"),
+    NPG_KEY(INT,    "samples",           WINDOW(samples),        "1500",       0,    1e6,  "N",
         "vertices that such frames are brought near their pose with, and that the distance to the surface is "
         "fitted over, 0: the usual number"),
-    NPG_KEY(INT,    "rounds",            WINDOW(warm.rounds),    "2",          1,    1000, "N",
+    NPG_KEY(INT,    "rounds",            WINDOW(rounds),         "2",          1,    1000, "N",
         "times that a fit by the distance to the surface is matched"),
     NPG_KEY(INT,    "match-points",      MATCH(points),          "5000",       10,   1e7,  "N",
         "most points of a frame that pull there"),
@@ -125,6 +138,8 @@ static const npg_option options[] = {
     NPG_KEY(INT,    "state-every",       offsetof(state, state_every_s), "120",        0,    1e6,  "SECONDS",
         "without alignment: a window that takes longer writes its state meanwhile, "
         "so that no more is lost when the run is killed"),
+    NPG_KEY(INT,    "fit-batch",         FIT(batch),             "4",          1,    64,   "N",
+        "frames whose hidden layers are kept at a time"),
     {0}};
 /* clang-format on */
 
@@ -260,11 +275,19 @@ static void note_result(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_joint_result *joint = npg_window_result(s->solver);
+    const npg_fit_step *least = joint ? NULL : npg_fit_result(npg_window_fit(s->solver));
     if (joint)
         npg_worker_log(
             worker, NPG_LOG_INFO, -1,
             "window %lld: joint fit in %lld steps: points %.5f off, vertices moved by %.5f in the mean",
             (long long)s->window_at, (long long)joint->steps, joint->noise, joint->moved);
+    if (!least) return;
+    s->last_chamfer = least->chamfer;
+    s->last_isometry = least->isometry;
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "window %lld: least loss after %lld of %lld steps, kept: chamfer %.4g isometry %.4g",
+                   (long long)s->window_at, (long long)least->epoch, (long long)least->epochs, least->chamfer,
+                   least->isometry);
 }
 
 /* A window that a warm start lost is no silent matter. */
@@ -494,12 +517,12 @@ static double expects(const npg_worker *worker, npg_pass pass)
     double frames = (double)npg_worker_facts(worker)->frame_count;
     if (pass != NPG_PASS_SOLVE) return 0;
     if (npg_worker_has_field(worker, NPG_FIELD_POSE)) return joint_s_per_frame * frames;
-    const npg_warm_settings *warm = &s->window_settings.warm;
-    bool by_samples = warm->distance == NPG_DISTANCE_SURFACE && warm->samples;
+    bool by_samples = s->window_settings.warm.distance == NPG_DISTANCE_SURFACE && s->window_settings.samples;
     double vertices = (double)npg_worker_verts_at_most(worker);
-    if (by_samples) vertices = fmin(vertices, (double)warm->samples);
+    if (by_samples) vertices = fmin(vertices, (double)s->window_settings.samples);
     const npg_fit_settings *fit = &s->window_settings.fit;
-    double sample = npg_cost_decoder_flops((double)fit->width_1, (double)fit->width_2);
+    double sample =
+        npg_cost_decoder_flops((double)fit->width_1, (double)fit->width_2, (double)fit->hidden_layers);
     return cores *
            npg_cost_network_s(frames * vertices * (double)fit->epochs * sample, cores * NPG_COST_CORE_FLOPS);
 }

@@ -43,23 +43,26 @@ typedef struct outlier_state {
 
 /* clang-format off */
 static const npg_option outlier_options[] = {
-    /* type         name                  place                  default   least most  shown as or words */
-    NPG_ROW_FLAG(   "outliers",           AT(drop_isolated),     "yes",
-        "Drop isolated points (the statistical filter that PCL has, too, repeated until it finds no more)"),
-    NPG_KEY(REAL,   "outlier-ratio",      AT(ratio),             "5",      0.5,  100,  NULL,
+    /* type         name             place              default   least most  shown as or words */
+    NPG_ROW_FLAG(   "outliers",      AT(drop_isolated), "yes",
+        "Keep isolated points. Without it they are dropped by the statistical filter that PCL has, too, "
+        "repeated until it finds no more"),
+    NPG_KEY(REAL,   "outlier-ratio", AT(ratio),         "5",      0.5,  100, NULL,
         "Standard deviations above the mean at which a point is isolated"),
-    NPG_KEY(INT,    "points-max",         AT(point_max),         "250000", 1000, 4e9,  NULL,
+    NPG_KEY(INT,    "points-max",    AT(point_max),     "250000", 1000, 4e9, NULL,
         "Thin frames with more points than this, with a warning"),
-    NPG_ROW_CHOICE( "normals",            AT(normals),           "auto",   "auto|estimate|given",
-        "Use given normals (checked and mended) or estimate them; auto: given where there are any"),
-    NPG_KEY(CHOICE, "normals-for",        AT(normals_for),       "key",    "key|all",
+    NPG_ROW_CHOICE( "normals",       AT(normals),       "auto",   "auto|estimate|given",
+        "Where normals come from. Given ones are checked and mended; auto: given where there are any, else "
+        "estimated"),
+    NPG_KEY(CHOICE, "normals-for",   AT(normals_for),   "key",    "key|all",
         "Make and mend normals for the keyframe alone or for all frames"),
-    NPG_ROW_TEXT(   "sensor",             AT(sensor_text),       "auto",   "X,Y,Z",
-        "Where the points were seen from, in the capture's unit: x,y,z, several x,y,z:x,y,z, or a file of a "
+    NPG_ROW_TEXT(   "sensor",        AT(sensor_text),   "auto",   "X,Y,Z",
+        "Where the points were seen from, in the capture's unit. x,y,z, several x,y,z:x,y,z, or a file of a "
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
-        "single one, what lies before the points is empty, and surface that can't be seen from there waits for "
-        "frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, if the "
-        "points look like one view from it; find: one sensor saw each frame, from a place that is looked for"),
+        "single one, what lies before the points is empty, and surface that can't be seen from there waits "
+        "for frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, "
+        "if the points look like one view from it; find: one sensor saw each frame, from a place that is "
+        "looked for"),
     {0}};
 /* clang-format on */
 

@@ -1,6 +1,7 @@
 """The Python module, installed, on a small sample capture.  Run by tests/python.bats; argv: a folder to work in."""
 
 import ctypes
+import json
 import os
 import pathlib
 import signal
@@ -16,7 +17,7 @@ import neupig
 from neupig import _library
 
 WORK = pathlib.Path(sys.argv.pop(1))
-SMALL = dict(epochs=6, faces=600, width_1=64, width_2=64, poisson_depth=6, max_residual=100, max_flipped=100)
+SMALL = dict(epochs=6, faces=600, width_1=64, width_2=64, poisson_depth=6, bars="residual=100,flipped=100")
 
 
 def ball(frame, count=900):
@@ -262,6 +263,10 @@ class Failures(unittest.TestCase):
         options = {option.name: option for option in neupig.options()}
         self.assertEqual(options["method"].choices, ("default", "best", "paper", "paper-1000", "grids"))
         self.assertEqual(options["seed"].type, "int")
+        self.assertEqual(options["epochs"].use, "method")
+        help_run = json.loads(subprocess.run([os.environ["NEUPIG"], "help", "run", "--json"], check=True, capture_output=True).stdout)
+        shown = {option["name"] for option in help_run["options"]}
+        self.assertEqual({name for name, option in options.items() if option.use == "command"} - shown, set())
         self.assertEqual(neupig.Options({"keep_going": True}).get("keep-going"), "yes")
 
     def test_nothing_stays_behind(self):

@@ -1,7 +1,7 @@
 # Surface that no points support: measured and placed, for the reference and in every frame, with a bar for each.
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
-    --keyframe 5 --max-residual 100 --min-coverage 0 --max-flipped 100 --max-stretched 100)
+    --keyframe 5 --bars residual=100,coverage=0,flipped=100,stretched=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -44,7 +44,7 @@ shares() {
 }
 
 @test "bars as high as that let it pass" {
-    "$NEUPIG" run one/points -o lenient --unseen keep "${small[@]}" --frames 0:6 --max-invented 100 --max-unsupported 100
+    "$NEUPIG" run one/points -o lenient --unseen keep "${small[@]}" --frames 0:6 --bars invented=100,unsupported=100
     [ "$(grep -c '"good":true' lenient/frames.jsonl)" -eq 6 ]
 }
 

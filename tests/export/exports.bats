@@ -2,7 +2,7 @@
 
 small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
-    --max-residual 100 --max-flipped 100 --quiet)
+    --bars residual=100,flipped=100 --quiet)
 forms=(--method '{"align": false, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,glb,usda,npz,vdb --unit cm --up z --fps 24)
 
 setup_file() {
@@ -90,7 +90,7 @@ find_modules() {
 
 @test "OBJ files keep colours and texture coordinates of the user's mesh" {
     find_python
-    "$NEUPIG" run capture/points -o plain "${small[@]}" --keyframe 4 --format obj
+    "$NEUPIG" run capture/points -o plain "${small[@]}" --keyframe 4 --export obj
     "$python" - <<'END'
 lines, corner = [], 0
 for line in open("plain/meshes/frame_0004.obj"):

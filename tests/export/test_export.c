@@ -70,7 +70,7 @@ static npg_status give_mesh(npg_facts *facts, npg_frame *frame)
     npg_box_local_to_unit(&facts->box, frame->vert_unit, frame->pos_local, 4);
     frame->vert_count = 4;
     frame->fields |= NPG_FIELD_VERTICES | NPG_FIELD_FIGURES;
-    frame->figures = (npg_figures){.coverage = 0.75, .chamfer = (double)NAN, .good = true};
+    frame->figures = (npg_figures){.coverage = 0.75, .truth_cd = (double)NAN, .good = true};
     return NPG_OK;
 }
 
@@ -173,7 +173,7 @@ static void the_list_is_in_the_order_of_time(void **state)
         assert_true(json_is_true(json_object_get(frame, "good")));
         json_t *figures = json_object_get(frame, "figures");
         assert_true(json_real_value(json_object_get(figures, "coverage")) == 0.75);
-        assert_true(json_is_null(json_object_get(figures, "chamfer")));
+        assert_true(json_is_null(json_object_get(figures, "truth_cd")));
         const char *source = json_string_value(json_object_get(frame, "source"));
         assert_int_equal(source != NULL, t == 0);
         json_decref(frame);
@@ -249,7 +249,7 @@ static void scale_and_axes_change_what_is_written(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         scene s = plain_scene();
-        const char *const settings[][2] = {{"scale", "0.001"}, {"axes", cases[i].axes}, {"format", "obj"},
+        const char *const settings[][2] = {{"scale", "0.001"}, {"axes", cases[i].axes}, {"export", "obj"},
                                            {"fps", "12.5"},    {"prefix", "my mesh"},   {NULL, NULL}};
         assert_int_equal(run_scene(&s, cases[i].axes, settings), NPG_OK);
         npg_origin nowhere = {.known = true};

@@ -1,7 +1,7 @@
 # The reference from the points of all frames: better than from one, resumed with the same bytes, left out on request.
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
-    --keyframe 5 --max-residual 100 --max-flipped 100 --max-stretched 100 --max-invented 100)
+    --keyframe 5 --bars residual=100,flipped=100,stretched=100,invented=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -67,7 +67,7 @@ better() {
 }
 
 @test "only the reference that is delivered has its faults in the report" {
-    run "$NEUPIG" run parts/points -o bare "${small[@]}" --frames 0:6 --max-invented 0 --unseen keep
+    run "$NEUPIG" run parts/points -o bare "${small[@]}" --frames 0:6 --bars invented=0 --unseen keep
     echo "$output"
     [ "$status" -eq 7 ]
     [[ "$output" == *"no point of the keyframe saw it"*"no point of any frame saw it"* ]]

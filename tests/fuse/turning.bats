@@ -2,7 +2,7 @@
 # saw to the whole body, whose vertices turn with it.
 
 small=(--faces 3000 --method '{"align-nodes": 200, "poisson-depth": 7}' --no-outliers --quiet --keyframe 6
-    --max-residual 100 --max-flipped 100 --max-stretched 100 --max-unsupported 100 --max-invented 100)
+    --bars residual=100,flipped=100,stretched=100,unsupported=100,invented=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -18,8 +18,7 @@ setup() {
     read -r slide share < <(python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide grown 6)
     read -r slide_key share_key < <(
         "$NEUPIG" run body/points -o key --sensor body/sensor.txt "${small[@]}" --method '{"reference-from": "key"}' >/dev/null || true
-        python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide key 6
-    )
+        python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide key 6)
     echo "grown: slide $slide, share $share; from the keyframe: $slide_key, $share_key"
     awk -v s="$slide" -v w="$share" -v k="$share_key" 'BEGIN { exit !(s < 0.01 && w > 0.95 && k < 0.8) }'
 }

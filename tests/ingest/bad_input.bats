@@ -2,8 +2,8 @@
 # with the documented exit code.  (Folders, headers, frames without a surface: run.bats; lists, selections,
 # standard input: input.bats; checkpoints, disks, jobs: resume.bats; sources that stop: live.bats.)
 
-small=(--method '{"epochs": 4, "width-1": 32, "width-2": 32, "poisson-depth": 6, "grid-levels": 3}' --faces 600 --quiet --max-flipped 100
-    --max-stretched 100)
+small=(--method '{"epochs": 4, "width-1": 32, "width-2": 32, "poisson-depth": 6, "grid-levels": 3}' --faces 600 --quiet
+    --bars flipped=100,stretched=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -108,8 +108,8 @@ box() {
 @test "coordinates around a million keep their millimetres" {
     moved near 0 0 0
     moved far 1000000 -2000000 500000
-    "$NEUPIG" run near -o near-out --format obj --keyframe 0 --frames 0:1 "${small[@]}"
-    "$NEUPIG" run far -o far-out --format obj --keyframe 0 --frames 0:1 "${small[@]}"
+    "$NEUPIG" run near -o near-out --export obj --keyframe 0 --frames 0:1 "${small[@]}"
+    "$NEUPIG" run far -o far-out --export obj --keyframe 0 --frames 0:1 "${small[@]}"
     # the body is 2 wide; in floats alone it would be made of steps of 0.06 and 0.12
     echo "$(box near-out/meshes/frame_0000.obj 0 0 0) $(box far-out/meshes/frame_0000.obj 1000000 -2000000 500000)" |
         awk '{ print; for (i = 1; i <= 6; i++) if (($i - $(i + 6)) ^ 2 > 0.01 ^ 2) exit 1 }'
@@ -139,11 +139,11 @@ box() {
     for n in 0 1 2; do
         awk '$1 == "v" && $4 > 0.02 { print $2, $3, $4 }' "$points/frame_000$n.obj" >half/frame_000$n.xyz
     done
-    run "$NEUPIG" run half -o trimmed --max-residual 100 --min-coverage 0 "${small[@]}" --sensor 0,0,10
+    run "$NEUPIG" run half -o trimmed --bars residual=100,coverage=0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 0 ]
     grep -q 'unseen in all frames, trimmed off' trimmed/report.json
-    run "$NEUPIG" run half -o kept --unseen keep --max-residual 100 --min-coverage 0 "${small[@]}" --sensor 0,0,10
+    run "$NEUPIG" run half -o kept --unseen keep --bars residual=100,coverage=0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 7 ]
     [[ "$output" == *"surface is invented"* ]]

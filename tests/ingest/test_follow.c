@@ -302,7 +302,7 @@ static const npg_stage *const chain[] = {&npg_stage_ingest, &watch, NULL};
               (const char *const[][2]){{"follow", capture},                                                  \
                                        {"output", "unused"},                                                 \
                                        {"follow-settle", "0.3"},                                             \
-                                       {"follow-idle", "5"},                                                 \
+                                       {"follow-end.idle", "5"},                                                 \
                                        __VA_ARGS__,                                                          \
                                        {NULL, NULL}},                                                        \
               text)
@@ -344,7 +344,7 @@ static void options_that_make_no_sense(void **state)
     char text[1024];
     assert_int_equal(RUN({"input", "files"}), NPG_USAGE);
     assert_non_null(strstr(text, "files"));
-    assert_int_equal(RUN({"follow-end", ""}, {"follow-idle", "0"}), NPG_USAGE);
+    assert_int_equal(RUN({"follow-end.name", ""}, {"follow-end.idle", "0"}), NPG_USAGE);
     assert_non_null(strstr(text, "nothing would ever end"));
     assert_int_equal(RUN({"frames", "-3:"}), NPG_USAGE);
     end_it();

@@ -1,7 +1,7 @@
 # A folder of unknown origin: nothing outside the job is read or written, nothing hangs.
 
-small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "grid-levels": 3}' --faces 200 --quiet --max-residual 100
-    --max-flipped 100 --max-stretched 100)
+small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "grid-levels": 3}' --faces 200 --quiet
+    --bars residual=100,flipped=100,stretched=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -213,13 +213,15 @@ held() {
 
 @test "a batch reads nothing that links lead out of a capture's folder, unless it is told to" {
     cp -r "$BATS_FILE_TMPDIR/capture/truth" outside/truth
-    mkdir -p set/{good,frames,points,truth,only}
+    mkdir -p set/{good,frames,points,truth,meshes/truth,only}
     cp "$BATS_FILE_TMPDIR"/capture/points/* set/good
+    cp "$BATS_FILE_TMPDIR"/capture/points/* set/meshes
     for name in frames points truth; do cp in/frame_0000.ply set/$name; done
     ln -s ../../outside/frame.ply set/frames/frame_0001.ply
     rm set/points/*
     ln -s ../../in set/points/points
     ln -s ../../outside/truth set/truth/truth
+    ln -s ../../../outside/truth/frame_0000.ply set/meshes/truth/frame_0000.ply
     ln -s ../../in set/only/anything
     ln -s ../in set/link
     ln -s good set/same
@@ -229,9 +231,10 @@ held() {
     held frames 'set/frames/frame_0001.ply: leads out of .*set/frames.*--no-confine'
     held points 'set/points/points: leads out of .*set/points'
     held truth 'set/truth/truth: leads out of .*set/truth'
+    held meshes 'truth: .*set/meshes/truth/frame_0000.ply: leads out of .*set/meshes/truth'
     held only 'set/only/anything/frame_0000.ply: leads out of .*set/only'
     held link 'set/link: leads out of .*set,'
-    [ "$(grep -c '"verdict": "bad input"' results/batch.json)" -eq 5 ]
+    [ "$(grep -c '"verdict": "bad input"' results/batch.json)" -eq 6 ]
     # whoever writes the manifest names the folders; what is in them is of others all the same
     echo '{"captures": [{"input": "set/link"}, {"input": "set/frames"}, {"input": "set/points", "confine": false}]}' >named.json
     rm -r results

@@ -18,7 +18,7 @@ if [ -z "$capture" ]; then
     "$neupig" synth --body bar --frames "$frames" --points 800 -o "$folder/capture" >"$folder/synth.log" || exit 1
     options=(--method '{"epochs": 12, "width-1": 64, "width-2": 64, "poisson-depth": 6, "window": 8, "overlap": 2,
                         "align-nodes": 60}' --faces 600
-    --max-residual 100 "${options[@]}")
+    --bars residual=100 "${options[@]}")
 fi
 
 work() { # OUT

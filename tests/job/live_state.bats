@@ -2,9 +2,8 @@
 # test_push_resume.c.
 
 small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "align-nodes": 40,
-                  "align-steps": 6, "grid-levels": 3}' --faces 300 --quiet --max-residual 100
-       --min-coverage 0 --max-stretched 100 --max-flipped 100)
-open=(--method '{"window": 6, "overlap": 2}' --look-ahead 10 --follow-idle 0)
+                  "align-steps": 6, "grid-levels": 3}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100)
+open=(--method '{"window": 6, "overlap": 2}' --look-ahead 10 --follow-end 0)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -103,7 +102,7 @@ check_killed() {
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--method '{"align": false, "samples": 100, "state-every": 0, "epochs": 80}')
+    local free=(--method '{"align": false, "deliver": "last", "samples": 100, "state-every": 0, "epochs": 80}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
     for place in 1 2; do
@@ -150,7 +149,7 @@ check_killed() {
 }
 
 @test "a changed option or file is named; a file that is gone matters where it is needed" {
-    local far=(--method '{"window": 6, "overlap": 3}' --look-ahead 18 --keyframe 13 --follow-idle 0) # frame 0 is solved in window 4
+    local far=(--method '{"window": 6, "overlap": 3}' --look-ahead 18 --keyframe 13 --follow-end 0) # frame 0 is solved in window 4
     "$NEUPIG" run --follow all -o far "${small[@]}" "${far[@]}" >far.log
     cp -r capture/points changing
     "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" >change.log 2>&1 &
@@ -179,7 +178,7 @@ check_killed() {
     rm changing/frame_0012.ply
     touch changing/*
     mv changing moved # the same files elsewhere, and another end
-    run "$NEUPIG" run --follow moved -o change "${small[@]}" "${far[@]}" --follow-idle 9
+    run "$NEUPIG" run --follow moved -o change "${small[@]}" "${far[@]}" --follow-end 9
     echo "$output"
     [ "$status" -eq 0 ]
     [[ "$output" == *"1 files of frames that are solved are gone"* ]]

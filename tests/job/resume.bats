@@ -2,7 +2,7 @@
 
 small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
-    --max-residual 100 --max-flipped 100 --quiet)
+    --bars residual=100,flipped=100 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

@@ -512,7 +512,7 @@ static void a_bar_for_invented_surface(void **state)
     (void)state;
     char text[1024];
     outcome o = {.cut = 1, .kept = 1};
-    assert_int_equal(run_stage(&o, "max-invented", "100", text), NPG_OK);
+    assert_int_equal(run_stage(&o, "bars.invented", "100", text), NPG_OK);
     assert_true(o.unseen > 0.25);
     npg_mesh_unref(&o.mesh);
 }

@@ -169,7 +169,7 @@ static void all_options_are_described_and_sound(void **state)
         assert_true(strlen(info.help) > 5);
         assert_non_null(info.default_text);
         assert_int_equal(info.type == NPG_OPTION_CHOICE, info.choices != NULL);
-        assert_int_equal(strspn(info.name, "abcdefghijklmnopqrstuvwxyz0123456789-"), strlen(info.name));
+        assert_int_equal(strspn(info.name, "abcdefghijklmnopqrstuvwxyz0123456789-."), strlen(info.name));
         assert_int_equal(npg_options_set(options, info.name, info.default_text), NPG_OK);
         assert_null(npg_option_gone(info.name));
         for (size_t i = 0; i < count; i++) {
@@ -365,6 +365,48 @@ static void a_bad_method_is_named(void **state)
     npg_options_close(&options);
 }
 
+static void a_list_sets_its_parts(void **state)
+{
+    const char *const bad[][2] = {{"bars", "5"},
+                                  {"bars", "residual=x"},
+                                  {"bars", "residual"},
+                                  {"bars", "resid=5"},
+                                  {"bars", "residual=101"},
+                                  {"bars", ""},
+                                  {"depth-range", "1:2:3"},
+                                  {"depth-range", "a"},
+                                  {"follow-end", "1,2,3"}};
+    (void)state;
+    npg_options *options = open_all();
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(npg_options_set(options, bad[i][0], bad[i][1]), NPG_USAGE);
+        assert_non_null(strstr(npg_error_text(), bad[i][0]));
+    }
+    npg_options_close(&options);
+    options = open_all();
+    assert_int_equal(npg_options_set(options, "bars", "residual=2,coverage=0"), NPG_OK);
+    assert_int_equal(npg_options_set(options, "bars", "flipped=3"), NPG_OK);
+    assert_string_equal(npg_options_get(options, "bars.residual"), "2");
+    assert_string_equal(npg_options_get(options, "bars.coverage"), "0");
+    assert_string_equal(npg_options_get(options, "bars.flipped"), "3");
+    assert_int_equal(npg_options_set(options, "depth-range", ":3.5"), NPG_OK);
+    assert_false(npg_options_is_set(options, "depth-range.near"));
+    assert_string_equal(npg_options_get(options, "depth-range.far"), "3.5");
+    assert_int_equal(npg_options_set(options, "depth-range", "1:2"), NPG_OK);
+    assert_string_equal(npg_options_get(options, "depth-range.near"), "1");
+    assert_int_equal(npg_options_set(options, "follow-end", "5"), NPG_OK);
+    assert_string_equal(npg_options_get(options, "follow-end.idle"), "5");
+    assert_string_equal(npg_options_get(options, "follow-end.name"), "capture.end");
+    assert_int_equal(npg_options_set(options, "follow-end", "stop"), NPG_OK);
+    assert_int_equal(npg_options_set(options, "follow-end", "name=,idle=0"), NPG_OK);
+    assert_string_equal(npg_options_get(options, "follow-end.name"), "");
+    assert_int_equal(npg_options_set(options, "method", "{\"bars\": \"residual=4\", \"bars.cover\": 2}"),
+                     NPG_OK);
+    assert_string_equal(npg_options_get(options, "bars.residual"), "4");
+    assert_string_equal(npg_options_get(options, "bars.cover"), "2");
+    npg_options_close(&options);
+}
+
 static void a_published_method_says_what_it_ignores(void **state)
 {
     (void)state;
@@ -396,6 +438,7 @@ int main(void)
         cmocka_unit_test(no_memory_is_said),
         cmocka_unit_test(a_method_is_a_name_a_text_or_a_file),
         cmocka_unit_test(a_bad_method_is_named),
+        cmocka_unit_test(a_list_sets_its_parts),
         cmocka_unit_test(a_published_method_says_what_it_ignores),
     };
     return cmocka_run_group_tests(tests, open_folder, close_folder);

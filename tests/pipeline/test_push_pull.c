@@ -42,7 +42,7 @@ static npg_options *open_options(void)
 {
     const char *const settings[][2] = {{"pull", "yes"},   {"epochs", "40"},      {"width-1", "64"},
                                        {"width-2", "64"}, {"faces", "600"},      {"poisson-depth", "6"},
-                                       {"output", ""},    {"max-residual", "5"}, {"keyframe", "12"}};
+                                       {"output", ""},    {"bars.residual", "5"}, {"keyframe", "12"}};
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);
     for (size_t i = 0; i < sizeof settings / sizeof *settings; i++)

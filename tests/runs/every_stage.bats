@@ -1,8 +1,8 @@
 # Every stage, and every way that results take, once and as short as can be: what the sanitizers and tests/run.sh --fast
 # have of whole runs.  How good results are is for other tests; here a run ends as it should and leaves what it should.
 
-small=(--faces 500 --method '{"poisson-depth": 5, "align-nodes": 60, "align-steps": 5}' --max-residual 100
-    --max-flipped 100 --max-stretched 100 --max-unsupported 100 --max-invented 100 --quiet)
+small=(--faces 500 --method '{"poisson-depth": 5, "align-nodes": 60, "align-steps": 5}' --bars residual=100,flipped=100,stretched=100,unsupported=100,invented=100
+    --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -42,7 +42,7 @@ meshes() { # OUT COUNT
 
 @test "depth images of several sensors, with colours" {
     "$NEUPIG" synth --body bar --rig --cameras 3 --frames 3 --cycles 0.1 --width 80 --height 60 --cell 0.06 -o seen >>synth.log
-    "$NEUPIG" run seen/rig -o rig "${small[@]}"
+    "$NEUPIG" run seen/rig -o rig --method '{"truth": "seen/truth"}' "${small[@]}"
     meshes rig 3
     head -c 400 rig/reference.ply | grep -aq "property uchar red"
 }
@@ -61,7 +61,7 @@ meshes() { # OUT COUNT
 
 @test "an object that comes: segments" {
     "$NEUPIG" synth --body two --frames 10 --change 5 --points 500 --cell 0.06 --seed 2 -o two >>synth.log
-    "$NEUPIG" run two/points -o two.out --segments auto --method '{"segment-min": 3}' --keyframe 2 "${small[@]}" --min-coverage 0 || [ $? -eq 7 ]
+    "$NEUPIG" run two/points -o two.out --segments auto --method '{"segment-min": 3}' --keyframe 2 "${small[@]}" --bars coverage=0 || [ $? -eq 7 ]
     [ -s two.out/segments.json ] && [ -s two.out/done.json ]
 }
 

@@ -92,8 +92,8 @@ programs() {
 @test "a clock that jumps an hour to and fro changes nothing" {
     needs_shim
     "$NEUPIG" synth --body bar --frames 3 --points 400 -o capture >synth.log
-    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet --max-residual 100
-        --max-flipped 100 --max-stretched 100)
+    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet
+        --bars residual=100,flipped=100,stretched=100)
     "$NEUPIG" run capture/points -o plain "${small[@]}"
     LD_PRELOAD=$shim NPG_FAULT_CLOCK=3600 timeout 60 "$NEUPIG" run capture/points -o jumps "${small[@]}"
     diff -r plain/meshes jumps/meshes

@@ -15,7 +15,7 @@ trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 export XDG_CACHE_HOME=${XDG_CACHE_HOME:-$HOME/.cache}
 small=(epochs 2 width-1 32 width-2 32 faces 200 poisson-depth 5 grid-levels 3 align-nodes 30 align-steps 3
-    samples 60 max-residual 100 max-flipped 100 max-stretched 100 min-coverage 0 window 3 overlap 1)
+    samples 60 bars residual=100,flipped=100,stretched=100,coverage=0 window 3 overlap 1)
 bad=0
 
 capture() {
@@ -23,10 +23,10 @@ capture() {
 }
 
 work() { # OUT: one run; its exit code is in $status
-    local options=() i
-    for ((i = 0; i < ${#small[@]}; i += 2)); do options+=("--${small[i]}" "${small[i + 1]}"); done
+    local method= i
+    for ((i = 0; i < ${#small[@]}; i += 2)); do method+="${method:+, }\"${small[i]}\": \"${small[i + 1]}\""; done
     status=0
-    "$neupig" run capture/points -o "$1" --quiet "${options[@]}" >"$1.log" 2>&1 || status=$?
+    "$neupig" run capture/points -o "$1" --quiet --method "{$method}" >"$1.log" 2>&1 || status=$?
 }
 
 complain() {

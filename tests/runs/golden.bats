@@ -13,7 +13,7 @@ setup() {
 
 @test "the whole way: meshes with the same faces near the truth, reports, done.json last" {
     # shellcheck disable=SC2086
-    "$NEUPIG" run "$capture/points" -o out "${small[@]}" --max-residual 5
+    "$NEUPIG" run "$capture/points" -o out "${small[@]}" --bars residual=5
     for name in reference.ply report.json frames.jsonl done.json; do [ -s out/$name ]; done
     [ "$(ls out/meshes)" = "$(printf 'frame_%04d.ply\n' 0 1 2 3 4)" ]
     [ "$(wc -l <out/frames.jsonl)" -eq 5 ]

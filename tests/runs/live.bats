@@ -1,8 +1,8 @@
 # Live captures through the command: standard input and a folder that grows, longer than the look-ahead.
 
 small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "window": 8, "overlap": 2,
-                  "align-nodes": 60}' --faces 300 --quiet --max-residual 100
-       --min-coverage 0 --max-stretched 100 --max-flipped 100 --look-ahead 10)
+                  "align-nodes": 60}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100
+       --look-ahead 10)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -36,7 +36,7 @@ await() {
 
 @test "a folder that grows gives the same meshes, until its end file is there" {
     mkdir -p grows
-    "$NEUPIG" run --follow grows -o followed --follow-idle 0 "${small[@]}" >followed.log &
+    "$NEUPIG" run --follow grows -o followed --follow-end 0 "${small[@]}" >followed.log &
     pid=$!
     for file in capture/points/*.ply; do
         name=$(basename "$file")
@@ -51,17 +51,17 @@ await() {
 
 @test "without frames for a while it ends, too, and an incomplete last file is an error" {
     cp -r capture/points idle
-    "$NEUPIG" run --follow idle -o idled --follow-idle 1 "${small[@]}" >idled.log
+    "$NEUPIG" run --follow idle -o idled --follow-end 1 "${small[@]}" >idled.log
     same_meshes idled
     head -c 3000 capture/points/frame_0029.ply >idle/frame_0030.ply
     status=0
-    "$NEUPIG" run --follow idle -o cut --follow-idle 1 --method '{"follow-settle": 0}' "${small[@]}" 2>cut.log || status=$?
+    "$NEUPIG" run --follow idle -o cut --follow-end 1 --method '{"follow-settle": 0}' "${small[@]}" 2>cut.log || status=$?
     cat cut.log
     [ "$status" -eq 3 ]
     grep -q 'idle/frame_0030.ply' cut.log
     [ ! -e cut/done.json ]
     status=0
-    "$NEUPIG" run --follow idle -o kept --follow-idle 1 --method '{"follow-settle": 0}' --keep-going "${small[@]}" \
+    "$NEUPIG" run --follow idle -o kept --follow-end 1 --method '{"follow-settle": 0}' --keep-going "${small[@]}" \
         2>kept.log || status=$?
     [ "$status" -eq 7 ]
     grep -q 'frame_0030.ply' kept.log
@@ -138,7 +138,8 @@ await() {
     "$NEUPIG" synth --body bar --frames 24 --points 600 -o loop >loop.log
     for times in 1 5; do # there and back, so that nothing leaps
         for i in $(seq $times); do cat loop/points/*.ply $(ls -r loop/points/*.ply); done |
-            "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "grid-levels": 3, "align": false}' >long.log
+            "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "grid-levels": 3, "align": false,
+        "deliver": "last"}' >long.log
     done
     short=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long1/report.json)
     long=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long5/report.json)

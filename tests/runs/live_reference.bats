@@ -1,7 +1,7 @@
 # The reference of live runs: from all frames of the look-ahead, as from files; killed or stopped on the way.
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
-    --max-residual 100 --max-flipped 100 --max-stretched 100 --max-invented 100)
+    --bars residual=100,flipped=100,stretched=100,invented=100)
 open=(--look-ahead 9 --keyframe 5)
 
 setup_file() {
@@ -123,7 +123,7 @@ await() {
 @test "killed while the look-ahead comes, or in the fusing pass, a run ends with the same bytes" {
     mkdir grows
     cp $(ls noisy0/points/*.ply | head -5) grows
-    "$NEUPIG" run --follow grows -o killed "${small[@]}" "${open[@]}" --follow-idle 0 >killed.log 2>&1 &
+    "$NEUPIG" run --follow grows -o killed "${small[@]}" "${open[@]}" --follow-end 0 >killed.log 2>&1 &
     local pid=$!
     await killed/job/inputs.new $pid 400 # five lines
     kill -KILL $pid
@@ -152,7 +152,7 @@ await() {
 @test "a stop is heeded while the look-ahead comes and in the fusing pass" {
     mkdir few
     cp $(ls noisy0/points/*.ply | head -5) few
-    "$NEUPIG" run --follow few -o stopped "${small[@]}" "${open[@]}" --follow-idle 0 >stopped.log 2>&1 &
+    "$NEUPIG" run --follow few -o stopped "${small[@]}" "${open[@]}" --follow-end 0 >stopped.log 2>&1 &
     local pid=$! status=0
     await stopped/job/inputs.new $pid 400
     kill -TERM $pid

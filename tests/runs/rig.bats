@@ -1,13 +1,14 @@
 # Rigs, the whole way: depth and colour images -> points -> a coloured moving mesh, against the truth of a synthetic body.
 # A real recording is used where NEUPIG_TEST_DATA names a folder that holds kinect-rig/ (OpenCV files per frame).
 
-small=(--faces 2000 --method '{"poisson-depth": 6, "align-nodes": 80, "align-steps": 6}' --quiet --max-residual 100 --max-flipped 100 --max-stretched 100)
+small=(--faces 2000 --method '{"poisson-depth": 6, "align-nodes": 80, "align-steps": 6}' --quiet
+    --bars residual=100,flipped=100,stretched=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.1 --width 240 --height 180 --cell 0.04 --depth-noise 2 \
         -o capture >synth.log
-    "$NEUPIG" run capture/rig/rig.json -o out --export ply,glb,usda,npz,obj "${small[@]}"
+    "$NEUPIG" run capture/rig/rig.json -o out --export ply,glb,usda,npz,obj --method '{"truth": "capture/truth"}' "${small[@]}"
 }
 
 setup() {
@@ -23,18 +24,13 @@ report() {
     python3 -c 'import json, sys; print(eval("json.load(open(sys.argv[1]))" + sys.argv[2]))' "$1/report.json" "$2"
 }
 
-# CD of a run's meshes from the truth.
-chamfer() { # OUT TRUTH OPTIONS...
-    "$NEUPIG" eval "$@" --json | python3 -c 'import json, sys; print(json.load(sys.stdin)["CD"])'
-}
-
 numpy() {
     /usr/bin/python3 -c 'import numpy' 2>/dev/null || skip "needs python3-numpy"
 }
 
 @test "the images of four sensors become a mesh close to the truth" {
     [ "$(report out '["stages"]["ingest"]["rig"]["layout"]')" = rig.json ]
-    cd_mean=$(chamfer out capture/truth)
+    cd_mean=$(report out '["stages"]["evaluate"]["figures"]["truth_cd"]["mean"]')
     echo "CD $cd_mean"
     awk -v cd="$cd_mean" 'BEGIN { exit !(cd < 4) }'
 }
@@ -187,7 +183,7 @@ before = [s["before"] for s in json.load(sys.stdin)["sensors"]]
 assert [s["pose"] == "off" for s in before] == [False, False, True, False], before
 assert abs(before[2]["shift"] - 0.012) < 0.002 and abs(before[2]["turn_deg"] - 0.7) < 0.2, before
 assert len(before[2]["correction"]) == 16'
-    fine=(--frames 0:2 "${small[@]}" --faces 8000 --method '{"poisson-depth": 8,
+    fine=(--frames 0:2 "${small[@]}" --faces 8000 --method '{"truth": "wide/truth", "poisson-depth": 8,
         "align-nodes": 150}')
     for poses in rig.json off.json; do
         "$NEUPIG" run wide/rig/$poses --align-sensors -o "wide_$poses" "${fine[@]}"
@@ -195,7 +191,7 @@ assert len(before[2]["correction"]) == 16'
     "$NEUPIG" run wide/rig/off.json -o wide_wrong "${fine[@]}"
     [ "$(report wide_off.json '["stages"]["ingest"]["rig"]["sensors"][2]["pose"]')" = off ]
     for out in wide_rig.json wide_off.json wide_wrong; do
-        chamfer $out wide/truth --frames 0:2
+        report $out '["stages"]["evaluate"]["figures"]["truth_cd"]["mean"]'
     done | tee cds
     awk '{ cd[NR] = $1 } END { exit !(cd[2] < 1.15 * cd[1] && cd[3] > 1.5 * cd[2]) }' cds
 }

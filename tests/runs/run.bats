@@ -1,11 +1,11 @@
 # The whole chain on a small capture: what a run leaves, that it is the same every time, how bad input ends.
 
-small=(--method '{"epochs": 8, "width-1": 64, "width-2": 64, "poisson-depth": 7}' --faces 800 --max-flipped 5 --quiet)
+small=(--method '{"epochs": 8, "width-1": 64, "width-2": 64, "poisson-depth": 7}' --faces 800 --bars flipped=5 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG" synth --body bar --frames 5 --points 1200 -o capture >synth.log
-    "$NEUPIG" run capture/points -o first "${small[@]}" --max-residual 100 >first.log
+    "$NEUPIG" run capture/points -o first "${small[@]}" --bars residual=100 >first.log
 }
 
 setup() {
@@ -62,16 +62,16 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 
 @test "the keyframe of a mesh of one's own is the frame that it is nearest to, from files and live" {
     mesh=$(ls "$PWD"/capture/truth/* | sed -n 4p)
-    "$NEUPIG" run capture/points -o own "${small[@]}" --max-residual 100 --reference "$mesh"
+    "$NEUPIG" run capture/points -o own "${small[@]}" --bars residual=100 --reference "$mesh"
     key_is own 3
-    cat capture/points/* | "$NEUPIG" run - -o own-live "${small[@]}" --max-residual 100 --reference "$mesh"
+    cat capture/points/* | "$NEUPIG" run - -o own-live "${small[@]}" --bars residual=100 --reference "$mesh"
     key_is own-live 3
     cmp own/reference.ply own-live/reference.ply
 }
 
 @test "frames on standard input give the same meshes as the files" {
-    "$NEUPIG" run capture/points -o from-files "${small[@]}" --max-residual 100 >/dev/null
-    cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --max-residual 100 >/dev/null
+    "$NEUPIG" run capture/points -o from-files "${small[@]}" --bars residual=100 >/dev/null
+    cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --bars residual=100 >/dev/null
     for mesh in from-files/meshes/*.ply; do
         cmp "$mesh" "piped/meshes/$(basename "$mesh")"
     done
@@ -95,7 +95,7 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 @test "with keep-going a truncated frame is skipped, said, and the run ends with 7" {
     cp -r capture/points cut
     truncate -s 5000 cut/frame_0001.ply
-    run "$NEUPIG" run cut -o cut-out "${small[@]}" --max-residual 100 --keep-going
+    run "$NEUPIG" run cut -o cut-out "${small[@]}" --bars residual=100 --keep-going
     echo "$output"
     [ "$status" -eq 7 ]
     [[ "$output" == *frame_0001.ply* ]]

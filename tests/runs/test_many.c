@@ -83,8 +83,8 @@ static void run_capture(const temp_folder *folder, const char *output)
                                        {"align-nodes", "20"},
                                        {"align-steps", "2"},
                                        {"poisson-depth", "4"},
-                                       {"max-residual", "100"},
-                                       {"max-flipped", "100"}};
+                                       {"bars.residual", "100"},
+                                       {"bars.flipped", "100"}};
     npg_options *options = NULL;
     npg_run *run = NULL;
     assert_int_equal(npg_options_open(&options), NPG_OK);

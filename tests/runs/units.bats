@@ -2,8 +2,8 @@
 
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
-    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5}' --faces 300 --quiet --max-residual 100
-        --max-flipped 100 --max-stretched 100)
+    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5}' --faces 300 --quiet
+        --bars residual=100,flipped=100,stretched=100)
 }
 
 # An ellipsoid that grows and turns, 3 frames of 700 points, all multiplied by UNIT.

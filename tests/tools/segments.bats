@@ -2,7 +2,7 @@
 
 small=(--method '{"epochs": 10, "width-1": 64, "width-2": 64, "poisson-depth": 6, "window": 10, "overlap": 2,
                   "align-nodes": 300, "align-steps": 8, "grid-levels": 4, "segment-min": 4}' --faces 2000
-    --max-residual 100 --max-flipped 100 --min-coverage 0
+    --bars residual=100,flipped=100,coverage=0
     --quiet)
 
 setup_file() {

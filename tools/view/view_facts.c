@@ -92,7 +92,7 @@ static json_t *json_of_part(const npg_view_part *part)
                             "vertices", (json_int_t)(mesh ? mesh->vert_count : 0), "faces",
                             (json_int_t)(mesh ? mesh->face_count : 0), "group", (json_int_t)part->group,
                             "frame_count", (json_int_t)frames_in_all(part), "diagonal", part->diagonal,
-                            "cover", part->cover_share, "bar", option_number(part, "max-residual", 0.5),
+                            "cover", part->cover_share, "bar", option_number(part, "bars.residual", 0.5),
                             "windows", json_of_windows(part), "frames", json_of_frames(part));
     if (!out) return NULL;
     if (part->origin.known)

@@ -154,7 +154,7 @@ static void set_lengths(npg_view_part *part)
     part->diagonal = part->placement.scale * own;
     if (!(part->diagonal > 0) && part->reference) part->diagonal = npg_bounds_diagonal(&bounds);
     if (!(part->diagonal > 0) || !isfinite(part->diagonal)) part->diagonal = 1;
-    part->cover_share = 0.01 * number_in(options, "cover-distance", 1);
+    part->cover_share = 0.01 * number_in(options, "bars.cover", 1);
 }
 
 static npg_status fill_part(npg_view_part *part, int64_t every, bool may_be_empty)

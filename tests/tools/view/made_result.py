@@ -26,7 +26,7 @@ def line_of(i):
     error = 0.0005 + 0.0001 * (i % 7) / 3
     figures = {"point_dist_median": 0.0061 if i == 3 else error, "point_dist_mean": 1.3 * error,
                "point_dist_p95": 3 * error, "vertex_dist_mean": 0.004, "coverage": 0.97, "flipped_share": 0.0, "stretched_share": 0.0,
-               "edge_change": 0.02, "chamfer": 1.8}
+               "edge_change": 0.02, "chamfer": 1.8, "truth_cd": None}
     line = {"index": i, "number": i, "source": str(capture / "points" / meshes[i].name), "key": i == key,
             "skipped": i == count - 2, "held": False, "points": 600, "good": i not in (3, count - 2),
             "figures": figures, "file": f"meshes/{meshes[i].name}"}
@@ -47,7 +47,7 @@ alarm = {"from_frame": count - 2, "from_index": count - 2, "figure": "far", "val
 report = {"warnings": [{"text": "below the bar: </script><script>document.title = 'broken'</script>"}],
           "stages": {"keyframe": {"box_diagonal": 4.6, "figure_diagonal": 2.3},
                      "evaluate": {"topology": {"forward": alarm, "backward": None}}}}
-options = {"window": "6", "overlap": "2", "max-residual": "0.5", "cover-distance": "1", "fps": "25", "up": "y"}
+options = {"window": "6", "overlap": "2", "bars.residual": "0.5", "bars.cover": "1", "fps": "25", "up": "y"}
 done = {"neupig": "0.1.0", "status": "partial", "exit_code": 7, "frames": count, "axes": "xyz", "scale": 1.0,
         "options": options}
 job = {"input": str(capture / "points"), "options": options,

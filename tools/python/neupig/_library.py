@@ -55,7 +55,7 @@ class Error(RuntimeError):
 class OptionInfoStruct(Structure):
     _fields_ = [("struct_size", c_size_t), ("stage", c_char_p), ("name", c_char_p), ("help", c_char_p),
                 ("default_text", c_char_p), ("choices", c_char_p), ("value_name", c_char_p), ("type", c_int),
-                ("min", c_double), ("max", c_double)]
+                ("min", c_double), ("max", c_double), ("use", c_int)]
 
 
 class FrameViewStruct(Structure):

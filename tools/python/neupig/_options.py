@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ._library import OptionInfoStruct, Status, check, lib
 
+_USES = ("command", "method", "part", "program")
 _TYPES = ("flag", "int", "real", "choice", "text")
 
 
@@ -24,6 +25,7 @@ class Option(NamedTuple):
     choices: tuple[str, ...]
     min: float
     max: float
+    use: str  # "command", "method" (a key of the method), "part" (of a list, as bars.residual) or "program"
 
 
 def options() -> Iterator[Option]:
@@ -33,7 +35,7 @@ def options() -> Iterator[Option]:
     while check(lib.npg_options_describe(index, ctypes.byref(info))) is Status.OK:
         choices = tuple(info.choices.decode().split("|")) if info.choices else ()
         yield Option(info.stage.decode(), info.name.decode(), info.help.decode(), info.default_text.decode(),
-                     _TYPES[info.type], choices, info.min, info.max)
+                     _TYPES[info.type], choices, info.min, info.max, _USES[info.use])
         index += 1
 
 

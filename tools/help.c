@@ -1,0 +1,229 @@
+/* Help: the options of a verb, the keys of the method, and both as JSON, from the tables. */
+#include "tools/help.h"
+
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pipeline/stage.h"
+
+enum { SPELL_LIMIT = 96, LIMITS_LIMIT = 256, HELP_INDENT = 28, HELP_WIDTH = 100 };
+
+/* ---- one option ---- */
+
+/* A part of a list by its own name. */
+static const char *short_name(const char *name)
+{
+    const char *dot = strchr(name, '.');
+    return dot ? dot + 1 : name;
+}
+
+void npg_help_spell(char *out, size_t size, const npg_option_info *option)
+{
+    static const char *const by_type[] = {"", "N", "X", "WORD", "TEXT"};
+    const char *value = option->value_name ? option->value_name : by_type[option->type];
+    bool on = option->type == NPG_OPTION_FLAG && !strcmp(option->default_text, "yes");
+    if (option->use != NPG_USE_COMMON)
+        snprintf(out, size, "%s", short_name(option->name));
+    else if (option->type == NPG_OPTION_FLAG)
+        snprintf(out, size, "--%s%s", on ? "no-" : "", option->name);
+    else
+        snprintf(out, size, "--%s %s", option->name, value);
+}
+
+void npg_help_limits(char *out, size_t size, const npg_option_info *option)
+{
+    const char *given = option->default_text;
+    out[0] = 0;
+    switch (option->type) {
+    case NPG_OPTION_FLAG:
+        if (option->use != NPG_USE_COMMON) snprintf(out, size, "default: %s", given);
+        break;
+    case NPG_OPTION_CHOICE: snprintf(out, size, "%s; default: %s", option->choices, given); break;
+    case NPG_OPTION_INT:
+    case NPG_OPTION_REAL:
+        snprintf(out, size, "%.10g .. %.10g; default: %s", option->min, option->max, given);
+        break;
+    case NPG_OPTION_TEXT:
+        if (given && given[0]) snprintf(out, size, "default: %s", given);
+        break;
+    }
+}
+
+/* Print `size` bytes of text in words, wrapped; the cursor stands at *column. */
+static void print_wrapped(FILE *out, const char *text, size_t size, int *column, int indent)
+{
+    for (const char *end = text + size; text < end; text += strspn(text, " ")) {
+        int length = (int)strcspn(text, " ");
+        if (length > end - text) length = (int)(end - text);
+        if (*column + 1 + length > HELP_WIDTH) {
+            fprintf(out, "\n%*s", indent, "");
+            *column = indent;
+        } else if (*column > indent) {
+            fputc(' ', out);
+            ++*column;
+        }
+        fprintf(out, "%.*s", length, text);
+        *column += length;
+        text += length;
+    }
+}
+
+static void print_option(FILE *out, const npg_option_info *option, bool is_short)
+{
+    char spelled[SPELL_LIMIT], limits[LIMITS_LIMIT], bracketed[LIMITS_LIMIT + 4];
+    const char *end = is_short ? strstr(option->help, ". ") : NULL;
+    npg_help_spell(spelled, sizeof spelled, option);
+    npg_help_limits(limits, sizeof limits, option);
+    int column = fprintf(out, "  %s%s", option->use == NPG_USE_PART ? "  " : "", spelled);
+    if (column + 1 > HELP_INDENT) {
+        fputc('\n', out);
+        column = 0;
+    }
+    fprintf(out, "%*s", HELP_INDENT - column, "");
+    column = HELP_INDENT;
+    print_wrapped(out, option->help, end ? (size_t)(end - option->help) : strlen(option->help), &column,
+                  HELP_INDENT);
+    if (limits[0] && !is_short) {
+        snprintf(bracketed, sizeof bracketed, "(%s)", limits);
+        print_wrapped(out, bracketed, strlen(bracketed), &column, HELP_INDENT);
+    }
+    fputc('\n', out);
+}
+
+/* ---- a verb ---- */
+
+static void print_parts(FILE *out, const char *list)
+{
+    npg_option_info part = {.struct_size = sizeof part};
+    for (size_t i = 0; npg_options_describe(i, &part) == NPG_OK; i++)
+        if (part.use == NPG_USE_PART && !strcmp(npg_option_list_of(part.name)->name, list))
+            print_option(out, &part, false);
+}
+
+static void print_options(FILE *out, const npg_verb *verb, bool all)
+{
+    npg_option_info info;
+    const char *group = "";
+    bool is_short, is_run = verb->main == npg_verb_run;
+    for (size_t i = 0; npg_cli_option(&info, &is_short, verb, i) == NPG_OK; i++) {
+        if (is_run && !all && !is_short) continue;
+        if ((all || !is_run) && strcmp(group, info.stage) != 0)
+            fprintf(out, "\n%s%s:\n", is_run ? "" : "Options of neupig ", info.stage);
+        group = info.stage;
+        print_option(out, &info, is_run && !all);
+        if (all && is_run && npg_option_list_of(info.name)) print_parts(out, info.name);
+    }
+}
+
+void npg_help_verb(FILE *out, const npg_verb *verb, bool all)
+{
+    int column = 0;
+    bool is_run = verb->main == npg_verb_run, is_brief = is_run && !all;
+    const char *end = is_brief ? strstr(verb->text, ".  ") : NULL;
+    fprintf(out, "Usage: neupig %s %s%s%s\n", verb->name, verb->options ? "[options]" : "",
+            verb->options && verb->operands[0] ? " " : "", verb->operands);
+    if (!is_brief) fputc('\n', out);
+    print_wrapped(out, verb->text, end ? (size_t)(end + 1 - verb->text) : strlen(verb->text), &column, 0);
+    fputc('\n', out);
+    print_options(out, verb, all);
+    if (is_brief)
+        fputs("All options: neupig help run --help-all; names and keys of methods: neupig help method.\n",
+              out);
+    if (!is_run && verb->with_run_options)
+        fputs("\nThe options of neupig run count here as well (neupig help run --help-all).\n", out);
+}
+
+void npg_help_verbs(FILE *out)
+{
+    fputs("Usage: neupig VERB [options] [operands]\n\n"
+          "Turns a long sequence of point clouds into one mesh that moves.\n\n",
+          out);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++)
+        fprintf(out, "  %-10s%s\n", verb->name, verb->help);
+    fputs("\nneupig help VERB, or neupig VERB --help, shows the options of one verb.\n"
+          "Exit codes: 0 done, 1 failed, 2 usage, 3 bad input, 4 device, 5 disk, 6 memory,\n"
+          "7 finished with frames skipped or below the quality bar, 75 stopped by a signal.\n",
+          out);
+}
+
+void npg_help_method(FILE *out)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    fputs("--method NAME, --method FILE.json, or --method '{\"preset\": \"NAME\", \"KEY\": VALUE, ...}'; "
+          "several add up.\n\nNames:\n",
+          out);
+    for (const npg_preset *preset = npg_presets; preset->name; preset++)
+        fprintf(out, "  %-26s%s\n", preset->name, preset->help);
+    fputs("\nKeys, beside all options of neupig run:\n", out);
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        if (info.use == NPG_USE_METHOD) print_option(out, &info, false);
+}
+
+/* ---- as JSON ---- */
+
+static json_t *words_of(const char *choices)
+{
+    json_t *words = json_array();
+    for (const char *word = choices; *word; word += *word == '|') {
+        size_t length = strcspn(word, "|");
+        json_array_append_new(words, json_stringn(word, length));
+        word += length;
+    }
+    return words;
+}
+
+/* What a value may be, in the words of a JSON schema. */
+static json_t *schema_of(const npg_option_info *option)
+{
+    static const char *const types[] = {"boolean", "integer", "number", "string", "string"};
+    json_t *schema = json_pack("{ss ss ss}", "description", option->help, "type", types[option->type],
+                               "default", option->default_text);
+    if (option->type == NPG_OPTION_FLAG)
+        json_object_set_new(schema, "default", json_boolean(!strcmp(option->default_text, "yes")));
+    if (option->type == NPG_OPTION_CHOICE) json_object_set_new(schema, "enum", words_of(option->choices));
+    if (option->type != NPG_OPTION_INT && option->type != NPG_OPTION_REAL) return schema;
+    json_object_set_new(schema, "default", json_loads(option->default_text, JSON_DECODE_ANY, NULL));
+    json_object_set_new(schema, "minimum", json_real(option->min));
+    json_object_set_new(schema, "maximum", json_real(option->max));
+    return schema;
+}
+
+static void print_json(FILE *out, json_t *value)
+{
+    json_dumpf(value, out, JSON_INDENT(1) | JSON_REAL_PRECISION(12));
+    fputc('\n', out);
+    json_decref(value);
+}
+
+void npg_help_verb_json(FILE *out, const npg_verb *verb)
+{
+    npg_option_info info;
+    char spelled[SPELL_LIMIT];
+    json_t *options = json_array();
+    for (size_t i = 0; npg_cli_option(&info, NULL, verb, i) == NPG_OK; i++) {
+        npg_help_spell(spelled, sizeof spelled, &info);
+        json_t *option = schema_of(&info);
+        json_object_set_new(option, "name", json_string(info.name));
+        json_object_set_new(option, "option", json_string(spelled));
+        json_object_set_new(option, "group", json_string(info.stage));
+        json_array_append_new(options, option);
+    }
+    print_json(out, json_pack("{ss ss ss so}", "verb", verb->name, "operands", verb->operands, "help",
+                              verb->text, "options", options));
+}
+
+void npg_help_method_json(FILE *out)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    json_t *properties = json_object();
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        json_object_set_new(properties, strcmp(info.name, "method") != 0 ? info.name : "preset",
+                            schema_of(&info));
+    for (const npg_option_list *list = npg_option_lists; list->name; list++)
+        json_object_set_new(properties, list->name,
+                            json_pack("{ss ss}", "description", list->help, "type", "string"));
+    print_json(out, json_pack("{ss ss ss so sb}", "$schema", "https://json-schema.org/draft/2020-12/schema",
+                              "title", "method of neupig run", "type", "object", "properties", properties,
+                              "additionalProperties", 0));
+}
