@@ -36,19 +36,3 @@ npg_status npg_check_buffer(double *error, const npg_buffer *got, const double *
     npg_release(&values);
     return status;
 }
-
-void npg_check_slope(double *error, double *x, const double *slope, size_t n, size_t stride, double h,
-                     npg_check_function *f, void *user)
-{
-    double largest = 1e-30;
-    for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(slope[i]));
-    for (size_t i = 0; i < n; i += stride) {
-        double before = x[i];
-        x[i] = before + h;
-        double up = f(user);
-        x[i] = before - h;
-        double down = f(user);
-        x[i] = before;
-        *error = fmax(*error, fabs(slope[i] - (up - down) / (2 * h)) / largest);
-    }
-}

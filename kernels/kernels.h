@@ -10,14 +10,10 @@
  * figures of size 8 are large and odd) and give the largest error, relative to the largest value. */
 typedef npg_status npg_kernel_check(npg_device *device, int size, uint64_t seed, double *error);
 
-/* The gradient of a twin against central differences of the twin, in double; the largest relative error. */
-typedef npg_status npg_kernel_gradient(uint64_t seed, double *error);
-
 typedef struct npg_kernel_case {
     const char *op;
     npg_kernel_check *check;
-    npg_kernel_gradient *gradient; /* NULL: the op has no gradient */
-    double tolerance;              /* of the check                 */
+    double tolerance;
 } npg_kernel_case;
 
 /* Ends with op NULL. */

@@ -8,17 +8,18 @@
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 
-static void make_levels(npg_levels *levels, int size, double screen, double degree)
+/* Both matrices of the smoothing, by turns. */
+static void make_levels(npg_levels *levels, int size)
 {
     *levels = (npg_levels){0};
     int count = size < 4 ? 3 : 8;
     for (int l = 0; l < count; l++)
         npg_levels_add(levels,
                        (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 1.0 / count, 0.4 * pow(1.5, l),
-                                   screen, degree, 1},
+                                   l % 2 ? 1 : 3.4, l % 2 ? 2 : 1, 1},
                        0);
     npg_levels_add(levels, (npg_level){NPG_LEVEL_HASHED, 9 + size, 0, 0, 0, 2, 1, 0, 1, 1, 1}, 256);
-    npg_levels_add(levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, screen, degree, 1}, 0);
+    npg_levels_add(levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, 3.4, 1, 1}, 0);
 }
 
 /* ---- latent ---- */
@@ -36,7 +37,7 @@ static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
     npg_random random = npg_random_stream(seed, 10, (uint64_t)size);
     d->real = size == 1 ? 5 : (size_t)size * 397 + 3;
     d->rows = NPG_PADDED(d->real);
-    make_levels(&d->levels, size, 1, 1);
+    make_levels(&d->levels, size);
     size_t nodes = d->levels.row_count * CHANNELS, z = d->rows * CHANNELS;
     NPG_TRY(npg_check_values(&d->positions, NULL, d->real * 3, 1.05, &random)); /* some outside the cube */
     NPG_TRY(npg_check_values(&d->normals, NULL, d->real * 3, 1, &random));
@@ -93,36 +94,6 @@ npg_status npg_check_latent(npg_device *device, int size, uint64_t seed, double 
     return status;
 }
 
-/* The function whose gradient is dnodes: sum of dz z over the real rows. */
-static double latent_value(void *user)
-{
-    latent_data *d = user;
-    double sum = 0;
-    npg_latent_sample_ref(d->z, d->nodes_wide, &d->samples);
-    for (size_t i = 0; i < d->real * CHANNELS; i++) sum += d->dz_wide[i] * d->z[i];
-    return sum;
-}
-
-npg_status npg_slope_latent(uint64_t seed, double *error)
-{
-    latent_data d = {0};
-    *error = 0;
-    npg_status status = open_latent_data(&d, 1, seed);
-    if (!status) {
-        latent_value(&d);
-        npg_latent_back_ref(d.dnodes, d.dz_wide, d.z, &d.samples);
-        /* channels that a level does not use have no gradient by definition: check those it uses */
-        for (size_t n = 0; n < d.samples.node_count; n += 7) {
-            size_t lo = (size_t)NPG_CHANNEL_FIRST(d.samples.channels[n]),
-                   end = (size_t)NPG_CHANNEL_END(d.samples.channels[n]);
-            size_t at = n * CHANNELS + lo;
-            npg_check_slope(error, d.nodes_wide + at, d.dnodes + at, end - lo, 3, 1e-5, latent_value, &d);
-        }
-    }
-    close_latent_data(&d);
-    return status;
-}
-
 /* ---- sobolev: the residual of the matrix itself ---- */
 
 static npg_status residual_of(npg_device *device, const npg_levels *levels, npg_random *random, double *error)
@@ -156,26 +127,10 @@ static npg_status residual_of(npg_device *device, const npg_levels *levels, npg_
     return status;
 }
 
-static npg_status check_sobolev(npg_device *device, int size, uint64_t seed, double screen, double degree,
-                                double *error)
+npg_status npg_check_sobolev(npg_device *device, int size, uint64_t seed, double *error)
 {
     npg_levels levels;
     npg_random random = npg_random_stream(seed, 11, (uint64_t)size);
-    make_levels(&levels, size, screen, degree);
+    make_levels(&levels, size);
     return residual_of(device, &levels, &random, error);
-}
-
-npg_status npg_check_sobolev(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_sobolev(device, size, seed, 3.4, 1, error);
-}
-
-npg_status npg_check_sobolev_graph(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_sobolev(device, size, seed, 1, 1, error);
-}
-
-npg_status npg_check_sobolev_doubled(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_sobolev(device, size, seed, 1, 2, error);
 }

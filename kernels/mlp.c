@@ -5,34 +5,17 @@
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 
-size_t npg_mlp_units(const npg_mlp_shape *s, size_t layer)
-{
-    return layer > 1 ? s->w2 : s->w1;
-}
-size_t npg_mlp_last_units(const npg_mlp_shape *s)
-{
-    return npg_mlp_units(s, s->layers);
-}
-double npg_mlp_multiply_adds(const npg_mlp_shape *s)
-{
-    return (double)(npg_mlp_at_head(s) + NPG_MLP_USED * npg_mlp_last_units(s));
-}
-
-size_t npg_mlp_at_weights(const npg_mlp_shape *s, size_t layer)
-{
-    return layer > 2 ? (s->w1 + (layer - 3) * s->w2) * s->w2 : 0;
-}
 size_t npg_mlp_at_head(const npg_mlp_shape *s)
 {
-    return npg_mlp_at_weights(s, s->layers + 1);
+    return s->w1 * s->w2;
 }
-size_t npg_mlp_at_bias(const npg_mlp_shape *s, size_t layer)
+size_t npg_mlp_at_b2(const npg_mlp_shape *s)
 {
-    return npg_mlp_at_head(s) + npg_mlp_last_units(s) * NPG_MLP_HEAD_ROW + (layer - 2) * s->w2;
+    return npg_mlp_at_head(s) + s->w2 * NPG_MLP_HEAD_ROW;
 }
 size_t npg_mlp_at_head_bias(const npg_mlp_shape *s)
 {
-    return npg_mlp_at_bias(s, s->layers + 1);
+    return npg_mlp_at_b2(s) + s->w2;
 }
 size_t npg_mlp_at_w1z(const npg_mlp_shape *s)
 {
@@ -63,7 +46,7 @@ static size_t widest(const npg_mlp_shape *s)
 
 size_t npg_mlp_scratch(const npg_mlp_shape *s, size_t block)
 {
-    return (s->layers > 2 ? 3 : 2) * block * widest(s);
+    return 2 * block * widest(s);
 }
 
 static npg_status open_buffers(npg_mlp *m, npg_device *d)
@@ -77,7 +60,7 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     NPG_TRY(npg_buffer_open(&m->out, d, m->frames * m->rows * NPG_MLP_OUT * f));
     NPG_TRY(npg_buffer_open(&m->p, d, m->rows * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->c, d, m->frames * s->w1 * f));
-    NPG_TRY(npg_buffer_open(&m->h, d, kept * (s->layers - 1) * s->w2 * f));
+    NPG_TRY(npg_buffer_open(&m->h2, d, kept * s->w2 * f));
     NPG_TRY(npg_buffer_open(&m->scratch, d, m->groups * npg_mlp_scratch(s, block) * f));
     if (!m->batch) return NPG_OK;
     NPG_TRY(npg_buffer_open(&m->grad, d, npg_mlp_param_count(s) * f));
@@ -86,7 +69,7 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     NPG_TRY(npg_buffer_open(&m->dp, d, m->rows * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->dc, d, m->groups * m->frames * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->sums, d, m->groups * npg_mlp_at_w1t(s) * f));
-    size_t transposed = npg_mlp_at_head(s) + s->w1 * CHANNELS + NPG_MLP_USED * npg_mlp_last_units(s);
+    size_t transposed = npg_mlp_at_head(s) + s->w1 * CHANNELS + NPG_MLP_USED * s->w2;
     return npg_buffer_open(&m->transposed, d, transposed * f);
 }
 
@@ -104,15 +87,14 @@ npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *s
     const size_t block = (size_t)tuning->mlp_rows;
     NPG_REQUIRE(rows && rows % block == 0 && frames && shape->w1 % NPG_PANEL == 0 &&
                 shape->w2 % NPG_PANEL == 0);
-    NPG_REQUIRE(shape->w1 >= NPG_PANEL && shape->w2 >= NPG_PANEL && shape->layers >= 1 &&
-                shape->layers <= NPG_MLP_LAYERS_MAX);
+    NPG_REQUIRE(shape->w1 >= NPG_PANEL && shape->w2 >= NPG_PANEL);
     *mlp = (npg_mlp){.shape = *shape, .rows = rows, .blocks = rows / block, .frames = frames, .batch = batch};
     mlp->local = (size_t)tuning->mlp_local;
     mlp->span = (size_t)tuning->span;
     mlp->groups = (size_t)(tuning->mlp_groups * npg_device_facts(device)->units);
     if (mlp->groups > mlp->blocks) mlp->groups = mlp->blocks;
-    snprintf(constants, sizeof constants, "-DCZ=%zu -DW1=%zu -DW2=%zu -DLAYERS=%zu -DSLOPE=%.9gf", CHANNELS,
-             shape->w1, shape->w2, shape->layers, (double)shape->slope);
+    snprintf(constants, sizeof constants, "-DCZ=%zu -DW1=%zu -DW2=%zu -DSLOPE=%.9gf", CHANNELS, shape->w1,
+             shape->w2, NPG_MLP_SLOPE);
     npg_status status = npg_program_open(&mlp->program, device, "mlp", constants);
     if (!status) status = npg_program_open(&mlp->time, device, "time", "");
     if (!status) status = open_buffers(mlp, device);
@@ -124,7 +106,7 @@ void npg_mlp_close(npg_mlp *mlp)
 {
     npg_buffer *all[] = {&mlp->params, &mlp->grad, &mlp->code, &mlp->z,       &mlp->dz,
                          &mlp->out,    &mlp->dout, &mlp->p,    &mlp->dp,      &mlp->c,
-                         &mlp->dc,     &mlp->h,    &mlp->sums, &mlp->scratch, &mlp->transposed};
+                         &mlp->dc,     &mlp->h2,   &mlp->sums, &mlp->scratch, &mlp->transposed};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
     npg_program_close(&mlp->program);
     npg_program_close(&mlp->time);
@@ -148,15 +130,16 @@ npg_status npg_mlp_begin(npg_mlp *m)
 
 npg_status npg_mlp_forward(npg_mlp *m, size_t first, size_t count)
 {
-    return NPG_LAUNCH_GROUPS(m->program, "mlp_forward", m->groups, m->local, NPG_BUF(&m->out), NPG_BUF(&m->h),
-                             NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->params), NPG_BUF(&m->scratch),
-                             NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first), NPG_INT(m->batch > 0));
+    return NPG_LAUNCH_GROUPS(m->program, "mlp_forward", m->groups, m->local, NPG_BUF(&m->out),
+                             NPG_BUF(&m->h2), NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->params),
+                             NPG_BUF(&m->scratch), NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first),
+                             NPG_INT(m->batch > 0));
 }
 
 npg_status npg_mlp_backward(npg_mlp *m, size_t first, size_t count)
 {
     return NPG_LAUNCH_GROUPS(m->program, "mlp_backward", m->groups, m->local, NPG_BUF(&m->dp),
-                             NPG_BUF(&m->sums), NPG_BUF(&m->dc), NPG_BUF(&m->dout), NPG_BUF(&m->h),
+                             NPG_BUF(&m->sums), NPG_BUF(&m->dc), NPG_BUF(&m->dout), NPG_BUF(&m->h2),
                              NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->transposed), NPG_BUF(&m->scratch),
                              NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first), NPG_INT(m->frames));
 }

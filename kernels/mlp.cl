@@ -1,11 +1,11 @@
 /* mlp: the decoder psi of the paper's section on the temporal deformation model.
  *
- *     y = (z(v), gamma(t))        h_1 = f(z W1z + c_t)     h_l = f(h_(l-1) W_l + b_l), l = 2 .. L
- *     c_t = gamma(t) W1t + b1     out = h_L head + bias    f(x) = x for x > 0, SLOPE x else
+ *     y = (z(v), gamma(t))        h_1 = f(z W1z + c_t)     h_2 = f(h_1 W_2 + b_2)
+ *     c_t = gamma(t) W1t + b1     out = h_2 head + bias    f(x) = x for x > 0, SLOPE x else
  *
- * L hidden layers: the first has W1 units, all others have W2.  The first is split: z W1z is computed once
- * per vertex, c_t once per frame (op "time"), and the sum is made when it is needed.  The backward pass forms
- * h_1 again from both rather than keep it; h_2 .. h_L are kept.  With L = 1 the head lies on h_1.
+ * The first layer has W1 units, the second W2.  The first is split: z W1z is computed once per vertex, c_t once
+ * per frame (op "time"), and the sum is made when it is needed.  The backward pass forms h_1 again from both
+ * rather than keep it; h_2 is kept.
  *
  * Layouts.  Vertices come in blocks of ROWS.  A matrix with one row per vertex and C columns is stored in panels:
  * [block][C / 32][ROWS][32], so that all operands of the inner products are contiguous.  Weights K x C are stored
@@ -14,7 +14,7 @@
  * sum over vertices is made per group, in a fixed order, and added over groups by mlp_reduce: equal input and equal
  * constants give equal bits.
  *
- * Build constants: CZ (columns of z, multiple of 32), W1, W2 (multiples of 32), LAYERS (L), SLOPE; and from
+ * Build constants: CZ (columns of z, multiple of 32), W1, W2 (multiples of 32), SLOPE; and from
  * the tuning of the device ROWS (multiple of MR and HR), MR, VW, NV (VW * NV divides 32), GR (divides 32), HR,
  * LOCAL, SPAN.
  * Padded rows take part in the products; their output gradient must be 0, then they change nothing. */
@@ -34,26 +34,19 @@
 
 #define BLOCK(C) ((size_t)ROWS * (C))
 #define WMAX     (W1 > W2 ? W1 : W2)
-#define WLAST    (LAYERS > 1 ? W2 : W1) /* units of the last hidden layer */
 
-/* Of layer l > 1: units of the layer before it, the layer itself among those that are kept. */
-#define INPUTS(l)  ((l) > 2 ? W2 : W1)
-#define KEPT       BLOCK((LAYERS - 1) * W2)
-#define AT_KEPT(l) (((l) - 2) * BLOCK(W2))
-
-/* Blocks of WMAX columns that a group computes in: h_1, and gradients before two rectifiers. */
-#define SCRATCH ((LAYERS > 2 ? 3 : 2) * BLOCK(WMAX))
+/* Blocks of WMAX columns that a group computes in: h_1, and the gradient before the second rectifier. */
+#define SCRATCH (2 * BLOCK(WMAX))
 
 /* Offsets (floats) in the parameters, in their gradient and in a group's sums of it; w1t and b1 of op "time"
- * follow in the first two.  AT_W and AT_B are of layer l > 1. */
-#define AT_W(l)      ((l) > 2 ? ((size_t)W1 + ((l) - 3) * (size_t)W2) * W2 : 0)
-#define AT_HEAD      AT_W(LAYERS + 1)
-#define AT_B(l)      (AT_HEAD + (size_t)WLAST * NPG_MLP_HEAD_ROW + ((l) - 2) * (size_t)W2)
-#define AT_HEAD_BIAS AT_B(LAYERS + 1)
+ * follow in the first two.  W_2 is first. */
+#define AT_HEAD      ((size_t)W1 * W2)
+#define AT_B2        (AT_HEAD + (size_t)W2 * NPG_MLP_HEAD_ROW)
+#define AT_HEAD_BIAS (AT_B2 + W2)
 #define AT_W1Z       (AT_HEAD_BIAS + NPG_MLP_HEAD_ROW)
 #define AT_END       (AT_W1Z + (size_t)CZ * W1)
 
-/* The same for the transposes; those of W_2 .. W_L lie as they do. */
+/* The same for the transposes; that of W_2 lies as it does. */
 #define AT_W1Z_BACK  AT_HEAD
 #define AT_HEAD_BACK (AT_W1Z_BACK + (size_t)CZ * W1)
 
@@ -157,9 +150,8 @@ GROUP_KERNEL mlp_input(global float *p, global const float *z, global const floa
     }
 }
 
-/* out (one block, W2 columns) = f(in w + b), in with K columns. */
-inline void hidden_layer(global float *out, global const float *in, global const float *w,
-                         global const float *b, int K)
+/* h2 (one block) = f(h1 w + b). */
+inline void second_layer(global float *h2, global const float *h1, global const float *w, global const float *b)
 {
     FOR_COLUMNS(col, W2)
     {
@@ -169,8 +161,8 @@ inline void hidden_layer(global float *out, global const float *in, global const
             {
                 UNROLL for (int j = 0; j < NV; j++) acc[i][j] = LOAD(j, b + col);
             }
-            TILE_ADD(acc, in, w + COLUMN(K, col), K, r0)
-            global float *to = out + COLUMN(ROWS, col) + NPG_PANEL * r0;
+            TILE_ADD(acc, h1, w + COLUMN(W1, col), W1, r0)
+            global float *to = h2 + COLUMN(ROWS, col) + NPG_PANEL * r0;
             UNROLL for (int i = 0; i < MR; i++)
             {
                 UNROLL for (int j = 0; j < NV; j++) STORE(leaky(acc[i][j]), j, to + NPG_PANEL * i);
@@ -179,15 +171,15 @@ inline void hidden_layer(global float *out, global const float *in, global const
     }
 }
 
-/* out (ROWS x 8) = h w + b, h of the last hidden layer; w has rows of 16, columns 7..15 are 0. */
-inline void head_layer(global float *out, global const float *h, global const float *head,
+/* out (ROWS x 8) = h2 w + b; w has rows of 16, columns 7..15 are 0. */
+inline void head_layer(global float *out, global const float *h2, global const float *head,
                        global const float *bias)
 {
     for (int r0 = ITEM * HR; r0 < ROWS; r0 += LOCAL * HR) {
         float8 acc[HR];
         UNROLL for (int i = 0; i < HR; i++) acc[i] = vload8(0, bias);
-        for (int panel = 0; panel < WLAST; panel += NPG_PANEL) {
-            global const float *a = h + (size_t)panel * ROWS + NPG_PANEL * r0;
+        for (int panel = 0; panel < W2; panel += NPG_PANEL) {
+            global const float *a = h2 + (size_t)panel * ROWS + NPG_PANEL * r0;
             for (int k = 0; k < NPG_PANEL; k++) {
                 float8 w = vload8(2 * (panel + k), head);
                 UNROLL for (int i = 0; i < HR; i++) acc[i] = fma((float8)(a[NPG_PANEL * i + k]), w, acc[i]);
@@ -198,9 +190,8 @@ inline void head_layer(global float *out, global const float *h, global const fl
 }
 
 /* For the frames first_frame ...: out [all frames][blocks * ROWS][8] and, for the backward pass,
- * h [frames][blocks][LAYERS - 1][W2 panels], of layers 2 and up; with keep = 0 h is not kept and has room
- * for G blocks of each.  c: [all frames][W1].  scratch: [G][SCRATCH].  Global size: G groups. */
-GROUP_KERNEL mlp_forward(global float *out, global float *h, global const float *p, global const float *c,
+ * h2 [frames][blocks][W2 panels]; with keep = 0 h2 is not kept and has room for G blocks.  c: [all frames][W1].  scratch: [G][SCRATCH].  Global size: G groups. */
+GROUP_KERNEL mlp_forward(global float *out, global float *h2, global const float *p, global const float *c,
                          global const float *params, global float *scratch, int blocks, int frames,
                          int first_frame, int keep)
 {
@@ -208,36 +199,27 @@ GROUP_KERNEL mlp_forward(global float *out, global float *h, global const float 
     global float *h1 = scratch + group * SCRATCH;
     for (int item = group; item < blocks * frames; item += get_num_groups(0)) {
         size_t frame = item / blocks, block = item % blocks;
-        global float *mine = h + (keep ? frame * blocks + block : group) * KEPT, *last = h1;
+        global float *mine = h2 + (keep ? frame * blocks + block : group) * BLOCK(W2);
         first_layer(h1, p + block * BLOCK(W1), c + (first_frame + frame) * W1);
-        for (int l = 2; l <= LAYERS; l++) {
-            SYNC
-            hidden_layer(mine + AT_KEPT(l), last, params + AT_W(l), params + AT_B(l), INPUTS(l));
-            last = mine + AT_KEPT(l);
-        }
+        SYNC
+        second_layer(mine, h1, params, params + AT_B2);
         SYNC
         size_t first_row = ((first_frame + frame) * blocks + block) * ROWS;
-        head_layer(out + first_row * NPG_MLP_OUT, last, params + AT_HEAD, params + AT_HEAD_BIAS);
+        head_layer(out + first_row * NPG_MLP_OUT, mine, params + AT_HEAD, params + AT_HEAD_BIAS);
     }
 }
 
-/* A gradient before a rectifier: the first layer's is added up over frames, those of others stand alone. */
-inline void put_gradient(REAL d, int j, global float *to, int adds)
+/* d2 (one block) = (dout head^T) f'(h2), and its column sums into db. */
+inline void head_back(global float *d2, global float *db, global const float *dout, global const float *h2,
+                      global const float *transposed)
 {
-    STORE(adds ? d + LOAD(j, to) : d, j, to);
-}
-
-/* d (one block) = (dout head^T) f'(h), h of the last hidden layer, and its column sums into db. */
-inline void head_back(global float *d, global float *db, global const float *dout, global const float *h,
-                      global const float *transposed, int adds)
-{
-    FOR_COLUMNS(col, WLAST)
+    FOR_COLUMNS(col, W2)
     {
         REAL w[NPG_MLP_USED][NV], sum[NV];
         UNROLL for (int j = 0; j < NV; j++) sum[j] = LOAD(j, db + col);
         UNROLL for (int o = 0; o < NPG_MLP_USED; o++)
         {
-            UNROLL for (int j = 0; j < NV; j++) w[o][j] = LOAD(j, transposed + o * WLAST + col);
+            UNROLL for (int j = 0; j < NV; j++) w[o][j] = LOAD(j, transposed + o * W2 + col);
         }
         for (int r = 0; r < ROWS; r++) {
             size_t at = COLUMN(ROWS, col) + NPG_PANEL * r;
@@ -245,8 +227,8 @@ inline void head_back(global float *d, global float *db, global const float *dou
             {
                 REAL a = 0.0f;
                 UNROLL for (int o = 0; o < NPG_MLP_USED; o++) a = fma((REAL)(dout[NPG_MLP_OUT * r + o]), w[o][j], a);
-                a = leaky_back(a, LOAD(j, h + at));
-                put_gradient(a, j, d + at, adds);
+                a = leaky_back(a, LOAD(j, h2 + at));
+                STORE(a, j, d2 + at);
                 sum[j] += a;
             }
         }
@@ -254,8 +236,8 @@ inline void head_back(global float *d, global float *db, global const float *dou
     }
 }
 
-/* dhead (rows of 16) += h^T dout, dbias (16) += column sums of dout. */
-inline void head_grad(global float *dhead, global float *dbias, global const float *h,
+/* dhead (rows of 16) += h2^T dout, dbias (16) += column sums of dout. */
+inline void head_grad(global float *dhead, global float *dbias, global const float *h2,
                       global const float *dout)
 {
     if (ITEM == 0) {
@@ -263,9 +245,9 @@ inline void head_grad(global float *dhead, global float *dbias, global const flo
         for (int r = 0; r < ROWS; r++) sum += vload8(r, dout);
         vstore8(sum, 0, dbias);
     }
-    for (int k0 = ITEM * VW; k0 < WLAST; k0 += LOCAL * VW) {
+    for (int k0 = ITEM * VW; k0 < W2; k0 += LOCAL * VW) {
         REAL g[NPG_MLP_USED];
-        global const float *a = h + COLUMN(ROWS, k0);
+        global const float *a = h2 + COLUMN(ROWS, k0);
         UNROLL for (int o = 0; o < NPG_MLP_USED; o++) g[o] = 0.0f;
         for (int r = 0; r < ROWS; r++) {
             REAL v = LOAD(0, a + NPG_PANEL * r);
@@ -278,12 +260,11 @@ inline void head_grad(global float *dhead, global float *dbias, global const flo
     }
 }
 
-/* From layer l to the one before it, of C units: to (one block) = (d w^T) f'(h), h of that one, and its
- * column sums into db. */
-inline void hidden_back(global float *to, global float *db, global const float *d, global const float *h,
-                        global const float *transposed, int C, int adds)
+/* (d2 w^T) f'(h1), added to dp1 (one block) over frames, and its column sums into db. */
+inline void second_back(global float *dp1, global float *db, global const float *d2, global const float *h1,
+                        global const float *transposed)
 {
-    FOR_COLUMNS(col, C)
+    FOR_COLUMNS(col, W1)
     {
         REAL sum[NV];
         UNROLL for (int j = 0; j < NV; j++) sum[j] = LOAD(j, db + col);
@@ -294,14 +275,14 @@ inline void hidden_back(global float *to, global float *db, global const float *
             {
                 UNROLL for (int j = 0; j < NV; j++) acc[i][j] = (REAL)(0.0f);
             }
-            TILE_ADD(acc, d, transposed + COLUMN(W2, col), W2, r0)
+            TILE_ADD(acc, d2, transposed + COLUMN(W2, col), W2, r0)
             UNROLL for (int i = 0; i < MR; i++)
             {
                 UNROLL for (int j = 0; j < NV; j++)
                 {
-                    REAL e = leaky_back(acc[i][j], LOAD(j, h + at + NPG_PANEL * i));
+                    REAL e = leaky_back(acc[i][j], LOAD(j, h1 + at + NPG_PANEL * i));
                     sum[j] += e;
-                    put_gradient(e, j, to + at + NPG_PANEL * i, adds);
+                    STORE(e + LOAD(j, dp1 + at + NPG_PANEL * i), j, dp1 + at + NPG_PANEL * i);
                 }
             }
         }
@@ -309,46 +290,33 @@ inline void hidden_back(global float *to, global float *db, global const float *
     }
 }
 
-/* Gradients for the frames first_frame ... from dout [all frames][blocks * ROWS][8] and the kept h.
+/* Gradients for the frames first_frame ... from dout [all frames][blocks * ROWS][8] and the kept h2.
  * sums: [G][AT_END], added to.  dc: [G][all frames][W1], added to at rows first_frame...  dp: [blocks][W1 panels],
  * added to.  transposed: from mlp_transpose.
  * Group g takes the blocks g, g + G, ... with all frames of each.  Global size: G groups. */
 GROUP_KERNEL mlp_backward(global float *dp, global float *sums, global float *dc, global const float *dout,
-                          global const float *h, global const float *p, global const float *c,
+                          global const float *h2, global const float *p, global const float *c,
                           global const float *transposed, global float *scratch, int blocks, int frames,
                           int first_frame, int all_frames)
 {
     size_t group = get_group_id(0);
-    global float *h1 = scratch + group * SCRATCH;
+    global float *h1 = scratch + group * SCRATCH, *d2 = h1 + BLOCK(WMAX);
     global float *sum = sums + group * AT_END;
     for (int block = group; block < blocks; block += get_num_groups(0))
         for (int frame = 0; frame < frames; frame++) {
             size_t at = first_frame + frame;
             global const float *dy = dout + (at * blocks + block) * ROWS * NPG_MLP_OUT;
-            global const float *mine = h + ((size_t)frame * blocks + block) * KEPT;
-            global const float *last = LAYERS > 1 ? mine + AT_KEPT(LAYERS) : h1;
+            global const float *mine = h2 + ((size_t)frame * blocks + block) * BLOCK(W2);
             global float *dp1 = dp + block * BLOCK(W1), *dc1 = dc + (group * all_frames + at) * W1;
-            global float *d = h1 + BLOCK(WMAX), *spare = d + BLOCK(WMAX); /* by turns, from three layers on */
             first_layer(h1, p + block * BLOCK(W1), c + at * W1);
-            if (LAYERS == 1) {
-                SYNC
+            head_back(d2, sum + AT_B2, dy, mine, transposed + AT_HEAD_BACK);
+            head_grad(sum + AT_HEAD, sum + AT_HEAD_BIAS, mine, dy);
+            SYNC
+            FOR_COLUMNS(col, W2)
+            {
+                TILE_GRAD(sum + COLUMN(W1, col), h1, d2 + COLUMN(ROWS, col), W1)
             }
-            head_back(LAYERS > 1 ? d : dp1, LAYERS > 1 ? sum + AT_B(LAYERS) : dc1, dy, last,
-                      transposed + AT_HEAD_BACK, LAYERS == 1);
-            head_grad(sum + AT_HEAD, sum + AT_HEAD_BIAS, last, dy);
-            for (int l = LAYERS; l > 1; l--) {
-                global const float *in = l > 2 ? mine + AT_KEPT(l - 1) : h1;
-                SYNC
-                FOR_COLUMNS(col, W2)
-                {
-                    TILE_GRAD(sum + AT_W(l) + COLUMN(INPUTS(l), col), in, d + COLUMN(ROWS, col), INPUTS(l))
-                }
-                hidden_back(l > 2 ? spare : dp1, l > 2 ? sum + AT_B(l - 1) : dc1, d, in, transposed + AT_W(l),
-                            INPUTS(l), l == 2);
-                global float *done = d;
-                d = spare;
-                spare = done;
-            }
+            second_back(dp1, dc1, d2, h1, transposed);
             SYNC
         }
 }
@@ -389,19 +357,17 @@ inline void transpose_panel(global float *to, global const float *from, int K, i
             to[kp * C + (cp + c) * NPG_PANEL + k] = from[cp * K + (kp + k) * NPG_PANEL + c];
 }
 
-/* The transposes that the backward pass multiplies with, in the order W_2^T (packed W2 x W1), W_3^T .. W_L^T
- * (packed W2 x W2), w1z^T (packed W1 x CZ), head^T (7 x units of the last layer).
+/* The transposes that the backward pass multiplies with, in the order W_2^T (packed W2 x W1), w1z^T (packed
+ * W1 x CZ), head^T (7 x W2).
  * Global size: (WMAX / 32, WMAX / 32). */
 kernel void mlp_transpose(global float *transposed, global const float *params)
 {
     size_t kp = get_global_id(0) * NPG_PANEL, cp = get_global_id(1) * NPG_PANEL;
-    for (int l = 2; l <= LAYERS; l++)
-        if (kp < INPUTS(l) && cp < W2)
-            transpose_panel(transposed + AT_W(l), params + AT_W(l), INPUTS(l), W2, kp, cp);
+    if (kp < W1 && cp < W2) transpose_panel(transposed, params, W1, W2, kp, cp);
     if (kp < CZ && cp < W1) transpose_panel(transposed + AT_W1Z_BACK, params + AT_W1Z, CZ, W1, kp, cp);
-    if (kp != 0 || cp >= WLAST) return;
+    if (kp != 0 || cp >= W2) return;
     global float *head = transposed + AT_HEAD_BACK;
     for (size_t k = cp; k < cp + NPG_PANEL; k++)
         for (int o = 0; o < NPG_MLP_USED; o++)
-            head[o * WLAST + k] = params[AT_HEAD + k * NPG_MLP_HEAD_ROW + o];
+            head[o * W2 + k] = params[AT_HEAD + k * NPG_MLP_HEAD_ROW + o];
 }

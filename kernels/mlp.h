@@ -1,39 +1,28 @@
 /* mlp: the decoder, forward and backward, for many vertices in many frames; kernels in mlp.cl and time.cl,
  * twins in mlp_ref.c.
  *
- * Parameters, gradient and Adam's moments are one list of floats, in the order (L: hidden layers)
- *     W_2 (packed W1 x W2) | W_3 .. W_L (packed W2 x W2 each) | head (W2 x 16) | b_2 .. b_L (W2 each) |
- *     bias of the head (16) | W1z (packed 32 x W1) | W1t (M x W1) | b1 (W1)
- * "packed K x C" is [C / 32][K][32].  With L = 1 there is neither W_2 nor b_2, and the head is W1 x 16. */
+ * Parameters, gradient and Adam's moments are one list of floats, in the order
+ *     W_2 (packed W1 x W2) | head (W2 x 16) | b_2 (W2) | bias of the head (16) | W1z (packed 32 x W1) |
+ *     W1t (M x W1) | b1 (W1)
+ * "packed K x C" is [C / 32][K][32]. */
 #ifndef NPG_MLP_H
 #define NPG_MLP_H
 
 #include "kernels/layout.h"
 #include "kernels/runtime/device.h"
 
-#define NPG_MLP_LAYERS_MAX 4 /* hidden layers, at most */
+#define NPG_MLP_SLOPE 0.01 /* of the leaky rectifier below 0 */
 
 typedef struct npg_mlp_shape {
-    size_t w1, w2;    /* units of the first hidden layer and of each of the others, multiples of 32 */
-    size_t layers;    /* L, hidden layers, 1 .. NPG_MLP_LAYERS_MAX                                  */
-    size_t code_size; /* M, length of the time code                                                 */
-    float slope;      /* of the leaky rectifier                                                     */
+    size_t w1, w2;    /* units of the two hidden layers, multiples of 32 */
+    size_t code_size; /* M, length of the time code                      */
 } npg_mlp_shape;
 
 size_t npg_mlp_param_count(const npg_mlp_shape *shape);
 
-/* Units of a hidden layer (layer: 1 .. L), and of the last. */
-size_t npg_mlp_units(const npg_mlp_shape *shape, size_t layer);
-size_t npg_mlp_last_units(const npg_mlp_shape *shape);
-
-/* Multiply-adds of one vertex in one frame behind the first layer, forward: W1 W2 + (L - 2) W2^2 + 7 W2; with
- * L = 1 7 W1. */
-double npg_mlp_multiply_adds(const npg_mlp_shape *shape);
-
-/* Where parts of the list begin; weights and bias are those of layer 2 .. L. */
-size_t npg_mlp_at_weights(const npg_mlp_shape *shape, size_t layer);
+/* Where parts of the list begin, but for W_2, which is first. */
 size_t npg_mlp_at_head(const npg_mlp_shape *shape);
-size_t npg_mlp_at_bias(const npg_mlp_shape *shape, size_t layer);
+size_t npg_mlp_at_b2(const npg_mlp_shape *shape);
 size_t npg_mlp_at_head_bias(const npg_mlp_shape *shape);
 size_t npg_mlp_at_w1z(const npg_mlp_shape *shape);
 size_t npg_mlp_at_w1t(const npg_mlp_shape *shape);
@@ -52,19 +41,18 @@ typedef struct npg_mlp {
     npg_buffer out, dout;    /* [frames][rows][8]                                */
     npg_buffer p, dp;        /* [blocks][W1 panels]: z W1z and its gradient      */
     npg_buffer c, dc;        /* [frames][W1], [groups][frames][W1]               */
-    npg_buffer h;            /* [batch][blocks][L - 1][W2 panels]: layers 2 .. L */
+    npg_buffer h2;           /* [batch][blocks][W2 panels]                       */
     npg_buffer sums, transposed, scratch;
 } npg_mlp;
 
 /* The rows that so many vertices take: whole blocks of the device's tuning. */
 size_t npg_mlp_rows(const npg_device *device, size_t vertices);
 
-/* Floats of a group's own memory for `block` vertices: h of the first layer, and gradients of two others. */
+/* Floats of a group's own memory for `block` vertices: h of the first layer, and the gradient of the second. */
 size_t npg_mlp_scratch(const npg_mlp_shape *shape, size_t block);
 
-/* rows: from npg_mlp_rows; frames: T; batch: frames whose hidden layers but the first are kept between
- * forward and backward (0: forward only).  Device memory in bytes: about
- * 4 (rows (2 W1 + batch (L - 1) W2) + groups (W1 W2 + (L - 2) W2^2)). */
+/* rows: from npg_mlp_rows; frames: T; batch: frames whose second hidden layer is kept between forward and
+ * backward (0: forward only).  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
 npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
                         size_t frames, size_t batch);
 void npg_mlp_close(npg_mlp *mlp);

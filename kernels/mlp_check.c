@@ -18,10 +18,10 @@ typedef struct mlp_data {
 
 /* Some sizes have one block, some several batches of frames, some uneven widths; all have frames whose sums
  * come together. */
-static npg_status open_mlp_data(mlp_data *d, size_t block, size_t layers, int size, uint64_t seed)
+static npg_status open_mlp_data(mlp_data *d, size_t block, int size, uint64_t seed)
 {
     npg_random random = npg_random_stream(seed, 12, (uint64_t)size);
-    d->shape = (npg_mlp_shape){32 * (size_t)size, size > 1 ? 64 : 32, layers, size == 2 ? 2 : 8, 0.01f};
+    d->shape = (npg_mlp_shape){32 * (size_t)size, size > 1 ? 64 : 32, size == 2 ? 2 : 8};
     d->rows = block * (size > 2 ? 3 : 1);
     d->frames = size == 1 ? 2 : 5;
     size_t n = d->param_count = npg_mlp_param_count(&d->shape), samples = d->rows * d->frames;
@@ -29,7 +29,7 @@ static npg_status open_mlp_data(mlp_data *d, size_t block, size_t layers, int si
     NPG_TRY(npg_check_values(&d->z, &d->z_wide, d->rows * CHANNELS, 1, &random));
     NPG_TRY(npg_check_values(&d->code, &d->code_wide, d->frames * d->shape.code_size, 1, &random));
     NPG_TRY(npg_check_values(&d->dout, &d->dout_wide, samples * NPG_MLP_OUT, 1, &random));
-    for (size_t k = 0; k < npg_mlp_last_units(&d->shape); k++)
+    for (size_t k = 0; k < d->shape.w2; k++)
         for (size_t o = NPG_MLP_USED; o < NPG_MLP_HEAD_ROW; o++)
             d->params[npg_mlp_at_head(&d->shape) + k * NPG_MLP_HEAD_ROW + o] = 0;
     for (size_t o = NPG_MLP_USED; o < NPG_MLP_HEAD_ROW; o++)
@@ -88,71 +88,18 @@ static npg_status compare_mlp(npg_device *device, mlp_data *d, npg_mlp *mlp, npg
     return npg_check_buffer(error, &mlp->dz, d->dz, d->rows * CHANNELS);
 }
 
-static npg_status check_layers(npg_device *device, size_t layers, int size, uint64_t seed, double *error)
+npg_status npg_check_mlp(npg_device *device, int size, uint64_t seed, double *error)
 {
     mlp_data d = {0};
     npg_mlp mlp = {0};
     npg_buffer dcode = {0};
     *error = 0;
-    npg_status status = open_mlp_data(&d, npg_mlp_rows(device, 1), layers, size, seed);
+    npg_status status = open_mlp_data(&d, npg_mlp_rows(device, 1), size, seed);
     if (!status) status = compare_mlp(device, &d, &mlp, &dcode, error);
     npg_mlp_close(&mlp);
     npg_buffer_close(&dcode);
     close_mlp_data(&d);
     return status;
-}
-
-npg_status npg_check_mlp(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_layers(device, 2, size, seed, error);
-}
-npg_status npg_check_mlp_single(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_layers(device, 1, size, seed, error);
-}
-/* Three hidden layers, and four in every second size: there gradients change their places twice. */
-npg_status npg_check_mlp_deep(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_layers(device, size % 2 ? 3 : 4, size, seed, error);
-}
-
-/* One sample: the function whose gradient the twin gives is the sum of dout out. */
-static double mlp_value(void *user)
-{
-    mlp_data *d = user;
-    double sum = 0;
-    npg_mlp_forward_ref(d->out, d->z_wide, d->code_wide, d->params_wide, &d->shape);
-    for (size_t o = 0; o < 7; o++) sum += d->dout_wide[o] * d->out[o];
-    return sum;
-}
-
-static npg_status slope_of_layers(size_t layers, uint64_t seed, double *error)
-{
-    mlp_data d = {0};
-    *error = 0;
-    npg_status status = open_mlp_data(&d, 16, layers, 2, seed);
-    if (!status) {
-        npg_mlp_backward_ref(d.grad, d.dz, d.dcode, d.dout_wide, d.z_wide, d.code_wide, d.params_wide,
-                             &d.shape);
-        npg_check_slope(error, d.params_wide, d.grad, d.param_count, 13, 1e-6, mlp_value, &d);
-        npg_check_slope(error, d.z_wide, d.dz, CHANNELS, 1, 1e-6, mlp_value, &d);
-        npg_check_slope(error, d.code_wide, d.dcode, d.shape.code_size, 1, 1e-6, mlp_value, &d);
-    }
-    close_mlp_data(&d);
-    return status;
-}
-
-npg_status npg_slope_mlp(uint64_t seed, double *error)
-{
-    return slope_of_layers(2, seed, error);
-}
-npg_status npg_slope_mlp_single(uint64_t seed, double *error)
-{
-    return slope_of_layers(1, seed, error);
-}
-npg_status npg_slope_mlp_deep(uint64_t seed, double *error)
-{
-    return slope_of_layers(4, seed, error);
 }
 
 /* ---- adam ---- */

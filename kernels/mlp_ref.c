@@ -4,17 +4,19 @@
 #define CHANNELS  NPG_LATENT_CHANNELS
 #define WIDTH_MAX 4096 /* of a hidden layer: the most that options width-1 and width-2 take */
 
-/* What the hidden layers give, the first at [0]. */
-typedef double layers[NPG_MLP_LAYERS_MAX][WIDTH_MAX];
+/* What the two hidden layers give. */
+typedef struct layers {
+    double h1[WIDTH_MAX], h2[WIDTH_MAX];
+} layers;
 
-static double leaky(double x, double slope)
+static double leaky(double x)
 {
-    return x > 0 ? x : slope * x;
+    return x > 0 ? x : NPG_MLP_SLOPE * x;
 }
 
-static double leaky_back(double d, double y, double slope)
+static double leaky_back(double d, double y)
 {
-    return y > 0 ? d : slope * d;
+    return y > 0 ? d : NPG_MLP_SLOPE * d;
 }
 
 static void first_layer(double *h, const double *z, const double *code, const double *params,
@@ -26,68 +28,63 @@ static void first_layer(double *h, const double *z, const double *code, const do
         double sum = b1[n];
         for (size_t c = 0; c < CHANNELS; c++) sum += z[c] * w1z[npg_mlp_packed(CHANNELS, c, n)];
         for (size_t j = 0; j < s->code_size; j++) sum += code[j] * w1t[j * s->w1 + n];
-        h[n] = leaky(sum, (double)s->slope);
+        h[n] = leaky(sum);
     }
 }
 
-static void hidden(layers h, const double *z, const double *code, const double *params,
+static void hidden(layers *to, const double *z, const double *code, const double *params,
                    const npg_mlp_shape *s)
 {
-    first_layer(h[0], z, code, params, s);
-    for (size_t layer = 2; layer <= s->layers; layer++) {
-        size_t inputs = npg_mlp_units(s, layer - 1);
-        const double *w = params + npg_mlp_at_weights(s, layer), *b = params + npg_mlp_at_bias(s, layer);
-        for (size_t n = 0; n < s->w2; n++) {
-            double sum = b[n];
-            for (size_t k = 0; k < inputs; k++) sum += h[layer - 2][k] * w[npg_mlp_packed(inputs, k, n)];
-            h[layer - 1][n] = leaky(sum, (double)s->slope);
-        }
+    const double *b2 = params + npg_mlp_at_b2(s);
+    first_layer(to->h1, z, code, params, s);
+    for (size_t n = 0; n < s->w2; n++) {
+        double sum = b2[n];
+        for (size_t k = 0; k < s->w1; k++) sum += to->h1[k] * params[npg_mlp_packed(s->w1, k, n)];
+        to->h2[n] = leaky(sum);
     }
 }
 
 void npg_mlp_forward_ref(double *out, const double *z, const double *code, const double *params,
                          const npg_mlp_shape *s)
 {
-    layers h;
+    layers in;
     const double *head = params + npg_mlp_at_head(s), *bias = params + npg_mlp_at_head_bias(s);
-    hidden(h, z, code, params, s);
+    hidden(&in, z, code, params, s);
     for (size_t o = 0; o < NPG_MLP_USED; o++) {
         out[o] = bias[o];
-        for (size_t k = 0; k < npg_mlp_last_units(s); k++)
-            out[o] += h[s->layers - 1][k] * head[k * NPG_MLP_HEAD_ROW + o];
+        for (size_t k = 0; k < s->w2; k++) out[o] += in.h2[k] * head[k * NPG_MLP_HEAD_ROW + o];
     }
 }
 
-/* d: gradient before the rectifier of the last hidden layer, h; grad of the head. */
-static void head_back(double *d, double *grad, const double *dout, const double *h, const double *params,
+/* d2: gradient before the rectifier of the second layer; grad of the head. */
+static void head_back(double *d2, double *grad, const double *dout, const double *h2, const double *params,
                       const npg_mlp_shape *s)
 {
     size_t at = npg_mlp_at_head(s);
-    for (size_t k = 0; k < npg_mlp_last_units(s); k++) {
+    for (size_t k = 0; k < s->w2; k++) {
         double sum = 0;
         for (size_t o = 0; o < NPG_MLP_USED; o++) {
             sum += dout[o] * params[at + k * NPG_MLP_HEAD_ROW + o];
-            grad[at + k * NPG_MLP_HEAD_ROW + o] += dout[o] * h[k];
+            grad[at + k * NPG_MLP_HEAD_ROW + o] += dout[o] * h2[k];
         }
-        d[k] = leaky_back(sum, h[k], (double)s->slope);
+        d2[k] = leaky_back(sum, h2[k]);
     }
     for (size_t o = 0; o < NPG_MLP_USED; o++) grad[npg_mlp_at_head_bias(s) + o] += dout[o];
 }
 
-/* From d before the rectifier of a layer to before, that of the layer under it, h; grad of the layer. */
-static void hidden_back(double *before, double *grad, const double *d, const double *h, const double *params,
-                        size_t layer, const npg_mlp_shape *s)
+/* d1: gradient before the rectifier of the first layer; grad of the second. */
+static void second_back(double *d1, double *grad, const double *d2, const double *h1, const double *params,
+                        const npg_mlp_shape *s)
 {
-    size_t at = npg_mlp_at_weights(s, layer), inputs = npg_mlp_units(s, layer - 1);
-    for (size_t k = 0; k < inputs; k++) {
+    for (size_t k = 0; k < s->w1; k++) {
         double sum = 0;
         for (size_t n = 0; n < s->w2; n++) {
-            sum += d[n] * params[at + npg_mlp_packed(inputs, k, n)];
-            grad[at + npg_mlp_packed(inputs, k, n)] += h[k] * d[n];
+            sum += d2[n] * params[npg_mlp_packed(s->w1, k, n)];
+            grad[npg_mlp_packed(s->w1, k, n)] += h1[k] * d2[n];
         }
-        before[k] = leaky_back(sum, h[k], (double)s->slope);
+        d1[k] = leaky_back(sum, h1[k]);
     }
-    for (size_t n = 0; n < s->w2; n++) grad[npg_mlp_at_bias(s, layer) + n] += d[n];
+    for (size_t n = 0; n < s->w2; n++) grad[npg_mlp_at_b2(s) + n] += d2[n];
 }
 
 static void first_back(double *grad, double *dz, double *dcode, const double *d1, const double *z,
@@ -111,10 +108,10 @@ static void first_back(double *grad, double *dz, double *dcode, const double *d1
 void npg_mlp_backward_ref(double *grad, double *dz, double *dcode, const double *dout, const double *z,
                           const double *code, const double *params, const npg_mlp_shape *s)
 {
-    layers h, d;
-    hidden(h, z, code, params, s);
-    head_back(d[s->layers - 1], grad, dout, h[s->layers - 1], params, s);
-    for (size_t layer = s->layers; layer > 1; layer--)
-        hidden_back(d[layer - 2], grad, d[layer - 1], h[layer - 2], params, layer, s);
-    first_back(grad, dz, dcode, d[0], z, code, params, s);
+    layers in;
+    double d1[WIDTH_MAX], d2[WIDTH_MAX];
+    hidden(&in, z, code, params, s);
+    head_back(d2, grad, dout, in.h2, params, s);
+    second_back(d1, grad, d2, in.h1, params, s);
+    first_back(grad, dz, dcode, d1, z, code, params, s);
 }

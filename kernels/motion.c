@@ -79,11 +79,9 @@ npg_status npg_morton_order(uint32_t *order, const float *points, size_t count)
 
 /* ---- opening ---- */
 
-static npg_status open_programs(npg_motion *m, npg_device *device, npg_rotation rotation)
+static npg_status open_programs(npg_motion *m, npg_device *device)
 {
-    char constants[32];
-    snprintf(constants, sizeof constants, "-DROTATION=%d", (int)rotation);
-    NPG_TRY(npg_program_open(&m->transform, device, "transform", constants));
+    NPG_TRY(npg_program_open(&m->transform, device, "transform", ""));
     NPG_TRY(npg_program_open(&m->nearest, device, "nearest", ""));
     NPG_TRY(npg_program_open(&m->chamfer, device, "chamfer", ""));
     NPG_TRY(npg_program_open(&m->pull, device, "pull", ""));
@@ -232,9 +230,9 @@ static npg_status refit(npg_motion *m, npg_buffer *boxes, npg_buffer *points, np
                              NPG_BUF(slots), NPG_INT(first), NPG_INT(count));
 }
 
-npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotation, const float *vertices,
-                           size_t real, size_t rows, const uint32_t (*edges)[2], size_t edge_count,
-                           const npg_target *targets, size_t frames)
+npg_status npg_motion_open(npg_motion *m, npg_device *device, const float *vertices, size_t real, size_t rows,
+                           const uint32_t (*edges)[2], size_t edge_count, const npg_target *targets,
+                           size_t frames)
 {
     NPG_REQUIRE(real && real <= rows && rows % NPG_LANES == 0);
     *m = (npg_motion){.rows = rows,
@@ -242,7 +240,7 @@ npg_status npg_motion_open(npg_motion *m, npg_device *device, npg_rotation rotat
                       .frames = frames,
                       .local = (size_t)npg_device_tuning(device)->frame_local,
                       .queries = (size_t)npg_device_tuning(device)->nearest_queries};
-    npg_status status = open_programs(m, device, rotation);
+    npg_status status = open_programs(m, device);
     if (!status) status = upload_rest(m, device, vertices);
     if (!status) status = upload_edges(m, device, vertices, edges, edge_count);
     if (!status && targets) status = upload_targets(m, device, targets);

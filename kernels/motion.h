@@ -6,12 +6,6 @@
 #include "kernels/layout.h"
 #include "kernels/runtime/device.h"
 
-typedef enum npg_rotation {
-    NPG_ROTATION_QUATERNION,
-    NPG_ROTATION_CAYLEY,
-    NPG_ROTATION_EXPONENTIAL
-} npg_rotation;
-
 /* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last; and back. */
 void npg_pack16(float *out, const float *points, size_t count, size_t padded);
 void npg_unpack16(float *points, const float *packed, size_t count);
@@ -60,9 +54,9 @@ typedef struct npg_target {
 
 /* vertices: real x 3 in Morton order; edges between them (E pairs).  rows: real padded, a multiple of 16.
  * targets: one per frame, or NULL when npg_motion_chamfer() will not be called. */
-npg_status npg_motion_open(npg_motion *motion, npg_device *device, npg_rotation rotation,
-                           const float *vertices, size_t real, size_t rows, const uint32_t (*edges)[2],
-                           size_t edge_count, const npg_target *targets, size_t frames);
+npg_status npg_motion_open(npg_motion *motion, npg_device *device, const float *vertices, size_t real,
+                           size_t rows, const uint32_t (*edges)[2], size_t edge_count,
+                           const npg_target *targets, size_t frames);
 void npg_motion_close(npg_motion *motion);
 
 /* Give each frame positions of its own to transform (frames x real x 3, in the order of the vertices). */
@@ -86,9 +80,8 @@ npg_status npg_motion_back(npg_motion *motion, const npg_buffer *dout, const npg
                            const float *gains, double iso_gain, size_t first, size_t count);
 
 /* Plain twins, in double; one vertex each where no more is said. */
-void npg_transform_ref(double x[3], const double out[7], const double rest[3], npg_rotation rotation);
-void npg_transform_back_ref(double dout[7], const double g[3], const double out[7], const double rest[3],
-                            npg_rotation rotation);
+void npg_transform_ref(double x[3], const double out[7], const double rest[3]);
+void npg_transform_back_ref(double dout[7], const double g[3], const double out[7], const double rest[3]);
 /* index of the nearest of count points (count x 3), lowest index on ties. */
 size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *points, size_t count);
 /* cd and its gradient g (real x 3, overwritten) of one frame with given correspondences. */

@@ -85,13 +85,12 @@ static void close_motion_data(motion_data *d)
     }
 }
 
-static npg_status open_motion(npg_motion *motion, npg_buffer *out, npg_device *device, const motion_data *d,
-                              npg_rotation rotation)
+static npg_status open_motion(npg_motion *motion, npg_buffer *out, npg_device *device, const motion_data *d)
 {
     npg_target targets[FRAMES];
     for (size_t t = 0; t < FRAMES; t++) targets[t] = (npg_target){d->points[t], d->count[t]};
-    NPG_TRY(npg_motion_open(motion, device, rotation, d->rest, d->real, d->rows,
-                            (const uint32_t(*)[2])d->edges, d->edge_count, targets, FRAMES));
+    NPG_TRY(npg_motion_open(motion, device, d->rest, d->real, d->rows, (const uint32_t(*)[2])d->edges,
+                            d->edge_count, targets, FRAMES));
     NPG_TRY(npg_buffer_from(out, device, d->out, FRAMES * d->rows * NPG_MLP_OUT * sizeof(float)));
     return npg_motion_apply(motion, out, 0, FRAMES);
 }
@@ -124,34 +123,34 @@ static npg_status compare_frames(double *error, const npg_buffer *buffer, const 
 
 /* ---- transform ---- */
 
-static void transform_twins(motion_data *d, npg_rotation rotation)
+static void transform_twins(motion_data *d)
 {
     for (size_t t = 0; t < FRAMES; t++)
         for (size_t v = 0; v < d->real; v++) {
             const double *out = d->out_wide + (t * d->rows + v) * NPG_MLP_OUT;
-            npg_transform_ref(d->x + (t * d->real + v) * 3, out, d->rest_wide + 3 * v, rotation);
+            npg_transform_ref(d->x + (t * d->real + v) * 3, out, d->rest_wide + 3 * v);
         }
 }
 
-static void transform_back_twins(motion_data *d, npg_rotation rotation)
+static void transform_back_twins(motion_data *d)
 {
     for (size_t t = 0; t < FRAMES; t++)
         for (size_t v = 0; v < d->real; v++) {
             size_t at = (t * d->rows + v) * NPG_MLP_OUT;
             npg_transform_back_ref(d->dout + at, d->g + (t * d->real + v) * 3, d->out_wide + at,
-                                   d->rest_wide + 3 * v, rotation);
+                                   d->rest_wide + 3 * v);
         }
 }
 
 /* The gradient that is passed back here is the positions themselves, brought in as the
  * data term with gain 1. */
 static npg_status compare_transform(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                                    npg_buffer *dout, npg_rotation rotation, double *error)
+                                    npg_buffer *dout, double *error)
 {
     const float gains[FRAMES] = {1, 1, 1};
     float *x;
-    NPG_TRY(open_motion(motion, out, device, d, rotation));
-    transform_twins(d, rotation);
+    NPG_TRY(open_motion(motion, out, device, d));
+    transform_twins(d);
     NPG_TRY(compare_frames(error, &motion->x, d->x, d));
     NPG_TRY(npg_alloc_array(&x, NPG_FOR_RUN, FRAMES * d->rows, 3 * sizeof(float)));
     npg_status status = npg_buffer_read(&motion->x, 0, x, FRAMES * d->rows * 3 * sizeof(float));
@@ -159,81 +158,25 @@ static npg_status compare_transform(npg_device *device, motion_data *d, npg_moti
     npg_release(&x);
     NPG_TRY(status);
     memcpy(d->g, d->x, FRAMES * d->real * 3 * sizeof *d->g);
-    transform_back_twins(d, rotation);
+    transform_back_twins(d);
     NPG_TRY(npg_buffer_open(dout, device, FRAMES * d->rows * NPG_MLP_OUT * sizeof(float)));
     NPG_TRY(npg_motion_back(motion, dout, out, gains, 0, 0, FRAMES));
     return npg_check_buffer(error, dout, d->dout, FRAMES * d->rows * NPG_MLP_OUT);
 }
 
-static npg_status check_transform(npg_device *device, int size, uint64_t seed, npg_rotation rotation,
-                                  double *error)
+npg_status npg_check_transform(npg_device *device, int size, uint64_t seed, double *error)
 {
     motion_data d = {0};
     npg_motion motion = {0};
     npg_buffer out = {0}, dout = {0};
     *error = 0;
     npg_status status = open_motion_data(&d, size, seed);
-    if (!status) status = compare_transform(device, &d, &motion, &out, &dout, rotation, error);
+    if (!status) status = compare_transform(device, &d, &motion, &out, &dout, error);
     npg_motion_close(&motion);
     npg_buffer_close(&out);
     npg_buffer_close(&dout);
     close_motion_data(&d);
     return status;
-}
-
-npg_status npg_check_transform(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_transform(device, size, seed, NPG_ROTATION_QUATERNION, error);
-}
-npg_status npg_check_cayley(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_transform(device, size, seed, NPG_ROTATION_CAYLEY, error);
-}
-npg_status npg_check_exponential(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_transform(device, size, seed, NPG_ROTATION_EXPONENTIAL, error);
-}
-
-typedef struct turn {
-    double out[7], rest[3], g[3];
-    npg_rotation rotation;
-} turn;
-
-static double turn_value(void *user)
-{
-    turn *t = user;
-    double x[3];
-    npg_transform_ref(x, t->out, t->rest, t->rotation);
-    return t->g[0] * x[0] + t->g[1] * x[1] + t->g[2] * x[2];
-}
-
-static npg_status slope_transform(uint64_t seed, npg_rotation rotation, double *error)
-{
-    npg_random random = npg_random_stream(seed, 15, (uint64_t)rotation);
-    *error = 0;
-    for (int i = 0; i < 50; i++) {
-        turn t = {.rotation = rotation};
-        double slope[7], size = i < 10 ? 1e-3 : 1.5;
-        for (int k = 0; k < 7; k++) t.out[k] = size * (2 * npg_random_real(&random) - 1);
-        for (int k = 0; k < 3; k++) t.rest[k] = 2 * npg_random_real(&random) - 1;
-        for (int k = 0; k < 3; k++) t.g[k] = 2 * npg_random_real(&random) - 1;
-        npg_transform_back_ref(slope, t.g, t.out, t.rest, rotation);
-        npg_check_slope(error, t.out, slope, 7, 1, 1e-6, turn_value, &t);
-    }
-    return NPG_OK;
-}
-
-npg_status npg_slope_transform(uint64_t seed, double *error)
-{
-    return slope_transform(seed, NPG_ROTATION_QUATERNION, error);
-}
-npg_status npg_slope_cayley(uint64_t seed, double *error)
-{
-    return slope_transform(seed, NPG_ROTATION_CAYLEY, error);
-}
-npg_status npg_slope_exponential(uint64_t seed, double *error)
-{
-    return slope_transform(seed, NPG_ROTATION_EXPONENTIAL, error);
 }
 
 /* ---- nearest and chamfer ---- */
@@ -292,7 +235,7 @@ static npg_status take_positions(npg_motion *motion, motion_data *d)
 static npg_status run_chamfer(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
                               double alpha)
 {
-    NPG_TRY(open_motion(motion, out, device, d, NPG_ROTATION_QUATERNION));
+    NPG_TRY(open_motion(motion, out, device, d));
     NPG_TRY(take_positions(motion, d));
     return npg_motion_chamfer(motion, alpha, 0, FRAMES);
 }
@@ -348,34 +291,6 @@ npg_status npg_check_chamfer(npg_device *device, int size, uint64_t seed, double
     return check_motion(device, size, seed, compare_chamfer, error);
 }
 
-/* Without the robust weight the value and the gradient belong together (the weight is held
- * constant in the latter). */
-static double chamfer_value(void *user)
-{
-    motion_data *d = user;
-    return npg_chamfer_pairs_ref(d->g, d->x, d->real, d->points_wide[2], d->count[2], d->to_points,
-                                 d->to_verts, 0);
-}
-
-npg_status npg_slope_chamfer(uint64_t seed, double *error)
-{
-    motion_data d = {0};
-    double *slope = NULL;
-    *error = 0;
-    npg_status status = open_motion_data(&d, 2, seed);
-    if (!status) status = npg_alloc_array(&slope, NPG_FOR_RUN, d.real * 3, sizeof *slope);
-    if (!status) {
-        transform_twins(&d, NPG_ROTATION_QUATERNION);
-        pair_up(&d, d.x, 2);
-        chamfer_value(&d);
-        memcpy(slope, d.g, d.real * 3 * sizeof *slope);
-        npg_check_slope(error, d.x, slope, d.real * 3, 5, 1e-5, chamfer_value, &d);
-    }
-    npg_release(&slope);
-    close_motion_data(&d);
-    return status;
-}
-
 /* ---- pull ---- */
 
 static npg_status make_pulls(npg_pull **pulls, int32_t start[FRAMES + 1], const motion_data *d, uint64_t seed)
@@ -404,7 +319,7 @@ static npg_status compare_pull(npg_device *device, motion_data *d, npg_motion *m
     npg_pull *pulls;
     int32_t start[FRAMES + 1];
     double want[FRAMES];
-    NPG_TRY(open_motion(motion, out, device, d, NPG_ROTATION_QUATERNION));
+    NPG_TRY(open_motion(motion, out, device, d));
     NPG_TRY(take_positions(motion, d));
     NPG_TRY(make_pulls(&pulls, start, d, 1));
     npg_status status = npg_motion_set_pulls(motion, pulls, start);
@@ -420,38 +335,6 @@ static npg_status compare_pull(npg_device *device, motion_data *d, npg_motion *m
 npg_status npg_check_pull(npg_device *device, int size, uint64_t seed, double *error)
 {
     return check_motion(device, size, seed, compare_pull, error);
-}
-
-typedef struct pull_data {
-    motion_data d;
-    npg_pull *pulls;
-    int32_t start[FRAMES + 1];
-} pull_data;
-
-static double pull_value(void *user)
-{
-    pull_data *p = user;
-    return npg_pull_ref(p->d.g, p->d.x, p->d.real, p->pulls, (size_t)p->start[FRAMES]);
-}
-
-npg_status npg_slope_pull(uint64_t seed, double *error)
-{
-    pull_data p = {0};
-    double *slope = NULL;
-    *error = 0;
-    npg_status status = open_motion_data(&p.d, 2, seed);
-    if (!status) status = npg_alloc_array(&slope, NPG_FOR_RUN, p.d.real * 3, sizeof *slope);
-    if (!status) status = make_pulls(&p.pulls, p.start, &p.d, seed);
-    if (!status) {
-        transform_twins(&p.d, NPG_ROTATION_QUATERNION);
-        pull_value(&p);
-        memcpy(slope, p.d.g, p.d.real * 3 * sizeof *slope);
-        npg_check_slope(error, p.d.x, slope, p.d.real * 3, 5, 1e-5, pull_value, &p);
-    }
-    npg_release(&slope);
-    npg_release(&p.pulls);
-    close_motion_data(&p.d);
-    return status;
 }
 
 /* ---- isometry ---- */
@@ -489,29 +372,4 @@ static npg_status compare_isometry(npg_device *device, motion_data *d, npg_motio
 npg_status npg_check_isometry(npg_device *device, int size, uint64_t seed, double *error)
 {
     return check_motion(device, size, seed, compare_isometry, error);
-}
-
-static double isometry_value(void *user)
-{
-    motion_data *d = user;
-    memset(d->g, 0, d->real * 3 * sizeof *d->g);
-    return npg_isometry_ref(d->g, d->x, (const uint32_t(*)[2])d->edges, d->edge_rest, d->edge_count);
-}
-
-npg_status npg_slope_isometry(uint64_t seed, double *error)
-{
-    motion_data d = {0};
-    double *slope = NULL;
-    *error = 0;
-    npg_status status = open_motion_data(&d, 2, seed);
-    if (!status) status = npg_alloc_array(&slope, NPG_FOR_RUN, d.real * 3, sizeof *slope);
-    if (!status) {
-        transform_twins(&d, NPG_ROTATION_QUATERNION);
-        isometry_value(&d);
-        memcpy(slope, d.g, d.real * 3 * sizeof *slope);
-        npg_check_slope(error, d.x, slope, d.real * 3, 5, 1e-7, isometry_value, &d);
-    }
-    npg_release(&slope);
-    close_motion_data(&d);
-    return status;
 }

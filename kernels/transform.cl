@@ -3,10 +3,7 @@
  * out: [frames][rows][8] = four rotation values, three of translation, one unused.  Positions are in blocks (layout.h),
  * frame after frame.  All kernels of the step work on the frames first .. first + count - 1.
  *
- *     ROTATION 0    offset quaternion (1 + o0, o1, o2, o3), normalised
- *     ROTATION 1    Cayley: the quaternion (1, o1, o2, o3), normalised
- *     ROTATION 2    exponential map of the rotation vector (o1, o2, o3)
- */
+ * q is the offset quaternion (1 + o0, o1, o2, o3), normalised. */
 
 #define REACH 0.1f /* farthest translation along an axis, in units (paper) */
 
@@ -16,27 +13,11 @@ typedef struct turn {
     float scale; /* 1 / norm before normalising        */
 } turn;
 
-/* half_sinc(t) = sin(t / 2) / t and its derivative over t, divided by t.  For small t the differences of nearly equal
- * numbers keep too few digits; the first terms of the series are then exact to those of a float. */
-inline float half_sinc(float t)
-{
-    return t > 1e-3f ? sin(0.5f * t) / t : 0.5f - t * t / 48.0f;
-}
-inline float half_sinc_slope(float t)
-{
-    return t > 0.05f ? (0.5f * cos(0.5f * t) - sin(0.5f * t) / t) / (t * t) : -1.0f / 24.0f + t * t / 960.0f;
-}
-
 inline turn turn_of(float8 o)
 {
-#if ROTATION == 2
-    float t = length(o.s123);
-    return (turn){cos(0.5f * t), half_sinc(t) * o.s123, 1.0f};
-#else
-    float s = ROTATION == 0 ? 1.0f + o.s0 : 1.0f;
+    float s = 1.0f + o.s0;
     float norm = max(sqrt(s * s + dot(o.s123, o.s123)), 1e-8f);
     return (turn){s / norm, o.s123 / norm, 1.0f / norm};
-#endif
 }
 
 /* x: [frames] x positions; rest: the positions to transform, `stride` floats
@@ -75,14 +56,9 @@ kernel void transform_back(global float *dout, global const float *g, global con
         float3 f = POINT(from, at);
         float ds = 2.0f * dot(f, cross(q.u, v));
         float3 du = 2.0f * (q.s * cross(v, f) + f * dot(q.u, v) + v * dot(f, q.u) - 2.0f * q.u * dot(f, v));
-#if ROTATION == 2
-        float t = length(o.s123), slope = half_sinc_slope(t);
-        d.s123 = half_sinc(t) * du + o.s123 * (slope * dot(du, o.s123) - 0.5f * half_sinc(t) * ds);
-#else
         float along = q.s * ds + dot(q.u, du);
-        if (ROTATION == 0) d.s0 = (ds - q.s * along) * q.scale;
+        d.s0 = (ds - q.s * along) * q.scale;
         d.s123 = (du - q.u * along) * q.scale;
-#endif
         float3 bound = tanh(REACH * o.s456);
         d.s456 = f * REACH * (1.0f - bound * bound);
     }

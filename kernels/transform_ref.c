@@ -5,20 +5,14 @@
 
 #define REACH 0.1 /* as in transform.cl */
 
-/* The unit quaternion (s, x, y, z) of the decoder's first four values. */
-static void quaternion_of(double q[4], const double out[7], npg_rotation rotation)
+/* The unit quaternion (s, x, y, z) of the decoder's first four values; gives the norm it had. */
+static double quaternion_of(double q[4], const double out[7])
 {
-    double t = sqrt(out[1] * out[1] + out[2] * out[2] + out[3] * out[3]);
-    if (rotation == NPG_ROTATION_EXPONENTIAL) {
-        double sinc = t > 1e-8 ? sin(t / 2) / t : 0.5;
-        q[0] = cos(t / 2);
-        for (int i = 1; i < 4; i++) q[i] = sinc * out[i];
-        return;
-    }
-    double s = rotation == NPG_ROTATION_QUATERNION ? 1 + out[0] : 1;
+    double t = sqrt(out[1] * out[1] + out[2] * out[2] + out[3] * out[3]), s = 1 + out[0];
     double norm = fmax(sqrt(s * s + t * t), 1e-8);
     q[0] = s / norm;
     for (int i = 1; i < 4; i++) q[i] = out[i] / norm;
+    return norm;
 }
 
 static void matrix_of(double m[3][3], const double q[4])
@@ -30,10 +24,10 @@ static void matrix_of(double m[3][3], const double q[4])
     for (int i = 0; i < 9; i++) m[i / 3][i % 3] = full[i / 3][i % 3];
 }
 
-void npg_transform_ref(double x[3], const double out[7], const double rest[3], npg_rotation rotation)
+void npg_transform_ref(double x[3], const double out[7], const double rest[3])
 {
     double q[4], m[3][3];
-    quaternion_of(q, out, rotation);
+    quaternion_of(q, out);
     matrix_of(m, q);
     for (int i = 0; i < 3; i++)
         x[i] = m[i][0] * rest[0] + m[i][1] * rest[1] + m[i][2] * rest[2] + tanh(REACH * out[4 + i]);
@@ -53,24 +47,12 @@ static void matrix_back(double dq[4], const double g[3], const double q[4], cons
     }
 }
 
-void npg_transform_back_ref(double dout[7], const double g[3], const double out[7], const double rest[3],
-                            npg_rotation rotation)
+void npg_transform_back_ref(double dout[7], const double g[3], const double out[7], const double rest[3])
 {
-    double q[4], dq[4], along = 0, t = sqrt(out[1] * out[1] + out[2] * out[2] + out[3] * out[3]);
-    quaternion_of(q, out, rotation);
+    double q[4], dq[4], along = 0, norm = quaternion_of(q, out);
     matrix_back(dq, g, q, rest);
-    dout[0] = 0;
-    if (rotation == NPG_ROTATION_EXPONENTIAL) {
-        double sinc = t > 1e-4 ? sin(t / 2) / t : 0.5 - t * t / 48;
-        double slope = t > 1e-3 ? (cos(t / 2) / 2 - sinc) / (t * t) : -1.0 / 24;
-        for (int i = 1; i < 4; i++) along += dq[i] * out[i];
-        for (int i = 1; i < 4; i++) dout[i] = sinc * dq[i] + out[i] * (slope * along - sinc / 2 * dq[0]);
-    } else {
-        double s = rotation == NPG_ROTATION_QUATERNION ? 1 + out[0] : 1,
-               norm = fmax(sqrt(s * s + t * t), 1e-8);
-        for (int i = 0; i < 4; i++) along += dq[i] * q[i];
-        for (int i = rotation == NPG_ROTATION_CAYLEY; i < 4; i++) dout[i] = (dq[i] - q[i] * along) / norm;
-    }
+    for (int i = 0; i < 4; i++) along += dq[i] * q[i];
+    for (int i = 0; i < 4; i++) dout[i] = (dq[i] - q[i] * along) / norm;
     for (int i = 0; i < 3; i++) {
         double bound = tanh(REACH * out[4 + i]);
         dout[4 + i] = g[i] * REACH * (1 - bound * bound);

@@ -48,7 +48,6 @@ typedef struct npg_figures {
     double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, share of all */
     double edge_change;     /* mean |length / reference length - 1| */
     double chamfer;         /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5 */
-    double truth_cd, truth_nc, truth_f, truth_corr; /* against a ground truth; NaN without */
     /* Share of the area that no points are near, of this frame or of those that the reference was made from
      * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
     double unsupported_share, unsupported_at[3];

@@ -38,12 +38,10 @@ static inline double npg_cost_pass_s(double frames, double points)
 }
 
 /* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and twice as many backward.  40
- * inputs, a first hidden layer of width_1 units, all others of width_2, and a head of 7. */
-static inline double npg_cost_decoder_flops(double width_1, double width_2, double hidden_layers)
+ * inputs, two hidden layers of width_1 and width_2 units, and a head of 7. */
+static inline double npg_cost_decoder_flops(double width_1, double width_2)
 {
-    bool is_single = hidden_layers < 2;
-    double between = is_single ? 0 : (width_1 + (hidden_layers - 2) * width_2) * width_2;
-    return 3 * 2 * (40 * width_1 + between + 7 * (is_single ? width_1 : width_2));
+    return 3 * 2 * (40 * width_1 + width_1 * width_2 + 7 * width_2);
 }
 
 /* So many of them: of `flops` a second, which the registers could make, the kernels make about half. */

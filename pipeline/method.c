@@ -23,9 +23,7 @@ typedef struct word {
 /* The published word, the option here, and its word. */
 /* clang-format off */
 static const word rotations[] = {
-    {"quaternions", "rotation", "quaternion"},
-    {"cayley",      "rotation", "cayley"},
-    {"exp",         "rotation", "exponential"},
+    {"quaternions", NULL, NULL},
     {0}};
 static const word time_codes[] = {
     {"fourier_features2", "time-code", "fourier"},
@@ -54,12 +52,12 @@ typedef struct rule {
     const char *section, *key; /* section NULL: on top */
     const word *words;         /* for keys that hold a word */
     const char *options[2];    /* for keys that hold a number */
-    double divide_by, minus;   /* 0 and 0: the number as it stands */
+    double divide_by, is;      /* 0: the number as it stands; without an option: what it is anyway */
 } rule;
 
 /* clang-format off */
 static const rule rules[] = {
-    /* section       key                   words        options                 divide_by, minus */
+    /* section       key                   words        options                 divide_by, is */
     {NULL,           "descriptor",         descriptors, {0},                    0, 0},
     {NULL,           "time_encoding",      time_codes,  {0},                    0, 0},
     {NULL,           "rotation_method",    rotations,   {0},                    0, 0},
@@ -75,7 +73,7 @@ static const rule rules[] = {
     {"grid",         "smoothness",         NULL,        {"lambda"},             0, 0},
     {"grid",         "lr",                 NULL,        {"grid-rate"},          0, 0},
     {"mlp",          "hidden",             NULL,        {"width-1", "width-2"}, 0, 0},
-    {"mlp",          "layers",             NULL,        {"hidden-layers"},      0, 1}, /* with the head */
+    {"mlp",          "layers",             NULL,        {0},                    0, 3}, /* with the head */
     {"mlp",          "point_dim",          NULL,        {"position-channels"},  0, 0},
     {"mlp",          "normal_dim",         NULL,        {"normal-channels"},    0, 0},
     {"mlp",          "time_dim",           NULL,        {"time-frequencies"},   2, 0},
@@ -104,7 +102,6 @@ static npg_status set_number(npg_options *options, const rule *r, double value)
 {
     char text[64];
     if (r->divide_by > 0) value /= r->divide_by;
-    value -= r->minus;
     snprintf(text, sizeof text, "%.15g", value);
     for (size_t i = 0; i < 2 && r->options[i]; i++) NPG_TRY(npg_options_set(options, r->options[i], text));
     return NPG_OK;
@@ -120,6 +117,7 @@ static npg_status apply(npg_options *options, const rule *r, const json_t *value
         if (!w->published) name_unmatched(u, r->section, r->key, value);
         return w->option ? npg_options_set(options, w->option, w->own) : NPG_OK;
     }
+    if (!r->options[0] && json_number_value(value) != r->is) name_unmatched(u, r->section, r->key, value);
     return set_number(options, r, json_number_value(value));
 }
 

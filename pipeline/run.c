@@ -46,9 +46,9 @@ const npg_option npg_run_options[] = {
         "Leave out frames that can't be used. Without it they stop the run; with it there is exit code 7 at "
         "the end"),
     NPG_ROW_FLAG(         "confine",    AT(confine),        "no",
-        "For folders of unknown origin: follow no link out of them. Frames outside the input's folder "
-        "(links, paths in a list) and links in the place of the output's own folders are refused; in a "
-        "batch it is on unless the batch says otherwise"),
+        "For folders of unknown origin: refuse frames outside the input's folder (links, paths in a list), "
+        "and links in the place of the output's own folders; "
+        "in a batch it is on unless the batch says otherwise"),
     NPG_PROGRAM_ROW(INT,  "ring",       AT(ring_capacity),  "2",         1, 1024, NULL,
         "Chunks that may wait between two stages"),
     NPG_PROGRAM_ROW(INT,  "chunk",      AT(chunk_frames),   "4",         1, 1024, NULL,

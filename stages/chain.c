@@ -37,7 +37,6 @@ static const npg_preset_value paper[] = {
     {"rate-end",        "1"},
     {"feature-start",   "0"},
     {"time-span",       "1"},
-    {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
     {"align",           "no"},
@@ -54,7 +53,6 @@ static const npg_preset_value paper_1000[] = {
     {"rate-end",        "1"},
     {"feature-start",   "0"},
     {"time-span",       "1"},
-    {"deliver",         "last"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {
     {"align",           "no"},         /* grids and decoder alone carry the motion */

@@ -1,4 +1,4 @@
-"""What explore.py, figures.py and paper_tables.py share: one run of the command, timed and compared with its truth.
+"""What explore.py and figures.py share: one run of the command, timed and compared with its truth.
 
 Cost is that of the whole command, files in to files out: wall and processor seconds, and the most resident memory of its
 largest process.  Needs Python 3 alone.

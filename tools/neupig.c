@@ -30,7 +30,7 @@ const npg_verb npg_verbs[] = {
      "what stands in defaults and captures are options of neupig run and keys of its method, "
      "and \"max-time\" and \"segments\"; paths are seen from the file; the command line wins.  "
      "Of a DIR every sub-folder is a capture; the folders of the paper's published code "
-     "(point_clouds/ or gt/ in each) are understood, and what lies in truth/ or gt/ is compared with.  "
+     "(point_clouds/ or gt/ in each) are understood.  "
      "Each capture gets OUT/NAME with its results, log.jsonl and verdict.json; "
      "a capture that fails does not touch the others.  "
      "What links lead out of a capture's folder is not read "

@@ -1,25 +1,9 @@
 /* neupig apply: another mesh, or points, carried through all frames of a finished run. */
-#include <dirent.h>
-#include <errno.h>
-#include <jansson.h>
 #include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <strings.h>
-#include <unistd.h>
 
 #include "export/export.h"
-#include "geometry/geometry.h"
-#include "ingest/ingest.h"
-#include "pipeline/file.h"
-#include "pipeline/file_facts.h"
-#include "pipeline/json_file.h"
-#include "pipeline/json_lines.h"
 #include "tools/cli.h"
-#include "tools/listing.h"
 #include "tools/segments/segments.h"
-
-#define PATH_SIZE 4096
 
 typedef struct settings {
     const char *mesh, *output, *prefix;
@@ -28,8 +12,6 @@ typedef struct settings {
     double far_share;
     bool overwrite;
 } settings;
-
-enum { AS_MESH, AS_PLY, AS_OBJ };
 
 #define AT(member) offsetof(settings, member)
 
@@ -54,408 +36,30 @@ const npg_option npg_apply_options[] = {
     {0}};
 /* clang-format on */
 
-typedef struct moment { /* a solved frame */
-    bool is_there;
-    int64_t index, number;
-    float *vert_pos; /* V x 3, owned */
-} moment;
-
-typedef struct applying {
-    settings s;
-    const char *job;
-    npg_origin origin;
-    npg_mesh *reference, *carried;
-    npg_attachment *attachment;
-    moment window[4];   /* in time; [1] and [2] are the two frames that are being written between */
-    float *between;     /* reference's V x 3                                                      */
-    double *pos;        /* carried's V x 3                                                        */
-    float *pos_float;   /* the same, where normals are made from it                               */
-    float *normals;     /* carried's V x 3, or NULL                                               */
-    bool turns_normals; /* they are the file's own                                                */
-    bool is_like;       /* OBJ from OBJ: the file's lines are kept                                */
-    npg_mesh_names names;
-    npg_file *done; /* collects OUT/done.json; appears last */
-    size_t frame_count, written, far_count;
-    int64_t number_max;
-    int64_t first_index, last_index;
-    double fps;
-} applying;
-
-/* ---- the job ---- */
-
-static npg_status path_of(char path[PATH_SIZE], const char *folder, const char *name)
+static npg_status apply(npg_applied *applied, const settings *s, const char *job)
 {
-    if ((size_t)snprintf(path, PATH_SIZE, "%s/%s", folder, name) < PATH_SIZE) return NPG_OK;
-    return npg_error(NPG_USAGE, "%s: the name is too long", folder);
-}
-
-static npg_status check_job(applying *a)
-{
-    char path[PATH_SIZE];
-    NPG_TRY(npg_segments_refuse(a->job, "apply", false));
-    static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
-                                         "job/job.json"};
-    bool is_job = false;
-    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
-        is_job = is_job || npg_is_in_folder(a->job, traces[i]);
-    if (!is_job) return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", a->job);
-    if (!npg_is_in_folder(a->job, "done.json") || !npg_is_in_folder(a->job, "frames.jsonl"))
-        return npg_error(NPG_BAD_INPUT, "%s: the run is not finished (there is no %s); run it again first",
-                         a->job, npg_is_in_folder(a->job, "done.json") ? "frames.jsonl" : "done.json");
-    NPG_TRY(path_of(path, a->job, "done.json"));
-    json_error_t error;
-    int fd;
-    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
-    json_t *done = json_loadfd(fd, 0, &error);
-    close(fd);
-    if (!done) return npg_error(NPG_BAD_INPUT, "%s:%d: %s", path, error.line, error.text);
-    a->fps = json_number_value(json_object_get(done, "fps"));
-    json_decref(done);
-    return NPG_OK;
-}
-
-static npg_status count_line(void *user, const json_t *frame, const char *line, size_t size)
-{
-    applying *a = user;
-    int64_t number = json_integer_value(json_object_get(frame, "number"));
-    int64_t index = json_integer_value(json_object_get(frame, "index"));
-    const char *file = json_string_value(json_object_get(frame, "file"));
-    (void)line, (void)size;
-    if (!file) return NPG_OK;
-    if (npg_path_stays(file) && !npg_is_in_folder(a->job, file))
-        return npg_error(NPG_BAD_INPUT, "%s/%s is missing; apply needs the meshes of all frames", a->job,
-                         file);
-    if (a->frame_count && index <= a->last_index)
-        return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl: frame %lld is not after the one before it", a->job,
-                         (long long)index);
-    if (!a->frame_count++) a->first_index = index;
-    a->last_index = index;
-    if (number > a->number_max) a->number_max = number;
-    return NPG_OK;
-}
-
-static npg_status each_line(const applying *a, npg_json_line_visit *visit, void *user)
-{
-    char path[PATH_SIZE];
-    NPG_TRY(path_of(path, a->job, "frames.jsonl"));
-    return npg_json_lines_each(path, (int64_t)npg_file_bytes(path), visit, user);
-}
-
-static npg_status open_job(applying *a)
-{
-    char path[PATH_SIZE];
-    NPG_TRY(check_job(a));
-    NPG_TRY(each_line(a, count_line, a));
-    if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->job);
-    NPG_TRY(path_of(path, a->job, "reference.ply"));
-    return npg_read_mesh(&a->reference, path, &a->origin);
-}
-
-/* Check that a mesh is the reference moved, and copy its positions. */
-static npg_status copy_positions(const applying *a, float *vert_pos, const npg_mesh *mesh, const char *path)
-{
-    const npg_mesh *reference = a->reference;
-    NPG_TRY(npg_mesh_require_finite(mesh, path));
-    if (mesh->vert_count != reference->vert_count || mesh->face_count != reference->face_count)
-        return npg_error(NPG_BAD_INPUT, "%s has %zu vertices and %zu faces, %s/reference.ply %zu and %zu",
-                         path, mesh->vert_count, mesh->face_count, a->job, reference->vert_count,
-                         reference->face_count);
-    if (memcmp(mesh->faces, reference->faces, reference->face_count * 3 * sizeof *reference->faces) != 0)
-        return npg_error(NPG_BAD_INPUT, "%s: its faces are not those of %s/reference.ply", path, a->job);
-    memcpy(vert_pos, mesh->vert_pos, 3 * mesh->vert_count * sizeof *vert_pos);
-    return NPG_OK;
-}
-
-static npg_status read_moment(const applying *a, moment *m, const char *file)
-{
-    char path[PATH_SIZE];
-    npg_origin origin = a->origin;
-    npg_mesh *mesh;
-    if (!npg_path_stays(file))
-        return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names %s, which is not in the job", a->job, file);
-    NPG_TRY(npg_alloc_array(&m->vert_pos, NPG_FOR_MESH, a->reference->vert_count, 3 * sizeof *m->vert_pos));
-    NPG_TRY(path_of(path, a->job, file));
-    NPG_TRY(npg_read_mesh(&mesh, path, &origin));
-    npg_status status = copy_positions(a, m->vert_pos, mesh, path);
-    npg_mesh_unref(&mesh);
-    return status;
-}
-
-/* ---- the mesh that is carried ---- */
-
-static double diagonal_of(const npg_mesh *mesh)
-{
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
-    return npg_bounds_diagonal(&bounds);
-}
-
-static npg_status attach_carried(applying *a)
-{
-    const npg_mesh *mesh = a->carried;
-    size_t worst;
-    double diagonal = diagonal_of(a->reference), worst_dist;
-    NPG_TRY(npg_error_prefix(
-        npg_attach_open(&a->attachment, a->reference, mesh->vert_pos, a->normals, mesh->vert_count), "%s",
-        a->s.mesh));
-    npg_attach_far(a->attachment, a->s.far_share * diagonal, &a->far_count, &worst, &worst_dist);
-    if (a->far_count)
+    static const char *const endings[] = {NULL, "ply", "obj"}; /* as the words of --format */
+    const npg_apply_settings all = {job,          s->mesh,      s->output,   s->prefix, endings[s->format],
+                                    s->fps_scale, s->far_share, s->overwrite};
+    NPG_TRY(npg_segments_refuse(job, "apply", false));
+    npg_status status = npg_apply(applied, &all);
+    if (applied->far_count)
         fprintf(stderr,
                 "neupig apply: %zu of %zu points of %s lie farther than %g diagonals from the reference; "
                 "the worst, point %zu, %.3g away (%.3g diagonals)\n",
-                a->far_count, mesh->vert_count, a->s.mesh, a->s.far_share, worst, worst_dist,
-                worst_dist / diagonal);
-    return NPG_OK;
-}
-
-/* Normals say which side of a thin part a point belongs to: those of the file, else those of its faces. */
-static npg_status open_carried(applying *a)
-{
-    NPG_TRY(npg_read_shape(&a->carried, a->s.mesh, &a->origin));
-    const npg_mesh *mesh = a->carried;
-    size_t v = mesh->vert_count;
-    NPG_TRY(npg_mesh_require_finite(mesh, a->s.mesh));
-    a->turns_normals = mesh->vert_normals != NULL;
-    NPG_TRY(npg_alloc_array(&a->pos, NPG_FOR_MESH, v, 3 * sizeof *a->pos));
-    NPG_TRY(npg_alloc_array(&a->between, NPG_FOR_MESH, a->reference->vert_count, 3 * sizeof *a->between));
-    if (a->turns_normals || mesh->face_count)
-        NPG_TRY(npg_alloc_array(&a->normals, NPG_FOR_MESH, v, 3 * sizeof *a->normals));
-    if (!a->turns_normals && mesh->face_count)
-        NPG_TRY(npg_alloc_array(&a->pos_float, NPG_FOR_MESH, v, 3 * sizeof *a->pos_float));
-    if (a->turns_normals)
-        memcpy(a->normals, mesh->vert_normals, v * 3 * sizeof *a->normals);
-    else if (mesh->face_count)
-        npg_mesh_vertex_normals(a->normals, mesh->vert_pos, v, mesh->faces, mesh->face_count);
-    return attach_carried(a);
-}
-
-/* ---- the output folder ---- */
-
-static bool is_own_name(const applying *a, const char *name)
-{
-    size_t length = strlen(a->names.prefix);
-    if (strncmp(name, a->names.prefix, length) != 0 || name[length] != '_') return false;
-    const char *digits = name + length + 1;
-    size_t count = strspn(digits, "0123456789");
-    return count && (!strcmp(digits + count, ".ply") || !strcmp(digits + count, ".obj"));
-}
-
-/* Remove the mesh files of this prefix, or without overwrite refuse the first. */
-static npg_status clear_files(const applying *a)
-{
-    char path[PATH_SIZE];
-    npg_status status = NPG_OK;
-    DIR *folder = opendir(a->s.output);
-    if (!folder) return npg_error_errno(NPG_DISK, "can't list %s", a->s.output);
-    for (struct dirent *entry; !status && (entry = readdir(folder));) {
-        if (!is_own_name(a, entry->d_name)) continue;
-        status = path_of(path, a->s.output, entry->d_name);
-        if (!status && !a->s.overwrite)
-            status = npg_error(NPG_USAGE,
-                               "%s lies there already and would mix with the new files: "
-                               "choose another folder, or --overwrite removes what is there",
-                               path);
-        if (!status && unlink(path)) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    }
-    closedir(folder);
-    return status;
-}
-
-static void choose_names(applying *a)
-{
-    const char *dot = strrchr(a->s.mesh, '.');
-    bool is_obj = a->s.format == AS_MESH ? dot && !strcasecmp(dot, ".obj") : a->s.format == AS_OBJ;
-    const char *read_as = npg_reader_for(a->s.mesh);
-    a->is_like = is_obj && read_as && !strcmp(read_as, "obj");
-    int64_t steps = (a->last_index - a->first_index) * a->s.fps_scale;
-    a->names = (npg_mesh_names){.prefix = a->s.prefix,
-                                .ending = is_obj ? "obj" : "ply",
-                                .width = npg_number_width(a->s.fps_scale > 1 ? steps : a->number_max)};
-}
-
-static npg_status open_output(applying *a)
-{
-    char path[PATH_SIZE];
-    choose_names(a);
-    NPG_TRY(npg_folder_probe(a->s.output));
-    if (npg_is_in_folder(a->s.output, "frames.jsonl") || npg_is_in_folder(a->s.output, "job"))
-        return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", a->s.output);
-    NPG_TRY(path_of(path, a->s.output, "done.json"));
-    if (!a->s.overwrite) NPG_TRY(clear_files(a));
-    if (unlink(path) && errno != ENOENT) return npg_error_errno(NPG_DISK, "can't remove %s", path);
-    if (a->s.overwrite) NPG_TRY(clear_files(a)); /* after done.json: what is left can't pass for whole */
-    return npg_file_open(&a->done, path);
-}
-
-/* ---- writing ---- */
-
-static npg_status list_file(applying *a, const char *name)
-{
-    json_t *entry = json_pack("{ss}", "path", name);
-    npg_status status = npg_file_facts(entry, a->s.output, name);
-    char *text = status ? NULL : json_dumps(entry, JSON_COMPACT);
-    if (!status && !text) status = npg_error(NPG_MEMORY, "no memory for done.json");
-    if (text) {
-        npg_file_print(a->done, "%s\n    ", a->written ? "," : "{\n  \"files\": [");
-        status = npg_file_write(a->done, text, strlen(text));
-    }
-    free(text);
-    json_decref(entry);
-    return status;
-}
-
-/* The carried mesh as it is when the reference's vertices are at vert_pos. */
-static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
-{
-    char name[NPG_MESH_NAME_SIZE], path[PATH_SIZE];
-    const npg_mesh *mesh = a->carried;
-    NPG_TRY(npg_attach_move(a->attachment, vert_pos, a->pos, a->turns_normals ? a->normals : NULL));
-    if (!a->turns_normals && a->normals) {
-        for (size_t i = 0; i < 3 * mesh->vert_count; i++) a->pos_float[i] = (float)a->pos[i];
-        npg_mesh_vertex_normals(a->normals, a->pos_float, mesh->vert_count, mesh->faces, mesh->face_count);
-    }
-    for (size_t i = 0; i < 3 * mesh->vert_count; i++) a->pos[i] += a->origin.world[i % 3];
-    npg_mesh_view view = {.vert_count = mesh->vert_count,
-                          .face_count = mesh->face_count,
-                          .vert_world = a->pos,
-                          .vert_normals = a->normals,
-                          .faces = mesh->faces,
-                          .vert_colours = mesh->vert_colours,
-                          .vert_uvs = mesh->vert_uvs};
-    npg_mesh_name(name, &a->names, number);
-    NPG_TRY(path_of(path, a->s.output, name));
-    NPG_TRY(a->is_like ? npg_write_obj_like(path, a->s.mesh, &view) : npg_write_mesh(path, &view));
-    NPG_TRY(list_file(a, name));
-    a->written++;
-    return NPG_OK;
-}
-
-/* ---- time ---- */
-
-/* Change per index at window[k], from its neighbours in time; one-sided at the ends of the run. */
-static double slope(const moment *window, int k, size_t i)
-{
-    const moment *before = &window[window[k - 1].is_there ? k - 1 : k];
-    const moment *after = &window[window[k + 1].is_there ? k + 1 : k];
-    return ((double)after->vert_pos[i] - (double)before->vert_pos[i]) /
-           (double)(after->index - before->index);
-}
-
-/* The reference at share 0..1 of the way from window[1] to window[2]: the cubic that has the two
- * positions and the slopes there (Catmull-Rom; the slopes count missing frames, so that a gap does
- * not bend the curve). */
-static void make_curve(applying *a, double share)
-{
-    const moment *w = a->window;
-    double gap = (double)(w[2].index - w[1].index), u = share, u2 = u * u, u3 = u2 * u;
-    for (size_t i = 0; i < 3 * a->reference->vert_count; i++) {
-        double p = (double)w[1].vert_pos[i], q = (double)w[2].vert_pos[i];
-        a->between[i] = (float)((2 * u3 - 3 * u2 + 1) * p + (3 * u2 - 2 * u3) * q +
-                                (u3 - 2 * u2 + u) * gap * slope(w, 1, i) + (u3 - u2) * gap * slope(w, 2, i));
-    }
-}
-
-/* window[1], and the steps from it to window[2]. */
-static npg_status write_step(applying *a)
-{
-    const moment *from = &a->window[1], *to = &a->window[2];
-    int64_t scale = a->s.fps_scale, first = (from->index - a->first_index) * scale;
-    if (!from->is_there) return NPG_OK;
-    NPG_TRY(write_pose(a, from->vert_pos, scale > 1 ? first : from->number));
-    if (!to->is_there || scale == 1) return NPG_OK;
-    int64_t steps = (to->index - from->index) * scale;
-    for (int64_t k = 1; k < steps; k++) {
-        make_curve(a, (double)k / (double)steps);
-        NPG_TRY(write_pose(a, a->between, first + k));
-    }
-    return NPG_OK;
-}
-
-static void shift_window(applying *a)
-{
-    npg_release(&a->window[0].vert_pos);
-    memmove(a->window, a->window + 1, 3 * sizeof *a->window);
-    a->window[3] = (moment){0};
-}
-
-static npg_status visit_frame(void *user, const json_t *frame, const char *line, size_t size)
-{
-    applying *a = user;
-    const char *file = json_string_value(json_object_get(frame, "file"));
-    (void)line, (void)size;
-    if (!file) return NPG_OK;
-    shift_window(a);
-    a->window[3].index = json_integer_value(json_object_get(frame, "index"));
-    a->window[3].number = json_integer_value(json_object_get(frame, "number"));
-    NPG_TRY(read_moment(a, &a->window[3], file));
-    a->window[3].is_there = true;
-    return write_step(a);
-}
-
-static npg_status write_done(applying *a)
-{
-    for (int i = 0; i < 2; i++) {
-        shift_window(a);
-        NPG_TRY(write_step(a));
-    }
-    json_t *facts = json_pack("{ss sI sI sI sf si}", "neupig", npg_version(), "frames",
-                              (json_int_t)a->frame_count, "fps_scale", (json_int_t)a->s.fps_scale,
-                              "points_far", (json_int_t)a->far_count, "fps", a->fps * (double)a->s.fps_scale,
-                              "exit_code", npg_status_exit_code(a->far_count ? NPG_PARTIAL : NPG_OK));
-    json_object_set_new(facts, "job", npg_json_text(a->job));
-    json_object_set_new(facts, "mesh", npg_json_text(a->s.mesh));
-    char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-    json_decref(facts);
-    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
-    npg_status status = npg_file_print(a->done, "\n  ],%s\n", text + 1); /* the rest of the same object */
-    free(text);
+                applied->far_count, applied->point_count, s->mesh, s->far_share, applied->worst,
+                applied->worst_dist, applied->worst_share);
     NPG_TRY(status);
-    status = npg_file_commit(&a->done);
-    char path[PATH_SIZE];
-    if (status && path_of(path, a->s.output, "done.json") == NPG_OK)
-        unlink(path); /* whole it may be, but what fails at its last step is not done */
-    return status;
-}
-
-/* ---- the verb ---- */
-
-static npg_status apply(applying *a)
-{
-    if (!a->s.mesh[0]) return npg_error(NPG_USAGE, "what is to be carried? say it with --mesh FILE");
-    if (!a->s.output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o OUT");
-    if (!a->s.prefix[0] || strchr(a->s.prefix, '/') || strlen(a->s.prefix) > 100)
-        return npg_error(NPG_USAGE, "option prefix: \"%s\" can't begin a file's name", a->s.prefix);
-    NPG_TRY(open_job(a));
-    NPG_TRY(open_carried(a));
-    NPG_TRY(open_output(a));
-    NPG_TRY(each_line(a, visit_frame, a));
-    return write_done(a);
-}
-
-static void close_applying(applying *a)
-{
-    for (int i = 0; i < 4; i++) npg_release(&a->window[i].vert_pos);
-    npg_file_discard(&a->done);
-    npg_attach_close(&a->attachment);
-    npg_mesh_unref(&a->reference);
-    npg_mesh_unref(&a->carried);
-    npg_release(&a->between);
-    npg_release(&a->pos);
-    npg_release(&a->pos_float);
-    npg_release(&a->normals);
+    printf("%zu frames of %s in %s\n", applied->frames, s->mesh, s->output);
+    return applied->far_count ? NPG_PARTIAL : NPG_OK;
 }
 
 int npg_verb_apply(int argc, char **argv)
 {
-    applying a = {0};
+    settings s;
     npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &a.s, NULL, argc, argv);
-    if (!status) {
-        a.job = cli.operands[0];
-        status = apply(&a);
-        if (!status) printf("%zu frames of %s in %s\n", a.written, a.s.mesh, a.s.output);
-    }
-    bool is_far = !status && a.far_count;
-    close_applying(&a);
-    return npg_cli_end(argv[0], is_far ? NPG_PARTIAL : status);
+    npg_applied applied = {0};
+    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
+    if (!status) status = apply(&applied, &s, cli.operands[0]);
+    return npg_cli_end(argv[0], status);
 }

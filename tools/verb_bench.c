@@ -99,7 +99,7 @@ static npg_status open_figure(bench *b)
 static npg_status open_kernels(bench *b)
 {
     enum { BATCH = 4 };
-    static const npg_mlp_shape decoder = {512, 512, 2, 8, 0.01f}; /* of the paper's preset */
+    static const npg_mlp_shape decoder = {512, 512, 8}; /* of the paper's preset */
     npg_target targets[BATCH];
     uint32_t(*edges)[2];
     size_t edge_count;
@@ -112,9 +112,8 @@ static npg_status open_kernels(bench *b)
     NPG_TRY(npg_mlp_open(&b->mlp, b->device, &decoder, rows, b->batch, b->batch));
     NPG_TRY(npg_mlp_begin(&b->mlp));
     NPG_TRY(npg_mesh_edges(&edges, &edge_count, m->faces, m->face_count));
-    npg_status status =
-        npg_motion_open(&b->motion, b->device, NPG_ROTATION_QUATERNION, m->vert_pos, m->vert_count, rows,
-                        (const uint32_t(*)[2])edges, edge_count, targets, b->batch);
+    npg_status status = npg_motion_open(&b->motion, b->device, m->vert_pos, m->vert_count, rows,
+                                        (const uint32_t(*)[2])edges, edge_count, targets, b->batch);
     npg_release(&edges);
     return status;
 }

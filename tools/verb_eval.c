@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "evaluate/evaluate.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "tools/cli.h"
-#include "tools/eval_motion.h"
 #include "tools/listing.h"
 
 typedef struct settings {
@@ -45,14 +45,9 @@ typedef struct evaluation {
     settings s;
     npg_listing predicted, truth;
     npg_origin origin;
-    npg_metrics_settings metrics;
-    npg_mesh *first_truth;
-    uint32_t *truth_of;
-    bool has_corr; /* constant topology on both sides, so far */
-    npg_eval_motion motion;
-    npg_eval_motion_figures moved;
-    npg_frame_metrics sum;
-    double corr_sum, sizes[4]; /* vertices and faces of prediction and truth */
+    npg_sequence *sequence;
+    npg_sequence_figures all;
+    double sizes[4]; /* vertices and faces of prediction and truth */
     json_t *per_frame;
 } evaluation;
 
@@ -103,29 +98,6 @@ static npg_status list_both(evaluation *e, const npg_cli *cli)
 
 /* ---- figures ---- */
 
-static npg_status begin_metrics(evaluation *e, npg_mesh *predicted, npg_mesh *truth, const char *path)
-{
-    e->metrics = (npg_metrics_settings){.sample_count = (size_t)e->s.samples,
-                                        .tau = e->s.tau,
-                                        .diagonal = npg_points_diagonal(truth->vert_pos, truth->vert_count),
-                                        .seed = (uint64_t)e->s.seed};
-    if (!(e->metrics.diagonal > 0)) return npg_error(NPG_BAD_INPUT, "%s: all points are equal", path);
-    e->motion.diagonal = e->metrics.diagonal;
-    e->sizes[0] = (double)predicted->vert_count;
-    e->sizes[1] = (double)predicted->face_count;
-    e->sizes[2] = (double)truth->vert_count;
-    e->sizes[3] = (double)truth->face_count;
-    e->first_truth = npg_mesh_ref(truth);
-    e->has_corr = !e->s.points_only;
-    return e->has_corr ? npg_metrics_tie(&e->truth_of, predicted, truth) : NPG_OK;
-}
-
-static bool same_faces(const npg_mesh *a, const npg_mesh *b)
-{
-    return a->vert_count == b->vert_count && a->face_count == b->face_count &&
-           !memcmp(a->faces, b->faces, a->face_count * 3 * sizeof *a->faces);
-}
-
 static void set_real(json_t *object, const char *name, double value)
 {
     json_object_set_new(object, name, isfinite(value) ? json_real(value) : json_null());
@@ -144,42 +116,39 @@ static json_t *json_of_metrics(const npg_frame_metrics *m)
     return object;
 }
 
-static void add_frame(evaluation *e, size_t t, const npg_frame_metrics *m, double corr)
+static void tell_frame(evaluation *e, size_t t, const npg_frame_metrics *m, double corr)
 {
-    npg_frame_metrics *sum = &e->sum;
-    sum->cd += m->cd;
-    sum->cd_to_truth += m->cd_to_truth;
-    sum->cd_from_truth += m->cd_from_truth;
-    sum->nc += m->nc;
-    sum->f += m->f;
-    sum->precision += m->precision;
-    sum->recall += m->recall;
     json_t *line = json_of_metrics(m);
     json_object_set_new(line, "frame", json_integer((json_int_t)t));
-    set_real(line, "Corr", t ? corr : (double)NAN);
+    set_real(line, "Corr", corr);
     json_array_append_new(e->per_frame, line);
-    if (e->s.per_frame && !e->s.json)
-        printf("%5zu  CD %9.4f  NC %7.5f  F %7.5f%s", t, m->cd, m->nc, m->f, t && e->has_corr ? "" : "\n");
-    if (e->s.per_frame && !e->s.json && t && e->has_corr) printf("  Corr %8.6f\n", corr);
+    if (!e->s.per_frame || e->s.json) return;
+    printf("%5zu  CD %9.4f  NC %7.5f  F %7.5f", t, m->cd, m->nc, m->f);
+    if (isfinite(corr)) printf("  Corr %8.6f", corr);
+    putchar('\n');
 }
 
 static npg_status eval_frame(evaluation *e, size_t t, npg_mesh *predicted, npg_mesh *truth)
 {
     npg_frame_metrics m;
-    double corr = 0;
-    if (t == 0) NPG_TRY(begin_metrics(e, predicted, truth, e->truth.paths[0]));
-    NPG_TRY(npg_error_prefix(npg_metrics_compare(&m, predicted, truth, &e->metrics, t), "%s, %s",
+    double corr;
+    if (t == 0) {
+        e->sizes[0] = (double)predicted->vert_count;
+        e->sizes[1] = (double)predicted->face_count;
+        e->sizes[2] = (double)truth->vert_count;
+        e->sizes[3] = (double)truth->face_count;
+    }
+    NPG_TRY(npg_error_prefix(npg_sequence_add(e->sequence, &m, &corr, predicted, truth), "%s, %s",
                              e->predicted.paths[t], e->truth.paths[t]));
-    NPG_TRY(npg_eval_motion_add(&e->motion, predicted));
-    e->has_corr = e->has_corr && e->motion.vertices_last && same_faces(truth, e->first_truth);
-    if (t && e->has_corr)
-        e->corr_sum += corr = npg_metrics_drift(predicted, truth, e->truth_of, e->metrics.diagonal);
-    add_frame(e, t, &m, corr);
+    tell_frame(e, t, &m, corr);
     return NPG_OK;
 }
 
 static npg_status eval_all(evaluation *e)
 {
+    const npg_metrics_settings asked = {
+        .sample_count = (size_t)e->s.samples, .tau = e->s.tau, .seed = (uint64_t)e->s.seed};
+    NPG_TRY(npg_sequence_open(&e->sequence, &asked, e->s.points_only));
     for (size_t t = 0; t < e->truth.count; t++) {
         npg_mesh *predicted = NULL, *truth = NULL;
         npg_status status = read_truth(&truth, e->truth.paths[t], e);
@@ -191,33 +160,25 @@ static npg_status eval_all(evaluation *e)
         npg_mesh_unref(&truth);
         NPG_TRY(status);
     }
-    return npg_eval_motion_end(&e->moved, &e->motion);
+    return npg_sequence_figures_of(&e->all, e->sequence);
 }
 
 /* ---- output ---- */
 
-static npg_frame_metrics mean_of(const evaluation *e)
+static void print_json(const evaluation *e)
 {
-    double count = (double)e->truth.count;
-    npg_frame_metrics m = e->sum;
-    double *fields[] = {&m.cd, &m.cd_to_truth, &m.cd_from_truth, &m.nc, &m.f, &m.precision, &m.recall};
-    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) *fields[i] /= count;
-    return m;
-}
-
-static void print_json(const evaluation *e, const npg_frame_metrics *mean, double corr)
-{
-    json_t *object = json_of_metrics(mean);
+    const npg_sequence_figures *all = &e->all;
+    json_t *object = json_of_metrics(&all->mean);
     json_object_set_new(object, "frames", json_integer((json_int_t)e->truth.count));
     json_object_set_new(object, "samples", json_integer((json_int_t)e->s.samples));
     set_real(object, "tau", e->s.tau);
-    set_real(object, "diagonal", e->metrics.diagonal);
-    set_real(object, "Corr", corr);
-    set_real(object, "jitter", e->moved.jitter);
-    set_real(object, "edge", e->moved.edge);
-    set_real(object, "rigidity", e->moved.rigid);
-    set_real(object, "bad_area", e->moved.bad);
-    json_object_set_new(object, "pred_constant_topology", json_boolean(e->motion.topology_last));
+    set_real(object, "diagonal", all->diagonal);
+    set_real(object, "Corr", all->corr);
+    set_real(object, "jitter", all->jitter);
+    set_real(object, "edge", all->edge);
+    set_real(object, "rigidity", all->rigid);
+    set_real(object, "bad_area", all->bad);
+    json_object_set_new(object, "pred_constant_topology", json_boolean(all->topology_last));
     static const char *const names[] = {"pred_vertices", "pred_faces", "gt_vertices", "gt_faces"};
     for (int i = 0; i < 4; i++) json_object_set_new(object, names[i], json_integer((json_int_t)e->sizes[i]));
     json_object_set(object, "per_frame", e->per_frame);
@@ -227,29 +188,20 @@ static void print_json(const evaluation *e, const npg_frame_metrics *mean, doubl
     json_decref(object);
 }
 
-static void print_text(const evaluation *e, const npg_frame_metrics *mean, double corr)
+static void print_text(const evaluation *e)
 {
+    const npg_sequence_figures *all = &e->all;
+    const npg_frame_metrics *mean = &all->mean;
     printf("frames %zu  CD %.4f (to truth %.4f, from truth %.4f)", e->truth.count, mean->cd,
            mean->cd_to_truth, mean->cd_from_truth);
     if (isfinite(mean->nc)) printf("  NC %.4f", mean->nc);
     printf("  F-%g%% %.4f", 100 * e->s.tau, mean->f);
-    if (isfinite(corr)) printf("  Corr %.5f", corr);
-    printf("\nconstant topology %s", e->motion.topology_last ? "yes" : "no");
-    if (isfinite(e->moved.jitter)) printf("  jitter %.3g", e->moved.jitter);
-    if (isfinite(e->moved.edge))
-        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", e->moved.edge, e->moved.rigid,
-               e->moved.bad);
+    if (isfinite(all->corr)) printf("  Corr %.5f", all->corr);
+    printf("\nconstant topology %s", all->topology_last ? "yes" : "no");
+    if (isfinite(all->jitter)) printf("  jitter %.3g", all->jitter);
+    if (isfinite(all->edge))
+        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", all->edge, all->rigid, all->bad);
     putchar('\n');
-}
-
-static void close_evaluation(evaluation *e)
-{
-    npg_listing_close(&e->predicted);
-    npg_listing_close(&e->truth);
-    npg_mesh_unref(&e->first_truth);
-    npg_release(&e->truth_of);
-    npg_eval_motion_close(&e->motion);
-    json_decref(e->per_frame);
 }
 
 int npg_verb_eval(int argc, char **argv)
@@ -259,15 +211,11 @@ int npg_verb_eval(int argc, char **argv)
     npg_status status = npg_cli_parse(&cli, argv[0], &e.s, NULL, argc, argv);
     if (!status) status = list_both(&e, &cli);
     if (!status) status = eval_all(&e);
-    if (!status) {
-        npg_frame_metrics mean = mean_of(&e);
-        double corr =
-            e.has_corr && e.truth.count > 1 ? e.corr_sum / (double)(e.truth.count - 1) : (double)NAN;
-        if (e.s.json)
-            print_json(&e, &mean, corr);
-        else
-            print_text(&e, &mean, corr);
-    }
-    close_evaluation(&e);
+    if (!status && e.s.json) print_json(&e);
+    if (!status && !e.s.json) print_text(&e);
+    npg_listing_close(&e.predicted);
+    npg_listing_close(&e.truth);
+    npg_sequence_close(&e.sequence);
+    json_decref(e.per_frame);
     return npg_cli_end(argv[0], status);
 }

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/evaluate_truth.h"
 #include "evaluate/measure.h"
 #include "evaluate/topology.h"
 #include "job/frame_log.h"
@@ -38,11 +37,7 @@ static const struct {
     {"flipped_share",     offsetof(npg_figures, flipped_share),     false},
     {"stretched_share",   offsetof(npg_figures, stretched_share),   false},
     {"edge_change",       offsetof(npg_figures, edge_change),       false},
-    {"chamfer",           offsetof(npg_figures, chamfer),           false},
-    {"truth_cd",          offsetof(npg_figures, truth_cd),          false},
-    {"truth_nc",          offsetof(npg_figures, truth_nc),          true},
-    {"truth_f",           offsetof(npg_figures, truth_f),           true},
-    {"truth_corr",        offsetof(npg_figures, truth_corr),        false}};
+    {"chamfer",           offsetof(npg_figures, chamfer),           false}};
 /* clang-format on */
 enum { SUMMED = sizeof summed / sizeof *summed };
 
@@ -50,17 +45,10 @@ typedef struct evaluate_state {
     /* options; the shares in per cent */
     double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max;
     npg_measure_settings measured;
-    const char *truth_folder;
     npg_topology_settings watch;
     /* of the run */
     npg_measure *measure; /* opened for the first frame that has a mesh */
     npg_topology *topology;
-    npg_truth *truth;
-    bool is_tied; /* the truth, in a frame */
-    /* V x 3, owned: the surface in that frame, or in that of the run that is resumed; NULL before */
-    float *tied_vert_unit;
-    size_t tied_count;
-    int64_t tied_number;
     aggregate sums[SUMMED];
     int64_t *bad; /* numbers of the frames below the bar; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
@@ -91,61 +79,6 @@ static npg_figures no_figures(void)
     return figures;
 }
 
-/* Correspondence is tied in the first frame that is compared; a resumed run ties it in the same one. */
-static npg_status keep_tied_frame(npg_worker *worker, npg_frame *frame)
-{
-    evaluate_state *state = npg_worker_state(worker);
-    size_t size = frame->vert_count * 3 * sizeof(float);
-    if (state->tied_vert_unit) return NPG_OK;
-    NPG_TRY(npg_alloc(&state->tied_vert_unit, NPG_FOR_MESH, size));
-    memcpy(state->tied_vert_unit, frame->vert_unit, size);
-    state->tied_count = frame->vert_count;
-    state->tied_number = frame->number;
-    return NPG_OK;
-}
-
-static npg_status compare_truth(npg_worker *worker, npg_frame *frame)
-{
-    evaluate_state *state = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    uint64_t seed = (uint64_t)npg_worker_settings(worker)->seed;
-    bool is_restored = state->tied_vert_unit && !state->is_tied;
-    NPG_TRY(keep_tied_frame(worker, frame));
-    if (is_restored) {
-        npg_frame first = {.number = state->tied_number,
-                           .vert_count = state->tied_count,
-                           .vert_unit = state->tied_vert_unit};
-        NPG_TRY(npg_truth_compare(state->truth, &first, facts, seed));
-    }
-    state->is_tied = true;
-    return npg_truth_compare(state->truth, frame, facts, seed);
-}
-
-/* ---- the state on disk ---- */
-
-#define BLOCK_TIED        "evaluate.tied"
-#define BLOCK_TIED_NUMBER "evaluate.tied.number"
-
-static npg_status save(const npg_worker *worker, npg_archive_writer *out)
-{
-    const evaluate_state *state = npg_worker_state(worker);
-    if (!state->tied_vert_unit) return NPG_OK;
-    NPG_TRY(npg_archive_put(out, BLOCK_TIED, state->tied_vert_unit, state->tied_count * 3 * sizeof(float)));
-    return npg_archive_put(out, BLOCK_TIED_NUMBER, &state->tied_number, sizeof state->tied_number);
-}
-
-static npg_status restore_tied(evaluate_state *state, const npg_archive *in)
-{
-    size_t size;
-    const float *tied = npg_archive_find(in, BLOCK_TIED, &size);
-    if (!tied) return NPG_OK;
-    NPG_TRY(npg_archive_get(in, BLOCK_TIED_NUMBER, &state->tied_number, sizeof state->tied_number));
-    NPG_TRY(npg_alloc(&state->tied_vert_unit, NPG_FOR_MESH, size));
-    memcpy(state->tied_vert_unit, tied, size);
-    state->tied_count = size / (3 * sizeof(float));
-    return NPG_OK;
-}
-
 static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
@@ -153,7 +86,6 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
     if (!state->measure)
         NPG_TRY(npg_measure_open(&state->measure, facts->reference, facts->unseen_share, &state->measured));
     NPG_TRY(check_vertices(frame, facts->reference));
-    if (state->truth) NPG_TRY(compare_truth(worker, frame));
     return npg_measure_frame(state->measure, frame, &facts->box);
 }
 
@@ -325,7 +257,6 @@ static npg_status restore(npg_worker *worker)
 {
     npg_job *job = npg_job_of(worker);
     int64_t count, bytes;
-    NPG_TRY(restore_tied(npg_worker_state(worker), npg_job_archive(job)));
     npg_job_exported(job, &count, &bytes);
     return npg_frame_log_each(npg_worker_settings(worker)->output, bytes, restore_line, worker);
 }
@@ -334,11 +265,8 @@ static npg_status restore(npg_worker *worker)
 
 static npg_status init(npg_worker *worker)
 {
-    evaluate_state *state = npg_worker_state(worker);
     if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;
-    if (npg_worker_facts(worker)->is_resumed) NPG_TRY(restore(worker));
-    if (!state->truth_folder[0]) return NPG_OK;
-    return npg_truth_open(&state->truth, state->truth_folder, npg_worker_settings(worker)->confine);
+    return npg_worker_facts(worker)->is_resumed ? restore(worker) : NPG_OK;
 }
 
 /* In a fusing pass: whether the reference explains the capture to its ends, so that what all frames saw may
@@ -382,9 +310,7 @@ static void uninit(npg_worker *worker)
     evaluate_state *state = npg_worker_state(worker);
     npg_measure_close(&state->measure);
     npg_topology_close(&state->topology);
-    npg_truth_close(&state->truth);
     npg_release(&state->bad);
-    npg_release(&state->tied_vert_unit);
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
@@ -418,8 +344,6 @@ static const npg_option options[] = {
         "how near a point must be to cover the surface, in per cent of the diagonal"),
     NPG_KEY(INT,            "evaluate-points",  AT(measured.point_limit), "100000", 0, 1e12, NULL,
         "Points per frame that figures are taken from, evenly spread over the file; 0: all"),
-    NPG_PROGRAM_ROW(TEXT,   "truth",            AT(truth_folder),       "",       "DIR",
-        "Folder with the true meshes, numbered as the frames: their figures go into the report"),
     NPG_PROGRAM_ROW(CHOICE, "alarm",            AT(watch.mode),         "report", "report|split",
         "Where the reference no longer explains the points: "
         "say so and go on, or end there (what --segments auto asks for)"),
@@ -445,5 +369,4 @@ const npg_stage npg_stage_evaluate = {.name = "evaluate",
                                       .process = process,
                                       .flush = flush,
                                       .uninit = uninit,
-                                      .save = save,
                                       .memory = memory};

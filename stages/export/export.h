@@ -1,10 +1,11 @@
 /* Door of the export room: what tools use of it.
  *
- * writer.h: one mesh into a file (neupig apply, synth).  placement.h: the capture's coordinates to those of
+ * apply.h: a mesh carried through a run (neupig apply).  writer.h: one mesh into a file (synth).  placement.h: the capture's coordinates to those of
  * the written files (neupig view). */
 #ifndef NPG_EXPORT_H
 #define NPG_EXPORT_H
 
+#include "export/apply.h"
 #include "export/forms/placement.h"
 #include "export/forms/writer.h"
 

@@ -57,11 +57,7 @@ static json_t *json_of_figures(const npg_figures *f)
                   {"flipped_share", f->flipped_share},
                   {"stretched_share", f->stretched_share},
                   {"edge_change", f->edge_change},
-                  {"chamfer", f->chamfer},
-                  {"truth_cd", f->truth_cd},
-                  {"truth_nc", f->truth_nc},
-                  {"truth_f", f->truth_f},
-                  {"truth_corr", f->truth_corr}};
+                  {"chamfer", f->chamfer}};
     json_t *figures = json_object();
     for (size_t i = 0; i < sizeof values / sizeof *values; i++)
         json_object_set_new(figures, values[i].name, npg_json_real(values[i].value));

@@ -11,10 +11,11 @@
 #include "kernels/latent.h"
 #include "kernels/mlp.h"
 #include "kernels/sobolev.h"
-#include "optimize/fit_least.h"
 #include "optimize/fit_levels.h"
 #include "optimize/fit_weights.h"
 #include "pipeline/random.h"
+
+#define BATCH 4 /* frames whose second hidden layer is kept at a time */
 
 struct npg_fit {
     npg_fit_settings settings;
@@ -38,8 +39,6 @@ struct npg_fit {
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
-    npg_fit_least least;                /* of a run at work                                          */
-    npg_fit_step result;                /* what the present state measures; of a run that keeps the least */
     bool is_pulled;                     /* by known correspondences, from bases */
     size_t tied_count;                  /* frames, the first outward, that follow their tie */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
@@ -123,8 +122,7 @@ static npg_status open_grids(npg_fit *fit, const float *normals)
 
 static npg_mlp_shape shape_of(const npg_fit_settings *s)
 {
-    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, (size_t)s->hidden_layers,
-                           2 * (size_t)s->frequencies, (float)s->slope};
+    return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies};
 }
 
 /* values[at] .. values[end - 1], uniform in +-1 / sqrt(inputs). */
@@ -144,12 +142,9 @@ static void draw_zero(float *values, size_t at, size_t end, npg_random *random)
 /* Weights and biases in the order of their list; the head is zero, so that all begins as the identity. */
 static void draw_layers(float *to, const npg_mlp_shape *s, size_t inputs, npg_random *random)
 {
-    for (size_t l = 2; l <= s->layers; l++)
-        draw_uniform(to, npg_mlp_at_weights(s, l), npg_mlp_at_weights(s, l + 1), npg_mlp_units(s, l - 1),
-                     random);
-    draw_zero(to, npg_mlp_at_head(s), npg_mlp_at_bias(s, 2), random);
-    for (size_t l = 2; l <= s->layers; l++)
-        draw_uniform(to, npg_mlp_at_bias(s, l), npg_mlp_at_bias(s, l + 1), npg_mlp_units(s, l - 1), random);
+    draw_uniform(to, 0, npg_mlp_at_head(s), s->w1, random);
+    draw_zero(to, npg_mlp_at_head(s), npg_mlp_at_b2(s), random);
+    draw_uniform(to, npg_mlp_at_b2(s), npg_mlp_at_head_bias(s), s->w1, random);
     draw_zero(to, npg_mlp_at_head_bias(s), npg_mlp_at_w1z(s), random);
     draw_uniform(to, npg_mlp_at_w1z(s), npg_mlp_param_count(s), inputs, random);
 }
@@ -215,7 +210,6 @@ void npg_fit_close(npg_fit **slot)
     if (!slot || !*slot) return;
     npg_fit *fit = *slot;
     close_window(fit);
-    npg_fit_least_clear(&(*slot)->least);
     npg_latent_close(&fit->latent);
     npg_sobolev_close(&fit->sobolev);
     npg_adam_close(&fit->grid_adam);
@@ -289,9 +283,8 @@ static npg_status copy_target(npg_target *target, const npg_fit_frame *frame)
 
 static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
 {
-    return npg_motion_open(&fit->motion, fit->device, (npg_rotation)fit->settings.rotation, fit->rest,
-                           fit->real, fit->rows, (const uint32_t(*)[2])fit->edges, fit->edge_count, targets,
-                           fit->frame_count);
+    return npg_motion_open(&fit->motion, fit->device, fit->rest, fit->real, fit->rows,
+                           (const uint32_t(*)[2])fit->edges, fit->edge_count, targets, fit->frame_count);
 }
 
 /* Of the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
@@ -355,7 +348,7 @@ npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count
 {
     NPG_REQUIRE(fit && frames && count);
     npg_mlp_shape shape = shape_of(&fit->settings);
-    size_t batch = (size_t)fit->settings.batch < count ? (size_t)fit->settings.batch : count;
+    size_t batch = count < BATCH ? count : BATCH;
     close_window(fit);
     fit->frame_count = count;
     fit->is_pulled = frames[0].base != NULL;
@@ -482,8 +475,8 @@ static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
     return status;
 }
 
-/* What the present state measures; with is_learning the gradients for a step, too. */
-static npg_status measure_epoch(npg_fit *fit, npg_fit_step *step, bool is_learning)
+/* What the present state measures, and the gradients for a step. */
+static npg_status measure_epoch(npg_fit *fit, npg_fit_step *step)
 {
     npg_weights weights;
     double progress = (double)step->epoch / (double)step->epochs;
@@ -492,7 +485,7 @@ static npg_status measure_epoch(npg_fit *fit, npg_fit_step *step, bool is_learni
     for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
         size_t left = fit->frame_count - first, count = left < fit->mlp.batch ? left : fit->mlp.batch;
         NPG_TRY(measure_batch(fit, &weights, first, count, step->epoch));
-        if (is_learning) NPG_TRY(npg_mlp_backward(&fit->mlp, first, count));
+        NPG_TRY(npg_mlp_backward(&fit->mlp, first, count));
     }
     return sum_up(fit, step);
 }
@@ -516,35 +509,11 @@ static double rate_at(const npg_fit_settings *s, int64_t epoch)
     return s->rate_end + (1 - s->rate_end) * 0.5 * (1 + cos(M_PI * part));
 }
 
-static npg_fit_knowns knowns_of(npg_fit *fit)
-{
-    return (npg_fit_knowns){&fit->u, &fit->mlp.params, fit->time_code};
-}
-
-static bool keeps_least(const npg_fit *fit)
-{
-    return fit->settings.deliver == NPG_DELIVER_LEAST && !fit->is_pulled;
-}
-
-struct npg_fit_least *npg_fit_open_least(npg_fit *fit)
-{
-    return &fit->least;
-}
-
-/* The state that step measured, where it is the best so far. */
-static npg_status offer(npg_fit *fit, const npg_fit_step *step)
-{
-    npg_fit_knowns now = knowns_of(fit);
-    if (!keeps_least(fit)) return NPG_OK;
-    return npg_fit_least_offer(&fit->least, step, npg_fit_plain_loss(step, fit->settings.isometry), &now);
-}
-
 static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_watch *watch, void *user)
 {
     for (; step->epoch < end; step->epoch++) {
         fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
-        NPG_TRY(measure_epoch(fit, step, true));
-        NPG_TRY(offer(fit, step));
+        NPG_TRY(measure_epoch(fit, step));
         NPG_TRY(end_epoch(fit));
         npg_status status = watch ? watch(user, step) : NPG_OK;
         if (status == NPG_END)
@@ -575,26 +544,11 @@ void npg_fit_set_epochs(npg_fit *fit, int64_t epochs)
     fit->settings.epochs = epochs;
 }
 
-/* The last step's outcome is measured as well; then the fit returns to the state with the least loss. */
-static npg_status return_to_least(npg_fit *fit, npg_fit_step *step)
-{
-    npg_fit_knowns now = knowns_of(fit);
-    NPG_TRY(measure_epoch(fit, step, false));
-    NPG_TRY(offer(fit, step));
-    fit->result = fit->least.step;
-    return npg_fit_least_restore(&fit->least, &now);
-}
-
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
 {
     npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
-    fit->result.epochs = 0;
-    if (first == 0) npg_fit_least_clear(&fit->least);
-    npg_status status = run_epochs(fit, &step, end, watch, user);
-    if (!status && end > first && keeps_least(fit)) status = return_to_least(fit, &step);
-    npg_fit_least_clear(&fit->least);
-    if (!status) status = npg_fit_read_params(fit);
-    NPG_TRY(status);
+    NPG_TRY(run_epochs(fit, &step, end, watch, user));
+    NPG_TRY(npg_fit_read_params(fit));
     return decode(fit);
 }
 
@@ -610,11 +564,6 @@ npg_status npg_fit_write_params(npg_fit *fit)
                             : NPG_OK;
 }
 
-const npg_fit_step *npg_fit_result(const npg_fit *fit)
-{
-    return fit->result.epochs ? &fit->result : NULL;
-}
-
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
 {
     NPG_REQUIRE(i < fit->frame_count);
@@ -627,19 +576,6 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
             vert_unit[3 * fit->order[row] + axis] = at;
         }
     return NPG_OK;
-}
-
-npg_status npg_fit_features(npg_fit *fit, float *features)
-{
-    size_t row_size = NPG_LATENT_CHANNELS * sizeof(float);
-    float *rows;
-    NPG_REQUIRE(fit->frame_count);
-    NPG_TRY(npg_alloc(&rows, NPG_FOR_FIT, fit->real * row_size));
-    npg_status status = npg_buffer_read(&fit->mlp.z, 0, rows, fit->real * row_size);
-    for (size_t row = 0; row < fit->real && !status; row++)
-        memcpy(features + NPG_LATENT_CHANNELS * fit->order[row], rows + NPG_LATENT_CHANNELS * row, row_size);
-    npg_release(&rows);
-    return status;
 }
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit)
@@ -658,9 +594,8 @@ size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frame
     const npg_tuning *tuning = &npg_tuning_wide; /* a processor: elsewhere the device has memory of its own */
     size_t block = (size_t)tuning->mlp_rows, groups = (size_t)(tuning->mlp_groups * units);
     size_t rows = (vert_count + block - 1) / block * block;
-    size_t batch = (size_t)s->batch < frames ? (size_t)s->batch : frames;
-    size_t kept = (shape.layers - 1) * shape.w2;
-    size_t per_row = 2 * shape.w1 + batch * kept + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
+    size_t batch = frames < BATCH ? frames : BATCH;
+    size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
     size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
     size_t per_group = npg_mlp_param_count(&shape) + npg_mlp_scratch(&shape, block);
     size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_param_count(&shape) * 7;

@@ -35,27 +35,19 @@ typedef enum npg_smoothing {
 
 typedef enum npg_encoding { NPG_ENCODING_GRID, NPG_ENCODING_SINGLE, NPG_ENCODING_HASH } npg_encoding;
 
-/* Which of the states that a run by Chamfer distance goes through is its result;
- * runs by pulls end with the last. */
-typedef enum npg_deliver {
-    NPG_DELIVER_LEAST, /* the one with the least loss, the confidence left aside */
-    NPG_DELIVER_LAST   /* the one after the last step                            */
-} npg_deliver;
-
 typedef struct npg_fit_settings {
     int64_t epochs;
-    int rotation, time_code, encoding, confidence, catch_up, smoothing, deliver /* enums of these names */;
+    int time_code, encoding, confidence, catch_up, smoothing; /* enums of these names */
     int64_t frequencies;
     double time_span; /* times of a window go from 0 to this: the code of 1 is nearly that of 0; paper: 1 */
     int64_t grid_base, grid_step, grid_levels, normal_nodes;
     int64_t position_channels, normal_channels; /* |z_p| and |z_n|, together NPG_LATENT_CHANNELS at most */
     bool normal_grid;
     double lambda, lambda_growth, grid_rate, grid_rate_growth;
-    double mlp_rate, slope, isometry, alpha;
-    int64_t width_1, width_2, hidden_layers; /* of the decoder: npg_mlp_shape */
-    double rate_end;      /* learning rates at the last epoch, as a share; they fall by half a cosine */
-    double feature_start; /* grid features begin evenly spread over +- this before smoothing; paper: 0 */
-    int64_t batch;        /* frames whose hidden layers are kept at a time */
+    double mlp_rate, isometry, alpha;
+    int64_t width_1, width_2; /* of the decoder: npg_mlp_shape */
+    double rate_end;          /* learning rates at the last epoch, as a share; they fall by half a cosine */
+    double feature_start;     /* grid features begin evenly spread over +- this before smoothing; paper: 0 */
 } npg_fit_settings;
 
 /* The values that the options have now (table of the optimize stage). */
@@ -114,16 +106,8 @@ void npg_fit_set_epochs(npg_fit *fit, int64_t epochs);
  * names epoch and frame. */
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user);
 
-/* What the state that the last run ended with measures (its epoch: steps before it), or NULL where the run
- * simply kept the last. */
-const npg_fit_step *npg_fit_result(const npg_fit *fit);
-
 /* vert_unit (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
-
-/* features (V x NPG_LATENT_CHANNELS, in the order of the reference): what the grids gave the decoder in the
- * last window, as it is after its last step. */
-npg_status npg_fit_features(npg_fit *fit, float *features);
 
 /* What goes from window to window, for saving and restoring: loans of the fit's own. */
 typedef struct npg_fit_parts {
@@ -136,9 +120,6 @@ typedef struct npg_fit_parts {
 } npg_fit_parts;
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit);
-
-/* Of a run at work that keeps the state of least loss (fit_least.h): that state, for saving and restoring. */
-struct npg_fit_least *npg_fit_open_least(npg_fit *fit);
 
 /* While a window is begun its decoder is on the device: into parts.params, and from there.  Nothing to do
  * without a window. */

@@ -37,69 +37,62 @@ typedef struct state {
 
 #define WINDOW(member) offsetof(state, window_settings.member)
 #define FIT(member)    WINDOW(fit.member)
-#define MATCH(member)  WINDOW(match.member)
+#define MATCH(member)  WINDOW(warm.match.member)
 #define JOINT(member)  WINDOW(joint.member)
 
 /* clang-format off */
 static const npg_option options[] = {
-    /* type         name                 place                   default       least most  shown as or words */
-    NPG_KEY(INT,    "epochs",            FIT(epochs),            "60",         0,    1e6,  "N",
+    /* type         name                 place                   default     least most  shown as or words */
+    NPG_KEY(INT,    "epochs",            FIT(epochs),            "60",       0,    1e6,  "N",
         "steps of each window's joint fit, at most; 0 leaves the frames as the alignment put them"),
-    NPG_KEY(INT,    "joint-points",      JOINT(points),          "5000",       10,   1e7,  "N",
+    NPG_KEY(INT,    "joint-points",      JOINT(points),          "5000",     10,   1e7,  "N",
         "most points of an aligned frame that pull at the surface"),
-    NPG_KEY(REAL,   "joint-shape",       JOINT(shape),           "0.1",        0,    1e6,  NULL,
+    NPG_KEY(REAL,   "joint-shape",       JOINT(shape),           "0.1",      0,    1e6,  NULL,
         "weight of the change of the surface's edges against the distance of a point, of aligned frames"),
-    NPG_KEY(CHOICE, "rotation",          FIT(rotation),          "quaternion",
-        "quaternion|cayley|exponential",
-        "how the decoder's output becomes a rotation"),
     NPG_KEY(CHOICE, "time-code",         FIT(time_code),         "fourier",
         "fourier|polynomial|gaussian|learned",
         "what the decoder is told about time"),
-    NPG_KEY(INT,    "time-frequencies",  FIT(frequencies),       "4",          1,    16,   "M",
+    NPG_KEY(INT,    "time-frequencies",  FIT(frequencies),       "4",        1,    16,   "M",
         "frequencies of the time code; it has twice as many values"),
-    NPG_KEY(REAL,   "time-span",         FIT(time_span),         "0.8",        0.01, 1,    NULL,
+    NPG_KEY(REAL,   "time-span",         FIT(time_span),         "0.8",      0.01, 1,    NULL,
         "share of the time code's length that a window goes through: the codes of its ends are nearly alike; "
         "1 as in the paper"),
-    NPG_KEY(CHOICE, "encoding",          FIT(encoding),          "grid",       "grid|single|hash",
+    NPG_KEY(CHOICE, "encoding",          FIT(encoding),          "grid",     "grid|single|hash",
         "features: a hierarchy of grids, its finest grid alone, or a hash table"),
-    NPG_KEY(INT,    "grid-levels",       FIT(grid_levels),       "8",          1,    16,   "L",
+    NPG_KEY(INT,    "grid-levels",       FIT(grid_levels),       "8",        1,    16,   "L",
         "levels of the position grid"),
-    NPG_KEY(INT,    "grid-base",         FIT(grid_base),         "2",          2,    64,   "N",
+    NPG_KEY(INT,    "grid-base",         FIT(grid_base),         "2",        2,    64,   "N",
         "nodes per axis of the coarsest level"),
-    NPG_KEY(INT,    "grid-step",         FIT(grid_step),         "3",          0,    16,   "N",
+    NPG_KEY(INT,    "grid-step",         FIT(grid_step),         "3",        0,    16,   "N",
         "nodes per axis that each level adds"),
-    NPG_KEY(REAL,   "grid-rate",         FIT(grid_rate),         "0.005",      0,    10,   NULL,
+    NPG_KEY(REAL,   "grid-rate",         FIT(grid_rate),         "0.005",    0,    10,   NULL,
         "learning rate of the coarsest level"),
-    NPG_KEY(REAL,   "grid-rate-growth",  FIT(grid_rate_growth),  "2.5",        0.1,  10,   NULL,
+    NPG_KEY(REAL,   "grid-rate-growth",  FIT(grid_rate_growth),  "2.5",      0.1,  10,   NULL,
         "its growth per level"),
-    NPG_KEY(REAL,   "lambda",            FIT(lambda),            "0.4",        0,    1e4,  NULL,
+    NPG_KEY(REAL,   "lambda",            FIT(lambda),            "0.4",      0,    1e4,  NULL,
         "smoothing of the coarsest level, 0 for none"),
-    NPG_KEY(REAL,   "lambda-growth",     FIT(lambda_growth),     "1.5",        0.1,  10,   NULL,
+    NPG_KEY(REAL,   "lambda-growth",     FIT(lambda_growth),     "1.5",      0.1,  10,   NULL,
         "its growth per level"),
-    NPG_KEY(CHOICE, "smoothing",         FIT(smoothing),         "screened",   "graph|screened|doubled",
+    NPG_KEY(CHOICE, "smoothing",         FIT(smoothing),         "screened", "graph|screened|doubled",
         "matrix of the smoothing: I + lambda (D - A), the same with 6 lambda more on the diagonal, "
         "or I + lambda (2 D - A)"),
     NPG_KEY(FLAG,   "normal-grid",       FIT(normal_grid),       "yes",
         "features by normal direction beside those by position"),
-    NPG_KEY(INT,    "normal-nodes",      FIT(normal_nodes),      "4",          2,    32,   "N",
+    NPG_KEY(INT,    "normal-nodes",      FIT(normal_nodes),      "4",        2,    32,   "N",
         "nodes per axis of the normal grid"),
-    NPG_KEY(INT,    "position-channels", FIT(position_channels), "30",         2,    31,   "N",
+    NPG_KEY(INT,    "position-channels", FIT(position_channels), "30",       2,    31,   "N",
         "features that the position grids give the decoder"),
-    NPG_KEY(INT,    "normal-channels",   FIT(normal_channels),   "2",          1,    30,   "N",
+    NPG_KEY(INT,    "normal-channels",   FIT(normal_channels),   "2",        1,    30,   "N",
         "features that the normal grid gives it; both together are 32 at most"),
-    NPG_KEY(INT,    "width-1",           FIT(width_1),           "512",        32,   4096, "N",
+    NPG_KEY(INT,    "width-1",           FIT(width_1),           "512",      32,   4096, "N",
         "units of the first hidden layer"),
-    NPG_KEY(INT,    "width-2",           FIT(width_2),           "512",        32,   4096, "N",
-        "units of each of the hidden layers after it"),
-    NPG_KEY(INT,    "hidden-layers",     FIT(hidden_layers),     "2",          1,    NPG_MLP_LAYERS_MAX, "N",
-        "hidden layers of the decoder, before the one that gives the motion"),
-    NPG_KEY(REAL,   "mlp-rate",          FIT(mlp_rate),          "0.001",      0,    1,    NULL,
+    NPG_KEY(INT,    "width-2",           FIT(width_2),           "512",      32,   4096, "N",
+        "units of the second"),
+    NPG_KEY(REAL,   "mlp-rate",          FIT(mlp_rate),          "0.001",    0,    1,    NULL,
         "learning rate of the decoder"),
-    NPG_KEY(REAL,   "slope",             FIT(slope),             "0.01",       0,    1,    NULL,
-        "slope of the leaky rectifier below 0"),
-    NPG_KEY(REAL,   "isometry",          FIT(isometry),          "5",          0,    1e6,  NULL,
+    NPG_KEY(REAL,   "isometry",          FIT(isometry),          "5",        0,    1e6,  NULL,
         "weight of the change of edge lengths"),
-    NPG_KEY(REAL,   "welsch",            FIT(alpha),             "0.3",        0,    1e3,  NULL,
+    NPG_KEY(REAL,   "welsch",            FIT(alpha),             "0.3",      0,    1e3,  NULL,
         "width of the robust weight on squared unit distances, 0 for none"),
     NPG_KEY(CHOICE, "confidence",        FIT(confidence),        "constant",
         "cumulative|single|delta|constant",
@@ -107,39 +100,31 @@ static const npg_option options[] = {
     NPG_KEY(CHOICE, "catch-up",          FIT(catch_up),          "root",
         "root|constant|linear|exponential|interpolated",
         "how the confidence opens with the epochs"),
-    NPG_KEY(REAL,   "feature-start",     FIT(feature_start),     "3",          0,    1e3,  NULL,
+    NPG_KEY(REAL,   "feature-start",     FIT(feature_start),     "3",        0,    1e3,  NULL,
         "grid features begin spread over +- this; 0 as in the paper"),
-    NPG_KEY(REAL,   "rate-end",          FIT(rate_end),          "0.1",        0,    1,    NULL,
+    NPG_KEY(REAL,   "rate-end",          FIT(rate_end),          "0.1",      0,    1,    NULL,
         "learning rates at the last epoch as a share; they fall by half a cosine"),
-    NPG_KEY(CHOICE, "deliver",           FIT(deliver),           "least",      "least|last",
-        "result of a joint fit by Chamfer distance: "
-        "of all the states between its steps the one with the least loss, or the last"),
-    NPG_KEY(CHOICE, "distance",          WINDOW(warm.distance),  "vertices",   "vertices|surface",
+    NPG_KEY(CHOICE, "distance",          WINDOW(warm.distance),  "vertices", "vertices|surface",
         "without alignment: the paper's distance between all vertices and the points, "
         "or that between points and surface, over --samples vertices"),
-    NPG_KEY(FLAG,   "warm-start",        WINDOW(warm.is_on),     "yes",
-        "without alignment: bring a window's new frames near their pose from those that are solved, "
-        "before all are fitted"),
-    NPG_KEY(INT,    "samples",           WINDOW(samples),        "1500",       0,    1e6,  "N",
+    NPG_KEY(INT,    "samples",           WINDOW(warm.samples),   "1500",     0,    1e6,  "N",
         "vertices that such frames are brought near their pose with, and that the distance to the surface is "
         "fitted over, 0: the usual number"),
-    NPG_KEY(INT,    "rounds",            WINDOW(rounds),         "2",          1,    1000, "N",
+    NPG_KEY(INT,    "rounds",            WINDOW(warm.rounds),    "2",        1,    1000, "N",
         "times that a fit by the distance to the surface is matched"),
-    NPG_KEY(INT,    "match-points",      MATCH(points),          "5000",       10,   1e7,  "N",
+    NPG_KEY(INT,    "match-points",      MATCH(points),          "5000",     10,   1e7,  "N",
         "most points of a frame that pull there"),
-    NPG_KEY(REAL,   "match-along",       MATCH(along),           "0.02",       0,    1,    NULL,
+    NPG_KEY(REAL,   "match-along",       MATCH(along),           "0.02",     0,    1,    NULL,
         "share of distances along the surface there, 0 to 1"),
-    NPG_KEY(REAL,   "match-reverse",     MATCH(reverse),         "0.5",        0,    100,  NULL,
+    NPG_KEY(REAL,   "match-reverse",     MATCH(reverse),         "0.5",      0,    100,  NULL,
         "weight of surface to points against points to surface there"),
-    NPG_KEY(REAL,   "match-total",       MATCH(total),           "5000",       1,    1e9,  NULL,
+    NPG_KEY(REAL,   "match-total",       MATCH(total),           "5000",     1,    1e9,  NULL,
         "weight of all points of a frame there"),
-    NPG_KEY(REAL,   "match-tie",         MATCH(tie),             "1",          0,    1e6,  NULL,
+    NPG_KEY(REAL,   "match-tie",         MATCH(tie),             "1",        0,    1e6,  NULL,
         "weight of staying where the window before has put a frame, against its points"),
-    NPG_KEY(INT,    "state-every",       offsetof(state, state_every_s), "120",        0,    1e6,  "SECONDS",
+    NPG_KEY(INT,    "state-every",       offsetof(state, state_every_s), "120",      0,    1e6,  "SECONDS",
         "without alignment: a window that takes longer writes its state meanwhile, "
         "so that no more is lost when the run is killed"),
-    NPG_KEY(INT,    "fit-batch",         FIT(batch),             "4",          1,    64,   "N",
-        "frames whose hidden layers are kept at a time"),
     {0}};
 /* clang-format on */
 
@@ -275,19 +260,11 @@ static void note_result(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_joint_result *joint = npg_window_result(s->solver);
-    const npg_fit_step *least = joint ? NULL : npg_fit_result(npg_window_fit(s->solver));
     if (joint)
         npg_worker_log(
             worker, NPG_LOG_INFO, -1,
             "window %lld: joint fit in %lld steps: points %.5f off, vertices moved by %.5f in the mean",
             (long long)s->window_at, (long long)joint->steps, joint->noise, joint->moved);
-    if (!least) return;
-    s->last_chamfer = least->chamfer;
-    s->last_isometry = least->isometry;
-    npg_worker_log(worker, NPG_LOG_INFO, -1,
-                   "window %lld: least loss after %lld of %lld steps, kept: chamfer %.4g isometry %.4g",
-                   (long long)s->window_at, (long long)least->epoch, (long long)least->epochs, least->chamfer,
-                   least->isometry);
 }
 
 /* A window that a warm start lost is no silent matter. */
@@ -517,12 +494,12 @@ static double expects(const npg_worker *worker, npg_pass pass)
     double frames = (double)npg_worker_facts(worker)->frame_count;
     if (pass != NPG_PASS_SOLVE) return 0;
     if (npg_worker_has_field(worker, NPG_FIELD_POSE)) return joint_s_per_frame * frames;
-    bool by_samples = s->window_settings.warm.distance == NPG_DISTANCE_SURFACE && s->window_settings.samples;
+    const npg_warm_settings *warm = &s->window_settings.warm;
+    bool by_samples = warm->distance == NPG_DISTANCE_SURFACE && warm->samples;
     double vertices = (double)npg_worker_verts_at_most(worker);
-    if (by_samples) vertices = fmin(vertices, (double)s->window_settings.samples);
+    if (by_samples) vertices = fmin(vertices, (double)warm->samples);
     const npg_fit_settings *fit = &s->window_settings.fit;
-    double sample =
-        npg_cost_decoder_flops((double)fit->width_1, (double)fit->width_2, (double)fit->hidden_layers);
+    double sample = npg_cost_decoder_flops((double)fit->width_1, (double)fit->width_2);
     return cores *
            npg_cost_network_s(frames * vertices * (double)fit->epochs * sample, cores * NPG_COST_CORE_FLOPS);
 }

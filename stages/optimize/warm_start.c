@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "optimize/fit_least.h"
 #include "pipeline/parallel.h"
 
 #define MATCHERS_MAX 8
@@ -45,9 +44,6 @@ struct npg_warm {
     const npg_facts *facts; /* loan */
     npg_warm_settings settings;
     npg_fit_settings fit_settings;
-    npg_match_settings match;
-    int64_t rounds;
-    size_t sample_target;
     double isometry; /* of the samples' fit */
     uint64_t seed;
     npg_carry *carry;
@@ -99,14 +95,14 @@ static npg_status open_matchers(npg_warm *w)
     w->surface_verts = w->carry->surface->mesh->vert_count;
     NPG_TRY(npg_alloc_array(&w->surfaces, NPG_FOR_FIT, count * w->surface_verts, 3 * sizeof(float)));
     for (; w->matcher_count < count; w->matcher_count++)
-        NPG_TRY(npg_matcher_open(&w->matchers[w->matcher_count], w->carry, &w->match));
+        NPG_TRY(npg_matcher_open(&w->matchers[w->matcher_count], w->carry, &w->settings.match));
     return NPG_OK;
 }
 
 /* What only windows need that start warm, once the first of them comes; each opens its probe itself. */
 static npg_status open_samples(npg_warm *w)
 {
-    size_t samples = w->sample_target ? w->sample_target : SAMPLES;
+    size_t samples = w->settings.samples ? (size_t)w->settings.samples : SAMPLES;
     if (w->carry) return NPG_OK;
     NPG_TRY(npg_carry_open(&w->carry, w->facts->reference, samples, NPG_THIN_SURFACE));
     w->samples = w->carry->samples->mesh->vert_count;
@@ -114,8 +110,7 @@ static npg_status open_samples(npg_warm *w)
 }
 
 npg_status npg_warm_open(npg_warm **out, npg_device *device, const npg_warm_settings *settings,
-                         const npg_fit_settings *fit, const npg_match_settings *match, size_t samples,
-                         int64_t rounds, const npg_facts *facts, uint64_t seed)
+                         const npg_fit_settings *fit, const npg_facts *facts, uint64_t seed)
 {
     npg_warm *w;
     *out = NULL;
@@ -124,9 +119,6 @@ npg_status npg_warm_open(npg_warm **out, npg_device *device, const npg_warm_sett
     w->facts = facts;
     w->settings = *settings;
     w->fit_settings = *fit;
-    w->match = *match;
-    w->rounds = rounds;
-    w->sample_target = samples;
     w->seed = seed;
     *out = w;
     return NPG_OK;
@@ -439,14 +431,14 @@ static npg_status fit_surface(npg_warm *w, some all)
     int64_t epochs = w->fit_settings.epochs;
     NPG_TRY(begin_dense(w, true, true));
     widen(w, LAST_WIDTH);
-    for (int64_t round = w->is_resumed ? w->at.count : 0; round < w->rounds; round++) {
+    for (int64_t round = w->is_resumed ? w->at.count : 0; round < w->settings.rounds; round++) {
         if (!w->is_resumed) NPG_TRY(keep(w, PHASE_SURFACE, round));
         w->is_resumed = false;
         if (round) NPG_TRY(read_field(w, all));
         NPG_TRY(set_pulls(w, all, 0, true));
         npg_fit_set_epochs(w->probe, epochs);
-        NPG_TRY(npg_fit_run(w->probe, round * epochs / w->rounds, (round + 1) * epochs / w->rounds,
-                            watch_step, w));
+        NPG_TRY(npg_fit_run(w->probe, round * epochs / w->settings.rounds,
+                            (round + 1) * epochs / w->settings.rounds, watch_step, w));
     }
     return decode(w);
 }
@@ -583,7 +575,7 @@ npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *fram
 {
     bool is_first = window->direction == 0, by_vertices = w->settings.distance == NPG_DISTANCE_VERTICES;
     bool is_alone = w->facts->plan.window >= w->facts->plan.frame_count; /* then it is the paper's */
-    bool is_cold = by_vertices && (is_alone || !w->settings.is_on);
+    bool is_cold = by_vertices && is_alone;
     NPG_TRY(is_cold ? NPG_OK : open_samples(w));
     NPG_TRY(open_window(w, frames));
     w->dense = fit;
@@ -597,7 +589,7 @@ npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *fram
     w->steps = steps_of(w, is_cold);
     npg_status status = is_cold ? solve_cold(w) : solve_warm(w, window);
     w->is_resumed = false;
-    if (!status && is_first && w->settings.is_on) status = npg_fit_copy_take(&w->first, fit);
+    if (!status && is_first) status = npg_fit_copy_take(&w->first, fit);
     close_window(w);
     return status;
 }
@@ -618,7 +610,7 @@ npg_status npg_warm_save(npg_warm *w, npg_archive_writer *archive)
     if (!status && w->probe) status = npg_fit_copy_take(&copy, w->probe);
     if (!status && w->probe) status = npg_fit_copy_save(&copy, archive, "inside.probe");
     npg_fit_copy_clear(&copy);
-    return status ? status : npg_fit_least_save(npg_fit_open_least(w->dense), archive);
+    return status;
 }
 
 static npg_status restore_fit(npg_fit *fit, const npg_archive *archive, const char *block)
@@ -654,7 +646,6 @@ npg_status npg_warm_restore(npg_warm *w, npg_fit *fit, const npg_archive *archiv
     NPG_TRY(npg_archive_get(archive, "inside", &w->at, sizeof w->at));
     NPG_TRY(restore_fit(fit, archive, "inside.fit"));
     NPG_TRY(restore_poses(w, archive));
-    NPG_TRY(npg_fit_least_load(npg_fit_open_least(fit), archive));
     w->is_resumed = true;
     return NPG_OK;
 }
@@ -664,13 +655,12 @@ npg_status npg_warm_restore(npg_warm *w, npg_fit *fit, const npg_archive *archiv
 #define UNITS         2 /* as window.c has it */
 #define SURFACE_BYTES 400
 
-size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings *fit,
-                       const npg_match_settings *match, size_t samples, size_t vert_count, size_t frames)
+size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings *fit, size_t vert_count,
+                       size_t frames)
 {
-    size_t all = samples ? samples : SAMPLES, count = all + all / 10 + 16;
-    if (!settings->is_on) return 0;
+    size_t all = settings->samples ? (size_t)settings->samples : SAMPLES, count = all + all / 10 + 16;
     if (count > vert_count) count = vert_count;
-    size_t pulls = frames * ((size_t)match->points + 2 * count) * sizeof(npg_pull);
+    size_t pulls = frames * ((size_t)settings->match.points + 2 * count) * sizeof(npg_pull);
     size_t wide = settings->distance == NPG_DISTANCE_SURFACE ? 2 : 0, vector = 3 * sizeof(float);
     return 2 * npg_fit_memory(fit, count, frames, 0, UNITS) + 2 * pulls + 2 * frames * count * vector +
            wide * frames * vert_count * vector + vert_count * (sizeof(npg_carrier) + vector) +

@@ -24,8 +24,10 @@ typedef enum npg_distance {
 } npg_distance;
 
 typedef struct npg_warm_settings {
-    bool is_on;   /* else each window simply goes on from the one solved before, as window 0 */
-    int distance; /* npg_distance                                                           */
+    int distance;    /* npg_distance                                   */
+    int64_t samples; /* of the reference, 0: the usual number          */
+    int64_t rounds;  /* times that the last fit by the surface is matched */
+    npg_match_settings match;
 } npg_warm_settings;
 
 /* The frames of a window as the solver has them, in order of time; loans. */
@@ -41,16 +43,14 @@ typedef struct npg_warm npg_warm;
 /* Called between steps from which the window's fit could be continued: it may save that (npg_warm_save). */
 typedef npg_status npg_warm_keep(void *user);
 
-/* samples: of the reference, 0 for the usual number; rounds: times that the last fit by the surface is
- * matched.  device and facts outlive it. */
+/* device and facts outlive it. */
 npg_status npg_warm_open(npg_warm **warm, npg_device *device, const npg_warm_settings *settings,
-                         const npg_fit_settings *fit, const npg_match_settings *match, size_t samples,
-                         int64_t rounds, const npg_facts *facts, uint64_t seed);
+                         const npg_fit_settings *fit, const npg_facts *facts, uint64_t seed);
 void npg_warm_close(npg_warm **warm);
 
 /* Bytes that it takes at most. */
-size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings *fit,
-                       const npg_match_settings *match, size_t samples, size_t vert_count, size_t frames);
+size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings *fit, size_t vert_count,
+                       size_t frames);
 
 /* keep gets the user of npg_warm_solve. */
 void npg_warm_set_keep(npg_warm *warm, npg_warm_keep *keep);

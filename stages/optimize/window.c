@@ -72,8 +72,7 @@ npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
     npg_status status = is_aligned ? npg_joint_window_open(&s->joint, facts->reference, &s->settings.joint)
                                    : npg_fit_open(&s->fit, device, &s->settings.fit, facts->reference, seed);
     if (!status && !is_aligned)
-        status = npg_warm_open(&s->warm, device, &s->settings.warm, &s->settings.fit, &s->settings.match,
-                               (size_t)settings->samples, settings->rounds, facts, seed);
+        status = npg_warm_open(&s->warm, device, &s->settings.warm, &s->settings.fit, facts, seed);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
@@ -88,8 +87,7 @@ size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, s
     size_t solved = frames * vert_count * vector, clouds = frames * points * vector;
     if (is_aligned) return solved + clouds + npg_joint_window_memory(&settings->joint, vert_count, frames);
     return solved + clouds + npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS) +
-           npg_warm_memory(&settings->warm, &settings->fit, &settings->match, (size_t)settings->samples,
-                           vert_count, frames);
+           npg_warm_memory(&settings->warm, &settings->fit, vert_count, frames);
 }
 
 /* ---- the window's frames ---- */
@@ -106,7 +104,9 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
     return NPG_OK;
 }
 
-double npg_window_time(const npg_plan *plan, double span, double index)
+/* What the time code is a function of: the absolute frame with a fixed period, the length of the first
+ * window, so that frames which two windows share mean the same to both.  That window goes from 0 to span. */
+static double time_of(const npg_plan *plan, double span, double index)
 {
     npg_window first = npg_plan_key_window(plan);
     int64_t length = first.last - first.first;
@@ -120,11 +120,11 @@ static npg_status open_frames(npg_window_solver *s, npg_held *const *held)
     NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, s->count * verts, 3 * sizeof(float)));
     for (size_t i = 0; i < s->count; i++) {
         const npg_frame *frame = &held[i]->frame;
-        s->frames[i] = (npg_fit_frame){
-            .index = frame->index,
-            .time = npg_window_time(&s->facts->plan, s->settings.fit.time_span, (double)frame->index),
-            .points = s->points + 3 * s->point_start[i],
-            .count = frame->point_count};
+        s->frames[i] =
+            (npg_fit_frame){.index = frame->index,
+                            .time = time_of(&s->facts->plan, s->settings.fit.time_span, (double)frame->index),
+                            .points = s->points + 3 * s->point_start[i],
+                            .count = frame->point_count};
     }
     return NPG_OK;
 }

@@ -8,18 +8,13 @@
 
 #include "optimize/fit.h"
 #include "optimize/joint.h"
-#include "optimize/match.h"
 #include "optimize/warm_start.h"
 #include "pipeline/stage.h"
 
 typedef struct npg_window_settings {
     npg_fit_settings fit;     /* its epochs are the steps of aligned frames' fit, too */
     npg_joint_settings joint; /* its steps are filled in from there                   */
-    /* without alignment */
-    npg_match_settings match;
-    int64_t samples; /* 0: the usual number        */
-    int64_t rounds;  /* times the matches are made */
-    npg_warm_settings warm;
+    npg_warm_settings warm;   /* without alignment                                    */
 } npg_window_settings;
 
 /* A frame in hand. */
@@ -53,13 +48,7 @@ void npg_window_set_noise(npg_window_solver *solver, double noise);
 /* Windows without alignment (warm_start.h); NULL for aligned frames.  A loan. */
 npg_warm *npg_window_warm(npg_window_solver *solver);
 
-/* What the time code is a function of: the absolute frame with a fixed period,
- * the length of the first window, so that frames which two windows share mean the same to both.  That window
- * goes from 0 to span.  Moments between frames have times, too. */
-double npg_window_time(const npg_plan *plan, double span, double index);
-
-/* How much a window says of a frame, or of a moment between two, against what the windows before it have
- * said: 1 where it is the first to solve, less the farther into the overlap, 0 on the first frame outside. */
+/* How much a window says of a frame against what the windows before it have said: 1 where it is the first to solve, less the farther into the overlap, 0 on the first frame outside. */
 double npg_window_share(const npg_window *window, double index);
 
 /* Solve a window: held[i] are its frames in order of time; fills `solved` of each. */

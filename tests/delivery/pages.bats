@@ -93,7 +93,7 @@ copy_tree() { # FOLDER
 
 @test "every option that a page names is one of the command or of a script" {
     for verb in run batch append apply probe eval synth render view bench doctor man; do "$NEUPIG" help $verb; done >known
-    for script in explore plot_explore figures paper_tables; do "$root/tools/$script.py" --help; done >>known
+    for script in explore plot_explore figures; do "$root/tools/$script.py" --help; done >>known
     # of CMake, CTest, pip, bats and others
     echo "--build --target --install --prefix --preset --config --test-dir --output-on-failure --system-site-packages --array" >>known
     echo "--cflags --libs --list --clean --filter --tests --fast" >>known
@@ -141,11 +141,6 @@ copy_tree() { # FOLDER
     tree/tools/figures.py --write-pages
     tree/tools/figures.py --check
     grep -q '9\.87' tree/README.md
-}
-
-@test "the page of the paper's tables is what its file says" {
-    command -v python3 >/dev/null || skip "python3 is not installed"
-    "$root/tools/paper_tables.py" --check
 }
 
 @test "figures are measured once, on captures that are at hand, and measuring resumes" {

@@ -10,7 +10,6 @@
 #include <stdlib.h>
 
 #include "evaluate/evaluate_shape.h"
-#include "evaluate/evaluate_truth.h"
 #include "export/forms/writer.h"
 #include "mesh/unseen.h"
 #include "tests/support/group_folder.h"
@@ -296,7 +295,6 @@ static void distances_are_those_that_were_made(void **state)
         assert_true(f->vertex_dist_mean >= gap - 1e-6);
         assert_true(f->coverage == 1);
         assert_true(f->flipped_share == 0 && f->stretched_share == 0 && f->edge_change < 1e-5);
-        assert_true(isnan(f->truth_cd) && isnan(f->truth_corr));
         assert_true(f->good);
     }
     assert_true(s.figures[2].chamfer > 1e5 * pow(0.05 / s.diagonal, 2));
@@ -459,55 +457,6 @@ static void a_vertex_that_is_not_finite_is_a_failure(void **state)
     assert_non_null(strstr(last_text, "frame 1: vertex 33"));
 }
 
-/* ---- truth ---- */
-
-static void write_truth(const char *name, double shift)
-{
-    npg_mesh *sphere;
-    static double world[3 * VERTS];
-    assert_int_equal(open_sphere(&sphere), NPG_OK);
-    for (size_t i = 0; i < 3 * VERTS; i++) world[i] = (double)sphere->vert_pos[i] + (i % 3 == 0 ? shift : 0);
-    npg_mesh_view view = {
-        .vert_count = VERTS, .face_count = FACES, .vert_world = world, .faces = sphere->faces};
-    assert_int_equal(npg_write_mesh(in_folder(&folder, name), &view), NPG_OK);
-    npg_mesh_unref(&sphere);
-}
-
-static void a_truth_gives_the_papers_figures(void **state)
-{
-    (void)state;
-    scene s = plain_scene();
-    write_truth("truth_0000.ply", 0);
-    write_truth("truth_0001.ply", 0.1);
-    const char *const settings[][2] = {{"truth", folder.path}, {NULL, NULL}};
-    assert_int_equal(run_scene(&s, settings), NPG_OK);
-    double diagonal = 2 * sqrt(3.0);
-    assert_true(s.figures[0].truth_cd >= 0 && s.figures[0].truth_cd < 5);
-    assert_true(s.figures[0].truth_f > 0.95 && s.figures[0].truth_nc > 0.98);
-    assert_true(s.figures[0].truth_corr < 1e-6);
-    assert_true(is_near(s.figures[1].truth_corr, 0.1 / diagonal, 1e-4));
-    assert_true(s.figures[1].truth_cd > 10 && s.figures[1].truth_f < 0.7);
-    assert_true(isnan(s.figures[2].truth_cd)); /* there is no truth_0002 */
-}
-
-static void a_truth_that_is_none_is_refused(void **state)
-{
-    (void)state;
-    scene s = plain_scene();
-    const char *const missing[][2] = {{"truth", in_folder(&folder, "nowhere")}, {NULL, NULL}};
-    assert_int_equal(run_scene(&s, missing), NPG_BAD_INPUT);
-    mkdir(in_folder(&folder, "empty"), 0777);
-    const char *const empty[][2] = {{"truth", in_folder(&folder, "empty")}, {NULL, NULL}};
-    assert_int_equal(run_scene(&s, empty), NPG_BAD_INPUT);
-    assert_non_null(strstr(last_text, "empty"));
-    mkdir(in_folder(&folder, "twice"), 0777);
-    write_text_file(in_folder(&folder, "twice/a_1.obj"), "");
-    write_text_file(in_folder(&folder, "twice/b_01.obj"), "");
-    const char *const twice[][2] = {{"truth", in_folder(&folder, "twice")}, {NULL, NULL}};
-    assert_int_equal(run_scene(&s, twice), NPG_BAD_INPUT);
-    assert_non_null(strstr(last_text, "same number"));
-}
-
 static void no_memory_is_said(void **state)
 {
     (void)state;
@@ -543,8 +492,6 @@ int main(void)
         cmocka_unit_test(bad_frames_make_a_partial_run),
         cmocka_unit_test(fewer_points_give_nearly_the_same),
         cmocka_unit_test(a_vertex_that_is_not_finite_is_a_failure),
-        cmocka_unit_test(a_truth_gives_the_papers_figures),
-        cmocka_unit_test(a_truth_that_is_none_is_refused),
         cmocka_unit_test(no_memory_is_said),
     };
     return cmocka_run_group_tests(tests, open_folder, close_folder);

@@ -70,7 +70,7 @@ static npg_status give_mesh(npg_facts *facts, npg_frame *frame)
     npg_box_local_to_unit(&facts->box, frame->vert_unit, frame->pos_local, 4);
     frame->vert_count = 4;
     frame->fields |= NPG_FIELD_VERTICES | NPG_FIELD_FIGURES;
-    frame->figures = (npg_figures){.coverage = 0.75, .truth_cd = (double)NAN, .good = true};
+    frame->figures = (npg_figures){.coverage = 0.75, .chamfer = (double)NAN, .good = true};
     return NPG_OK;
 }
 
@@ -173,7 +173,7 @@ static void the_list_is_in_the_order_of_time(void **state)
         assert_true(json_is_true(json_object_get(frame, "good")));
         json_t *figures = json_object_get(frame, "figures");
         assert_true(json_real_value(json_object_get(figures, "coverage")) == 0.75);
-        assert_true(json_is_null(json_object_get(figures, "truth_cd")));
+        assert_true(json_is_null(json_object_get(figures, "chamfer")));
         const char *source = json_string_value(json_object_get(frame, "source"));
         assert_int_equal(source != NULL, t == 0);
         json_decref(frame);

@@ -3,7 +3,7 @@
 small=(--method '{"align": false, "width-1": 32, "width-2": 32, "poisson-depth": 5, "samples": 100,
                   "grid-levels": 3, "state-every": 0}' --faces 400 --bars residual=100,flipped=100
     --quiet)
-joint=(--method '{"window": 0, "epochs": 60, "deliver": "least"}')
+joint=(--method '{"window": 0, "epochs": 60}')
 warm=(--method '{"window": 5, "overlap": 2, "epochs": 30}')
 surface=(--method '{"preset": "grids", "window": 5, "overlap": 2, "epochs": 6}')
 
@@ -59,13 +59,6 @@ check_killed() {
 
 @test "windows by vertices that are killed inside give the same bytes" {
     check_killed warm "3 12" "${warm[@]}"
-}
-
-@test "a decoder of three hidden layers that is killed gives the same bytes" {
-    check_killed deep "4" "${joint[@]}" --method '{"hidden-layers": 3}'
-    run "$NEUPIG" run capture/points -o deep "${small[@]}" "${joint[@]}"
-    [ "$status" -eq 2 ]
-    [[ "$output" == *'option hidden-layers was "3" and is "2"'* ]]
 }
 
 @test "windows by the surface that are killed inside give the same bytes" {

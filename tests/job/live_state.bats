@@ -102,7 +102,7 @@ check_killed() {
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--method '{"align": false, "deliver": "last", "samples": 100, "state-every": 0, "epochs": 80}')
+    local free=(--method '{"align": false, "samples": 100, "state-every": 0, "epochs": 80}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
     for place in 1 2; do

@@ -24,7 +24,7 @@
 #     85     0.054    adam: second moment without its correction
 #
 # What it does not notice, as Adam forgives it: a bias with the wrong sign, half of the rows or of the channels, no derivative of
-# the latent tanh.  For these there is the comparison of every gradient with finite differences (tests/kernels/test_kernels.c).
+# the latent tanh.  For these there is the comparison of every gradient with finite differences (tests/kernels/test_gradients.c).
 
 setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
 

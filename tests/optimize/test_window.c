@@ -14,11 +14,11 @@
 #include "kernels/check.h"
 #include "kernels/latent.h"
 #include "kernels/mlp.h"
-#include "optimize/fit_least.h"
 #include "optimize/match.h"
 #include "optimize/window.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_device.h"
+#include "tests/support/slope.h"
 
 enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 3 };
 
@@ -42,7 +42,7 @@ static double tied_loss(void *user)
     tied *t = user;
     for (size_t s = 0; s < t->samples; s++) {
         npg_mlp_forward_ref(t->out + 7 * s, t->z + NPG_LATENT_CHANNELS * s, t->code, t->params, &t->shape);
-        npg_transform_ref(t->x + 3 * s, t->out + 7 * s, t->base_wide + 3 * s, NPG_ROTATION_QUATERNION);
+        npg_transform_ref(t->x + 3 * s, t->out + 7 * s, t->base_wide + 3 * s);
     }
     return npg_pull_ref(t->g, t->x, t->samples, t->pulls, t->pull_count);
 }
@@ -52,8 +52,7 @@ static void tied_slopes(tied *t)
 {
     for (size_t s = 0; s < t->samples; s++) {
         double dout[7] = {0};
-        npg_transform_back_ref(dout, t->g + 3 * s, t->out + 7 * s, t->base_wide + 3 * s,
-                               NPG_ROTATION_QUATERNION);
+        npg_transform_back_ref(dout, t->g + 3 * s, t->out + 7 * s, t->base_wide + 3 * s);
         npg_mlp_backward_ref(t->grad, t->dz + NPG_LATENT_CHANNELS * s, t->dcode, dout,
                              t->z + NPG_LATENT_CHANNELS * s, t->code, t->params, &t->shape);
     }
@@ -76,7 +75,7 @@ static void open_tied(tied *t, npg_mesh *ball)
     const npg_match_settings match = {200, 0.02, 0.5, 5000, 0.7};
     npg_random random = npg_random_stream(11, 0, 0);
     float dense[3 * VERTS], before[3 * VERTS];
-    *t = (tied){.shape = {32, 64, 3, 4, 0.01f}};
+    *t = (tied){.shape = {32, 64, 4}};
     assert_int_equal(npg_carry_open(&t->carry, ball, 60, 0), 0);
     assert_int_equal(npg_matcher_open(&t->matcher, t->carry, &match), 0);
     size_t s = t->samples = t->carry->samples->mesh->vert_count;
@@ -138,9 +137,9 @@ static void gradients_through_the_ties_are_slopes(void **state)
     open_tied(&t, ball);
     assert_true(tied_loss(&t) > 1);
     tied_slopes(&t);
-    npg_check_slope(&error, t.params, t.grad, t.param_count, 7, 1e-6, tied_loss, &t);
-    npg_check_slope(&error, t.z, t.dz, t.samples * NPG_LATENT_CHANNELS, 13, 1e-6, tied_loss, &t);
-    npg_check_slope(&error, t.code, t.dcode, 4, 1, 1e-6, tied_loss, &t);
+    check_slope(&error, t.params, t.grad, t.param_count, 7, 1e-6, tied_loss, &t);
+    check_slope(&error, t.z, t.dz, t.samples * NPG_LATENT_CHANNELS, 13, 1e-6, tied_loss, &t);
+    check_slope(&error, t.code, t.dcode, 4, 1, 1e-6, tied_loss, &t);
     print_message("ties: gradient off by %.2g\n", error);
     assert_true(error < 1e-5);
     close_tied(&t);
@@ -157,8 +156,7 @@ static npg_status device_slopes(tied *t, npg_mlp *mlp, npg_motion *motion)
     size_t rows = npg_mlp_rows(device, t->samples);
     float row[NPG_LATENT_CHANNELS], code[4], *params;
     NPG_TRY(npg_mlp_open(mlp, device, &t->shape, rows, 1, 1));
-    NPG_TRY(npg_motion_open(motion, device, NPG_ROTATION_QUATERNION, t->base, t->samples, rows, edges, 1,
-                            NULL, 1));
+    NPG_TRY(npg_motion_open(motion, device, t->base, t->samples, rows, edges, 1, NULL, 1));
     NPG_TRY(npg_alloc_array(&params, NPG_FOR_RUN, t->param_count, sizeof *params));
     for (size_t i = 0; i < t->param_count; i++) params[i] = (float)t->params[i];
     npg_status status = npg_buffer_write(&mlp->params, 0, params, t->param_count * sizeof *params);
@@ -223,15 +221,12 @@ static const npg_fit_settings small = {.epochs = 12,
                                        .grid_rate = 0.005,
                                        .grid_rate_growth = 2.5,
                                        .mlp_rate = 1e-3,
-                                       .slope = 0.01,
                                        .isometry = 5,
                                        .alpha = 0.3,
                                        .width_1 = 32,
                                        .width_2 = 32,
-                                       .hidden_layers = 2,
                                        .rate_end = 0.1,
-                                       .feature_start = 3,
-                                       .batch = 2};
+                                       .feature_start = 3};
 
 static void the_warm_start_is_exact_on_the_overlap(void **state)
 {
@@ -262,69 +257,6 @@ static void the_warm_start_is_exact_on_the_overlap(void **state)
     print_message("moved by %.2g, another start by %.2g\n", (double)moved, (double)worst);
     assert_true(moved > 1e-3f && worst < 1e-6f);
     npg_fit_close(&fit);
-    npg_mesh_unref(&ball);
-}
-
-typedef struct seen {
-    npg_fit_step steps[100];
-    size_t count;
-} seen;
-
-static npg_status note(void *user, const npg_fit_step *step)
-{
-    seen *s = user;
-    s->steps[s->count++] = *step;
-    return NPG_OK;
-}
-
-/* Runs a fit of the first `end` of 40 epochs that overshoot, and takes the vertices of its last frame. */
-static void overshoot(npg_mesh *ball, npg_deliver deliver, npg_time_kind time_code, int64_t end, seen *s,
-                      float *verts, npg_fit_step *result)
-{
-    npg_fit_settings settings = small;
-    npg_fit *fit;
-    npg_fit_frame frames[FRAMES];
-    float points[FRAMES][3 * VERTS];
-    settings.epochs = 40;
-    settings.rate_end = 1;
-    settings.mlp_rate = 0.03;
-    settings.deliver = deliver;
-    settings.time_code = time_code;
-    for (int i = 0; i < FRAMES; i++) {
-        pose_ball(points[i], ball->vert_pos, VERTS, i);
-        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL, NULL};
-    }
-    assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
-    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
-    assert_int_equal(npg_fit_run(fit, 0, end, s ? note : NULL, s), 0);
-    assert_int_equal(npg_fit_vertices(fit, verts, FRAMES - 1), 0);
-    assert_true((npg_fit_result(fit) != NULL) == (deliver == NPG_DELIVER_LEAST));
-    if (npg_fit_result(fit)) *result = *npg_fit_result(fit);
-    npg_fit_close(&fit);
-}
-
-/* The result is the state with the least loss: that of a run that stops there, byte by byte. */
-static void a_fit_ends_with_its_least_loss(void **state)
-{
-    npg_mesh *ball = ball_mesh(RINGS, SPOKES);
-    (void)state;
-    for (int kind = 0; kind < 2; kind++) {
-        npg_time_kind code = kind ? NPG_TIME_LEARNED : NPG_TIME_FOURIER;
-        seen s = {.count = 0};
-        npg_fit_step result, none;
-        float verts[3 * VERTS], again[3 * VERTS], last[3 * VERTS];
-        overshoot(ball, NPG_DELIVER_LEAST, code, 40, &s, verts, &result);
-        print_message("kept after %d steps: chamfer %.4g; last step's %.4g\n", (int)result.epoch,
-                      result.chamfer, s.steps[39].chamfer);
-        assert_int_equal(s.count, 40);
-        for (size_t e = 0; e < s.count; e++)
-            assert_true(npg_fit_plain_loss(&s.steps[e], 5) >= npg_fit_plain_loss(&result, 5));
-        assert_true(result.epoch > 0 && result.epoch < 40); /* or the settings no longer overshoot */
-        overshoot(ball, NPG_DELIVER_LAST, code, result.epoch, NULL, again, &none);
-        overshoot(ball, NPG_DELIVER_LAST, code, 40, NULL, last, &none);
-        assert_memory_equal(verts, again, sizeof verts);
-        assert_memory_not_equal(verts, last, sizeof verts);
-    }
     npg_mesh_unref(&ball);
 }
 
@@ -438,7 +370,6 @@ int main(void)
         cmocka_unit_test(gradients_through_the_ties_are_slopes),
         cmocka_unit_test(the_device_has_the_same_gradient),
         cmocka_unit_test(the_warm_start_is_exact_on_the_overlap),
-        cmocka_unit_test(a_fit_ends_with_its_least_loss),
         cmocka_unit_test(a_window_has_its_share_of_solved_frames),
         cmocka_unit_test(where_the_surface_is_does_not_matter),
     };

@@ -138,8 +138,7 @@ await() {
     "$NEUPIG" synth --body bar --frames 24 --points 600 -o loop >loop.log
     for times in 1 5; do # there and back, so that nothing leaps
         for i in $(seq $times); do cat loop/points/*.ply $(ls -r loop/points/*.ply); done |
-            "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "grid-levels": 3, "align": false,
-        "deliver": "last"}' >long.log
+            "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "grid-levels": 3, "align": false}' >long.log
     done
     short=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long1/report.json)
     long=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long5/report.json)

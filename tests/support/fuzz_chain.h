@@ -13,7 +13,6 @@ static const npg_option fuzz_options[] = {
     NPG_ROW_FLAG  ("flag",      0,       "no", ""),
     NPG_ROW_CHOICE("choice",    0,       "one",   "one|two|three", ""),
     NPG_ROW_TEXT  ("text",      0,       "",      NULL, ""),
-    NPG_ROW_TEXT  ("truth",     0,       "",      NULL, ""),
     {0}};
 /* clang-format on */
 

@@ -161,9 +161,12 @@ EOF
     run "$NEUPIG" probe in --no-align
     [ "$status" -eq 2 ]
     [[ "$output" == *"--method '{\"align\": false}'"* ]]
+    run "$NEUPIG" run in -o out --catch-up=linear
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"--method '{\"catch-up\": \"linear\"}'"* ]]
     run "$NEUPIG" run in -o out --rotation=cayley
     [ "$status" -eq 2 ]
-    [[ "$output" == *"--method '{\"rotation\": \"cayley\"}'"* ]]
+    [[ "$output" == *"went: "*quaternion* ]]
     run "$NEUPIG" run in -o out --pull
     [ "$status" -eq 2 ]
     [[ "$output" == *"for programs"* ]]

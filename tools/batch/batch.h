@@ -77,9 +77,8 @@ npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char
                               const npg_batch_given *given);
 
 /* Where frames lie in a folder of a capture: its sub-folder points/, point_clouds/, points_clouds/ or
- * pcl_seqs/ when that holds any, else the folder; only meshes in gt/: that.  Sets the option "truth" to the
- * sub-folder truth/ or gt/ unless it is set or is the input.  *input is to be given to npg_release().
- * NPG_BAD_INPUT: one of these sub-folders leads out of the folder, and is_confined. */
+ * pcl_seqs/ when that holds any, else the folder; only meshes in truth/ or gt/: that.  *input is to be given to
+ * npg_release().  NPG_BAD_INPUT: one of these sub-folders leads out of the folder, and is_confined. */
 npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *folder, bool is_confined);
 
 /* An absolute path of `text` seen from `folder`; to be given to npg_release(). */

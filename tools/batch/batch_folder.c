@@ -83,8 +83,6 @@ npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *
     char *truth;
     NPG_TRY(find_first(&truth, &in, truths, MESH_ENDINGS));
     npg_status status = find_input(input, &capture->of_mesh_vertices, &in, truth);
-    if (!status && truth && !npg_options_is_set(capture->options, "truth"))
-        status = npg_options_set(capture->options, "truth", truth);
     npg_release(&truth);
     if (status) npg_release(input);
     return status;

@@ -43,7 +43,7 @@ static npg_status folder_of(char **out, const char *path)
 
 static bool is_path(const char *key)
 {
-    return !strcmp(key, "reference") || !strcmp(key, "truth");
+    return !strcmp(key, "reference");
 }
 
 static npg_status set_path(const manifest *m, npg_options *options, const char *key, const json_t *value)

@@ -235,8 +235,7 @@ static double aligned_s(const npg_probe *probe, const npg_options *options, doub
 static double network_s(const npg_options *options, double vertex_frames, double cores)
 {
     double flops =
-        npg_cost_decoder_flops(number_of(options, "width-1", 512), number_of(options, "width-2", 512),
-                               number_of(options, "hidden-layers", 2));
+        npg_cost_decoder_flops(number_of(options, "width-1", 512), number_of(options, "width-2", 512));
     return npg_cost_network_s(vertex_frames * number_of(options, "epochs", 250) * flops,
                               cores * NPG_COST_CORE_FLOPS);
 }

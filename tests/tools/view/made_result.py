@@ -26,7 +26,7 @@ def line_of(i):
     error = 0.0005 + 0.0001 * (i % 7) / 3
     figures = {"point_dist_median": 0.0061 if i == 3 else error, "point_dist_mean": 1.3 * error,
                "point_dist_p95": 3 * error, "vertex_dist_mean": 0.004, "coverage": 0.97, "flipped_share": 0.0, "stretched_share": 0.0,
-               "edge_change": 0.02, "chamfer": 1.8, "truth_cd": None}
+               "edge_change": 0.02, "chamfer": 1.8}
     line = {"index": i, "number": i, "source": str(capture / "points" / meshes[i].name), "key": i == key,
             "skipped": i == count - 2, "held": False, "points": 600, "good": i not in (3, count - 2),
             "figures": figures, "file": f"meshes/{meshes[i].name}"}

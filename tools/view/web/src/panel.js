@@ -39,7 +39,6 @@ function frameRows(frame) {
     rows.push(["Flipped faces", percent(f.flipped_share, 2)]);
     rows.push(["Stretched faces", percent(f.stretched_share, 2)]);
     rows.push(["Edges changed by", percent(f.edge_change)]);
-    if (typeof f.truth_cd === "number") rows.push(["CD to the truth", f.truth_cd.toPrecision(4)]);
     return rows;
 }
 
