@@ -1,12 +1,9 @@
 /* neupig render: meshes and clouds to a PNG, without a display. */
-#include <math.h>
 #include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
 
+#include "export/export.h"
 #include "tools/cli.h"
 #include "tools/listing.h"
-#include "tools/render/render_image.h"
 
 typedef struct settings {
     const char *output;
@@ -48,28 +45,6 @@ const npg_option npg_render_options[] = {
     {0}};
 /* clang-format on */
 
-#define PIXELS_MAX ((int64_t)1 << 28) /* 768 MiB of colours */
-
-typedef struct job {
-    settings s;
-    npg_listing files;
-    npg_origin origin;
-    npg_bounds reach; /* along the eye's axes */
-    npg_eye eye;
-    npg_image image;
-    npg_mesh *first; /* the first file's mesh, for identity colours */
-    int64_t columns, tile_width;
-} job;
-
-static void turn_eye(npg_eye *eye, const settings *s)
-{
-    static const double angles[][2] = {{0, 0}, {0, 0}, {180, 0}, {-90, 0}, {90, 0}, {0, 90}, {0, -90}};
-    if (s->view)
-        npg_eye_turn(eye, angles[s->view][0], angles[s->view][1], s->up + 1);
-    else
-        npg_eye_turn(eye, s->azimuth, s->elevation, s->up + 1);
-}
-
 static void thin_out(npg_listing *files, size_t count)
 {
     size_t all = files->count;
@@ -84,65 +59,45 @@ static void thin_out(npg_listing *files, size_t count)
     files->count = count;
 }
 
-static npg_status list_files(job *j, const npg_cli *cli)
+static npg_status list_files(npg_listing *files, const settings *s, const npg_cli *cli)
 {
     static const char endings[] = ".ply .obj .xyz .xyzn .txt .pts .npy .pcd";
-    if (!j->s.output[0]) return npg_error(NPG_USAGE, "no picture to write; say where with -o FILE.png");
-    for (int i = 0; i < cli->operand_count; i++)
-        NPG_TRY(npg_listing_add(&j->files, cli->operands[i], endings));
-    thin_out(&j->files, (size_t)j->s.count);
-    for (size_t i = 0; i < j->files.count; i++)
-        NPG_TRY(npg_scene_measure(&j->reach, j->files.paths[i], &j->origin, j->eye.axes));
-    if (!(j->reach.lo[0] <= j->reach.hi[0]))
-        return npg_error(NPG_BAD_INPUT, "%s: nothing to draw", j->files.paths[0]);
+    if (!s->output[0]) return npg_error(NPG_USAGE, "no picture to write; say where with -o FILE.png");
+    for (int i = 0; i < cli->operand_count; i++) NPG_TRY(npg_listing_add(files, cli->operands[i], endings));
+    thin_out(files, (size_t)s->count);
     return NPG_OK;
 }
 
-static npg_status lay_out(job *j)
+static npg_status draw(const npg_listing *files, const settings *s)
 {
-    const int64_t count = (int64_t)j->files.count;
-    double aspect = j->s.width ? (double)j->s.width / (double)j->s.height : 0;
-    npg_eye_fit(&j->eye, &aspect, &j->reach);
-    j->tile_width = j->s.width ? j->s.width : (int64_t)lrint((double)j->s.height * aspect);
-    j->columns = j->s.columns ? j->s.columns : 8;
-    if (j->columns > count) j->columns = count;
-    int64_t rows = (count + j->columns - 1) / j->columns, width = j->columns * j->tile_width;
-    if (width * rows * j->s.height > PIXELS_MAX)
-        return npg_error(NPG_USAGE,
-                         "the picture would have %lld x %lld pixels; choose a smaller --height or --count",
-                         (long long)width, (long long)(rows * j->s.height));
-    return npg_image_open(&j->image, width, rows * j->s.height);
-}
-
-static npg_status draw_tile(job *j, size_t i)
-{
-    npg_scene scene;
-    int64_t column = (int64_t)i % j->columns, row = (int64_t)i / j->columns;
-    double radius = 0.01 * j->s.point_size * npg_bounds_diagonal(&j->reach);
-    NPG_TRY(npg_scene_open(&scene, j->files.paths[i], &j->origin, radius, j->s.colour, j->first));
-    if (!j->first && !scene.ball_middle) j->first = npg_mesh_ref(scene.mesh);
-    if (scene.shown < scene.total)
-        fprintf(stderr, "neupig render: %s: drawing %zu of %zu points\n", j->files.paths[i], scene.shown,
-                scene.total);
-    npg_status status = npg_image_draw(&j->image, &scene, &j->eye, column * j->tile_width, row * j->s.height,
-                                       j->tile_width, j->s.height, j->s.samples);
-    npg_scene_close(&scene);
-    return npg_error_prefix(status, "%s", j->files.paths[i]);
+    /* as the words of --view */
+    static const double angles[][2] = {{0, 0}, {0, 0}, {180, 0}, {-90, 0}, {90, 0}, {0, 90}, {0, -90}};
+    const npg_picture_settings all = {.width = s->width,
+                                      .height = s->height,
+                                      .columns = s->columns ? s->columns : 8,
+                                      .samples = s->samples,
+                                      .azimuth = s->view ? angles[s->view][0] : s->azimuth,
+                                      .elevation = s->view ? angles[s->view][1] : s->elevation,
+                                      .is_z_up = s->up,
+                                      .colour = s->colour,
+                                      .point_size = 0.01 * s->point_size};
+    npg_picture picture;
+    NPG_TRY(npg_picture_write(&picture, s->output, files->paths, files->count, &all));
+    if (picture.points_drawn < picture.points_total)
+        fprintf(stderr, "neupig render: drew %zu of %zu points\n", picture.points_drawn,
+                picture.points_total);
+    printf("%s: %lld x %lld\n", s->output, (long long)picture.width, (long long)picture.height);
+    return NPG_OK;
 }
 
 int npg_verb_render(int argc, char **argv)
 {
-    job j = {.reach = npg_bounds_empty()};
+    settings s;
+    npg_listing files = {0};
     npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &j.s, NULL, argc, argv);
-    if (!status) turn_eye(&j.eye, &j.s);
-    if (!status) status = list_files(&j, &cli);
-    if (!status) status = lay_out(&j);
-    for (size_t i = 0; i < j.files.count && !status; i++) status = draw_tile(&j, i);
-    if (!status) status = npg_image_write(&j.image, j.s.output);
-    if (!status) printf("%s: %lld x %lld\n", j.s.output, (long long)j.image.width, (long long)j.image.height);
-    npg_image_close(&j.image);
-    npg_mesh_unref(&j.first);
-    npg_listing_close(&j.files);
+    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
+    if (!status) status = list_files(&files, &s, &cli);
+    if (!status) status = draw(&files, &s);
+    npg_listing_close(&files);
     return npg_cli_end(argv[0], status);
 }

@@ -1,11 +1,9 @@
 /* Scenes to draw: a mesh, or a cloud as small balls, with colours. */
-#ifndef NPG_RENDER_SCENE_H
-#define NPG_RENDER_SCENE_H
+#ifndef NPG_PICTURE_SCENE_H
+#define NPG_PICTURE_SCENE_H
 
 #include "pipeline/frame_box.h"
 #include "pipeline/mesh.h"
-
-enum { NPG_COLOUR_PLAIN, NPG_COLOUR_VERTEX, NPG_COLOUR_NORMAL, NPG_COLOUR_IDENTITY }; /* words of --colour */
 
 typedef struct npg_scene {
     npg_mesh *mesh; /* what rays meet, with vertex normals; owned */
@@ -14,9 +12,6 @@ typedef struct npg_scene {
         *ball_middle; /* clouds: the middle of each ball, owned; ball b has faces 8 b .. 8 b + 7; else NULL */
     size_t shown, total; /* clouds: points drawn and points there */
 } npg_scene;
-
-/* Whether a file holds faces: a PLY that declares some, an OBJ with an f line. */
-npg_status npg_file_has_faces(bool *faces, const char *path);
 
 /* Read only what a file fills of the space, along three axes (rows of unit length); points that are not
  * finite are left out.  Added to *reach. */

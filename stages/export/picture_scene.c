@@ -1,5 +1,5 @@
 /* Scenes to draw: a mesh, or a cloud as small balls, with colours. */
-#include "tools/render/render_scene.h"
+#include "export/picture_scene.h"
 
 #include <errno.h>
 #include <math.h>
@@ -9,13 +9,15 @@
 #include <strings.h>
 #include <unistd.h>
 
+#include "export/picture.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
 
 enum { BALLS_MAX = 200000 }; /* points drawn at most: each is a mesh of 8 faces */
 
-npg_status npg_file_has_faces(bool *faces, const char *path)
+/* Whether a file holds faces: a PLY that declares some, an OBJ with an f line. */
+static npg_status has_faces(bool *faces, const char *path)
 {
     char line[512];
     const char *dot = strrchr(path, '.');
@@ -70,7 +72,7 @@ static npg_status read_cloud(npg_mesh **out, const char *path, npg_origin *origi
 
 static npg_status read_any(npg_mesh **mesh, bool *faces, const char *path, npg_origin *origin)
 {
-    NPG_TRY(npg_file_has_faces(faces, path));
+    NPG_TRY(has_faces(faces, path));
     if (!*faces) return read_cloud(mesh, path, origin);
     NPG_TRY(npg_read_mesh(mesh, path, origin));
     npg_status status = npg_mesh_require_finite(*mesh, path);

@@ -1,0 +1,264 @@
+/* Pictures: cameras that fit a box, tiles traced by rays, PNG files. */
+#include "export/picture.h"
+
+#include <math.h>
+#include <png.h>
+#include <string.h>
+
+#include "export/picture_scene.h"
+#include "geometry/geometry.h"
+#include "pipeline/file.h"
+
+#define RADIANS (3.14159265358979323846 / 180)
+
+#define PIXELS_MAX ((int64_t)1 << 28) /* 768 MiB of colours */
+
+static const float background[3] = {0.97f, 0.97f, 0.98f};
+
+typedef struct camera {
+    double position[3];
+    double axes[9];          /* rows of unit length: to the right, up, ahead      */
+    double slope_x, slope_y; /* half the picture's width and height at distance 1 */
+} camera;
+
+typedef struct drawing {
+    const npg_picture_settings *s;
+    npg_picture *picture;
+    char *const *files;
+    npg_origin origin;
+    npg_bounds reach; /* along the eye's axes */
+    camera eye;
+    npg_arena arena;
+    uint8_t *pixels; /* height x width x 3, RGB */
+    npg_ray *rays;   /* of one row of a tile    */
+    npg_ray_hit *hits;
+    npg_mesh *first; /* the first mesh, for identity colours */
+    int64_t columns, tile_width;
+} drawing;
+
+/* ---- camera ---- */
+
+static void turn_eye(camera *eye, const npg_picture_settings *s)
+{
+    double a = s->azimuth * RADIANS,
+           e = fmin(fmax(s->elevation, -89.9), 89.9) * RADIANS; /* at 90 nothing is right of the eye */
+    double back[3] = {sin(a) * cos(e), sin(e), cos(a) * cos(e)}, world_up[3] = {0, 1, 0};
+    double *right = eye->axes, *above = eye->axes + 3, *ahead = eye->axes + 6;
+    if (s->is_z_up) {
+        double z_up[3] = {back[0], -back[2], back[1]};
+        memcpy(back, z_up, sizeof back);
+        world_up[1] = 0;
+        world_up[2] = 1;
+    }
+    for (int k = 0; k < 3; k++) ahead[k] = -back[k];
+    npg_vec3_cross(right, ahead, world_up);
+    npg_vec3_make_unit(right);
+    npg_vec3_cross(above, right, ahead);
+}
+
+/* Place a turned eye so that all of `reach` is in the picture; *aspect is width / height of what it sees (in:
+ * 0 to choose it). */
+static void fit_eye(camera *eye, double *aspect, const npg_bounds *reach)
+{
+    /* 5 % are left around; the eye is 3 diagonals away, for little perspective. */
+    const double margin = 1.05, distances = 3.0;
+    double diagonal = fmax(npg_bounds_diagonal(reach), 1e-12), half[3], middle[3];
+    for (int k = 0; k < 3; k++) {
+        half[k] = 0.5 * (reach->hi[k] - reach->lo[k]);
+        middle[k] = 0.5 * (reach->hi[k] + reach->lo[k]);
+    }
+    middle[2] -= distances * diagonal;
+    for (int k = 0; k < 3; k++)
+        eye->position[k] =
+            middle[0] * eye->axes[k] + middle[1] * eye->axes[3 + k] + middle[2] * eye->axes[6 + k];
+    double nearest = distances * diagonal - half[2];
+    double slope_x = margin * fmax(half[0], 0.01 * diagonal) / nearest;
+    double slope_y = margin * fmax(half[1], 0.01 * diagonal) / nearest;
+    if (!(*aspect > 0)) *aspect = fmin(fmax(slope_x / slope_y, 0.25), 4); /* no strips */
+    eye->slope_y = fmax(slope_y, slope_x / *aspect);
+    eye->slope_x = eye->slope_y * *aspect;
+}
+
+/* ---- rays and shading ---- */
+
+static void aim(npg_ray *ray, const camera *eye, double x, double y)
+{
+    for (int k = 0; k < 3; k++) {
+        ray->origin[k] = (float)eye->position[k];
+        ray->direction[k] =
+            (float)(eye->axes[6 + k] + x * eye->slope_x * eye->axes[k] - y * eye->slope_y * eye->axes[3 + k]);
+    }
+    ray->t_min = 0;
+    ray->t_max = INFINITY;
+}
+
+static void shading_normal(double normal[3], const npg_scene *scene, const npg_ray_hit *hit)
+{
+    const npg_mesh *mesh = scene->mesh;
+    const uint32_t *face = mesh->faces + 3 * (size_t)hit->face;
+    for (int k = 0; k < 3; k++) {
+        normal[k] = 0;
+        for (int c = 0; c < 3; c++)
+            normal[k] +=
+                (double)hit->weights[c] * (double)mesh->vert_normals[3 * (size_t)face[c] + (size_t)k];
+    }
+    double length = sqrt(npg_vec3_dot(normal, normal));
+    for (int k = 0; k < 3 && length > 0; k++) normal[k] /= length;
+}
+
+/* A light from the upper left behind the eye and a weaker one from the eye;
+ * insides of surfaces are reddish.  Directions and weights were set by eye. */
+static void shade(float out[3], const npg_scene *scene, const camera *eye, const npg_ray_hit *hit)
+{
+    static const float inside[3] = {0.75f, 0.35f, 0.30f};
+    double normal[3], light[3];
+    bool is_back = hit->is_back && !scene->ball_middle;
+    shading_normal(normal, scene, hit);
+    if (npg_vec3_dot(normal, eye->axes + 6) > 0)
+        for (int k = 0; k < 3; k++) normal[k] = -normal[k];
+    for (int k = 0; k < 3; k++)
+        light[k] = -0.55 * eye->axes[k] + 0.65 * eye->axes[3 + k] - 0.55 * eye->axes[6 + k];
+    double key = fmax(npg_vec3_dot(normal, light) / sqrt(npg_vec3_dot(light, light)), 0),
+           head = fabs(npg_vec3_dot(normal, eye->axes + 6));
+    double amount = 0.16 + 0.62 * key + 0.26 * head;
+    const uint32_t *face = scene->mesh->faces + 3 * (size_t)hit->face;
+    for (size_t k = 0; k < 3; k++) {
+        double colour = 0;
+        for (size_t c = 0; c < 3; c++)
+            colour += (double)hit->weights[c] * (double)scene->colours[3 * (size_t)face[c] + k];
+        if (is_back) colour = (double)inside[k];
+        out[k] = (float)fmin(colour * amount, 1);
+    }
+}
+
+static npg_status draw_row(drawing *d, uint8_t *pixels, const npg_scene *scene, const npg_surface *surface,
+                           int64_t row)
+{
+    const int64_t width = d->tile_width, height = d->s->height, samples = d->s->samples;
+    for (int64_t i = 0; i < width * samples * samples; i++) {
+        int64_t sub = i % (samples * samples), column = i / (samples * samples);
+        double x = ((double)column + ((double)(sub % samples) + 0.5) / (double)samples) / (double)width;
+        double y = ((double)row + ((double)(sub / samples) + 0.5) / (double)samples) / (double)height;
+        aim(&d->rays[i], &d->eye, 2 * x - 1, 2 * y - 1);
+    }
+    NPG_TRY(npg_surface_rays(surface, d->hits, d->rays, (size_t)(width * samples * samples), 0));
+    for (int64_t column = 0; column < width; column++) {
+        float sum[3] = {0};
+        for (int64_t sub = 0; sub < samples * samples; sub++) {
+            const npg_ray_hit *hit = &d->hits[column * samples * samples + sub];
+            float colour[3] = {background[0], background[1], background[2]};
+            if (hit->face != UINT32_MAX) shade(colour, scene, &d->eye, hit);
+            for (int k = 0; k < 3; k++) sum[k] += colour[k];
+        }
+        for (int k = 0; k < 3; k++)
+            pixels[3 * column + k] = (uint8_t)lrintf(255 * sum[k] / (float)(samples * samples));
+    }
+    return NPG_OK;
+}
+
+/* The tile whose corner is at (left, top). */
+static npg_status draw_scene(drawing *d, const npg_scene *scene, int64_t left, int64_t top)
+{
+    npg_surface *surface = NULL;
+    const npg_mesh *mesh = scene->mesh;
+    npg_status status =
+        npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
+    for (int64_t row = 0; row < d->s->height && !status; row++)
+        status = draw_row(d, d->pixels + 3 * ((top + row) * d->picture->width + left), scene, surface, row);
+    npg_surface_close(&surface);
+    return status;
+}
+
+static npg_status draw_tile(drawing *d, size_t i)
+{
+    npg_scene scene;
+    npg_picture *p = d->picture;
+    int64_t column = (int64_t)i % d->columns, row = (int64_t)i / d->columns;
+    double radius = d->s->point_size * npg_bounds_diagonal(&d->reach);
+    NPG_TRY(npg_scene_open(&scene, d->files[i], &d->origin, radius, d->s->colour, d->first));
+    if (!d->first && !scene.ball_middle) d->first = npg_mesh_ref(scene.mesh);
+    if (scene.total > p->points_total) {
+        p->points_total = scene.total;
+        p->points_drawn = scene.shown;
+    }
+    npg_status status = draw_scene(d, &scene, column * d->tile_width, row * d->s->height);
+    npg_scene_close(&scene);
+    return npg_error_prefix(status, "%s", d->files[i]);
+}
+
+/* ---- the picture ---- */
+
+static npg_status lay_out(drawing *d, int64_t count)
+{
+    const npg_picture_settings *s = d->s;
+    npg_picture *p = d->picture;
+    double aspect = s->width ? (double)s->width / (double)s->height : 0;
+    fit_eye(&d->eye, &aspect, &d->reach);
+    d->tile_width = s->width ? s->width : (int64_t)lrint((double)s->height * aspect);
+    d->columns = s->columns < count ? s->columns : count;
+    p->width = d->columns * d->tile_width;
+    p->height = (count + d->columns - 1) / d->columns * s->height;
+    if (p->width * p->height > PIXELS_MAX)
+        return npg_error(NPG_USAGE,
+                         "the picture would have %lld x %lld pixels; choose a smaller --height or --count",
+                         (long long)p->width, (long long)p->height);
+    size_t rays = (size_t)(d->tile_width * s->samples * s->samples);
+    d->pixels = npg_arena_take(&d->arena, (size_t)p->width, (size_t)p->height * 3);
+    d->rays = npg_arena_take(&d->arena, rays, sizeof *d->rays);
+    d->hits = npg_arena_take(&d->arena, rays, sizeof *d->hits);
+    NPG_TRY(npg_arena_status(&d->arena));
+    for (int64_t i = 0; i < 3 * p->width * p->height; i++)
+        d->pixels[i] = (uint8_t)lrintf(255 * background[i % 3]);
+    return NPG_OK;
+}
+
+static npg_status write_png(const drawing *d, const char *path)
+{
+    png_image png = {.version = PNG_IMAGE_VERSION,
+                     .width = (png_uint_32)d->picture->width,
+                     .height = (png_uint_32)d->picture->height,
+                     .format = PNG_FORMAT_RGB};
+    png_alloc_size_t size = 0;
+    npg_file *file;
+    void *bytes;
+    if (!png_image_write_to_memory(&png, NULL, &size, 0, d->pixels, 0, NULL))
+        return npg_error(NPG_FAILED, "%s: libpng: %s", path, png.message);
+    NPG_TRY(npg_alloc(&bytes, NPG_FOR_FILES, size));
+    npg_status status = NPG_OK;
+    if (!png_image_write_to_memory(&png, bytes, &size, 0, d->pixels, 0, NULL))
+        status = npg_error(NPG_FAILED, "%s: libpng: %s", path, png.message);
+    if (!status) status = npg_file_open(&file, path);
+    if (!status) {
+        npg_file_write(file, bytes, size);
+        status = npg_file_commit(&file);
+    }
+    npg_release(&bytes);
+    return status;
+}
+
+static npg_status draw(drawing *d, const char *path, size_t count)
+{
+    turn_eye(&d->eye, d->s);
+    for (size_t i = 0; i < count; i++)
+        NPG_TRY(npg_scene_measure(&d->reach, d->files[i], &d->origin, d->eye.axes));
+    if (!(d->reach.lo[0] <= d->reach.hi[0]))
+        return npg_error(NPG_BAD_INPUT, "%s: nothing to draw", d->files[0]);
+    NPG_TRY(lay_out(d, (int64_t)count));
+    for (size_t i = 0; i < count; i++) NPG_TRY(draw_tile(d, i));
+    return write_png(d, path);
+}
+
+npg_status npg_picture_write(npg_picture *picture, const char *path, char *const *files, size_t count,
+                             const npg_picture_settings *settings)
+{
+    drawing d = {.s = settings,
+                 .picture = picture,
+                 .files = files,
+                 .reach = npg_bounds_empty(),
+                 .arena = {.purpose = NPG_FOR_FILES}};
+    *picture = (npg_picture){0};
+    npg_status status = draw(&d, path, count);
+    npg_mesh_unref(&d.first);
+    npg_arena_release(&d.arena);
+    return status;
+}
