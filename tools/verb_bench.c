@@ -14,8 +14,7 @@
 #include "pipeline/busy.h"
 #include "pipeline/order.h"
 #include "tools/cli.h"
-#include "tools/synth/synth_body.h"
-#include "tools/synth/synth_points.h"
+#include "tools/synth/synth.h"
 
 typedef struct settings {
     int64_t vertices, points, frames, repeat;

@@ -8,9 +8,7 @@
 #include "pipeline/file.h"
 #include "pipeline/frame_box.h"
 #include "tools/cli.h"
-#include "tools/synth/synth_body.h"
-#include "tools/synth/synth_points.h"
-#include "tools/synth/synth_rig.h"
+#include "tools/synth/synth.h"
 
 typedef struct settings {
     const char *output;

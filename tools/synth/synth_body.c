@@ -1,5 +1,5 @@
 /* Synthetic bodies: a closed surface and its exact motion; some change their topology once. */
-#include "tools/synth/synth_body.h"
+#include "tools/synth/synth.h"
 
 #include <math.h>
 #include <string.h>

@@ -5,7 +5,7 @@
 
 #include "geometry/geometry.h"
 #include "pipeline/random.h"
-#include "tools/synth/synth_camera.h"
+#include "tools/synth/synth.h"
 
 #define PI 3.14159265358979323846
 

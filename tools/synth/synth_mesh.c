@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "tools/synth/synth_body.h"
+#include "tools/synth/synth.h"
 
 /* Each cube is cut into six tetrahedra around its diagonal, so that neighbours
  * share their faces' cuts and the result is closed and manifold by construction.

@@ -1,5 +1,5 @@
 /* Synthetic captures: from an exact surface to the points a scanner would have seen. */
-#include "tools/synth/synth_points.h"
+#include "tools/synth/synth.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Synthetic rigs: what a ring of cameras sees, as a capture program would write it. */
-#include "tools/synth/synth_rig.h"
+#include "tools/synth/synth.h"
 
 #include <math.h>
 #include <png.h>
@@ -10,7 +10,6 @@
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/random.h"
-#include "tools/synth/synth_camera.h"
 
 #define DEPTH_STEP 0.0005 /* metres: 16 bits reach 32 m */
 

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "tools/synth/synth_body.h"
+#include "tools/synth/synth.h"
 
 #define PI 3.14159265358979323846
 
