@@ -108,9 +108,3 @@ npg_status npg_subfolder(char **out, const char *folder, const char *names)
     }
     return npg_copy_text(out, folder);
 }
-
-uint64_t npg_file_bytes(const char *path)
-{
-    struct stat facts;
-    return stat(path, &facts) == 0 && facts.st_size > 0 ? (uint64_t)facts.st_size : 0;
-}

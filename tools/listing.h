@@ -23,7 +23,4 @@ void npg_listing_keep(npg_listing *listing, const npg_selection *selection);
  * to be given to npg_release(). */
 npg_status npg_subfolder(char **out, const char *folder, const char *names);
 
-/* Size of a file in bytes, 0 where it can't be found out. */
-uint64_t npg_file_bytes(const char *path);
-
 #endif

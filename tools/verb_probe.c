@@ -4,10 +4,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "ingest/ingest.h"
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
 #include "tools/cli.h"
-#include "tools/probe/probe.h"
 
 typedef struct settings {
     bool json;

@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "ingest/ingest.h"
+#include "ingest/frame_files.h"
 #include "pipeline/frame_box.h"
 
 typedef struct npg_probe {
