@@ -12,7 +12,7 @@ static int64_t max_of(int64_t a, int64_t b)
     return a > b ? a : b;
 }
 
-/* One latent space is good for so many frames (samples/guide/why_these_defaults.md; the paper's own table has
+/* One latent space is good for so many frames (tests/bed/decisions.md; the paper's own table has
  * CD 0.53 at 40 frames and 1.31 at 120), and windows of 24 work. */
 enum { JOINT_MOST = 60, WINDOW_AUTO = 24 };
 

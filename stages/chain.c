@@ -57,7 +57,7 @@ static const npg_preset_value paper_1000[] = {
 static const npg_preset_value grids[] = {
     {"align",           "no"},         /* grids and decoder alone carry the motion */
     {"distance",        "surface"},    /* of few samples */
-    {"width-1",         "256"},        /* a third of the cost, as good: samples/guide/why_these_defaults.md */
+    {"width-1",         "256"},        /* a third of the cost, as good: tests/bed/decisions.md */
     {"width-2",         "256"},
     {"grid-rate",       "0.015"},      /* with few samples larger steps pay */
     {"mlp-rate",        "0.002"},
@@ -66,7 +66,7 @@ static const npg_preset_value grids[] = {
     {"rounds",          "8"},
     {NULL, NULL}};
 static const npg_preset_value best[] = {
-    {"reference-rounds", "2"}, /* a finer graph gains nothing: samples/guide/why_these_defaults.md */
+    {"reference-rounds", "2"}, /* a finer graph gains nothing: tests/bed/decisions.md */
     {NULL, NULL}};
 static const npg_preset_value none[] = {
     {NULL, NULL}};

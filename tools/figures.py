@@ -24,7 +24,7 @@ import plot_explore
 TREE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FILE = "samples/guide/figures.json"
 PICTURE = "samples/guide/accuracy.svg"
-PAGES = ("README.md", "samples/guide/figures.md", "samples/guide/why_these_defaults.md")
+PAGES = ("README.md", "samples/guide/figures.md", "samples/guide/defaults.md")
 
 # Captures by the names that the pages give them.  Those with options are made by neupig synth; the others are handed in.
 CAPTURES = {
@@ -72,6 +72,18 @@ def shown(key, value):
 
 # ---- the tables: what is in them decides what is measured ----
 
+PAPER = "--method paper"
+
+
+def keys_of_method(**keys):
+    """The option that sets some keys of the method."""
+    return f"--method '{json.dumps({key.replace('_', '-'): value for key, value in keys.items()})}'"
+
+
+ALIGNED = keys_of_method(epochs=0)
+FEW_NODES = keys_of_method(align_nodes=400)
+
+
 class Cell:
     """One figure of one run."""
 
@@ -109,11 +121,11 @@ def coded(*settings):
 
 
 def main_table(keys, compared, alone_standing):
-    """Captures with default, paper's preset and published code; then some with the default alone."""
+    """Captures with default, paper's method and published code; then some with the default alone."""
     rows = []
     for capture in compared:
         rows.append(row(CAPTURES[capture][0], capture, "", keys))
-        rows.append(row("", capture, "--preset paper", keys))
+        rows.append(row("", capture, PAPER, keys))
         rows.append(published_row(capture, keys))
     rows += [row(CAPTURES[capture][0], capture, "", keys) for capture in alone_standing]
     return table_of_runs(keys, *rows)
@@ -132,43 +144,42 @@ TABLES = {
     "identity": table_of_captures(
         ("way", "options"), ("dancer17", "horse17"), ("CD", "Corr"),
         [((words, f"`{options}`" if options else ""), options) for words, options in (
-            ("one joint window, every vertex, from the reference (the paper)", "--preset paper"),
-            ("alignment from frame to frame alone", "--epochs 0"),
+            ("one joint window, every vertex, from the reference (the paper)", PAPER),
+            ("alignment from frame to frame alone", ALIGNED),
             ("alignment, then the joint fit of windows (default)", ""))]),
     "joint": table_of_runs(("CD", "NC", "Corr", "jitter", "cpu_s"), *[
         row(CAPTURES[capture][0] if not options else "", capture, options, ("CD", "NC", "Corr", "jitter", "cpu_s"))
         for capture in ("dancer17", "dancer175", "horse17", "noisy40", "sparse40", "fast24", "cameras48")
-        for options in ("", "--epochs 0")]),
+        for options in ("", ALIGNED)]),
     "hundreds": table_of_captures(
         ("way", "options"), ("dancer96", "walker96"), ("CD", "Corr", "worst_Corr"),
         [((words, f"`{options}`" if options else ""), options) for words, options in (
             ("alignment, then windows of 24, overlap 4 (default)", ""),
-            ("alignment alone", "--epochs 0"),
-            ("one joint window after the alignment", "--window 0"),
-            ("more weight along the surface", "--align-along 0.05"),
-            ("stiffer", "--align-stiffness 0.02"))]),
+            ("alignment alone", ALIGNED),
+            ("one joint window after the alignment", keys_of_method(window=0)),
+            ("more weight along the surface", keys_of_method(align_along=0.05)),
+            ("stiffer", keys_of_method(align_stiffness=0.02)))]),
     "along": table_of_captures(
         ("options",), ("dancer17", "horse17", "noisy40"), ("CD", "Corr"),
-        coded("--align-along 0.01", "", "--align-along 0.0001")),
+        coded(keys_of_method(align_along=0.01), "", keys_of_method(align_along=0.0001))),
     "whole": table_of_captures(
         ("options",), ("walker17", "walker17far"), ("CD", "Corr"),
-        coded("--epochs 0 --keyframe 8", "--keyframe 8")),
+        coded(ALIGNED + " --keyframe 8", "--keyframe 8")),
     "fit": table_of_captures(
         ("options",), ("dancer17", "horse17"), ("CD", "Corr"),
-        coded(*("--preset paper" + options for options in (
-            " --smoothing screened", " --hold-apart loose --deliver least", "")))),
+        coded(keys_of_method(preset="paper", smoothing="screened"), keys_of_method(preset="paper", hold_apart="loose"), PAPER)),
     "apart": table_of_captures(
         ("options",), ("dancer40", "horse17"), ("CD", "Corr"),
-        coded("--hold-apart no", "--hold-apart loose", "")),
+        coded(keys_of_method(hold_apart="no"), keys_of_method(hold_apart="loose"), "")),
     "quality": table_of_captures(
         ("options",), ("dancer17", "horse17"), ("CD", "Corr", "cpu_s"),
-        coded("", "--align-nodes 400", "--align-nodes 400 --epochs 0", "--epochs 0")),
+        coded("", FEW_NODES, keys_of_method(align_nodes=400, epochs=0), ALIGNED)),
 }
 
 # The picture: these settings on these captures.
 PICTURED = [(capture, options) for capture in ("dancer17", "horse17") for options in (
-    "", "--epochs 0", "--align-nodes 400", "--align-nodes 400 --epochs 0", "--preset paper")] + [
-        ("dancer17", "--preset paper --epochs 60"), ("dancer17", "--preset paper --epochs 125")]
+    "", ALIGNED, FEW_NODES, keys_of_method(align_nodes=400, epochs=0), PAPER)] + [
+        ("dancer17", keys_of_method(preset="paper", epochs=epochs)) for epochs in (60, 125)]
 
 
 def wanted(table):
@@ -227,7 +238,7 @@ def measure_run(arguments, name, options):
         return None
     measure.note(f"figures: {name} {options}")
     folder = os.path.join(arguments.work, "run")
-    run = {"capture": name, "options": options, "command": " ".join(f"neupig run {name} -o OUT {options}".split())}
+    run = {"capture": name, "options": options, "command": f"neupig run {name} -o OUT {options}".strip()}
     run.update(measure.source(arguments.neupig))
     run["machine"] = measure.machine()
     run.update(measure.measure(arguments.neupig, *capture, shlex.split(options), folder))

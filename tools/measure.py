@@ -58,14 +58,16 @@ def explains(folder):
 
 def method_of(options):
     """Options written as --name value or --no-name, as one object for --method: keys of the method may be among them."""
-    method, name = {}, ""
+    method, name, given = {}, "", []
     for word in (part for option in options for part in option.split("=", option.startswith("--"))):
         if word.startswith("--"):
             name = word[2:]
             method[name.removeprefix("no-")] = not name.startswith("no-")
         else:
             method[name] = word
-    return ["--method", json.dumps(method)] if method else []
+            if name == "method":  # a name, a file or an object itself
+                given += ["--method", method.pop(name)]
+    return given + (["--method", json.dumps(method)] if method else [])
 
 
 def measure(neupig, points, truth, frames, options, folder):

@@ -32,7 +32,7 @@
  * motion, which is theirs while the body moves as one piece: then it is followed as far as it has places for
  * half of a frame's points, else as far as stage fuse says. */
 #define EXPLAINED_STIFF 0.5
-#define BENT            0.01 /* of its diagonal, what a rigid motion leaves; by trial, why_these_defaults.md */
+#define BENT            0.01 /* of its diagonal, what a rigid motion leaves; by trial, tests/bed/decisions.md */
 
 typedef struct state {
     bool is_on;

@@ -9,7 +9,7 @@
 
 /* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest; more of
  * it where several sensors leave little hidden, between parts that are seen.  By trial,
- * samples/guide/why_these_defaults.md, one sensor and a body that turns. */
+ * tests/bed/decisions.md, one sensor and a body that turns. */
 #define PRIOR_ONE     0.95 /* before one sensor */
 #define PRIOR_SEVERAL 0.9
 /* A link counts little where both ends are seen: a piece that has points goes where they are, and one that the

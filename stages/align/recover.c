@@ -8,7 +8,7 @@
 #include "align/tracker.h"
 #include "pipeline/order.h"
 
-/* Set by trial on a fast gallop: samples/guide/why_these_defaults.md, lost frames. */
+/* Set by trial on a fast gallop: tests/bed/decisions.md, lost frames. */
 #define LOST        1.4  /* times what the best quarter has: its Chamfer distance, and ...            */
 #define POINTS_LOST 1.1  /* ... its points' distances alone, which holes do not raise                 */
 #define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */

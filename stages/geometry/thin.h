@@ -9,7 +9,7 @@
 
 /* Vertices of the surface that frames are aligned and matched with: where the reference has more, it is
  * thinned for that.  By trial: above, distances to it gain nothing, and only the time grows
- * (samples/why_these_defaults.md, "Fine references"). */
+ * (tests/bed/decisions.md, "Fine references"). */
 #define NPG_THIN_SURFACE 10000
 
 typedef struct npg_thin {

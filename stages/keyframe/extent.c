@@ -11,7 +11,7 @@
 #define GRID_WORDS ((size_t)GRID * GRID * GRID / 64)
 #define BLOCK      1024 /* points turned into unit coordinates at a time */
 
-/* Set by trial on captures from sensors: samba and two others, samples/guide/why_these_defaults.md. */
+/* Set by trial on captures from sensors: samba and two others, tests/bed/decisions.md. */
 #define SIDE_SPACINGS 2.0   /* of the first frame's points ...                                 */
 #define SIDE_SIZE     0.015 /* ... and of the figure's diagonal: noise must not count as area  */
 #define PLACES        8

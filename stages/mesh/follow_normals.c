@@ -8,7 +8,7 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
 
-/* By trial (samples/guide/why_these_defaults.md, "Noise in the reference"). */
+/* By trial (tests/bed/decisions.md, "Noise in the reference"). */
 #define NEAR       16   /* points that a face asks                                      */
 #define WIDTH      0.6  /* of their weight's bell, in mean edges                        */
 #define STEPS      3    /* of the vertices                                              */

@@ -18,7 +18,7 @@
  *
  * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic.  Conjugate
  * gradients over all frames, preconditioned by each vertex's own five diagonals in time.  Not in the paper:
- * samples/guide/why_these_defaults.md compares. */
+ * tests/bed/decisions.md compares. */
 #ifndef NPG_JOINT_H
 #define NPG_JOINT_H
 

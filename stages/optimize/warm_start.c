@@ -8,7 +8,7 @@
 
 #define MATCHERS_MAX 8
 
-/* By trial (samples/guide/why_these_defaults.md, "Warm starts"). */
+/* By trial (tests/bed/decisions.md, "Warm starts"). */
 #define SAMPLES       1500 /* where the option says 0                                          */
 #define NEAR          3    /* solved frames beside a new one, which hold the field in place    */
 #define FAR           3    /* and others, by turns                                             */

@@ -92,11 +92,11 @@ copy_tree() { # FOLDER
 }
 
 @test "every option that a page names is one of the command or of a script" {
-    for verb in run batch append apply probe eval synth render view bench doctor man; do "$NEUPIG" help $verb; done >known
+    for verb in run batch append apply probe eval synth render view bench doctor man; do "$NEUPIG" help $verb --help-all; done >known
     for script in explore plot_explore figures; do "$root/tools/$script.py" --help; done >>known
     # of CMake, CTest, pip, bats and others
     echo "--build --target --install --prefix --preset --config --test-dir --output-on-failure --system-site-packages --array" >>known
-    echo "--cflags --libs --list --clean --filter --tests --fast" >>known
+    echo "--cflags --libs --list --clean --filter --tests --fast --help-all" >>known
     # an option that is on by default is listed as --no-NAME, and may be set as --NAME=no
     grep -o -e '--[a-z][a-z0-9-]*' known | sed 'p; s/^--no-/--/' | sort -u >options
     while read -r page; do
