@@ -73,7 +73,6 @@ void npg_frame_clear(npg_frame *frame)
     npg_release(&frame->sensor_local);
     npg_release(&frame->vert_unit);
     npg_release(&frame->vert_colours);
-    npg_release(&frame->align_state);
     *frame = (npg_frame){0};
 }
 
@@ -94,8 +93,6 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     out->pos_local = out->normals = out->vert_unit = NULL;
     out->colours = out->sensors = out->vert_colours = NULL;
     out->sensor_local = NULL;
-    out->align_state = NULL; /* belongs to one frame on its way, not to copies */
-    out->align_state_size = 0;
     npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
     size_t n = frame->point_count, row = 3 * sizeof(float);
     if (!status) status = copy_rows(&out->pos_local, frame->pos_local, n, row);

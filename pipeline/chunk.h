@@ -75,8 +75,6 @@ typedef struct npg_frame {
     float *vert_unit;      /* V x 3, owned; the deformed reference, in unit coordinates */
     uint8_t *vert_colours; /* V x 4, owned: as this frame saw them, or NULL */
     npg_figures figures;
-    void *align_state;       /* owned; on the last frame that a window waits for: what resumes stage align */
-    size_t align_state_size; /* after it; NULL on all others                                               */
 } npg_frame;
 
 typedef struct npg_chunk npg_chunk;
@@ -96,7 +94,7 @@ void npg_chunk_add(npg_chunk *chunk, npg_frame *frame);
 /* Free what a frame owns and empty it. */
 void npg_frame_clear(npg_frame *frame);
 
-/* A copy with its own arrays, without align_state. */
+/* A copy with its own arrays. */
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame);
 
 /* Keep the points whose keep[i] is not 0, in order, with all that they carry. */

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <xxhash.h>
 
 #include "pipeline/memory.h"
 
@@ -313,4 +314,37 @@ npg_status npg_make_folder(const char *path)
     if (status) return status < 0 && status != NPG_MEMORY ? NPG_DISK : status;
     if (stat(path, &info) || !S_ISDIR(info.st_mode)) return npg_error(NPG_DISK, "%s is not a folder", path);
     return NPG_OK;
+}
+
+/* ---- checksums ---- */
+
+static npg_status hash_bytes(XXH3_state_t *state, int fd, const char *path, uint64_t limit)
+{
+    unsigned char block[16 << 10];
+    XXH3_64bits_reset(state);
+    for (uint64_t left = limit; left;) {
+        ssize_t got = read(fd, block, left < sizeof block ? (size_t)left : sizeof block);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return npg_error_errno(NPG_DISK, "can't read %s", path);
+        if (got == 0 && limit == UINT64_MAX) break;
+        if (got == 0)
+            return npg_error(NPG_BAD_INPUT, "%s is %llu bytes shorter than it was", path,
+                             (unsigned long long)left);
+        XXH3_64bits_update(state, block, (size_t)got);
+        left -= (uint64_t)got;
+    }
+    return NPG_OK;
+}
+
+npg_status npg_hash_file(uint64_t *hash, const char *path, uint64_t limit)
+{
+    XXH3_state_t *state = XXH3_createState();
+    if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
+    int fd;
+    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
+    if (!status) status = hash_bytes(state, fd, path, limit);
+    if (fd >= 0) close(fd);
+    *hash = status ? 0 : XXH3_64bits_digest(state);
+    XXH3_freeState(state);
+    return status;
 }

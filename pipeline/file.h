@@ -60,6 +60,10 @@ npg_status npg_join_path(char **out, const char *folder, const char *name);
 bool npg_write_at(int fd, const void *data, size_t size, int64_t at);
 bool npg_read_at(int fd, void *data, size_t *size, int64_t at);
 
+/* XXH3 of the first `limit` bytes of a file (UINT64_MAX: all).  NPG_DISK when it can't be read, NPG_BAD_INPUT
+ * when it is shorter than a limit. */
+npg_status npg_hash_file(uint64_t *hash, const char *path, uint64_t limit);
+
 /* Whether something lies at the path, or in the folder under that name; false, too, where that can't be found
  * out. */
 bool npg_is_there(const char *path);

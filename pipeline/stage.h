@@ -8,7 +8,6 @@
 #include <jansson.h>
 #include <stdatomic.h>
 
-#include "pipeline/archive.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/json_file.h"
@@ -91,6 +90,7 @@ static inline bool npg_facts_has_changed(const npg_facts *facts)
 }
 
 typedef struct npg_worker npg_worker;
+typedef struct npg_store npg_store; /* job/store.h */
 
 /* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it,
  * and it is written once in a run. */
@@ -126,8 +126,9 @@ typedef struct npg_stage {
     size_t (*verts_at_most)(const npg_worker *worker);
     /* Add to a state on disk what this stage must find there when the run is resumed.
      * Called from the thread that writes the state, while a stage behind that has seen the frames that are
-     * written and no other; one before it may be at work on later ones.  May be NULL. */
-    npg_status (*save)(const npg_worker *worker, npg_archive_writer *out);
+     * written and no other; one before it may be at work on later ones, where the state is that behind the
+     * first `read` frames of the plan.  May be NULL. */
+    npg_status (*save)(const npg_worker *worker, npg_store *out, int64_t read);
     /* Processor seconds that the stage expects to take in a pass (CHOOSE, FUSE or SOLVE), on whatever
      * machine: the run's progress is the share of these that is done, and only their ratios matter.  Read
      * from options and facts, before the pass.  NULL: not worth counting. */
@@ -240,7 +241,7 @@ json_t *npg_worker_save_reports(npg_worker *worker);
 void npg_worker_restore_reports(npg_worker *worker, const json_t *saved);
 
 /* Let every stage add to a state on disk what it needs to be resumed (npg_stage.save). */
-npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out);
+npg_status npg_worker_save_stages(const npg_worker *worker, npg_store *out, int64_t read);
 
 /* The whole report, for conclude(). */
 json_t *npg_worker_run_report(npg_worker *worker);

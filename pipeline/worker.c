@@ -257,12 +257,12 @@ void npg_worker_restore_reports(npg_worker *worker, const json_t *saved)
     pthread_mutex_unlock(&run->lock);
 }
 
-npg_status npg_worker_save_stages(const npg_worker *worker, npg_archive_writer *out)
+npg_status npg_worker_save_stages(const npg_worker *worker, npg_store *out, int64_t read)
 {
     const npg_run *run = worker->run;
     for (size_t i = 0; i < run->worker_count; i++)
         if (run->workers[i].is_in_pass && run->workers[i].stage->save)
-            NPG_TRY(run->workers[i].stage->save(&run->workers[i], out));
+            NPG_TRY(run->workers[i].stage->save(&run->workers[i], out, read));
     return NPG_OK;
 }
 

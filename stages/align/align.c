@@ -8,14 +8,16 @@
 #include <string.h>
 
 #include "align/align_internal.h"
-#include "align/follow_log.h"
 #include "align/pose_cache.h"
+#include "align/resume_points.h"
 #include "align/tracker.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
+
+#define BLOCK_ALIGN "align" /* of a state on disk */
 
 #define POINTS_MOST 4  /* times the samples: points of a frame that are kept for the alignment */
 #define GROUP_MOST  96 /* frames that wait: a longer window is taken in parts                 */
@@ -39,8 +41,9 @@ typedef struct state {
     int64_t nodes, samples, steps;
     double stiffness, along;
     npg_tracker *tracker;
-    npg_pose_cache cache; /* from the pass before, to the next */
-    npg_follow_log *log;  /* of a fusing pass: what is found, and what an earlier run had; owned, or NULL */
+    npg_pose_cache cache;     /* from the pass before, to the next */
+    npg_resume_points points; /* for states on disk */
+    bool has_points;
     npg_group group;
     int64_t past_count;           /* frames that a growing reference does not reach */
     int64_t read;                 /* frames of the plan so far                           */
@@ -76,7 +79,7 @@ static void uninit(npg_worker *worker)
     state *s = npg_worker_state(worker);
     npg_tracker_close(&s->tracker);
     npg_pose_cache_close(&s->cache);
-    npg_follow_log_close(&s->log);
+    if (s->has_points) npg_resume_points_close(&s->points);
     npg_group_close(&s->group);
 }
 
@@ -102,16 +105,13 @@ static void pack_state(const state *s, unsigned char *to)
     memcpy(npg_group_pack(to, &s->group), &s->sum, sizeof s->sum);
 }
 
-/* The last frame that a window waits for takes it along: it comes to the stage that writes the state just
- * when the window can be solved. */
-static npg_status attach_state(const state *s, npg_frame *frame)
+/* Behind the last frame that a window waits for: the state on disk is written when that is solved. */
+static npg_status keep_point(state *s)
 {
     unsigned char *all;
     NPG_TRY(npg_alloc(&all, NPG_FOR_FIT, state_bytes(s)));
     pack_state(s, all);
-    frame->align_state = all;
-    frame->align_state_size = state_bytes(s);
-    return NPG_OK;
+    return npg_resume_points_add(&s->points, s->read, all, state_bytes(s));
 }
 
 static void unpack_state(state *s, const unsigned char *from)
@@ -123,7 +123,7 @@ static npg_status restore_state(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     size_t size;
-    const unsigned char *all = npg_archive_find(npg_job_archive(npg_job_of(worker)), NPG_BLOCK_ALIGN, &size);
+    const unsigned char *all = npg_record_find(npg_job_state(npg_job_of(worker)), BLOCK_ALIGN, &size);
     if (!all || size != state_bytes(s))
         return npg_error(NPG_BAD_INPUT, "the state to resume from has no poses for this reference");
     unpack_state(s, all);
@@ -154,28 +154,11 @@ static bool ends_late(const npg_facts *facts, npg_pass pass)
 
 /* ---- what is open for a pass ---- */
 
-/* What an earlier run of the same job followed before it was killed is read back. */
-static npg_status open_log(npg_worker *worker)
+static npg_status save(const npg_worker *worker, npg_store *out, int64_t read)
 {
     state *s = npg_worker_state(worker);
-    const npg_job *job = npg_job_of(worker);
-    if (!job || npg_worker_pass(worker) != NPG_PASS_FUSE) return NPG_OK;
-    npg_follow_key key = {0, npg_worker_facts(worker)->reference, nodes_of(s), state_bytes(s)};
-    char *path;
-    int64_t groups;
-    NPG_TRY(npg_job_fusing_key(worker, &key.job));
-    NPG_TRY(npg_job_followed_path(job, &path, npg_pose_cache_passes(worker)));
-    npg_status status = npg_follow_log_open(&s->log, &groups, path, &key);
-    npg_release(&path);
-    if (!status && groups)
-        npg_worker_log(worker, NPG_LOG_INFO, -1,
-                       "%lld groups of frames that an earlier run followed are read back", (long long)groups);
-    return status;
-}
-
-static npg_status save(const npg_worker *worker, npg_archive_writer *out)
-{
-    const state *s = npg_worker_state(worker);
+    if (!s->tracker) return NPG_OK; /* no frame came yet */
+    NPG_TRY(npg_resume_points_save(&s->points, read, out, BLOCK_ALIGN));
     return npg_pose_cache_save(&s->cache, out);
 }
 
@@ -186,10 +169,11 @@ static npg_status open_tracker(npg_worker *worker)
                                            s->along};
     NPG_TRY(npg_tracker_open(&s->tracker, npg_worker_facts(worker)->reference, &settings));
     size_t nodes = nodes_of(s);
+    npg_resume_points_open(&s->points);
+    s->has_points = true;
     NPG_TRY(npg_group_open(&s->group, nodes));
     json_object_set_new(npg_worker_report(worker), "nodes", json_integer((json_int_t)nodes));
-    NPG_TRY(npg_pose_cache_open(&s->cache, worker, s->tracker));
-    NPG_TRY(open_log(worker));
+    NPG_TRY(npg_pose_cache_open(&s->cache, worker, s->tracker, state_bytes(s)));
     return npg_worker_facts(worker)->is_resumed ? restore_state(worker) : NPG_OK;
 }
 
@@ -250,11 +234,6 @@ static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
     return NPG_OK;
 }
 
-static bool is_read_back(const state *s)
-{
-    return s->log && npg_follow_log_has_group(s->log);
-}
-
 /* Whether the reference is a side of the body that this pass adds to. */
 static bool is_growing(const npg_worker *worker, size_t sensor_count)
 {
@@ -296,7 +275,7 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     const npg_facts *facts = npg_worker_facts(worker);
     npg_waiting *w;
     NPG_TRY(npg_group_add(&w, &s->group, frame));
-    if (is_read_back(s)) return npg_follow_log_read(s->log, w->frame.index, w->pose);
+    if (npg_pose_cache_has_group(&s->cache)) return npg_pose_cache_read(&s->cache, w->frame.index, w->pose);
     NPG_TRY(take_points(worker, w));
     npg_side *at = &s->group.ways[w->frame.index < facts->plan.key];
     bool is_key = w->frame.index == facts->plan.key;
@@ -387,7 +366,6 @@ static npg_status pass_on(npg_worker *worker, npg_waiting *w)
         s->past_count++;
     } else {
         npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
-        NPG_TRY(npg_pose_cache_put(&s->cache, frame->index, w->pose));
     }
     NPG_TRY(npg_chunk_open(&chunk, 1));
     npg_chunk_add(chunk, frame);
@@ -396,36 +374,30 @@ static npg_status pass_on(npg_worker *worker, npg_waiting *w)
     return status;
 }
 
-/* As finish_group() left it in an earlier run. */
-static npg_status read_back_group(state *s)
-{
-    const void *packed;
-    NPG_TRY(npg_follow_log_end_group(s->log, &packed));
-    unpack_state(s, packed);
-    return NPG_OK;
-}
-
-static npg_status log_group(state *s)
-{
-    unsigned char *packed;
-    if (!s->log) return NPG_OK;
-    NPG_TRY(npg_alloc(&packed, NPG_FOR_FIT, state_bytes(s)));
-    pack_state(s, packed);
-    npg_status status = NPG_OK;
-    for (size_t i = 0; i < s->group.count && !status; i++)
-        status = npg_follow_log_add(s->log, s->group.frames[i].frame.index, s->group.frames[i].pose);
-    if (!status) status = npg_follow_log_commit_group(s->log, packed);
-    npg_release(&packed);
-    return status;
-}
-
+/* As it was left by an earlier run that followed the group, or for one that comes. */
 static npg_status follow_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    if (is_read_back(s)) return read_back_group(s);
-    NPG_TRY(finish_group(worker));
-    for (size_t i = 0; i < s->group.count; i++) add_to_report(s, &s->group.frames[i]);
-    return log_group(s);
+    unsigned char *packed;
+    if (!npg_pose_cache_has_group(&s->cache)) {
+        NPG_TRY(finish_group(worker));
+        for (size_t i = 0; i < s->group.count; i++) {
+            npg_waiting *w = &s->group.frames[i];
+            add_to_report(s, w);
+            NPG_TRY(npg_pose_cache_put(&s->cache, w->frame.index, w->pose));
+        }
+    }
+    NPG_TRY(npg_alloc(&packed, NPG_FOR_FIT, state_bytes(s)));
+    npg_status status = NPG_OK;
+    if (npg_pose_cache_has_group(&s->cache)) {
+        status = npg_pose_cache_read_end(&s->cache, packed, state_bytes(s));
+        if (!status) unpack_state(s, packed);
+    } else {
+        pack_state(s, packed);
+        status = npg_pose_cache_put_end(&s->cache, packed, state_bytes(s));
+    }
+    npg_release(&packed);
+    return status;
 }
 
 /* with_state: the group ends a window, or may. */
@@ -434,8 +406,7 @@ static npg_status close_group(npg_worker *worker, bool with_state)
     state *s = npg_worker_state(worker);
     if (!s->group.count) return NPG_OK;
     NPG_TRY(follow_group(worker));
-    if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE)
-        NPG_TRY(attach_state(s, &s->group.frames[s->group.count - 1].frame));
+    if (with_state && npg_job_of(worker) && npg_worker_pass(worker) == NPG_PASS_SOLVE) NPG_TRY(keep_point(s));
     for (size_t i = 0; i < s->group.count; i++) NPG_TRY(pass_on(worker, &s->group.frames[i]));
     npg_group_clear(&s->group);
     return NPG_OK;

@@ -1,40 +1,8 @@
-/* Poses: what one pass found of every frame, for the pass that follows with a better reference.
- *
- * On disk, so that memory does not grow with the capture: a record per frame, each with its checksum
- *
- *     offset index * (8 + 48 K):  XXH3 of the pose, as uint64; K x 12 float
- *
- * and read back by a run that was stopped in the meantime.  A record that was never written is 0. */
+/* Pose map: the way of a pose from the nodes of one reference to those of another. */
 #ifndef NPG_POSES_H
 #define NPG_POSES_H
 
-#include <stdbool.h>
-
 #include "align/tracker.h"
-
-typedef struct npg_poses npg_poses;
-
-/* For poses of `node_count` nodes.  path: an empty file there (its name is kept, not owned); NULL: a file
- * without a name, which ends with the process.  NPG_DISK. */
-npg_status npg_poses_create(npg_poses **poses, const char *path, size_t node_count);
-
-/* One that was written before.  NPG_BAD_INPUT. */
-npg_status npg_poses_open(npg_poses **poses, const char *path, size_t node_count);
-void npg_poses_close(npg_poses **poses);
-
-/* Nodes of each pose. */
-size_t npg_poses_nodes(const npg_poses *poses);
-
-/* pose: K x 12.  NPG_DISK. */
-npg_status npg_poses_put(npg_poses *poses, int64_t index, const double *pose);
-
-/* *is_there: whether one was put.  NPG_BAD_INPUT where what is there is damaged. */
-npg_status npg_poses_get(npg_poses *poses, int64_t index, double *pose, bool *is_there);
-
-/* Make what was put safe on disk.  NPG_DISK. */
-npg_status npg_poses_sync(npg_poses *poses);
-
-/* ---- from the nodes of one reference to those of another ---- */
 
 /* Where each new node hangs on the old graph. */
 typedef struct npg_pose_map {

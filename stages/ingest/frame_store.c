@@ -199,7 +199,6 @@ static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
     e->frame->pos_local = e->frame->normals = e->frame->vert_unit = NULL;
     e->frame->colours = e->frame->sensors = e->frame->vert_colours = NULL;
     e->frame->sensor_local = NULL;
-    e->frame->align_state = NULL;
     e->frame->path = NULL;
     bool is_put = !frame->path || !npg_copy_text(&e->frame->path, frame->path);
     is_put = is_put && put_sensors(e->frame, frame) &&

@@ -26,7 +26,7 @@ typedef struct npg_input_entry {
 
 typedef struct npg_input_log npg_input_log;
 
-/* How much of the log belongs to a state: a block of the state's archive. */
+/* How much of the log belongs to a state: a block of the state. */
 typedef struct npg_input_place {
     int64_t lines, bytes;
     uint64_t hash; /* XXH3 of these bytes */

@@ -6,24 +6,18 @@
  *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
  *                                  sizes, times and checksums
  *     OUT/job/inputs.jsonl         the inputs of a live run, frame by frame as they came (ingest/input_log.h)
- *     OUT/job/window_000012.npg    state after the 12th solved window: an archive (pipeline/archive.h) with
- *                                  the facts of the capture, the reference mesh in unit coordinates, what
- *                                  stages need to be resumed, the optimiser, and the frames that the next
- *                                  windows share
- *     OUT/job/window_000012.vdb    the latent grids of the same moment (optimize/vdb_grids.h)
+ *     OUT/job/store.npg            one file of records with checksums, each whole or not there (store.h): after
+ *                                  each solved window a state, with the facts of the capture, the reference
+ *                                  mesh in unit coordinates, what stages need to be resumed, the optimiser,
+ *                                  and the frames that the next windows share; a state inside the window at
+ *                                  work, where that takes long; and what stage align found in fusing passes
+ *     OUT/job/store.new            that of a run which has no state yet: until then what an earlier run left
+ *                                  stays
+ *     OUT/job/window_000012.vdb    the latent grids of the 12th state (optimize/vdb_grids.h)
  *
- *     OUT/job/inside.npg           state inside the window at work, where that takes long: what a window's
- *                                  state has, the fit's progress, its grids; removed when it is solved
- *
- *     OUT/job/poses.bin            where the last fusing pass brought the reference so far, frame by frame
- *                                  (align/poses.h): where the solving pass starts
- *
- *     OUT/job/followed_0.bin       what the first fusing pass found so far (align/follow_log.h); removed when
- *                                  there is a state to resume from
- *
- * The two newest windows stay, and the one that later frames start from (neupig append);
- * where grids are to be exported, those of all.  Each file appears whole or not at all; the archive names the
- * checksum of its grids and of the frame log, so that a damaged one is noticed and the one before it used.
+ * The two newest states stay, and the one that later frames start from (neupig append); where grids are to be
+ * exported, those of all.  A state names the checksum of its grids and of the frame log, so that a damaged one
+ * is noticed and the one before it used.
  * No file says that a run is at work.
  *
  * Threads: a run's npg_job belongs to the service until the passes begin.
@@ -32,7 +26,7 @@
 #ifndef NPG_JOB_H
 #define NPG_JOB_H
 
-#include "pipeline/archive.h"
+#include "job/store.h"
 #include "pipeline/stage.h"
 
 typedef struct npg_job npg_job;
@@ -63,7 +57,7 @@ bool npg_job_is_restart(const npg_job *job);
 int64_t npg_job_frame_count(const npg_job *job);
 
 /* The newest state that is whole, NULL when there is none (NPG_JOB_FRESH); a loan. */
-const npg_archive *npg_job_archive(const npg_job *job);
+const npg_record *npg_job_state(const npg_job *job);
 
 /* Its latent grids; NULL for a state inside a window, which has them itself. */
 const char *npg_job_grids_path(const npg_job *job);
@@ -98,34 +92,27 @@ typedef struct npg_job_moment {
     int64_t read;        /* frames of the plan that need not be read again         */
     int64_t last;        /* index of the last of them in time, -1 for none         */
     bool is_forward_end; /* later frames start from this state (neupig append)     */
+    bool is_inside;      /* the window at work, which is not solved yet            */
 } npg_job_moment;
 
-/* Adds to the state what the stage that writes it knows; grids_path is where its latent grids go. */
-typedef npg_status npg_job_write_state(void *user, npg_archive_writer *out, const char *grids_path);
+/* Adds to the state what the stage that writes it knows; grids_path is where its latent grids go, NULL inside a
+ * window. */
+typedef npg_status npg_job_write_state(void *user, npg_store *out, const char *grids_path);
 
 /* Write the next state: waits until the frames passed on are on disk, so that what is solved is never lost,
  * then facts, reports, reference, what stages save (npg_stage.save), and what write() adds.
- * The file appears whole or not at all.  NPG_DISK, NPG_ABORTED. */
+ * It is in the store whole or not at all.  NPG_DISK, NPG_ABORTED. */
 npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                               void *user);
 
-/* The same for the window at work, which is not solved yet; it replaces the one before.  write() gets no path
- * for grids. */
-npg_status npg_job_save_inside(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
-                               void *user);
-
-/* Facts, reference, reports and warnings from the open archive; before the first pass.  NPG_BAD_INPUT. */
+/* Facts, reference, reports and warnings from the open state; before the first pass.  NPG_BAD_INPUT. */
 npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job);
 
-/* Where stage align keeps the poses of the last fusing pass (align/poses.h); to npg_release().  New ones have
- * another name until the solving pass begins: those of an earlier run belong to its states. */
-npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new);
-npg_status npg_job_keep_poses(const npg_job *job);
-npg_status npg_job_remove_new_poses(const npg_job *job); /* also where there are none */
+/* Where stage align keeps what it finds in fusing passes; a loan. */
+npg_store *npg_job_store(const npg_job *job);
 
-/* Where stage align keeps what it found in a fusing pass, the first being 0 (align/follow_log.h); to
- * npg_release().  They go when there is a state to resume from. */
-npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass);
+/* The solving pass starts from the poses in the store that are `of` this: they stay with its states. */
+void npg_job_keep_poses(npg_job *job, uint64_t of);
 
 /* Hash of options and input, to be asked before the job is written: what of an earlier run has the same is of
  * the same job. */
@@ -134,18 +121,13 @@ npg_status npg_job_key(const npg_job *job, uint64_t *key);
 /* The same in a fusing pass: of a live source the input is the look-ahead that has come (job_live.c). */
 npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key);
 
-/* Block of a state: what stage align needs (npg_frame.align_state). */
-#define NPG_BLOCK_ALIGN     "align"
-#define NPG_BLOCK_ALIGN_MAP "align.map" /* from the nodes of those poses to the reference's */
-
-/* What job_state.c needs of the folder: block "log" of a state, paths of the next one, what is kept. */
+/* What job_state.c needs of the folder: block "log" of a state, the path of the next one's grids, what is kept. */
 typedef struct npg_job_log {
     int64_t bytes, count; /* of the frame log that goes with the state */
     uint64_t hash;        /* XXH3 of these bytes                       */
 } npg_job_log;
-npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path);
-npg_status npg_job_commit(npg_job *job, bool is_forward_end);
-npg_status npg_job_inside_path(const npg_job *job, char **path);
+npg_status npg_job_next_grids(const npg_job *job, char **path);
+npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment);
 int64_t npg_job_serial(const npg_job *job);         /* of the newest window's state, -1 while there is none */
 int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 

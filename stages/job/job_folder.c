@@ -17,25 +17,25 @@
 #include "job/frame_log.h"
 #include "pipeline/file.h"
 
-#define STATE_NAME  "window_%06lld.%s"
-#define INSIDE_NAME "inside.npg"
-#define POSES_NAME  "poses.bin"
-#define POSES_NEW   "poses.new"
-#define FOLLOWED    "followed_%lld.bin"
+#define GRIDS_NAME  "window_%06lld.vdb"
+#define STORE_NAME  "store.npg"
+#define STORE_NEW   "store.new"
 #define INPUTS_NAME "inputs.jsonl"
 #define INPUTS_NEW  "inputs.new"
 
 struct npg_job {
     char *output, *folder; /* owned */
     int lock_fd;
-    json_t *then, *now;   /* owned; what an earlier run was made of, and this one; NULL once written */
-    int64_t frame_count;  /* of the input, gaps included */
-    npg_archive *archive; /* owned */
-    char *grids_path;     /* of the archive, owned */
-    int64_t serial;       /* of the newest state in place, -1: none */
+    json_t *then, *now;  /* owned; what an earlier run was made of, and this one; NULL once written */
+    int64_t frame_count; /* of the input, gaps included */
+    npg_store *store;    /* owned */
+    npg_record *state;   /* that the run is resumed from; owned */
+    char *grids_path;    /* of the state, owned */
+    int64_t serial;      /* of the newest state in place, -1: none */
     int64_t forward_serial;
-    bool keeps_grids; /* of all windows, for the form vdb */
-    bool forgets;     /* older states go when the job is written */
+    uint64_t poses_of; /* what the poses that states go with were found from */
+    bool keeps_grids;  /* of all windows, for the form vdb */
+    bool forgets;      /* older states go when the job is written */
     bool is_restart;
     npg_job_source source;
 
@@ -45,37 +45,13 @@ struct npg_job {
     int64_t exported_count, log_bytes;
 };
 
-/* ---- paths ---- */
+/* ---- files ---- */
 
-static npg_status state_path(char **path, const npg_job *job, int64_t serial, const char *ending)
+static npg_status make_grids_path(char **path, const npg_job *job, int64_t serial)
 {
     char name[64];
-    snprintf(name, sizeof name, STATE_NAME, (long long)serial, ending);
+    snprintf(name, sizeof name, GRIDS_NAME, (long long)serial);
     return npg_join_path(path, job->folder, name);
-}
-
-/* The serial of a state's file (also of its hidden, unfinished form), -1 for other files. */
-static int64_t serial_of(const char *name)
-{
-    char ending[8], rest[8];
-    long long serial;
-    if (name[0] == '.') name++;
-    int fields = sscanf(name, "window_%lld.%3[a-z]%7s", &serial, ending, rest);
-    if (fields < 2 || serial < 0 || (strcmp(ending, "npg") != 0 && strcmp(ending, "vdb") != 0)) return -1;
-    return fields == 2 || !strcmp(rest, ".part") ? serial : -1;
-}
-
-/* Call visit(job, name, serial) for every file of a state. */
-static npg_status each_state(npg_job *job,
-                             npg_status (*visit)(npg_job *job, const char *name, int64_t serial))
-{
-    npg_status status = NPG_OK;
-    DIR *listing = opendir(job->folder);
-    if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
-    for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (serial_of(entry->d_name) >= 0) status = visit(job, entry->d_name, serial_of(entry->d_name));
-    closedir(listing);
-    return status;
 }
 
 static npg_status remove_file(const npg_job *job, const char *name)
@@ -88,35 +64,36 @@ static npg_status remove_file(const npg_job *job, const char *name)
     return status;
 }
 
-static npg_status remove_state(npg_job *job, const char *name, int64_t serial)
+/* The two newest states stay, and the one that later frames start from. */
+static bool is_kept(const npg_job *job, int64_t serial)
 {
-    (void)serial;
-    return remove_file(job, name);
+    return serial >= 0 &&
+           (serial == job->serial || serial == job->serial - 1 || serial == job->forward_serial);
 }
 
-static bool is_followed(const char *name)
+/* Grids of states that went, unless they are to be exported, and grids that were not finished; and what
+ * versions before the store left. */
+static bool is_stale(const npg_job *job, const char *name)
 {
-    return !strncmp(name, "followed_", 9);
+    static const char *const older[] = {"motion_", "poses.", "followed_", "inside."};
+    bool is_hidden = name[0] == '.';
+    long long serial;
+    name += is_hidden;
+    for (size_t i = 0; i < sizeof older / sizeof *older; i++)
+        if (!strncmp(name, older[i], strlen(older[i]))) return true;
+    if (sscanf(name, "window_%lld.", &serial) != 1) return false;
+    return is_hidden || !strstr(name, ".vdb") || !(job->keeps_grids || is_kept(job, serial));
 }
 
-/* Remove the files of the folder that are of a kind. */
-static npg_status remove_kind(npg_job *job, bool (*is_it)(const char *name))
+static npg_status remove_stale(const npg_job *job)
 {
     npg_status status = NPG_OK;
     DIR *listing = opendir(job->folder);
     if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
     for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (is_it(entry->d_name)) status = remove_file(job, entry->d_name);
+        if (is_stale(job, entry->d_name)) status = remove_file(job, entry->d_name);
     closedir(listing);
     return status;
-}
-
-/* Keep the two newest and the one that later frames start from; grids that are to be exported stay, too. */
-static npg_status remove_old(npg_job *job, const char *name, int64_t serial)
-{
-    bool stays = serial == job->serial || serial == job->serial - 1 || serial == job->forward_serial;
-    stays = stays || (job->keeps_grids && strstr(name, ".vdb"));
-    return stays && name[0] != '.' ? NPG_OK : remove_file(job, name);
 }
 
 /* ---- the lock ---- */
@@ -197,27 +174,65 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
     return status;
 }
 
+/* ---- the store ---- */
+
+static npg_status open_store(npg_job *job, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, job->folder, name));
+    npg_status status = npg_store_open(&job->store, path);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status rename_store(npg_job *job, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, job->folder, name));
+    npg_status status = npg_store_rename(job->store, path);
+    npg_release(&path);
+    return status;
+}
+
+npg_store *npg_job_store(const npg_job *job)
+{
+    return job->store;
+}
+
+void npg_job_keep_poses(npg_job *job, uint64_t of)
+{
+    job->poses_of = of;
+}
+
+static bool is_needed(const npg_record_id *id, const void *user)
+{
+    const npg_job *job = user;
+    if (!strcmp(id->kind, NPG_RECORD_STATE)) return is_kept(job, id->index);
+    if (!strcmp(id->kind, NPG_RECORD_INSIDE)) return id->index == job->serial;
+    return !strcmp(id->kind, NPG_RECORD_POSE) && id->of == job->poses_of;
+}
+
 /* ---- reading states ---- */
 
-static npg_status check_log(const npg_job *job, const npg_archive *archive)
+static npg_status check_log(const npg_job *job, const npg_record *record)
 {
     npg_job_log log;
     int64_t planned;
-    NPG_TRY(npg_archive_get(archive, "planned", &planned, sizeof planned));
+    NPG_TRY(npg_record_get(record, "planned", &planned, sizeof planned));
     /* frames are being appended: the log is made anew from that of the frames done */
     if (planned < (int64_t)json_array_size(json_object_get(job->then, "frames"))) return NPG_OK;
-    NPG_TRY(npg_archive_get(archive, "log", &log, sizeof log));
+    NPG_TRY(npg_record_get(record, "log", &log, sizeof log));
     return npg_frame_log_check(job->output, log.bytes, log.hash);
 }
 
 /* Of a live source. */
-static npg_status check_inputs(const npg_job *job, const npg_archive *archive)
+static npg_status check_inputs(const npg_job *job, const npg_record *record)
 {
     npg_input_place place;
     uint64_t hash;
     char *path;
     if (!job->source) return NPG_OK;
-    NPG_TRY(npg_archive_get(archive, NPG_BLOCK_INPUTS, &place, sizeof place));
+    NPG_TRY(npg_record_get(record, NPG_BLOCK_INPUTS, &place, sizeof place));
     NPG_TRY(npg_job_inputs_path(job, &path, false));
     npg_status status = npg_hash_file(&hash, path, (uint64_t)place.bytes);
     if (!status && hash != place.hash)
@@ -227,114 +242,69 @@ static npg_status check_inputs(const npg_job *job, const npg_archive *archive)
 }
 
 /* A state of aligned frames has none. */
-static npg_status check_grids(const npg_archive *archive, const char *path)
+static npg_status check_grids(const npg_record *record, const char *path)
 {
     size_t size;
-    if (!npg_archive_find(archive, "grids.hash", &size)) return NPG_OK;
+    if (!npg_record_find(record, "grids.hash", &size)) return NPG_OK;
     uint64_t wanted, hash;
-    NPG_TRY(npg_archive_get(archive, "grids.hash", &wanted, sizeof wanted));
+    NPG_TRY(npg_record_get(record, "grids.hash", &wanted, sizeof wanted));
     NPG_TRY(npg_hash_file(&hash, path, UINT64_MAX));
     return hash == wanted ? NPG_OK
                           : npg_error(NPG_BAD_INPUT, "%s is damaged: its checksum does not match", path);
 }
 
-static npg_status open_state(npg_job *job, int64_t serial, bool with_log)
+/* A state behind a solved window, or inside the one after it, in the place of that which is open. */
+static npg_status open_state(npg_job *job, const char *kind, int64_t serial, bool with_log)
 {
-    char *path = NULL, *grids = NULL;
-    npg_archive *archive = NULL;
-    npg_status status = state_path(&path, job, serial, "npg");
-    if (!status) status = state_path(&grids, job, serial, "vdb");
-    if (!status) status = npg_archive_open(&archive, path);
-    if (!status) status = npg_error_prefix(check_grids(archive, grids), "%s", path);
-    if (!status) status = npg_archive_get(archive, "forward", &job->forward_serial, sizeof(int64_t));
-    if (!status && with_log) status = npg_error_prefix(check_log(job, archive), "%s", path);
-    if (!status && with_log) status = npg_error_prefix(check_inputs(job, archive), "%s", path);
-    npg_release(&path);
+    npg_record *state = NULL;
+    int64_t forward;
+    char *grids = NULL;
+    bool is_solved = !strcmp(kind, NPG_RECORD_STATE);
+    npg_status status = npg_store_read(job->store, &state, kind, serial, 0);
+    if (!status && is_solved) status = make_grids_path(&grids, job, serial);
+    if (!status && is_solved) status = check_grids(state, grids);
+    if (!status && with_log) status = check_log(job, state);
+    if (!status && with_log) status = check_inputs(job, state);
+    if (!status) status = npg_record_get(state, "forward", &forward, sizeof forward);
     if (status) {
-        npg_archive_close(&archive);
+        npg_record_close(&state);
         npg_release(&grids);
         return status;
     }
-    npg_archive_close(&job->archive);
+    npg_record_close(&job->state);
     npg_release(&job->grids_path);
-    job->archive = archive;
+    job->state = state;
     job->grids_path = grids;
+    job->forward_serial = forward;
     return NPG_OK;
 }
 
-static npg_status note_serial(npg_job *job, const char *name, int64_t serial)
+static void warn_of_damage(npg_worker *worker, const char *what, bool is_over)
 {
-    /* the archive comes last: without it the state was never whole */
-    if (name[0] != '.' && strstr(name, ".npg") && serial > job->serial) job->serial = serial;
-    return NPG_OK;
+    npg_worker_warn(worker, false, -1, "%s; the job %s", what,
+                    is_over ? "starts over" : "resumes from the window before");
 }
 
-/* The newest state that is whole.  A damaged one is passed over with a warning: the work since is done
- * again. */
-static npg_status open_newest(npg_job *job, npg_worker *worker, bool with_log)
+/* The newest state that is whole, and one inside the window after it, which is newer.  A damaged one is passed
+ * over with a warning: the work since is done again. */
+static npg_status open_newest(npg_job *job, npg_worker *worker, bool is_done)
 {
-    NPG_TRY(each_state(job, note_serial));
-    int64_t newest = job->serial;
-    for (int64_t serial = newest; serial >= 0 && serial > newest - 2 && !job->archive; serial--) {
-        npg_status status = open_state(job, serial, with_log);
+    npg_status status = NPG_OK;
+    int64_t newest = npg_store_last(job->store, NPG_RECORD_STATE);
+    for (int64_t serial = newest; serial >= 0 && serial > newest - 2 && !job->state; serial--) {
+        status = open_state(job, NPG_RECORD_STATE, serial, !is_done);
+        if (!status) job->serial = serial;
         if (status == NPG_MEMORY) return status;
-        if (status && serial == 0)
-            npg_worker_warn(worker, false, -1, "%s; the job starts over", npg_error_text());
-        else if (status)
-            npg_worker_warn(worker, false, -1, "%s; the job resumes from the window before",
-                            npg_error_text());
-        else
-            job->serial = serial;
+        if (status) warn_of_damage(worker, npg_error_text(), serial == 0);
     }
-    if (job->archive || newest < 0) return NPG_OK;
-    if (newest > 0)
-        npg_worker_warn(worker, false, -1, "%s: no state is whole; the job starts over", job->folder);
-    return NPG_OK;
-}
-
-/* A state inside the window that follows the newest state is newer than that. */
-static npg_status open_inside(npg_job *job, npg_worker *worker, bool with_log)
-{
-    npg_archive *archive = NULL;
-    int64_t after = -1;
-    char *path;
-    NPG_TRY(npg_job_inside_path(job, &path));
-    bool is_there = npg_is_there(path);
-    npg_status status = is_there ? npg_archive_open(&archive, path) : NPG_END;
-    if (!status) status = npg_archive_get(archive, "after", &after, sizeof after);
-    if (!status && after != (job->archive ? job->serial : -1)) status = NPG_END;
-    if (!status && with_log) status = npg_error_prefix(check_log(job, archive), "%s", path);
-    if (!status && with_log) status = npg_error_prefix(check_inputs(job, archive), "%s", path);
-    if (!status) status = npg_archive_get(archive, "forward", &job->forward_serial, sizeof(int64_t));
-    npg_release(&path);
-    if (status) {
-        npg_archive_close(&archive);
-        if (status < 0 && status != NPG_MEMORY)
-            npg_worker_warn(worker, false, -1, "%s; the job resumes from the window before",
-                            npg_error_text());
-        return status == NPG_MEMORY ? status : NPG_OK;
+    if (!is_done && npg_store_has(job->store, NPG_RECORD_INSIDE, job->serial, 0)) {
+        status = open_state(job, NPG_RECORD_INSIDE, job->serial, true);
+        if (status == NPG_MEMORY) return status;
+        if (status) warn_of_damage(worker, npg_error_text(), !job->state);
     }
-    npg_archive_close(&job->archive);
-    npg_release(&job->grids_path);
-    job->archive = archive;
+    const char *damage = npg_store_damage(job->store);
+    if (*damage) warn_of_damage(worker, damage, !job->state);
     return NPG_OK;
-}
-
-npg_status npg_job_inside_path(const npg_job *job, char **path)
-{
-    return npg_join_path(path, job->folder, INSIDE_NAME);
-}
-
-npg_status npg_job_poses_path(const npg_job *job, char **path, bool is_new)
-{
-    return npg_join_path(path, job->folder, is_new ? POSES_NEW : POSES_NAME);
-}
-
-npg_status npg_job_followed_path(const npg_job *job, char **path, int64_t pass)
-{
-    char name[64];
-    snprintf(name, sizeof name, FOLLOWED, (long long)pass);
-    return npg_join_path(path, job->folder, name);
 }
 
 npg_status npg_job_key(const npg_job *job, uint64_t *key)
@@ -346,28 +316,6 @@ npg_status npg_job_key(const npg_job *job, uint64_t *key)
     return NPG_OK;
 }
 
-/* What was written under another name while an earlier run's file had this one. */
-static npg_status rename_file(const npg_job *job, const char *name, const char *new_name)
-{
-    char *from, *to = NULL;
-    NPG_TRY(npg_join_path(&from, job->folder, name));
-    npg_status status = npg_join_path(&to, job->folder, new_name);
-    if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
-    npg_release(&from);
-    npg_release(&to);
-    return status;
-}
-
-npg_status npg_job_keep_poses(const npg_job *job)
-{
-    return rename_file(job, POSES_NEW, POSES_NAME);
-}
-
-npg_status npg_job_remove_new_poses(const npg_job *job)
-{
-    return remove_file(job, POSES_NEW);
-}
-
 npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new)
 {
     return npg_join_path(path, job->folder, is_new ? INPUTS_NEW : INPUTS_NAME);
@@ -376,7 +324,14 @@ npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new)
 /* The log is open: what is added to it goes on under the new name. */
 static npg_status keep_inputs(const npg_job *job)
 {
-    return job->source ? rename_file(job, INPUTS_NEW, INPUTS_NAME) : remove_file(job, INPUTS_NAME);
+    char *from = NULL, *to = NULL;
+    if (!job->source) return remove_file(job, INPUTS_NAME);
+    npg_status status = npg_job_inputs_path(job, &from, true);
+    if (!status) status = npg_job_inputs_path(job, &to, false);
+    if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
+    npg_release(&from);
+    npg_release(&to);
+    return status;
 }
 
 int64_t npg_job_serial(const npg_job *job)
@@ -394,9 +349,9 @@ int64_t npg_job_frame_count(const npg_job *job)
     return job->frame_count;
 }
 
-const npg_archive *npg_job_archive(const npg_job *job)
+const npg_record *npg_job_state(const npg_job *job)
 {
-    return job->archive;
+    return job->state;
 }
 
 const char *npg_job_grids_path(const npg_job *job)
@@ -408,7 +363,7 @@ npg_status npg_job_open_forward(npg_job *job)
 {
     if (job->forward_serial < 0)
         return npg_error(NPG_USAGE, "%s: there is no state that later frames can start from", job->folder);
-    return open_state(job, job->forward_serial, false);
+    return open_state(job, NPG_RECORD_STATE, job->forward_serial, false);
 }
 
 /* ---- opening ---- */
@@ -442,10 +397,10 @@ static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *w
                         "%lld frames came since the job was begun; "
                         "neupig append adds them when it is done",
                         (long long)added);
-    if (job->archive) NPG_TRY(npg_archive_get(job->archive, "planned", &planned, sizeof planned));
-    bool is_longer = job->archive && planned < (int64_t)json_array_size(json_object_get(job->then, "frames"));
+    if (job->state) NPG_TRY(npg_record_get(job->state, "planned", &planned, sizeof planned));
+    bool is_longer = job->state && planned < (int64_t)json_array_size(json_object_get(job->then, "frames"));
     if ((added && is_done) || (is_longer && !is_done)) *start = NPG_JOB_APPEND;
-    if (*start == NPG_JOB_APPEND && !job->archive)
+    if (*start == NPG_JOB_APPEND && !job->state)
         return npg_error(NPG_USAGE, "%s: there is no state left to resume from; --restart starts over",
                          job->folder);
     return NPG_OK;
@@ -457,14 +412,16 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     *start = NPG_JOB_FRESH;
     npg_status status = read_json(&job->then, job->folder, "job.json");
     if (!status && !job->then) return NPG_OK;
+    if (!status && !json_equal(json_object_get(job->then, "layout"), json_object_get(job->now, "layout")))
+        status = npg_error(NPG_USAGE, "it was begun by another version of neupig");
     if (!status) status = look_for_end(job, &is_done, &was_partial);
     if (status == NPG_USAGE) return npg_job_differs(job);
     NPG_TRY(status);
     /* a stream, or frames that are pushed, may be others: stage export has the word on what is there */
     if (is_done && job->source > NPG_JOB_FOLLOW) return NPG_OK;
-    NPG_TRY(open_newest(job, worker, !is_done));
-    if (!is_done) NPG_TRY(open_inside(job, worker, true));
-    if (!job->archive && !is_done) return NPG_OK;
+    NPG_TRY(open_store(job, STORE_NAME));
+    NPG_TRY(open_newest(job, worker, is_done));
+    if (!job->state && !is_done) return rename_store(job, STORE_NEW); /* it may hold what was followed */
     NPG_TRY(choose_start(job, start, worker, is_done, append));
     if (*start == NPG_JOB_DONE && was_partial)
         npg_worker_warn(worker, true, -1, "the job was done with frames skipped or below the quality bar");
@@ -487,10 +444,10 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     NPG_TRY(npg_make_folder(job->folder));
     NPG_TRY(take_lock(job));
     *start = NPG_JOB_FRESH;
-    if (restart) NPG_TRY(remove_kind(job, is_followed));
     if (!restart) NPG_TRY(look_around(job, start, worker, append));
     job->forgets = *start == NPG_JOB_FRESH;
-    return NPG_OK;
+    if (restart || !job->forgets) NPG_TRY(remove_file(job, STORE_NEW));
+    return job->store ? NPG_OK : open_store(job, STORE_NEW);
 }
 
 npg_status npg_job_open(npg_job **out, npg_job_start *start, npg_worker *worker, bool restart, bool append)
@@ -508,7 +465,8 @@ void npg_job_close(npg_job **slot)
 {
     npg_job *job = *slot;
     if (!job) return;
-    npg_archive_close(&job->archive);
+    npg_record_close(&job->state);
+    npg_store_close(&job->store);
     npg_release(&job->grids_path);
     json_decref(job->then);
     json_decref(job->now);
@@ -550,16 +508,14 @@ static void forget_descriptions(npg_job *job)
 
 npg_status npg_job_write(npg_job *job, bool keeps_grids)
 {
-    job->keeps_grids = keeps_grids;
     if (job->forgets) {
         NPG_TRY(remove_file(job, "job.json"));
-        NPG_TRY(each_state(job, remove_state));
-        NPG_TRY(remove_file(job, INSIDE_NAME));
-        NPG_TRY(remove_file(job, POSES_NAME));
+        NPG_TRY(rename_store(job, STORE_NAME));
+        NPG_TRY(remove_stale(job));
         NPG_TRY(keep_inputs(job));
-        job->serial = job->forward_serial = -1;
         NPG_TRY(write_description(job));
     }
+    job->keeps_grids = keeps_grids;
     forget_descriptions(job);
     pthread_mutex_lock(&job->lock);
     job->is_written = true;
@@ -573,23 +529,17 @@ npg_status npg_job_extend(npg_job *job)
     return write_description(job);
 }
 
-npg_status npg_job_next(const npg_job *job, int64_t *serial, char **archive_path, char **grids_path)
+npg_status npg_job_next_grids(const npg_job *job, char **path)
 {
-    *serial = job->serial + 1;
-    *archive_path = *grids_path = NULL;
-    NPG_TRY(state_path(archive_path, job, *serial, "npg"));
-    npg_status status = state_path(grids_path, job, *serial, "vdb");
-    if (status) npg_release(archive_path);
-    return status;
+    return make_grids_path(path, job, job->serial + 1);
 }
 
-npg_status npg_job_commit(npg_job *job, bool is_forward_end)
+npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment)
 {
-    job->serial++;
-    if (is_forward_end) job->forward_serial = job->serial;
-    NPG_TRY(remove_file(job, INSIDE_NAME));
-    NPG_TRY(remove_kind(job, is_followed));
-    return each_state(job, remove_old);
+    job->serial += !moment->is_inside;
+    if (moment->is_forward_end) job->forward_serial = job->serial;
+    NPG_TRY(npg_store_forget(job->store, is_needed, job));
+    return remove_stale(job);
 }
 
 int64_t npg_job_forward_serial(const npg_job *job)

@@ -11,6 +11,9 @@
 #include "job/job.h"
 #include "pipeline/file.h"
 
+/* Of the files in the job folder; another one is not read. */
+#define LAYOUT 2
+
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
 static const char *const free_options[] = {
     "input",   "output",  "ring",   "chunk", "max-memory",  "pull",        "cache",  "overwrite",
@@ -169,7 +172,7 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     if (!status && settings.reference[0]) status = describe_file(mesh, settings.reference);
     if (!status) status = describe_option_files(files, options);
     json_t *description =
-        json_pack("{ss so so so so so so}", "neupig", npg_version(), "input",
+        json_pack("{ss si so so so so so so}", "neupig", npg_version(), "layout", LAYOUT, "input",
                   source > NPG_JOB_FOLLOW ? npg_json_text(input) : absolute(input), "options",
                   describe_options(options), "custom_stages", describe_custom_stages(options), "reference",
                   mesh, "files", files, "frames", frames);

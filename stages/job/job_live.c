@@ -6,6 +6,7 @@
 #include "ingest/follow.h"
 #include "ingest/input_log.h"
 #include "job/job.h"
+#include "pipeline/file.h"
 #include "pipeline/live_plan.h"
 
 npg_status npg_job_begin_inputs(npg_worker *worker, npg_job *job)
@@ -132,7 +133,7 @@ npg_status npg_job_resume_inputs(npg_worker *worker, npg_job *job)
     npg_input_place place;
     npg_input_log *log;
     char *path;
-    NPG_TRY(npg_archive_get(npg_job_archive(job), NPG_BLOCK_INPUTS, &place, sizeof place));
+    NPG_TRY(npg_record_get(npg_job_state(job), NPG_BLOCK_INPUTS, &place, sizeof place));
     NPG_TRY(npg_job_inputs_path(job, &path, false));
     npg_status status = npg_input_log_resume(&log, path, &place);
     npg_release(&path);

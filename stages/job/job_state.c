@@ -6,21 +6,22 @@
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "job/state_mesh.h"
+#include "pipeline/file.h"
 
 /* ---- saving ---- */
 
-static npg_status put_reports(npg_archive_writer *out, npg_worker *worker)
+static npg_status put_reports(npg_store *out, npg_worker *worker)
 {
     json_t *reports = npg_worker_save_reports(worker);
     char *text = reports ? json_dumps(reports, JSON_COMPACT) : NULL;
     json_decref(reports);
     if (!text) return npg_error(NPG_MEMORY, "no memory for the report");
-    npg_status status = npg_archive_put(out, "reports", text, strlen(text) + 1);
+    npg_status status = npg_store_put(out, "reports", text, strlen(text) + 1);
     free(text);
     return status;
 }
 
-static npg_status put_facts(npg_archive_writer *out, npg_worker *worker)
+static npg_status put_facts(npg_store *out, npg_worker *worker)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_facts plain;
@@ -34,23 +35,23 @@ static npg_status put_facts(npg_archive_writer *out, npg_worker *worker)
     plain.reference = NULL;
     plain.is_resumed = false;
     plain.resumed_read = 0;
-    NPG_TRY(npg_archive_put(out, "planned", &facts->plan.frame_count, sizeof(int64_t)));
-    NPG_TRY(npg_archive_put(out, "facts", &plain, sizeof plain));
+    NPG_TRY(npg_store_put(out, "planned", &facts->plan.frame_count, sizeof(int64_t)));
+    NPG_TRY(npg_store_put(out, "facts", &plain, sizeof plain));
     NPG_TRY(put_reports(out, worker));
     return npg_state_put_mesh(out, facts->reference);
 }
 
 /* The frame log goes with the state: it has to be on disk before. */
-static npg_status put_log(npg_archive_writer *out, const npg_worker *worker, int64_t emitted)
+static npg_status put_log(npg_store *out, const npg_worker *worker, int64_t emitted)
 {
     npg_job_log log = {.count = emitted};
     NPG_TRY(npg_job_wait_exported(npg_job_of(worker), emitted, &log.bytes));
     NPG_TRY(npg_frame_log_sync(npg_worker_settings(worker)->output, log.bytes, &log.hash));
-    return npg_archive_put(out, "log", &log, sizeof log);
+    return npg_store_put(out, "log", &log, sizeof log);
 }
 
 /* So does the log of a live source: what the plan was made from, and what is solved. */
-static npg_status put_inputs(npg_archive_writer *out, const npg_worker *worker, int64_t last)
+static npg_status put_inputs(npg_store *out, const npg_worker *worker, int64_t last)
 {
     npg_input_log *log = npg_worker_fact(worker, &npg_fact_input_log);
     const npg_facts *facts = npg_worker_facts(worker);
@@ -63,69 +64,48 @@ static npg_status put_inputs(npg_archive_writer *out, const npg_worker *worker, 
     NPG_TRY(npg_job_inputs_path(npg_job_of(worker), &path, false));
     npg_status status = npg_hash_file(&place.hash, path, (uint64_t)place.bytes);
     npg_release(&path);
-    return status ? status : npg_archive_put(out, NPG_BLOCK_INPUTS, &place, sizeof place);
+    return status ? status : npg_store_put(out, NPG_BLOCK_INPUTS, &place, sizeof place);
 }
 
-static npg_status put_all(npg_archive_writer *out, npg_worker *worker, const npg_job_moment *moment,
-                          int64_t forward)
+static npg_status put_all(npg_store *out, npg_worker *worker, const npg_job_moment *moment)
 {
+    const npg_job *job = npg_job_of(worker);
+    int64_t serial = npg_job_serial(job);
+    int64_t forward = moment->is_forward_end ? serial + 1 : npg_job_forward_serial(job);
     NPG_TRY(put_log(out, worker, moment->emitted));
     NPG_TRY(put_inputs(out, worker, moment->last));
-    NPG_TRY(npg_archive_put(out, "forward", &forward, sizeof forward));
-    NPG_TRY(npg_archive_put(out, "read", &moment->read, sizeof moment->read));
+    NPG_TRY(npg_store_put(out, "forward", &forward, sizeof forward));
+    NPG_TRY(npg_store_put(out, "read", &moment->read, sizeof moment->read));
     NPG_TRY(put_facts(out, worker));
     /* the stages behind have no frame in hand: those passed on before are on disk
      * (put_log), no other followed */
-    return npg_worker_save_stages(worker, out);
+    return npg_worker_save_stages(worker, out, moment->read);
 }
 
 npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                               void *user)
 {
     npg_job *job = npg_job_of(worker);
-    npg_archive_writer *out = NULL;
-    char *path, *grids_path;
-    int64_t serial;
-    NPG_TRY(npg_job_next(job, &serial, &path, &grids_path));
-    npg_status status = npg_archive_create(&out, path);
-    if (!status)
-        status = put_all(out, worker, moment, moment->is_forward_end ? serial : npg_job_forward_serial(job));
+    npg_store *out = npg_job_store(job);
+    int64_t serial = npg_job_serial(job);
+    char *grids_path = NULL;
+    npg_status status = moment->is_inside ? NPG_OK : npg_job_next_grids(job, &grids_path);
+    NPG_TRY(status);
+    npg_store_begin(out, moment->is_inside ? NPG_RECORD_INSIDE : NPG_RECORD_STATE,
+                    moment->is_inside ? serial : serial + 1, 0);
+    status = put_all(out, worker, moment);
     if (!status) status = write(user, out, grids_path);
-    if (!status)
-        status = npg_archive_commit(&out);
-    else
-        npg_archive_discard(&out);
-    npg_release(&path);
+    status = npg_store_end(out, status, true);
     npg_release(&grids_path);
-    return status ? status : npg_job_commit(job, moment->is_forward_end);
-}
-
-npg_status npg_job_save_inside(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
-                               void *user)
-{
-    npg_job *job = npg_job_of(worker);
-    npg_archive_writer *out = NULL;
-    char *path;
-    const int64_t serial = npg_job_serial(job);
-    NPG_TRY(npg_job_inside_path(job, &path));
-    npg_status status = npg_archive_create(&out, path);
-    if (!status) status = put_all(out, worker, moment, npg_job_forward_serial(job));
-    if (!status) status = npg_archive_put(out, "after", &serial, sizeof serial);
-    if (!status) status = write(user, out, NULL);
-    if (!status)
-        status = npg_archive_commit(&out);
-    else
-        npg_archive_discard(&out);
-    npg_release(&path);
-    return status;
+    return status ? status : npg_job_commit(job, moment);
 }
 
 /* ---- restoring ---- */
 
-static npg_status get_reports(npg_worker *worker, const npg_archive *in)
+static npg_status get_reports(npg_worker *worker, const npg_record *in)
 {
     size_t size;
-    const char *text = npg_archive_find(in, "reports", &size);
+    const char *text = npg_record_find(in, "reports", &size);
     json_t *reports = text && size ? json_loadb(text, size - 1, 0, NULL) : NULL;
     if (!reports) return npg_error(NPG_BAD_INPUT, "the report so far is missing");
     npg_worker_restore_reports(worker, reports);
@@ -136,12 +116,12 @@ static npg_status get_reports(npg_worker *worker, const npg_archive *in)
 npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job)
 {
     npg_facts restored;
-    const npg_archive *in = npg_job_archive(job);
+    const npg_record *in = npg_job_state(job);
     int64_t read;
     npg_job_log log;
-    NPG_TRY(npg_archive_get(in, "facts", &restored, sizeof restored));
-    NPG_TRY(npg_archive_get(in, "read", &read, sizeof read));
-    NPG_TRY(npg_archive_get(in, "log", &log, sizeof log));
+    NPG_TRY(npg_record_get(in, "facts", &restored, sizeof restored));
+    NPG_TRY(npg_record_get(in, "read", &read, sizeof read));
+    NPG_TRY(npg_record_get(in, "log", &log, sizeof log));
     NPG_TRY(get_reports(worker, in));
     NPG_TRY(npg_state_get_mesh(&restored.reference, in));
     restored.is_resumed = true;

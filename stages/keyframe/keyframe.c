@@ -408,7 +408,7 @@ static npg_status init(npg_worker *worker)
         return npg_error(NPG_USAGE, "option overlap: %lld frames don't fit in windows of %lld",
                          (long long)state->overlap, (long long)window);
     if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed)
-        return npg_outside_restore(&state->outside, npg_job_archive(npg_job_of(worker)), facts);
+        return npg_outside_restore(&state->outside, npg_job_state(npg_job_of(worker)), facts);
     if (pass == NPG_PASS_MEASURE) {
         *npg_own(worker, bounds_local) = npg_bounds_empty();
         *npg_own(worker, point_count_max) = 0;
@@ -463,8 +463,9 @@ static void uninit(npg_worker *worker)
 }
 
 /* Of a state on disk: the plan and the box are facts. */
-static npg_status save(const npg_worker *worker, npg_archive_writer *out)
+static npg_status save(const npg_worker *worker, npg_store *out, int64_t read)
 {
+    (void)read;
     keyframe_state *state = npg_worker_state(worker);
     return npg_worker_facts(worker)->is_live ? npg_outside_save(&state->outside, out) : NPG_OK;
 }

@@ -72,8 +72,8 @@ void npg_outside_tell(npg_worker *worker, const npg_outside *outside);
 
 /* Those that were told, to a state on disk and back: of frames that are solved, the others come again.  Any
  * thread may save. */
-npg_status npg_outside_save(npg_outside *outside, npg_archive_writer *out);
-npg_status npg_outside_restore(npg_outside *outside, const npg_archive *in, const npg_facts *facts);
+npg_status npg_outside_save(npg_outside *outside, npg_store *out);
+npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const npg_facts *facts);
 
 /* Shortlist: which frames the choosing pass reads, and which of them may become the keyframe. */
 

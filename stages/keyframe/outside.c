@@ -72,19 +72,19 @@ void npg_outside_tell(npg_worker *worker, const npg_outside *outside)
 
 #define BLOCK_OUTSIDE "outside"
 
-npg_status npg_outside_save(npg_outside *outside, npg_archive_writer *out)
+npg_status npg_outside_save(npg_outside *outside, npg_store *out)
 {
     pthread_mutex_lock(&outside->lock);
     size_t size = outside->count * sizeof *outside->frames;
-    npg_status status = size ? npg_archive_put(out, BLOCK_OUTSIDE, outside->frames, size) : NPG_OK;
+    npg_status status = size ? npg_store_put(out, BLOCK_OUTSIDE, outside->frames, size) : NPG_OK;
     pthread_mutex_unlock(&outside->lock);
     return status;
 }
 
-npg_status npg_outside_restore(npg_outside *outside, const npg_archive *in, const npg_facts *facts)
+npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const npg_facts *facts)
 {
     size_t size;
-    const npg_outside_frame *saved = npg_archive_find(in, BLOCK_OUTSIDE, &size);
+    const npg_outside_frame *saved = npg_record_find(in, BLOCK_OUTSIDE, &size);
     for (size_t i = 0; saved && i < size / sizeof *saved; i++) {
         npg_outside_frame one;
         memcpy(&one, saved + i, sizeof one);

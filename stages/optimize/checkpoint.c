@@ -27,15 +27,15 @@ static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t inde
 
 /* ---- saving: frames ---- */
 
-static npg_status put_array(npg_archive_writer *out, const char *what, int64_t index, const float *values,
+static npg_status put_array(npg_store *out, const char *what, int64_t index, const float *values,
                             size_t count)
 {
     char name[NPG_BLOCK_NAME];
     block_name(name, what, index);
-    return values ? npg_archive_put(out, name, values, count * 3 * sizeof(float)) : NPG_OK;
+    return values ? npg_store_put(out, name, values, count * 3 * sizeof(float)) : NPG_OK;
 }
 
-static npg_status put_frame(npg_archive_writer *out, const npg_held *held, size_t vert_count)
+static npg_status put_frame(npg_store *out, const npg_held *held, size_t vert_count)
 {
     const npg_frame *f = &held->frame;
     char name[NPG_BLOCK_NAME];
@@ -53,18 +53,18 @@ static npg_status put_frame(npg_archive_writer *out, const npg_held *held, size_
                          .has_sure_normals = f->has_sure_normals,
                          .cleaning = f->cleaning};
     block_name(name, "frame", f->index);
-    NPG_TRY(npg_archive_put(out, name, &saved, sizeof saved));
+    NPG_TRY(npg_store_put(out, name, &saved, sizeof saved));
     NPG_TRY(put_array(out, "points", f->index, f->pos_local, f->point_count));
     NPG_TRY(put_array(out, "normals", f->index, f->normals, f->point_count));
     block_name(name, "colours", f->index);
-    if (f->colours) NPG_TRY(npg_archive_put(out, name, f->colours, 4 * f->point_count));
+    if (f->colours) NPG_TRY(npg_store_put(out, name, f->colours, 4 * f->point_count));
     NPG_TRY(put_array(out, "aligned", f->index, f->vert_unit, vert_count));
     NPG_TRY(put_array(out, "solved", f->index, held->solved, vert_count));
     block_name(name, "path", f->index);
-    return f->path ? npg_archive_put(out, name, f->path, strlen(f->path) + 1) : NPG_OK;
+    return f->path ? npg_store_put(out, name, f->path, strlen(f->path) + 1) : NPG_OK;
 }
 
-static npg_status put_frames(npg_archive_writer *out, const npg_hand *hand, size_t vert_count)
+static npg_status put_frames(npg_store *out, const npg_hand *hand, size_t vert_count)
 {
     int64_t *indices;
     size_t count = 0;
@@ -75,34 +75,20 @@ static npg_status put_frames(npg_archive_writer *out, const npg_hand *hand, size
         indices[count++] = hand->held[i].frame.index;
         status = put_frame(out, &hand->held[i], vert_count);
     }
-    if (!status) status = npg_archive_put(out, "held", indices, count * sizeof *indices);
+    if (!status) status = npg_store_put(out, "held", indices, count * sizeof *indices);
     npg_release(&indices);
     return status;
 }
 
 /* ---- saving: all of it ---- */
 
-/* What the coarse alignment needs after `read` frames came with the last of them. */
-static npg_status put_alignment(npg_archive_writer *out, const npg_hand *hand, const npg_plan *plan)
-{
-    int64_t read = npg_live_read_before(plan, hand->window_at, hand->total);
-    int64_t last = npg_live_frame(plan, npg_live_next_place(plan, read, hand->total) - 1);
-    for (size_t i = 0; i < hand->held_count; i++) {
-        const npg_frame *frame = &hand->held[i].frame;
-        if (frame->index == last && frame->align_state)
-            return npg_archive_put(out, NPG_BLOCK_ALIGN, frame->align_state, frame->align_state_size);
-    }
-    return npg_error(NPG_FAILED, "frame %lld came without the alignment's state", (long long)last);
-}
-
-static npg_status put_hand(npg_archive_writer *out, const npg_facts *facts, const npg_hand *hand)
+static npg_status put_hand(npg_store *out, const npg_facts *facts, const npg_hand *hand)
 {
     const saved_progress progress = {hand->window_at,    hand->is_aligned,    hand->total,
                                      hand->last_chamfer, hand->last_isometry, hand->noise};
-    NPG_TRY(npg_archive_put(out, "progress", &progress, sizeof progress));
-    if (hand->is_aligned) NPG_TRY(put_alignment(out, hand, &facts->plan));
-    if (hand->usual > 0) NPG_TRY(npg_archive_put(out, "usual", &hand->usual, sizeof hand->usual));
-    if (hand->lost_count) NPG_TRY(npg_archive_put(out, "lost", &hand->lost_count, sizeof hand->lost_count));
+    NPG_TRY(npg_store_put(out, "progress", &progress, sizeof progress));
+    if (hand->usual > 0) NPG_TRY(npg_store_put(out, "usual", &hand->usual, sizeof hand->usual));
+    if (hand->lost_count) NPG_TRY(npg_store_put(out, "lost", &hand->lost_count, sizeof hand->lost_count));
     return put_frames(out, hand, facts->reference->vert_count);
 }
 
@@ -117,7 +103,7 @@ static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
     return place;
 }
 
-static npg_status put_first(npg_archive_writer *out, const npg_facts *facts, const npg_hand *hand)
+static npg_status put_first(npg_store *out, const npg_facts *facts, const npg_hand *hand)
 {
     bool is_needed = npg_live_is_first_needed_after(&facts->plan, hand->window_at, hand->total);
     if (!hand->warm || !is_needed) return NPG_OK;
@@ -131,7 +117,7 @@ typedef struct saving {
     npg_fit *fit; /* or NULL */
 } saving;
 
-static npg_status write_state(void *user, npg_archive_writer *out, const char *grids_path)
+static npg_status write_state(void *user, npg_store *out, const char *grids_path)
 {
     const saving *s = user;
     const npg_facts *facts = npg_worker_facts(s->worker);
@@ -160,7 +146,7 @@ npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit
     return npg_job_save_state(worker, &moment, write_state, &s);
 }
 
-static npg_status write_inside(void *user, npg_archive_writer *out, const char *grids_path)
+static npg_status write_inside(void *user, npg_store *out, const char *grids_path)
 {
     const saving *s = user;
     const npg_facts *facts = npg_worker_facts(s->worker);
@@ -172,9 +158,10 @@ static npg_status write_inside(void *user, npg_archive_writer *out, const char *
 
 npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
 {
-    const npg_job_moment moment = moment_of(&npg_worker_facts(worker)->plan, hand);
+    npg_job_moment moment = moment_of(&npg_worker_facts(worker)->plan, hand);
+    moment.is_inside = true;
     saving s = {worker, hand, NULL};
-    return npg_job_save_inside(worker, &moment, write_inside, &s);
+    return npg_job_save_state(worker, &moment, write_inside, &s);
 }
 
 /* ---- restoring: the fit ---- */
@@ -182,46 +169,46 @@ npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
 npg_status npg_checkpoint_restore_fit(npg_worker *worker, npg_fit *fit, npg_warm *warm)
 {
     const npg_job *job = npg_job_of(worker);
-    const npg_archive *in = npg_job_archive(job);
+    const npg_record *in = npg_job_state(job);
     size_t size;
     if (warm) NPG_TRY(npg_fit_copy_load(npg_warm_first(warm), in, "first"));
-    if (!npg_archive_find(in, "inside", &size)) return npg_fit_restore(fit, in, npg_job_grids_path(job));
+    if (!npg_record_find(in, "inside", &size)) return npg_fit_restore(fit, in, npg_job_grids_path(job));
     return warm ? npg_warm_restore(warm, fit, in) : npg_error(NPG_BAD_INPUT, "a block that is not expected");
 }
 
 /* ---- restoring: frames ---- */
 
-static npg_status get_array(const npg_archive *in, const char *what, int64_t index, float **values,
+static npg_status get_array(const npg_record *in, const char *what, int64_t index, float **values,
                             size_t count)
 {
     char name[NPG_BLOCK_NAME];
     size_t size;
     block_name(name, what, index);
-    if (!npg_archive_find(in, name, &size) || size / (3 * sizeof(float)) != count)
+    if (!npg_record_find(in, name, &size) || size / (3 * sizeof(float)) != count)
         return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu points", name, count);
     NPG_TRY(npg_alloc_array(values, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
-    return npg_archive_get(in, name, *values, count * 3 * sizeof(float));
+    return npg_record_get(in, name, *values, count * 3 * sizeof(float));
 }
 
-static npg_status get_colours(npg_frame *f, const npg_archive *in)
+static npg_status get_colours(npg_frame *f, const npg_record *in)
 {
     char name[NPG_BLOCK_NAME];
     size_t size;
     block_name(name, "colours", f->index);
-    if (!npg_archive_find(in, name, &size) || size / 4 != f->point_count)
+    if (!npg_record_find(in, name, &size) || size / 4 != f->point_count)
         return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu points", name, f->point_count);
     NPG_TRY(npg_alloc_array(&f->colours, NPG_FOR_FRAMES, f->point_count, 4));
-    return npg_archive_get(in, name, f->colours, 4 * f->point_count);
+    return npg_record_get(in, name, f->colours, 4 * f->point_count);
 }
 
-static npg_status get_frame(npg_held *held, const npg_archive *in, int64_t index, size_t vert_count)
+static npg_status get_frame(npg_held *held, const npg_record *in, int64_t index, size_t vert_count)
 {
     char name[NPG_BLOCK_NAME];
     saved_frame saved;
     size_t size;
     npg_frame *f = &held->frame;
     block_name(name, "frame", index);
-    NPG_TRY(npg_archive_get(in, name, &saved, sizeof saved));
+    NPG_TRY(npg_record_get(in, name, &saved, sizeof saved));
     if (saved.vert_count != vert_count || saved.index != index)
         return npg_error(NPG_BAD_INPUT, "frame %lld is not one of this reference", (long long)index);
     *f = (npg_frame){.index = saved.index,
@@ -241,14 +228,14 @@ static npg_status get_frame(npg_held *held, const npg_archive *in, int64_t index
     if (saved.has_aligned) f->vert_count = vert_count;
     NPG_TRY(get_array(in, "solved", index, &held->solved, vert_count));
     block_name(name, "path", index);
-    const char *path = npg_archive_find(in, name, &size);
+    const char *path = npg_record_find(in, name, &size);
     return path ? npg_copy_text(&f->path, path) : NPG_OK;
 }
 
-static npg_status get_frames(npg_hand *hand, const npg_archive *in, int64_t first_index, size_t vert_count)
+static npg_status get_frames(npg_hand *hand, const npg_record *in, int64_t first_index, size_t vert_count)
 {
     size_t size;
-    const int64_t *indices = npg_archive_find(in, "held", &size);
+    const int64_t *indices = npg_record_find(in, "held", &size);
     size_t count = size / sizeof *indices;
     if (!indices) return npg_error(NPG_BAD_INPUT, "the block held is missing");
     NPG_TRY(npg_grow(&hand->held, &hand->held_capacity, count, sizeof *hand->held, NPG_FOR_FRAMES));
@@ -264,11 +251,11 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_job *job = npg_job_of(worker);
-    const npg_archive *in = npg_job_archive(job);
+    const npg_record *in = npg_job_state(job);
     saved_progress progress;
     int64_t planned, first_index = 0, log_bytes;
-    NPG_TRY(npg_archive_get(in, "progress", &progress, sizeof progress));
-    NPG_TRY(npg_archive_get(in, "planned", &planned, sizeof planned));
+    NPG_TRY(npg_record_get(in, "progress", &progress, sizeof progress));
+    NPG_TRY(npg_record_get(in, "planned", &planned, sizeof planned));
     bool is_appending = planned < facts->plan.frame_count;
     if (is_appending) first_index = npg_plan_window(&facts->plan, 0).first;
     hand->window_at = is_appending ? -1 : progress.window_at;
@@ -278,10 +265,10 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     hand->last_chamfer = progress.last_chamfer;
     hand->last_isometry = progress.last_isometry;
     size_t size;
-    if (npg_archive_find(in, "usual", &size))
-        NPG_TRY(npg_archive_get(in, "usual", &hand->usual, sizeof hand->usual));
-    if (npg_archive_find(in, "lost", &size))
-        NPG_TRY(npg_archive_get(in, "lost", &hand->lost_count, sizeof hand->lost_count));
+    if (npg_record_find(in, "usual", &size))
+        NPG_TRY(npg_record_get(in, "usual", &hand->usual, sizeof hand->usual));
+    if (npg_record_find(in, "lost", &size))
+        NPG_TRY(npg_record_get(in, "lost", &hand->lost_count, sizeof hand->lost_count));
     npg_job_exported(job, &hand->emitted, &log_bytes);
     return get_frames(hand, in, first_index, facts->reference->vert_count);
 }

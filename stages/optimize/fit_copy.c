@@ -95,18 +95,18 @@ npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from)
     return status ? status : npg_fit_write_params(to);
 }
 
-npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_archive_writer *archive, const char *block)
+npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_store *store, const char *block)
 {
-    return copy->bytes ? npg_archive_put(archive, block, copy->bytes, copy->size) : NPG_OK;
+    return copy->bytes ? npg_store_put(store, block, copy->bytes, copy->size) : NPG_OK;
 }
 
-npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_archive *archive, const char *block)
+npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_record *record, const char *block)
 {
     npg_fit_copy_clear(copy);
-    if (!npg_archive_find(archive, block, &copy->size)) {
+    if (!npg_record_find(record, block, &copy->size)) {
         copy->size = 0;
         return NPG_OK;
     }
     NPG_TRY(npg_alloc(&copy->bytes, NPG_FOR_FIT, copy->size));
-    return npg_archive_get(archive, block, copy->bytes, copy->size);
+    return npg_record_get(record, block, copy->bytes, copy->size);
 }

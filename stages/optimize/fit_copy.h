@@ -4,8 +4,8 @@
 #ifndef NPG_FIT_COPY_H
 #define NPG_FIT_COPY_H
 
+#include "job/store.h"
 #include "optimize/fit.h"
-#include "pipeline/archive.h"
 
 /* {0} is none yet. */
 typedef struct npg_fit_copy {
@@ -22,8 +22,8 @@ void npg_fit_copy_clear(npg_fit_copy *copy);
  * loss would shorten or lengthen its steps for hundreds of epochs. */
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from);
 
-/* As a block of an archive; loading a block that is missing leaves none. */
-npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_archive_writer *archive, const char *block);
-npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_archive *archive, const char *block);
+/* As a block of an store; loading a block that is missing leaves none. */
+npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_store *store, const char *block);
+npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_record *store, const char *block);
 
 #endif

@@ -319,7 +319,6 @@ static npg_status emit(npg_worker *worker, npg_held *held)
     state *s = npg_worker_state(worker);
     npg_chunk *chunk;
     NPG_TRY(npg_chunk_open(&chunk, 1));
-    npg_release(&held->frame.align_state); /* was for the state of the window that waited for this frame */
     npg_release(&held->frame.vert_unit);
     held->frame.vert_unit = held->solved;
     held->frame.vert_count = npg_worker_facts(worker)->reference->vert_count;

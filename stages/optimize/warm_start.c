@@ -67,8 +67,8 @@ struct npg_warm {
     npg_warm_keep *keep; /* or NULL */
     progress at;
     double usual;      /* Chamfer distance that other windows came to, or 0 */
-    bool is_resumed;   /* `at`, poses and the fits are from an archive */
-    size_t pose_count; /* of an archive: frames that have poses        */
+    bool is_resumed;   /* `at`, poses and the fits are from a record */
+    size_t pose_count; /* of a record: frames that have poses        */
 };
 
 /* ---- opening ---- */
@@ -596,56 +596,56 @@ npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *fram
 
 /* ---- states inside a window ---- */
 
-npg_status npg_warm_save(npg_warm *w, npg_archive_writer *archive)
+npg_status npg_warm_save(npg_warm *w, npg_store *store)
 {
     npg_fit_copy copy = {0};
     size_t count = w->in->count;
-    NPG_TRY(npg_archive_put(archive, "inside", &w->at, sizeof w->at));
+    NPG_TRY(npg_store_put(store, "inside", &w->at, sizeof w->at));
     if (w->carry) {
-        NPG_TRY(npg_archive_put(archive, "inside.poses", w->poses, count * 3 * w->samples * sizeof(float)));
+        NPG_TRY(npg_store_put(store, "inside.poses", w->poses, count * 3 * w->samples * sizeof(float)));
     }
-    NPG_TRY(npg_archive_put(archive, "inside.known", w->is_known, count * sizeof *w->is_known));
+    NPG_TRY(npg_store_put(store, "inside.known", w->is_known, count * sizeof *w->is_known));
     npg_status status = npg_fit_copy_take(&copy, w->dense);
-    if (!status) status = npg_fit_copy_save(&copy, archive, "inside.fit");
+    if (!status) status = npg_fit_copy_save(&copy, store, "inside.fit");
     if (!status && w->probe) status = npg_fit_copy_take(&copy, w->probe);
-    if (!status && w->probe) status = npg_fit_copy_save(&copy, archive, "inside.probe");
+    if (!status && w->probe) status = npg_fit_copy_save(&copy, store, "inside.probe");
     npg_fit_copy_clear(&copy);
     return status;
 }
 
-static npg_status restore_fit(npg_fit *fit, const npg_archive *archive, const char *block)
+static npg_status restore_fit(npg_fit *fit, const npg_record *record, const char *block)
 {
     npg_fit_copy copy = {0};
-    npg_status status = npg_fit_copy_load(&copy, archive, block);
+    npg_status status = npg_fit_copy_load(&copy, record, block);
     if (!status && copy.bytes) status = npg_fit_copy_give(&copy, fit);
     npg_fit_copy_clear(&copy);
     return status;
 }
 
-static npg_status restore_poses(npg_warm *w, const npg_archive *archive)
+static npg_status restore_poses(npg_warm *w, const npg_record *record)
 {
     size_t poses = 0, known = 0;
-    npg_archive_find(archive, "inside.known", &known);
-    if (npg_archive_find(archive, "inside.poses", &poses)) {
+    npg_record_find(record, "inside.known", &known);
+    if (npg_record_find(record, "inside.poses", &poses)) {
         NPG_TRY(open_samples(w));
         NPG_TRY(open_probe(w));
-        NPG_TRY(restore_fit(w->probe, archive, "inside.probe"));
+        NPG_TRY(restore_fit(w->probe, record, "inside.probe"));
         NPG_TRY(npg_alloc(&w->poses, NPG_FOR_FIT, poses));
-        NPG_TRY(npg_archive_get(archive, "inside.poses", w->poses, poses));
+        NPG_TRY(npg_record_get(record, "inside.poses", w->poses, poses));
         if (poses != known / sizeof *w->is_known * 3 * w->samples * sizeof(float))
             return npg_error(NPG_BAD_INPUT, "the block inside.poses has not the size of its frames");
     }
     NPG_TRY(npg_alloc(&w->is_known, NPG_FOR_FIT, known));
     w->pose_count = known / sizeof *w->is_known;
-    return npg_archive_get(archive, "inside.known", w->is_known, known);
+    return npg_record_get(record, "inside.known", w->is_known, known);
 }
 
-npg_status npg_warm_restore(npg_warm *w, npg_fit *fit, const npg_archive *archive)
+npg_status npg_warm_restore(npg_warm *w, npg_fit *fit, const npg_record *record)
 {
     close_window(w);
-    NPG_TRY(npg_archive_get(archive, "inside", &w->at, sizeof w->at));
-    NPG_TRY(restore_fit(fit, archive, "inside.fit"));
-    NPG_TRY(restore_poses(w, archive));
+    NPG_TRY(npg_record_get(record, "inside", &w->at, sizeof w->at));
+    NPG_TRY(restore_fit(fit, record, "inside.fit"));
+    NPG_TRY(restore_poses(w, record));
     w->is_resumed = true;
     return NPG_OK;
 }

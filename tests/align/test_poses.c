@@ -1,5 +1,4 @@
-/* Poses: kept on disk from one pass to the next, and carried from one reference's nodes to another's. */
-#include <fcntl.h>
+/* Poses carried from one reference's nodes to another's. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,142 +8,10 @@
 
 #include <cmocka.h>
 
+#include "align/pose.h"
 #include "align/poses.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_folder.h"
-#include "tests/support/shapes.h"
-
-enum { NODES = 5, NUMBERS = NODES * NPG_POSE_SIZE };
-
-#define RECORD_BYTES (8 + NUMBERS * (off_t)sizeof(float))
-
-static void make_pose(double pose[NUMBERS], uint64_t seed)
-{
-    shape_random random = {seed};
-    for (int i = 0; i < NUMBERS; i++) pose[i] = shape_gauss(&random);
-}
-
-static void assert_pose(npg_poses *poses, int64_t index, uint64_t seed)
-{
-    double got[NUMBERS], wanted[NUMBERS];
-    bool is_there = false;
-    make_pose(wanted, seed);
-    assert_int_equal(npg_poses_get(poses, index, got, &is_there), NPG_OK);
-    assert_true(is_there);
-    for (int i = 0; i < NUMBERS; i++) assert_true(got[i] == (double)(float)wanted[i]);
-}
-
-static void assert_absent(npg_poses *poses, int64_t index)
-{
-    double got[NUMBERS];
-    bool is_there = true;
-    assert_int_equal(npg_poses_get(poses, index, got, &is_there), NPG_OK);
-    assert_false(is_there);
-}
-
-/* Frames 2 and 0, in this order, and 2 again. */
-static void put_some(npg_poses *poses)
-{
-    const int64_t frames[3] = {2, 0, 2};
-    const uint64_t seeds[3] = {9, 1, 3};
-    for (int i = 0; i < 3; i++) {
-        double pose[NUMBERS];
-        make_pose(pose, seeds[i]);
-        assert_int_equal(npg_poses_put(poses, frames[i], pose), NPG_OK);
-    }
-}
-
-static void check_some(npg_poses *poses)
-{
-    assert_int_equal(npg_poses_nodes(poses), NODES);
-    assert_pose(poses, 2, 3);
-    assert_pose(poses, 0, 1);
-    assert_absent(poses, 1);
-    assert_absent(poses, 3);
-    assert_absent(poses, 1000000);
-}
-
-static const char *made_file(const char *name)
-{
-    npg_poses *poses;
-    const char *path = in_folder(&folder, name);
-    assert_int_equal(npg_poses_create(&poses, path, NODES), NPG_OK);
-    put_some(poses);
-    assert_int_equal(npg_poses_sync(poses), NPG_OK);
-    check_some(poses);
-    npg_poses_close(&poses);
-    assert_null(poses);
-    return path;
-}
-
-static void what_was_put_is_read_back(void **state)
-{
-    npg_poses *poses;
-    const char *path = made_file("poses.bin");
-    (void)state;
-    assert_int_equal(npg_poses_open(&poses, path, NODES), NPG_OK);
-    check_some(poses);
-    npg_poses_close(&poses);
-    assert_int_equal(npg_poses_create(&poses, path, NODES), NPG_OK); /* empties what is there */
-    assert_absent(poses, 2);
-    npg_poses_close(&poses);
-}
-
-static void a_file_needs_no_name(void **state)
-{
-    npg_poses *poses;
-    (void)state;
-    assert_int_equal(npg_poses_create(&poses, NULL, NODES), NPG_OK);
-    put_some(poses);
-    assert_int_equal(npg_poses_sync(poses), NPG_OK);
-    check_some(poses);
-    npg_poses_close(&poses);
-}
-
-static void a_missing_file_is_bad_input(void **state)
-{
-    npg_poses *poses;
-    (void)state;
-    assert_int_equal(npg_poses_open(&poses, in_folder(&folder, "nowhere.bin"), NODES), NPG_BAD_INPUT);
-    assert_null(poses);
-    assert_non_null(strstr(npg_error_text(), "nowhere.bin"));
-}
-
-static void assert_damaged(const char *path, int64_t index)
-{
-    npg_poses *poses;
-    double got[NUMBERS];
-    bool is_there;
-    assert_int_equal(npg_poses_open(&poses, path, NODES), NPG_OK);
-    assert_int_equal(npg_poses_get(poses, index, got, &is_there), NPG_BAD_INPUT);
-    assert_non_null(strstr(npg_error_text(), path));
-    npg_poses_close(&poses);
-}
-
-/* Of the checksum, of the first number, of the last one. */
-static void a_changed_byte_is_noticed_and_the_file_named(void **state)
-{
-    const off_t places[3] = {0, 8, RECORD_BYTES - 1};
-    (void)state;
-    for (int i = 0; i < 3; i++) {
-        const char *path = made_file("changed.bin");
-        unsigned char byte;
-        int fd = open(path, O_RDWR);
-        assert_int_equal(pread(fd, &byte, 1, 2 * RECORD_BYTES + places[i]), 1);
-        byte ^= 0x10;
-        assert_int_equal(pwrite(fd, &byte, 1, 2 * RECORD_BYTES + places[i]), 1);
-        close(fd);
-        assert_damaged(path, 2);
-    }
-}
-
-static void a_record_that_was_cut_is_noticed(void **state)
-{
-    const char *path = made_file("cut.bin");
-    (void)state;
-    assert_int_equal(truncate(path, 3 * RECORD_BYTES - 1), 0);
-    assert_damaged(path, 2);
-}
 
 /* ---- from one graph to another ---- */
 
@@ -287,11 +154,6 @@ static void a_map_to_nodes_that_are_not_there_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_was_put_is_read_back),
-        cmocka_unit_test(a_file_needs_no_name),
-        cmocka_unit_test(a_missing_file_is_bad_input),
-        cmocka_unit_test(a_changed_byte_is_noticed_and_the_file_named),
-        cmocka_unit_test(a_record_that_was_cut_is_noticed),
         cmocka_unit_test(a_rigid_motion_stays_one),
         cmocka_unit_test(a_packed_map_is_the_same_map),
         cmocka_unit_test(every_cut_of_a_packed_map_is_refused),

@@ -1,5 +1,7 @@
 # Surface that no points support: measured and placed, for the reference and in every frame, with a bar for each.
 
+load ../support/store
+
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --keyframe 5 --bars residual=100,coverage=0,flipped=100,stretched=100)
 
@@ -82,7 +84,7 @@ lumpy() {
 @test "a run that is killed resumes to the same figures" {
     "$NEUPIG" run one/points -o killed --unseen keep "${small[@]}" >killed.log 2>&1 &
     pid=$!
-    while kill -0 $pid 2>/dev/null && ! ls killed/job/window*npg >/dev/null 2>&1; do sleep 0.02; done
+    while kill -0 $pid 2>/dev/null && [ "$(records killed)" -eq 0 ]; do sleep 0.02; done
     kill -KILL $pid 2>/dev/null
     wait $pid || true
     [ ! -e killed/done.json ]

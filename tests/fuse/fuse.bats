@@ -1,5 +1,7 @@
 # The reference from the points of all frames: better than from one, resumed with the same bytes, left out on request.
 
+load ../support/store
+
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --keyframe 5 --bars residual=100,flipped=100,stretched=100,invented=100)
 
@@ -61,7 +63,7 @@ better() {
 @test "reference-from key makes no fusing pass, reference-rounds as many as it says" {
     [ "$(fusing_passes noisy-key.log)" -eq 0 ]
     [ -z "$(report noisy-key frames)" ]
-    [ ! -e noisy-key/job/poses.bin ]
+    [ "$(records noisy-key pose)" -eq 0 ]
     "$NEUPIG" run noisy/points -o rounds --method '{"reference-rounds": 2}' "${small[@]}" --frames 0:6 >rounds.log 2>&1
     [ "$(fusing_passes rounds.log)" -eq 2 ]
 }
@@ -80,7 +82,7 @@ kill_in_solving() {
     rm -rf "$1"
     "$NEUPIG" run noisy/points -o "$1" "${small[@]}" >"$1.log" 2>&1 &
     local pid=$!
-    while kill -0 $pid 2>/dev/null && ! ls "$1"/job/window*npg >/dev/null 2>&1; do sleep 0.02; done
+    while kill -0 $pid 2>/dev/null && [ "$(records "$1")" -eq 0 ]; do sleep 0.02; done
     kill -KILL $pid 2>/dev/null
     wait $pid || true
     [ ! -e "$1/done.json" ]
@@ -103,26 +105,33 @@ same() {
     same killed
 }
 
-# Kill a run into $1 in its fusing pass, once file $2 of its job holds a group; further options follow.
+# In how many passes of the run into $1 groups of frames were followed.
+passes() {
+    grep -abo NPGREC01group "$1/job/store.new" 2>/dev/null | cut -d: -f1 | while read -r at; do
+        od -An -tx8 -j $((at + 24)) -N 8 "$1/job/store.new"
+    done | sort -u | wc -l
+}
+
+# Kill a run into $1 in its fusing pass, the $2nd, once it has followed a group; further options follow.
 kill_in_fusing() {
-    local out=$1 log=$2
+    local out=$1 wanted=$2
     shift 2
     rm -rf "$out"
     "$NEUPIG" run noisy/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
     local pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(stat -c %s "$out/job/$log" 2>/dev/null || echo 0)" -lt 1000 ]; do sleep 0.02; done
+    while kill -0 $pid 2>/dev/null && [ "$(passes "$out")" -lt "$wanted" ]; do sleep 0.02; done
     kill -KILL $pid 2>/dev/null
     wait $pid || true
-    [ -s "$out/job/$log" ]
-    ! ls "$out"/job/window*npg 2>/dev/null
+    [ "$(passes "$out")" -eq "$wanted" ]
+    [ "$(records "$out")" -eq 0 ]
 }
 
 @test "a run killed in a fusing pass does not follow the same frames again, and ends with the same bytes" {
-    kill_in_fusing followed followed_0.bin
+    kill_in_fusing followed 1
     cp -r followed torn
     cp -r followed spoilt
-    truncate -s -100 torn/job/followed_0.bin # of the last group
-    printf 'XXXX' | dd of=spoilt/job/followed_0.bin bs=1 seek=300 conv=notrunc status=none # of the first one
+    truncate -s -100 torn/job/store.new # of the last record
+    printf 'XXXX' | dd of=spoilt/job/store.new bs=1 seek=300 conv=notrunc status=none # of the first one
     for out in followed torn spoilt; do
         run "$NEUPIG" run noisy/points -o $out "${small[@]}"
         echo "$output"
@@ -130,12 +139,12 @@ kill_in_fusing() {
         [ $out != followed ] || [[ "$output" == *"groups of frames that an earlier run followed are read back"* ]]
         [ $out != spoilt ] || [[ "$output" != *"are read back"* ]]
         same $out
-        [ ! -e $out/job/followed_0.bin ]
+        [ ! -e $out/job/store.new ]
     done
 }
 
 @test "what another job followed is not taken, nor after --restart" {
-    kill_in_fusing other followed_0.bin
+    kill_in_fusing other 1
     cp -r other anew
     run "$NEUPIG" run noisy/points -o other "${small[@]}" --method '{"align-samples": 300}'
     [ "$status" -eq 0 ]
@@ -147,7 +156,7 @@ kill_in_fusing() {
 
 @test "killed in the second of two fusing passes, both are read back" {
     "$NEUPIG" run noisy/points -o two "${small[@]}" --frames 0:8 --method '{"reference-rounds": 2}' --quiet
-    kill_in_fusing second followed_1.bin --frames 0:8 --method '{"reference-rounds": 2}'
+    kill_in_fusing second 2 --frames 0:8 --method '{"reference-rounds": 2}'
     run "$NEUPIG" run noisy/points -o second "${small[@]}" --frames 0:8 --method '{"reference-rounds": 2}'
     [ "$(grep -c "are read back" <<<"$output")" -eq 2 ]
     cmp two/reference.ply second/reference.ply
@@ -160,29 +169,28 @@ kill_in_fusing() {
     cp -r hurt again
     "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --method '{"align-steps": 200, "align-nodes": 500}' >again.log 2>&1 &
     local pid=$!
-    while kill -0 $pid 2>/dev/null && [ ! -e again/job/poses.new ]; do sleep 0.02; done
+    while kill -0 $pid 2>/dev/null && ! grep -qs NPGREC01pose again/job/store.new; do sleep 0.02; done
     kill -KILL $pid
     wait $pid || true
-    [ -e again/job/poses.new ]
+    [ -e again/job/store.new ]
     "$NEUPIG" run noisy/points -o again "${small[@]}" --quiet
     grep -q resumed_frames again/report.json
     same again
 }
 
-@test "damaged or missing poses of an unfinished job are bad input, named; --restart discards them" {
+@test "an unfinished job whose poses are damaged or missing starts over, and says so" {
     [ -d hurt ] || skip "needs the job that the test before left"
     cp -r hurt missing
-    size=$(stat -c %s hurt/job/poses.bin)
-    head -c "$size" /dev/zero | tr '\0' 'Z' >hurt/job/poses.bin
-    rm missing/job/poses.bin
+    printf 'ZZZZ' | dd of=hurt/job/store.npg bs=1 seek=1000 conv=notrunc status=none # of the first pose
+    rm missing/job/store.npg
     for out in hurt missing; do
         run "$NEUPIG" run noisy/points -o $out "${small[@]}" --quiet
         echo "$output"
-        [ "$status" -eq 3 ]
-        [[ "$output" == *"job/poses.bin"* ]]
+        [ "$status" -eq 0 ]
+        [ $out = missing ] || [[ "$output" == *"job/store.npg is damaged"*"starts over"* ]]
+        ! grep -q resumed_frames $out/report.json
+        same $out
     done
-    "$NEUPIG" run noisy/points -o hurt "${small[@]}" --restart --quiet
-    same hurt
 }
 
 @test "progress begins before the fusing pass, never goes back and ends with all" {

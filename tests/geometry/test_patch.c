@@ -108,16 +108,16 @@ static void the_mask_goes_with_its_mesh(void **state)
 
 static npg_mesh *through_a_state(const npg_mesh *mesh)
 {
-    npg_archive_writer *writer;
-    npg_archive *archive;
+    npg_store *store;
+    npg_record *record;
     npg_mesh *out;
-    const char *path = in_folder(&folder, "state.npg");
-    assert_int_equal(npg_archive_create(&writer, path), NPG_OK);
-    assert_int_equal(npg_state_put_mesh(writer, mesh), NPG_OK);
-    assert_int_equal(npg_archive_commit(&writer), NPG_OK);
-    assert_int_equal(npg_archive_open(&archive, path), NPG_OK);
-    assert_int_equal(npg_state_get_mesh(&out, archive), NPG_OK);
-    npg_archive_close(&archive);
+    assert_int_equal(npg_store_open(&store, NULL), NPG_OK);
+    npg_store_begin(store, NPG_RECORD_STATE, 0, 0);
+    assert_int_equal(npg_store_end(store, npg_state_put_mesh(store, mesh), false), NPG_OK);
+    assert_int_equal(npg_store_read(store, &record, NPG_RECORD_STATE, 0, 0), NPG_OK);
+    assert_int_equal(npg_state_get_mesh(&out, record), NPG_OK);
+    npg_record_close(&record);
+    npg_store_close(&store);
     return out;
 }
 

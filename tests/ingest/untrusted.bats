@@ -165,7 +165,7 @@ untouched() {
 
 @test "pipes in the output folder do not hang" {
     "$NEUPIG" run in/frame_0000.ply -o out "${small[@]}"
-    for name in done.json job/job.json frames.jsonl job/window_000000.npg; do
+    for name in done.json job/job.json frames.jsonl job/store.npg; do
         rm -rf job
         cp -r out job
         rm -f "job/$name"

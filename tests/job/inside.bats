@@ -1,5 +1,7 @@
 # Runs without alignment that are killed inside a window: they continue there, with the same bytes.
 
+load ../support/store
+
 small=(--method '{"align": false, "width-1": 32, "width-2": 32, "poisson-depth": 5, "samples": 100,
                   "grid-levels": 3, "state-every": 0}' --faces 400 --bars residual=100,flipped=100
     --quiet)
@@ -23,8 +25,8 @@ kill_inside() {
     "$NEUPIG" run capture/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
     local pid=$!
     while kill -0 $pid 2>/dev/null && [ $seen -lt "$wanted" ]; do
-        now=$(stat -c %i-%Y "$out/job/inside.npg" 2>/dev/null || echo none)
-        if [ "$now" != none ] && [ "$now" != "$last" ]; then
+        now=$(stat -c %i "$out"/job/store.npg 2>/dev/null)-$(last_record "$out"/job/store.npg inside)
+        if [[ "$now" != *- ]] && [ "$now" != "$last" ]; then
             seen=$((seen + 1))
             last=$now
         fi
@@ -39,15 +41,13 @@ check_killed() {
     local name=$1 places=$2
     shift 2
     "$NEUPIG" run capture/points -o "$name-whole" "${small[@]}" "$@" >"$name.log"
-    [ ! -e "$name-whole/job/inside.npg" ]
     for place in $places; do
         kill_inside "$name" KILL "$place" "$@"
         [ ! -e "$name/done.json" ]
     done
-    [ -e "$name/job/inside.npg" ]
+    [ "$(records "$name" inside)" -gt 0 ]
     "$NEUPIG" run capture/points -o "$name" "${small[@]}" "$@"
     grep -q resumed_frames "$name/report.json"
-    [ ! -e "$name/job/inside.npg" ]
     cmp "$name-whole/reference.ply" "$name/reference.ply"
     cmp "$name-whole/frames.jsonl" "$name/frames.jsonl"
     diff -r "$name-whole/meshes" "$name/meshes"
@@ -68,14 +68,14 @@ check_killed() {
 @test "SIGTERM inside a window keeps what was done" {
     kill_inside stopped TERM 3 "${joint[@]}" --method '{"epochs": 5000}'
     [ $killed_status -eq 75 ]
-    [ -e stopped/job/inside.npg ]
+    [ "$(records stopped inside)" -gt 0 ]
 }
 
 @test "a damaged state inside a window is said" {
     kill_inside hurt KILL 3 "${joint[@]}" --method '{"epochs": 5000}'
-    truncate -s -100 hurt/job/inside.npg
+    truncate -s -100 hurt/job/store.npg
     run "$NEUPIG" run capture/points -o hurt "${small[@]}" "${joint[@]}" --method '{"epochs": 5000}' --restart=no --max-memory 1
-    [[ "$output" == *inside.npg* ]]
+    [[ "$output" == *"store.npg is damaged"* ]]
 }
 
 @test "windows that a warm start lost are counted over all that a run was broken off" {
@@ -88,7 +88,7 @@ check_killed() {
     grep -q '"windows_lost": [1-9]' lost-whole/report.json
     "$NEUPIG" run capture/points -o lost "${small[@]}" "${warm[@]}" --keyframe 2 >>lost.log 2>&1 &
     local pid=$!
-    while kill -0 $pid 2>/dev/null && [ ! -e lost/job/window_000001.npg ]; do :; done
+    while kill -0 $pid 2>/dev/null && [ "$(newest_state lost)" != 1 ]; do :; done
     kill -KILL $pid 2>/dev/null || true
     wait $pid || true
     [ ! -e lost/done.json ]

@@ -7,6 +7,7 @@
 # Every moment gets a folder of its own: the run is killed (-9) there once, started again, and must end with the
 # same exit code and the same bytes in every mesh.  Ends with 0 when all do.
 set -u
+source "$(dirname "$0")/../support/store.bash"
 moments=${1:-40} frames=${2:-64} seed=${3:-1} capture=${4:-}
 shift $(($# < 4 ? $# : 4))
 neupig=${NEUPIG:-build/neupig}
@@ -51,7 +52,7 @@ for ((i = 1; i <= moments; i++)); do
     worker=$(pgrep -P $pid -x neupig || echo $pid)
     kill -9 $worker 2>/dev/null
     wait $pid 2>/dev/null
-    states=$(ls "$out/job" 2>/dev/null | grep -c '^window.*npg')
+    states=$(records "$out")
     work "$out"
     status=$?
     if [ $status -eq $expected ] && same "$out"; then

@@ -1,6 +1,8 @@
 # Live runs that are killed (-9) and started again: a folder that is followed, standard input.  Pushed frames:
 # test_push_resume.c.
 
+load ../support/store
+
 small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "align-nodes": 40,
                   "align-steps": 6, "grid-levels": 3}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100)
 open=(--method '{"window": 6, "overlap": 2}' --look-ahead 10 --follow-end 0)
@@ -18,15 +20,11 @@ setup() {
     cd "$BATS_FILE_TMPDIR"
 }
 
-newest() {
-    ls "$1/job" 2>/dev/null | sed -n 's/^window_0*\([0-9][0-9]*\)\.npg$/\1/p' | sort -n | tail -1
-}
-
 # Kill the run of process $3 into $1 once it has written state $2 (from 0 on).
 kill_at_state() {
     local at
     while kill -0 "$3" 2>/dev/null; do
-        at=$(newest "$1")
+        at=$(newest_state "$1")
         [ -z "$at" ] || [ "$at" -lt "$2" ] || break
         sleep 0.02
     done
@@ -109,7 +107,7 @@ check_killed() {
         "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}" >killed.log 2>&1 &
         local pid=$!
         # in the first window, then in the second
-        until [ -e killed/job/inside.npg ] && [ "$(newest killed)" = "${next:-}" ]; do
+        until [ "$(records killed inside)" -gt 0 ] && [ "$(newest_state killed)" = "${next:-}" ]; do
             kill -0 $pid
             sleep 0.01
         done
@@ -154,7 +152,7 @@ check_killed() {
     cp -r capture/points changing
     "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" >change.log 2>&1 &
     kill_at_state change 0 $!
-    [ "$(newest change)" -lt 4 ]
+    [ "$(newest_state change)" -lt 4 ]
     : >changing/capture.end
     run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" --method '{"epochs": 3}'
     echo "$output"
@@ -235,7 +233,7 @@ check_killed() {
         cat disk.log
         [ $status -eq 5 ]
         grep -q "No space left" disk.log
-        ls disk/full/job/window*.npg
+        grep -q NPGREC01state disk/full/job/store.npg
         mount -o remount,size=100m disk
         "$NEUPIG" run --follow all -o disk/full "$@"
         grep -q resumed_frames disk/full/report.json

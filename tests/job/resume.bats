@@ -1,5 +1,7 @@
 # Runs that are killed, stopped, damaged, out of room, changed, or continued with more frames.
 
+load ../support/store
+
 small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
     --bars residual=100,flipped=100 --quiet)
@@ -21,7 +23,7 @@ kill_at() {
     rm -rf "$out"
     "$NEUPIG" run capture/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
     local pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(ls "$out/job" 2>/dev/null | grep -c '^window.*npg$')" -lt "$states" ]; do
+    while kill -0 $pid 2>/dev/null && [ "$(records "$out")" -lt "$states" ]; do
         sleep 0.02
     done
     kill "-$signal" $pid 2>/dev/null || true
@@ -39,10 +41,6 @@ same() {
     cmp whole/reference.ply "$1/reference.ply"
     cmp whole/frames.jsonl "$1/frames.jsonl"
     diff -r whole/meshes "$1/meshes"
-}
-
-newest() {
-    ls "$1"/job/window_*."$2" | tail -1
 }
 
 @test "a killed run goes on and gives the same bytes" {
@@ -79,8 +77,9 @@ newest() {
 @test "damaged and truncated states are said, and the window before is taken" {
     kill_at hurt KILL 2
     cp -r hurt cut
-    printf '\x5a\xa5' | dd of="$(newest hurt npg)" bs=1 seek=3000 conv=notrunc status=none
-    truncate -s 2000 "$(newest cut npg)"
+    at=$(last_record hurt/job/store.npg state)
+    printf '\x5a\xa5' | dd of=hurt/job/store.npg bs=1 seek=$((at + 3000)) conv=notrunc status=none
+    truncate -s $((at + 2000)) cut/job/store.npg
     for out in hurt cut; do
         go_on $out
         [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
@@ -91,7 +90,7 @@ newest() {
 @test "damaged latent grids, of frames without alignment, are said likewise" {
     "$NEUPIG" run capture/points -o free "${small[@]}" --method '{"align": false}' >free.log
     kill_at grids KILL 2 --method '{"align": false}'
-    printf '\x5a\xa5' | dd of="$(newest grids vdb)" bs=1 seek=3000 conv=notrunc status=none
+    printf '\x5a\xa5' | dd of="$(ls grids/job/window_*.vdb | tail -1)" bs=1 seek=3000 conv=notrunc status=none
     go_on grids --method '{"align": false}'
     [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
     diff -r free/meshes grids/meshes
@@ -99,7 +98,7 @@ newest() {
 
 @test "without any state that is whole the job starts over" {
     kill_at none KILL 1
-    for state in none/job/window*; do truncate -s 100 "$state"; done
+    truncate -s 100 none/job/store.npg
     go_on none
     [[ "$output" == *"starts over"* ]]
     same none
@@ -128,6 +127,20 @@ newest() {
     same changed
 }
 
+@test "a job of a version before the store is refused, and --restart discards it" {
+    cp -r whole older
+    sed -i '/"layout"/d' older/job/job.json
+    mv older/job/store.npg older/job/window_000002.npg
+    touch older/job/poses.bin older/job/motion_000000.npg
+    run "$NEUPIG" run capture/points -o older "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"another version of neupig"*--restart* ]]
+    "$NEUPIG" run capture/points -o older "${small[@]}" --restart
+    [ "$(ls older/job)" = "$(ls whole/job)" ]
+    same older
+}
+
 @test "a second run on the same job refuses" {
     cp -r whole twice
     exec 9>twice/job/lock
@@ -153,7 +166,7 @@ newest() {
         cat disk.log
         [ $status -eq 5 ]
         grep -q "No space left" disk.log
-        ls disk/full/job/window*.npg
+        grep -q NPGREC01state disk/full/job/store.npg
         mount -o remount,size=100m disk
         "$NEUPIG" run capture/points -o disk/full "$@"
         grep -q resumed_frames disk/full/report.json

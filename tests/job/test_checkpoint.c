@@ -1,4 +1,4 @@
-/* Archives notice every damage; grids come back from OpenVDB bit by bit; plans of appended frames. */
+/* Grids come back from OpenVDB bit by bit; plans of appended frames. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,120 +7,9 @@
 #include <cmocka.h>
 
 #include "optimize/vdb_grids.h"
-#include "pipeline/archive.h"
 #include "pipeline/plan.h"
 #include "pipeline/random.h"
 #include "tests/support/group_folder.h"
-
-/* ---- archives ---- */
-
-static npg_status write_archive(const char *path)
-{
-    npg_archive_writer *writer;
-    const double numbers[3] = {1.5, -0.0, 3e300};
-    NPG_TRY(npg_archive_create(&writer, path));
-    npg_archive_put(writer, "text", "seven b", 7);
-    npg_archive_put(writer, "nothing", NULL, 0);
-    npg_archive_put(writer, "numbers", numbers, sizeof numbers);
-    return npg_archive_commit(&writer);
-}
-
-static void what_is_put_is_found(void **state)
-{
-    (void)state;
-    npg_archive *archive;
-    double numbers[3];
-    size_t size;
-    const char *path = in_folder(&folder, "whole.npg");
-    assert_int_equal(write_archive(path), NPG_OK);
-    assert_int_equal(npg_archive_open(&archive, path), NPG_OK);
-    assert_memory_equal(npg_archive_find(archive, "text", &size), "seven b", 7);
-    assert_int_equal(size, 7);
-    assert_non_null(npg_archive_find(archive, "nothing", &size));
-    assert_int_equal(size, 0);
-    assert_int_equal(npg_archive_get(archive, "numbers", numbers, sizeof numbers), NPG_OK);
-    assert_true(numbers[0] == 1.5 && 1 / numbers[1] < 0 && numbers[2] == 3e300);
-    assert_int_equal(npg_archive_get(archive, "numbers", numbers, 8), NPG_BAD_INPUT);
-    assert_null(npg_archive_find(archive, "other", &size));
-    assert_int_equal(npg_archive_get(archive, "other", numbers, 8), NPG_BAD_INPUT);
-    npg_archive_close(&archive);
-}
-
-static size_t read_bytes(unsigned char *bytes, size_t most, const char *path)
-{
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    size_t size = fread(bytes, 1, most, file);
-    fclose(file);
-    return size;
-}
-
-static void write_bytes(const unsigned char *bytes, size_t size, const char *path)
-{
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    fclose(file);
-}
-
-static void every_damage_is_noticed(void **state)
-{
-    (void)state;
-    unsigned char bytes[4096];
-    npg_archive *archive;
-    char path[512], damaged[512];
-    snprintf(path, sizeof path, "%s", in_folder(&folder, "good.npg"));
-    snprintf(damaged, sizeof damaged, "%s", in_folder(&folder, "bad.npg"));
-    assert_int_equal(write_archive(path), NPG_OK);
-    size_t size = read_bytes(bytes, sizeof bytes, path);
-    assert_true(size > 100 && size < sizeof bytes);
-    for (size_t i = 0; i < size; i++) {
-        bytes[i] ^= 1 << i % 8;
-        write_bytes(bytes, size, damaged);
-        bytes[i] ^= 1 << i % 8;
-        assert_int_equal(npg_archive_open(&archive, damaged), NPG_BAD_INPUT);
-        assert_null(archive);
-        assert_non_null(strstr(npg_error_text(), damaged));
-    }
-    for (size_t cut = 0; cut < size; cut++) {
-        write_bytes(bytes, cut, damaged);
-        assert_int_equal(npg_archive_open(&archive, damaged), NPG_BAD_INPUT);
-    }
-    assert_int_equal(npg_archive_open(&archive, in_folder(&folder, "nowhere")), NPG_BAD_INPUT);
-}
-
-static void an_archive_given_up_leaves_nothing(void **state)
-{
-    (void)state;
-    npg_archive_writer *writer;
-    const char *path = in_folder(&folder, "never.npg");
-    assert_int_equal(npg_archive_create(&writer, path), NPG_OK);
-    npg_archive_put(writer, "a", "b", 1);
-    npg_archive_discard(&writer);
-    assert_false(exists(path));
-    assert_false(exists(in_folder(&folder, ".never.npg.part")));
-    assert_int_equal(npg_archive_create(&writer, "/nonexistent/a"), NPG_DISK);
-    assert_null(writer);
-}
-
-static void without_memory_nothing_remains(void **state)
-{
-    (void)state;
-    npg_archive *archive;
-    const char *path = in_folder(&folder, "memory.npg");
-    size_t before = npg_memory_used();
-    npg_status status = NPG_MEMORY;
-    for (uint64_t n = 1; status == NPG_MEMORY; n++) {
-        npg_memory_fail_at(n, true);
-        status = write_archive(path);
-        if (!status) status = npg_archive_open(&archive, path);
-        npg_memory_fail_at(0, false);
-        if (!status) npg_archive_close(&archive);
-        assert_int_equal(npg_memory_used(), before);
-        assert_true(n < 100);
-    }
-    assert_int_equal(status, NPG_OK);
-}
 
 /* ---- grids ---- */
 
@@ -238,10 +127,6 @@ static void windows_say_what_is_read_before_them(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_put_is_found),
-        cmocka_unit_test(every_damage_is_noticed),
-        cmocka_unit_test(an_archive_given_up_leaves_nothing),
-        cmocka_unit_test(without_memory_nothing_remains),
         cmocka_unit_test(grids_come_back_bit_by_bit),
         cmocka_unit_test(a_file_that_is_no_vdb_is_said),
         cmocka_unit_test(appended_frames_get_windows_of_their_own),

@@ -131,10 +131,13 @@ await() {
     cp noisy0/points/* grows
     "$NEUPIG" run --follow grows -o killed "${small[@]}" "${open[@]}" >killed.log 2>&1 &
     pid=$!
-    await killed/job/followed_0.bin $pid 1000
+    until grep -qs NPGREC01group killed/job/store.new; do
+        kill -0 $pid
+        sleep 0.02
+    done
     kill -KILL $pid
     wait $pid || true
-    [ -z "$(ls killed/job/window*npg 2>/dev/null)" ]
+    [ ! -e killed/job/store.npg ]
     cp -r killed other
     run "$NEUPIG" run --follow grows -o killed "${small[@]}" "${open[@]}"
     echo "$output"
@@ -162,7 +165,7 @@ await() {
         "align-nodes": 600}' >halted.log 2>&1 &
     pid=$!
     status=0
-    until [ -e halted/job/poses.new ]; do
+    until grep -qs NPGREC01pose halted/job/store.new; do
         kill -0 $pid
         sleep 0.02
     done

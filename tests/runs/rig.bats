@@ -1,6 +1,8 @@
 # Rigs, the whole way: depth and colour images -> points -> a coloured moving mesh, against the truth of a synthetic body.
 # A real recording is used where NEUPIG_TEST_DATA names a folder that holds kinect-rig/ (OpenCV files per frame).
 
+load ../support/store
+
 small=(--faces 2000 --method '{"poisson-depth": 6, "align-nodes": 80, "align-steps": 6}' --quiet
     --bars residual=100,flipped=100,stretched=100)
 
@@ -102,7 +104,7 @@ P
     rm -rf killed
     "$NEUPIG" run "${options[@]}" -o killed &
     pid=$!
-    while kill -0 $pid 2>/dev/null && [ -z "$(ls killed/job/window_*npg 2>/dev/null)" ]; do sleep 0.02; done
+    while kill -0 $pid 2>/dev/null && [ "$(records killed)" -eq 0 ]; do sleep 0.02; done
     kill -KILL $pid 2>/dev/null || true
     wait $pid || true
     "$NEUPIG" run "${options[@]}" -o killed

@@ -139,7 +139,7 @@ setup() {
         {\"input\": \"long\"}, {\"input\": \"set/one\", \"name\": \"later\"}]}" >stopped.json
     "$NEUPIG" batch stopped.json >stopped.table 2>stopped.log &
     pid=$!
-    await $pid ls stopped/long/job/window_000000.npg
+    await $pid grep -q NPGREC01state stopped/long/job/store.npg
     kill -TERM $pid
     kill -TERM $pid
     status=0

@@ -72,7 +72,7 @@ flags() {
     await $pid ls watch-out/two/done.json
     cp -r long watched/long
     touch watched/long/capture.end
-    await $pid ls watch-out/long/job/window_000000.npg
+    await $pid grep -q NPGREC01state watch-out/long/job/store.npg
     kill -TERM "$(pgrep -P $pid -f watch_folder.sh || echo $pid)"
     wait $pid || true
     cat watch.log
@@ -178,7 +178,7 @@ teardown() {
         {\"input\": \"long\", \"name\": \"b\"}, {\"input\": \"short\", \"name\": \"c\"}]}" >farm.json
     job=$(sbatch --parsable --array=1-2 --output="$PWD/task-%a.log" "$samples/batch.sbatch" "$PWD/farm.json" "$PWD/farm")
     is_idle() { [ -z "$(squeue -h -j "$job")" ]; }
-    has_state() { ls "farm/$1/job/window_000000.npg" || is_idle; }
+    has_state() { grep -q NPGREC01state "farm/$1/job/store.npg" || is_idle; }
     controller=$(cat "$slurm/slurmctld.pid")
     await "$controller" has_state a >/dev/null
     await "$controller" has_state b >/dev/null
