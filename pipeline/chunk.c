@@ -86,13 +86,18 @@ static npg_status copy_rows(void *out, const void *rows, size_t count, size_t ro
     return NPG_OK;
 }
 
+npg_frame npg_frame_bare(const npg_frame *frame)
+{
+    npg_frame bare = *frame;
+    bare.path = NULL;
+    bare.pos_local = bare.normals = bare.vert_unit = bare.sensor_local = NULL;
+    bare.colours = bare.sensors = bare.vert_colours = NULL;
+    return bare;
+}
+
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
 {
-    *out = *frame;
-    out->path = NULL;
-    out->pos_local = out->normals = out->vert_unit = NULL;
-    out->colours = out->sensors = out->vert_colours = NULL;
-    out->sensor_local = NULL;
+    *out = npg_frame_bare(frame);
     npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
     size_t n = frame->point_count, row = 3 * sizeof(float);
     if (!status) status = copy_rows(&out->pos_local, frame->pos_local, n, row);

@@ -94,6 +94,9 @@ void npg_chunk_add(npg_chunk *chunk, npg_frame *frame);
 /* Free what a frame owns and empty it. */
 void npg_frame_clear(npg_frame *frame);
 
+/* The frame without its arrays, which stay its own. */
+npg_frame npg_frame_bare(const npg_frame *frame);
+
 /* A copy with its own arrays. */
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame);
 

@@ -1,48 +1,24 @@
 /* File facts: sizes and checksums. */
 #include "pipeline/file_facts.h"
 
-#include <errno.h>
 #include <stdio.h>
-#include <unistd.h>
-#include <xxhash.h>
+#include <sys/stat.h>
 
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 
-static npg_status hash_file(XXH64_hash_t *hash, int64_t *size, const char *path)
-{
-    unsigned char block[16 << 10];
-    XXH3_state_t *state = XXH3_createState();
-    if (!state) return npg_error(NPG_MEMORY, "no memory for a checksum");
-    XXH3_64bits_reset(state);
-    int fd;
-    npg_status status = npg_file_open_plain(&fd, path, NPG_DISK);
-    *size = 0;
-    while (!status) {
-        ssize_t got = read(fd, block, sizeof block);
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-        if (got <= 0) break;
-        XXH3_64bits_update(state, block, (size_t)got);
-        *size += got;
-    }
-    if (fd >= 0) close(fd);
-    *hash = XXH3_64bits_digest(state);
-    XXH3_freeState(state);
-    return status;
-}
-
 npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
 {
     char *path, text[17];
-    XXH64_hash_t hash;
-    int64_t size;
+    uint64_t hash;
+    struct stat info;
     NPG_TRY(npg_join_path(&path, output, file));
-    npg_status status = hash_file(&hash, &size, path);
+    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
+    if (!status && stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     npg_release(&path);
     NPG_TRY(status);
     snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
-    json_object_set_new(entry, "bytes", json_integer((json_int_t)size));
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)info.st_size));
     json_object_set_new(entry, "xxh3", json_string(text));
     return NPG_OK;
 }

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <xxhash.h>
 
-#include "align/pose.h"
+#include "align/align_internal.h"
 #include "job/job.h"
 
 #define BLOCK_POSE  "pose"        /* of a record of a frame                              */

@@ -195,11 +195,7 @@ static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
 {
     size_t count = frame->point_count;
     if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return false;
-    *e->frame = *frame;
-    e->frame->pos_local = e->frame->normals = e->frame->vert_unit = NULL;
-    e->frame->colours = e->frame->sensors = e->frame->vert_colours = NULL;
-    e->frame->sensor_local = NULL;
-    e->frame->path = NULL;
+    *e->frame = npg_frame_bare(frame);
     bool is_put = !frame->path || !npg_copy_text(&e->frame->path, frame->path);
     is_put = is_put && put_sensors(e->frame, frame) &&
              put_array(s, &e->points_at, frame->pos_local, count * ROW) &&

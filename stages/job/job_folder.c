@@ -480,24 +480,6 @@ void npg_job_close(npg_job **slot)
 
 /* ---- writing ---- */
 
-static npg_status write_description(const npg_job *job)
-{
-    char *path;
-    npg_file *file = NULL;
-    char *text = json_dumps(job->now, JSON_INDENT(1));
-    if (!text) return npg_error(NPG_MEMORY, "no memory for job.json");
-    npg_status status = npg_join_path(&path, job->folder, "job.json");
-    if (!status) status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
-    npg_release(&path);
-    free(text);
-    return status;
-}
-
 /* They have about a KiB for every frame, and nobody asks for them any more. */
 static void forget_descriptions(npg_job *job)
 {
@@ -513,7 +495,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
         NPG_TRY(rename_store(job, STORE_NAME));
         NPG_TRY(remove_stale(job));
         NPG_TRY(keep_inputs(job));
-        NPG_TRY(write_description(job));
+        NPG_TRY(npg_json_write(job->folder, "job.json", job->now));
     }
     job->keeps_grids = keeps_grids;
     forget_descriptions(job);
@@ -526,7 +508,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
 
 npg_status npg_job_extend(npg_job *job)
 {
-    return write_description(job);
+    return npg_json_write(job->folder, "job.json", job->now);
 }
 
 npg_status npg_job_next_grids(const npg_job *job, char **path)

@@ -116,20 +116,26 @@ static npg_status fail(const npg_store *s, const char *does)
     return npg_error_errno(NPG_DISK, "can't %s %s", does, name_of(s));
 }
 
-static npg_status check_content(npg_store *s, bool *is_whole, const record_head *head)
+struct npg_record {
+    unsigned char *bytes; /* owned */
+    size_t size;
+};
+
+/* What is there of a record; *is_whole: whether that is all of one. */
+static npg_status read_record(const npg_store *s, record_head *head, npg_record *record, int64_t at,
+                              int64_t file_size, bool *is_whole)
 {
-    unsigned char block[16 << 10];
-    int64_t at = s->end + (int64_t)sizeof *head;
-    XXH3_64bits_reset(s->hash);
-    for (uint64_t left = head->size; left;) {
-        size_t size = left < sizeof block ? (size_t)left : sizeof block;
-        if (!npg_read_at(s->fd, block, &size, at)) return fail(s, "read");
-        if (!size) break;
-        XXH3_64bits_update(s->hash, block, size);
-        at += (int64_t)size;
-        left -= size;
-    }
-    *is_whole = hash_of(head, XXH3_64bits_digest(s->hash)) == head->hash;
+    size_t size = sizeof *head;
+    int64_t left = file_size - at - (int64_t)sizeof *head;
+    *head = (record_head){0};
+    *is_whole = false;
+    if (!npg_read_at(s->fd, head, &size, at)) return fail(s, "read");
+    if (memcmp(head->magic, magic, sizeof magic) != 0 || left < 0 || head->size > (uint64_t)left)
+        return NPG_OK;
+    record->size = size = (size_t)head->size;
+    NPG_TRY(npg_alloc(&record->bytes, NPG_FOR_FILES, size + !size));
+    if (!npg_read_at(s->fd, record->bytes, &size, at + (int64_t)sizeof *head)) return fail(s, "read");
+    *is_whole = size == record->size && hash_of(head, XXH3_64bits(record->bytes, size)) == head->hash;
     return NPG_OK;
 }
 
@@ -137,23 +143,19 @@ static npg_status check_content(npg_store *s, bool *is_whole, const record_head 
 static npg_status read_next(npg_store *s, int64_t file_size, bool *is_there)
 {
     static const char unwritten[sizeof magic];
-    record_head head = {0};
-    size_t size = sizeof head;
-    bool is_whole = false;
-    *is_there = false;
-    if (!npg_read_at(s->fd, &head, &size, s->end)) return fail(s, "read");
-    if (!memcmp(head.magic, unwritten, sizeof magic)) return NPG_OK;
-    int64_t left = file_size - s->end - (int64_t)sizeof head;
-    if (!memcmp(head.magic, magic, sizeof magic) && left >= 0 && head.size <= (uint64_t)left)
-        NPG_TRY(check_content(s, &is_whole, &head));
-    if (!is_whole) {
-        snprintf(s->damage, sizeof s->damage, "%s is damaged: the record at byte %lld is not whole",
-                 name_of(s), (long long)s->end);
+    record_head head;
+    npg_record record = {0};
+    npg_status status = read_record(s, &head, &record, s->end, file_size, is_there);
+    npg_release(&record.bytes);
+    NPG_TRY(status);
+    if (!*is_there) {
+        if (memcmp(head.magic, unwritten, sizeof magic) != 0)
+            snprintf(s->damage, sizeof s->damage, "%s is damaged: the record at byte %lld is not whole",
+                     name_of(s), (long long)s->end);
         return NPG_OK;
     }
     const place found = {head.id, s->end, head.size};
     s->end += (int64_t)(sizeof head + head.size);
-    *is_there = true;
     return add_place(s, &found);
 }
 
@@ -259,6 +261,16 @@ npg_status npg_store_put(npg_store *s, const char *name, const void *data, size_
     return s->failure;
 }
 
+npg_status npg_store_put_arrays(npg_store *s, const void *owner, const npg_store_array *arrays, size_t count)
+{
+    for (const npg_store_array *a = arrays; a < arrays + count; a++) {
+        const void *rows;
+        memcpy(&rows, (const char *)owner + a->offset, sizeof rows);
+        if (rows) NPG_TRY(npg_store_put(s, a->name, rows, a->count * a->row));
+    }
+    return NPG_OK;
+}
+
 npg_status npg_store_end(npg_store *s, npg_status status, bool with_sync)
 {
     const place written = {s->head.id, s->end, s->head.size};
@@ -269,11 +281,11 @@ npg_status npg_store_end(npg_store *s, npg_status status, bool with_sync)
     if (!status && with_sync && fdatasync(s->fd)) status = fail(s, "write");
     pthread_mutex_lock(&s->lock);
     if (!status) status = add_place(s, &written);
-    pthread_mutex_unlock(&s->lock);
     if (!status)
         s->end += (int64_t)(sizeof s->head + s->head.size);
     else if (ftruncate(s->fd, s->end))
         status = fail(s, "write");
+    pthread_mutex_unlock(&s->lock);
     pthread_mutex_unlock(&s->writing);
     return status;
 }
@@ -372,27 +384,15 @@ bool npg_store_has(npg_store *s, const char *kind, int64_t index, uint64_t of)
     return is_there;
 }
 
-struct npg_record {
-    unsigned char *bytes; /* owned */
-    size_t size;
-};
-
 static npg_status read_content(npg_store *s, npg_record *record, const npg_record_id *id)
 {
     record_head head;
+    bool is_whole;
     const place *p = place_of(s, id);
-    size_t head_size = sizeof head;
     if (!p)
         return npg_error(NPG_BAD_INPUT, "%s has no %.8s %lld", name_of(s), id->kind, (long long)id->index);
-    record->size = (size_t)p->size;
-    NPG_TRY(npg_alloc(&record->bytes, NPG_FOR_FILES, record->size + !record->size));
-    size_t size = record->size;
-    if (!npg_read_at(s->fd, &head, &head_size, p->at) ||
-        !npg_read_at(s->fd, record->bytes, &size, p->at + (int64_t)sizeof head))
-        return fail(s, "read");
-    if (head_size == sizeof head && size == record->size &&
-        hash_of(&head, XXH3_64bits(record->bytes, size)) == head.hash)
-        return NPG_OK;
+    NPG_TRY(read_record(s, &head, record, p->at, s->end, &is_whole));
+    if (is_whole && !compare(&head.id, id)) return NPG_OK;
     return npg_error(NPG_BAD_INPUT, "%s is damaged: %.8s %lld is not what was written", name_of(s), id->kind,
                      (long long)id->index);
 }
@@ -441,5 +441,21 @@ npg_status npg_record_get(const npg_record *record, const char *name, void *data
     if (found != size)
         return npg_error(NPG_BAD_INPUT, "the block %s has %zu bytes in place of %zu", name, found, size);
     if (size) memcpy(data, bytes, size);
+    return NPG_OK;
+}
+
+npg_status npg_record_get_arrays(const npg_record *record, void *owner, const npg_store_array *arrays,
+                                 size_t count, npg_purpose purpose)
+{
+    for (const npg_store_array *a = arrays; a < arrays + count; a++) {
+        void **rows = (void **)(void *)((char *)owner + a->offset);
+        size_t size;
+        npg_release(rows);
+        if (!npg_record_find(record, a->name, &size)) continue;
+        if (size / a->row != a->count)
+            return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu rows", a->name, a->count);
+        NPG_TRY(npg_alloc_array(rows, purpose, a->count, a->row));
+        NPG_TRY(npg_record_get(record, a->name, *rows, a->count * a->row));
+    }
     return NPG_OK;
 }

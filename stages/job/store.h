@@ -55,6 +55,14 @@ void npg_store_begin(npg_store *store, const char *kind, int64_t index, uint64_t
 /* Add a block; names are shorter than NPG_BLOCK_NAME and different. */
 npg_status npg_store_put(npg_store *store, const char *name, const void *data, size_t size);
 
+/* An array that a struct points to, as a block; NULL is no block. */
+typedef struct npg_store_array {
+    char name[NPG_BLOCK_NAME];
+    size_t offset, count, row; /* of the pointer in the struct; rows, and bytes of each */
+} npg_store_array;
+npg_status npg_store_put_arrays(npg_store *store, const void *owner, const npg_store_array *arrays,
+                                size_t count);
+
 /* The record is whole, and after with_sync safe on disk.  After a failure, this or an earlier one (`status`),
  * nothing of it remains. */
 npg_status npg_store_end(npg_store *store, npg_status status, bool with_sync);
@@ -80,5 +88,10 @@ const void *npg_record_find(const npg_record *record, const char *name, size_t *
 
 /* Copy a block that must have exactly this size.  NPG_BAD_INPUT. */
 npg_status npg_record_get(const npg_record *record, const char *name, void *data, size_t size);
+
+/* The arrays of a struct, where there is a block; what the pointers had before is released.  NPG_BAD_INPUT: one
+ * has another size. */
+npg_status npg_record_get_arrays(const npg_record *record, void *owner, const npg_store_array *arrays,
+                                 size_t count, npg_purpose purpose);
 
 #endif

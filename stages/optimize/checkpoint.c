@@ -1,19 +1,12 @@
 /* Checkpoint: the state of a run after a closed window, to the job's folder and back. */
 #include "optimize/checkpoint.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "optimize/fit_state.h"
 #include "pipeline/live_plan.h"
-
-/* A held frame but for its arrays. */
-typedef struct saved_frame {
-    int64_t index, number;
-    uint64_t fields, point_count, vert_count;
-    uint8_t is_key, is_skipped, is_held, has_normals, has_aligned, has_colours, has_sure_normals, unused;
-    npg_cleaning cleaning;
-} saved_frame;
 
 typedef struct saved_progress {
     int64_t window_at, is_aligned, total;
@@ -25,41 +18,40 @@ static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t inde
     snprintf(name, NPG_BLOCK_NAME, "%s.%lld", what, (long long)index);
 }
 
-/* ---- saving: frames ---- */
+enum { ARRAYS = 5 };
 
-static npg_status put_array(npg_store *out, const char *what, int64_t index, const float *values,
-                            size_t count)
+static void list_arrays(npg_store_array list[ARRAYS], const npg_frame *frame, size_t vert_count)
 {
-    char name[NPG_BLOCK_NAME];
-    block_name(name, what, index);
-    return values ? npg_store_put(out, name, values, count * 3 * sizeof(float)) : NPG_OK;
+    static const struct {
+        const char *name;
+        size_t offset, row;
+        bool is_of_points;
+    } arrays[ARRAYS] = {{"points", offsetof(npg_held, frame.pos_local), 12, true},
+                        {"normals", offsetof(npg_held, frame.normals), 12, true},
+                        {"colours", offsetof(npg_held, frame.colours), 4, true},
+                        {"aligned", offsetof(npg_held, frame.vert_unit), 12, false},
+                        {"solved", offsetof(npg_held, solved), 12, false}};
+    for (int i = 0; i < ARRAYS; i++) {
+        block_name(list[i].name, arrays[i].name, frame->index);
+        list[i].offset = arrays[i].offset;
+        list[i].row = arrays[i].row;
+        list[i].count = arrays[i].is_of_points ? frame->point_count : vert_count;
+    }
 }
+
+/* ---- saving: frames ---- */
 
 static npg_status put_frame(npg_store *out, const npg_held *held, size_t vert_count)
 {
     const npg_frame *f = &held->frame;
+    npg_store_array arrays[ARRAYS];
     char name[NPG_BLOCK_NAME];
-    saved_frame saved = {.index = f->index,
-                         .number = f->number,
-                         .fields = f->fields,
-                         .point_count = f->point_count,
-                         .vert_count = vert_count,
-                         .is_key = f->is_key,
-                         .is_skipped = f->is_skipped,
-                         .is_held = f->is_held,
-                         .has_normals = f->normals != NULL,
-                         .has_aligned = f->vert_unit != NULL,
-                         .has_colours = f->colours != NULL,
-                         .has_sure_normals = f->has_sure_normals,
-                         .cleaning = f->cleaning};
+    npg_frame bare = npg_frame_bare(f);
+    bare.sensor_count = 0;
     block_name(name, "frame", f->index);
-    NPG_TRY(npg_store_put(out, name, &saved, sizeof saved));
-    NPG_TRY(put_array(out, "points", f->index, f->pos_local, f->point_count));
-    NPG_TRY(put_array(out, "normals", f->index, f->normals, f->point_count));
-    block_name(name, "colours", f->index);
-    if (f->colours) NPG_TRY(npg_store_put(out, name, f->colours, 4 * f->point_count));
-    NPG_TRY(put_array(out, "aligned", f->index, f->vert_unit, vert_count));
-    NPG_TRY(put_array(out, "solved", f->index, held->solved, vert_count));
+    NPG_TRY(npg_store_put(out, name, &bare, sizeof bare));
+    list_arrays(arrays, f, vert_count);
+    NPG_TRY(npg_store_put_arrays(out, held, arrays, ARRAYS));
     block_name(name, "path", f->index);
     return f->path ? npg_store_put(out, name, f->path, strlen(f->path) + 1) : NPG_OK;
 }
@@ -178,55 +170,17 @@ npg_status npg_checkpoint_restore_fit(npg_worker *worker, npg_fit *fit, npg_warm
 
 /* ---- restoring: frames ---- */
 
-static npg_status get_array(const npg_record *in, const char *what, int64_t index, float **values,
-                            size_t count)
-{
-    char name[NPG_BLOCK_NAME];
-    size_t size;
-    block_name(name, what, index);
-    if (!npg_record_find(in, name, &size) || size / (3 * sizeof(float)) != count)
-        return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu points", name, count);
-    NPG_TRY(npg_alloc_array(values, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
-    return npg_record_get(in, name, *values, count * 3 * sizeof(float));
-}
-
-static npg_status get_colours(npg_frame *f, const npg_record *in)
-{
-    char name[NPG_BLOCK_NAME];
-    size_t size;
-    block_name(name, "colours", f->index);
-    if (!npg_record_find(in, name, &size) || size / 4 != f->point_count)
-        return npg_error(NPG_BAD_INPUT, "the block %s has not the size of %zu points", name, f->point_count);
-    NPG_TRY(npg_alloc_array(&f->colours, NPG_FOR_FRAMES, f->point_count, 4));
-    return npg_record_get(in, name, f->colours, 4 * f->point_count);
-}
-
 static npg_status get_frame(npg_held *held, const npg_record *in, int64_t index, size_t vert_count)
 {
+    npg_store_array arrays[ARRAYS];
     char name[NPG_BLOCK_NAME];
-    saved_frame saved;
     size_t size;
     npg_frame *f = &held->frame;
     block_name(name, "frame", index);
-    NPG_TRY(npg_record_get(in, name, &saved, sizeof saved));
-    if (saved.vert_count != vert_count || saved.index != index)
-        return npg_error(NPG_BAD_INPUT, "frame %lld is not one of this reference", (long long)index);
-    *f = (npg_frame){.index = saved.index,
-                     .number = saved.number,
-                     .fields = (uint32_t)saved.fields,
-                     .is_key = saved.is_key,
-                     .is_skipped = saved.is_skipped,
-                     .is_held = saved.is_held,
-                     .has_sure_normals = saved.has_sure_normals,
-                     .point_count = saved.point_count,
-                     .cleaning = saved.cleaning};
-    if (saved.point_count) NPG_TRY(get_array(in, "points", index, &f->pos_local, f->point_count));
-    if (saved.has_normals && f->point_count)
-        NPG_TRY(get_array(in, "normals", index, &f->normals, f->point_count));
-    if (saved.has_colours && f->point_count) NPG_TRY(get_colours(f, in));
-    if (saved.has_aligned) NPG_TRY(get_array(in, "aligned", index, &f->vert_unit, vert_count));
-    if (saved.has_aligned) f->vert_count = vert_count;
-    NPG_TRY(get_array(in, "solved", index, &held->solved, vert_count));
+    NPG_TRY(npg_record_get(in, name, f, sizeof *f));
+    list_arrays(arrays, f, vert_count);
+    NPG_TRY(npg_record_get_arrays(in, held, arrays, ARRAYS, NPG_FOR_FRAMES));
+    if (!held->solved) return npg_error(NPG_BAD_INPUT, "frame %lld is not solved", (long long)index);
     block_name(name, "path", index);
     const char *path = npg_record_find(in, name, &size);
     return path ? npg_copy_text(&f->path, path) : NPG_OK;

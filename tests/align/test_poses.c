@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "align/pose.h"
+#include "align/align_internal.h"
 #include "align/poses.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_folder.h"

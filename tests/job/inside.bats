@@ -25,8 +25,8 @@ kill_inside() {
     "$NEUPIG" run capture/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
     local pid=$!
     while kill -0 $pid 2>/dev/null && [ $seen -lt "$wanted" ]; do
-        now=$(stat -c %i "$out"/job/store.npg 2>/dev/null)-$(last_record "$out"/job/store.npg inside)
-        if [[ "$now" != *- ]] && [ "$now" != "$last" ]; then
+        now=$(stat -c %i-%s "$out/job/store.npg" 2>/dev/null || echo none)
+        if [ "$now" != "$last" ] && { [ $seen -gt 0 ] || [ "$(records "$out" inside)" -gt 0 ]; }; then
             seen=$((seen + 1))
             last=$now
         fi

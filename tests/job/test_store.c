@@ -343,6 +343,7 @@ static void without_memory_nothing_remains(void **state)
     size_t before = npg_memory_used();
     npg_status status = NPG_MEMORY;
     for (uint64_t n = 1; status == NPG_MEMORY; n++) {
+        unlink(path);
         npg_memory_fail_at(n, true);
         status = write_and_read(path);
         npg_memory_fail_at(0, false);
