@@ -1,6 +1,4 @@
 /* Own stage: a stage that a program adds to the chain; shows each frame to a callback. */
-#include "pipeline/custom_stage.h"
-
 #include <math.h>
 #include <string.h>
 

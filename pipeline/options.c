@@ -11,10 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "pipeline/custom_stage.h"
 #include "pipeline/memory.h"
 #include "pipeline/method.h"
 #include "pipeline/nearest.h"
+#include "pipeline/run_internal.h"
 #include "pipeline/run_settings.h"
 #include "pipeline/struct_size.h"
 

@@ -149,4 +149,8 @@ const char *npg_option_gone(const char *name);
 /* Check `text` against an option; NPG_USAGE says what it takes. */
 npg_status npg_option_check(const npg_option *option, const char *text);
 
+/* The run's own options (run_settings.h), and the named sets of values (stages/chain.c). */
+extern const npg_option npg_run_options[];
+extern const npg_preset npg_presets[];
+
 #endif

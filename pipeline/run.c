@@ -11,6 +11,7 @@
 #include "pipeline/busy.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
+#include "pipeline/options.h"
 #include "pipeline/run_internal.h"
 #include "pipeline/struct_size.h"
 

@@ -7,8 +7,8 @@
 #include <stdatomic.h>
 
 #include "pipeline/busy.h"
-#include "pipeline/custom_stage.h"
 #include "pipeline/ring.h"
+#include "pipeline/stage.h"
 
 #define NPG_STAGES_MAX   16
 #define NPG_SERVICES_MAX 2
@@ -17,6 +17,25 @@
 #define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */
 
 #define NPG_TIMED_PASSES 3 /* CHOOSE, FUSE, SOLVE */
+
+/* ---- stages that a program adds (custom_stage.c) ---- */
+
+#define NPG_CUSTOM_STAGES_MAX 6 /* beside the chain's */
+
+typedef struct npg_custom {
+    npg_stage stage; /* first: what the worker points to */
+    npg_custom_stage given;
+    uint32_t fields; /* NPG_FIELD_* that frames and facts have where it stands */
+} npg_custom;
+
+/* A stage for `given` (a loan that outlives it), to stand right after `before` in a chain that has `fields`
+ * there. */
+npg_custom npg_custom_make(const npg_custom_stage *given, const npg_stage *before, uint32_t fields);
+
+/* Check what a program gives: name, place in the chain, callback.  NPG_USAGE. */
+npg_status npg_custom_check(const npg_custom_stage *given, const npg_stage *const *chain);
+
+/* ---- a run ---- */
 
 /* One stage at work, or a service that begins. */
 struct npg_worker {

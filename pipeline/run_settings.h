@@ -2,7 +2,8 @@
 #ifndef NPG_RUN_SETTINGS_H
 #define NPG_RUN_SETTINGS_H
 
-#include "pipeline/options.h"
+#include <stdbool.h>
+#include <stdint.h>
 
 /* What becomes of the colours of the points. */
 typedef enum npg_colour_mode { NPG_COLOUR_REFERENCE, NPG_COLOUR_FRAMES, NPG_COLOUR_NO } npg_colour_mode;
@@ -19,7 +20,5 @@ typedef struct npg_settings {
     bool confine;           /* refuse what lies outside its folder   */
     bool pull;              /* finished frames are also to be pulled */
 } npg_settings;
-
-extern const npg_option npg_run_options[];
 
 #endif

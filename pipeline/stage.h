@@ -13,7 +13,6 @@
 #include "pipeline/json_file.h"
 #include "pipeline/latch.h"
 #include "pipeline/mesh.h"
-#include "pipeline/options.h"
 #include "pipeline/plan.h"
 #include "pipeline/run_settings.h"
 
@@ -90,7 +89,8 @@ static inline bool npg_facts_has_changed(const npg_facts *facts)
 }
 
 typedef struct npg_worker npg_worker;
-typedef struct npg_store npg_store; /* job/store.h */
+typedef struct npg_option npg_option; /* pipeline/options.h */
+typedef struct npg_store npg_store;   /* job/store.h */
 
 /* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it,
  * and it is written once in a run. */
@@ -150,7 +150,6 @@ typedef struct npg_service {
 /* In the order of the data's way, NULL at the end (stages/chain.c); the services of a run with that chain. */
 extern const npg_stage *const npg_chain[];
 extern const npg_service *const npg_services[];
-extern const npg_preset npg_presets[];
 
 /* Of a run with this chain: npg_services with npg_chain, none with any other. */
 const npg_service *const *npg_services_of(const npg_stage *const *chain);

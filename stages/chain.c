@@ -1,4 +1,5 @@
 /* Chain: the order of the data's way.  The program's table of contents. */
+#include "pipeline/options.h"
 #include "pipeline/stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,

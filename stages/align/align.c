@@ -16,6 +16,7 @@
 #include "job/job.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
+#include "pipeline/options.h"
 
 #define BLOCK_ALIGN "align" /* of a state on disk */
 

@@ -10,6 +10,7 @@
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "pipeline/file.h"
+#include "pipeline/options.h"
 #include "pipeline/order.h"
 #include "pipeline/stage.h"
 

@@ -15,6 +15,7 @@
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
+#include "pipeline/options.h"
 #include "pipeline/order.h"
 
 typedef enum numbering { NUMBER_OF_FILE, NUMBER_OF_INDEX } numbering;

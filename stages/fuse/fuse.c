@@ -27,6 +27,7 @@
 #include "mesh/fused.h"
 #include "mesh/mesh_clean.h"
 #include "pipeline/cost.h"
+#include "pipeline/options.h"
 #include "pipeline/order.h"
 
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */

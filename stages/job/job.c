@@ -9,6 +9,7 @@
 
 #include "job/frame_log.h"
 #include "pipeline/file.h"
+#include "pipeline/options.h"
 
 typedef struct job_state {
     bool restart, append;

@@ -118,25 +118,24 @@ static npg_status take_lock(npg_job *job)
 
 /* ---- what is there ---- */
 
-static npg_status read_json(json_t **value, const char *folder, const char *name)
+npg_status npg_job_read_json(json_t **value, const char *folder, const char *name)
 {
     char *path;
     json_error_t error;
+    int fd = -1;
     *value = NULL;
     NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = NPG_OK;
-    if (access(path, F_OK) == 0) {
-        int fd;
-        status = npg_file_open_plain(&fd, path, NPG_USAGE);
-        *value = status ? NULL : json_loadfd(fd, 0, &error);
-        if (fd >= 0) close(fd);
-        if (!status && !json_is_object(*value))
+    bool is_missing = access(path, F_OK) && errno == ENOENT;
+    npg_status status = is_missing ? NPG_OK : npg_file_open_plain(&fd, path, NPG_USAGE);
+    if (fd >= 0) {
+        *value = json_loadfd(fd, 0, &error);
+        close(fd);
+        if (!json_is_object(*value)) {
+            json_decref(*value);
+            *value = NULL;
             status = npg_error(NPG_USAGE, "%s is damaged (line %d: %s)", path, error.line, error.text);
-    } else if (errno != ENOENT) {
-        status = npg_error_errno(NPG_DISK, "can't look for %s", path);
+        }
     }
-    if (status) json_decref(*value);
-    if (status) *value = NULL;
     npg_release(&path);
     return status;
 }
@@ -164,7 +163,7 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
 {
     json_t *done;
     *is_done = *was_partial = false;
-    NPG_TRY(read_json(&done, job->output, "done.json"));
+    NPG_TRY(npg_job_read_json(&done, job->output, "done.json"));
     if (!done) return NPG_OK;
     size_t frames = json_array_size(json_object_get(job->then, "frames"));
     *is_done = job->source || json_integer_value(json_object_get(done, "frames")) == (json_int_t)frames;
@@ -410,7 +409,7 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
 {
     bool is_done, was_partial;
     *start = NPG_JOB_FRESH;
-    npg_status status = read_json(&job->then, job->folder, "job.json");
+    npg_status status = npg_job_read_json(&job->then, job->folder, "job.json");
     if (!status && !job->then) return NPG_OK;
     if (!status && !json_equal(json_object_get(job->then, "layout"), json_object_get(job->now, "layout")))
         status = npg_error(NPG_USAGE, "it was begun by another version of neupig");

@@ -59,28 +59,11 @@ static json_t *describe_custom_stages(const npg_options *options)
     return list;
 }
 
-static npg_status describe_file(json_t *entry, const char *path)
-{
-    struct stat info;
-    uint64_t hash;
-    char text[17];
-    const char *slash = strrchr(path, '/');
-    if (stat(path, &info)) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
-    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
-    if (status) return status == NPG_DISK ? NPG_BAD_INPUT : status;
-    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
-    json_object_set_new(entry, "name", npg_json_text(slash ? slash + 1 : path));
-    json_object_set_new(entry, "bytes", json_integer((json_int_t)info.st_size));
-    json_object_set_new(entry, "modified_ns",
-                        json_integer((json_int_t)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec));
-    json_object_set_new(entry, "xxh3", json_string(text));
-    return NPG_OK;
-}
-
-/* One frame of several files: their names, sizes and checksums in one. */
+/* Of one file, or of all that a frame is made of. */
 typedef struct file_sum {
     json_int_t bytes;
     uint64_t hash;
+    bool is_begun;
 } file_sum;
 
 static npg_status add_file(void *user, const char *path)
@@ -92,21 +75,34 @@ static npg_status add_file(void *user, const char *path)
     npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
     if (status) return status == NPG_DISK ? NPG_BAD_INPUT : status;
     sum->bytes += (json_int_t)info.st_size;
-    sum->hash = (sum->hash ^ hash) * 0x9e3779b97f4a7c15u; /* the order counts */
+    sum->hash = sum->is_begun ? (sum->hash ^ hash) * 0x9e3779b97f4a7c15u : hash; /* the order counts */
+    sum->is_begun = true;
+    return NPG_OK;
+}
+
+static void describe_sum(json_t *entry, const char *path, const file_sum *sum)
+{
+    const char *slash = strrchr(path, '/');
+    json_object_set_new(entry, "name", npg_json_text(slash ? slash + 1 : path));
+    json_object_set_new(entry, "bytes", json_integer(sum->bytes));
+    json_object_set_new(entry, "xxh3", json_sprintf("%016llx", (unsigned long long)sum->hash));
+}
+
+static npg_status describe_file(json_t *entry, const char *path)
+{
+    file_sum sum = {0};
+    NPG_TRY(add_file(&sum, path));
+    describe_sum(entry, path, &sum);
     return NPG_OK;
 }
 
 /* The images of a frame, and the calibration that it is made with. */
 static npg_status describe_rig_frame(json_t *entry, const npg_frame_files *list, size_t i)
 {
-    const char *path = list->slots[i].path, *slash = strrchr(path, '/');
-    file_sum sum = {.hash = npg_rig_frame_hash(list->rig, npg_rig_find(list->rig, list->slots[i].number))};
-    char text[17];
+    file_sum sum = {.hash = npg_rig_frame_hash(list->rig, npg_rig_find(list->rig, list->slots[i].number)),
+                    .is_begun = true};
     NPG_TRY(npg_frame_files_each(list, i, add_file, &sum));
-    snprintf(text, sizeof text, "%016llx", (unsigned long long)sum.hash);
-    json_object_set_new(entry, "name", npg_json_text(slash ? slash + 1 : path));
-    json_object_set_new(entry, "bytes", json_integer(sum.bytes));
-    json_object_set_new(entry, "xxh3", json_string(text));
+    describe_sum(entry, list->slots[i].path, &sum);
     return NPG_OK;
 }
 
@@ -288,22 +284,14 @@ static npg_status set_from(npg_options *options, const json_t *job, const char *
 
 npg_status npg_options_load_job(npg_options *options, const char *folder)
 {
-    char *path;
-    json_error_t error;
-    json_t *job = NULL;
-    int fd;
+    json_t *job;
     NPG_REQUIRE(options && folder);
-    NPG_TRY(npg_join_path(&path, folder, "job/job.json"));
-    npg_status status = npg_file_open_plain(&fd, path, NPG_USAGE);
-    if (!status) job = json_loadfd(fd, 0, &error);
-    if (fd >= 0) close(fd);
+    npg_status status = npg_job_read_json(&job, folder, "job/job.json");
     if (status)
-        status = npg_error(NPG_USAGE, "%s holds no job (%s)", folder, npg_error_text());
+        status = npg_error_prefix(status, "%s holds no job", folder);
     else
-        status = job ? set_from(options, job, path)
-                     : npg_error(NPG_USAGE, "%s holds no job (%s: %s)", folder, path, error.text);
+        status = job ? set_from(options, job, folder) : npg_error(NPG_USAGE, "%s holds no job", folder);
     if (!status) status = npg_options_set(options, "output", folder);
     json_decref(job);
-    npg_release(&path);
     return status;
 }

@@ -14,6 +14,7 @@
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"
+#include "pipeline/options.h"
 
 typedef struct state {
     npg_window_settings window_settings;

@@ -13,6 +13,7 @@
 #include "outlier/normals.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/clock.h"
+#include "pipeline/options.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
 

@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 
+#include "pipeline/options.h"
 #include "tests/support/test_chain.h"
 
 static int released;

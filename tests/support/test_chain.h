@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "pipeline/options.h"
 #include "pipeline/run_internal.h"
 
 /* What the chain of the running test does; set it before the run is opened. */
