@@ -4,7 +4,7 @@
 #   tests/fuzz_seeds.sh DIR
 set -euo pipefail
 folder=$1
-for name in ply obj xyz npy pcd config store inputs rig trajectory image; do mkdir -p "$folder/$name"; done
+for name in ply obj xyz npy pcd config store rig trajectory image; do mkdir -p "$folder/$name"; done
 cd "$folder"
 
 xyz='property float x\nproperty float y\nproperty float z\n'
@@ -43,7 +43,7 @@ printf '{"preset": "paper", "input": "in/%%04d.ply", "keep-going": "no", "chunk"
 printf '{"optimization": {"epochs": 2}, "grid": {"solver": "CG", "whole": 3}, "rotation_method": "x"}' >config/published
 printf '{"text": "// no comment \\" here", "whole": -5}//' >config/comment
 
-block() { # NAME SIZE BYTES: as in job/store.h
+block() { # NAME SIZE BYTES: as in pipeline/store.h
     local i
     printf '%s' "$1" && for ((i = ${#1}; i < 32; i++)); do printf '\0'; done
     printf "\\$(printf %o "$2")\0\0\0\0\0\0\0" && printf "$3"
@@ -58,8 +58,6 @@ block() { # NAME SIZE BYTES: as in job/store.h
     block held 8 '\0\0\0\0\0\0\0\0'
 } >store/reference
 block text 7 'seven b' >store/small
-printf '{"number":7,"index":0,"name":"a_07.ply","digits":0,"bytes":80,"xxh3":"00ff00ff00ff00ff"}\n{"number":8,"index":1,"missing":true,"held":true}\n{"number":9,"name":[97,255],"digits":1,"skipped":true}\n' >inputs/folder
-printf '{"number":-1,"index":0,"bytes":500,"xxh3":"1"}\n' >inputs/pushed
 mkdir -p manifest
 printf '{"output": "results", // here\n "defaults": {"whole": 60, "max-time": 7200, "segments": "auto"},\n "captures": [{"input": "dancer"}, {"input": "horse/scan_%%04d.ply", "name": "horse", "method": "fit.json", "flag": true, "reference": "a.ply"}]}\n' >manifest/two
 printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "b", "max-time": 1.5, "segments": "one", "confine": false}]}' >manifest/names

@@ -1,6 +1,6 @@
 /* Pose cache: the poses that one pass over the frames leaves to the next, which has another reference.
  *
- * A fusing pass writes the pose of each frame to the job's store (job/store.h), or without a job to one without
+ * A fusing pass writes the pose of each frame to the job's store (pipeline/store.h), or without a job to one without
  * a name, and keeps its tracker; the pass that follows starts from them, carried to its own nodes, and so does
  * a resumed run.  With a job each group of frames is there with what the stage needs behind it, so that a run
  * which is killed in a fusing pass does not follow these frames again: what it reads back is the same to the
@@ -11,7 +11,7 @@
 #define NPG_POSE_CACHE_H
 
 #include "align/poses.h"
-#include "job/store.h"
+#include "pipeline/store.h"
 #include "pipeline/stage.h"
 
 /* Zeros are a pass that has nothing from another, and leaves nothing. */

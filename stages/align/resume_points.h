@@ -5,7 +5,7 @@
 
 #include <pthread.h>
 
-#include "job/store.h"
+#include "pipeline/store.h"
 
 /* Zeros are an empty list, once its lock is open. */
 typedef struct npg_resume_points {

@@ -29,7 +29,7 @@ npg_status npg_capture_open_list(npg_capture **out, npg_frame_files **list, cons
     c->keep_going = keep_going;
     status = refuse_gaps(c, input);
     if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
-    if (!status) status = npg_frame_store_open(&c->store, c->list->count, cache_limit, spill_folder);
+    if (!status) status = npg_frame_store_open(&c->store, cache_limit, spill_folder);
     if (status) npg_capture_close(&c);
     *out = c;
     return status;

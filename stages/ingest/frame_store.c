@@ -28,7 +28,6 @@ struct npg_frame_store {
     pthread_mutex_t lock;
     entry *entries; /* owned */
     size_t count, capacity, bytes, byte_max;
-    bool keeps_all;
     char *folder; /* owned; NULL: nothing goes to disk (any more) */
     int file;     /* -1: not made yet */
     off_t file_bytes, file_max;
@@ -41,30 +40,18 @@ static void release_nothing(void *value)
 
 const npg_fact_kind npg_fact_frame_store = {"frame_store", "ingest", release_nothing};
 
-static npg_status open_store(npg_frame_store **out, npg_frame_store settings, const char *spill_folder)
+npg_status npg_frame_store_open(npg_frame_store **out, size_t byte_max, const char *spill_folder)
 {
     npg_frame_store *s;
     *out = NULL;
     NPG_TRY(npg_alloc(&s, NPG_FOR_FILES, sizeof *s));
-    *s = settings;
+    s->byte_max = byte_max;
     s->file = -1;
     pthread_mutex_init(&s->lock, NULL);
-    npg_status status = npg_alloc_array(&s->entries, NPG_FOR_FILES, s->count, sizeof *s->entries);
-    if (!status && spill_folder) status = npg_copy_text(&s->folder, spill_folder);
+    npg_status status = spill_folder ? npg_copy_text(&s->folder, spill_folder) : NPG_OK;
     if (status) npg_frame_store_close(&s);
     *out = s;
     return status;
-}
-
-npg_status npg_frame_store_open(npg_frame_store **store, size_t frame_count, size_t byte_max,
-                                const char *spill_folder)
-{
-    return open_store(store, (npg_frame_store){.count = frame_count, .byte_max = byte_max}, spill_folder);
-}
-
-npg_status npg_frame_store_open_all(npg_frame_store **store, size_t byte_max, const char *spill_folder)
-{
-    return open_store(store, (npg_frame_store){.byte_max = byte_max, .keeps_all = true}, spill_folder);
 }
 
 /* Of a point, in the arrays that the frame has. */
@@ -228,18 +215,16 @@ static npg_status put_in_memory(npg_frame_store *s, entry *e, const npg_frame *f
     return status;
 }
 
-/* Where nothing may be left out, memory takes what the disk does not. */
-static npg_status put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool is_final)
+static void put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool is_final)
 {
-    if (fits(s, frame) && !put_in_memory(s, e, frame)) return NPG_OK;
-    if (is_final && frame->point_count && put_on_disk(s, e, frame)) return NPG_OK;
-    return s->keeps_all ? put_in_memory(s, e, frame) : NPG_OK;
+    if (fits(s, frame) && !put_in_memory(s, e, frame)) return;
+    if (is_final) put_on_disk(s, e, frame);
 }
 
 /* Under the lock: an entry for this index, too. */
 static npg_status grow(npg_frame_store *s, int64_t index)
 {
-    if (!s->keeps_all || index < (int64_t)s->count) return NPG_OK;
+    if (index < (int64_t)s->count) return NPG_OK;
     NPG_TRY(npg_grow(&s->entries, &s->capacity, (size_t)index + 1, sizeof *s->entries, NPG_FOR_FILES));
     while ((int64_t)s->count <= index) s->entries[s->count++] = (entry){0};
     return NPG_OK;
@@ -247,12 +232,12 @@ static npg_status grow(npg_frame_store *s, int64_t index)
 
 npg_status npg_frame_store_put(npg_frame_store *s, const npg_frame *frame, bool is_final)
 {
+    if (!frame->point_count || frame->is_held) return NPG_OK;
     pthread_mutex_lock(&s->lock);
     npg_status status = grow(s, frame->index);
     entry *e = status ? NULL : find(s, frame->index);
-    bool is_kept = s->keeps_all || (frame->point_count && !frame->is_held);
     if (e) drop(s, e);
-    if (e && is_kept) status = put_frame(s, e, frame, is_final);
+    if (e) put_frame(s, e, frame, is_final);
     pthread_mutex_unlock(&s->lock);
     return status;
 }

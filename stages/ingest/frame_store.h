@@ -1,10 +1,9 @@
 /* Frame store: frames kept for the passes that bring them again, in memory up to a limit and beyond it in a
  * file without a name, which is gone with the run whatever ends it.
  *
- * A frame is kept as it was read until stage outlier puts it back clean, with NPG_FIELD_CLEAN.  Of files a
- * frame that finds no room, in memory or on disk, is left out without harm: it is read again.  What a live
- * source brought comes only once: there the store keeps all, in memory where the disk takes no more.  What
- * comes out is the same bytes as what went in.
+ * A frame is kept as it was read until stage outlier puts it back clean, with NPG_FIELD_CLEAN.  One that finds no
+ * room, in memory or on disk, is left out without harm: it is read again, from its file or the spool of a live
+ * source (spool.h).  What comes out is the same bytes as what went in.
  *
  * Threads: all functions but open and close may be called from any thread. */
 #ifndef NPG_FRAME_STORE_H
@@ -18,13 +17,8 @@ typedef struct npg_frame_store_use {
     size_t memory_bytes, disk_bytes; /* now; of the file so far */
 } npg_frame_store_use;
 
-/* For frames with index 0 .. frame_count - 1.  spill_folder: where the file is made when it is needed; NULL:
- * nothing goes to disk.  NPG_MEMORY. */
-npg_status npg_frame_store_open(npg_frame_store **store, size_t frame_count, size_t byte_max,
-                                const char *spill_folder);
-
-/* For frames that can't be had again, however many: none is left out, whatever byte_max says. */
-npg_status npg_frame_store_open_all(npg_frame_store **store, size_t byte_max, const char *spill_folder);
+/* spill_folder: where the file is made when it is needed; NULL: nothing goes to disk.  NPG_MEMORY. */
+npg_status npg_frame_store_open(npg_frame_store **store, size_t byte_max, const char *spill_folder);
 void npg_frame_store_close(npg_frame_store **store);
 npg_frame_store_use npg_frame_store_used(npg_frame_store *store);
 

@@ -1,7 +1,7 @@
 /* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
  * from standard input, from a folder that grows, or from those that are pushed. */
 #include "ingest/capture.h"
-#include "ingest/look_ahead.h"
+#include "ingest/live_source.h"
 #include "ingest/rig/rig_report.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
@@ -33,7 +33,7 @@ static const npg_option ingest_options[] = {
     NPG_ROW_INT(          "cache",            AT(cache_mib),       "256",         0,    1048576, "MIB",
         "Memory for frames that were read and cleaned. Later passes need not do that again; what does not "
         "fit goes to a file in OUT/job that has no name, and is gone with the run; 0: nothing is kept, "
-        "neither in memory nor on disk, but for the look-ahead of a live run"),
+        "neither in memory nor on disk"),
     NPG_ROW_INT(          "look-ahead",       AT(look_ahead),      "64",          1,    1e6,     NULL,
         "Live: frames that the reference is made from. They are kept first: box, keyframe and reference are "
         "made from them as from a capture of that many frames"),
@@ -286,45 +286,50 @@ static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
 
 /* ---- a live source ---- */
 
-static void release_look_ahead(void *thing)
+static void release_live(void *thing)
 {
-    npg_look_ahead *look_ahead = thing;
-    npg_look_ahead_close(&look_ahead);
+    npg_live_source *live = thing;
+    npg_live_source_close(&live);
 }
 
-static npg_status open_look_ahead(npg_worker *worker)
+static npg_status open_live(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     const npg_live_settings settings = {.frames = s->frames,
                                         .follow_end = s->follow_end,
                                         .follow_idle_s = s->follow_idle_s,
                                         .follow_settle_s = s->follow_settle_s,
-                                        .missing = (npg_missing)s->missing};
-    npg_look_ahead *look_ahead;
+                                        .missing = (npg_missing)s->missing,
+                                        .look_ahead = s->look_ahead};
+    npg_live_source *live;
     char *folder;
     NPG_TRY(spill_folder(&folder, worker));
-    npg_status status = npg_look_ahead_open(&look_ahead, worker, &settings, cache_limit(worker), folder);
+    npg_status status = npg_live_source_open(&live, worker, &settings, cache_limit(worker), folder);
     npg_release(&folder);
     NPG_TRY(status);
-    npg_worker_keep(worker, look_ahead, release_look_ahead);
-    return npg_worker_publish(worker, &npg_fact_frame_store, look_ahead->store);
+    npg_worker_keep(worker, live, release_live);
+    return npg_worker_publish(worker, &npg_fact_frame_store, npg_live_source_cache(live));
 }
 
 /* One frame per chunk, so that nothing waits for frames that may come much later. */
 static npg_status next_from_source(npg_worker *worker, npg_chunk *chunk)
 {
     state *s = npg_worker_state(worker);
-    npg_look_ahead *look_ahead = npg_worker_kept(worker);
-    bool is_last = npg_worker_pass(worker) == NPG_PASS_SOLVE;
+    npg_live_source *live = npg_worker_kept(worker);
+    bool is_first = npg_worker_pass(worker) == NPG_PASS_MEASURE,
+         is_last = npg_worker_pass(worker) == NPG_PASS_SOLVE;
     npg_status status = NPG_END;
-    if (npg_worker_pass(worker) == NPG_PASS_MEASURE)
-        status = npg_look_ahead_take(look_ahead, chunk, s->look_ahead);
-    else
+    npg_frame frame;
+    if (is_first && s->next < s->look_ahead)
+        status = npg_live_source_read(live, &frame, s->next++, false);
+    else if (!is_first)
         while (status == NPG_END && s->next < place_count(worker))
-            status = npg_look_ahead_read(look_ahead, chunk, index_at(worker, s->next++), is_last);
+            status = npg_live_source_read(live, &frame, index_at(worker, s->next++), is_last);
+    if (!status) npg_chunk_add(chunk, &frame);
     if (status != NPG_END) return status;
     report_cache(worker);
-    return is_last ? npg_look_ahead_end(look_ahead) : NPG_END;
+    if (is_first) NPG_TRY(npg_live_source_plan(live, s->look_ahead));
+    return is_last ? npg_live_source_end(live) : NPG_END;
 }
 
 /* ---- the stage ---- */
@@ -342,7 +347,7 @@ static npg_status init(npg_worker *worker)
     state *s = npg_worker_state(worker);
     if (npg_worker_pass(worker) == NPG_PASS_SOLVE && facts->is_resumed) s->next = resumed_place(facts);
     if (npg_worker_kept(worker)) return NPG_OK; /* from an earlier pass */
-    return facts->is_live ? open_look_ahead(worker) : open_capture(worker);
+    return facts->is_live ? open_live(worker) : open_capture(worker);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
@@ -355,22 +360,13 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     return status;
 }
 
-/* A run that is resumed has yet to keep what it still needs of the look-ahead. */
-static size_t kept_at_most(const npg_worker *worker)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    npg_frame_store *store = npg_worker_fact(worker, &npg_fact_frame_store);
-    if (!facts->is_live || !facts->is_resumed) return store ? npg_frame_store_used(store).memory_bytes : 0;
-    size_t frame = sizeof(npg_frame) + facts->point_count_max * (6 * sizeof(float) + 5);
-    size_t all = (size_t)facts->planned_count * frame, limit = cache_limit(worker);
-    return all < limit ? all : limit;
-}
-
 /* The normals are those of the keyframe, which are to come. */
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
+    npg_frame_store *store = npg_worker_fact(worker, &npg_fact_frame_store);
     *chunks_held = 1;
-    return kept_at_most(worker) + npg_worker_facts(worker)->point_count_max * 3 * sizeof(float);
+    return (store ? npg_frame_store_used(store).memory_bytes : 0) +
+           npg_worker_facts(worker)->point_count_max * 3 * sizeof(float);
 }
 
 extern const npg_stage npg_stage_ingest;

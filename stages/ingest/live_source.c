@@ -1,10 +1,18 @@
 /* Live source: frames that come one after the other. */
 #include "ingest/live_source.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
+
+#include "ingest/follow.h"
+#include "ingest/formats/reader.h"
+#include "ingest/frame_names.h"
+#include "ingest/frame_select.h"
+#include "ingest/spool.h"
+#include "pipeline/file.h"
+#include "pipeline/live_plan.h"
 
 #include "pipeline/file.h"
 
@@ -12,7 +20,40 @@
  * make millions; set far above what a capture loses. */
 #define GAP_MAX 100000
 
+struct npg_live_source {
+    npg_worker *worker; /* a loan */
+    npg_live_settings settings;
+    npg_selection selection;
+    npg_stream *stream; /* standard input                                  */
+    npg_follow *follow; /* a folder that grows; neither: frames are pushed */
+    npg_chunk *pushed;  /* the pushed chunk under way                      */
+    size_t pushed_at;
+    int64_t next;                /* index of the next frame                               */
+    int64_t seen;                /* frames that came or are missing, chosen or not        */
+    npg_frame waiting, previous; /* the frame behind a gap; a copy of the one before it   */
+    int64_t gap_left, step;      /* missing frames before the waiting one; their distance */
+    bool is_waiting, is_counted; /* gap_left is known                                     */
+    int64_t skipped_count;
+    npg_frame last;         /* the one that was taken last, until it is read; its index is next - 1 */
+    npg_store *spool;       /* of what came; a loan, or ...                                     */
+    npg_store *own;         /* ... without a job one that has no name: of the look-ahead        */
+    npg_frame_store *cache; /* of what was read and cleaned; owned                               */
+    uint64_t key;           /* of the last entry of the spool                                    */
+    int64_t *entries;       /* in the spool, of each frame by index, where some are not selected */
+    size_t entry_capacity;
+    int64_t again; /* of a resumed run: entries that were pushed again and compared          */
+    int64_t came;  /* entries of the spool that earlier runs had                             */
+    int64_t total; /* frames, where an earlier run has seen the end; else -1                 */
+    bool is_ended;
+    char cause[512]; /* why the frame that was skipped last was */
+};
+
 /* ---- opening ---- */
+
+static bool holds(const npg_live_source *live)
+{
+    return live->settings.missing == NPG_MISSING_HOLD;
+}
 
 static npg_status open_follow(npg_live_source *live)
 {
@@ -49,26 +90,7 @@ static npg_status open_source(npg_live_source *live)
     return NPG_OK;
 }
 
-npg_status npg_live_source_open(npg_live_source *live, npg_worker *worker, const npg_live_settings *settings)
-{
-    live->worker = worker;
-    live->settings = *settings;
-    live->log = npg_worker_fact(worker, &npg_fact_input_log);
-    NPG_TRY(open_source(live));
-    return npg_live_replay_open(live);
-}
-
-void npg_live_source_close(npg_live_source *live)
-{
-    npg_selection_clear(&live->selection);
-    npg_stream_close(&live->stream);
-    npg_follow_close(&live->follow);
-    npg_chunk_unref(&live->pushed);
-    npg_frame_clear(&live->waiting);
-    npg_frame_clear(&live->previous);
-}
-
-const char *npg_live_source_name(const npg_live_source *live)
+static const char *name_of(const npg_live_source *live)
 {
     return live->stream   ? "standard input"
            : live->follow ? npg_worker_settings(live->worker)->follow
@@ -78,7 +100,7 @@ const char *npg_live_source_name(const npg_live_source *live)
 /* ---- the next frame ---- */
 
 /* The next frame that was pushed, its arrays moved out of the chunk. */
-npg_status npg_live_next_pushed(npg_live_source *live, npg_frame *frame)
+static npg_status next_of_feed(npg_live_source *live, npg_frame *frame)
 {
     while (!live->pushed || live->pushed_at == npg_chunk_count(live->pushed)) {
         npg_chunk_unref(&live->pushed);
@@ -100,6 +122,7 @@ static npg_status next_followed(npg_live_source *live, npg_frame *frame)
         return NPG_BAD_INPUT; /* the text is the reader's */
     }
     npg_worker_warn(live->worker, true, frame->number, "skipped: %s", npg_error_text());
+    snprintf(live->cause, sizeof live->cause, "%s", npg_error_text());
     live->skipped_count++;
     frame->is_skipped = true;
     frame->fields = NPG_FIELD_POINTS;
@@ -108,7 +131,7 @@ static npg_status next_followed(npg_live_source *live, npg_frame *frame)
 
 /* After a damaged frame nobody knows where the next one begins on a pipe: with keep-going the stream ends
  * there, and what came before is finished. */
-npg_status npg_live_next_streamed(npg_live_source *live, npg_frame *frame)
+static npg_status next_streamed(npg_live_source *live, npg_frame *frame)
 {
     npg_status status = npg_stream_next(live->stream, frame, npg_own(live->worker, origin));
     if (status != NPG_BAD_INPUT || !npg_worker_settings(live->worker)->keep_going || !live->next)
@@ -117,28 +140,48 @@ npg_status npg_live_next_streamed(npg_live_source *live, npg_frame *frame)
     return NPG_END;
 }
 
+static npg_status refuse(const npg_live_source *live, int64_t number, const char *what)
+{
+    return npg_error(NPG_USAGE,
+                     "%s holds another job: frame %lld of %s %s; "
+                     "give --restart to discard what is there, or choose another output folder",
+                     npg_worker_settings(live->worker)->output, (long long)number, name_of(live), what);
+}
+
+static npg_status check_content(const npg_live_source *live, const npg_spooled *entry, const npg_frame *frame)
+{
+    bool is_same = entry->bytes == (int64_t)frame->point_count && entry->hash == npg_spool_hash(frame);
+    return is_same ? NPG_OK : refuse(live, entry->number, "is not the one it was");
+}
+
+/* Frames that earlier runs had may be pushed again, or left out. */
+static npg_status next_pushed(npg_live_source *live, npg_frame *frame)
+{
+    for (npg_spooled entry;; npg_frame_clear(frame)) {
+        NPG_TRY(next_of_feed(live, frame));
+        entry.number = INT64_MIN;
+        while (live->again < live->came && entry.number < frame->number)
+            NPG_TRY(npg_spool_get(live->spool, live->again++, &entry, NULL));
+        if (entry.number < frame->number) return NPG_OK;
+        if (entry.number > frame->number || entry.is_missing)
+            return refuse(live, frame->number, "did not come before");
+        NPG_TRY(check_content(live, &entry, frame));
+    }
+}
+
 static npg_status next_frame(npg_live_source *live, npg_frame *frame)
 {
-    NPG_TRY(live->stream   ? npg_live_next_streamed(live, frame)
+    NPG_TRY(live->stream   ? next_streamed(live, frame)
             : live->follow ? next_followed(live, frame)
-                           : npg_live_next_pushed(live, frame));
+                           : next_pushed(live, frame));
     frame->cleaning.read = frame->point_count;
     return NPG_OK;
 }
 
-/* ---- the log ---- */
-
-uint64_t npg_live_frame_hash(const npg_frame *frame)
-{
-    const size_t vectors = frame->point_count * 3 * sizeof(float);
-    uint64_t hash = frame->pos_local ? XXH3_64bits(frame->pos_local, vectors) : 0;
-    if (frame->normals) hash = XXH3_64bits_withSeed(frame->normals, vectors, hash + 1);
-    if (frame->colours) hash = XXH3_64bits_withSeed(frame->colours, 4 * frame->point_count, hash + 2);
-    return hash;
-}
+/* ---- the spool ---- */
 
 /* A file that has gone since it was read can't be compared later. */
-static npg_status describe_file(npg_input_entry *entry, const char *path)
+static npg_status describe_file(npg_spooled *entry, const char *path)
 {
     struct stat info;
     entry->bytes = -1;
@@ -148,30 +191,51 @@ static npg_status describe_file(npg_input_entry *entry, const char *path)
     return status == NPG_MEMORY ? status : NPG_OK;
 }
 
-static npg_status log_frame(npg_live_source *live, const npg_frame *frame, int64_t index)
+/* Where frame `index` is in the spool. */
+static npg_status note_place(npg_live_source *live, int64_t index, int64_t entry)
 {
-    npg_input_entry entry = {.number = frame->number, .index = index, .is_skipped = frame->is_skipped};
-    if (!live->log) return NPG_OK;
-    if (live->follow) {
-        entry.name = strrchr(frame->path, '/') + 1;
-        entry.digits = (int64_t)npg_follow_digits(live->follow);
-        NPG_TRY(describe_file(&entry, frame->path));
-    } else {
-        entry.bytes = (int64_t)frame->point_count;
-        entry.hash = npg_live_frame_hash(frame);
-    }
-    return npg_input_log_add(live->log, &entry);
+    NPG_TRY(npg_grow(&live->entries, &live->entry_capacity, (size_t)index + 1, sizeof *live->entries,
+                     NPG_FOR_FILES));
+    live->entries[index] = entry;
+    return NPG_OK;
 }
 
-static npg_status log_missing(npg_live_source *live, const npg_frame *frame, int64_t index)
+/* The frame that came, or is missing, in the spool; then it is the last one, where it was selected. */
+static npg_status keep(npg_live_source *live, npg_frame *frame, bool is_missing, bool is_chosen)
 {
-    const npg_input_entry entry = {.number = frame->number,
-                                   .index = index,
-                                   .bytes = -1,
-                                   .is_missing = true,
-                                   .is_held = frame->is_held,
-                                   .is_skipped = frame->is_skipped};
-    return live->log ? npg_input_log_add(live->log, &entry) : NPG_OK;
+    npg_spooled entry = {.number = frame->number,
+                         .index = is_chosen ? live->next : -1,
+                         .bytes = -1,
+                         .key = live->key,
+                         .is_missing = is_missing,
+                         .is_held = frame->is_held,
+                         .is_skipped = frame->is_skipped,
+                         .has_file = live->follow && !is_missing};
+    npg_status status = NPG_OK;
+    frame->index = entry.index;
+    if (entry.has_file) {
+        entry.digits = (int64_t)npg_follow_digits(live->follow);
+        status = describe_file(&entry, frame->path);
+    } else if (!is_missing) {
+        entry.bytes = (int64_t)frame->point_count;
+        entry.hash = npg_spool_hash(frame);
+    }
+    if (!status && (!live->own || live->next < live->settings.look_ahead)) {
+        if (is_chosen) status = note_place(live, live->next, npg_spool_count(live->spool));
+        bool with_points = !entry.has_file && (is_chosen || holds(live));
+        const char *cause = frame->is_skipped && !is_missing ? live->cause : NULL;
+        if (!status) status = npg_spool_add(live->spool, &entry, frame, with_points, cause);
+    }
+    live->key = entry.key;
+    npg_frame_clear(&live->last);
+    if (!status && is_chosen) {
+        live->last = *frame;
+        *frame = (npg_frame){0};
+        live->skipped_count += is_missing && live->last.is_skipped;
+        live->next++;
+    }
+    npg_frame_clear(frame);
+    return status;
 }
 
 /* ---- gaps ---- */
@@ -220,38 +284,33 @@ static npg_status count_gap(npg_live_source *live, const npg_frame *frame)
     return NPG_OK;
 }
 
-npg_status npg_live_keep_previous(npg_live_source *live, const npg_frame *frame)
+static npg_status keep_previous(npg_live_source *live, const npg_frame *frame)
 {
     npg_frame_clear(&live->previous);
-    if (live->settings.missing == NPG_MISSING_HOLD && !live->stream)
-        return npg_frame_copy(&live->previous, frame);
+    if (holds(live) && !live->stream) return npg_frame_copy(&live->previous, frame);
     live->previous.number = frame->number;
     return NPG_OK;
 }
 
-static npg_status fill_gap(npg_live_source *live, npg_chunk *chunk)
+static void warn_of_missing(npg_live_source *live, int64_t number, bool is_held)
+{
+    npg_worker_warn(live->worker, !is_held, number, "the frame is missing and %s",
+                    is_held ? "repeats the frame before it" : "is skipped");
+}
+
+static npg_status fill_gap(npg_live_source *live)
 {
     npg_frame frame = {.fields = NPG_FIELD_POINTS};
     live->gap_left--;
     int64_t number = live->previous.number += live->step;
-    bool is_held = live->settings.missing == NPG_MISSING_HOLD;
-    bool is_chosen = npg_selection_takes(&live->selection, live->seen++, number, -1);
+    bool is_held = holds(live), is_chosen = npg_selection_takes(&live->selection, live->seen++, number, -1);
     if (is_chosen && is_held) NPG_TRY(npg_frame_copy(&frame, &live->previous));
     frame.number = number;
     frame.is_key = false;
     frame.is_held = is_held;
     frame.is_skipped = !is_held || live->previous.is_skipped;
-    npg_status status = log_missing(live, &frame, is_chosen ? live->next : -1);
-    if (status || !is_chosen) {
-        npg_frame_clear(&frame);
-        return status;
-    }
-    frame.index = live->next++;
-    live->skipped_count += frame.is_skipped;
-    npg_worker_warn(live->worker, !is_held, number, "the frame is missing and %s",
-                    is_held ? "repeats the frame before it" : "is skipped");
-    npg_chunk_add(chunk, &frame);
-    return NPG_OK;
+    if (is_chosen) warn_of_missing(live, number, is_held);
+    return keep(live, &frame, true, is_chosen);
 }
 
 /* ---- the end ---- */
@@ -260,13 +319,22 @@ static npg_status fill_gap(npg_live_source *live, npg_chunk *chunk)
 static npg_status check_end(npg_live_source *live)
 {
     size_t fresh = 0;
+    npg_frame frame = {0};
+    npg_status status = NPG_OK;
     if (live->total < 0) return NPG_OK;
+    /* what is pushed again is compared */
+    while (!live->stream && !live->follow && !status) {
+        status = next_pushed(live, &frame);
+        if (!status) status = refuse(live, frame.number, "did not come before");
+        npg_frame_clear(&frame);
+    }
+    if (status && status != NPG_END) return status;
     if (live->next < live->total)
         return npg_error(NPG_USAGE,
                          "%s holds another job: %s had %lld frames and has %lld; "
                          "give --restart to discard what is there, or choose another output folder",
-                         npg_worker_settings(live->worker)->output, npg_live_source_name(live),
-                         (long long)live->total, (long long)live->next);
+                         npg_worker_settings(live->worker)->output, name_of(live), (long long)live->total,
+                         (long long)live->next);
     if (live->follow) NPG_TRY(npg_follow_count_new(live->follow, &fresh));
     if (fresh)
         npg_worker_warn(live->worker, false, -1,
@@ -278,7 +346,8 @@ static npg_status end_live(npg_live_source *live)
 {
     json_t *report = npg_worker_report(live->worker);
     size_t late_count = live->follow ? npg_follow_late_count(live->follow) : 0;
-    const char *name = npg_live_source_name(live);
+    const char *name = name_of(live);
+    live->is_ended = true;
     if (!live->next) return npg_error(NPG_BAD_INPUT, "%s: no frame came", name);
     NPG_TRY(check_end(live));
     *npg_own(live->worker, skipped_count) = live->skipped_count;
@@ -296,26 +365,20 @@ static npg_status end_live(npg_live_source *live)
 
 /* ---- frame after frame ---- */
 
-static npg_status take_waiting(npg_live_source *live, npg_chunk *chunk)
+static npg_status take_waiting(npg_live_source *live)
 {
     npg_frame *frame = &live->waiting;
     bool is_chosen = npg_selection_takes(&live->selection, live->seen++, frame->number, -1);
     live->is_waiting = false;
-    NPG_TRY(npg_live_keep_previous(live, frame));
-    NPG_TRY(log_frame(live, frame, is_chosen ? live->next : -1));
-    if (!is_chosen) {
-        npg_frame_clear(frame);
-        return NPG_OK;
-    }
-    frame->index = live->next++;
-    npg_chunk_add(chunk, frame);
-    return NPG_OK;
+    NPG_TRY(keep_previous(live, frame));
+    return keep(live, frame, false, is_chosen);
 }
 
-/* The chunk stays empty for a frame that is not chosen. */
-static npg_status step(npg_live_source *live, npg_chunk *chunk)
+/* One more frame that came or is missing; NPG_END. */
+static npg_status step(npg_live_source *live)
 {
-    if (live->replay_at < live->replay_count) return npg_live_replay(live, chunk);
+    if (live->is_ended) return NPG_END;
+    if (npg_worker_stopping(live->worker)) return npg_error(NPG_STOPPED, "stopped while reading");
     if (live->total >= 0 && live->next >= live->total) return end_live(live);
     if (!live->is_waiting) {
         npg_status status = next_frame(live, &live->waiting);
@@ -325,14 +388,276 @@ static npg_status step(npg_live_source *live, npg_chunk *chunk)
     }
     if (!live->is_counted) NPG_TRY(count_gap(live, &live->waiting));
     live->is_counted = true;
-    return live->gap_left > 0 ? fill_gap(live, chunk) : take_waiting(live, chunk);
+    return live->gap_left > 0 ? fill_gap(live) : take_waiting(live);
 }
 
-npg_status npg_live_source_next(npg_live_source *live, npg_chunk *chunk)
+/* Frame `index` has come, and with it all before. */
+static npg_status await(npg_live_source *live, int64_t index)
 {
-    while (!npg_chunk_count(chunk)) {
-        if (npg_worker_stopping(live->worker)) return npg_error(NPG_STOPPED, "stopped while reading");
-        NPG_TRY(step(live, chunk));
+    npg_status status = NPG_OK;
+    while (live->next <= index && !status) status = step(live);
+    return status;
+}
+
+static npg_status from_spool(npg_live_source *live, npg_frame *frame, int64_t index)
+{
+    npg_record *record;
+    npg_spooled entry;
+    char *path;
+    NPG_TRY(npg_spool_get(live->spool, live->entries[index], &entry, &record));
+    npg_status status = npg_spool_frame(&entry, record, frame);
+    npg_record_close(&record);
+    if (status || !entry.has_file) return status;
+    const char *slash = frame->path ? strrchr(frame->path, '/') : NULL;
+    status = npg_follow_path(live->follow, &path, slash ? slash + 1 : "");
+    npg_release(&frame->path);
+    if (!status && entry.is_skipped) {
+        frame->path = path;
+        return NPG_OK;
     }
+    if (!status) status = npg_read_cloud(frame, path, npg_own(live->worker, origin));
+    npg_release(&path);
+    frame->number = entry.number;
+    frame->index = index;
+    return status;
+}
+
+npg_status npg_live_source_read(npg_live_source *live, npg_frame *frame, int64_t index, bool is_last_use)
+{
+    npg_pass pass = npg_worker_pass(live->worker);
+    *frame = (npg_frame){0};
+    if (pass == NPG_PASS_MEASURE || index >= npg_worker_facts(live->worker)->planned_count) {
+        if (pass != NPG_PASS_MEASURE && pass != NPG_PASS_SOLVE) return NPG_END;
+        NPG_TRY(await(live, index));
+    }
+    npg_status status = npg_frame_store_get(live->cache, frame, index, is_last_use);
+    if (status != NPG_END) {
+        frame->fields &= NPG_FIELD_POINTS | NPG_FIELD_CLEAN;
+        return status;
+    }
+    if (live->last.fields && live->last.index == index) {
+        *frame = live->last;
+        live->last = (npg_frame){0};
+    } else {
+        NPG_TRY(from_spool(live, frame, index));
+    }
+    status = is_last_use ? NPG_OK : npg_frame_store_put(live->cache, frame, false);
+    if (status) npg_frame_clear(frame);
+    return status;
+}
+
+npg_status npg_live_source_plan(npg_live_source *live, int64_t most)
+{
+    npg_status status = await(live, most);
+    if (status && status != NPG_END) return status;
+    *npg_own(live->worker, planned_count) = live->next < most ? live->next : most;
     return NPG_OK;
+}
+
+npg_status npg_live_source_end(npg_live_source *live)
+{
+    npg_status status = step(live);
+    return status ? status : npg_error(NPG_FAILED, "a frame came behind the last one");
+}
+
+/* ---- a run that is resumed, or done ---- */
+
+/* A file that is gone matters where its points are needed once more. */
+static npg_status check_file(npg_live_source *live, const npg_spooled *entry, const npg_record *record,
+                             bool is_needed, size_t *gone)
+{
+    struct stat info;
+    uint64_t hash = 0;
+    char *path;
+    const char *name = npg_spool_path(record), *slash = name ? strrchr(name, '/') : NULL;
+    const char *what = NULL;
+    if (!slash) return npg_error(NPG_BAD_INPUT, "frame %lld has no file", (long long)entry->number);
+    if (entry->is_skipped || entry->bytes < 0) return NPG_OK;
+    NPG_TRY(npg_follow_path(live->follow, &path, slash + 1));
+    bool is_there = !stat(path, &info);
+    npg_status status = NPG_OK;
+    if (is_there && info.st_size == entry->bytes) status = npg_hash_file(&hash, path, UINT64_MAX);
+    npg_release(&path);
+    *gone += !is_there;
+    if (!is_there && is_needed) what = "missing";
+    if (is_there && hash != entry->hash) what = "not the one it was";
+    if (status || !what) return status;
+    return npg_error(NPG_USAGE,
+                     "%s holds another job: the input %s is %s (frame %lld); "
+                     "give --restart to discard what is there, or choose another output folder",
+                     npg_worker_settings(live->worker)->output, slash + 1, what, (long long)entry->number);
+}
+
+/* The state may be older than what was said of the frame. */
+static void warn_again(npg_live_source *live, const npg_spooled *entry, const npg_record *record)
+{
+    size_t size;
+    const char *cause = npg_record_find(record, "cause", &size);
+    if (entry->is_missing && entry->index >= 0)
+        warn_of_missing(live, entry->number, entry->is_held);
+    else if (cause && size && !cause[size - 1])
+        npg_worker_warn(live->worker, true, entry->number, "skipped: %s", cause);
+}
+
+/* A frame that was piped comes again. */
+static npg_status compare_streamed(npg_live_source *live, const npg_spooled *entry)
+{
+    npg_frame frame = {0};
+    live->next = entry->index >= 0 ? entry->index + 1 : live->next;
+    npg_status status = next_streamed(live, &frame);
+    if (status == NPG_END) return refuse(live, entry->number, "does not come any more");
+    if (!status) status = check_content(live, entry, &frame);
+    npg_frame_clear(&frame);
+    return status;
+}
+
+/* What the frame was is so still; and where the source stands behind it. */
+static npg_status pass_over(npg_live_source *live, const npg_spooled *entry, const npg_record *record,
+                            npg_follow_place *place, bool is_needed, size_t *gone)
+{
+    live->key = entry->key;
+    live->seen++;
+    live->skipped_count += entry->is_skipped && (entry->index >= 0 || !entry->is_missing);
+    if (is_needed) warn_again(live, entry, record);
+    if (entry->index >= 0) NPG_TRY(note_place(live, entry->index, live->seen - 1));
+    if (!entry->is_missing && live->stream) NPG_TRY(compare_streamed(live, entry));
+    if (entry->has_file && live->follow) NPG_TRY(check_file(live, entry, record, is_needed, gone));
+    if (entry->index >= 0) live->next = entry->index + 1;
+    live->previous.number = entry->number;
+    if (entry->is_missing) return NPG_OK;
+    if (place->taken_count++) place->step = npg_common_divisor(entry->number - place->number, place->step);
+    place->number = entry->number;
+    place->digits = (size_t)entry->digits;
+    live->again = live->seen - 1; /* for the moment: the last that came */
+    return NPG_OK;
+}
+
+/* As if all of it had come in this run: where the folder goes on, and what a gap would repeat. */
+static npg_status stand_behind(npg_live_source *live, npg_follow_place *place)
+{
+    npg_frame *previous = &live->previous;
+    npg_missing missing = live->settings.missing;
+    npg_record *record;
+    npg_spooled entry;
+    const int64_t number = previous->number;
+    NPG_TRY(npg_spool_get(live->spool, live->again, &entry, &record));
+    npg_status status = NPG_OK;
+    const char *path = npg_spool_path(record), *slash = path ? strrchr(path, '/') : NULL;
+    if (live->follow && slash) {
+        place->last = slash + 1;
+        status = npg_follow_resume(live->follow, place);
+    }
+    if (!status && holds(live) && entry.has_file && !entry.is_skipped) {
+        char *now;
+        status = npg_follow_path(live->follow, &now, place->last);
+        if (!status) status = npg_read_cloud(previous, now, npg_own(live->worker, origin));
+        npg_release(&now);
+    } else if (!status && holds(live) && !live->stream) {
+        status = npg_spool_frame(&entry, record, previous);
+    }
+    npg_record_close(&record);
+    previous->number = number;
+    previous->is_skipped = entry.is_skipped;
+    if (live->follow && missing != NPG_MISSING_IGNORE && place->taken_count > 1) live->step = place->step;
+    if (!live->follow && !live->stream && place->taken_count > 1 &&
+        (holds(live) || missing == NPG_MISSING_SKIP))
+        live->step = 1;
+    live->again = 0;
+    return status;
+}
+
+/* Through all that earlier runs had of the source. */
+static npg_status walk_again(npg_live_source *live, bool is_done)
+{
+    const npg_facts *facts = npg_worker_facts(live->worker);
+    npg_follow_place place = {0};
+    size_t gone = 0;
+    live->came = npg_spool_count(live->spool);
+    for (int64_t i = 0; i < live->came; i++) {
+        npg_record *record;
+        npg_spooled entry;
+        NPG_TRY(npg_spool_get(live->spool, i, &entry, &record));
+        bool is_needed =
+            !is_done && entry.index >= 0 &&
+            !npg_live_is_read(&facts->plan, entry.index, facts->resumed_read, facts->frame_count);
+        bool is_repeated = !is_done && holds(live) && i == live->came - 1;
+        npg_status status = pass_over(live, &entry, record, &place, is_needed || is_repeated, &gone);
+        npg_record_close(&record);
+        NPG_TRY(status);
+    }
+    if (gone)
+        npg_worker_warn(live->worker, false, -1,
+                        "%zu files of frames that are solved are gone: whether they are those of then can't "
+                        "be compared",
+                        gone);
+    return live->came ? stand_behind(live, &place) : NPG_OK;
+}
+
+/* ---- the whole ---- */
+
+npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const npg_live_settings *settings,
+                                size_t cache_bytes, const char *spill_folder)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_live_source *live;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&live, NPG_FOR_FILES, sizeof *live));
+    live->worker = worker;
+    live->settings = *settings;
+    live->total = facts->is_resumed ? facts->frame_count : -1;
+    live->spool = npg_worker_fact(worker, &npg_fact_spool);
+    npg_status status = NPG_OK;
+    if (!live->spool) {
+        status = npg_store_open(&live->own, NULL);
+        live->spool = live->own;
+    }
+    if (!status) status = npg_frame_store_open(&live->cache, cache_bytes, spill_folder);
+    if (!status) status = open_source(live);
+    if (!status && facts->is_resumed) status = walk_again(live, false);
+    if (status) npg_live_source_close(&live);
+    *out = live;
+    return status;
+}
+
+void npg_live_source_close(npg_live_source **slot)
+{
+    npg_live_source *live = *slot;
+    if (!live) return;
+    npg_selection_clear(&live->selection);
+    npg_stream_close(&live->stream);
+    npg_follow_close(&live->follow);
+    npg_chunk_unref(&live->pushed);
+    npg_frame_clear(&live->waiting);
+    npg_frame_clear(&live->previous);
+    npg_frame_clear(&live->last);
+    npg_frame_store_close(&live->cache);
+    npg_store_close(&live->own);
+    npg_release(&live->entries);
+    npg_release(slot);
+}
+
+npg_frame_store *npg_live_source_cache(npg_live_source *live)
+{
+    return live->cache;
+}
+
+npg_status npg_live_check_done(npg_worker *worker, npg_store *spool)
+{
+    npg_live_source *live;
+    size_t fresh = 0;
+    if (!npg_worker_settings(worker)->follow[0]) return NPG_OK;
+    NPG_TRY(npg_alloc(&live, NPG_FOR_FILES, sizeof *live));
+    live->worker = worker;
+    live->spool = spool;
+    live->settings = (npg_live_settings){
+        .follow_end = npg_options_get(npg_worker_options(worker), "follow-end.name"), .follow_idle_s = 1};
+    npg_status status = open_follow(live);
+    if (!status) status = walk_again(live, true);
+    if (!status) status = npg_follow_count_new(live->follow, &fresh);
+    npg_live_source_close(&live);
+    if (status || !fresh) return status;
+    return npg_error(NPG_USAGE,
+                     "%s is done, but %zu files came since: --restart starts over, "
+                     "another output folder begins a new run",
+                     npg_worker_settings(worker)->output, fresh);
 }

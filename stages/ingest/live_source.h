@@ -1,68 +1,52 @@
 /* Live source: frames from standard input, from a folder that grows, or from those that are pushed, each as
  * soon as it is there, with the numbers that are left out between them.
  *
- * What comes is noted in the input log (input_log.h) where the run keeps one.  A run that is resumed goes
- * through the log first (live_replay.c): a frame that is solved is not brought again, but compared where it
- * comes again; the others are.  Then the source goes on behind it.  A source that had ended ends there again.
- * Which frames a pass brings, and in what order, look_ahead.h says.
+ * What comes goes to the spool (spool.h), in order; from then on it is a capture like one in files, which passes
+ * read in any order, from the cache of what was read and cleaned (frame_store.h) or from the spool.  The measuring
+ * pass walks the first frames, the look-ahead, and waits for one more: whether there is one decides whether the
+ * source goes on.  In the solving pass it does, behind the look-ahead; meanwhile a folder, a pipe or npg_run_push()
+ * hold back what comes.
+ *
+ * A run that is resumed has in the spool all that came, compares what comes again (files of the folder, what is
+ * piped or pushed), and goes on behind it.  A source that had ended ends there again.
  *
  * Threads: that of stage ingest. */
 #ifndef NPG_LIVE_SOURCE_H
 #define NPG_LIVE_SOURCE_H
 
 #include "ingest/capture.h"
-#include "ingest/follow.h"
-#include "ingest/formats/reader.h"
-#include "ingest/input_log.h"
+#include "pipeline/store.h"
 
 typedef struct npg_live_settings {
     const char *frames, *follow_end;
     double follow_idle_s, follow_settle_s;
     npg_missing missing;
+    int64_t look_ahead; /* without a job more is not kept */
 } npg_live_settings;
 
-typedef struct npg_live_source {
-    npg_worker *worker; /* a loan */
-    npg_live_settings settings;
-    npg_selection selection;
-    npg_stream *stream; /* standard input                                  */
-    npg_follow *follow; /* a folder that grows; neither: frames are pushed */
-    npg_chunk *pushed;  /* the pushed chunk under way                      */
-    size_t pushed_at;
-    int64_t next;                /* index of the next frame                               */
-    int64_t seen;                /* frames that came or are missing, chosen or not        */
-    npg_frame waiting, previous; /* the frame behind a gap; a copy of the one before it   */
-    int64_t gap_left, step;      /* missing frames before the waiting one; their distance */
-    bool is_waiting, is_counted; /* gap_left is known                                     */
-    int64_t skipped_count;
-    npg_input_log *log; /* a loan, or NULL                                     */
-    size_t replay_at, replay_count;
-    int64_t total; /* frames, where an earlier run has seen the end; else -1 */
-} npg_live_source;
+typedef struct npg_live_source npg_live_source;
 
-/* NPG_USAGE, NPG_BAD_INPUT.  Close it after failure, too. */
-npg_status npg_live_source_open(npg_live_source *live, npg_worker *worker, const npg_live_settings *settings);
-void npg_live_source_close(npg_live_source *live);
+/* For the whole run.  Frames that were read and cleaned take cache_bytes, and beyond that a file in spill_folder
+ * (frame_store.h).  NPG_USAGE, NPG_BAD_INPUT. */
+npg_status npg_live_source_open(npg_live_source **live, npg_worker *worker, const npg_live_settings *settings,
+                                size_t cache_bytes, const char *spill_folder);
+void npg_live_source_close(npg_live_source **live);
 
-/* The next frame, one per chunk, so that nothing waits for frames that may come much later.  NPG_END,
- * NPG_STOPPED, or what can't be read. */
-npg_status npg_live_source_next(npg_live_source *live, npg_chunk *chunk);
+/* What was read and cleaned; a loan. */
+npg_frame_store *npg_live_source_cache(npg_live_source *live);
 
-/* ---- what live_source.c and live_replay.c share ---- */
+/* Frame `index` into *frame: any of the look-ahead, with is_last_use only once more; in the measuring pass and
+ * behind the look-ahead in the solving one also the next that comes.  NPG_END: there is none with this index;
+ * once a source has ended facts.frame_count says how many there are.  NPG_STOPPED, or what can't be read. */
+npg_status npg_live_source_read(npg_live_source *live, npg_frame *frame, int64_t index, bool is_last_use);
 
-/* Where the frames come from, for messages. */
-const char *npg_live_source_name(const npg_live_source *live);
+/* End of the measuring pass: facts.planned_count, `most` or as many as there are. */
+npg_status npg_live_source_plan(npg_live_source *live, int64_t most);
 
-/* A frame as it comes from the pipe, or was pushed; of the content, not of a file. */
-uint64_t npg_live_frame_hash(const npg_frame *frame);
-npg_status npg_live_next_streamed(npg_live_source *live, npg_frame *frame);
-npg_status npg_live_next_pushed(npg_live_source *live, npg_frame *frame);
-npg_status npg_live_keep_previous(npg_live_source *live, const npg_frame *frame);
+/* Solving pass, when all its frames were read: the source's last word. */
+npg_status npg_live_source_end(npg_live_source *live);
 
-/* Of a resumed run: where the log leads to, before the first frame. */
-npg_status npg_live_replay_open(npg_live_source *live);
-
-/* The next line of the log; the chunk stays empty for a frame that does not come again. */
-npg_status npg_live_replay(npg_live_source *live, npg_chunk *chunk);
+/* Of a job that is done: NPG_USAGE where the files of a followed folder are others, or more came. */
+npg_status npg_live_check_done(npg_worker *worker, npg_store *spool);
 
 #endif

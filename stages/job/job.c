@@ -7,6 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "ingest/live_source.h"
+#include "ingest/spool.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"
@@ -27,6 +29,17 @@ static const npg_option options[] = {
         "Go on with frames that came since the job was done (neupig append)"),
     {0}};
 /* clang-format on */
+
+npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key)
+{
+    const npg_job *job = npg_job_of(worker);
+    uint64_t frames = 0;
+    NPG_TRY(npg_job_key(job, key));
+    if (npg_job_frames(job))
+        NPG_TRY(npg_spool_key(npg_job_frames(job), npg_worker_facts(worker)->planned_count, &frames));
+    *key ^= frames;
+    return NPG_OK;
+}
 
 static void release_job(void *value)
 {
@@ -95,6 +108,16 @@ static npg_status begin_append(npg_worker *worker, npg_job *job)
     return NPG_OK;
 }
 
+/* All that was pushed is kept. */
+static npg_status want_next(npg_worker *worker, npg_store *frames)
+{
+    npg_spooled last;
+    if (!npg_spool_count(frames)) return NPG_OK;
+    NPG_TRY(npg_spool_get(frames, npg_spool_count(frames) - 1, &last, NULL));
+    *npg_own(worker, wanted_number) = last.number + 1;
+    return NPG_OK;
+}
+
 static npg_status begin(npg_worker *worker)
 {
     const job_state *state = npg_worker_state(worker);
@@ -107,16 +130,17 @@ static npg_status begin(npg_worker *worker)
         return npg_error(NPG_USAGE, "frames can be appended to a job of files, not to one of a live source");
     NPG_TRY(npg_job_open(&job, &start, worker, state->restart, state->append));
     NPG_TRY(npg_worker_publish(worker, &job_fact, job));
+    if (is_live) NPG_TRY(npg_worker_publish(worker, &npg_fact_spool, npg_job_frames(job)));
     switch (start) {
-    case NPG_JOB_FRESH: return is_live ? npg_job_begin_inputs(worker, job) : NPG_OK;
+    case NPG_JOB_FRESH: return NPG_OK;
     case NPG_JOB_DONE:
-        if (is_live) NPG_TRY(npg_job_check_inputs(worker, job));
+        if (is_live) NPG_TRY(npg_live_check_done(worker, npg_job_frames(job)));
         npg_worker_log(worker, NPG_LOG_INFO, -1, "%s is done already: nothing is left to do",
                        settings->output);
         return NPG_END;
     case NPG_JOB_RESUME:
         NPG_TRY(npg_job_restore_facts(worker, job));
-        if (is_live) NPG_TRY(npg_job_resume_inputs(worker, job));
+        if (npg_job_source_of(settings) == NPG_JOB_PUSH) NPG_TRY(want_next(worker, npg_job_frames(job)));
         break;
     case NPG_JOB_APPEND: NPG_TRY(begin_append(worker, job)); break;
     }

@@ -5,7 +5,7 @@
  *                                  process
  *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
  *                                  sizes, times and checksums
- *     OUT/job/inputs.jsonl         the inputs of a live run, frame by frame as they came (ingest/input_log.h)
+ *     OUT/job/frames.npg           what came from a live source, frame by frame (ingest/spool.h)
  *     OUT/job/store.npg            one file of records with checksums, each whole or not there (store.h): after
  *                                  each solved window a state, with the facts of the capture, the reference
  *                                  mesh in unit coordinates, what stages need to be resumed, the optimiser,
@@ -26,8 +26,8 @@
 #ifndef NPG_JOB_H
 #define NPG_JOB_H
 
-#include "job/store.h"
 #include "pipeline/stage.h"
+#include "pipeline/store.h"
 
 typedef struct npg_job npg_job;
 
@@ -121,7 +121,7 @@ void npg_job_keep_poses(npg_job *job, uint64_t of);
  * the same job. */
 npg_status npg_job_key(const npg_job *job, uint64_t *key);
 
-/* The same in a fusing pass: of a live source the input is the look-ahead that has come (job_live.c). */
+/* The same in a fusing pass: of a live source the input is the look-ahead that has come. */
 npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key);
 
 /* What job_state.c needs of the folder: block "log" of a state, the path of the next one's grids, what is kept. */
@@ -134,24 +134,15 @@ npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment);
 int64_t npg_job_serial(const npg_job *job);         /* of the newest window's state, -1 while there is none */
 int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 
-/* ---- the inputs of a live run (job_live.c) ---- */
+/* ---- the frames of a live run (ingest/spool.h) ---- */
 
-#define NPG_BLOCK_INPUTS "inputs" /* npg_input_place */
+#define NPG_BLOCK_FRAMES "frames" /* of a state: how many had come */
 
-/* Of a fresh run: begin the log of its inputs.  Its file has another name until the job is written. */
-npg_status npg_job_begin_inputs(npg_worker *worker, npg_job *job);
-
-/* Of a resumed one, whose facts are restored: which of the frames that came need not come again.  NPG_USAGE
- * where a followed folder has other files than then, with the words of npg_job_differs(). */
-npg_status npg_job_resume_inputs(npg_worker *worker, npg_job *job);
-
-/* Of one that is done: NPG_USAGE where the folder has other files than then, or more. */
-npg_status npg_job_check_inputs(npg_worker *worker, npg_job *job);
+/* A loan; NULL where the job is one of files.  Its file has another name until the job is written. */
+npg_store *npg_job_frames(const npg_job *job);
 
 /* The job is not the one that lies there: npg_error_text() with what to do about it.  NPG_USAGE. */
 npg_status npg_job_differs(const npg_job *job);
-
-npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new);
 
 /* ---- what the results are made of (job_inputs.c) ---- */
 

@@ -13,15 +13,15 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "ingest/input_log.h"
+#include "ingest/spool.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
 
 #define GRIDS_NAME  "window_%06lld.vdb"
 #define STORE_NAME  "store.npg"
 #define STORE_NEW   "store.new"
-#define INPUTS_NAME "inputs.jsonl"
-#define INPUTS_NEW  "inputs.new"
+#define FRAMES_NAME "frames.npg"
+#define FRAMES_NEW  "frames.new"
 
 struct npg_job {
     char *output, *folder; /* owned */
@@ -29,6 +29,7 @@ struct npg_job {
     json_t *then, *now;  /* owned; what an earlier run was made of, and this one; NULL once written */
     int64_t frame_count; /* of the input, gaps included */
     npg_store *store;    /* owned */
+    npg_store *frames;   /* of a live source (ingest/spool.h); owned, or NULL */
     npg_record *state;   /* that the run is resumed from; owned */
     char *grids_path;    /* of the state, owned */
     int64_t serial;      /* of the newest state in place, -1: none */
@@ -175,20 +176,21 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
 
 /* ---- the store ---- */
 
-static npg_status open_store(npg_job *job, const char *name)
+static npg_status open_store(npg_store **store, const npg_job *job, const char *name)
 {
     char *path;
+    npg_store_close(store);
     NPG_TRY(npg_join_path(&path, job->folder, name));
-    npg_status status = npg_store_open(&job->store, path);
+    npg_status status = npg_store_open(store, path);
     npg_release(&path);
     return status;
 }
 
-static npg_status rename_store(npg_job *job, const char *name)
+static npg_status rename_store(npg_store *store, const npg_job *job, const char *name)
 {
     char *path;
     NPG_TRY(npg_join_path(&path, job->folder, name));
-    npg_status status = npg_store_rename(job->store, path);
+    npg_status status = npg_store_rename(store, path);
     npg_release(&path);
     return status;
 }
@@ -224,20 +226,15 @@ static npg_status check_log(const npg_job *job, const npg_record *record)
     return npg_frame_log_check(job->output, log.bytes, log.hash);
 }
 
-/* Of a live source. */
-static npg_status check_inputs(const npg_job *job, const npg_record *record)
+/* Of a live source: what had come is there. */
+static npg_status check_frames(const npg_job *job, const npg_record *record)
 {
-    npg_input_place place;
-    uint64_t hash;
-    char *path;
+    int64_t count;
     if (!job->source) return NPG_OK;
-    NPG_TRY(npg_record_get(record, NPG_BLOCK_INPUTS, &place, sizeof place));
-    NPG_TRY(npg_job_inputs_path(job, &path, false));
-    npg_status status = npg_hash_file(&hash, path, (uint64_t)place.bytes);
-    if (!status && hash != place.hash)
-        status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_record_get(record, NPG_BLOCK_FRAMES, &count, sizeof count));
+    if (npg_spool_count(job->frames) >= count) return NPG_OK;
+    const char *damage = npg_store_damage(job->frames);
+    return npg_error(NPG_BAD_INPUT, "%s", *damage ? damage : "frames that came are not there any more");
 }
 
 /* A state of aligned frames has none. */
@@ -263,7 +260,7 @@ static npg_status open_state(npg_job *job, const char *kind, int64_t serial, boo
     if (!status && is_solved) status = make_grids_path(&grids, job, serial);
     if (!status && is_solved) status = check_grids(state, grids);
     if (!status && with_log) status = check_log(job, state);
-    if (!status && with_log) status = check_inputs(job, state);
+    if (!status && with_log) status = check_frames(job, state);
     if (!status) status = npg_record_get(state, "forward", &forward, sizeof forward);
     if (status) {
         npg_record_close(&state);
@@ -315,22 +312,9 @@ npg_status npg_job_key(const npg_job *job, uint64_t *key)
     return NPG_OK;
 }
 
-npg_status npg_job_inputs_path(const npg_job *job, char **path, bool is_new)
+npg_store *npg_job_frames(const npg_job *job)
 {
-    return npg_join_path(path, job->folder, is_new ? INPUTS_NEW : INPUTS_NAME);
-}
-
-/* The log is open: what is added to it goes on under the new name. */
-static npg_status keep_inputs(const npg_job *job)
-{
-    char *from = NULL, *to = NULL;
-    if (!job->source) return remove_file(job, INPUTS_NAME);
-    npg_status status = npg_job_inputs_path(job, &from, true);
-    if (!status) status = npg_job_inputs_path(job, &to, false);
-    if (!status && rename(from, to)) status = npg_error_errno(NPG_DISK, "can't rename %s", from);
-    npg_release(&from);
-    npg_release(&to);
-    return status;
+    return job->frames;
 }
 
 int64_t npg_job_serial(const npg_job *job)
@@ -418,9 +402,11 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     NPG_TRY(status);
     /* a stream, or frames that are pushed, may be others: stage export has the word on what is there */
     if (is_done && job->source > NPG_JOB_FOLLOW) return NPG_OK;
-    NPG_TRY(open_store(job, STORE_NAME));
+    NPG_TRY(open_store(&job->store, job, STORE_NAME));
+    if (job->source) NPG_TRY(open_store(&job->frames, job, FRAMES_NAME));
     NPG_TRY(open_newest(job, worker, is_done));
-    if (!job->state && !is_done) return rename_store(job, STORE_NEW); /* it may hold what was followed */
+    if (!job->state && !is_done)
+        return rename_store(job->store, job, STORE_NEW); /* it may hold what was followed */
     NPG_TRY(choose_start(job, start, worker, is_done, append));
     if (*start == NPG_JOB_DONE && was_partial)
         npg_worker_warn(worker, true, -1, "the job was done with frames skipped or below the quality bar");
@@ -446,7 +432,10 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     if (!restart) NPG_TRY(look_around(job, start, worker, append));
     job->forgets = *start == NPG_JOB_FRESH;
     if (restart || !job->forgets) NPG_TRY(remove_file(job, STORE_NEW));
-    return job->store ? NPG_OK : open_store(job, STORE_NEW);
+    if (!job->store) NPG_TRY(open_store(&job->store, job, STORE_NEW));
+    if (!job->source || !job->forgets) return NPG_OK;
+    NPG_TRY(remove_file(job, FRAMES_NEW));
+    return open_store(&job->frames, job, FRAMES_NEW);
 }
 
 npg_status npg_job_open(npg_job **out, npg_job_start *start, npg_worker *worker, bool restart, bool append)
@@ -466,10 +455,11 @@ void npg_job_close(npg_job **slot)
     if (!job) return;
     npg_record_close(&job->state);
     npg_store_close(&job->store);
+    npg_store_close(&job->frames);
     npg_release(&job->grids_path);
     json_decref(job->then);
     json_decref(job->now);
-    if (job->source && job->folder && !job->is_written) remove_file(job, INPUTS_NEW);
+    if (job->source && job->folder && !job->is_written) remove_file(job, FRAMES_NEW);
     if (job->lock_fd >= 0) close(job->lock_fd);
     npg_release(&job->folder);
     npg_release(&job->output);
@@ -491,9 +481,9 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
 {
     if (job->forgets) {
         NPG_TRY(remove_file(job, "job.json"));
-        NPG_TRY(rename_store(job, STORE_NAME));
+        NPG_TRY(rename_store(job->store, job, STORE_NAME));
         NPG_TRY(remove_stale(job));
-        NPG_TRY(keep_inputs(job));
+        NPG_TRY(job->frames ? rename_store(job->frames, job, FRAMES_NAME) : remove_file(job, FRAMES_NAME));
         NPG_TRY(npg_json_write(job->folder, "job.json", job->now));
     }
     job->keeps_grids = keeps_grids;

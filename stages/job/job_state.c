@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/input_log.h"
+#include "ingest/spool.h"
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "job/state_mesh.h"
@@ -50,21 +50,14 @@ static npg_status put_log(npg_store *out, const npg_worker *worker, int64_t emit
     return npg_store_put(out, "log", &log, sizeof log);
 }
 
-/* So does the log of a live source: what the plan was made from, and what is solved. */
-static npg_status put_inputs(npg_store *out, const npg_worker *worker, int64_t last)
+/* So do the frames of a live source. */
+static npg_status put_frames(npg_store *out, const npg_worker *worker)
 {
-    npg_input_log *log = npg_worker_fact(worker, &npg_fact_input_log);
-    const npg_facts *facts = npg_worker_facts(worker);
-    npg_input_place place;
-    char *path;
-    if (!log) return NPG_OK;
-    if (last < facts->planned_count - 1) last = facts->planned_count - 1;
-    npg_input_log_place(log, last, &place);
-    NPG_TRY(npg_input_log_sync(log));
-    NPG_TRY(npg_job_inputs_path(npg_job_of(worker), &path, false));
-    npg_status status = npg_hash_file(&place.hash, path, (uint64_t)place.bytes);
-    npg_release(&path);
-    return status ? status : npg_store_put(out, NPG_BLOCK_INPUTS, &place, sizeof place);
+    npg_store *frames = npg_job_frames(npg_job_of(worker));
+    if (!frames) return NPG_OK;
+    const int64_t count = npg_spool_count(frames);
+    NPG_TRY(npg_store_sync(frames));
+    return npg_store_put(out, NPG_BLOCK_FRAMES, &count, sizeof count);
 }
 
 static npg_status put_all(npg_store *out, npg_worker *worker, const npg_job_moment *moment)
@@ -73,7 +66,7 @@ static npg_status put_all(npg_store *out, npg_worker *worker, const npg_job_mome
     int64_t serial = npg_job_serial(job);
     int64_t forward = moment->is_forward_end ? serial + 1 : npg_job_forward_serial(job);
     NPG_TRY(put_log(out, worker, moment->emitted));
-    NPG_TRY(put_inputs(out, worker, moment->last));
+    NPG_TRY(put_frames(out, worker));
     NPG_TRY(npg_store_put(out, "forward", &forward, sizeof forward));
     NPG_TRY(npg_store_put(out, "read", &moment->read, sizeof moment->read));
     NPG_TRY(put_facts(out, worker));

@@ -2,8 +2,8 @@
 #ifndef NPG_STATE_MESH_H
 #define NPG_STATE_MESH_H
 
-#include "job/store.h"
 #include "pipeline/mesh.h"
+#include "pipeline/store.h"
 
 /* Add the blocks "reference", "reference.vertices", ... */
 npg_status npg_state_put_mesh(npg_store *out, const npg_mesh *mesh);

@@ -5,7 +5,7 @@
 #include <pthread.h>
 
 #include "align/tracker.h"
-#include "job/store.h"
+#include "pipeline/store.h"
 #include "mesh/poisson.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"

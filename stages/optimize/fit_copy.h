@@ -4,7 +4,7 @@
 #ifndef NPG_FIT_COPY_H
 #define NPG_FIT_COPY_H
 
-#include "job/store.h"
+#include "pipeline/store.h"
 #include "optimize/fit.h"
 
 /* {0} is none yet. */

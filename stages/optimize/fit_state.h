@@ -2,7 +2,7 @@
 #ifndef NPG_FIT_STATE_H
 #define NPG_FIT_STATE_H
 
-#include "job/store.h"
+#include "pipeline/store.h"
 #include "optimize/fit.h"
 #include "optimize/vdb_grids.h"
 

@@ -89,7 +89,7 @@ static void frames_come_back_from_memory_and_from_disk(void **state)
     for (int on_disk = 0; on_disk < 2; on_disk++) {
         npg_frame_store *store;
         size_t room = on_disk ? 2 * sizeof(npg_frame) + 3 * POINTS * 12 : 1 << 20;
-        assert_int_equal(npg_frame_store_open(&store, FRAMES, room, folder), NPG_OK);
+        assert_int_equal(npg_frame_store_open(&store, room, folder), NPG_OK);
         for (int64_t i = 0; i < FRAMES; i++) put(store, i, NPG_FIELD_CLEAN, i % 2);
         assert_true(is_empty(folder));
         assert_int_equal(npg_frame_store_used(store).disk_bytes > 0, on_disk);
@@ -107,7 +107,7 @@ static void what_finds_no_room_is_left_out(void **state)
     for (int f = 0; f < 2; f++) {
         npg_frame_store *store;
         npg_frame frame = {0};
-        assert_int_equal(npg_frame_store_open(&store, FRAMES, 100, folders[f]), NPG_OK);
+        assert_int_equal(npg_frame_store_open(&store, 100, folders[f]), NPG_OK);
         put(store, 1, NPG_FIELD_CLEAN, true);
         assert_int_equal(npg_frame_store_get(store, &frame, 1, false), NPG_END);
         assert_int_equal(npg_frame_store_get(store, &frame, 7, false), NPG_END);
@@ -122,7 +122,7 @@ static void clean_frames_replace_raw_ones(void **state)
     (void)state;
     npg_frame_store *store;
     npg_frame frame = {0};
-    assert_int_equal(npg_frame_store_open(&store, FRAMES, sizeof(npg_frame) + POINTS * 12, "/tmp"), NPG_OK);
+    assert_int_equal(npg_frame_store_open(&store, sizeof(npg_frame) + POINTS * 12, "/tmp"), NPG_OK);
     put(store, 0, NPG_FIELD_POINTS, false);
     put(store, 1, NPG_FIELD_POINTS, false);
     assert_int_equal(npg_frame_store_get(store, &frame, 1, false), NPG_END);
@@ -141,7 +141,7 @@ static void made_normals_are_kept_beside_the_frame(void **state)
         npg_frame_store *store;
         npg_frame frame, other;
         size_t room = sizeof(npg_frame) + (on_disk ? 1 : 3) * POINTS * 12;
-        assert_int_equal(npg_frame_store_open(&store, FRAMES, room, "/tmp"), NPG_OK);
+        assert_int_equal(npg_frame_store_open(&store, room, "/tmp"), NPG_OK);
         put(store, 2, NPG_FIELD_CLEAN, false);
         make_frame(&frame, 2, NPG_FIELD_CLEAN, true);
         assert_false(npg_frame_store_get_normals(store, &frame));
@@ -158,39 +158,11 @@ static void made_normals_are_kept_beside_the_frame(void **state)
     }
 }
 
-/* Whatever there is room for, and whatever a frame is: none comes twice from a live source. */
-static void a_store_of_all_leaves_none_out(void **state)
-{
-    (void)state;
-    const char *const folders[] = {NULL, "/not/there", "/tmp"};
-    for (int f = 0; f < 3; f++) {
-        npg_frame_store *store;
-        npg_frame missing = {.index = FRAMES, .is_skipped = true}, frame = {0};
-        assert_int_equal(npg_frame_store_open_all(&store, 100, folders[f]), NPG_OK);
-        for (int64_t i = 0; i < FRAMES; i++) put(store, i, NPG_FIELD_POINTS, i % 2);
-        assert_int_equal(npg_frame_store_put(store, &missing, true), NPG_OK);
-        for (int64_t i = 1; i < FRAMES; i++) put(store, i, NPG_FIELD_CLEAN, i % 2);
-        assert_int_equal(npg_frame_store_used(store).disk_bytes > 0, f == 2);
-        for (int last = 0; last < 2; last++)
-            for (int64_t i = 0; i < FRAMES; i++) expect(store, i, i % 2, last);
-        assert_int_equal(npg_frame_store_get(store, &frame, FRAMES, false), NPG_OK);
-        assert_true(frame.is_skipped);
-        assert_int_equal(npg_frame_store_get(store, &frame, 0, false), NPG_END); /* was given away */
-        assert_int_equal(npg_frame_store_get(store, &frame, FRAMES + 1, false), NPG_END);
-        npg_memory_fail_at(1, false);
-        missing = (npg_frame){.index = FRAMES + 1, .is_skipped = true};
-        assert_int_equal(npg_frame_store_put(store, &missing, true), NPG_MEMORY);
-        npg_memory_fail_at(0, false);
-        npg_frame_store_close(&store);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(frames_come_back_from_memory_and_from_disk),
                                        cmocka_unit_test(what_finds_no_room_is_left_out),
                                        cmocka_unit_test(clean_frames_replace_raw_ones),
-                                       cmocka_unit_test(made_normals_are_kept_beside_the_frame),
-                                       cmocka_unit_test(a_store_of_all_leaves_none_out)};
+                                       cmocka_unit_test(made_normals_are_kept_beside_the_frame)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

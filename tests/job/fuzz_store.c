@@ -5,7 +5,7 @@
 #include <xxhash.h>
 
 #include "job/state_mesh.h"
-#include "job/store.h"
+#include "pipeline/store.h"
 #include "tests/support/fuzz_target.h"
 
 static void take_parts(const npg_record *record)

@@ -82,12 +82,16 @@ static npg_status run_from(const char *output, int first, const char *const more
 
 static int has_state(const char *output, int serial)
 {
+    static char head[8 + 8 + 8]; /* of a record of the job's store: magic, kind, number */
     char path[600];
-    for (int s = serial; s < FRAMES; s++) { /* two stay */
-        snprintf(path, sizeof path, "%s/job/window_%06d.npg", output, s);
-        if (exists(path)) return 1;
-    }
-    return 0;
+    int64_t newest = -1;
+    snprintf(path, sizeof path, "%s/job/store.npg", output);
+    FILE *file = fopen(path, "rb");
+    if (!file) return 0;
+    for (long at = 0; !fseek(file, at, SEEK_SET) && fread(head, sizeof head, 1, file) == 1; at += 8)
+        if (!memcmp(head, "NPGREC01state\0\0\0", 16)) memcpy(&newest, head + 16, sizeof newest);
+    fclose(file);
+    return newest >= serial;
 }
 
 /* Pushes what is wanted up to frame `last`, then waits for the end that comes. */

@@ -1,12 +1,12 @@
 # Live captures through the command: standard input and a folder that grows, longer than the look-ahead.
 
-small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "window": 8, "overlap": 2,
+small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "window": 4, "overlap": 1,
                   "align-nodes": 60}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100
-       --look-ahead 10)
+       --look-ahead 6)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 30 --points 600 -o capture >synth.log
+    "$NEUPIG" synth --body bar --frames 16 --points 600 -o capture >synth.log
     cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" >piped.log
 }
 
@@ -15,7 +15,7 @@ setup() {
 }
 
 same_meshes() {
-    [ "$(ls "$1/meshes" | wc -l)" -eq 30 ]
+    [ "$(ls "$1/meshes" | wc -l)" -eq 16 ]
     for mesh in piped/meshes/*.ply; do cmp "$mesh" "$1/meshes/$(basename "$mesh")"; done
 }
 
@@ -28,8 +28,8 @@ await() {
 }
 
 @test "standard input may be longer than the look-ahead" {
-    [ "$(ls piped/meshes | wc -l)" -eq 30 ]
-    [ "$(wc -l <piped/frames.jsonl)" -eq 30 ]
+    [ "$(ls piped/meshes | wc -l)" -eq 16 ]
+    [ "$(wc -l <piped/frames.jsonl)" -eq 16 ]
     grep -q '"status": "ok"' piped/done.json
     grep -q '"open": true' piped/report.json
 }
@@ -53,19 +53,19 @@ await() {
     cp -r capture/points idle
     "$NEUPIG" run --follow idle -o idled --follow-end 1 "${small[@]}" >idled.log
     same_meshes idled
-    head -c 3000 capture/points/frame_0029.ply >idle/frame_0030.ply
+    head -c 3000 capture/points/frame_0015.ply >idle/frame_0016.ply
     status=0
     "$NEUPIG" run --follow idle -o cut --follow-end 1 --method '{"follow-settle": 0}' "${small[@]}" 2>cut.log || status=$?
     cat cut.log
     [ "$status" -eq 3 ]
-    grep -q 'idle/frame_0030.ply' cut.log
+    grep -q 'idle/frame_0016.ply' cut.log
     [ ! -e cut/done.json ]
     status=0
     "$NEUPIG" run --follow idle -o kept --follow-end 1 --method '{"follow-settle": 0}' --keep-going "${small[@]}" \
         2>kept.log || status=$?
     [ "$status" -eq 7 ]
-    grep -q 'frame_0030.ply' kept.log
-    [ -e kept/meshes/frame_0029.ply ]
+    grep -q 'frame_0016.ply' kept.log
+    [ -e kept/meshes/frame_0015.ply ]
     rm -r idle
 }
 
@@ -74,34 +74,34 @@ await() {
     "$NEUPIG" run - -o early "${small[@]}" <fifo >early.log &
     pid=$!
     exec 7>fifo
-    cat $(ls capture/points/*.ply | head -$((10 + 8 + 2 - 1))) >&7 # look-ahead + window + overlap - 1
+    cat $(ls capture/points/*.ply | head -$((6 + 4 + 1 - 1))) >&7 # look-ahead + window + overlap - 1
     await early/frames.partial.jsonl $pid
     until [ -s early/frames.partial.jsonl ]; do
         kill -0 $pid
         sleep 0.05
     done
     [ "$(ls early/meshes/*.ply | wc -l)" -ge 1 ]
-    cat $(ls capture/points/*.ply | tail -n +$((10 + 8 + 2))) >&7
+    cat $(ls capture/points/*.ply | tail -n +$((6 + 4 + 1))) >&7
     exec 7>&-
     wait $pid
     same_meshes early
 }
 
 @test "a source that stops in the middle of a frame: exit 3, the frames before it are safe" {
-    cat capture/points/*.ply | head -c $((24 * $(stat -c %s capture/points/frame_0000.ply) + 5000)) >cut-stream
+    cat capture/points/*.ply | head -c $((12 * $(stat -c %s capture/points/frame_0000.ply) + 5000)) >cut-stream
     status=0
     "$NEUPIG" run - -o torn "${small[@]}" <cut-stream 2>torn.log || status=$?
     cat torn.log
     [ "$status" -eq 3 ]
-    grep -q 'frame 2[0-9]: standard input' torn.log
+    grep -q 'frame 1[0-9]: standard input' torn.log
     [ ! -e torn/done.json ]
     [ ! -e torn/frames.jsonl ]
     # In one gulp the cut may overtake the first window: with a pause between, the finished frames stay.
-    (cat $(ls capture/points/*.ply | head -24); until [ -s paused/frames.partial.jsonl ]; do sleep 0.05; done
-     head -c 5000 capture/points/frame_0024.ply) |
+    (cat $(ls capture/points/*.ply | head -12); until [ -s paused/frames.partial.jsonl ]; do sleep 0.05; done
+     head -c 5000 capture/points/frame_0012.ply) |
         "$NEUPIG" run - -o paused "${small[@]}" 2>paused.log || status=$?
     [ "$status" -eq 3 ]
-    grep -q 'frame 24: standard input' paused.log
+    grep -q 'frame 12: standard input' paused.log
     [ ! -e paused/done.json ]
     sed -n 's/.*"file":"\([^"]*\)".*/\1/p' paused/frames.partial.jsonl >finished
     [ -s finished ]
@@ -115,7 +115,7 @@ await() {
     [ "$status" -eq 7 ]
     grep -q 'taken to end here' mended.log
     frames=$(ls mended/meshes | wc -l)
-    [ "$frames" -ge 24 ]
+    [ "$frames" -ge 12 ]
     [ "$frames" -eq "$(wc -l <mended/frames.jsonl)" ]
     grep -q '"status": "partial"' mended/done.json
 }

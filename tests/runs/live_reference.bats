@@ -125,7 +125,7 @@ await() {
     cp $(ls noisy0/points/*.ply | head -5) grows
     "$NEUPIG" run --follow grows -o killed "${small[@]}" "${open[@]}" --follow-end 0 >killed.log 2>&1 &
     local pid=$!
-    await killed/job/inputs.new $pid 400 # five lines
+    await killed/job/frames.new $pid 1000 # five records
     kill -KILL $pid
     wait $pid || true
     cp noisy0/points/* grows
@@ -157,7 +157,7 @@ await() {
     cp $(ls noisy0/points/*.ply | head -5) few
     "$NEUPIG" run --follow few -o stopped "${small[@]}" "${open[@]}" --follow-end 0 >stopped.log 2>&1 &
     local pid=$! status=0
-    await stopped/job/inputs.new $pid 400
+    await stopped/job/frames.new $pid 1000
     kill -TERM $pid
     wait $pid || status=$?
     [ "$status" -eq 75 ]

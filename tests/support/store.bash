@@ -1,4 +1,4 @@
-# What a job's store holds (stages/job/store.h), from outside.  A record's head: "NPGREC01", its kind, its index.
+# What a job's store holds (pipeline/store.h), from outside.  A record's head: "NPGREC01", its kind, its index.
 
 # How many records of kind $2 (state) the job in folder $1 has, those that were forgotten included.
 records() {

@@ -23,6 +23,7 @@
 #define NPG_RECORD_STATE  "state"  /* of the run behind a solved window, numbered; 0                   */
 #define NPG_RECORD_INSIDE "inside" /* inside the window after the state of this number (-1: none); 0   */
 #define NPG_RECORD_POSE   "pose"   /* of a frame, its place in time; what it was found from (a hash)   */
+#define NPG_RECORD_FRAME  "frame"  /* that came from a live source, counted as they came; 0                */
 #define NPG_RECORD_GROUP  "group"  /* of frames that were followed together, counted in a pass; the same */
 
 typedef struct npg_record_id {
@@ -66,6 +67,9 @@ npg_status npg_store_put_arrays(npg_store *store, const void *owner, const npg_s
 /* The record is whole, and after with_sync safe on disk.  After a failure, this or an earlier one (`status`),
  * nothing of it remains. */
 npg_status npg_store_end(npg_store *store, npg_status status, bool with_sync);
+
+/* All records that are whole are safe on disk. */
+npg_status npg_store_sync(npg_store *store);
 
 /* Forget records that are not needed. */
 npg_status npg_store_forget(npg_store *store, bool (*is_needed)(const npg_record_id *id, const void *user),

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "job/store.h"
+#include "pipeline/store.h"
 #include "tests/support/group_folder.h"
 
 static const double numbers[3] = {1.5, -0.0, 3e300};

@@ -1,5 +1,5 @@
 /* Store: one file that records are appended to, each with its checksum. */
-#include "job/store.h"
+#include "pipeline/store.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -287,6 +287,14 @@ npg_status npg_store_end(npg_store *s, npg_status status, bool with_sync)
         status = fail(s, "write");
     pthread_mutex_unlock(&s->lock);
     pthread_mutex_unlock(&s->writing);
+    return status;
+}
+
+npg_status npg_store_sync(npg_store *s)
+{
+    pthread_mutex_lock(&s->lock);
+    npg_status status = fdatasync(s->fd) ? fail(s, "write") : NPG_OK;
+    pthread_mutex_unlock(&s->lock);
     return status;
 }
 
