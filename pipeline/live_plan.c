@@ -131,14 +131,6 @@ int64_t npg_live_read_before(const npg_plan *plan, int64_t i, int64_t total)
     return window.direction > 0 ? window.new_last + 1 : key.last + 1 - window.new_first;
 }
 
-int64_t npg_live_last_until(const npg_plan *plan, int64_t i, int64_t total)
-{
-    npg_window window = npg_live_window(plan, i, total), key = npg_live_window(plan, 0, total);
-    if (plan->appended_at || window.direction > 0) return window.new_last;
-    if (npg_plan_is_open(plan) || window.direction == 0) return key.last;
-    return plan->frame_count - 1;
-}
-
 /* Those are windows 1 of either side: the first that do not are followed by none. */
 bool npg_live_is_first_needed_after(const npg_plan *plan, int64_t i, int64_t total)
 {

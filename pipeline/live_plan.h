@@ -53,9 +53,6 @@ int64_t npg_live_next_place(const npg_plan *plan, int64_t read, int64_t total);
 /* Whether the frame is one of the first `read` that came. */
 bool npg_live_is_read(const npg_plan *plan, int64_t index, int64_t read, int64_t total);
 
-/* The frame latest in time of windows 0 to i. */
-int64_t npg_live_last_until(const npg_plan *plan, int64_t i, int64_t total);
-
 /* Whether a window after window i starts from window 0. */
 bool npg_live_is_first_needed_after(const npg_plan *plan, int64_t i, int64_t total);
 

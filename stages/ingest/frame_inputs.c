@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 
 #include "ingest/formats/formats.h"
-#include "ingest/formats/number.h"
+#include "pipeline/number.h"
 #include "ingest/frame_names.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"

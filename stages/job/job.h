@@ -93,7 +93,6 @@ npg_status npg_job_wait_exported(npg_job *job, int64_t count, int64_t *log_bytes
 typedef struct npg_job_moment {
     int64_t emitted;     /* frames that have been passed on to evaluate and export */
     int64_t read;        /* frames of the plan that need not be read again         */
-    int64_t last;        /* index of the last of them in time, -1 for none         */
     bool is_forward_end; /* later frames start from this state (neupig append)     */
     bool is_inside;      /* the window at work, which is not solved yet            */
 } npg_job_moment;

@@ -122,10 +122,9 @@ static npg_status write_state(void *user, npg_store *out, const char *grids_path
 
 static npg_job_moment moment_of(const npg_plan *plan, const npg_hand *hand)
 {
-    npg_job_moment moment = {.emitted = hand->emitted, .last = -1};
+    npg_job_moment moment = {.emitted = hand->emitted};
     if (hand->window_at < 0) return moment;
     moment.read = npg_live_read_before(plan, hand->window_at, hand->total);
-    moment.last = npg_live_last_until(plan, hand->window_at, hand->total);
     return moment;
 }
 

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/number.h"
-#include "ingest/formats/source.h"
+#include "pipeline/number.h"
+#include "pipeline/source.h"
 #include "pipeline/file.h"
 
 #define FILE_MOST ((uint64_t)256 << 20) /* bytes */

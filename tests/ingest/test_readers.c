@@ -9,7 +9,7 @@
 #include <math.h>
 #include <sys/wait.h>
 
-#include "ingest/formats/number.h"
+#include "pipeline/number.h"
 #include "tests/ingest/read_helpers.h"
 
 enum { N = 5 };

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/formats/number.h"
+#include "pipeline/number.h"
 
 /* Constants of OpenGL that glTF 2.0 uses. */
 enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };

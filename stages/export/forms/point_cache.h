@@ -3,7 +3,7 @@
 #define NPG_POINT_CACHE_H
 
 #include "export/forms/forms.h"
-#include "ingest/formats/bytes.h"
+#include "pipeline/bytes.h"
 #include "pipeline/file.h"
 
 typedef struct npg_cache {

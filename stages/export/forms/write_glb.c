@@ -15,7 +15,7 @@
 #include "export/forms/corner_split.h"
 #include "export/forms/glb_text.h"
 #include "export/forms/srgb.h"
-#include "ingest/formats/bytes.h"
+#include "pipeline/bytes.h"
 #include "pipeline/file.h"
 
 /* Of a file's binary part: lengths have 32 bits, and a MiB is left for the JSON. */

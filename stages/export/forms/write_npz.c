@@ -20,7 +20,7 @@
 #include "export/forms/forms.h"
 #include "export/forms/zip_store.h"
 #include "geometry/rigid.h"
-#include "ingest/formats/bytes.h"
+#include "pipeline/bytes.h"
 
 enum {
     FACES,

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "export/forms/write_obj.h"
-#include "ingest/formats/number.h"
+#include "pipeline/number.h"
 #include "pipeline/file.h"
 
 /* Digits after the point that keep 1e-7 of the extent, and 9 digits at least where the extent is unknown. */

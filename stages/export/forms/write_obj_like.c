@@ -3,8 +3,8 @@
 
 #include "export/forms/write_obj.h"
 #include "export/forms/writer.h"
-#include "ingest/formats/number.h"
-#include "ingest/formats/source.h"
+#include "pipeline/number.h"
+#include "pipeline/source.h"
 #include "pipeline/file.h"
 
 typedef struct copying {

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "export/forms/writer.h"
-#include "ingest/formats/bytes.h"
+#include "pipeline/bytes.h"
 #include "pipeline/file.h"
 
 #define KEPT_SHARE 1e-6 /* of the extent: what positions may lose as float */

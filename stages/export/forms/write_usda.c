@@ -17,7 +17,7 @@
 
 #include "export/forms/forms.h"
 #include "export/forms/srgb.h"
-#include "ingest/formats/number.h"
+#include "pipeline/number.h"
 #include "pipeline/file.h"
 
 #define EXTENT_SIZE 144 /* bytes of one sample of the extent, padded with blanks          */

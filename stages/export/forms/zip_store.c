@@ -4,7 +4,7 @@
 #include <pthread.h>
 #include <stdbool.h>
 
-#include "ingest/formats/bytes.h"
+#include "pipeline/bytes.h"
 
 /* Records and numbers of PKWARE's APPNOTE.TXT, version 6.3. */
 #define FIXED_TIME     0x00210000 /* 1980-01-01 00:00, the first one there is: the same bytes every day */

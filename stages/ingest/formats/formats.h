@@ -3,10 +3,10 @@
 #ifndef NPG_FORMATS_H
 #define NPG_FORMATS_H
 
-#include "ingest/formats/source.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/mesh.h"
+#include "pipeline/source.h"
 
 /* One PLY with all its elements.  NPG_END when the source has no byte left; what follows the last element is
  * left there.  may_be_points: a mesh may be without faces. */

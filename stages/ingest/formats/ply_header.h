@@ -2,7 +2,7 @@
 #ifndef NPG_PLY_HEADER_H
 #define NPG_PLY_HEADER_H
 
-#include "ingest/formats/source.h"
+#include "pipeline/source.h"
 
 enum { NPG_PLY_ELEMENTS = 16, NPG_PLY_PROPERTIES = 128, NPG_PLY_NAME = 64 };
 

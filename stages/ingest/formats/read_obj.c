@@ -5,8 +5,8 @@
 
 #include "ingest/formats/formats.h"
 #include "ingest/formats/mesh_builder.h"
-#include "ingest/formats/number.h"
 #include "ingest/formats/point_list.h"
+#include "pipeline/number.h"
 
 #define CORNERS_MAX 1024 /* of a polygon; larger ones are damage (set by trial) */
 
@@ -89,12 +89,8 @@ static npg_status count_lines(reader *r)
 static npg_status parse_values(reader *r, double *values, int least, int most, int *count, const char *at,
                                const char *end)
 {
-    for (*count = 0; at < end && *count < most; ++*count) {
-        const char *after = npg_number_parse(at, end, &values[*count]);
-        int shown = end - at > 30 ? 30 : (int)(end - at);
-        if (!after) return npg_source_bad_line(r->source, "\"%.*s\" is not a number", shown, at);
-        at = npg_skip_blanks(after, end);
-    }
+    for (*count = 0; at < end && *count < most; ++*count)
+        NPG_TRY(npg_source_number(r->source, &values[*count], &at, end));
     if (at < end) return npg_source_bad_line(r->source, "more than %d values", most);
     if (*count < least)
         return npg_source_bad_line(r->source, "%d value%s where there must be %d", *count,

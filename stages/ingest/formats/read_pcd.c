@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/bytes.h"
 #include "ingest/formats/formats.h"
 #include "ingest/formats/ply_header.h"
 #include "ingest/formats/point_list.h"
+#include "pipeline/bytes.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 #define NONE        UINT64_MAX         /* the header has no such line     */

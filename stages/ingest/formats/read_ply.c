@@ -4,9 +4,9 @@
 
 #include "ingest/formats/formats.h"
 #include "ingest/formats/mesh_builder.h"
-#include "ingest/formats/number.h"
 #include "ingest/formats/ply_header.h"
 #include "ingest/formats/point_list.h"
+#include "pipeline/number.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 #define CORNERS_MAX 1024               /* of a polygon; larger ones are damage (set by trial) */
@@ -235,25 +235,8 @@ static npg_status skip_binary_element(reader *r, const npg_ply_element *element)
 static npg_status next_row(reader *r, const npg_ply_element *element, uint64_t row, const char **at,
                            const char **end)
 {
-    size_t length;
-    do {
-        npg_status status = npg_source_line(r->source, at, &length);
-        if (status == NPG_END) return ends_early(r, element, row);
-        if (status) return status;
-        *end = *at + length;
-        *at = npg_skip_blanks(*at, *end);
-    } while (*at == *end);
-    return NPG_OK;
-}
-
-static npg_status bad_row(const reader *r, const npg_ply_element *element, size_t values, const char *at,
-                          const char *end)
-{
-    int shown = end - at > 30 ? 30 : (int)(end - at);
-    if (at == end)
-        return npg_source_bad_line(r->source, "%zu values where element \"%s\" has %zu", values,
-                                   element->name, element->property_count);
-    return npg_source_bad_line(r->source, "\"%.*s\" is not a number", shown, at);
+    npg_status status = npg_source_row(r->source, at, end);
+    return status == NPG_END ? ends_early(r, element, row) : status;
 }
 
 static npg_status parse_row(reader *r, double slots[SLOTS], const char *at, const char *end)
@@ -261,10 +244,11 @@ static npg_status parse_row(reader *r, double slots[SLOTS], const char *at, cons
     const npg_ply_element *vertex = r->vertex;
     for (size_t p = 0; p < vertex->property_count; p++) {
         double value;
-        const char *after = npg_number_parse(at, end, &value);
-        if (!after) return bad_row(r, vertex, p, at, end);
+        if (at == end)
+            return npg_source_bad_line(r->source, "%zu values where element \"vertex\" has %zu", p,
+                                       vertex->property_count);
+        NPG_TRY(npg_source_number(r->source, &value, &at, end));
         if (r->slot_of[p] >= 0) slots[r->slot_of[p]] = value;
-        at = npg_skip_blanks(after, end);
     }
     if (at < end)
         return npg_source_bad_line(r->source, "more than the %zu values that element \"vertex\" has",
@@ -351,11 +335,8 @@ static npg_status read_binary_faces(reader *r)
 
 static npg_status parse_value(reader *r, const char **at, const char *end, double *value)
 {
-    const char *after = npg_number_parse(*at, end, value);
-    if (!after && *at == end) return npg_source_bad_line(r->source, "the row of a face ends early");
-    if (!after) return bad_row(r, r->face, 0, *at, end);
-    *at = npg_skip_blanks(after, end);
-    return NPG_OK;
+    if (*at == end) return npg_source_bad_line(r->source, "the row of a face ends early");
+    return npg_source_number(r->source, value, at, end);
 }
 
 static npg_status parse_face_property(reader *r, uint64_t row, const npg_ply_property *property,

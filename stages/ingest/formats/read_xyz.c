@@ -6,8 +6,8 @@
 
 #include "geometry/vec3.h"
 #include "ingest/formats/formats.h"
-#include "ingest/formats/number.h"
 #include "ingest/formats/point_list.h"
+#include "pipeline/number.h"
 
 #define COLUMNS_MAX    6
 #define UNIT_TOLERANCE 0.02 /* of a normal's length from 1; set by trial, as the next                   */
@@ -48,13 +48,6 @@ static npg_status count_rows(npg_source *source, size_t *rows)
     return npg_source_rewind(source);
 }
 
-static const char *skip_separator(const char *at, const char *end)
-{
-    at = npg_skip_blanks(at, end);
-    if (at < end && (*at == ',' || *at == ';')) at = npg_skip_blanks(at + 1, end);
-    return at;
-}
-
 /* "x y z" and the like above the first row. */
 static bool is_title(const char *at, const char *end)
 {
@@ -67,11 +60,8 @@ static npg_status parse_row(reader *r, double values[COLUMNS_MAX], int *columns,
 {
     *columns = 0;
     while (at < end && *columns < COLUMNS_MAX) {
-        const char *after = npg_number_parse(at, end, &values[*columns]);
-        int shown = end - at > 30 ? 30 : (int)(end - at);
-        if (!after) return npg_source_bad_line(r->source, "\"%.*s\" is not a number", shown, at);
-        ++*columns;
-        at = skip_separator(after, end);
+        NPG_TRY(npg_source_number(r->source, &values[(*columns)++], &at, end));
+        if (at < end && (*at == ',' || *at == ';')) at = npg_skip_blanks(at + 1, end);
     }
     return NPG_OK;
 }

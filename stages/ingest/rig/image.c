@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "ingest/formats/source.h"
+#include "pipeline/source.h"
 #include "pipeline/memory.h"
 
 void npg_image_clear(npg_image *image)

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/formats/number.h"
-#include "ingest/formats/source.h"
+#include "pipeline/number.h"
+#include "pipeline/source.h"
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
 

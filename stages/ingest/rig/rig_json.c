@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/formats/source.h"
+#include "pipeline/source.h"
 #include "ingest/frame_inputs.h"
 #include "ingest/rig/image.h"
 #include "ingest/rig/rig.h"

@@ -3,10 +3,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/formats/number.h"
-#include "ingest/formats/source.h"
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
+#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 void npg_stamped_clear(npg_stamped_list *list)
 {
@@ -18,12 +18,9 @@ void npg_stamped_clear(npg_stamped_list *list)
 /* The next line that is neither empty nor a comment; NPG_END. */
 static npg_status next_line(npg_source *source, const char **at, const char **end)
 {
-    size_t length;
     do {
-        NPG_TRY(npg_source_line(source, at, &length));
-        *end = *at + length;
-        *at = npg_skip_blanks(*at, *end);
-    } while (*at == *end || **at == '#');
+        NPG_TRY(npg_source_row(source, at, end));
+    } while (**at == '#');
     if (source->byte > NPG_RIG_TEXT_MAX)
         return npg_source_bad_line(source, "the file is larger than %zu MiB", NPG_RIG_TEXT_MAX >> 20);
     return NPG_OK;

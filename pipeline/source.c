@@ -1,5 +1,5 @@
 /* Source: the bytes of one file or stream through a sliding window. */
-#include "ingest/formats/source.h"
+#include "pipeline/source.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -10,12 +10,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "ingest/formats/number.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
+#include "pipeline/number.h"
 
 #define WINDOW_SIZE  ((size_t)256 << 10) /* set by trial */
-#define STOP_POLL_MS 250                 /* a stop is noticed within that; formats/source.h says so */
+#define STOP_POLL_MS 250                 /* a stop is noticed within that; source.h says so */
 
 static npg_status refuse_unreadable(const char *name, int cause)
 {

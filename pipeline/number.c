@@ -1,5 +1,5 @@
 /* Number: decimal numbers from text, fast and the same under every locale. */
-#include "ingest/formats/number.h"
+#include "pipeline/number.h"
 
 #include <ctype.h>
 #include <locale.h>
