@@ -4,6 +4,7 @@
  * Holds the frames of one window and fits them jointly - aligned ones by joint.h, others as in the paper on
  * the OpenCL device -, writes vertices into each frame and passes on what no later window needs. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "kernels/kernels.h"
@@ -13,6 +14,7 @@
 #include "optimize/window.h"
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
+#include "pipeline/json_file.h"
 #include "pipeline/live_plan.h"
 #include "pipeline/options.h"
 
@@ -159,11 +161,30 @@ static bool is_resumed(const npg_worker *worker)
     return npg_worker_pass(worker) == NPG_PASS_SOLVE && npg_worker_facts(worker)->is_resumed;
 }
 
+/* Keys of the solver that the method does not use: whoever sets one expects an effect. */
+static void say_unused(npg_worker *worker, bool is_aligned)
+{
+    char names[512] = "";
+    for (const npg_option *option = options; option->name; option++) {
+        bool is_joint = !strncmp(option->name, "joint-", 6), is_both = !strcmp(option->name, "epochs");
+        size_t used = strlen(names);
+        if (is_both || is_joint == is_aligned) continue;
+        if (!npg_options_is_set(npg_worker_options(worker), option->name)) continue;
+        snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "", option->name);
+    }
+    if (!names[0]) return;
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "without effect on fits %s alignment: %s",
+                   is_aligned ? "with" : "without", names);
+    json_object_set_new(npg_worker_report(worker), "keys_without_effect", npg_json_text(names));
+}
+
 /* Aligned frames are fitted on the host: no device is looked for. */
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     s->total = -1;
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE)
+        say_unused(worker, npg_worker_has_field(worker, NPG_FIELD_POSE));
     NPG_TRY(check_widths(&s->window_settings.fit));
     if (npg_worker_has_field(worker, NPG_FIELD_POSE)) return is_resumed(worker) ? resume(worker) : NPG_OK;
     NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));

@@ -17,6 +17,7 @@ setup() {
     for name in reference.ply report.json frames.jsonl done.json; do [ -s out/$name ]; done
     [ "$(ls out/meshes)" = "$(printf 'frame_%04d.ply\n' 0 1 2 3 4)" ]
     [ "$(wc -l <out/frames.jsonl)" -eq 5 ]
+    grep -q '"keys_without_effect": "grid-levels, width-1, width-2"' out/report.json
     run "$NEUPIG" eval out "$capture"
     [ "$status" -eq 0 ]
     [[ "$output" == *"constant topology yes"* ]]
