@@ -4,6 +4,8 @@
 #define NPG_JSON_FILE_H
 
 #include <jansson.h>
+#include <stddef.h>
+#include <stdint.h>
 
 #include "pipeline/status.h"
 
@@ -25,5 +27,23 @@ json_t *npg_json_real(double value);
 /* Write a file that appears whole: <folder>/<name>, or the one of this path.  NPG_DISK, NPG_MEMORY. */
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value);
 npg_status npg_json_save(const char *path, const json_t *value);
+
+/* ---- JSON lines: one object a line, read so that memory does not grow with the file ---- */
+
+/* Given each line in turn: its object, a loan, and its bytes with their newline.  A failure ends the
+ * visit. */
+typedef npg_status npg_json_line_visit(void *user, const json_t *object, const char *line, size_t size);
+
+/* The lines in the first `bytes` bytes of a file.  NPG_DISK when it can't be read, NPG_BAD_INPUT where
+ * these are no whole lines with an object each. */
+npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user);
+
+/* ---- what the lists of a run say of a file ---- */
+
+/* {"bytes": n, "xxh3": "16 hex digits"} added to entry for the file OUT/<file>.  NPG_DISK. */
+npg_status npg_file_facts(json_t *entry, const char *output, const char *file);
+
+/* NPG_BAD_INPUT when OUT/<file> is not the file that entry ({"bytes", "xxh3"}) describes. */
+npg_status npg_file_check(const json_t *entry, const char *output, const char *file);
 
 #endif

@@ -1,9 +1,12 @@
-/* JSON: values from data that it can't hold as it is, and the files that the program writes. */
+/* JSON: values from data that it can't hold as it is, and the files that the program writes and reads back. */
 #include "pipeline/json_file.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
@@ -72,4 +75,73 @@ npg_status npg_json_write(const char *folder, const char *name, const json_t *va
     npg_status status = npg_json_save(path, value);
     npg_release(&path);
     return status;
+}
+
+/* ---- lines ---- */
+
+static npg_status read_lines(FILE *file, const char *path, int64_t bytes, npg_json_line_visit *visit,
+                             void *user)
+{
+    char *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    for (int64_t at = 0; at < bytes && !status;) {
+        ssize_t size = getline(&line, &capacity, file);
+        json_t *object = size > 0 ? json_loadb(line, (size_t)size, 0, NULL) : NULL;
+        if (!json_is_object(object) || at + size > bytes)
+            status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written (byte %lld)", path,
+                               (long long)at);
+        if (!status) status = visit(user, object, line, (size_t)size);
+        at += size;
+        json_decref(object);
+    }
+    free(line);
+    return status;
+}
+
+npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user)
+{
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_DISK));
+    FILE *file = fdopen(fd, "r");
+    npg_status status = file ? read_lines(file, path, bytes, visit, user)
+                             : npg_error_errno(NPG_DISK, "can't read back %s", path);
+    if (file)
+        fclose(file);
+    else
+        close(fd);
+    return status;
+}
+
+/* ---- what lists say of files ---- */
+
+npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
+{
+    char *path, text[17];
+    uint64_t hash;
+    struct stat info;
+    NPG_TRY(npg_join_path(&path, output, file));
+    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
+    if (!status && stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    npg_release(&path);
+    NPG_TRY(status);
+    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)info.st_size));
+    json_object_set_new(entry, "xxh3", json_string(text));
+    return NPG_OK;
+}
+
+npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
+{
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
+    json_t *now = json_object();
+    npg_status status = npg_file_facts(now, output, file);
+    if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
+                    !json_equal(json_object_get(now, "xxh3"), json_object_get(entry, "xxh3"))))
+        status = npg_error(NPG_BAD_INPUT,
+                           "%s/%s was changed since it was written; --restart discards what is there", output,
+                           file);
+    json_decref(now);
+    return status == NPG_DISK ? NPG_BAD_INPUT : status;
 }

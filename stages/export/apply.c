@@ -14,9 +14,7 @@
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
-#include "pipeline/file_facts.h"
 #include "pipeline/json_file.h"
-#include "pipeline/json_lines.h"
 
 #define PATH_SIZE 4096
 

@@ -8,7 +8,7 @@
 #include "export/export_folder.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
-#include "pipeline/file_facts.h"
+#include "pipeline/json_file.h"
 
 static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)
 {

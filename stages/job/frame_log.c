@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "pipeline/file.h"
-#include "pipeline/file_facts.h"
+#include "pipeline/json_file.h"
 
 typedef struct line_place { /* a frame's line in the partial list */
     int64_t index;

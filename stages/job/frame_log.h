@@ -9,7 +9,7 @@
 #ifndef NPG_FRAME_LOG_H
 #define NPG_FRAME_LOG_H
 
-#include "pipeline/json_lines.h"
+#include "pipeline/json_file.h"
 #include "pipeline/stage.h"
 
 #define NPG_FRAME_LOG_NAME "frames.partial.jsonl"

@@ -10,7 +10,6 @@
 
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
-#include "pipeline/json_lines.h"
 #include "pipeline/memory.h"
 #include "tools/batch/batch.h"
 

@@ -12,7 +12,6 @@
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
-#include "pipeline/json_lines.h"
 #include "tools/segments/segments.h"
 
 #define JSON_SIZE_MAX ((size_t)256 << 20)

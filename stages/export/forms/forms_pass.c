@@ -13,8 +13,7 @@
 #include "ingest/formats/reader.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
-#include "pipeline/file_facts.h"
-#include "pipeline/json_lines.h"
+#include "pipeline/json_file.h"
 
 struct npg_form_log {
     const char *output;
