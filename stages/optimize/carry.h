@@ -21,9 +21,9 @@ typedef struct npg_carry {
     npg_thin *surface;             /* W vertices: the surface that points are matched with */
     npg_thin *samples;             /* S: vertices of that surface                          */
     uint32_t *vertex;              /* S: which vertex of the reference each sample is      */
-    npg_carrier *carriers;         /* V                                                    */
     npg_carrier *surface_carriers; /* W                                                    */
     npg_surface *rest;             /* of the samples, at rest                              */
+    npg_arena arrays;              /* holds the two                                        */
     size_t vert_count;             /* V                                                    */
 } npg_carry;
 
@@ -33,9 +33,10 @@ npg_status npg_carry_open(npg_carry **carry, const npg_mesh *reference, size_t s
                           size_t surface_target);
 void npg_carry_close(npg_carry **carry);
 
-/* Which samples carry points given at rest (N x 3).  threads: 0 for one per core. */
-npg_status npg_carry_find(const npg_carry *carry, npg_carrier *carriers, const float *rest, size_t count,
-                          int threads);
+/* Which vertices of `mesh`, whose surface at rest is `rest`, carry points (N x 3).  threads: 0 for one per
+ * core. */
+npg_status npg_carriers_find(npg_carrier *carriers, const npg_mesh *mesh, npg_surface *rest,
+                             const float *points, size_t count, int threads);
 
 /* samples (S x 3) = the samples' rows of vert_pos (V x 3). */
 void npg_carry_gather(const npg_carry *carry, float *samples, const float *vert_pos);

@@ -5,7 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "optimize/fit_state.h"
+#include "job/vdb_file.h"
+#include "optimize/vdb_grids.h"
 #include "pipeline/live_plan.h"
 
 typedef struct saved_progress {
@@ -102,6 +103,32 @@ static npg_status put_first(npg_store *out, const npg_facts *facts, const npg_ha
     return npg_fit_copy_save(npg_warm_first(hand->warm), out, "first");
 }
 
+typedef struct grids {
+    const npg_levels *levels;
+    const float *rows;
+    const npg_vdb_place *place;
+} grids;
+
+static npg_status save_levels(void *user, const char *path)
+{
+    const grids *g = user;
+    return npg_vdb_save_levels(path, g->levels, g->rows, g->place);
+}
+
+/* The latent grids for other programs, in a file beside the store; the state itself has them, too. */
+static npg_status put_grids(npg_store *out, npg_fit *fit, const char *path, const npg_vdb_place *place)
+{
+    npg_fit_parts parts = npg_fit_open_parts(fit);
+    float *rows;
+    uint64_t hash;
+    NPG_TRY(npg_alloc(&rows, NPG_FOR_FILES, parts.u->size));
+    npg_status status = npg_buffer_read(parts.u, 0, rows, parts.u->size);
+    if (!status) status = npg_vdb_file_write(path, &hash, save_levels, &(grids){parts.levels, rows, place});
+    if (!status) status = npg_store_put(out, "grids.hash", &hash, sizeof hash);
+    npg_release(&rows);
+    return status;
+}
+
 /* What npg_job_save_state() has written by us. */
 typedef struct saving {
     npg_worker *worker;
@@ -117,7 +144,8 @@ static npg_status write_state(void *user, npg_store *out, const char *grids_path
     NPG_TRY(put_hand(out, facts, s->hand));
     if (!s->fit) return NPG_OK;
     NPG_TRY(put_first(out, facts, s->hand));
-    return npg_fit_save(s->fit, out, grids_path, &place);
+    NPG_TRY(put_grids(out, s->fit, grids_path, &place));
+    return npg_fit_save(s->fit, out, "fit");
 }
 
 static npg_job_moment moment_of(const npg_plan *plan, const npg_hand *hand)
@@ -159,11 +187,10 @@ npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
 
 npg_status npg_checkpoint_restore_fit(npg_worker *worker, npg_fit *fit, npg_warm *warm)
 {
-    const npg_job *job = npg_job_of(worker);
-    const npg_record *in = npg_job_state(job);
+    const npg_record *in = npg_job_state(npg_job_of(worker));
     size_t size;
     if (warm) NPG_TRY(npg_fit_copy_load(npg_warm_first(warm), in, "first"));
-    if (!npg_record_find(in, "inside", &size)) return npg_fit_restore(fit, in, npg_job_grids_path(job));
+    if (!npg_record_find(in, "inside", &size)) return npg_fit_restore(fit, in, "fit");
     return warm ? npg_warm_restore(warm, fit, in) : npg_error(NPG_BAD_INPUT, "a block that is not expected");
 }
 

@@ -21,9 +21,10 @@ struct npg_fit {
     npg_fit_settings settings;
     npg_device *device;   /* loan */
     size_t real, rows;    /* V, V padded to blocks */
-    uint32_t *order;      /* order[i]: vertex of the reference at row i; Morton order; owned */
-    uint32_t *row_of;     /* its inverse, owned */
-    float *rest;          /* V x 3 in that order, owned */
+    npg_arena arrays;     /* holds order, row_of, rest, params */
+    uint32_t *order;      /* order[i]: vertex of the reference at row i; Morton order */
+    uint32_t *row_of;     /* its inverse */
+    float *rest;          /* V x 3 in that order */
     uint32_t (*edges)[2]; /* between rows, owned */
     size_t edge_count;
     npg_levels levels;
@@ -32,16 +33,16 @@ struct npg_fit {
     npg_buffer u, nodes, dnodes; /* differential coordinates, features, gradient: [nodes][32] */
     npg_adam grid_adam, mlp_adam;
     npg_time_code *time_code;
-    float *params; /* decoder's parameters between windows, owned */
+    float *params; /* decoder's parameters between windows */
     uint64_t seed;
-    /* of the window */
+    npg_arena window; /* holds the arrays of the window */
     npg_mlp mlp;
     npg_motion motion;
     npg_buffer dcode;
     size_t frame_count;
     bool is_pulled;                     /* by known correspondences, from bases */
     size_t tied_count;                  /* frames, the first outward, that follow their tie */
-    size_t *place;                      /* place[k]: which frame of the caller comes k-th outward; owned */
+    size_t *place;                      /* place[k]: which frame of the caller comes k-th outward */
     size_t *rank;                       /* its inverse */
     int64_t *index;                     /* by k */
     double *times;                      /* by k */
@@ -53,8 +54,10 @@ struct npg_fit {
 
 static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **normals)
 {
-    NPG_TRY(npg_alloc_array(&fit->order, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
-    NPG_TRY(npg_alloc_array(&fit->rest, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
+    fit->order = npg_arena_take(&fit->arrays, fit->real, sizeof *fit->order);
+    fit->row_of = npg_arena_take(&fit->arrays, fit->real, sizeof *fit->row_of);
+    fit->rest = npg_arena_take(&fit->arrays, fit->real, 3 * sizeof *fit->rest);
+    NPG_TRY(npg_arena_status(&fit->arrays));
     NPG_TRY(npg_alloc_array(normals, NPG_FOR_FIT, fit->real, 3 * sizeof(float)));
     NPG_TRY(npg_morton_order(fit->order, mesh->vert_pos, fit->real));
     for (size_t i = 0; i < 3 * fit->real; i++) {
@@ -62,7 +65,6 @@ static npg_status sort_vertices(npg_fit *fit, const npg_mesh *mesh, float **norm
         (*normals)[i] = mesh->vert_normals[3 * fit->order[i / 3] + i % 3];
     }
     NPG_TRY(npg_mesh_edges(&fit->edges, &fit->edge_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_alloc_array(&fit->row_of, NPG_FOR_FIT, fit->real, sizeof(uint32_t)));
     for (size_t i = 0; i < fit->real; i++) fit->row_of[fit->order[i]] = (uint32_t)i;
     for (size_t e = 0; e < 2 * fit->edge_count; e++)
         fit->edges[e / 2][e % 2] = fit->row_of[fit->edges[e / 2][e % 2]];
@@ -157,7 +159,8 @@ static npg_status draw_params(npg_fit *fit)
     size_t count = npg_mlp_param_count(&s);
     size_t inputs = (size_t)(settings->position_channels + settings->normal_channels) + s.code_size;
     float rate = (float)settings->mlp_rate;
-    NPG_TRY(npg_alloc_array(&fit->params, NPG_FOR_FIT, count, sizeof(float)));
+    fit->params = npg_arena_take(&fit->arrays, count, sizeof *fit->params);
+    NPG_TRY(npg_arena_status(&fit->arrays));
     draw_layers(fit->params, &s, inputs, &random);
     return npg_adam_open(&fit->mlp_adam, fit->device, &rate, count, count);
 }
@@ -173,6 +176,7 @@ npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_setting
     fit->settings = *settings;
     fit->device = device;
     fit->seed = seed;
+    fit->arrays.purpose = fit->window.purpose = NPG_FOR_FIT;
     fit->real = reference->vert_count;
     fit->rows = npg_mlp_rows(device, fit->real);
     npg_fit_levels(&fit->levels, settings);
@@ -193,15 +197,7 @@ static void close_window(npg_fit *fit)
     npg_mlp_close(&fit->mlp);
     npg_motion_close(&fit->motion);
     npg_buffer_close(&fit->dcode);
-    npg_release(&fit->place);
-    npg_release(&fit->rank);
-    npg_release(&fit->index);
-    npg_release(&fit->times);
-    npg_release(&fit->cd);
-    npg_release(&fit->gains);
-    npg_release(&fit->codes);
-    npg_release(&fit->packed);
-    npg_release(&fit->has_points);
+    npg_arena_release(&fit->window);
     fit->frame_count = fit->tied_count = 0;
 }
 
@@ -218,11 +214,8 @@ void npg_fit_close(npg_fit **slot)
     npg_buffer_close(&fit->nodes);
     npg_buffer_close(&fit->dnodes);
     npg_time_code_close(&fit->time_code);
-    npg_release(&fit->params);
-    npg_release(&fit->order);
-    npg_release(&fit->row_of);
-    npg_release(&fit->rest);
     npg_release(&fit->edges);
+    npg_arena_release(&fit->arrays);
     npg_release(slot);
 }
 
@@ -231,15 +224,17 @@ void npg_fit_close(npg_fit **slot)
 static npg_status alloc_window(npg_fit *fit, size_t count)
 {
     size_t code = 2 * (size_t)fit->settings.frequencies;
-    NPG_TRY(npg_alloc_array(&fit->place, NPG_FOR_FIT, count, sizeof(size_t)));
-    NPG_TRY(npg_alloc_array(&fit->rank, NPG_FOR_FIT, count, sizeof(size_t)));
-    NPG_TRY(npg_alloc_array(&fit->index, NPG_FOR_FIT, count, sizeof(int64_t)));
-    NPG_TRY(npg_alloc_array(&fit->times, NPG_FOR_FIT, count, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&fit->cd, NPG_FOR_FIT, count, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&fit->gains, NPG_FOR_FIT, count, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&fit->codes, NPG_FOR_FIT, count * code, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&fit->packed, NPG_FOR_FIT, fit->rows, 3 * sizeof(float)));
-    return npg_alloc_array(&fit->has_points, NPG_FOR_FIT, count, sizeof(bool));
+    npg_arena *a = &fit->window;
+    fit->place = npg_arena_take(a, count, sizeof(size_t));
+    fit->rank = npg_arena_take(a, count, sizeof(size_t));
+    fit->index = npg_arena_take(a, count, sizeof(int64_t));
+    fit->times = npg_arena_take(a, count, sizeof(double));
+    fit->cd = npg_arena_take(a, count, sizeof(float));
+    fit->gains = npg_arena_take(a, count, sizeof(float));
+    fit->codes = npg_arena_take(a, count * code, sizeof(float));
+    fit->packed = npg_arena_take(a, fit->rows, 3 * sizeof(float));
+    fit->has_points = npg_arena_take(a, count, sizeof(bool));
+    return npg_arena_status(a);
 }
 
 /* The caller's frames from the key outward: nearest first, the earlier one on ties. */

@@ -110,3 +110,21 @@ npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_record *record, const
     NPG_TRY(npg_alloc(&copy->bytes, NPG_FOR_FIT, copy->size));
     return npg_record_get(record, block, copy->bytes, copy->size);
 }
+
+npg_status npg_fit_save(npg_fit *fit, npg_store *store, const char *block)
+{
+    npg_fit_copy copy = {0};
+    npg_status status = npg_fit_copy_take(&copy, fit);
+    if (!status) status = npg_fit_copy_save(&copy, store, block);
+    npg_fit_copy_clear(&copy);
+    return status;
+}
+
+npg_status npg_fit_restore(npg_fit *fit, const npg_record *record, const char *block)
+{
+    npg_fit_copy copy = {0};
+    npg_status status = npg_fit_copy_load(&copy, record, block);
+    if (!status) status = npg_fit_copy_give(&copy, fit);
+    npg_fit_copy_clear(&copy);
+    return npg_error_prefix(status, "the block %s", block);
+}

@@ -22,8 +22,13 @@ void npg_fit_copy_clear(npg_fit_copy *copy);
  * loss would shorten or lengthen its steps for hundreds of epochs. */
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from);
 
-/* As a block of an store; loading a block that is missing leaves none. */
+/* As a block of a store; loading a block that is missing leaves none. */
 npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_store *store, const char *block);
 npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_record *store, const char *block);
+
+/* The present state of a fit as a block, and back into one of the same settings and reference: NPG_BAD_INPUT
+ * where the block is missing or has another size. */
+npg_status npg_fit_save(npg_fit *fit, npg_store *store, const char *block);
+npg_status npg_fit_restore(npg_fit *fit, const npg_record *record, const char *block);
 
 #endif

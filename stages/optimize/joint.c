@@ -28,9 +28,10 @@ struct npg_joint {
     uint32_t (*edges)[2];
     size_t edge_count;
     npg_joint_ring ring;
+    npg_arena rings;
     size_t threads;
     npg_joint_matcher matchers[THREADS_MAX];
-    /* of the window at work, owned */
+    npg_arena window; /* holds what follows, of the window at work */
     float *positions; /* T x W x 3: where the frames' surfaces are */
     float *kept;      /* the same, before the points pulled        */
     float *shares, *lambda, *bend, *ties;
@@ -45,22 +46,13 @@ struct npg_joint {
     double noise, lambda_median;
 };
 
-static void close_window(npg_joint *j)
-{
-    void *all[] = {&j->positions, &j->kept,        &j->shares,  &j->lambda, &j->bend,
-                   &j->ties,      &j->is_known,    &j->spreads, &j->scores, &j->frames,
-                   &j->pulls,     &j->pull_counts, &j->quadrics};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
-    npg_joint_system_close(&j->system);
-}
-
 void npg_joint_close(npg_joint **slot)
 {
     if (!slot || !*slot) return;
     npg_joint *j = *slot;
-    close_window(j);
     for (size_t i = 0; i < THREADS_MAX; i++) npg_joint_matcher_close(&j->matchers[i]);
-    npg_joint_ring_close(&j->ring);
+    npg_arena_release(&j->window);
+    npg_arena_release(&j->rings);
     npg_release(&j->edges);
     npg_mesh_unref(&j->mesh);
     npg_release(slot);
@@ -70,7 +62,8 @@ static npg_status open_parts(npg_joint *j)
 {
     const npg_mesh *mesh = j->mesh;
     NPG_TRY(npg_mesh_edges(&j->edges, &j->edge_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_joint_ring_open(&j->ring, (const uint32_t(*)[2])j->edges, j->edge_count, mesh->vert_count));
+    NPG_TRY(npg_joint_ring_take(&j->ring, &j->rings, (const uint32_t(*)[2])j->edges, j->edge_count,
+                                mesh->vert_count));
     j->threads = npg_parallel_parts(THREADS_MAX, 1, THREADS_MAX);
     for (size_t i = 0; i < j->threads; i++)
         NPG_TRY(npg_joint_matcher_open(&j->matchers[i], mesh, (size_t)j->settings.points));
@@ -83,6 +76,7 @@ npg_status npg_joint_open(npg_joint **out, npg_mesh *surface, const npg_joint_se
     *out = NULL;
     NPG_TRY(npg_alloc(&j, NPG_FOR_FIT, sizeof *j));
     j->settings = *settings;
+    j->rings.purpose = j->window.purpose = NPG_FOR_FIT;
     j->mesh = npg_mesh_ref(surface);
     npg_status status = open_parts(j);
     if (status) npg_joint_close(&j);
@@ -100,27 +94,30 @@ void npg_joint_set_noise(npg_joint *j, double noise)
 static npg_status open_window(npg_joint *j, const npg_joint_frame *frames, size_t count)
 {
     size_t w = j->mesh->vert_count, most = (size_t)j->settings.points;
-    close_window(j);
-    NPG_TRY(npg_alloc_array(&j->positions, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->kept, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->shares, NPG_FOR_FIT, count, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->lambda, NPG_FOR_FIT, w, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->bend, NPG_FOR_FIT, w, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->ties, NPG_FOR_FIT, w, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&j->is_known, NPG_FOR_FIT, count, sizeof(bool)));
-    NPG_TRY(npg_alloc_array(&j->spreads, NPG_FOR_FIT, count, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&j->scores, NPG_FOR_FIT, count, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&j->frames, NPG_FOR_FIT, count, sizeof *j->frames));
-    NPG_TRY(npg_alloc_array(&j->pulls, NPG_FOR_FIT, count * most, sizeof *j->pulls));
-    NPG_TRY(npg_alloc_array(&j->pull_counts, NPG_FOR_FIT, count, sizeof *j->pull_counts));
-    NPG_TRY(npg_alloc_array(&j->quadrics, NPG_FOR_FIT, count * w, sizeof *j->quadrics));
+    npg_arena *a = &j->window;
+    npg_arena_release(a);
+    j->positions = npg_arena_take(a, count * w, 3 * sizeof(float));
+    j->kept = npg_arena_take(a, count * w, 3 * sizeof(float));
+    j->shares = npg_arena_take(a, count, sizeof(float));
+    j->lambda = npg_arena_take(a, w, sizeof(float));
+    j->bend = npg_arena_take(a, w, sizeof(float));
+    j->ties = npg_arena_take(a, w, sizeof(float));
+    j->is_known = npg_arena_take(a, count, sizeof(bool));
+    j->spreads = npg_arena_take(a, count, sizeof(double));
+    j->scores = npg_arena_take(a, count, sizeof(double));
+    j->frames = npg_arena_take(a, count, sizeof *j->frames);
+    j->pulls = npg_arena_take(a, count * most, sizeof *j->pulls);
+    j->pull_counts = npg_arena_take(a, count, sizeof *j->pull_counts);
+    j->quadrics = npg_arena_take(a, count * w, sizeof *j->quadrics);
+    npg_joint_system_take(&j->system, a, count, w);
+    NPG_TRY(npg_arena_status(a));
     for (size_t t = 0; t < count; t++) {
         j->frames[t] = frames[t];
         j->frames[t].positions = j->positions + t * w * 3;
         memcpy(j->frames[t].positions, frames[t].positions, w * 3 * sizeof(float));
         j->is_known[t] = frames[t].is_known;
     }
-    return npg_joint_system_open(&j->system, count, w);
+    return NPG_OK;
 }
 
 /* What threads do: frame after frame. */
@@ -336,7 +333,7 @@ npg_status npg_joint_solve(npg_joint *j, npg_joint_result *result, const npg_joi
     if (!status) note(j, result, frames, count);
     for (size_t t = 0; t < count && !status; t++)
         memcpy(frames[t].positions, j->frames[t].positions, j->mesh->vert_count * 3 * sizeof(float));
-    close_window(j);
+    npg_arena_release(&j->window);
     return status;
 }
 

@@ -17,19 +17,20 @@ npg_status npg_joint_matcher_open(npg_joint_matcher *m, const npg_mesh *mesh, si
     const size_t vector = 3 * sizeof(float);
     m->mesh = mesh;
     m->most = most;
-    NPG_TRY(npg_surface_open(&m->surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_alloc_array(&m->targets, NPG_FOR_FIT, most, vector));
-    NPG_TRY(npg_alloc_array(&m->target_normals, NPG_FOR_FIT, most, vector));
-    NPG_TRY(npg_alloc_array(&m->vert_normals, NPG_FOR_FIT, mesh->vert_count, vector));
-    NPG_TRY(npg_alloc_array(&m->dists, NPG_FOR_FIT, most, sizeof *m->dists));
-    return npg_alloc_array(&m->hits, NPG_FOR_FIT, most, sizeof *m->hits);
+    m->arrays.purpose = NPG_FOR_FIT;
+    m->targets = npg_arena_take(&m->arrays, most, vector);
+    m->target_normals = npg_arena_take(&m->arrays, most, vector);
+    m->vert_normals = npg_arena_take(&m->arrays, mesh->vert_count, vector);
+    m->dists = npg_arena_take(&m->arrays, most, sizeof *m->dists);
+    m->hits = npg_arena_take(&m->arrays, most, sizeof *m->hits);
+    NPG_TRY(npg_arena_status(&m->arrays));
+    return npg_surface_open(&m->surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
 }
 
 void npg_joint_matcher_close(npg_joint_matcher *m)
 {
     npg_surface_close(&m->surface);
-    void *all[] = {&m->targets, &m->target_normals, &m->vert_normals, &m->dists, &m->hits};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_arena_release(&m->arrays);
 }
 
 /* The frame's points, thinned, and where the surface is closest to them. */

@@ -12,6 +12,7 @@ typedef struct npg_joint_matcher {
     npg_surface *surface;
     float *targets, *target_normals, *vert_normals, *dists; /* M x 3, M x 3, W x 3, M */
     npg_surface_hit *hits;                                  /* M */
+    npg_arena arrays;                                       /* holds these */
 } npg_joint_matcher;
 
 npg_status npg_joint_matcher_open(npg_joint_matcher *matcher, const npg_mesh *mesh, size_t most);

@@ -8,23 +8,17 @@
 
 #define BLOCKS 64 /* of vertices: sums are made block by block, so that threads don't matter */
 
-npg_status npg_joint_system_open(npg_joint_system *s, size_t frame_count, size_t vert_count)
+void npg_joint_system_take(npg_joint_system *s, npg_arena *arena, size_t frame_count, size_t vert_count)
 {
     size_t count = frame_count * vert_count, vector = 3 * sizeof(float);
-    s->frame_count = frame_count;
-    s->vert_count = vert_count;
-    NPG_TRY(npg_alloc_array(&s->right, NPG_FOR_FIT, count, vector));
-    NPG_TRY(npg_alloc_array(&s->step, NPG_FOR_FIT, count, vector));
-    NPG_TRY(npg_alloc_array(&s->precond, NPG_FOR_FIT, count, vector));
-    NPG_TRY(npg_alloc_array(&s->direction, NPG_FOR_FIT, count, vector));
-    NPG_TRY(npg_alloc_array(&s->image, NPG_FOR_FIT, count, vector));
-    return npg_alloc_array(&s->diagonal, NPG_FOR_FIT, count, sizeof(float));
-}
-
-void npg_joint_system_close(npg_joint_system *s)
-{
-    void *all[] = {&s->right, &s->step, &s->precond, &s->direction, &s->image, &s->diagonal};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    *s = (npg_joint_system){.frame_count = frame_count,
+                            .vert_count = vert_count,
+                            .right = npg_arena_take(arena, count, vector),
+                            .step = npg_arena_take(arena, count, vector),
+                            .precond = npg_arena_take(arena, count, vector),
+                            .direction = npg_arena_take(arena, count, vector),
+                            .image = npg_arena_take(arena, count, vector),
+                            .diagonal = npg_arena_take(arena, count, sizeof(float))};
 }
 
 size_t npg_joint_system_memory(size_t frame_count, size_t vert_count)
@@ -32,23 +26,18 @@ size_t npg_joint_system_memory(size_t frame_count, size_t vert_count)
     return frame_count * vert_count * 16 * sizeof(float);
 }
 
-npg_status npg_joint_ring_open(npg_joint_ring *ring, const uint32_t (*edges)[2], size_t edge_count,
-                               size_t vert_count)
+npg_status npg_joint_ring_take(npg_joint_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
+                               size_t edge_count, size_t vert_count)
 {
-    NPG_TRY(npg_alloc_array(&ring->start, NPG_FOR_FIT, vert_count + 2, sizeof *ring->start));
-    NPG_TRY(npg_alloc_array(&ring->neighbour, NPG_FOR_FIT, 2 * edge_count + 1, sizeof *ring->neighbour));
+    ring->start = npg_arena_take(arena, vert_count + 2, sizeof *ring->start);
+    ring->neighbour = npg_arena_take(arena, 2 * edge_count + 1, sizeof *ring->neighbour);
+    NPG_TRY(npg_arena_status(arena));
     uint32_t *at = ring->start + 1; /* shifted by one while it is filled */
     for (size_t e = 0; e < 2 * edge_count; e++) at[edges[e / 2][e % 2] + 1]++;
     for (size_t v = 0; v < vert_count; v++) at[v + 1] += at[v];
     for (size_t e = 0; e < 2 * edge_count; e++)
         ring->neighbour[at[edges[e / 2][e % 2]]++] = edges[e / 2][1 - e % 2];
     return NPG_OK;
-}
-
-void npg_joint_ring_close(npg_joint_ring *ring)
-{
-    npg_release(&ring->start);
-    npg_release(&ring->neighbour);
 }
 
 /* ---- products ---- */

@@ -27,14 +27,13 @@ typedef struct npg_joint_system {
     size_t most;
     const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
     const float *shares; /* T: of the frames' ties; loan                     */
-    /* T x W x 3, owned */
+    /* T x W x 3 */
     float *right, *step, *precond, *direction, *image; /* precond: main, near, far of the factors */
     float *diagonal;                                   /* T x W */
 } npg_joint_system;
 
-/* Arrays for T frames of W vertices. */
-npg_status npg_joint_system_open(npg_joint_system *system, size_t frame_count, size_t vert_count);
-void npg_joint_system_close(npg_joint_system *system);
+/* Arrays for T frames of W vertices, from an arena whose status is to be asked. */
+void npg_joint_system_take(npg_joint_system *system, npg_arena *arena, size_t frame_count, size_t vert_count);
 size_t npg_joint_system_memory(size_t frame_count, size_t vert_count);
 
 /* Solve for `step` from `right`; both pieces of the left side are taken from the members.  Ends when the
@@ -49,9 +48,8 @@ void npg_joint_bend(float *image, const npg_joint_system *system, const float *x
 /* image -= the shape's part: shape * sum_j (d_v - d_j), d = now - kept (W x 3 each). */
 void npg_joint_keep_shape(float *image, const npg_joint_system *system, const float *kept, const float *now);
 
-/* Rings of a mesh's edges; close releases both arrays. */
-npg_status npg_joint_ring_open(npg_joint_ring *ring, const uint32_t (*edges)[2], size_t edge_count,
-                               size_t vert_count);
-void npg_joint_ring_close(npg_joint_ring *ring);
+/* Rings of a mesh's edges, from an arena. */
+npg_status npg_joint_ring_take(npg_joint_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
+                               size_t edge_count, size_t vert_count);
 
 #endif

@@ -10,17 +10,20 @@ struct npg_joint_window {
     npg_thin *surface; /* W vertices; owned */
     size_t vert_count; /* V */
     npg_joint *joint;
-    npg_carrier *carriers; /* V: corners of the surface's faces; owned        */
-    float *before, *now;   /* T x W x 3, of the window at work; owned         */
+    npg_carrier *carriers; /* V: corners of the surface's faces; owned */
 };
+
+/* T x W x 3: the thinned surfaces of the window at work. */
+typedef struct surfaces {
+    float *before, *now;
+} surfaces;
 
 void npg_joint_window_close(npg_joint_window **slot)
 {
     if (!slot || !*slot) return;
     npg_joint_close(&(*slot)->joint);
     npg_thin_close(&(*slot)->surface);
-    void *all[] = {&(*slot)->carriers, &(*slot)->before, &(*slot)->now};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_release(&(*slot)->carriers);
     npg_release(slot);
 }
 
@@ -28,21 +31,12 @@ void npg_joint_window_close(npg_joint_window **slot)
 static npg_status find_carriers(npg_joint_window *window, const npg_mesh *reference)
 {
     const npg_mesh *mesh = window->surface->mesh;
-    npg_surface *rest = NULL;
-    npg_surface_hit *hits;
+    npg_surface *rest;
     NPG_TRY(npg_alloc_array(&window->carriers, NPG_FOR_FIT, window->vert_count, sizeof *window->carriers));
-    NPG_TRY(npg_alloc_array(&hits, NPG_FOR_FIT, window->vert_count, sizeof *hits));
+    NPG_TRY(npg_surface_open(&rest, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
     npg_status status =
-        npg_surface_open(&rest, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
-    if (!status)
-        status = npg_surface_closest_near(rest, hits, reference->vert_pos, window->vert_count, NULL, NULL, 0);
-    for (size_t v = 0; v < window->vert_count && !status; v++)
-        for (size_t c = 0; c < 3; c++) {
-            window->carriers[v].sample[c] = (int32_t)mesh->faces[3 * (size_t)hits[v].face + c];
-            window->carriers[v].share[c] = hits[v].weights[c];
-        }
+        npg_carriers_find(window->carriers, mesh, rest, reference->vert_pos, window->vert_count, 0);
     npg_surface_close(&rest);
-    npg_release(&hits);
     return status;
 }
 
@@ -67,27 +61,24 @@ void npg_joint_window_set_noise(npg_joint_window *window, double noise)
 }
 
 /* What solving takes: the thinned surfaces before and after. */
-static npg_status fill_frames(npg_joint_window *window, npg_joint_frame *frames, npg_held *const *held,
-                              size_t count, const npg_joint_points *points)
+static void fill_frames(npg_joint_window *window, const surfaces *s, npg_joint_frame *frames,
+                        npg_held *const *held, size_t count, const npg_joint_points *points)
 {
-    size_t w = window->surface->mesh->vert_count, size = 3 * w;
-    NPG_TRY(npg_alloc_array(&window->before, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&window->now, NPG_FOR_FIT, count * w, 3 * sizeof(float)));
+    size_t size = 3 * window->surface->mesh->vert_count;
     for (size_t t = 0; t < count; t++) {
         const npg_frame *frame = &held[t]->frame;
         const float *from = held[t]->solved ? held[t]->solved : frame->vert_unit;
-        npg_thin_gather(window->surface, window->before + t * size, from);
-        frames[t] = (npg_joint_frame){window->now + t * size, points->all + 3 * points->start[t],
-                                      frame->normals, frame->point_count, held[t]->solved != NULL};
+        npg_thin_gather(window->surface, s->before + t * size, from);
+        frames[t] = (npg_joint_frame){s->now + t * size, points->all + 3 * points->start[t], frame->normals,
+                                      frame->point_count, held[t]->solved != NULL};
     }
-    memcpy(window->now, window->before, count * size * sizeof(float));
-    return NPG_OK;
+    memcpy(s->now, s->before, count * size * sizeof(float));
 }
 
-static void carry(npg_joint_window *window, npg_held *held, size_t t, const npg_window *at)
+static void carry(npg_joint_window *window, const surfaces *s, npg_held *held, size_t t, const npg_window *at)
 {
     size_t size = 3 * window->surface->mesh->vert_count;
-    float *before = window->before + t * size, *now = window->now + t * size;
+    float *before = s->before + t * size, *now = s->now + t * size;
     float share = (float)npg_window_share(at, (double)held->frame.index);
     if (!held->solved) {
         held->solved = held->frame.vert_unit;
@@ -114,16 +105,17 @@ npg_status npg_joint_window_solve(npg_joint_window *window, npg_joint_result *re
                                   const npg_window *at, const npg_joint_points *points, npg_fit_watch *watch,
                                   void *user)
 {
-    size_t count = (size_t)(at->last - at->first + 1);
+    size_t count = (size_t)(at->last - at->first + 1), size = 3 * window->surface->mesh->vert_count;
     watching w = {watch, user};
-    npg_joint_frame *frames;
-    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, count, sizeof *frames));
-    npg_status status = fill_frames(window, frames, held, count, points);
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    npg_joint_frame *frames = npg_arena_take(&scratch, count, sizeof *frames);
+    surfaces s = {npg_arena_take(&scratch, count, size * sizeof(float)),
+                  npg_arena_take(&scratch, count, size * sizeof(float))};
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) fill_frames(window, &s, frames, held, count, points);
     if (!status) status = npg_joint_solve(window->joint, result, frames, count, watch_step, &w);
-    for (size_t t = 0; t < count && !status; t++) carry(window, held[t], t, at);
-    npg_release(&frames);
-    npg_release(&window->before);
-    npg_release(&window->now);
+    for (size_t t = 0; t < count && !status; t++) carry(window, &s, held[t], t, at);
+    npg_arena_release(&scratch);
     return status;
 }
 

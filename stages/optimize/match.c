@@ -26,6 +26,7 @@ struct npg_matcher {
     float *sorted;            /* max(M, S): distances */
     uint32_t *near;           /* S */
     float *near_sq;           /* S */
+    npg_arena arrays;         /* holds these */
     size_t target_count;
     double least_width;
 };
@@ -33,17 +34,15 @@ struct npg_matcher {
 void npg_matcher_close(npg_matcher **slot)
 {
     if (!slot || !*slot) return;
-    npg_matcher *m = *slot;
-    npg_surface_close(&m->surface);
-    void *all[] = {&m->vert_normals, &m->targets, &m->normals, &m->hits,   &m->rest,
-                   &m->carriers,     &m->sorted,  &m->near,    &m->near_sq};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_surface_close(&(*slot)->surface);
+    npg_arena_release(&(*slot)->arrays);
     npg_release(slot);
 }
 
 npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg_match_settings *settings)
 {
     npg_matcher *m;
+    npg_arena *a;
     const npg_mesh *mesh = carry->surface->mesh;
     size_t n = (size_t)settings->points, s = carry->samples->mesh->vert_count, w = mesh->vert_count;
     *out = NULL;
@@ -51,16 +50,19 @@ npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg
     m->settings = *settings;
     m->carry = carry;
     m->mesh = mesh;
-    npg_status status = npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
-    if (!status) status = npg_alloc_array(&m->vert_normals, NPG_FOR_FIT, w, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&m->targets, NPG_FOR_FIT, n, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&m->normals, NPG_FOR_FIT, n, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&m->hits, NPG_FOR_FIT, n, sizeof *m->hits);
-    if (!status) status = npg_alloc_array(&m->rest, NPG_FOR_FIT, n, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&m->carriers, NPG_FOR_FIT, n, sizeof *m->carriers);
-    if (!status) status = npg_alloc_array(&m->sorted, NPG_FOR_FIT, n > s ? n : s, sizeof(float));
-    if (!status) status = npg_alloc_array(&m->near, NPG_FOR_FIT, s, sizeof *m->near);
-    if (!status) status = npg_alloc_array(&m->near_sq, NPG_FOR_FIT, s, sizeof(float));
+    a = &m->arrays;
+    a->purpose = NPG_FOR_FIT;
+    m->vert_normals = npg_arena_take(a, w, 3 * sizeof(float));
+    m->targets = npg_arena_take(a, n, 3 * sizeof(float));
+    m->normals = npg_arena_take(a, n, 3 * sizeof(float));
+    m->hits = npg_arena_take(a, n, sizeof *m->hits);
+    m->rest = npg_arena_take(a, n, 3 * sizeof(float));
+    m->carriers = npg_arena_take(a, n, sizeof *m->carriers);
+    m->sorted = npg_arena_take(a, n > s ? n : s, sizeof(float));
+    m->near = npg_arena_take(a, s, sizeof *m->near);
+    m->near_sq = npg_arena_take(a, s, sizeof(float));
+    npg_status status = npg_arena_status(a);
+    if (!status) status = npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
     if (status) npg_matcher_close(&m);
     *out = m;
     return status;
@@ -172,7 +174,8 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
     for (size_t i = 0; i < m->target_count; i++)
         face_point(m->rest + 3 * i, mesh->vert_pos, mesh->faces + 3 * (size_t)m->hits[i].face,
                    m->hits[i].weights);
-    NPG_TRY(npg_carry_find(m->carry, m->carriers, m->rest, m->target_count, 1));
+    NPG_TRY(
+        npg_carriers_find(m->carriers, m->carry->samples->mesh, m->carry->rest, m->rest, m->target_count, 1));
     match_targets(m, pulls, count, vert_unit, samples, normals != NULL);
     if (m->settings.reverse <= 0) return NPG_OK;
     return match_samples(m, pulls, count, samples, points, normals, point_count);

@@ -173,7 +173,7 @@ typedef struct choice {
     const npg_time_quadric *quadrics;
     const uint32_t (*edges)[2];
     size_t edge_count, threads;
-    const float *degree;
+    float *degree;
     double *errors, *fars; /* LADDER x W */
     double *here;          /* W: the points' squares without smoothing, and what may not matter */
 } choice;
@@ -238,24 +238,21 @@ npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames,
                                   size_t edge_count)
 {
     size_t w = frames->vert_count;
-    float *degree = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
     choice c = {.frames = frames, .quadrics = quadrics, .edges = edges, .edge_count = edge_count};
     memset(lambda, 0, w * sizeof *lambda);
     if (frames->frame_count < NPG_TIME_SMOOTH_LEAST) return NPG_OK;
     c.threads = npg_parallel_parts(LADDER, 1, 0);
-    npg_status status = npg_alloc_array(&c.errors, NPG_FOR_FIT, LADDER * w, sizeof *c.errors);
-    if (!status) status = npg_alloc_array(&c.fars, NPG_FOR_FIT, LADDER * w, sizeof *c.fars);
-    if (!status) status = npg_alloc_array(&c.here, NPG_FOR_FIT, w, sizeof *c.here);
-    if (!status) status = npg_alloc_array(&degree, NPG_FOR_FIT, w, sizeof *degree);
-    for (size_t e = 0; e < 2 * edge_count && !status; e++) degree[edges[e / 2][e % 2]]++;
-    c.degree = degree;
+    c.errors = npg_arena_take(&scratch, LADDER * w, sizeof *c.errors);
+    c.fars = npg_arena_take(&scratch, LADDER * w, sizeof *c.fars);
+    c.here = npg_arena_take(&scratch, w, sizeof *c.here);
+    c.degree = npg_arena_take(&scratch, w, sizeof *c.degree);
+    npg_status status = npg_arena_status(&scratch);
+    for (size_t e = 0; e < 2 * edge_count && !status; e++) c.degree[edges[e / 2][e % 2]]++;
     if (!status) sum_here(&c, c.errors);
     if (!status) status = npg_parallel(try_steps, &c, c.threads);
     if (!status) choose(lambda, &c);
-    npg_release(&c.errors);
-    npg_release(&c.fars);
-    npg_release(&c.here);
-    npg_release(&degree);
+    npg_arena_release(&scratch);
     return status;
 }
 

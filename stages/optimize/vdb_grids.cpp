@@ -1,5 +1,4 @@
 // Latent grids as OpenVDB files that other programs open.
-#include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 
 #include <cstdio>
@@ -34,23 +33,6 @@ void take(const float *from, float &to)
 void take(const float *from, openvdb::Vec3s &to)
 {
     to = openvdb::Vec3s(from[0], from[1], from[2]);
-}
-void give(const float &from, float *to)
-{
-    to[0] = from;
-}
-void give(const openvdb::Vec3s &from, float *to)
-{
-    for (int c = 0; c < 3; c++) to[c] = from[c];
-}
-
-// Calls body(coordinate, row) for every node of a level.
-template <class Body> void each_node(const npg_level &level, Body body)
-{
-    size_t row = level.first_row;
-    for (int i = 0; i < level.nodes; i++)
-        for (int j = 0; j < level.nodes; j++)
-            for (int k = 0; k < level.nodes; k++) body(openvdb::Coord(i, j, k), row++);
 }
 
 double unit_step(const npg_level &level)
@@ -97,53 +79,35 @@ void add_grid(npg::vdb_writer &file, const npg_level &level, int at, int channel
 {
     auto grid = Grid::create();
     auto accessor = grid->getAccessor();
-    each_node(level, [&](const openvdb::Coord &node, size_t row) {
-        typename Grid::ValueType value;
-        take(rows + row * NPG_LATENT_CHANNELS + size_t(channel), value);
-        accessor.setValueOn(node, value);
-    });
+    const float *from = rows + level.first_row * NPG_LATENT_CHANNELS + size_t(channel);
+    for (int i = 0; i < level.nodes; i++)
+        for (int j = 0; j < level.nodes; j++)
+            for (int k = 0; k < level.nodes; k++, from += NPG_LATENT_CHANNELS) {
+                typename Grid::ValueType value;
+                take(from, value);
+                accessor.setValueOn(openvdb::Coord(i, j, k), value);
+            }
     describe(*grid, level, at, channel, place);
     file.add(grid);
 }
 
-template <class Grid>
-npg_status read_grid(openvdb::io::File &file, const npg_level &level, int at, int channel, float *rows)
+// Three channels at a time, then those that are left over.
+void add_level(npg::vdb_writer &file, const npg_level &level, int at, const float *rows,
+               const npg_vdb_place &place)
 {
-    auto base = file.readGrid(name_of(level, at, channel));
-    auto grid = openvdb::gridPtrCast<Grid>(base);
-    size_t nodes = size_t(level.nodes), all = nodes * nodes * nodes;
-    if (!grid || grid->activeVoxelCount() != all)
-        return npg_error(NPG_BAD_INPUT, "the grid %s has %zu values in place of %zu",
-                         name_of(level, at, channel).c_str(), grid ? size_t(grid->activeVoxelCount()) : 0,
-                         all);
-    auto accessor = grid->getConstAccessor();
-    each_node(level, [&](const openvdb::Coord &node, size_t row) {
-        give(accessor.getValue(node), rows + row * NPG_LATENT_CHANNELS + size_t(channel));
-    });
-    return NPG_OK;
-}
-
-// Calls vec3(at, channel) or single(at, channel) for every grid that the levels make.
-template <class Vec3, class Single> npg_status each_grid(const npg_levels *levels, Vec3 vec3, Single single)
-{
-    for (int at = 0; at < levels->count; at++) {
-        const npg_level &level = levels->level[at];
-        if (level.kind == NPG_LEVEL_HASHED) continue;
-        int channel = level.channel_first;
-        for (; channel + 3 <= level.channel_end; channel += 3) NPG_TRY(vec3(at, channel));
-        for (; channel < level.channel_end; channel++) NPG_TRY(single(at, channel));
-    }
-    return NPG_OK;
+    int channel = level.channel_first;
+    for (; channel + 3 <= level.channel_end; channel += 3)
+        add_grid<Vec3SGrid>(file, level, at, channel, rows, place);
+    for (; channel < level.channel_end; channel++) add_grid<FloatGrid>(file, level, at, channel, rows, place);
 }
 
 int32_t grid_count(const npg_levels *levels)
 {
     int32_t count = 0;
-    auto one_more = [&](int, int) {
-        count++;
-        return NPG_OK;
-    };
-    each_grid(levels, one_more, one_more);
+    for (int at = 0; at < levels->count; at++) {
+        int channels = levels->level[at].channel_end - levels->level[at].channel_first;
+        if (levels->level[at].kind != NPG_LEVEL_HASHED) count += channels / 3 + channels % 3;
+    }
     return count;
 }
 
@@ -161,36 +125,10 @@ npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const
         about.insertMeta("npg_world_centre", openvdb::Vec3DMetadata(openvdb::Vec3d(place->world_centre)));
         about.insertMeta("npg_unit_per_world", openvdb::DoubleMetadata(place->unit_per_world));
         npg::vdb_writer file(path, about, grid_count(levels));
-        NPG_TRY(each_grid(
-            levels,
-            [&](int at, int channel) {
-                add_grid<Vec3SGrid>(file, levels->level[at], at, channel, rows, *place);
-                return NPG_OK;
-            },
-            [&](int at, int channel) {
-                add_grid<FloatGrid>(file, levels->level[at], at, channel, rows, *place);
-                return NPG_OK;
-            }));
+        for (int at = 0; at < levels->count; at++)
+            if (levels->level[at].kind != NPG_LEVEL_HASHED)
+                add_level(file, levels->level[at], at, rows, *place);
         file.close();
         return NPG_OK;
-    });
-}
-
-npg_status npg_vdb_load_levels(const char *path, const npg_levels *levels, float *rows)
-{
-    return npg::guard("OpenVDB", [&] {
-        openvdb::initialize();
-        openvdb::io::File file(path);
-        file.open(false); // all at once: no copy in a temporary folder
-        npg_status status = each_grid(
-            levels,
-            [&](int at, int channel) {
-                return read_grid<Vec3SGrid>(file, levels->level[at], at, channel, rows);
-            },
-            [&](int at, int channel) {
-                return read_grid<FloatGrid>(file, levels->level[at], at, channel, rows);
-            });
-        file.close();
-        return status;
     });
 }

@@ -28,10 +28,6 @@ typedef struct npg_vdb_place {
 npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const float *rows,
                                const npg_vdb_place *place);
 
-/* Read the same grids back into rows; other rows are left alone.  NPG_BAD_INPUT when a grid is missing or
- * has another size. */
-npg_status npg_vdb_load_levels(const char *path, const npg_levels *levels, float *rows);
-
 #ifdef __cplusplus
 }
 #endif

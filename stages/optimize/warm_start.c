@@ -598,28 +598,13 @@ npg_status npg_warm_solve(npg_warm *w, npg_fit *fit, const npg_warm_frames *fram
 
 npg_status npg_warm_save(npg_warm *w, npg_store *store)
 {
-    npg_fit_copy copy = {0};
     size_t count = w->in->count;
     NPG_TRY(npg_store_put(store, "inside", &w->at, sizeof w->at));
-    if (w->carry) {
+    if (w->carry)
         NPG_TRY(npg_store_put(store, "inside.poses", w->poses, count * 3 * w->samples * sizeof(float)));
-    }
     NPG_TRY(npg_store_put(store, "inside.known", w->is_known, count * sizeof *w->is_known));
-    npg_status status = npg_fit_copy_take(&copy, w->dense);
-    if (!status) status = npg_fit_copy_save(&copy, store, "inside.fit");
-    if (!status && w->probe) status = npg_fit_copy_take(&copy, w->probe);
-    if (!status && w->probe) status = npg_fit_copy_save(&copy, store, "inside.probe");
-    npg_fit_copy_clear(&copy);
-    return status;
-}
-
-static npg_status restore_fit(npg_fit *fit, const npg_record *record, const char *block)
-{
-    npg_fit_copy copy = {0};
-    npg_status status = npg_fit_copy_load(&copy, record, block);
-    if (!status && copy.bytes) status = npg_fit_copy_give(&copy, fit);
-    npg_fit_copy_clear(&copy);
-    return status;
+    NPG_TRY(npg_fit_save(w->dense, store, "inside.fit"));
+    return w->probe ? npg_fit_save(w->probe, store, "inside.probe") : NPG_OK;
 }
 
 static npg_status restore_poses(npg_warm *w, const npg_record *record)
@@ -629,7 +614,7 @@ static npg_status restore_poses(npg_warm *w, const npg_record *record)
     if (npg_record_find(record, "inside.poses", &poses)) {
         NPG_TRY(open_samples(w));
         NPG_TRY(open_probe(w));
-        NPG_TRY(restore_fit(w->probe, record, "inside.probe"));
+        NPG_TRY(npg_fit_restore(w->probe, record, "inside.probe"));
         NPG_TRY(npg_alloc(&w->poses, NPG_FOR_FIT, poses));
         NPG_TRY(npg_record_get(record, "inside.poses", w->poses, poses));
         if (poses != known / sizeof *w->is_known * 3 * w->samples * sizeof(float))
@@ -644,7 +629,7 @@ npg_status npg_warm_restore(npg_warm *w, npg_fit *fit, const npg_record *record)
 {
     close_window(w);
     NPG_TRY(npg_record_get(record, "inside", &w->at, sizeof w->at));
-    NPG_TRY(restore_fit(fit, record, "inside.fit"));
+    NPG_TRY(npg_fit_restore(fit, record, "inside.fit"));
     NPG_TRY(restore_poses(w, record));
     w->is_resumed = true;
     return NPG_OK;

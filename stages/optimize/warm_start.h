@@ -65,7 +65,7 @@ double npg_warm_lost_by(const npg_warm *warm);
 npg_status npg_warm_solve(npg_warm *warm, npg_fit *fit, const npg_warm_frames *frames,
                           const npg_window *window, npg_fit_watch *watch, void *user);
 
-/* How far the window at work is: during a keep, as blocks of an store; and back, before npg_warm_solve of
+/* How far the window at work is: during a keep, as blocks of a store; and back, before npg_warm_solve of
  * the same window, which then continues there. */
 npg_status npg_warm_save(npg_warm *warm, npg_store *store);
 npg_status npg_warm_restore(npg_warm *warm, npg_fit *fit, const npg_record *store);

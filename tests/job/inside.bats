@@ -5,7 +5,7 @@ load ../support/store
 small=(--method '{"align": false, "width-1": 32, "width-2": 32, "poisson-depth": 5, "samples": 100,
                   "grid-levels": 3, "state-every": 0}' --faces 400 --bars residual=100,flipped=100
     --quiet)
-joint=(--method '{"window": 0, "epochs": 60}')
+joint=(--method '{"window": 0, "epochs": 240}')
 warm=(--method '{"window": 5, "overlap": 2, "epochs": 30}')
 surface=(--method '{"preset": "grids", "window": 5, "overlap": 2, "epochs": 6}')
 

