@@ -49,7 +49,7 @@ def find_commit():
 
 def run_capture(neupig, folder, out):
     """The processor seconds of a run; exits where it fails (7 is a finished one, too)."""
-    process = subprocess.Popen([neupig, "run", folder / "points", "-o", out, "--quiet"])
+    process = subprocess.Popen([neupig, "run", folder / "points", "-o", out, "--quiet"], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in (0, 7):
