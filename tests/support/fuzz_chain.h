@@ -3,6 +3,7 @@
 #ifndef NPG_FUZZ_CHAIN_H
 #define NPG_FUZZ_CHAIN_H
 
+#include "pipeline/options.h"
 #include "pipeline/stage.h"
 
 /* clang-format off */
