@@ -2,10 +2,11 @@
 #ifndef NPG_PROGRESS_H
 #define NPG_PROGRESS_H
 
-#include "pipeline/status.h"
-
+#include <jansson.h>
 #include <stdbool.h>
 #include <stddef.h>
+
+#include "pipeline/status.h"
 
 enum { NPG_SHOW_AUTO, NPG_SHOW_BAR, NPG_SHOW_JSON, NPG_SHOW_NONE }; /* the words of --progress */
 
@@ -33,7 +34,28 @@ void npg_reporter_pause(npg_reporter *reporter);
 /* Remove the bar, and write the closing record to the log file and in JSON mode to standard output. */
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output);
 
+/* Append a record (consumed; NULL does nothing) with "time" put in front to a log file: one write, so that
+ * several processes may append to the same one.  A write that fails is reported once on standard error, and
+ * *fd (-1: does nothing) becomes -1. */
+void npg_log_file_write(int *fd, json_t *record);
+
 /* "1:02:03", "2:03", or "?" where it is not known. */
 void npg_spell_time(char *out, size_t size, double seconds);
+
+/* ---- what the verbs that start runs share (verb_run.c) ---- */
+
+/* Holds the process id of the batch that a run belongs to. */
+#define NPG_PARENT_VARIABLE "NEUPIG_BATCH_PID"
+
+/* A run from its start to its end.  SIGINT, SIGTERM and SIGHUP stop it; when it does not end in time the
+ * process does, with exit code 75: a run can be resumed from what is on disk at any moment. */
+npg_status npg_run_job(const npg_options *options, npg_reporter *reporter);
+
+/* The same without the reporter's closing record, for one run of several.  *is_open: its options were
+ * good. */
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open);
+
+/* Where the results are, on standard output; how it ended, on standard error. */
+void npg_run_job_results(const char *verb, const char *output, npg_status status);
 
 #endif

@@ -6,7 +6,6 @@
 #include "pipeline/file.h"
 #include "tools/cli.h"
 #include "tools/progress.h"
-#include "tools/run_job.h"
 #include "tools/segments/segments.h"
 
 typedef struct settings {

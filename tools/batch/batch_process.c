@@ -17,8 +17,7 @@
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "tools/log_file.h"
-#include "tools/run_job.h"
+#include "tools/progress.h"
 
 #define GRACE_SECONDS 10 /* a run that was asked ends within 5 s; then it is killed */
 

@@ -22,7 +22,6 @@
 #include "pipeline/memory.h"
 #include "pipeline/options.h"
 #include "tools/progress.h"
-#include "tools/run_job.h"
 
 enum { NPG_SEGMENTS_ONE, NPG_SEGMENTS_AUTO }; /* the words of --segments */
 

@@ -7,7 +7,6 @@
 
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
-#include "tools/base64.h"
 
 /* ---- JSON inside of HTML ---- */
 
@@ -47,10 +46,37 @@ static npg_status write_json(npg_file *file, json_t *results, bool is_live)
 
 /* ---- blocks ---- */
 
+enum { BYTES_AT_ONCE = 3072 }; /* a multiple of 3 */
+
+static void write_some(npg_file *file, const unsigned char *bytes, size_t size)
+{
+    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    char text[BYTES_AT_ONCE / 3 * 4];
+    size_t length = 0;
+    for (size_t i = 0; i < size; i += 3) {
+        uint32_t left = (uint32_t)(size - i), three = (uint32_t)bytes[i] << 16;
+        if (left > 1) three |= (uint32_t)bytes[i + 1] << 8;
+        if (left > 2) three |= bytes[i + 2];
+        text[length++] = digits[three >> 18];
+        text[length++] = digits[three >> 12 & 63];
+        text[length++] = left > 1 ? digits[three >> 6 & 63] : '=';
+        text[length++] = left > 2 ? digits[three & 63] : '=';
+    }
+    npg_file_write(file, text, length);
+}
+
+static void write_base64(npg_file *file, const void *bytes, size_t size)
+{
+    for (size_t at = 0; at < size; at += BYTES_AT_ONCE) {
+        size_t left = size - at;
+        write_some(file, (const unsigned char *)bytes + at, left < BYTES_AT_ONCE ? left : BYTES_AT_ONCE);
+    }
+}
+
 static void write_block(npg_file *file, npg_bytes *block, const char *id)
 {
     npg_file_print(file, "<script type=\"text/plain\" id=\"%s\">", id);
-    npg_base64_write(file, block->data, block->size);
+    write_base64(file, block->data, block->size);
     npg_file_print(file, "</script>\n");
     block->size = 0;
 }
