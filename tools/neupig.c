@@ -113,7 +113,9 @@ static int unknown_verb(const char *name)
 {
     npg_nearest nearest = npg_nearest_to(name);
     for (const npg_verb *verb = npg_verbs; verb->name; verb++) npg_nearest_offer(&nearest, verb->name);
-    if (nearest.word)
+    if (!strcmp(name, "tune"))
+        fputs("neupig: verb tune went: the set of kernel parameters is chosen by device\n", stderr);
+    else if (nearest.word)
         fprintf(stderr, "neupig: there is no verb \"%s\"; did you mean %s?\n", name, nearest.word);
     else
         fprintf(stderr, "neupig: there is no verb \"%s\"; neupig help lists them\n", name);

@@ -2,6 +2,7 @@
 #ifndef NPG_SYNTH_H
 #define NPG_SYNTH_H
 
+#include "pipeline/memory.h"
 #include "pipeline/mesh.h"
 
 /* ---- bodies: a closed surface and its exact motion; some change their topology once ---- */
@@ -109,15 +110,14 @@ typedef struct npg_synth_camera {
 } npg_synth_camera;
 
 typedef struct npg_synth_picture {
-    double *depth;  /* H x W, along `ahead`; infinity where nothing is seen; owned */
-    uint32_t *face; /* H x W: the face seen; owned                                 */
+    double *depth;  /* H x W, along `ahead`; infinity where nothing is seen */
+    uint32_t *face; /* H x W: the face seen                                 */
 } npg_synth_picture;
 
 /* The i-th of a ring of capture->cameras. */
 npg_synth_camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i);
 
-npg_status npg_synth_picture_open(npg_synth_picture *picture, const npg_synth_camera *camera);
-void npg_synth_picture_close(npg_synth_picture *picture);
+npg_synth_picture npg_synth_picture_take(npg_arena *arena, const npg_synth_camera *camera);
 
 /* Draw the mesh from scratch. */
 void npg_synth_draw(npg_synth_picture *picture, const npg_synth_camera *camera, const npg_mesh *mesh);

@@ -28,13 +28,14 @@ static npg_status open_weights(npg_body *body, double cell)
     const npg_mesh *rest = body->rest;
     size_t edge_count, size = rest->vert_count * NPG_BONES;
     uint32_t(*edges)[2];
-    float *next = NULL, *degree = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
     int rounds =
         (int)ceil(reach * reach / (cell * cell)); /* a round carries heat one cell, n rounds sqrt(n) */
     NPG_TRY(npg_alloc_array(&body->weights, NPG_FOR_MESH, size, sizeof(float)));
     NPG_TRY(npg_mesh_edges(&edges, &edge_count, rest->faces, rest->face_count));
-    npg_status status = npg_alloc_array(&next, NPG_FOR_MESH, size, sizeof *next);
-    if (!status) status = npg_alloc_array(&degree, NPG_FOR_MESH, rest->vert_count, sizeof *degree);
+    float *next = npg_arena_take(&scratch, size, sizeof *next);
+    float *degree = npg_arena_take(&scratch, rest->vert_count, sizeof *degree);
+    npg_status status = npg_arena_status(&scratch);
     for (size_t v = 0; v < rest->vert_count && !status; v++) {
         const float *p = rest->vert_pos + 3 * v;
         int bone = npg_walker_nearest_bone((double[3]){(double)p[0], (double)p[1], (double)p[2]},
@@ -55,8 +56,7 @@ static npg_status open_weights(npg_body *body, double cell)
         for (size_t i = 0; i < size; i++)
             body->weights[i] = 0.5f * body->weights[i] + 0.5f * next[i] / degree[i / NPG_BONES];
     }
-    npg_release(&degree);
-    npg_release(&next);
+    npg_arena_release(&scratch);
     npg_release(&edges);
     return status;
 }

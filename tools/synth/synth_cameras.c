@@ -74,17 +74,11 @@ static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint3
         }
 }
 
-npg_status npg_synth_picture_open(picture *out, const camera *c)
+picture npg_synth_picture_take(npg_arena *arena, const camera *c)
 {
     size_t pixels = (size_t)(c->width * c->height);
-    NPG_TRY(npg_alloc_array(&out->depth, NPG_FOR_FRAMES, pixels, sizeof *out->depth));
-    return npg_alloc_array(&out->face, NPG_FOR_FRAMES, pixels, sizeof *out->face);
-}
-
-void npg_synth_picture_close(picture *p)
-{
-    npg_release(&p->depth);
-    npg_release(&p->face);
+    return (picture){npg_arena_take(arena, pixels, sizeof(double)),
+                     npg_arena_take(arena, pixels, sizeof(uint32_t))};
 }
 
 void npg_synth_draw(picture *out, const camera *c, const npg_mesh *mesh)
@@ -126,15 +120,16 @@ static npg_status add_seen_points(npg_scanned *points, const picture *seen, cons
 
 npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh, uint64_t frame)
 {
-    picture seen = {0};
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
     npg_random random = npg_random_stream(capture->seed, frame, NPG_FOR_CAMERAS);
     camera first = npg_synth_camera_of_ring(capture, 0);
-    npg_status status = npg_synth_picture_open(&seen, &first);
+    picture seen = npg_synth_picture_take(&scratch, &first);
+    npg_status status = npg_arena_status(&scratch);
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
         camera c = npg_synth_camera_of_ring(capture, i);
         npg_synth_draw(&seen, &c, mesh);
         status = add_seen_points(points, &seen, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
     }
-    npg_synth_picture_close(&seen);
+    npg_arena_release(&scratch);
     return status;
 }

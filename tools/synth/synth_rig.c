@@ -123,8 +123,8 @@ static void place_at_rest(double out[3], const npg_mesh *mesh, const npg_mesh *r
 
 typedef struct images {
     npg_synth_picture seen;
-    uint16_t *depth; /* H x W, first row on top; owned     */
-    uint8_t *colour; /* H x W x 3; owned                   */
+    uint16_t *depth; /* H x W, first row on top */
+    uint8_t *colour; /* H x W x 3               */
 } images;
 
 static void fill_images(images *im, const npg_synth_camera *c, const npg_mesh *mesh, const npg_mesh *rest,
@@ -151,13 +151,15 @@ static void fill_images(images *im, const npg_synth_camera *c, const npg_mesh *m
 npg_status npg_synth_rig_frame(const char *folder, const npg_scan *capture, const npg_mesh *mesh,
                                const npg_mesh *rest, int64_t frame, double noise_m)
 {
-    images im = {.depth = NULL};
+    images im;
     npg_random random = npg_random_stream(capture->seed, (uint64_t)frame, NPG_FOR_CAMERAS);
     npg_synth_camera first = upright(capture, 0);
     size_t pixels = (size_t)(first.width * first.height);
-    npg_status status = npg_synth_picture_open(&im.seen, &first);
-    if (!status) status = npg_alloc_array(&im.depth, NPG_FOR_FRAMES, pixels, sizeof *im.depth);
-    if (!status) status = npg_alloc(&im.colour, NPG_FOR_FRAMES, 3 * pixels);
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    im.seen = npg_synth_picture_take(&scratch, &first);
+    im.depth = npg_arena_take(&scratch, pixels, sizeof *im.depth);
+    im.colour = npg_arena_take(&scratch, pixels, 3);
+    npg_status status = npg_arena_status(&scratch);
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
         npg_synth_camera c = upright(capture, i);
         npg_synth_draw(&im.seen, &c, mesh);
@@ -165,8 +167,6 @@ npg_status npg_synth_rig_frame(const char *folder, const npg_scan *capture, cons
         status = write_png(folder, i, "depth", frame, &c, PNG_FORMAT_LINEAR_Y, im.depth);
         if (!status) status = write_png(folder, i, "colour", frame, &c, PNG_FORMAT_RGB, im.colour);
     }
-    npg_synth_picture_close(&im.seen);
-    npg_release(&im.depth);
-    npg_release(&im.colour);
+    npg_arena_release(&scratch);
     return status;
 }
