@@ -10,7 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "export/export.h"
+#include "export/export_folder.h"
+#include "export/forms/writer.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"

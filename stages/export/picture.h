@@ -4,15 +4,13 @@
 
 #include "pipeline/frame_box.h"
 
-enum { NPG_COLOUR_PLAIN, NPG_COLOUR_VERTEX, NPG_COLOUR_NORMAL, NPG_COLOUR_IDENTITY };
-
 typedef struct npg_picture_settings {
     int64_t width, height;     /* of a tile, pixels; width 0: as what is drawn needs                   */
     int64_t columns;           /* tiles in a row                                                       */
     int64_t samples;           /* rays per pixel and axis                                              */
     double azimuth, elevation; /* of the eye, degrees; azimuth 0: along -z from the front, 90: from +x */
     bool is_z_up;              /* then from the front is along +y                                      */
-    int colour;                /* identity: by place in the first mesh                                 */
+    int colour;                /* 0 plain, 1 the file's, 2 normals, 3 identity: by place in the first mesh */
     double point_size;         /* radius of a cloud's points, in diagonals                             */
 } npg_picture_settings;
 

@@ -9,7 +9,6 @@
 #include <strings.h>
 #include <unistd.h>
 
-#include "export/picture.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"

@@ -5,6 +5,8 @@
 #include "pipeline/frame_box.h"
 #include "pipeline/mesh.h"
 
+enum { NPG_COLOUR_PLAIN, NPG_COLOUR_VERTEX, NPG_COLOUR_NORMAL, NPG_COLOUR_IDENTITY };
+
 typedef struct npg_scene {
     npg_mesh *mesh; /* what rays meet, with vertex normals; owned */
     float *colours; /* V x 3, 0..1, owned                         */

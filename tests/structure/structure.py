@@ -41,8 +41,6 @@ OPEN_CIRCLES = [
     "pipeline/method pipeline/options",
     "tools/cli tools/help",
     "stages/align/align_internal stages/align/tracker",
-    "stages/export/apply stages/export/export stages/export/export_folder",
-    "stages/export/picture stages/export/picture_scene",
     "stages/optimize/fit stages/optimize/fit_levels stages/optimize/fit_weights",
     "stages/optimize/joint stages/optimize/joint_match stages/optimize/joint_system",
     "stages/optimize/joint_window stages/optimize/window",
