@@ -1,21 +1,20 @@
-/* Check: random values, comparison, finite differences. */
+/* Check: random values, comparison. */
 #include "kernels/check.h"
 
 #include <math.h>
 
-npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random)
+void npg_check_values(npg_arena *arena, float **values, double **wide, size_t n, double scale,
+                      npg_random *random)
 {
-    NPG_TRY(npg_alloc_array(values, NPG_FOR_RUN, n, sizeof **values));
-    npg_status status = wide ? npg_alloc_array(wide, NPG_FOR_RUN, n, sizeof **wide) : NPG_OK;
-    for (size_t i = 0; i < n && !status; i++) {
+    *values = npg_arena_take(arena, n, sizeof **values);
+    if (wide) *wide = npg_arena_take(arena, n, sizeof **wide);
+    for (size_t i = 0; i < n && !npg_arena_status(arena); i++) {
         (*values)[i] = (float)(scale * (2 * npg_random_real(random) - 1));
         if (wide) (*wide)[i] = (double)(*values)[i];
     }
-    if (status) npg_release(values);
-    return status;
 }
 
-/* 1e-30 here and below: what is all zero is compared as it is, not divided by 0. */
+/* 1e-30: what is all zero is compared as it is, not divided by 0. */
 void npg_check_compare(double *error, const float *got, const double *want, size_t n)
 {
     double largest = 1e-30, worst = 0;

@@ -6,8 +6,10 @@
 #include "kernels/runtime/device.h"
 #include "pipeline/random.h"
 
-/* n values in +-scale, as float and (when `wide` is not NULL) the same in double. */
-npg_status npg_check_values(float **values, double **wide, size_t n, double scale, npg_random *random);
+/* n values in +-scale, as float and (when `wide` is not NULL) the same in double, from an arena whose status
+ * is to be asked before they are used. */
+void npg_check_values(npg_arena *arena, float **values, double **wide, size_t n, double scale,
+                      npg_random *random);
 
 /* *error = max(*error, max |got - want| / max |want|); a value that is not finite counts
  * as infinitely wrong. */

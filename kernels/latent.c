@@ -44,20 +44,24 @@ static void transpose(npg_samples *samples, size_t real)
 static npg_status alloc_samples(npg_samples *samples, size_t real)
 {
     size_t entries = samples->rows * samples->per_row, back = real * samples->per_row;
-    NPG_TRY(npg_alloc_array(&samples->index, NPG_FOR_FIT, entries, sizeof(int32_t)));
-    NPG_TRY(npg_alloc_array(&samples->weight, NPG_FOR_FIT, entries, sizeof(float)));
-    NPG_TRY(npg_alloc_array(&samples->start, NPG_FOR_FIT, samples->node_count + 2, sizeof(int32_t)));
-    NPG_TRY(npg_alloc_array(&samples->vertex, NPG_FOR_FIT, back, sizeof(int32_t)));
-    NPG_TRY(npg_alloc_array(&samples->channels, NPG_FOR_FIT, samples->node_count, sizeof(int32_t)));
-    return npg_alloc_array(&samples->weight_back, NPG_FOR_FIT, back, sizeof(float));
+    npg_arena *a = &samples->arrays;
+    samples->index = npg_arena_take(a, entries, sizeof(int32_t));
+    samples->weight = npg_arena_take(a, entries, sizeof(float));
+    samples->start = npg_arena_take(a, samples->node_count + 2, sizeof(int32_t));
+    samples->vertex = npg_arena_take(a, back, sizeof(int32_t));
+    samples->channels = npg_arena_take(a, samples->node_count, sizeof(int32_t));
+    samples->weight_back = npg_arena_take(a, back, sizeof(float));
+    return npg_arena_status(a);
 }
 
 npg_status npg_samples_open(npg_samples *samples, const npg_levels *levels, const float *positions,
                             const float *normals, size_t real, size_t rows)
 {
     NPG_REQUIRE(real && real <= rows && rows < INT32_MAX / 256);
-    *samples = (npg_samples){
-        .rows = rows, .node_count = levels->row_count, .per_row = NPG_CELL_NODES * (size_t)levels->count};
+    *samples = (npg_samples){.arrays = {.purpose = NPG_FOR_FIT},
+                             .rows = rows,
+                             .node_count = levels->row_count,
+                             .per_row = NPG_CELL_NODES * (size_t)levels->count};
     npg_status status = alloc_samples(samples, real);
     for (size_t row = 0; row < rows && !status; row++) {
         size_t from = row < real ? row : real - 1;
@@ -71,12 +75,7 @@ npg_status npg_samples_open(npg_samples *samples, const npg_levels *levels, cons
 
 void npg_samples_close(npg_samples *samples)
 {
-    npg_release(&samples->index);
-    npg_release(&samples->weight);
-    npg_release(&samples->start);
-    npg_release(&samples->vertex);
-    npg_release(&samples->channels);
-    npg_release(&samples->weight_back);
+    npg_arena_release(&samples->arrays);
 }
 
 /* ---- the kernels ---- */

@@ -8,8 +8,9 @@
 /* The constant sparse matrix, by rows (K entries each) and transposed (row lists by node). */
 typedef struct npg_samples {
     size_t rows, node_count, per_row;   /* K = 8 x levels                       */
-    int32_t *index;                     /* rows x K, owned                      */
-    float *weight;                      /* rows x K, owned                      */
+    npg_arena arrays;                   /* holds these                          */
+    int32_t *index;                     /* rows x K                             */
+    float *weight;                      /* rows x K                             */
     int32_t *start, *vertex, *channels; /* node_count + 1, real x K, node_count */
     float *weight_back;                 /* real x K                             */
 } npg_samples;

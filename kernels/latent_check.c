@@ -30,6 +30,7 @@ typedef struct latent_data {
     float *positions, *normals, *nodes, *dz;
     double *nodes_wide, *dz_wide, *z, *dnodes;
     size_t real, rows;
+    npg_arena arrays; /* holds all arrays but those of the samples */
 } latent_data;
 
 static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
@@ -39,22 +40,17 @@ static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
     d->rows = NPG_PADDED(d->real);
     make_levels(&d->levels, size);
     size_t nodes = d->levels.row_count * CHANNELS, z = d->rows * CHANNELS;
-    NPG_TRY(npg_check_values(&d->positions, NULL, d->real * 3, 1.05, &random)); /* some outside the cube */
-    NPG_TRY(npg_check_values(&d->normals, NULL, d->real * 3, 1, &random));
-    NPG_TRY(npg_check_values(&d->nodes, &d->nodes_wide, nodes, 1, &random));
-    NPG_TRY(npg_check_values(&d->dz, &d->dz_wide, z, 1, &random));
-    NPG_TRY(npg_alloc_array(&d->z, NPG_FOR_RUN, z, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&d->dnodes, NPG_FOR_RUN, nodes, sizeof(double)));
+    npg_arena *a = &d->arrays;
+    a->purpose = NPG_FOR_RUN;
+    npg_check_values(a, &d->positions, NULL, d->real * 3, 1.05, &random); /* some outside the cube */
+    npg_check_values(a, &d->normals, NULL, d->real * 3, 1, &random);
+    npg_check_values(a, &d->nodes, &d->nodes_wide, nodes, 1, &random);
+    npg_check_values(a, &d->dz, &d->dz_wide, z, 1, &random);
+    d->z = npg_arena_take(a, z, sizeof(double));
+    d->dnodes = npg_arena_take(a, nodes, sizeof(double));
+    NPG_TRY(npg_arena_status(a));
     for (size_t i = d->real * CHANNELS; i < z; i++) d->dz[i] = 0, d->dz_wide[i] = 0;
     return npg_samples_open(&d->samples, &d->levels, d->positions, d->normals, d->real, d->rows);
-}
-
-static void close_latent_data(latent_data *d)
-{
-    npg_samples_close(&d->samples);
-    void *all[] = {&d->positions,  &d->normals, &d->nodes, &d->dz,
-                   &d->nodes_wide, &d->dz_wide, &d->z,     &d->dnodes};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
 }
 
 typedef struct latent_buffers {
@@ -90,7 +86,8 @@ npg_status npg_check_latent(npg_device *device, int size, uint64_t seed, double 
     npg_buffer_close(&b.nodes);
     npg_buffer_close(&b.dnodes);
     npg_buffer_close(&b.dz);
-    close_latent_data(&d);
+    npg_samples_close(&d.samples);
+    npg_arena_release(&d.arrays);
     return status;
 }
 
@@ -101,11 +98,12 @@ static npg_status residual_of(npg_device *device, const npg_levels *levels, npg_
     npg_sobolev sobolev = {0};
     npg_buffer x = {0}, y = {0};
     size_t n = levels->row_count * CHANNELS;
-    float *right = NULL, *solution = NULL;
-    double *right_wide = NULL, *wide = NULL, *again = NULL;
-    npg_status status = npg_check_values(&right, &right_wide, n, 1, random);
-    if (!status) status = npg_check_values(&solution, &wide, n, 1, random);
-    if (!status) status = npg_alloc_array(&again, NPG_FOR_RUN, n, sizeof *again);
+    npg_arena scratch = {.purpose = NPG_FOR_RUN};
+    float *right, *solution = npg_arena_take(&scratch, n, sizeof *solution);
+    double *right_wide, *wide = npg_arena_take(&scratch, n, sizeof *wide);
+    double *again = npg_arena_take(&scratch, n, sizeof *again);
+    npg_check_values(&scratch, &right, &right_wide, n, 1, random);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = npg_sobolev_open(&sobolev, device, levels);
     if (!status) status = npg_buffer_from(&y, device, right, n * sizeof(float));
     if (!status) status = npg_buffer_open(&x, device, n * sizeof(float));
@@ -122,8 +120,7 @@ static npg_status residual_of(npg_device *device, const npg_levels *levels, npg_
     npg_sobolev_close(&sobolev);
     npg_buffer_close(&x);
     npg_buffer_close(&y);
-    void *all[] = {&right, &solution, &right_wide, &wide, &again};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_arena_release(&scratch);
     return status;
 }
 

@@ -14,6 +14,7 @@ typedef struct mlp_data {
     float *params, *z, *code, *dout;
     double *params_wide, *z_wide, *code_wide, *dout_wide;
     double *out, *grad, *dz, *dcode;
+    npg_arena arrays; /* holds all of these */
 } mlp_data;
 
 /* Some sizes have one block, some several batches of frames, some uneven widths; all have frames whose sums
@@ -25,27 +26,24 @@ static npg_status open_mlp_data(mlp_data *d, size_t block, int size, uint64_t se
     d->rows = block * (size > 2 ? 3 : 1);
     d->frames = size == 1 ? 2 : 5;
     size_t n = d->param_count = npg_mlp_param_count(&d->shape), samples = d->rows * d->frames;
-    NPG_TRY(npg_check_values(&d->params, &d->params_wide, n, 1 / sqrt((double)d->shape.w1), &random));
-    NPG_TRY(npg_check_values(&d->z, &d->z_wide, d->rows * CHANNELS, 1, &random));
-    NPG_TRY(npg_check_values(&d->code, &d->code_wide, d->frames * d->shape.code_size, 1, &random));
-    NPG_TRY(npg_check_values(&d->dout, &d->dout_wide, samples * NPG_MLP_OUT, 1, &random));
+    npg_arena *a = &d->arrays;
+    a->purpose = NPG_FOR_RUN;
+    npg_check_values(a, &d->params, &d->params_wide, n, 1 / sqrt((double)d->shape.w1), &random);
+    npg_check_values(a, &d->z, &d->z_wide, d->rows * CHANNELS, 1, &random);
+    npg_check_values(a, &d->code, &d->code_wide, d->frames * d->shape.code_size, 1, &random);
+    npg_check_values(a, &d->dout, &d->dout_wide, samples * NPG_MLP_OUT, 1, &random);
+    d->out = npg_arena_take(a, samples * NPG_MLP_OUT, sizeof(double));
+    d->grad = npg_arena_take(a, n, sizeof(double));
+    d->dz = npg_arena_take(a, d->rows * CHANNELS, sizeof(double));
+    d->dcode = npg_arena_take(a, d->frames * d->shape.code_size, sizeof(double));
+    NPG_TRY(npg_arena_status(a));
     for (size_t k = 0; k < d->shape.w2; k++)
         for (size_t o = NPG_MLP_USED; o < NPG_MLP_HEAD_ROW; o++)
             d->params[npg_mlp_at_head(&d->shape) + k * NPG_MLP_HEAD_ROW + o] = 0;
     for (size_t o = NPG_MLP_USED; o < NPG_MLP_HEAD_ROW; o++)
         d->params[npg_mlp_at_head_bias(&d->shape) + o] = 0;
     for (size_t i = 7; i < samples * NPG_MLP_OUT; i += NPG_MLP_OUT) d->dout[i] = 0;
-    NPG_TRY(npg_alloc_array(&d->out, NPG_FOR_RUN, samples * NPG_MLP_OUT, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&d->grad, NPG_FOR_RUN, n, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&d->dz, NPG_FOR_RUN, d->rows * CHANNELS, sizeof(double)));
-    return npg_alloc_array(&d->dcode, NPG_FOR_RUN, d->frames * d->shape.code_size, sizeof(double));
-}
-
-static void close_mlp_data(mlp_data *d)
-{
-    void *all[] = {&d->params,    &d->z,         &d->code, &d->dout, &d->params_wide, &d->z_wide,
-                   &d->code_wide, &d->dout_wide, &d->out,  &d->grad, &d->dz,          &d->dcode};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    return NPG_OK;
 }
 
 static void mlp_twins(mlp_data *d)
@@ -98,7 +96,7 @@ npg_status npg_check_mlp(npg_device *device, int size, uint64_t seed, double *er
     if (!status) status = compare_mlp(device, &d, &mlp, &dcode, error);
     npg_mlp_close(&mlp);
     npg_buffer_close(&dcode);
-    close_mlp_data(&d);
+    npg_arena_release(&d.arrays);
     return status;
 }
 
@@ -109,23 +107,25 @@ typedef struct adam_data {
     npg_buffer params, gradient;
     float *start, *slope, *rates;
     double *wide, *slope_wide, *first, *second;
+    npg_arena arrays; /* holds all of these */
 } adam_data;
 
 static npg_status run_adam(npg_device *device, adam_data *d, size_t n, size_t row, npg_random *random,
                            double *error)
 {
-    NPG_TRY(npg_check_values(&d->start, &d->wide, n, 1, random));
-    NPG_TRY(npg_check_values(&d->rates, NULL, (n + row - 1) / row, 0.1, random));
-    NPG_TRY(npg_alloc_array(&d->first, NPG_FOR_RUN, n, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&d->second, NPG_FOR_RUN, n, sizeof(double)));
+    d->arrays.purpose = NPG_FOR_RUN;
+    npg_check_values(&d->arrays, &d->start, &d->wide, n, 1, random);
+    npg_check_values(&d->arrays, &d->rates, NULL, (n + row - 1) / row, 0.1, random);
+    d->first = npg_arena_take(&d->arrays, n, sizeof(double));
+    d->second = npg_arena_take(&d->arrays, n, sizeof(double));
+    NPG_TRY(npg_arena_status(&d->arrays));
     NPG_TRY(npg_adam_open(&d->adam, device, d->rates, row, n));
     NPG_TRY(npg_buffer_from(&d->params, device, d->start, n * sizeof(float)));
     for (int64_t step = 1; step <= 5; step++) {
-        npg_release(&d->slope);
-        npg_release(&d->slope_wide);
         npg_buffer_close(&d->gradient);
         /* gradients down to the size of epsilon */
-        NPG_TRY(npg_check_values(&d->slope, &d->slope_wide, n, step % 2 ? 1 : 1e-7, random));
+        npg_check_values(&d->arrays, &d->slope, &d->slope_wide, n, step % 2 ? 1 : 1e-7, random);
+        NPG_TRY(npg_arena_status(&d->arrays));
         NPG_TRY(npg_buffer_from(&d->gradient, device, d->slope, n * sizeof(float)));
         NPG_TRY(npg_adam_step(&d->adam, &d->params, &d->gradient));
         npg_adam_step_ref(d->wide, d->first, d->second, d->slope_wide, d->rates, row, n, step);
@@ -142,7 +142,6 @@ npg_status npg_check_adam(npg_device *device, int size, uint64_t seed, double *e
     npg_adam_close(&d.adam);
     npg_buffer_close(&d.params);
     npg_buffer_close(&d.gradient);
-    void *all[] = {&d.start, &d.slope, &d.rates, &d.wide, &d.slope_wide, &d.first, &d.second};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_arena_release(&d.arrays);
     return status;
 }

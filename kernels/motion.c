@@ -127,21 +127,19 @@ static void fill_edges(int32_t *start, int32_t *neighbour, float *rest, const fl
 static npg_status upload_edges(npg_motion *m, npg_device *device, const float *vertices,
                                const uint32_t (*edges)[2], size_t edge_count)
 {
-    int32_t *start = NULL, *neighbour = NULL;
-    float *rest = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
     size_t half = m->half_edges = 2 * edge_count;
-    npg_status status = npg_alloc_array(&start, NPG_FOR_FIT, m->rows + 2, sizeof *start);
-    if (!status) status = npg_alloc_array(&neighbour, NPG_FOR_FIT, half + 1, sizeof *neighbour);
-    if (!status) status = npg_alloc_array(&rest, NPG_FOR_FIT, half + 1, sizeof *rest);
+    int32_t *start = npg_arena_take(&scratch, m->rows + 2, sizeof *start),
+            *neighbour = npg_arena_take(&scratch, half + 1, sizeof *neighbour);
+    float *rest = npg_arena_take(&scratch, half + 1, sizeof *rest);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) {
         fill_edges(start, neighbour, rest, vertices, m->rows, edges, edge_count);
         status = npg_buffer_from(&m->start, device, start, (m->rows + 1) * sizeof *start);
     }
     if (!status) status = npg_buffer_from(&m->neighbour, device, neighbour, (half + 1) * sizeof *neighbour);
     if (!status) status = npg_buffer_from(&m->edge_rest, device, rest, (half + 1) * sizeof *rest);
-    npg_release(&start);
-    npg_release(&neighbour);
-    npg_release(&rest);
+    npg_arena_release(&scratch);
     return status;
 }
 

@@ -15,6 +15,7 @@ typedef struct motion_data {
     double *x, *g, *dout; /* of all frames: real x 3, real x 3, rows x 8 */
     uint32_t (*edges)[2];
     size_t *to_points, *to_verts; /* of one frame */
+    npg_arena arrays;             /* holds all of these */
 } motion_data;
 
 /* Put points into Morton order, in both copies. */
@@ -35,14 +36,16 @@ static npg_status make_points(motion_data *d, int size, npg_random *random)
     for (size_t t = 0; t < FRAMES; t++) {
         /* one point, a full leaf, and many; some of them in one place */
         d->count[t] = t == 0 ? 1 : t == 1 ? 16 * (size_t)size : 61 * (size_t)(size * size) + 5;
-        NPG_TRY(npg_check_values(&d->points[t], &d->points_wide[t], d->count[t] * 3, 0.7, random));
+        npg_check_values(&d->arrays, &d->points[t], &d->points_wide[t], d->count[t] * 3, 0.7, random);
+        NPG_TRY(npg_arena_status(&d->arrays));
         for (size_t i = d->count[t] / 2; i < d->count[t] / 2 + 3 && i < d->count[t]; i++)
             memcpy(d->points[t] + 3 * i, d->points[t], 3 * sizeof(float));
         NPG_TRY(sort_points(d->points[t], d->points_wide[t], d->count[t]));
         if (d->count[t] > most) most = d->count[t];
     }
-    NPG_TRY(npg_alloc_array(&d->to_verts, NPG_FOR_RUN, most, sizeof(size_t)));
-    return npg_alloc_array(&d->to_points, NPG_FOR_RUN, d->real, sizeof(size_t));
+    d->to_verts = npg_arena_take(&d->arrays, most, sizeof(size_t));
+    d->to_points = npg_arena_take(&d->arrays, d->real, sizeof(size_t));
+    return npg_arena_status(&d->arrays);
 }
 
 static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
@@ -51,17 +54,22 @@ static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
     d->real = size == 1 ? 4 : (size_t)(size * size) * 53 + 1;
     d->rows = NPG_PADDED(d->real);
     d->edge_count = 2 * d->real - 3;
-    NPG_TRY(npg_check_values(&d->rest, &d->rest_wide, d->real * 3, 0.9, &random));
+    d->arrays.purpose = NPG_FOR_RUN;
+    npg_check_values(&d->arrays, &d->rest, &d->rest_wide, d->real * 3, 0.9, &random);
+    npg_check_values(&d->arrays, &d->out, &d->out_wide, FRAMES * d->rows * NPG_MLP_OUT, 2, &random);
+    d->edges = npg_arena_take(&d->arrays, d->edge_count, sizeof *d->edges);
+    d->edge_rest = npg_arena_take(&d->arrays, d->edge_count, sizeof(double));
+    d->x = npg_arena_take(&d->arrays, FRAMES * d->real * 3, sizeof(double));
+    d->g = npg_arena_take(&d->arrays, FRAMES * d->real * 3, sizeof(double));
+    d->dout = npg_arena_take(&d->arrays, FRAMES * d->rows * NPG_MLP_OUT, sizeof(double));
+    NPG_TRY(npg_arena_status(&d->arrays));
     NPG_TRY(sort_points(d->rest, d->rest_wide, d->real));
-    NPG_TRY(npg_check_values(&d->out, &d->out_wide, FRAMES * d->rows * NPG_MLP_OUT, 2, &random));
     for (size_t i = 0; i < FRAMES * d->rows; i++) { /* padding repeats the last vertex, as in a fit */
         size_t v = i % d->rows < d->real ? i : i / d->rows * d->rows + d->real - 1;
         memcpy(d->out + i * NPG_MLP_OUT, d->out + v * NPG_MLP_OUT, NPG_MLP_OUT * sizeof(float));
         memcpy(d->out_wide + i * NPG_MLP_OUT, d->out_wide + v * NPG_MLP_OUT, NPG_MLP_OUT * sizeof(double));
     }
     NPG_TRY(make_points(d, size, &random));
-    NPG_TRY(npg_alloc_array(&d->edges, NPG_FOR_RUN, d->edge_count, sizeof *d->edges));
-    NPG_TRY(npg_alloc_array(&d->edge_rest, NPG_FOR_RUN, d->edge_count, sizeof(double)));
     for (size_t e = 0; e < d->edge_count; e++) { /* a strip: every vertex with the next two */
         d->edges[e][0] = (uint32_t)(e / 2);
         d->edges[e][1] = (uint32_t)(e / 2 + 1 + e % 2);
@@ -69,20 +77,7 @@ static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
         d->edge_rest[e] =
             (double)(float)sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
     }
-    NPG_TRY(npg_alloc_array(&d->x, NPG_FOR_RUN, FRAMES * d->real * 3, sizeof(double)));
-    NPG_TRY(npg_alloc_array(&d->g, NPG_FOR_RUN, FRAMES * d->real * 3, sizeof(double)));
-    return npg_alloc_array(&d->dout, NPG_FOR_RUN, FRAMES * d->rows * NPG_MLP_OUT, sizeof(double));
-}
-
-static void close_motion_data(motion_data *d)
-{
-    void *all[] = {&d->rest, &d->out,  &d->rest_wide, &d->out_wide,  &d->edge_rest, &d->x,
-                   &d->g,    &d->dout, &d->edges,     &d->to_points, &d->to_verts};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
-    for (size_t t = 0; t < FRAMES; t++) {
-        npg_release(&d->points[t]);
-        npg_release(&d->points_wide[t]);
-    }
+    return NPG_OK;
 }
 
 static npg_status open_motion(npg_motion *motion, npg_buffer *out, npg_device *device, const motion_data *d)
@@ -175,7 +170,7 @@ npg_status npg_check_transform(npg_device *device, int size, uint64_t seed, doub
     npg_motion_close(&motion);
     npg_buffer_close(&out);
     npg_buffer_close(&dout);
-    close_motion_data(&d);
+    npg_arena_release(&d.arrays);
     return status;
 }
 
@@ -278,7 +273,7 @@ static npg_status check_motion(npg_device *device, int size, uint64_t seed, comp
     if (!status) status = compare(device, &d, &motion, &out, error);
     npg_motion_close(&motion);
     npg_buffer_close(&out);
-    close_motion_data(&d);
+    npg_arena_release(&d.arrays);
     return status;
 }
 

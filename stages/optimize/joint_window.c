@@ -4,13 +4,13 @@
 #include <string.h>
 
 #include "geometry/query.h"
-#include "optimize/carry.h"
+#include "optimize/skinning.h"
 
 struct npg_joint_window {
     npg_thin *surface; /* W vertices; owned */
     size_t vert_count; /* V */
     npg_joint *joint;
-    npg_carrier *carriers; /* V: corners of the surface's faces; owned */
+    npg_skin_weights *weights; /* V: corners of the surface's faces; owned */
 };
 
 /* T x W x 3: the thinned surfaces of the window at work. */
@@ -23,19 +23,19 @@ void npg_joint_window_close(npg_joint_window **slot)
     if (!slot || !*slot) return;
     npg_joint_close(&(*slot)->joint);
     npg_thin_close(&(*slot)->surface);
-    npg_release(&(*slot)->carriers);
+    npg_release(&(*slot)->weights);
     npg_release(slot);
 }
 
 /* Where the whole reference's vertices are on the thinned surface. */
-static npg_status find_carriers(npg_joint_window *window, const npg_mesh *reference)
+static npg_status bind(npg_joint_window *window, const npg_mesh *reference)
 {
     const npg_mesh *mesh = window->surface->mesh;
     npg_surface *rest;
-    NPG_TRY(npg_alloc_array(&window->carriers, NPG_FOR_FIT, window->vert_count, sizeof *window->carriers));
+    NPG_TRY(npg_alloc_array(&window->weights, NPG_FOR_FIT, window->vert_count, sizeof *window->weights));
     NPG_TRY(npg_surface_open(&rest, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
     npg_status status =
-        npg_carriers_find(window->carriers, mesh, rest, reference->vert_pos, window->vert_count, 0);
+        npg_skin_bind(window->weights, mesh, rest, reference->vert_pos, window->vert_count, 0);
     npg_surface_close(&rest);
     return status;
 }
@@ -49,7 +49,7 @@ npg_status npg_joint_window_open(npg_joint_window **out, const npg_mesh *referen
     window->vert_count = reference->vert_count;
     npg_status status = npg_thin_open(&window->surface, reference, NPG_THIN_SURFACE);
     if (!status) status = npg_joint_open(&window->joint, window->surface->mesh, settings);
-    if (!status) status = find_carriers(window, reference);
+    if (!status) status = bind(window, reference);
     if (status) npg_joint_window_close(&window);
     *out = window;
     return status;
@@ -75,7 +75,7 @@ static void fill_frames(npg_joint_window *window, const surfaces *s, npg_joint_f
     memcpy(s->now, s->before, count * size * sizeof(float));
 }
 
-static void carry(npg_joint_window *window, const surfaces *s, npg_held *held, size_t t, const npg_window *at)
+static void skin(npg_joint_window *window, const surfaces *s, npg_held *held, size_t t, const npg_window *at)
 {
     size_t size = 3 * window->surface->mesh->vert_count;
     float *before = s->before + t * size, *now = s->now + t * size;
@@ -86,7 +86,7 @@ static void carry(npg_joint_window *window, const surfaces *s, npg_held *held, s
     } else {
         for (size_t i = 0; i < size; i++) now[i] = before[i] + share * (now[i] - before[i]);
     }
-    npg_carriers_move(window->carriers, window->vert_count, held->solved, before, now);
+    npg_skin_move(window->weights, window->vert_count, held->solved, before, now);
 }
 
 typedef struct watching {
@@ -114,7 +114,7 @@ npg_status npg_joint_window_solve(npg_joint_window *window, npg_joint_result *re
     npg_status status = npg_arena_status(&scratch);
     if (!status) fill_frames(window, &s, frames, held, count, points);
     if (!status) status = npg_joint_solve(window->joint, result, frames, count, watch_step, &w);
-    for (size_t t = 0; t < count && !status; t++) carry(window, &s, held[t], t, at);
+    for (size_t t = 0; t < count && !status; t++) skin(window, &s, held[t], t, at);
     npg_arena_release(&scratch);
     return status;
 }
@@ -123,5 +123,5 @@ size_t npg_joint_window_memory(const npg_joint_settings *settings, size_t vert_c
 {
     size_t surface = vert_count < 2 * NPG_THIN_SURFACE ? vert_count : NPG_THIN_SURFACE;
     return npg_joint_memory(settings, surface, frames) + 2 * frames * surface * 3 * sizeof(float) +
-           vert_count * sizeof(npg_carrier);
+           vert_count * sizeof(npg_skin_weights);
 }

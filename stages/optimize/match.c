@@ -15,18 +15,18 @@
 
 struct npg_matcher {
     npg_match_settings settings;
-    const npg_carry *carry;   /* loan */
-    const npg_mesh *mesh;     /* its surface, W vertices */
-    npg_surface *surface;     /* moves from frame to frame */
-    float *vert_normals;      /* W x 3 */
-    float *targets, *normals; /* M x 3 */
-    npg_surface_hit *hits;    /* M */
-    float *rest;              /* M x 3: where the hits are at rest */
-    npg_carrier *carriers;    /* M */
-    float *sorted;            /* max(M, S): distances */
-    uint32_t *near;           /* S */
-    float *near_sq;           /* S */
-    npg_arena arrays;         /* holds these */
+    const npg_skinning *skinning; /* loan */
+    const npg_mesh *mesh;         /* its surface, W vertices */
+    npg_surface *surface;         /* moves from frame to frame */
+    float *vert_normals;          /* W x 3 */
+    float *targets, *normals;     /* M x 3 */
+    npg_surface_hit *hits;        /* M */
+    float *rest;                  /* M x 3: where the hits are at rest */
+    npg_skin_weights *weights;    /* M */
+    float *sorted;                /* max(M, S): distances */
+    uint32_t *near;               /* S */
+    float *near_sq;               /* S */
+    npg_arena arrays;             /* holds these */
     size_t target_count;
     double least_width;
 };
@@ -39,16 +39,17 @@ void npg_matcher_close(npg_matcher **slot)
     npg_release(slot);
 }
 
-npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg_match_settings *settings)
+npg_status npg_matcher_open(npg_matcher **out, const npg_skinning *skinning,
+                            const npg_match_settings *settings)
 {
     npg_matcher *m;
     npg_arena *a;
-    const npg_mesh *mesh = carry->surface->mesh;
-    size_t n = (size_t)settings->points, s = carry->samples->mesh->vert_count, w = mesh->vert_count;
+    const npg_mesh *mesh = skinning->surface->mesh;
+    size_t n = (size_t)settings->points, s = skinning->samples->mesh->vert_count, w = mesh->vert_count;
     *out = NULL;
     NPG_TRY(npg_alloc(&m, NPG_FOR_FIT, sizeof *m));
     m->settings = *settings;
-    m->carry = carry;
+    m->skinning = skinning;
     m->mesh = mesh;
     a = &m->arrays;
     a->purpose = NPG_FOR_FIT;
@@ -57,7 +58,7 @@ npg_status npg_matcher_open(npg_matcher **out, const npg_carry *carry, const npg
     m->normals = npg_arena_take(a, n, 3 * sizeof(float));
     m->hits = npg_arena_take(a, n, sizeof *m->hits);
     m->rest = npg_arena_take(a, n, 3 * sizeof(float));
-    m->carriers = npg_arena_take(a, n, sizeof *m->carriers);
+    m->weights = npg_arena_take(a, n, sizeof *m->weights);
     m->sorted = npg_arena_take(a, n > s ? n : s, sizeof(float));
     m->near = npg_arena_take(a, s, sizeof *m->near);
     m->near_sq = npg_arena_take(a, s, sizeof(float));
@@ -75,7 +76,7 @@ void npg_matcher_widen(npg_matcher *m, double width)
 
 size_t npg_matcher_most(const npg_matcher *m)
 {
-    return (size_t)m->settings.points + 2 * m->carry->samples->mesh->vert_count;
+    return (size_t)m->settings.points + 2 * m->skinning->samples->mesh->vert_count;
 }
 
 static double median_of(float *values, size_t count)
@@ -110,8 +111,8 @@ static void pull_target(npg_matcher *m, npg_pull *pull, size_t i, const float *v
     face_point(pull->normal, m->vert_normals, face, hit->weights);
     npg_vec3_make_unitf(pull->normal);
     for (int c = 0; c < 3; c++) {
-        pull->vertex[c] = m->carriers[i].sample[c];
-        pull->share[c] = m->carriers[i].share[c];
+        pull->vertex[c] = m->weights[i].sample[c];
+        pull->share[c] = m->weights[i].share[c];
         for (size_t k = 0; k < 3; k++) at[k] -= pull->share[c] * samples[3 * (size_t)pull->vertex[c] + k];
     }
     for (size_t k = 0; k < 3; k++) pull->constant[k] = at[k] - m->targets[3 * i + k];
@@ -137,7 +138,7 @@ static void match_targets(npg_matcher *m, npg_pull *pulls, size_t *count, const 
 static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, const float *samples,
                                 const float *points, const float *normals, size_t point_count)
 {
-    size_t s_count = m->carry->samples->mesh->vert_count;
+    size_t s_count = m->skinning->samples->mesh->vert_count;
     npg_kdtree *tree;
     NPG_TRY(npg_kdtree_open(&tree, points, point_count));
     npg_status status = npg_kdtree_nearest(tree, m->near, m->near_sq, samples, s_count, 1, 1);
@@ -149,7 +150,8 @@ static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, 
     for (size_t s = 0; s < s_count; s++) {
         const float *to = points + 3 * (size_t)m->near[s];
         npg_pull pull = {.vertex = {(int32_t)s, (int32_t)s, (int32_t)s}, .share = {1, 0, 0}};
-        memcpy(pull.normal, m->vert_normals + 3 * (size_t)m->carry->samples->vertex[s], sizeof pull.normal);
+        memcpy(pull.normal, m->vert_normals + 3 * (size_t)m->skinning->samples->vertex[s],
+               sizeof pull.normal);
         if (normals && npg_vec3_dotf(pull.normal, normals + 3 * (size_t)m->near[s]) < (float)OPPOSITE)
             continue;
         pull.weight = (float)share * robust_weight((double)m->near_sq[s], width);
@@ -174,8 +176,8 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
     for (size_t i = 0; i < m->target_count; i++)
         face_point(m->rest + 3 * i, mesh->vert_pos, mesh->faces + 3 * (size_t)m->hits[i].face,
                    m->hits[i].weights);
-    NPG_TRY(
-        npg_carriers_find(m->carriers, m->carry->samples->mesh, m->carry->rest, m->rest, m->target_count, 1));
+    NPG_TRY(npg_skin_bind(m->weights, m->skinning->samples->mesh, m->skinning->rest, m->rest, m->target_count,
+                          1));
     match_targets(m, pulls, count, vert_unit, samples, normals != NULL);
     if (m->settings.reverse <= 0) return NPG_OK;
     return match_samples(m, pulls, count, samples, points, normals, point_count);
@@ -183,7 +185,7 @@ npg_status npg_match_points(npg_matcher *m, npg_pull *pulls, size_t *count, cons
 
 void npg_match_tie(const npg_matcher *m, npg_pull *pulls, size_t *count, const float *solved)
 {
-    size_t s_count = m->carry->samples->mesh->vert_count;
+    size_t s_count = m->skinning->samples->mesh->vert_count;
     for (size_t s = 0; s < s_count && m->settings.tie > 0; s++) {
         npg_pull pull = {.vertex = {(int32_t)s, (int32_t)s, (int32_t)s}, .share = {1, 0, 0}, .along = 1};
         pull.weight = (float)(m->settings.tie * m->settings.total / (double)s_count);

@@ -4,7 +4,7 @@
 #define NPG_MATCH_H
 
 #include "kernels/motion.h"
-#include "optimize/carry.h"
+#include "optimize/skinning.h"
 
 typedef struct npg_matcher npg_matcher;
 
@@ -16,9 +16,9 @@ typedef struct npg_match_settings {
     double tie;     /* weight of keeping solved positions, for a whole frame */
 } npg_match_settings;
 
-/* carry is a loan that outlives the matcher.  A matcher works in its caller's thread;
- * several may share a carry. */
-npg_status npg_matcher_open(npg_matcher **matcher, const npg_carry *carry,
+/* skinning is a loan that outlives the matcher.  A matcher works in its caller's thread;
+ * several may share it. */
+npg_status npg_matcher_open(npg_matcher **matcher, const npg_skinning *skinning,
                             const npg_match_settings *settings);
 void npg_matcher_close(npg_matcher **matcher);
 
@@ -29,7 +29,7 @@ void npg_matcher_widen(npg_matcher *matcher, double width);
 /* The most pulls of one frame. */
 size_t npg_matcher_most(const npg_matcher *matcher);
 
-/* Pulls of a frame whose surface (carry.h) is now at vert_unit (W x 3) with the samples at `samples` (S x 3).
+/* Pulls of a frame whose surface (skinning.h) is now at vert_unit (W x 3) with the samples at `samples` (S x 3).
  * Points: N x 3 unit, normals N x 3 or NULL.  Distances count less the more they exceed three times the
  * frame's median (Geman and McClure).  Appends to pulls and *count. */
 npg_status npg_match_points(npg_matcher *matcher, npg_pull *pulls, size_t *count, const float *vert_unit,

@@ -46,7 +46,7 @@ struct npg_warm {
     npg_fit_settings fit_settings;
     double isometry; /* of the samples' fit */
     uint64_t seed;
-    npg_carry *carry;
+    npg_skinning *skinning;
     npg_fit *probe; /* over the samples */
     npg_matcher *matchers[MATCHERS_MAX];
     size_t matcher_count, samples, surface_verts;
@@ -86,16 +86,16 @@ static npg_status open_probe(npg_warm *w)
         probe.mlp_rate *= RATE_FACTOR;
     }
     w->isometry = probe.isometry;
-    return npg_fit_open(&w->probe, w->device, &probe, w->carry->samples->mesh, w->seed);
+    return npg_fit_open(&w->probe, w->device, &probe, w->skinning->samples->mesh, w->seed);
 }
 
 static npg_status open_matchers(npg_warm *w)
 {
     size_t count = npg_parallel_parts(MATCHERS_MAX, 1, MATCHERS_MAX);
-    w->surface_verts = w->carry->surface->mesh->vert_count;
+    w->surface_verts = w->skinning->surface->mesh->vert_count;
     NPG_TRY(npg_alloc_array(&w->surfaces, NPG_FOR_FIT, count * w->surface_verts, 3 * sizeof(float)));
     for (; w->matcher_count < count; w->matcher_count++)
-        NPG_TRY(npg_matcher_open(&w->matchers[w->matcher_count], w->carry, &w->settings.match));
+        NPG_TRY(npg_matcher_open(&w->matchers[w->matcher_count], w->skinning, &w->settings.match));
     return NPG_OK;
 }
 
@@ -103,9 +103,9 @@ static npg_status open_matchers(npg_warm *w)
 static npg_status open_samples(npg_warm *w)
 {
     size_t samples = w->settings.samples ? (size_t)w->settings.samples : SAMPLES;
-    if (w->carry) return NPG_OK;
-    NPG_TRY(npg_carry_open(&w->carry, w->facts->reference, samples, NPG_THIN_SURFACE));
-    w->samples = w->carry->samples->mesh->vert_count;
+    if (w->skinning) return NPG_OK;
+    NPG_TRY(npg_skinning_open(&w->skinning, w->facts->reference, samples, NPG_THIN_SURFACE));
+    w->samples = w->skinning->samples->mesh->vert_count;
     return open_matchers(w);
 }
 
@@ -146,7 +146,7 @@ void npg_warm_close(npg_warm **slot)
     npg_fit_close(&w->probe);
     for (size_t m = 0; m < MATCHERS_MAX; m++) npg_matcher_close(&w->matchers[m]);
     npg_release(&w->surfaces);
-    npg_carry_close(&w->carry);
+    npg_skinning_close(&w->skinning);
     npg_release(slot);
 }
 
@@ -209,7 +209,7 @@ static npg_status begin(npg_warm *w, some of)
     for (size_t i = 0; i < of.count; i++) {
         const npg_fit_frame *from = &w->in->frames[of.place[i]];
         frames[i] = (npg_fit_frame){
-            .index = from->index, .time = from->time, .base = w->carry->samples->mesh->vert_pos};
+            .index = from->index, .time = from->time, .base = w->skinning->samples->mesh->vert_pos};
     }
     npg_status status = npg_fit_begin(w->probe, frames, of.count, w->facts->plan.key);
     npg_release(&frames);
@@ -240,14 +240,14 @@ typedef struct pulling {
 /* Where the surface is that points are matched with (W x 3). */
 static void place_surface(const npg_warm *w, float *surface, size_t place)
 {
-    const npg_thin *thin = w->carry->surface;
+    const npg_thin *thin = w->skinning->surface;
     if (w->wide) {
-        npg_thin_gather(thin, surface, w->wide + place * 3 * w->carry->vert_count);
+        npg_thin_gather(thin, surface, w->wide + place * 3 * w->skinning->vert_count);
         return;
     }
     memcpy(surface, thin->mesh->vert_pos, w->surface_verts * 3 * sizeof(float));
-    npg_carriers_move(w->carry->surface_carriers, w->surface_verts, surface,
-                      w->carry->samples->mesh->vert_pos, pose_of(w, place));
+    npg_skin_move(w->skinning->surface_weights, w->surface_verts, surface,
+                  w->skinning->samples->mesh->vert_pos, pose_of(w, place));
 }
 
 static npg_status pull_frame(const pulling *p, size_t i, npg_matcher *matcher, float *surface)
@@ -265,7 +265,7 @@ static npg_status pull_frame(const pulling *p, size_t i, npg_matcher *matcher, f
     NPG_TRY(npg_match_points(matcher, pulls, count, surface, pose_of(w, place), frame->points,
                              w->in->normals[place], frame->count));
     if (!p->with_ties || !w->in->solved[place]) return NPG_OK;
-    npg_carry_gather(w->carry, surface, w->in->solved[place]); /* no more than W */
+    npg_skinning_gather(w->skinning, surface, w->in->solved[place]); /* no more than W */
     npg_match_tie(matcher, pulls, count, surface);
     return NPG_OK;
 }
@@ -368,11 +368,11 @@ static void find_known(npg_warm *w)
 {
     for (size_t i = 0; i < w->in->count; i++) {
         w->is_known[i] = was_known(w, i);
-        if (!w->carry) continue; /* nothing is brought near */
+        if (!w->skinning) continue; /* nothing is brought near */
         if (w->in->solved[i])
-            npg_carry_gather(w->carry, pose_of(w, i), w->in->solved[i]);
+            npg_skinning_gather(w->skinning, pose_of(w, i), w->in->solved[i]);
         else if (w->is_known[i])
-            memcpy(pose_of(w, i), w->carry->samples->mesh->vert_pos, 3 * w->samples * sizeof(float));
+            memcpy(pose_of(w, i), w->skinning->samples->mesh->vert_pos, 3 * w->samples * sizeof(float));
     }
 }
 
@@ -418,7 +418,7 @@ static npg_status begin_dense(npg_warm *w, bool is_pulled, bool is_handed_over)
 /* Where the field has all frames now, from which they are matched next. */
 static npg_status read_field(npg_warm *w, some all)
 {
-    size_t size = 3 * w->carry->vert_count;
+    size_t size = 3 * w->skinning->vert_count;
     if (!w->wide) NPG_TRY(npg_alloc_array(&w->wide, NPG_FOR_FIT, w->in->count, size * sizeof(float)));
     NPG_TRY(decode(w));
     for (size_t i = 0; i < all.count; i++) NPG_TRY(npg_fit_vertices(w->dense, w->wide + i * size, i));
@@ -600,7 +600,7 @@ npg_status npg_warm_save(npg_warm *w, npg_store *store)
 {
     size_t count = w->in->count;
     NPG_TRY(npg_store_put(store, "inside", &w->at, sizeof w->at));
-    if (w->carry)
+    if (w->skinning)
         NPG_TRY(npg_store_put(store, "inside.poses", w->poses, count * 3 * w->samples * sizeof(float)));
     NPG_TRY(npg_store_put(store, "inside.known", w->is_known, count * sizeof *w->is_known));
     NPG_TRY(npg_fit_save(w->dense, store, "inside.fit"));
@@ -648,6 +648,6 @@ size_t npg_warm_memory(const npg_warm_settings *settings, const npg_fit_settings
     size_t pulls = frames * ((size_t)settings->match.points + 2 * count) * sizeof(npg_pull);
     size_t wide = settings->distance == NPG_DISTANCE_SURFACE ? 2 : 0, vector = 3 * sizeof(float);
     return 2 * npg_fit_memory(fit, count, frames, 0, UNITS) + 2 * pulls + 2 * frames * count * vector +
-           wide * frames * vert_count * vector + vert_count * (sizeof(npg_carrier) + vector) +
+           wide * frames * vert_count * vector + vert_count * (sizeof(npg_skin_weights) + vector) +
            (1 + MATCHERS_MAX) * vert_count * SURFACE_BYTES;
 }

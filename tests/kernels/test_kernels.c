@@ -58,15 +58,17 @@ static void sampling_gives_equal_bytes(void **state)
     npg_samples samples;
     npg_latent latent;
     npg_random random = npg_random_stream(5, 0, 0);
+    npg_arena arena = {.purpose = NPG_FOR_RUN};
     float *points, *nodes, *dz, *first = NULL;
     (void)state;
     for (int l = 0; l < 8; l++)
         npg_levels_add(&levels,
                        (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, 3.4, 1, 1}, 0);
     size_t size = levels.row_count * NPG_LATENT_CHANNELS;
-    assert_int_equal(npg_check_values(&points, NULL, POINTS * 3, 1, &random), 0);
-    assert_int_equal(npg_check_values(&nodes, NULL, size, 1, &random), 0);
-    assert_int_equal(npg_check_values(&dz, NULL, ROWS * NPG_LATENT_CHANNELS, 1, &random), 0);
+    npg_check_values(&arena, &points, NULL, POINTS * 3, 1, &random);
+    npg_check_values(&arena, &nodes, NULL, size, 1, &random);
+    npg_check_values(&arena, &dz, NULL, ROWS * NPG_LATENT_CHANNELS, 1, &random);
+    assert_int_equal(npg_arena_status(&arena), 0);
     assert_int_equal(npg_samples_open(&samples, &levels, points, points, POINTS, ROWS), 0);
     assert_int_equal(npg_latent_open(&latent, device, &samples), 0);
     for (int run = 0; run < 2; run++) {
@@ -89,9 +91,7 @@ static void sampling_gives_equal_bytes(void **state)
         npg_buffer_close(&slope);
     }
     npg_release(&first);
-    npg_release(&points);
-    npg_release(&nodes);
-    npg_release(&dz);
+    npg_arena_release(&arena);
     npg_samples_close(&samples);
     npg_latent_close(&latent);
 }

@@ -28,7 +28,7 @@ enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 3 };
 typedef struct tied {
     npg_mlp_shape shape;
     size_t samples, param_count;
-    npg_carry *carry;
+    npg_skinning *skinning;
     npg_matcher *matcher;
     npg_pull *pulls;
     size_t pull_count;
@@ -76,9 +76,9 @@ static void open_tied(tied *t, npg_mesh *ball)
     npg_random random = npg_random_stream(11, 0, 0);
     float dense[3 * VERTS], before[3 * VERTS];
     *t = (tied){.shape = {32, 64, 4}};
-    assert_int_equal(npg_carry_open(&t->carry, ball, 60, 0), 0);
-    assert_int_equal(npg_matcher_open(&t->matcher, t->carry, &match), 0);
-    size_t s = t->samples = t->carry->samples->mesh->vert_count;
+    assert_int_equal(npg_skinning_open(&t->skinning, ball, 60, 0), 0);
+    assert_int_equal(npg_matcher_open(&t->matcher, t->skinning, &match), 0);
+    size_t s = t->samples = t->skinning->samples->mesh->vert_count;
     t->param_count = npg_mlp_param_count(&t->shape);
     assert_int_equal(npg_alloc_array(&t->base, NPG_FOR_RUN, s, 3 * sizeof(float)), 0);
     assert_int_equal(npg_alloc_array(&t->solved, NPG_FOR_RUN, s, 3 * sizeof(float)), 0);
@@ -86,8 +86,8 @@ static void open_tied(tied *t, npg_mesh *ball)
                      0);
     pose_ball(dense, ball->vert_pos, VERTS, 1);
     pose_ball(before, ball->vert_pos, VERTS, 1.5);
-    npg_carry_gather(t->carry, t->base, dense);
-    npg_carry_gather(t->carry, t->solved, before);
+    npg_skinning_gather(t->skinning, t->base, dense);
+    npg_skinning_gather(t->skinning, t->solved, before);
     npg_match_tie(t->matcher, t->pulls, &t->pull_count, t->solved);
     assert_int_equal(t->pull_count, s);
     t->params = wide_array(t->param_count), t->grad = wide_array(t->param_count);
@@ -106,7 +106,7 @@ static void close_tied(tied *t)
                    &t->x,     &t->g,    &t->out,    &t->grad,   &t->dz};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
     npg_matcher_close(&t->matcher);
-    npg_carry_close(&t->carry);
+    npg_skinning_close(&t->skinning);
 }
 
 static void ties_are_the_squared_way_back(void **state)
