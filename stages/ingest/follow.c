@@ -8,18 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/inotify.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "ingest/formats/formats.h"
+#include "ingest/formats/formats_internal.h"
 #include "ingest/formats/reader.h"
 #include "ingest/frame_names.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 
-/* Between two scans of the folder: inotify says when files change, but not on every file system (network
- * folders), and an unchanged size is what tells there that a file is complete. */
+/* Between two scans of the folder: a file that is the same in both is complete, on every file system. */
 #define SCAN_MS 250
 
 typedef struct file {
@@ -27,14 +25,13 @@ typedef struct file {
     off_t size, refused_size;
     struct timespec changed; /* as the file system tells; only compared for being equal */
     double since_s;          /* when it was first seen as it is                         */
-    bool is_stable, is_closed, was_refused;
+    bool is_stable, was_refused;
 } file;
 
 struct npg_follow {
     npg_follow_settings settings;
     char *folder, *pattern, *last; /* owned; pattern may be NULL; last: the name that was taken last */
     char ending[16];               /* of all frames, once one was taken */
-    int watch;                     /* inotify, -1 without */
     file *files;                   /* files[begin .. count): not taken yet, in natural order; owned */
     size_t begin, count, capacity;
     size_t taken_count, late_count;
@@ -70,12 +67,7 @@ npg_status npg_follow_open(npg_follow **out, const npg_follow_settings *settings
     *out = NULL;
     NPG_TRY(npg_alloc(&follow, NPG_FOR_FILES, sizeof *follow));
     follow->settings = *settings;
-    follow->watch = -1;
     npg_status status = split_place(follow, settings->where);
-    /* Where inotify is not to be had, the scans alone find what changes. */
-    if (!status) follow->watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
-    if (follow->watch >= 0)
-        inotify_add_watch(follow->watch, follow->folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_CREATE);
     if (status) npg_follow_close(&follow);
     *out = follow;
     return status;
@@ -90,7 +82,6 @@ void npg_follow_close(npg_follow **slot)
 {
     npg_follow *follow = *slot;
     if (!follow) return;
-    if (follow->watch >= 0) close(follow->watch);
     clear_files(follow->files, follow->count);
     npg_release(&follow->files);
     npg_release(&follow->folder);
@@ -170,7 +161,6 @@ static void note_change(npg_follow *follow, file *f, const struct stat *now)
     f->size = now->st_size;
     f->changed = now->st_mtim;
     f->since_s = npg_clock_s();
-    f->is_closed = false;
     follow->is_changed = true;
 }
 
@@ -282,29 +272,13 @@ npg_status npg_follow_count_new(npg_follow *follow, size_t *count)
 
 /* ---- waiting ---- */
 
-/* Files that their writers have closed, or that were moved here whole. */
-static void read_events(npg_follow *follow)
-{
-    _Alignas(struct inotify_event) char buffer[16 << 10];
-    for (ssize_t got; (got = read(follow->watch, buffer, sizeof buffer)) > 0;)
-        for (ssize_t at = 0; at < got;) {
-            const struct inotify_event *event = (const void *)(buffer + at);
-            at += (ssize_t)(sizeof *event + event->len);
-            if (!event->len || !(event->mask & (IN_CLOSE_WRITE | IN_MOVED_TO))) continue;
-            file *f = find_file(follow, event->name);
-            if (f) f->is_closed = true;
-        }
-}
-
 static npg_status wait_and_scan(npg_follow *follow)
 {
-    struct pollfd wanted = {follow->watch, POLLIN, 0};
     if (follow->settings.stopping(follow->settings.user))
         return npg_error(NPG_STOPPED, "%s: stopped", follow->folder);
-    poll(&wanted, follow->watch >= 0, SCAN_MS);
+    poll(NULL, 0, SCAN_MS);
     follow->is_changed = false;
     NPG_TRY(scan_folder(follow));
-    if (follow->watch >= 0) read_events(follow);
     double now_s = npg_clock_s(), idle_s = follow->settings.idle_s;
     if (follow->is_changed) follow->idle_since_s = now_s;
     if (idle_s > 0 && now_s - follow->idle_since_s >= idle_s) follow->is_ended = true;
@@ -410,7 +384,7 @@ static npg_status try_head(npg_follow *follow, npg_frame *frame, npg_origin *ori
     if (!follow->last) choose_ending_and_number(follow);
     file *head = &follow->files[follow->begin];
     *is_taken = false;
-    if (waits_for_number(follow, head) || !(head->is_closed || head->is_stable)) return NPG_OK;
+    if (waits_for_number(follow, head) || !head->is_stable) return NPG_OK;
     bool is_known_bad = head->was_refused && head->refused_size == head->size;
     if (is_known_bad && !is_broken(follow, head)) return NPG_OK;
     npg_status status = read_file(follow, head, frame, origin);

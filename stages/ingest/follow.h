@@ -1,7 +1,6 @@
 /* Follow: the frames of a folder that grows, in natural order, each as soon as its file is complete.
  *
- * A file is taken when its reader succeeds and it was closed by the program that wrote it, moved into the
- * folder, or kept its size between two scans a quarter of a second apart.  Where the numbers in the names
+ * A file is taken when its reader succeeds and it was the same in two scans a quarter of a second apart.  Where the numbers in the names
  * leave one out, up to NPG_FOLLOW_LATE later files wait for it; then it counts as missing.  A file that its
  * reader refuses, that a later one follows and that has not changed for settle_s is broken.  The source ends
  * when the end file is in the folder and every file has been taken, or when nothing changed for idle_s while

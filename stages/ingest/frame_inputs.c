@@ -10,11 +10,11 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "ingest/formats/formats.h"
-#include "pipeline/number.h"
+#include "ingest/formats/formats_internal.h"
 #include "ingest/frame_names.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
+#include "pipeline/number.h"
 
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 

@@ -1,7 +1,7 @@
 /* Stream: frames one after the other from a pipe. */
 #include <string.h>
 
-#include "ingest/formats/formats.h"
+#include "ingest/formats/formats_internal.h"
 #include "ingest/formats/reader.h"
 
 struct npg_stream {

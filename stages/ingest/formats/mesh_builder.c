@@ -1,7 +1,5 @@
 /* Mesh builder: what a reader collects a mesh in. */
-#include "ingest/formats/mesh_builder.h"
-
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 
 npg_status npg_builder_reserve(npg_mesh_builder *b, size_t vertices, size_t triangles)
 {

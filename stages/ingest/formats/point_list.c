@@ -1,5 +1,5 @@
 /* Point list: what a reader collects a cloud in. */
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,9 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/formats.h"
-#include "ingest/formats/mesh_builder.h"
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 #include "pipeline/number.h"
 
 #define CORNERS_MAX 1024 /* of a polygon; larger ones are damage (set by trial) */

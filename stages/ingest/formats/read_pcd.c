@@ -5,9 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/formats.h"
-#include "ingest/formats/ply_header.h"
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 #include "pipeline/bytes.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */

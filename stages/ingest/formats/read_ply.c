@@ -2,10 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/formats/formats.h"
-#include "ingest/formats/mesh_builder.h"
-#include "ingest/formats/ply_header.h"
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 #include "pipeline/number.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */

@@ -5,8 +5,7 @@
 #include <strings.h>
 
 #include "geometry/vec3.h"
-#include "ingest/formats/formats.h"
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 #include "pipeline/number.h"
 
 #define COLUMNS_MAX    6

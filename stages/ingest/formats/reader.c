@@ -5,8 +5,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "ingest/formats/formats.h"
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 
 typedef npg_status (*cloud_reader)(npg_frame *frame, npg_source *source, npg_origin *origin);
 

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/formats/point_list.h"
+#include "ingest/formats/formats_internal.h"
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
