@@ -11,8 +11,8 @@
 #define NPG_POSE_CACHE_H
 
 #include "align/poses.h"
-#include "pipeline/store.h"
 #include "pipeline/stage.h"
+#include "pipeline/store.h"
 
 /* Zeros are a pass that has nothing from another, and leaves nothing. */
 typedef struct npg_pose_cache {

@@ -5,11 +5,11 @@
 #include <pthread.h>
 
 #include "align/tracker.h"
-#include "pipeline/store.h"
 #include "mesh/poisson.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/stage.h"
+#include "pipeline/store.h"
 
 /* Likeness: how near a user's own mesh is to a frame's points, where it was put.
  *

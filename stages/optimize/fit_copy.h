@@ -4,8 +4,8 @@
 #ifndef NPG_FIT_COPY_H
 #define NPG_FIT_COPY_H
 
-#include "pipeline/store.h"
 #include "optimize/fit.h"
+#include "pipeline/store.h"
 
 /* {0} is none yet. */
 typedef struct npg_fit_copy {

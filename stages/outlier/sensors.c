@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pipeline/file.h"
 #include "pipeline/number.h"
 #include "pipeline/source.h"
-#include "pipeline/file.h"
 
 #define FILE_MOST ((uint64_t)256 << 20) /* bytes */
 

@@ -302,7 +302,7 @@ static const npg_stage *const chain[] = {&npg_stage_ingest, &watch, NULL};
               (const char *const[][2]){{"follow", capture},                                                  \
                                        {"output", "unused"},                                                 \
                                        {"follow-settle", "0.3"},                                             \
-                                       {"follow-end.idle", "5"},                                                 \
+                                       {"follow-end.idle", "5"},                                             \
                                        __VA_ARGS__,                                                          \
                                        {NULL, NULL}},                                                        \
               text)

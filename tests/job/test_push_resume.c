@@ -21,8 +21,8 @@ enum { FRAMES = 26, POINTS = 400, FIRST = 100, STEP = 10 };
 static npg_status open_run(npg_run **run, const char *output, const char *const more[2])
 {
     const char *const settings[][2] = {
-        {"output", output},     {"window", "5"},        {"overlap", "2"},      {"look-ahead", "8"},
-        {"epochs", "2"},        {"faces", "200"},       {"align-nodes", "20"}, {"align-steps", "2"},
+        {"output", output},      {"window", "5"},        {"overlap", "2"},       {"look-ahead", "8"},
+        {"epochs", "2"},         {"faces", "200"},       {"align-nodes", "20"},  {"align-steps", "2"},
         {"bars.flipped", "100"}, {"poisson-depth", "4"}, {"bars.coverage", "0"}, {"bars.residual", "100"}};
     npg_options *options = NULL;
     assert_int_equal(npg_options_open(&options), NPG_OK);

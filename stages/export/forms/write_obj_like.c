@@ -3,9 +3,9 @@
 
 #include "export/forms/write_obj.h"
 #include "export/forms/writer.h"
+#include "pipeline/file.h"
 #include "pipeline/number.h"
 #include "pipeline/source.h"
-#include "pipeline/file.h"
 
 typedef struct copying {
     npg_file *file;

@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-#include "pipeline/source.h"
 #include "pipeline/memory.h"
+#include "pipeline/source.h"
 
 void npg_image_clear(npg_image *image)
 {

@@ -5,13 +5,13 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "pipeline/source.h"
 #include "ingest/frame_inputs.h"
 #include "ingest/rig/image.h"
 #include "ingest/rig/rig.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
+#include "pipeline/source.h"
 
 typedef struct place {
     const char *file;
