@@ -9,7 +9,7 @@
 #include "geometry/geometry.h"
 #include "kernels/mlp.h"
 #include "kernels/motion.h"
-#include "mesh/poisson.h"
+#include "mesh/surface.h"
 #include "optimize/joint.h"
 #include "pipeline/busy.h"
 #include "pipeline/order.h"

@@ -23,9 +23,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
-#include "mesh/denoise.h"
-#include "mesh/fused.h"
-#include "mesh/mesh_clean.h"
+#include "mesh/surface.h"
 #include "pipeline/cost.h"
 #include "pipeline/options.h"
 #include "pipeline/order.h"
@@ -40,12 +38,13 @@
 #define FRAMES_SHARE    0.05 /* of all frames must have seen a place, ...                              */
 #define FRAMES_AT_LEAST 2    /* ... and so many                                                        */
 
-#define HUE_SIDE 1 /* side of a cube that colours are averaged over, in spacings of the keyframe's points */
-#define HUES_MOST                                                                                            \
+#define COLOUR_SIDE                                                                                          \
+    1 /* side of a cube that colours are averaged over, in spacings of the keyframe's points */
+#define COLOURS_MOST                                                                                         \
     60000 /* such cubes; at 20 000 faces each vertex has six                                       */
 
-#define HUE_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
-#define HUE_HALF 2.0 /* frames away at which they count half of that                       */
+#define COLOUR_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
+#define COLOUR_HALF 2.0 /* frames away at which they count half of that                       */
 
 /* Space that sensors saw empty, in spacings of the keyframe's points, each over eight of them. */
 #define EMPTY_SIDE   0.4    /* of a cell ...                                                      */
@@ -77,11 +76,11 @@ typedef struct state {
     size_t sensors;
     npg_carry_back *carry;
     npg_cells *cells;
-    npg_empty_cells *empty; /* NULL: it is not known where sensors stood */
-    npg_colour_cells *hues; /* NULL: the points have no colours, or none are wanted */
-    int64_t key;            /* index of the keyframe */
-    double spacing, noise;  /* of the keyframe's points */
-    double usual;           /* mean of the frames' median distances */
+    npg_empty_cells *empty;    /* NULL: it is not known where sensors stood */
+    npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
+    int64_t key;               /* index of the keyframe */
+    double spacing, noise;     /* of the keyframe's points */
+    double usual;              /* mean of the frames' median distances */
     int64_t frames, misaligned, points, strays;
     double grow_dist; /* of an open reference that sensors saw: so near its border points add to it; else 0 */
 } state;
@@ -140,9 +139,9 @@ static npg_status median_dist(double *median, const cloud *c, bool is_growing)
 }
 
 /* The surface slides along the body, the more the farther a frame is from the keyframe: colours blur. */
-static unsigned hue_weight(int64_t away)
+static unsigned colour_weight(int64_t away)
 {
-    double weight = HUE_KEY / (1 + (double)llabs(away) / HUE_HALF);
+    double weight = COLOUR_KEY / (1 + (double)llabs(away) / COLOUR_HALF);
     return weight > 1 ? (unsigned)lrint(weight) : 1;
 }
 
@@ -150,7 +149,7 @@ static unsigned hue_weight(int64_t away)
  * surface is, so that noise across the surface averages out; what is not, where it is. */
 static npg_status add_points(state *s, const cloud *c, int64_t frame, double near_dist, double far_dist)
 {
-    unsigned weight = hue_weight(frame - s->key);
+    unsigned weight = colour_weight(frame - s->key);
     for (size_t i = 0; i < c->count; i++) {
         const npg_carried *p = &c->carried[i];
         bool is_near = (double)p->dist <= near_dist;
@@ -164,8 +163,8 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
             continue;
         }
         const uint8_t *colour = c->colours ? c->colours + 4 * npg_spread_index(i, c->count, c->of) : NULL;
-        if (colour && colour[3] && is_near && s->hues)
-            npg_colour_cells_add(s->hues, p->foot, p->facing, colour, weight);
+        if (colour && colour[3] && is_near && s->colours)
+            npg_colour_cells_add(s->colours, p->foot, p->facing, colour, weight);
         NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,
                               p->point, p->normal, (float)(robust * robust), frame));
     }
@@ -229,7 +228,8 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     double median;
     NPG_TRY(open_cloud(c, worker, frame));
     if (!s->carry) NPG_TRY(open_gathering(worker, c));
-    if (c->colours && !s->hues) NPG_TRY(npg_colour_cells_open(&s->hues, HUE_SIDE * s->spacing, HUES_MOST));
+    if (c->colours && !s->colours)
+        NPG_TRY(npg_colour_cells_open(&s->colours, COLOUR_SIDE * s->spacing, COLOURS_MOST));
     NPG_TRY(npg_carry_back_move(s->carry, frame->vert_unit));
     NPG_TRY(npg_carry_back_points(s->carry, c->carried, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
@@ -291,15 +291,15 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
                : NPG_OK;
 }
 
-static npg_status collect_hues(const state *s, npg_fused *fused)
+static npg_status collect_colours(const state *s, npg_fused *fused)
 {
-    size_t count = s->hues ? npg_colour_cells_count(s->hues) : 0;
+    size_t count = s->colours ? npg_colour_cells_count(s->colours) : 0;
     if (!count) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&fused->hue_points, NPG_FOR_MESH, count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&fused->hue_normals, NPG_FOR_MESH, count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&fused->hues, NPG_FOR_MESH, count, 4));
-    npg_colour_cells_means(s->hues, fused->hue_points, fused->hue_normals, fused->hues);
-    fused->hue_count = count;
+    NPG_TRY(npg_alloc_array(&fused->colour_points, NPG_FOR_MESH, count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fused->colour_normals, NPG_FOR_MESH, count, 3 * sizeof(float)));
+    NPG_TRY(npg_alloc_array(&fused->colours, NPG_FOR_MESH, count, 4));
+    npg_colour_cells_means(s->colours, fused->colour_points, fused->colour_normals, fused->colours);
+    fused->colour_count = count;
     return NPG_OK;
 }
 
@@ -320,7 +320,7 @@ static npg_status publish(npg_worker *worker)
     npg_fused *fused;
     NPG_TRY(npg_alloc(&fused, NPG_FOR_MESH, sizeof *fused));
     npg_status status = collect(worker, fused);
-    if (!status) status = collect_hues(s, fused);
+    if (!status) status = collect_colours(s, fused);
     if (!status) status = collect_empty(s, fused);
     if (status) {
         npg_fused_close(&fused);
@@ -428,7 +428,7 @@ static void uninit(npg_worker *worker)
     npg_carry_back_close(&s->carry);
     npg_cells_close(&s->cells);
     npg_empty_cells_close(&s->empty);
-    npg_colour_cells_close(&s->hues);
+    npg_colour_cells_close(&s->colours);
 }
 
 /* Without alignment nothing is known to carry points by. */
@@ -445,10 +445,10 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t points =
         facts->point_count_max < NPG_FUSED_FRAME_MOST ? facts->point_count_max : NPG_FUSED_FRAME_MOST;
     *chunks_held = 1;
-    size_t hues =
-        npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(HUES_MOST);
+    size_t colours =
+        npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(COLOURS_MOST);
     size_t empty = facts->sensor_count_max ? npg_empty_cells_memory(EMPTY_MOST) : 0;
-    return empty + hues + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
+    return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
 }
 

@@ -4,9 +4,7 @@
 #include <math.h>
 
 #include "geometry/mesh_tools.h"
-#include "mesh/contact.h"
-#include "mesh/mesh_clean.h"
-#include "mesh/resurface.h"
+#include "mesh/surface.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
 
@@ -37,8 +35,8 @@ static npg_status draft_from(npg_mesh **mesh, int64_t *handles, const npg_candid
     int rounds;
     npg_mending mending;
     NPG_TRY(npg_cloud_spacing(&spacing, cloud->points, cloud->point_count));
-    NPG_TRY(npg_resurface_apart(mesh, &moved, &turned, &rounds, normals, cloud->points, cloud->point_count,
-                                spacing, settings));
+    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, &rounds, normals, cloud->points, cloud->point_count,
+                                  spacing, settings));
     NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
     NPG_TRY(npg_mesh_handles(handles, *mesh));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));

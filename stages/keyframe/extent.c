@@ -4,7 +4,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
-#include "mesh/mesh_clean.h"
+#include "mesh/surface.h"
 #include "pipeline/memory.h"
 
 #define GRID       512 /* cells per axis at most: the paper's */

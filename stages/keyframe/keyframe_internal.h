@@ -4,21 +4,22 @@
 
 #include <pthread.h>
 
+    #include "pipeline/chunk.h"
 #include "align/tracker.h"
-#include "mesh/poisson.h"
+#include "mesh/surface.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/stage.h"
 #include "pipeline/store.h"
 
-/* Likeness: how near a user's own mesh is to a frame's points, where it was put.
+    /* Likeness: how near a user's own mesh is to a frame's points, where it was put.
  *
  *     d = mean_p |p - nearest vertex| + mean_v |v - nearest point|
  *
  * over at most about LOOKED_AT points p of the frame and as many vertices v.  The frame with the smallest d
  * is the one whose pose the mesh has: it is the keyframe that a run with the user's own mesh should have. */
 
-typedef struct npg_likeness npg_likeness;
+    typedef struct npg_likeness npg_likeness;
 
 /* Read the mesh (PLY or OBJ).  origin is known.  NPG_BAD_INPUT names the file. */
 npg_status npg_likeness_open(npg_likeness **likeness, const char *path, const npg_origin *origin,
@@ -116,11 +117,11 @@ void npg_shortlist_choose(npg_choice *choice, const npg_shortlist *shortlist, in
  *     * (1 + 0.3 * (frames from the middle / frames of the capture)^2)
  *
  * lengths in units; the first three are means over the other frames, contact is that of its own points
- * (contact.h).  A weld keeps surface away from points, stretches where limbs part, and often makes a handle;
- * contact tells of welds that the coarse tracker does not feel.  The frame with the best score stays the
- * keyframe unless another is clearly cheaper and has its parts more apart: fewer handles, or clearly less
- * contact.  Candidates that are not more apart are neither drafted nor followed; where there is none, the
- * choice costs one draft. */
+ * (npg_cloud_contact()).  A false bridge keeps surface away from points, stretches where limbs part, and often
+ * makes a handle; contact tells of bridges that the coarse tracker does not feel.  The frame with the best
+ * score stays the keyframe unless another is clearly cheaper and has its parts more apart: fewer handles, or
+ * clearly less contact.  Candidates that are not more apart are neither drafted nor followed; where there is
+ * none, the choice costs one draft. */
 
 typedef struct npg_draft_result {
     int64_t index, number;
@@ -152,7 +153,7 @@ typedef struct npg_choose_pass {
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk);
 
 /* The end of the pass: *result gets the candidate to take, result->index -1 where the frame by score stays.
- * Its candidates go into the stage's report; what was seen is published where welds are to be cut
+ * Its candidates go into the stage's report; what was seen is published where bridges are to be cut
  * (npg_fact_candidate_clouds).  NPG_MEMORY, NPG_STOPPED. */
 npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_draft_result *result);
 

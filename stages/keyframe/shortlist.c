@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "mesh/contact.h"
+#include "mesh/surface.h"
 
 #define APART  2    /* places in the choice between two candidates, at least */
 #define NEARLY 0.95 /* of the most cells, that a candidate must show         */

@@ -1,5 +1,5 @@
 /* Denoise: how noisy a cloud is, and a smoother version of an oriented one. */
-#include "mesh/denoise.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <stdbool.h>

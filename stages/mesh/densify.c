@@ -1,5 +1,5 @@
 /* Densify: which points are of thin parts, their neighbours, and what lies between. */
-#include "mesh/densify.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <stdbool.h>

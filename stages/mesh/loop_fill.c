@@ -1,5 +1,5 @@
 /* Loop fill: the triangulation of least area. */
-#include "mesh/loop_fill.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <stdlib.h>

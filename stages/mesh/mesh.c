@@ -6,18 +6,12 @@
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
-#include "mesh/fused.h"
-#include "mesh/mesh_clean.h"
-#include "mesh/point_set.h"
-#include "mesh/reconstruct.h"
-#include "mesh/report.h"
-#include "mesh/unseen.h"
-#include "mesh/weld.h"
+#include "mesh/mesh_internal.h"
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
 #include "pipeline/stage.h"
 
-/* Limits of the reconstruction's process: one that hangs or that points of a strange kind have blown up ends. */
+/* Limits of the reconstruction's process: one that hangs, or that strange points have blown up, ends. */
 #define POISSON_TIME_S     600
 #define POISSON_MEMORY_MIB 8192 /* of address space, or what --max-memory says, if that is more */
 
@@ -25,7 +19,7 @@ typedef struct mesh_state {
     npg_reconstruct_settings surface; /* but for `poisson`, which is made of the next three */
     int64_t depth;
     double point_weight;
-    int apart; /* npg_apart_way */
+    int gaps; /* npg_gap_way */
     double invented_max;
     bool is_made; /* the reference of this pass */
 } mesh_state;
@@ -41,7 +35,7 @@ static const npg_option mesh_options[] = {
         "How closely the Poisson surface follows the points"),
     NPG_KEY(FLAG,   "smooth",         AT(surface.smooth),   "yes",
         "Smooth the keyframe's points for the reconstruction when they are noisy"),
-    NPG_KEY(CHOICE, "hold-apart",     AT(apart),            "tight", "tight|loose|no",
+    NPG_KEY(CHOICE, "hold-apart",     AT(gaps),             "tight", "tight|loose|no",
         "Hold parts that nearly touch apart while the surface is made, so that they are not joined; "
         "after that bring it back to its points (tight), "
         "or nearly so, which leaves a little of the gap (loose)"),
@@ -61,7 +55,7 @@ static npg_poisson_settings poisson_settings(const mesh_state *s)
 {
     return (npg_poisson_settings){.depth = (int)s->depth,
                                   .point_weight = s->point_weight,
-                                  .apart = (npg_apart_way)s->apart,
+                                  .gaps = (npg_gap_way)s->gaps,
                                   .time_limit_s = POISSON_TIME_S,
                                   .memory_limit = (size_t)POISSON_MEMORY_MIB << 20};
 }
@@ -83,6 +77,31 @@ typedef struct making { /* what is known while the reference is made */
     npg_mesh *mesh;         /* owned */
 } making;
 
+/* ---- the report ---- */
+
+void npg_mesh_note(npg_worker *worker, const char *key, double value)
+{
+    json_object_set_new(npg_worker_report(worker), key, json_real(value));
+}
+
+void npg_mesh_note_count(npg_worker *worker, const char *key, size_t value)
+{
+    json_object_set_new(npg_worker_report(worker), key, json_integer((json_int_t)value));
+}
+
+void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (npg_worker_pass(worker) == NPG_PASS_SOLVE)
+        npg_worker_warn(worker, partial, frame, "%s", text);
+    else
+        npg_worker_log(worker, NPG_LOG_INFO, frame, "%s", text);
+}
+
 /* ---- from points ---- */
 
 static npg_status make(making *m)
@@ -96,9 +115,9 @@ static npg_status make(making *m)
     return npg_reconstruct(&m->mesh, &m->invented_share, m->worker, &m->set, &settings);
 }
 
-/* ---- welds ---- */
+/* ---- false bridges ---- */
 
-static void report_welds(making *m, const npg_weld_cut *cut)
+static void report_false_bridges(making *m, const npg_bridge_cut *cut)
 {
     npg_mesh_note(m->worker, "handles", (double)cut->handles);
     npg_mesh_note_count(m->worker, "weld_frames", cut->frames);
@@ -107,9 +126,10 @@ static void report_welds(making *m, const npg_weld_cut *cut)
     npg_mesh_note(m->worker, "weld_area_share", cut->area_share);
     npg_mesh_note_count(m->worker, "welds_refused", cut->refused);
     if (cut->patches)
-        npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
-                       "%zu welds that other frames pull apart were cut: %zu faces, %.2f %% of the area",
-                       cut->patches, cut->faces, 100 * cut->area_share);
+        npg_worker_log(
+            m->worker, NPG_LOG_INFO, m->key->number,
+            "%zu false bridges that other frames pull apart were cut: %zu faces, %.2f %% of the area",
+            cut->patches, cut->faces, 100 * cut->area_share);
     if (cut->refused)
         npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
                        "%zu patches that other frames stretch could not be cut cleanly and stay",
@@ -117,20 +137,20 @@ static void report_welds(making *m, const npg_weld_cut *cut)
 }
 
 /* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
-static npg_status cut_welds(making *m)
+static npg_status cut_false_bridges(making *m)
 {
     bool is_last = npg_worker_pass(m->worker) == NPG_PASS_SOLVE;
     npg_candidate_clouds *clouds = is_last ? npg_worker_take_fact(m->worker, &npg_fact_candidate_clouds)
                                            : npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
-    npg_weld_settings settings = {
+    npg_bridge_settings settings = {
         .spacing_unit = m->set.spacing, .should_stop = npg_worker_should_stop, .user = m->worker};
-    npg_weld_cut done;
+    npg_bridge_cut done;
     if (!clouds) return NPG_OK;
     size_t at = npg_candidate_clouds_find(clouds, m->key->index);
     double since = npg_clock_s();
     npg_status status =
-        at < clouds->count ? npg_weld_cut_all(&m->mesh, &done, clouds, at, &settings) : NPG_OK;
-    if (!status && at < clouds->count) report_welds(m, &done);
+        at < clouds->count ? npg_bridge_cut_all(&m->mesh, &done, clouds, at, &settings) : NPG_OK;
+    if (!status && at < clouds->count) report_false_bridges(m, &done);
     npg_mesh_note(m->worker, "welds_s", npg_clock_s() - since);
     if (is_last) npg_candidate_clouds_close(&clouds); /* a few MB that no later frame needs */
     return status == NPG_DIVERGED ? NPG_OK : status;
@@ -233,14 +253,14 @@ static npg_status colour_reference(making *m)
 {
     npg_mesh *mesh = m->mesh;
     const npg_frame *key = m->key;
-    bool is_fused = m->fused && m->fused->hues;
+    bool is_fused = m->fused && m->fused->colours;
     float *points = NULL;
     if (mesh->vert_colours || npg_worker_settings(m->worker)->colour == NPG_COLOUR_NO) return NPG_OK;
     if (!is_fused && !key->colours) return NPG_OK;
-    npg_coloured cloud = {.count = is_fused ? m->fused->hue_count : key->point_count,
-                          .points = is_fused ? m->fused->hue_points : NULL,
-                          .normals = is_fused ? m->fused->hue_normals : key->normals,
-                          .colours = is_fused ? m->fused->hues : key->colours};
+    npg_coloured cloud = {.count = is_fused ? m->fused->colour_count : key->point_count,
+                          .points = is_fused ? m->fused->colour_points : NULL,
+                          .normals = is_fused ? m->fused->colour_normals : key->normals,
+                          .colours = is_fused ? m->fused->colours : key->colours};
     NPG_TRY(npg_alloc_array(&mesh->vert_colours, NPG_FOR_MESH, mesh->vert_count, 4));
     npg_status status =
         is_fused ? NPG_OK : npg_alloc_array(&points, NPG_FOR_MESH, cloud.count, 3 * sizeof(float));
@@ -269,7 +289,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status) status = is_given ? read_reference(&m) : make(&m);
-    if (!status && !is_given) status = cut_welds(&m);
+    if (!status && !is_given) status = cut_false_bridges(&m);
     if (!status) status = measure_reference(&m);
     if (!status) status = judge_invented(&m);
     if (!status) status = colour_reference(&m);

@@ -6,7 +6,7 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/sets.h"
 #include "geometry/vec3.h"
-#include "mesh/mesh_clean.h"
+#include "mesh/mesh_internal.h"
 
 #define SMOOTH_ROUNDS 12
 #define MEND_ROUNDS   12

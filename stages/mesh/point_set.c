@@ -1,12 +1,10 @@
 /* Point set: the reference's points, out of a frame or out of all frames, and their measures. */
-#include "mesh/point_set.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
-#include "mesh/mesh_clean.h"
-#include "mesh/report.h"
 #include "pipeline/cost.h"
 
 #define POINTS_MAX    80000
@@ -84,4 +82,26 @@ void npg_point_set_close(npg_point_set *set)
     npg_release(&set->points);
     npg_release(&set->normals);
     npg_cube_set_close(&set->empty);
+}
+
+/* ---- what all frames saw ---- */
+
+static void release_fused(void *value)
+{
+    npg_fused *fused = value;
+    npg_fused_close(&fused);
+}
+
+const npg_fact_kind npg_fact_fused = {"fused", "fuse", release_fused};
+
+void npg_fused_close(npg_fused **slot)
+{
+    if (!slot || !*slot) return;
+    npg_release(&(*slot)->points);
+    npg_release(&(*slot)->normals);
+    npg_release(&(*slot)->colour_points);
+    npg_release(&(*slot)->colour_normals);
+    npg_release(&(*slot)->colours);
+    npg_release(&(*slot)->empty);
+    npg_release(slot);
 }

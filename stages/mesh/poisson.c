@@ -1,5 +1,5 @@
 /* Poisson: checks, child process, checks. */
-#include "mesh/poisson.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <string.h>

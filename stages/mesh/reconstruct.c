@@ -1,18 +1,10 @@
 /* Reconstruct: the steps from a point set to a clean mesh, in the order in which they are taken. */
-#include "mesh/reconstruct.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
-#include "mesh/denoise.h"
-#include "mesh/densify.h"
-#include "mesh/flatten.h"
-#include "mesh/follow_normals.h"
-#include "mesh/fringe.h"
-#include "mesh/mesh_clean.h"
-#include "mesh/report.h"
-#include "mesh/resurface.h"
 #include "mesh/vdb.h"
 #include "pipeline/clock.h"
 
@@ -69,12 +61,12 @@ static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned,
     size_t count;
     /* noisy normals do not say what lies between, nor those that were estimated across both sides */
     if (r->is_rough || !p->has_given_normals)
-        return npg_resurface_apart(&r->mesh, moved, turned, rounds, p->normals, p->points, p->count,
-                                   p->spacing, settings);
+        return npg_resurface_widened(&r->mesh, moved, turned, rounds, p->normals, p->points, p->count,
+                                     p->spacing, settings);
     NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
     npg_mesh_note_count(r->worker, "points_between", count - p->count);
     npg_status status =
-        npg_resurface_apart(&r->mesh, moved, turned, rounds, normals, points, count, p->spacing, settings);
+        npg_resurface_widened(&r->mesh, moved, turned, rounds, normals, points, count, p->spacing, settings);
     if (!status) memcpy(p->normals, normals, 3 * p->count * sizeof *normals); /* their sides are mended */
     npg_release(&points);
     npg_release(&normals);
@@ -145,12 +137,12 @@ static npg_status judge_unseen(reconstruction *r, bool *trim_unseen)
 
 /* Of a side that has grown to a body shreds are left along the border.  One that still grows needs all it
  * has, and of one frame half a limb is as narrow. */
-static npg_status drop_fringe(reconstruction *r)
+static npg_status drop_shreds(reconstruction *r)
 {
     const npg_facts *facts = npg_worker_facts(r->worker);
     double share;
     if (!facts->growing_passes || facts->is_growing) return NPG_OK;
-    NPG_TRY(npg_mesh_drop_fringe(&r->mesh, &share, r->set->seen_dist));
+    NPG_TRY(npg_mesh_trim_shreds(&r->mesh, &share, r->set->seen_dist));
     npg_mesh_note(r->worker, "fringe_share", share);
     return NPG_OK;
 }
@@ -165,7 +157,7 @@ static npg_status trim(reconstruction *r)
     NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, limit));
     npg_mesh_note(r->worker, "trimmed_share", share);
     if (!r->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
-    if (trim_unseen) NPG_TRY(drop_fringe(r));
+    if (trim_unseen) NPG_TRY(drop_shreds(r));
     NPG_TRY(npg_mesh_unseen(&r->invented_share, r->mesh, p->points, p->count, p->seen_dist));
     if (!trim_unseen && share > LOST_TOLERATED)
         npg_mesh_warn(r->worker, false, p->key_number,
@@ -176,13 +168,13 @@ static npg_status trim(reconstruction *r)
 }
 
 /* The closed balloon over what nobody saw becomes the least surface there, out of space that is empty. */
-static npg_status flatten(reconstruction *r)
+static npg_status fair(reconstruction *r)
 {
     const npg_point_set *p = r->set;
-    npg_flattened done;
+    npg_faired done;
     npg_mending mending;
     if (r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
-    NPG_TRY(npg_mesh_flatten(r->mesh, &done, p->points, p->count, FLAT_SHARE * p->seen_dist, p->empty));
+    NPG_TRY(npg_mesh_fair(r->mesh, &done, p->points, p->count, FLAT_SHARE * p->seen_dist, p->empty));
     npg_mesh_note_count(r->worker, "vertices_flattened", done.moved);
     if (p->empty) npg_mesh_note_count(r->worker, "vertices_pushed", done.pushed);
     return done.moved ? npg_mesh_mend(&r->mesh, &mending) : NPG_OK;
@@ -195,7 +187,7 @@ static npg_status leave_empty_space(reconstruction *r)
     if (!r->set->empty) return NPG_OK;
     double share = npg_mesh_share_in(r->mesh, r->set->empty);
     npg_mesh_note(r->worker, "seen_empty_share", share);
-    return share > 0 ? flatten(r) : NPG_OK;
+    return share > 0 ? fair(r) : NPG_OK;
 }
 
 /* ---- few faces, and sound ones ---- */
@@ -226,7 +218,7 @@ static npg_status turn_faces(reconstruction *r)
 {
     npg_mending mending;
     if (!r->is_rough) return NPG_OK;
-    NPG_TRY(npg_mesh_follow_normals(r->mesh, r->set->points, r->set->normals, r->set->count));
+    NPG_TRY(npg_mesh_denoise(r->mesh, r->set->points, r->set->normals, r->set->count));
     return npg_mesh_mend(&r->mesh, &mending);
 }
 
@@ -247,7 +239,7 @@ static npg_status shape(reconstruction *r, bool *sound)
     NPG_TRY(leave_empty_space(r));
     NPG_TRY(decimate(r));
     NPG_TRY(turn_faces(r));
-    NPG_TRY(flatten(r));
+    NPG_TRY(fair(r));
     if (r->set->empty)
         npg_mesh_note(r->worker, "seen_empty_left_share", npg_mesh_share_in(r->mesh, r->set->empty));
     return is_sound(sound, r->mesh);

@@ -1,5 +1,5 @@
 /* Resurface: Poisson again and again, until points and surface agree on which side is out. */
-#include "mesh/resurface.h"
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -8,7 +8,6 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
 #include "geometry/vec3.h"
-#include "mesh/apart.h"
 
 #define ROUNDS_MAX  4
 #define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
@@ -80,20 +79,20 @@ npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *no
     return npg_poisson(mesh, points, normals, point_count, settings);
 }
 
-npg_status npg_resurface_apart(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
-                               const float *points, size_t n, double spacing,
-                               const npg_poisson_settings *settings)
+npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
+                                 const float *points, size_t n, double spacing,
+                                 const npg_poisson_settings *settings)
 {
-    npg_apart apart;
+    npg_gap_widening gaps;
     *mesh = NULL;
     *moved = 0;
-    if (settings->apart == NPG_APART_NOT)
+    if (settings->gaps == NPG_GAPS_KEPT)
         return npg_resurface(mesh, turned, rounds, normals, points, n, settings);
-    NPG_TRY(npg_apart_open(&apart, points, normals, n, spacing, settings->apart));
-    *moved = apart.moved;
-    npg_status status = npg_resurface(mesh, turned, rounds, normals, apart.shifted, n, settings);
-    if (!status) status = npg_apart_bring_back(&apart, *mesh);
+    NPG_TRY(npg_gaps_widen(&gaps, points, normals, n, spacing, settings->gaps));
+    *moved = gaps.moved;
+    npg_status status = npg_resurface(mesh, turned, rounds, normals, gaps.shifted, n, settings);
+    if (!status) status = npg_gaps_bring_back(&gaps, *mesh);
     if (status) npg_mesh_unref(mesh);
-    npg_apart_close(&apart);
+    npg_gaps_close(&gaps);
     return status;
 }

@@ -1,11 +1,10 @@
 /* Unseen: the mask of the reference, and its largest patch. */
-#include "mesh/unseen.h"
+#include "mesh/mesh_internal.h"
 
 #include <stdio.h>
 
 #include "align/tracker.h"
 #include "geometry/mesh_tools.h"
-#include "mesh/mesh_clean.h"
 
 npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t point_count, double dist_max)
 {

@@ -11,7 +11,7 @@
 
 #include "evaluate/evaluate_shape.h"
 #include "export/forms/writer.h"
-#include "mesh/unseen.h"
+#include "mesh/mesh_internal.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"
 

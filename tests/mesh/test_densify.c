@@ -9,9 +9,7 @@
 
 #include <cmocka.h>
 
-#include "mesh/denoise.h"
-#include "mesh/densify.h"
-#include "mesh/mesh_clean.h"
+#include "mesh/mesh_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/shapes.h"
 

@@ -11,8 +11,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
-#include "mesh/mesh_clean.h"
-#include "mesh/poisson.h"
+#include "mesh/surface.h"
 #include "mesh/vdb.h"
 #include "pipeline/child.h"
 #include "pipeline/stage.h"

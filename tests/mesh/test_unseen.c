@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "mesh/unseen.h"
+#include "mesh/mesh_internal.h"
 #include "tests/support/ball_mesh.h"
 
 static const float sensor[3] = {0, 0, 50};

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "mesh/denoise.h"
+#include "mesh/surface.h"
 #include "outlier/normals.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"

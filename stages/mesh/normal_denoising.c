@@ -1,5 +1,5 @@
-/* Follow normals: targets from the points once, then steps of the vertices. */
-#include "mesh/follow_normals.h"
+/* Normal-guided denoising: targets from the points once, then steps of the vertices. */
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <string.h>
@@ -126,8 +126,7 @@ static void take_back(work *w)
     for (size_t i = 0; i < count; i++) w->mesh->vert_pos[i] -= (float)w->smooth[i];
 }
 
-npg_status npg_mesh_follow_normals(npg_mesh *mesh, const float *points, const float *normals,
-                                   size_t point_count)
+npg_status npg_mesh_denoise(npg_mesh *mesh, const float *points, const float *normals, size_t point_count)
 {
     size_t v = mesh->vert_count, f = mesh->face_count;
     work w = {.mesh = mesh, .arena.purpose = NPG_FOR_MESH};

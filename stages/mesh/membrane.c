@@ -1,10 +1,9 @@
-/* Flatten: Gauss and Seidel's sweeps over the unseen vertices, in their order. */
-#include "mesh/flatten.h"
+/* Membrane fairing: Gauss and Seidel's sweeps over the unseen vertices, in their order. */
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 
 #include "geometry/mesh_tools.h"
-#include "mesh/mesh_clean.h"
 
 #define SWEEPS_MOST   400
 #define RELAXATION    1.7  /* beyond the mean: successive over-relaxation */
@@ -107,13 +106,13 @@ static npg_status find_unseen(uint8_t *kind, size_t *unseen, const npg_mesh *mes
     return status;
 }
 
-npg_status npg_mesh_flatten(npg_mesh *mesh, npg_flattened *done, const float *points, size_t point_count,
-                            double seen_dist, const npg_cube_set *empty)
+npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, size_t point_count,
+                         double seen_dist, const npg_cube_set *empty)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     moving m = {.mesh = mesh, .empty = empty};
     size_t n = mesh->vert_count, unseen = 0;
-    *done = (npg_flattened){0};
+    *done = (npg_faired){0};
     m.kind = npg_arena_take(&scratch, n, sizeof *m.kind);
     m.normals = npg_arena_take(&scratch, empty ? n : 0, 3 * sizeof *m.normals);
     uint32_t *ends = npg_arena_take(&scratch, n, sizeof *ends);

@@ -6,10 +6,7 @@
 #include <cmocka.h>
 
 #include "geometry/mesh_tools.h"
-#include "mesh/apart.h"
-#include "mesh/contact.h"
-#include "mesh/loop_fill.h"
-#include "mesh/resurface.h"
+#include "mesh/mesh_internal.h"
 #include "tests/support/legs.h"
 
 /* ---- a torus of n x n quads, with `holes` faces left out at its end ---- */
@@ -135,7 +132,7 @@ static void feet_that_nearly_touch_are_in_contact(void **state)
 }
 
 /* Mean distance to the surface of the points that were moved. */
-static double gap_to(const npg_mesh *mesh, const npg_apart *apart)
+static double gap_to(const npg_mesh *mesh, const npg_gap_widening *apart)
 {
     static npg_surface_hit hits[LEGS_POINTS];
     npg_surface *surface;
@@ -156,13 +153,12 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     (void)state;
     const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60};
     npg_frame frame = {0};
-    npg_apart apart;
+    npg_gap_widening apart;
     npg_mesh *mesh;
     size_t n = LEGS_POINTS;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK); /* a gap of 0.02 at the feet */
-    assert_int_equal(npg_apart_open(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_APART_TIGHT),
-                     NPG_OK);
+    assert_int_equal(npg_gaps_widen(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_GAPS_TIGHT), NPG_OK);
     assert_in_range(apart.moved, 20, n / 3);
     for (size_t i = 0; i < n; i++) { /* nobody crosses over, and the feet go outward */
         bool is_inner = frame.normals[3 * i] * frame.pos_local[3 * i] < 0;
@@ -171,14 +167,14 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     }
     assert_int_equal(npg_poisson(&mesh, apart.shifted, frame.normals, n, &settings), NPG_OK);
     double before = gap_to(mesh, &apart);
-    assert_int_equal(npg_apart_bring_back(&apart, mesh), NPG_OK);
+    assert_int_equal(npg_gaps_bring_back(&apart, mesh), NPG_OK);
     double after = gap_to(mesh, &apart);
     print_message("%zu points moved; the surface is %.4f from them, then %.4f\n", apart.moved, before, after);
     assert_true(before > 0.002 && after < 0.1 * before);
     assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
     assert_int_equal(handles, 0);
     npg_mesh_unref(&mesh);
-    npg_apart_close(&apart);
+    npg_gaps_close(&apart);
     npg_frame_clear(&frame);
 }
 
@@ -187,37 +183,36 @@ static void loose_vertices_come_back_nearly(void **state)
 {
     (void)state;
     npg_frame frame = {0};
-    npg_apart apart;
+    npg_gap_widening apart;
     npg_mesh *mesh;
     size_t n = LEGS_POINTS;
     double error = 0;
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
-    assert_int_equal(npg_apart_open(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_APART_LOOSE),
-                     NPG_OK);
+    assert_int_equal(npg_gaps_widen(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_GAPS_LOOSE), NPG_OK);
     assert_in_range(apart.moved, 20, n / 3);
     assert_int_equal(npg_mesh_open(&mesh, n, 0), NPG_OK);
     memcpy(mesh->vert_pos, apart.shifted, 3 * n * sizeof(float));
-    assert_int_equal(npg_apart_bring_back(&apart, mesh), NPG_OK);
+    assert_int_equal(npg_gaps_bring_back(&apart, mesh), NPG_OK);
     for (size_t i = 0; i < 3 * n; i++)
         error = fmax(error, fabs((double)mesh->vert_pos[i] - (double)frame.pos_local[i]));
     assert_true(error < 0.02);
     npg_mesh_unref(&mesh);
-    npg_apart_close(&apart);
+    npg_gaps_close(&apart);
     npg_frame_clear(&frame);
 }
 
 /* Handles of the legs' surface; the feet, welded, make one. */
-static int64_t handles_of_legs(double feet, npg_apart_way way, size_t *moved)
+static int64_t handles_of_legs(double feet, npg_gap_way way, size_t *moved)
 {
-    const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60, .apart = way};
+    const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60, .gaps = way};
     npg_frame frame = {0};
     npg_mesh *mesh;
     size_t turned;
     int rounds;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, feet, 5), NPG_OK);
-    assert_int_equal(npg_resurface_apart(&mesh, moved, &turned, &rounds, frame.normals, frame.pos_local,
-                                         LEGS_POINTS, 0.05, &settings),
+    assert_int_equal(npg_resurface_widened(&mesh, moved, &turned, &rounds, frame.normals, frame.pos_local,
+                                           LEGS_POINTS, 0.05, &settings),
                      NPG_OK);
     assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
     npg_mesh_unref(&mesh);
@@ -230,13 +225,13 @@ static void feet_that_nearly_touch_are_joined_unless_held_apart(void **state)
     (void)state;
     size_t moved;
     for (double feet = 0.155; feet < 0.177; feet += 0.005) { /* gaps of a fifth of the spacing to all of it */
-        for (npg_apart_way way = NPG_APART_TIGHT; way < NPG_APART_NOT; way++) {
+        for (npg_gap_way way = NPG_GAPS_TIGHT; way < NPG_GAPS_KEPT; way++) {
             assert_int_equal(handles_of_legs(feet, way, &moved), 0);
             assert_true(moved > 0);
         }
         print_message("gap %.2f of the spacing: %zu points moved\n", 2 * (feet - 0.15) / 0.05, moved);
     }
-    assert_true(handles_of_legs(0.155, NPG_APART_NOT, &moved) > 0);
+    assert_true(handles_of_legs(0.155, NPG_GAPS_KEPT, &moved) > 0);
     assert_int_equal(moved, 0);
 }
 
@@ -244,17 +239,17 @@ static void coming_back_needs_memory(void **state)
 {
     (void)state;
     npg_frame frame = {0};
-    npg_apart apart;
+    npg_gap_widening apart;
     npg_mesh *mesh = torus(8, 0);
     npg_status status = NPG_MEMORY;
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
     for (uint64_t i = 1; status && i < 60; i++) {
         npg_memory_fail_at(i, false);
-        status = npg_apart_open(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05, NPG_APART_TIGHT);
-        if (!status) status = npg_apart_bring_back(&apart, mesh);
+        status = npg_gaps_widen(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05, NPG_GAPS_TIGHT);
+        if (!status) status = npg_gaps_bring_back(&apart, mesh);
         npg_memory_fail_at(0, false);
         assert_true(status == NPG_OK || status == NPG_MEMORY);
-        npg_apart_close(&apart);
+        npg_gaps_close(&apart);
     }
     assert_int_equal(status, NPG_OK);
     npg_mesh_unref(&mesh);

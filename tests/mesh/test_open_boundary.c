@@ -7,7 +7,7 @@
 #include <cmocka.h>
 #include <math.h>
 
-#include "mesh/fringe.h"
+#include "mesh/mesh_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/ball_mesh.h"
 
@@ -51,7 +51,7 @@ static void a_strip_goes_and_the_sheet_stays(void **state)
     npg_mesh *mesh = sheet_with_strip();
     double share, least = INFINITY, most = -INFINITY;
     const double all = SIDE * SIDE + 2 * STRIP;
-    assert_int_equal(npg_mesh_drop_fringe(&mesh, &share, WIDTH), NPG_OK);
+    assert_int_equal(npg_mesh_trim_shreds(&mesh, &share, WIDTH), NPG_OK);
     for (size_t v = 0; v < mesh->vert_count; v++) {
         least = fmin(least, (double)mesh->vert_pos[3 * v]);
         most = fmax(most, (double)mesh->vert_pos[3 * v]);
@@ -67,7 +67,7 @@ static void expect_unchanged(npg_mesh *mesh)
 {
     double share;
     size_t faces = mesh->face_count;
-    assert_int_equal(npg_mesh_drop_fringe(&mesh, &share, 10), NPG_OK);
+    assert_int_equal(npg_mesh_trim_shreds(&mesh, &share, 10), NPG_OK);
     assert_int_equal(mesh->face_count, faces);
     assert_true(share == 0);
     npg_mesh_unref(&mesh);
@@ -93,7 +93,7 @@ static void without_memory_the_mesh_stays(void **state)
     size_t faces = mesh->face_count;
     for (uint64_t n = 1; n < 6; n++) {
         npg_memory_fail_at(n, false);
-        assert_int_equal(npg_mesh_drop_fringe(&mesh, &share, WIDTH), NPG_MEMORY);
+        assert_int_equal(npg_mesh_trim_shreds(&mesh, &share, WIDTH), NPG_MEMORY);
         assert_int_equal(mesh->face_count, faces);
     }
     npg_memory_fail_at(0, false);

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "geometry/vec3.h"
-#include "mesh/follow_normals.h"
+#include "mesh/mesh_internal.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/shapes.h"
 
@@ -72,8 +72,8 @@ static void check_ball(double flat)
     assert_int_equal(npg_mesh_copy(&mesh, smooth), NPG_OK);
     add_bumps(mesh);
     double slope_before = slope_error(mesh, smooth), off_before = offset(mesh, smooth, &mean_before);
-    assert_int_equal(
-        npg_mesh_follow_normals(mesh, points->vert_pos, points->vert_normals, points->vert_count), NPG_OK);
+    assert_int_equal(npg_mesh_denoise(mesh, points->vert_pos, points->vert_normals, points->vert_count),
+                     NPG_OK);
     double slope = slope_error(mesh, smooth), off = offset(mesh, smooth, &mean);
     print_message("flat %g: slope %.5f -> %.5f, offset %.5f -> %.5f, mean %.6f -> %.6f\n", flat, slope_before,
                   slope, off_before, off, mean_before, mean);
@@ -103,8 +103,8 @@ static void points_that_face_away_or_lie_far_say_nothing(void **state)
         for (size_t i = 0; i < 3 * away->vert_count && far; i++) away->vert_pos[i] += 5;
         assert_int_equal(npg_mesh_copy(&mesh[far], smooth), NPG_OK);
         add_bumps(mesh[far]);
-        assert_int_equal(
-            npg_mesh_follow_normals(mesh[far], away->vert_pos, away->vert_normals, away->vert_count), NPG_OK);
+        assert_int_equal(npg_mesh_denoise(mesh[far], away->vert_pos, away->vert_normals, away->vert_count),
+                         NPG_OK);
         double kept;
         assert_true(offset(mesh[far], smooth, &kept) > 0.95 * BUMPS);
     }
@@ -119,7 +119,7 @@ static npg_status follow_with_failure(const npg_mesh *from, uint64_t n)
     npg_mesh *mesh;
     assert_int_equal(npg_mesh_copy(&mesh, from), NPG_OK);
     npg_memory_fail_at(n, false);
-    npg_status status = npg_mesh_follow_normals(mesh, from->vert_pos, from->vert_normals, from->vert_count);
+    npg_status status = npg_mesh_denoise(mesh, from->vert_pos, from->vert_normals, from->vert_count);
     npg_memory_fail_at(0, false);
     npg_mesh_unref(&mesh);
     return status;

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "mesh/flatten.h"
+#include "mesh/mesh_internal.h"
 
 #define SIDE 31 /* vertices along a side of the sheet */
 #define STEP (2.0 / (SIDE - 1))
@@ -54,10 +54,10 @@ static void the_balloon_over_a_hole_becomes_flat(void **state)
 {
     static seen s;
     npg_mesh *mesh = bulged(&s, 0, 0), *before;
-    npg_flattened done;
+    npg_faired done;
     (void)state;
     assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
-    assert_int_equal(npg_mesh_flatten(mesh, &done, s.points, s.count, 0.5 * STEP, NULL), NPG_OK);
+    assert_int_equal(npg_mesh_fair(mesh, &done, s.points, s.count, 0.5 * STEP, NULL), NPG_OK);
     assert_int_equal(done.moved, SIDE * SIDE - s.count);
     for (size_t v = 0; v < mesh->vert_count; v++) {
         const float *now = mesh->vert_pos + 3 * v, *was = before->vert_pos + 3 * v;
@@ -74,14 +74,14 @@ static void nothing_moves_where_all_is_seen_or_nothing(void **state)
     static seen s;
     const float far[3] = {9, 9, 9};
     npg_mesh *mesh = bulged(&s, 0, 0), *before;
-    npg_flattened done = {7, 7};
+    npg_faired done = {7, 7};
     (void)state;
     assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
-    assert_int_equal(npg_mesh_flatten(mesh, &done, before->vert_pos, before->vert_count, 1e-6, NULL), NPG_OK);
+    assert_int_equal(npg_mesh_fair(mesh, &done, before->vert_pos, before->vert_count, 1e-6, NULL), NPG_OK);
     assert_int_equal(done.moved, 0);
     assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * mesh->vert_count);
     done.moved = 7;
-    assert_int_equal(npg_mesh_flatten(mesh, &done, far, 1, 0.1, NULL), NPG_OK);
+    assert_int_equal(npg_mesh_fair(mesh, &done, far, 1, 0.1, NULL), NPG_OK);
     assert_int_equal(done.moved, 0);
     assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * mesh->vert_count);
     npg_mesh_unref(&before);
@@ -96,11 +96,11 @@ static void a_piece_that_no_point_saw_keeps_its_shape(void **state)
     static const uint32_t sides[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
     const size_t verts = SIDE * SIDE;
     npg_mesh *mesh = bulged(&s, 4, 4);
-    npg_flattened done;
+    npg_faired done;
     (void)state;
     memcpy(mesh->vert_pos + 3 * verts, corners, sizeof corners);
     for (size_t i = 0; i < 12; i++) mesh->faces[6 * (SIDE - 1) * (SIDE - 1) + i] = (uint32_t)verts + sides[i];
-    assert_int_equal(npg_mesh_flatten(mesh, &done, s.points, s.count, 0.5 * STEP, NULL), NPG_OK);
+    assert_int_equal(npg_mesh_fair(mesh, &done, s.points, s.count, 0.5 * STEP, NULL), NPG_OK);
     assert_int_equal(done.moved, verts - s.count);
     assert_memory_equal(mesh->vert_pos + 3 * verts, corners, sizeof corners);
     npg_mesh_unref(&mesh);
@@ -130,11 +130,11 @@ static void what_lies_in_empty_space_is_pushed_out_of_it(void **state)
     static seen s;
     npg_mesh *mesh = bulged(&s, 0, 0);
     npg_cube_set *empty = bowl(0.02, -0.12);
-    npg_flattened done;
+    npg_faired done;
     double lowest = 1;
     (void)state;
     double before = npg_mesh_share_in(mesh, empty);
-    assert_int_equal(npg_mesh_flatten(mesh, &done, s.points, s.count, 0.5 * STEP, empty), NPG_OK);
+    assert_int_equal(npg_mesh_fair(mesh, &done, s.points, s.count, 0.5 * STEP, empty), NPG_OK);
     assert_int_equal(done.moved, SIDE * SIDE - s.count);
     assert_true(done.pushed > 0 && done.pushed < done.moved);
     for (size_t v = 0; v < mesh->vert_count; v++) {
@@ -155,10 +155,10 @@ static npg_status flatten_with_failure(const npg_mesh *bulge, const seen *s, con
                                        uint64_t n)
 {
     npg_mesh *mesh;
-    npg_flattened done;
+    npg_faired done;
     assert_int_equal(npg_mesh_copy(&mesh, bulge), NPG_OK);
     npg_memory_fail_at(n, false);
-    npg_status status = npg_mesh_flatten(mesh, &done, s->points, s->count, 0.5 * STEP, empty);
+    npg_status status = npg_mesh_fair(mesh, &done, s->points, s->count, 0.5 * STEP, empty);
     npg_memory_fail_at(0, false);
     npg_mesh_unref(&mesh);
     return status;

@@ -1,43 +1,41 @@
-/* Weld: hearing the frames, gathering patches, cutting and closing. */
-#include "mesh/weld.h"
+/* False bridge: the votes of the frames, gathering patches, cutting and closing. */
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
-#include "mesh/loop_fill.h"
-#include "mesh/mesh_clean.h"
 
-#define LONGER        2.0 /* times its length: an edge that speaks against its face    */
-#define FAR_SPACINGS  1.0 /* mean distance of a face's corners from the points         */
-#define EXPLAINED     0.5 /* spacings from points to surface, in a frame that is heard */
-#define LEAN_LONGER   1.4 /* the same, for faces that go with those beside them        */
-#define LEAN_SPACINGS 0.6
-#define FRAMES_LEAST  3    /* that speak against a face                                             */
-#define SEEDS_LEAST   2    /* faces of a patch that are spoken against                              */
-#define BORDER_NEAR   0.85 /* times the faces' distance from the points, for the border around them */
-#define SAVED_LEAST   0.7  /* the new faces' area, at most, of the patch in its worst pose          */
-#define LOOPS_LEAST   2    /* of its border: a tube between two parts; a cap or a crease is left    */
-#define TIDY_ROUNDS   10
-#define ISLAND_MOST   0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
-#define PATCH_MOST    0.2  /* of the faces: more is no weld but a surface that fits nowhere */
+#define LONGER          2.0 /* times its length: an edge that speaks against its face    */
+#define FAR_SPACINGS    1.0 /* mean distance of a face's corners from the points         */
+#define EXPLAINED       0.5 /* spacings from points to surface, in a frame that votes */
+#define NEARLY_LONGER   1.4 /* the same, for faces that go with those beside them        */
+#define NEARLY_SPACINGS 0.6
+#define FRAMES_LEAST    3    /* that speak against a face                                             */
+#define SEEDS_LEAST     2    /* faces of a patch that are spoken against                              */
+#define BORDER_NEAR     0.85 /* times the faces' distance from the points, for the border around them */
+#define SAVED_LEAST     0.7  /* the new faces' area, at most, of the patch in its worst pose          */
+#define LOOPS_LEAST     2    /* of its border: a tube between two parts; a cap or a crease is left    */
+#define TIDY_ROUNDS     10
+#define ISLAND_MOST     0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
+#define PATCH_MOST      0.2  /* of the faces: more is no false bridge but a surface that fits nowhere */
 
-static const npg_tracker_settings weld_tracking = {
+static const npg_tracker_settings bridge_tracking = {
     .nodes = 250, .samples = 2000, .steps = 12, .stiffness = 0.0005, .along = 0.1};
 
-typedef struct hearing {
-    const npg_weld_settings *settings;
+typedef struct ballot {
+    const npg_bridge_settings *settings;
     const npg_mesh *mesh;
     uint8_t *against; /* F: frames that speak against a face          */
-    uint8_t *leaning; /* F: frames that do so or nearly               */
-    double *dist_sum; /* V: over the heard frames                     */
-    float *poses;     /* frames x V x 3: the mesh in the heard frames */
+    uint8_t *nearly;  /* F: frames that do so or nearly               */
+    double *dist_sum; /* V: over the voting frames                     */
+    float *poses;     /* frames x V x 3: the mesh in the voting frames */
     size_t frames, room;
     float *dist_sq; /* V */
     uint32_t *near; /* V */
     npg_arena arena;
-} hearing;
+} ballot;
 
 /* ---- what a frame says ---- */
 
@@ -53,47 +51,47 @@ static double edge_growth(const float *rest, const float *now, uint32_t a, uint3
     return before > 0 ? sqrt(after / before) : 0;
 }
 
-/* Count what a frame says of a face: `against`, and with half the distance and less growth, `leaning`. */
-static void count_face(hearing *h, size_t f, const float *now)
+/* Count what a frame says of a face: `against`, and with half the distance and less growth, `nearly`. */
+static void count_face(ballot *b, size_t f, const float *now)
 {
-    const uint32_t *face = h->mesh->faces + 3 * f;
+    const uint32_t *face = b->mesh->faces + 3 * f;
     double growth = 0, dist = 0;
     for (int k = 0; k < 3; k++) {
-        growth = fmax(growth, edge_growth(h->mesh->vert_pos, now, face[k], face[(k + 1) % 3]));
-        dist += sqrt((double)h->dist_sq[face[k]]) / 3;
+        growth = fmax(growth, edge_growth(b->mesh->vert_pos, now, face[k], face[(k + 1) % 3]));
+        dist += sqrt((double)b->dist_sq[face[k]]) / 3;
     }
-    dist /= h->settings->spacing_unit;
-    h->against[f] += growth >= LONGER && dist > FAR_SPACINGS;
-    h->leaning[f] += growth >= LEAN_LONGER && dist > LEAN_SPACINGS;
+    dist /= b->settings->spacing_unit;
+    b->against[f] += growth >= LONGER && dist > FAR_SPACINGS;
+    b->nearly[f] += growth >= NEARLY_LONGER && dist > NEARLY_SPACINGS;
 }
 
-static npg_status hear(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
+static npg_status vote(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
                        const npg_tracked *tracked)
 {
-    hearing *h = user;
-    size_t v = h->mesh->vert_count;
-    if (h->settings->should_stop && h->settings->should_stop(h->settings->user))
-        return npg_error(NPG_STOPPED, "stopped while welds were looked for");
-    if (tracked->point_dist_mean > EXPLAINED * h->settings->spacing_unit || h->frames == h->room)
+    ballot *b = user;
+    size_t v = b->mesh->vert_count;
+    if (b->settings->should_stop && b->settings->should_stop(b->settings->user))
+        return npg_error(NPG_STOPPED, "stopped while false bridges were looked for");
+    if (tracked->point_dist_mean > EXPLAINED * b->settings->spacing_unit || b->frames == b->room)
         return NPG_OK;
-    NPG_TRY(npg_points_nearest(h->near, h->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
-    for (size_t i = 0; i < v; i++) h->dist_sum[i] += sqrt((double)h->dist_sq[i]);
-    for (size_t f = 0; f < h->mesh->face_count; f++) count_face(h, f, vert_unit);
-    memcpy(h->poses + h->frames++ * v * 3, vert_unit, v * 3 * sizeof(float));
+    NPG_TRY(npg_points_nearest(b->near, b->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
+    for (size_t i = 0; i < v; i++) b->dist_sum[i] += sqrt((double)b->dist_sq[i]);
+    for (size_t f = 0; f < b->mesh->face_count; f++) count_face(b, f, vert_unit);
+    memcpy(b->poses + b->frames++ * v * 3, vert_unit, v * 3 * sizeof(float));
     return NPG_OK;
 }
 
-static npg_status open_hearing(hearing *h, size_t room)
+static npg_status open_ballot(ballot *b, size_t room)
 {
-    size_t v = h->mesh->vert_count;
-    h->room = room;
-    h->against = npg_arena_take(&h->arena, h->mesh->face_count, 1);
-    h->leaning = npg_arena_take(&h->arena, h->mesh->face_count, 1);
-    h->dist_sum = npg_arena_take(&h->arena, v, sizeof *h->dist_sum);
-    h->dist_sq = npg_arena_take(&h->arena, v, sizeof *h->dist_sq);
-    h->near = npg_arena_take(&h->arena, v, sizeof *h->near);
-    h->poses = npg_arena_take(&h->arena, room * v, 3 * sizeof *h->poses);
-    return npg_arena_status(&h->arena);
+    size_t v = b->mesh->vert_count;
+    b->room = room;
+    b->against = npg_arena_take(&b->arena, b->mesh->face_count, 1);
+    b->nearly = npg_arena_take(&b->arena, b->mesh->face_count, 1);
+    b->dist_sum = npg_arena_take(&b->arena, v, sizeof *b->dist_sum);
+    b->dist_sq = npg_arena_take(&b->arena, v, sizeof *b->dist_sq);
+    b->near = npg_arena_take(&b->arena, v, sizeof *b->near);
+    b->poses = npg_arena_take(&b->arena, room * v, 3 * sizeof *b->poses);
+    return npg_arena_status(&b->arena);
 }
 
 /* ---- patches ---- */
@@ -213,9 +211,9 @@ static npg_status tidy(patches *p, const npg_mesh *mesh)
     return status;
 }
 
-static npg_status gather(patches *p, const hearing *h)
+static npg_status gather(patches *p, const ballot *b)
 {
-    const npg_mesh *mesh = h->mesh;
+    const npg_mesh *mesh = b->mesh;
     size_t seeds = 0;
     p->is_in = npg_arena_take(&p->arena, mesh->face_count, 1);
     p->is_near = npg_arena_take(&p->arena, mesh->vert_count, 1);
@@ -223,8 +221,8 @@ static npg_status gather(patches *p, const hearing *h)
     p->of_face = npg_arena_take(&p->arena, mesh->face_count, sizeof *p->of_face);
     NPG_TRY(npg_arena_status(&p->arena));
     for (size_t f = 0; f < mesh->face_count; f++) {
-        seeds += h->against[f] >= FRAMES_LEAST;
-        p->is_in[f] = h->leaning[f] >= FRAMES_LEAST;
+        seeds += b->against[f] >= FRAMES_LEAST;
+        p->is_in[f] = b->nearly[f] >= FRAMES_LEAST;
     }
     if (!seeds) return NPG_OK;
     widen(p, mesh);
@@ -235,14 +233,14 @@ static npg_status gather(patches *p, const hearing *h)
 /* ---- one patch ---- */
 
 /* The pose in which the patch is largest, and its area there. */
-static double worst_pose(const float **pose, const hearing *h, const patches *p, uint32_t patch)
+static double worst_pose(const float **pose, const ballot *b, const patches *p, uint32_t patch)
 {
     double worst = -1;
-    for (size_t i = 0; i < h->frames; i++) {
-        const float *at = h->poses + i * h->mesh->vert_count * 3;
+    for (size_t i = 0; i < b->frames; i++) {
+        const float *at = b->poses + i * b->mesh->vert_count * 3;
         double area = 0;
-        for (size_t f = 0; f < h->mesh->face_count; f++)
-            if (p->of_face[f] == patch) area += npg_face_area(at, h->mesh->faces + 3 * f);
+        for (size_t f = 0; f < b->mesh->face_count; f++)
+            if (p->of_face[f] == patch) area += npg_face_area(at, b->mesh->faces + 3 * f);
         if (!(area > worst)) continue;
         worst = area;
         *pose = at;
@@ -269,7 +267,7 @@ static bool link_border(uint32_t *next, size_t *border_count, const npg_mesh *me
 }
 
 typedef struct cutting {
-    const hearing *hearing;
+    const ballot *ballot;
     const patches *patches;
     npg_arena arena;
     uint32_t *twin, *next, *loop; /* 3 F, V, V */
@@ -283,7 +281,7 @@ typedef struct cutting {
 /* Fill every loop of the border; *area of all. */
 static npg_status fill_loops(cutting *c, double *area, size_t *loop_count, bool *is_filled, const float *pose)
 {
-    const npg_mesh *mesh = c->hearing->mesh;
+    const npg_mesh *mesh = c->ballot->mesh;
     *area = 0;
     *loop_count = 0;
     *is_filled = true;
@@ -312,24 +310,24 @@ static npg_status fill_loops(cutting *c, double *area, size_t *loop_count, bool 
 static size_t count_seeds(const cutting *c, uint32_t patch)
 {
     size_t seeds = 0;
-    for (size_t f = 0; f < c->hearing->mesh->face_count; f++)
-        seeds += c->patches->of_face[f] == patch && c->hearing->against[f] >= FRAMES_LEAST;
+    for (size_t f = 0; f < c->ballot->mesh->face_count; f++)
+        seeds += c->patches->of_face[f] == patch && c->ballot->against[f] >= FRAMES_LEAST;
     return seeds;
 }
 
 /* Whether the border lies much nearer the points than the faces that are spoken against. */
 static bool is_worth(const cutting *c, uint32_t patch)
 {
-    const hearing *h = c->hearing;
+    const ballot *b = c->ballot;
     size_t seeds = count_seeds(c, patch), border = 0;
     double border_dist = 0, seed_dist = 0;
-    for (size_t f = 0; f < h->mesh->face_count; f++)
-        for (size_t k = 0; k < 3 && c->patches->of_face[f] == patch && h->against[f] >= FRAMES_LEAST; k++)
-            seed_dist += h->dist_sum[h->mesh->faces[3 * f + k]] / 3;
-    for (size_t v = 0; v < h->mesh->vert_count; v++) {
+    for (size_t f = 0; f < b->mesh->face_count; f++)
+        for (size_t k = 0; k < 3 && c->patches->of_face[f] == patch && b->against[f] >= FRAMES_LEAST; k++)
+            seed_dist += b->dist_sum[b->mesh->faces[3 * f + k]] / 3;
+    for (size_t v = 0; v < b->mesh->vert_count; v++) {
         if (c->next[v] == UINT32_MAX) continue;
         border++;
-        border_dist += h->dist_sum[v];
+        border_dist += b->dist_sum[v];
     }
     return border_dist * (double)seeds < BORDER_NEAR * seed_dist * (double)border;
 }
@@ -338,7 +336,7 @@ static bool is_worth(const cutting *c, uint32_t patch)
 
 static npg_status open_cutting(cutting *c)
 {
-    const npg_mesh *mesh = c->hearing->mesh;
+    const npg_mesh *mesh = c->ballot->mesh;
     c->twin = npg_arena_take(&c->arena, mesh->face_count, 3 * sizeof *c->twin);
     c->next = npg_arena_take(&c->arena, mesh->vert_count, sizeof *c->next);
     c->loop = npg_arena_take(&c->arena, mesh->vert_count, sizeof *c->loop);
@@ -351,7 +349,7 @@ static npg_status open_cutting(cutting *c)
 /* The mesh without the cut faces and with the new ones. */
 static npg_status rebuild(npg_mesh **out, const cutting *c, size_t cut_count)
 {
-    const npg_mesh *mesh = c->hearing->mesh;
+    const npg_mesh *mesh = c->ballot->mesh;
     size_t at = 0, face_count = mesh->face_count - cut_count + c->new_count;
     NPG_TRY(npg_mesh_open(out, mesh->vert_count, face_count));
     memcpy((*out)->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof(float));
@@ -388,7 +386,7 @@ static npg_status is_as_good(bool *yes, const npg_mesh *before, const npg_mesh *
 static size_t mark_cut(cutting *c, uint32_t patch, uint8_t value)
 {
     size_t count = 0;
-    for (size_t f = 0; f < c->hearing->mesh->face_count; f++) {
+    for (size_t f = 0; f < c->ballot->mesh->face_count; f++) {
         if (c->patches->of_face[f] != patch) continue;
         c->is_cut[f] = value;
         count++;
@@ -396,9 +394,9 @@ static size_t mark_cut(cutting *c, uint32_t patch, uint8_t value)
     return count;
 }
 
-static npg_status try_patch(bool *is_cut, cutting *c, const npg_weld_cut *done, uint32_t patch)
+static npg_status try_patch(bool *is_cut, cutting *c, const npg_bridge_cut *done, uint32_t patch)
 {
-    const npg_mesh *mesh = c->hearing->mesh;
+    const npg_mesh *mesh = c->ballot->mesh;
     const float *pose = NULL;
     size_t border_count, loop_count;
     double area;
@@ -406,7 +404,7 @@ static npg_status try_patch(bool *is_cut, cutting *c, const npg_weld_cut *done, 
     memset(c->next, 0xff, mesh->vert_count * sizeof *c->next);
     if (!link_border(c->next, &border_count, mesh, c->patches, patch, c->twin) || !is_worth(c, patch))
         return NPG_OK;
-    double worst = worst_pose(&pose, c->hearing, c->patches, patch);
+    double worst = worst_pose(&pose, c->ballot, c->patches, patch);
     NPG_TRY(fill_loops(c, &area, &loop_count, is_cut, pose));
     *is_cut = *is_cut && loop_count >= LOOPS_LEAST && area < SAVED_LEAST * worst;
     if (!*is_cut) return NPG_OK;
@@ -420,7 +418,7 @@ static npg_status try_patch(bool *is_cut, cutting *c, const npg_weld_cut *done, 
     return status;
 }
 
-static npg_status cut_patch(cutting *c, npg_weld_cut *done, uint32_t patch)
+static npg_status cut_patch(cutting *c, npg_bridge_cut *done, uint32_t patch)
 {
     size_t before = c->new_count;
     bool is_cut;
@@ -439,7 +437,7 @@ static npg_status cut_patch(cutting *c, npg_weld_cut *done, uint32_t patch)
 
 static double cut_area(const cutting *c)
 {
-    const npg_mesh *mesh = c->hearing->mesh;
+    const npg_mesh *mesh = c->ballot->mesh;
     double all = 0, cut = 0;
     for (size_t f = 0; f < mesh->face_count; f++) {
         double area = npg_face_area(mesh->vert_pos, mesh->faces + 3 * f);
@@ -449,7 +447,7 @@ static double cut_area(const cutting *c)
     return all > 0 ? cut / all : 0;
 }
 
-static npg_status replace(npg_mesh **mesh, npg_weld_cut *done, const cutting *c)
+static npg_status replace(npg_mesh **mesh, npg_bridge_cut *done, const cutting *c)
 {
     npg_mesh *after;
     if (!done->patches) return NPG_OK;
@@ -460,11 +458,11 @@ static npg_status replace(npg_mesh **mesh, npg_weld_cut *done, const cutting *c)
     return NPG_OK;
 }
 
-static npg_status cut(npg_mesh **mesh, npg_weld_cut *done, const hearing *h)
+static npg_status cut(npg_mesh **mesh, npg_bridge_cut *done, const ballot *b)
 {
     patches p = {.arena.purpose = NPG_FOR_MESH};
-    cutting c = {.hearing = h, .patches = &p, .arena.purpose = NPG_FOR_MESH};
-    npg_status status = gather(&p, h);
+    cutting c = {.ballot = b, .patches = &p, .arena.purpose = NPG_FOR_MESH};
+    npg_status status = gather(&p, b);
     if (!status && p.count) status = open_cutting(&c);
     for (size_t i = 0; i < p.count && !status; i++) status = cut_patch(&c, done, (uint32_t)i);
     if (!status) status = replace(mesh, done, &c);
@@ -475,23 +473,23 @@ static npg_status cut(npg_mesh **mesh, npg_weld_cut *done, const hearing *h)
     return status;
 }
 
-npg_status npg_weld_cut_all(npg_mesh **mesh, npg_weld_cut *done, const npg_candidate_clouds *clouds,
-                            size_t at, const npg_weld_settings *settings)
+npg_status npg_bridge_cut_all(npg_mesh **mesh, npg_bridge_cut *done, const npg_candidate_clouds *clouds,
+                              size_t at, const npg_bridge_settings *settings)
 {
     npg_mesh *followed;
-    hearing h = {.settings = settings, .arena.purpose = NPG_FOR_MESH};
-    *done = (npg_weld_cut){0};
+    ballot b = {.settings = settings, .arena.purpose = NPG_FOR_MESH};
+    *done = (npg_bridge_cut){0};
     NPG_REQUIRE(at < clouds->count && settings->spacing_unit > 0);
     NPG_TRY(npg_mesh_handles(&done->handles, *mesh));
     if (done->handles < 1) return NPG_OK;
     NPG_TRY(npg_mesh_copy(&followed, *mesh));
-    h.mesh = followed;
+    b.mesh = followed;
     npg_status status = npg_mesh_make_normals(followed);
-    if (!status) status = open_hearing(&h, clouds->count);
-    if (!status) status = npg_candidate_follow(clouds, at, followed, &weld_tracking, hear, &h);
-    done->frames = h.frames;
-    if (!status && h.frames >= FRAMES_LEAST) status = cut(mesh, done, &h);
-    npg_arena_release(&h.arena);
+    if (!status) status = open_ballot(&b, clouds->count);
+    if (!status) status = npg_candidate_follow(clouds, at, followed, &bridge_tracking, vote, &b);
+    done->frames = b.frames;
+    if (!status && b.frames >= FRAMES_LEAST) status = cut(mesh, done, &b);
+    npg_arena_release(&b.arena);
     npg_mesh_unref(&followed);
     return status;
 }

@@ -1,5 +1,5 @@
-/* Apart: shifts of points that face each other, and the way back. */
-#include "mesh/apart.h"
+/* Gap widening: shifts of points that face each other, and the way back. */
+#include "mesh/mesh_internal.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -9,10 +9,13 @@
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
 #include "geometry/vec3.h"
-#include "mesh/contact.h"
 
-#define NEIGHBOURS    48 /* in which a facing point is looked for */
-#define SMOOTH_OVER   12 /* neighbours                            */
+#define NEIGHBOURS    48      /* in which a facing point is looked for */
+#define CONTACT_MOST  5000    /* points that contact is measured at                   */
+#define CONTACT_AMONG 24      /* of their neighbours, each                            */
+#define AGAINST       (-0.3f) /* cosine of two normals that face each other */
+#define ACROSS        0.5f    /* cosine of a normal and the way across the gap */
+#define SMOOTH_OVER   12      /* neighbours                            */
 #define SMOOTH_ROUNDS 3
 #define BACK_OVER     6  /* points around a vertex           */
 #define BACK_AMONG    16 /* nearest ones that they are among */
@@ -23,7 +26,56 @@ typedef struct manner {
     int rounds;        /* times that the surface is then drawn to its points       */
 } manner;
 
-static const manner manners[] = {[NPG_APART_TIGHT] = {1.2, true, 2}, [NPG_APART_LOOSE] = {1.5, false, 0}};
+static const manner manners[] = {[NPG_GAPS_TIGHT] = {1.2, true, 2}, [NPG_GAPS_LOOSE] = {1.5, false, 0}};
+
+/* ---- contact ---- */
+
+bool npg_points_face(const float *p, const float *n, const float *q, const float *m)
+{
+    float d[3], along_n = 0, along_m = 0, cosine = 0, length = 0;
+    for (int a = 0; a < 3; a++) {
+        d[a] = q[a] - p[a];
+        length += d[a] * d[a];
+        along_n += d[a] * n[a];
+        along_m += d[a] * m[a];
+        cosine += n[a] * m[a];
+    }
+    length = sqrtf(length);
+    return cosine < AGAINST && along_n > ACROSS * length && along_m < -ACROSS * length;
+}
+
+/* How many points face one of their neighbours. */
+static size_t count_facing(const float *p, const float *n, const uint32_t *near, size_t count)
+{
+    size_t facing = 0;
+    for (size_t i = 0; i < count; i++) {
+        size_t k = 0;
+        while (k < CONTACT_AMONG) {
+            size_t j = near[CONTACT_AMONG * i + k];
+            if (j < count && npg_points_face(p + 3 * i, n + 3 * i, p + 3 * j, n + 3 * j)) break;
+            k++;
+        }
+        facing += k < CONTACT_AMONG;
+    }
+    return facing;
+}
+
+npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_QUERY};
+    npg_neighbours near;
+    size_t count = point_count < CONTACT_MOST ? point_count : CONTACT_MOST;
+    *share = 0;
+    NPG_REQUIRE(count);
+    float *p = npg_arena_take(&scratch, count, 3 * sizeof *p);
+    float *n = npg_arena_take(&scratch, count, 3 * sizeof *n);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) npg_points_spread(p, n, count, points, normals, point_count);
+    if (!status) status = npg_neighbours_take(&near, &scratch, p, count, p, count, CONTACT_AMONG);
+    if (!status) *share = (double)count_facing(p, n, near.index, count) / (double)count;
+    npg_arena_release(&scratch);
+    return status;
+}
 
 /* ---- gaps ---- */
 
@@ -57,17 +109,17 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
     }
 }
 
-static npg_status measure_pushes(float *push, const npg_apart *apart)
+static npg_status measure_pushes(float *push, const npg_gap_widening *widening)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     npg_neighbours near;
-    const float *points = apart->points, *normals = apart->normals;
-    size_t n = apart->count;
+    const float *points = widening->points, *normals = widening->normals;
+    size_t n = widening->count;
     float *smoothed = npg_arena_take(&scratch, n, sizeof *smoothed);
     npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NEIGHBOURS);
     for (size_t i = 0; i < n && !status; i++)
         push[i] = push_of(i, near.index + NEIGHBOURS * i, near.dist_sq + NEIGHBOURS * i, points, normals, n,
-                          manners[apart->way].wide * apart->spacing);
+                          manners[widening->way].wide * widening->spacing);
     for (int round = 0; round < SMOOTH_ROUNDS && !status; round++) {
         smooth(smoothed, push, near.index, normals, n);
         memcpy(push, smoothed, n * sizeof(float));
@@ -76,33 +128,33 @@ static npg_status measure_pushes(float *push, const npg_apart *apart)
     return status;
 }
 
-npg_status npg_apart_open(npg_apart *apart, const float *points, const float *normals, size_t n,
-                          double spacing, npg_apart_way way)
+npg_status npg_gaps_widen(npg_gap_widening *widening, const float *points, const float *normals, size_t n,
+                          double spacing, npg_gap_way way)
 {
-    NPG_REQUIRE(n && spacing > 0 && way != NPG_APART_NOT);
-    *apart = (npg_apart){.points = points,
-                         .normals = normals,
-                         .count = n,
-                         .spacing = spacing,
-                         .way = way,
-                         .arena.purpose = NPG_FOR_MESH};
-    float *push = npg_arena_take(&apart->arena, n, sizeof *push);
-    apart->shift = npg_arena_take(&apart->arena, n, 3 * sizeof *apart->shift);
-    apart->shifted = npg_arena_take(&apart->arena, n, 3 * sizeof *apart->shifted);
-    npg_status status = npg_arena_status(&apart->arena);
-    if (!status) status = measure_pushes(push, apart);
+    NPG_REQUIRE(n && spacing > 0 && way != NPG_GAPS_KEPT);
+    *widening = (npg_gap_widening){.points = points,
+                                   .normals = normals,
+                                   .count = n,
+                                   .spacing = spacing,
+                                   .way = way,
+                                   .arena.purpose = NPG_FOR_MESH};
+    float *push = npg_arena_take(&widening->arena, n, sizeof *push);
+    widening->shift = npg_arena_take(&widening->arena, n, 3 * sizeof *widening->shift);
+    widening->shifted = npg_arena_take(&widening->arena, n, 3 * sizeof *widening->shifted);
+    npg_status status = npg_arena_status(&widening->arena);
+    if (!status) status = measure_pushes(push, widening);
     for (size_t i = 0; i < 3 * n && !status; i++) {
-        apart->moved += i % 3 == 0 && push[i / 3] > 0;
-        apart->shift[i] = -push[i / 3] * normals[i];
-        apart->shifted[i] = points[i] + apart->shift[i];
+        widening->moved += i % 3 == 0 && push[i / 3] > 0;
+        widening->shift[i] = -push[i / 3] * normals[i];
+        widening->shifted[i] = points[i] + widening->shift[i];
     }
-    if (status) npg_apart_close(apart);
+    if (status) npg_gaps_close(widening);
     return status;
 }
 
-void npg_apart_close(npg_apart *apart)
+void npg_gaps_close(npg_gap_widening *widening)
 {
-    npg_arena_release(&apart->arena);
+    npg_arena_release(&widening->arena);
 }
 
 /* ---- back ---- */
@@ -115,7 +167,7 @@ typedef struct around {
 } around;
 
 typedef struct way_back {
-    const npg_apart *apart;
+    const npg_gap_widening *widening;
     npg_mesh *mesh;
     around *of;            /* V */
     npg_surface_hit *hits; /* N */
@@ -123,12 +175,12 @@ typedef struct way_back {
 } way_back;
 
 static void choose_around(around *to, const float *vert_normal, const uint32_t *near, const float *dist_sq,
-                          const npg_apart *apart)
+                          const npg_gap_widening *widening)
 {
     float scale = 0;
-    for (size_t k = 0; k < BACK_AMONG && near[k] < apart->count && to->count < BACK_OVER; k++) {
-        bool is_across = npg_vec3_dotf(vert_normal, apart->normals + 3 * (size_t)near[k]) <= 0;
-        if (is_across && manners[apart->way].is_one_sided) continue;
+    for (size_t k = 0; k < BACK_AMONG && near[k] < widening->count && to->count < BACK_OVER; k++) {
+        bool is_across = npg_vec3_dotf(vert_normal, widening->normals + 3 * (size_t)near[k]) <= 0;
+        if (is_across && manners[widening->way].is_one_sided) continue;
         if (!to->count) scale = dist_sq[k] + 1e-12f;
         to->weight[to->count] = scale / (dist_sq[k] + scale);
         to->point[to->count++] = near[k];
@@ -142,12 +194,12 @@ static npg_status find_around(way_back *w)
     const npg_mesh *m = w->mesh;
     size_t v = m->vert_count;
     float *normals = npg_arena_take(&scratch, v, 3 * sizeof *normals);
-    npg_status status =
-        npg_neighbours_take(&near, &scratch, w->apart->shifted, w->apart->count, m->vert_pos, v, BACK_AMONG);
+    npg_status status = npg_neighbours_take(&near, &scratch, w->widening->shifted, w->widening->count,
+                                            m->vert_pos, v, BACK_AMONG);
     if (!status) npg_mesh_vertex_normals(normals, m->vert_pos, v, m->faces, m->face_count);
     for (size_t i = 0; i < v && !status; i++)
         choose_around(&w->of[i], normals + 3 * i, near.index + BACK_AMONG * i, near.dist_sq + BACK_AMONG * i,
-                      w->apart);
+                      w->widening);
     npg_arena_release(&scratch);
     return status;
 }
@@ -169,7 +221,7 @@ static void move(const way_back *w, const float *rows, float sign)
 {
     for (size_t i = 0; i < w->mesh->vert_count; i++) {
         float way[3], went[3];
-        mean_around(went, &w->of[i], w->apart->shift);
+        mean_around(went, &w->of[i], w->widening->shift);
         if (npg_vec3_dotf(went, went) <= 0) continue;
         mean_around(way, &w->of[i], rows);
         for (size_t a = 0; a < 3; a++) w->mesh->vert_pos[3 * i + a] += sign * way[a];
@@ -180,36 +232,36 @@ static void move(const way_back *w, const float *rows, float sign)
 static npg_status measure_gaps(way_back *w)
 {
     const npg_mesh *m = w->mesh;
-    const npg_apart *apart = w->apart;
-    NPG_TRY(npg_mesh_closest(w->hits, m, apart->points, apart->count));
-    for (size_t i = 0; i < apart->count; i++) {
+    const npg_gap_widening *widening = w->widening;
+    NPG_TRY(npg_mesh_closest(w->hits, m, widening->points, widening->count));
+    for (size_t i = 0; i < widening->count; i++) {
         const npg_surface_hit *hit = &w->hits[i];
         const uint32_t *corner = m->faces + 3 * (size_t)hit->face;
-        const float *point = apart->points + 3 * i, *normal = apart->normals + 3 * i;
+        const float *point = widening->points + 3 * i, *normal = widening->normals + 3 * i;
         float along = 0;
         for (size_t a = 0; a < 3; a++) {
             float on = 0;
             for (size_t k = 0; k < 3; k++) on += hit->weights[k] * m->vert_pos[3 * (size_t)corner[k] + a];
             along += (point[a] - on) * normal[a];
         }
-        bool is_of_it = (double)hit->dist_sq < apart->spacing * apart->spacing;
+        bool is_of_it = (double)hit->dist_sq < widening->spacing * widening->spacing;
         for (size_t a = 0; a < 3; a++) w->gaps[3 * i + a] = is_of_it ? along * normal[a] : 0;
     }
     return NPG_OK;
 }
 
-npg_status npg_apart_bring_back(const npg_apart *apart, npg_mesh *mesh)
+npg_status npg_gaps_bring_back(const npg_gap_widening *widening, npg_mesh *mesh)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
-    way_back w = {.apart = apart, .mesh = mesh};
-    if (!apart->moved) return NPG_OK;
+    way_back w = {.widening = widening, .mesh = mesh};
+    if (!widening->moved) return NPG_OK;
     w.of = npg_arena_take(&scratch, mesh->vert_count, sizeof *w.of);
-    w.hits = npg_arena_take(&scratch, apart->count, sizeof *w.hits);
-    w.gaps = npg_arena_take(&scratch, apart->count, 3 * sizeof *w.gaps);
+    w.hits = npg_arena_take(&scratch, widening->count, sizeof *w.hits);
+    w.gaps = npg_arena_take(&scratch, widening->count, 3 * sizeof *w.gaps);
     npg_status status = npg_arena_status(&scratch);
     if (!status) status = find_around(&w);
-    if (!status) move(&w, apart->shift, -1);
-    for (int round = 0; round < manners[apart->way].rounds && !status; round++) {
+    if (!status) move(&w, widening->shift, -1);
+    for (int round = 0; round < manners[widening->way].rounds && !status; round++) {
         status = measure_gaps(&w);
         if (!status) move(&w, w.gaps, 1);
     }
