@@ -1,9 +1,9 @@
 /* fuse: gathers what all frames saw of the body, for a reference that no single frame could give.
  *
- * In a fusing pass the reference so far is aligned with every frame.  Each frame's points are then carried
- * back to the keyframe's pose by that motion (carry_back.h) and averaged with those of the other frames
- * (cells.h); stage mesh makes the next reference from what comes out.  Parts that touch in a frame are told
- * apart by the surface that each point belongs to, so one frame's contact joins nothing.
+ * In a fusing pass the reference so far is aligned with every frame.  Each frame's points are then warped to
+ * the keyframe's pose by that motion (geometry/skinning.h) and averaged with those of the other frames
+ * (averages.c); stage mesh makes the next reference from what comes out.  Parts that touch in a frame are
+ * told apart by the surface that each point belongs to, so one frame's contact joins nothing.
  *
  * Where sensors see a side of the body, the reference so far is that side, and open.  It then grows: points
  * that lie past its border are carried by the border's motion and added, frame by frame outward from the
@@ -16,10 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fuse/carry_back.h"
-#include "fuse/cells.h"
-#include "fuse/colour_cells.h"
-#include "fuse/empty_cells.h"
+#include "fuse/fuse_internal.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
@@ -74,9 +71,9 @@ typedef struct state {
     int64_t rounds; /* option */
     int64_t usable; /* frames with points, and most sensors of one: of the measuring pass */
     size_t sensors;
-    npg_carry_back *carry;
+    npg_skin *skin;
     npg_cells *cells;
-    npg_empty_cells *empty;    /* NULL: it is not known where sensors stood */
+    npg_carving *empty;        /* NULL: it is not known where sensors stood */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
     int64_t key;               /* index of the keyframe */
     double spacing, noise;     /* of the keyframe's points */
@@ -103,7 +100,7 @@ static const npg_option options[] = {
 typedef struct cloud {
     npg_arena arena;
     float *points, *normals; /* unit */
-    npg_carried *carried;
+    npg_skinned *warped;
     size_t count;
     const uint8_t *colours; /* of the frame, a loan, or NULL ... */
     size_t of;              /* ... and how many points it has    */
@@ -114,7 +111,7 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
     size_t most = frame->point_count < NPG_FUSED_FRAME_MOST ? frame->point_count : NPG_FUSED_FRAME_MOST;
     c->points = npg_arena_take(&c->arena, most, 3 * sizeof *c->points);
     if (frame->normals) c->normals = npg_arena_take(&c->arena, most, 3 * sizeof *c->normals);
-    c->carried = npg_arena_take(&c->arena, most, sizeof *c->carried);
+    c->warped = npg_arena_take(&c->arena, most, sizeof *c->warped);
     NPG_TRY(npg_arena_status(&c->arena));
     c->count =
         npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
@@ -131,7 +128,7 @@ static npg_status median_dist(double *median, const cloud *c, bool is_growing)
     float *dists;
     NPG_TRY(npg_alloc_array(&dists, NPG_FOR_MESH, c->count, sizeof *dists));
     for (size_t i = 0; i < c->count; i++)
-        if (!is_growing || !c->carried[i].is_beyond) dists[count++] = c->carried[i].dist;
+        if (!is_growing || !c->warped[i].is_beyond) dists[count++] = c->warped[i].dist;
     qsort(dists, count, sizeof *dists, npg_order_float);
     *median = count ? (double)dists[count / 2] : HUGE_VAL;
     npg_release(&dists);
@@ -151,7 +148,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
 {
     unsigned weight = colour_weight(frame - s->key);
     for (size_t i = 0; i < c->count; i++) {
-        const npg_carried *p = &c->carried[i];
+        const npg_skinned *p = &c->warped[i];
         bool is_near = (double)p->dist <= near_dist;
         double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
         if (p->is_beyond && (double)p->dist <= s->grow_dist) {
@@ -194,9 +191,9 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                      .bin = EMPTY_BIN * s->spacing,
                      .margin = EMPTY_MARGIN * s->spacing + EMPTY_NOISE * s->noise};
     if (!s->empty)
-        NPG_TRY(npg_empty_cells_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
-                                     EMPTY_BAND * s->spacing, EMPTY_MOST));
-    return npg_empty_cells_see(s->empty, s->carry, &seen);
+        NPG_TRY(npg_carving_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
+                                 EMPTY_BAND * s->spacing, EMPTY_MOST));
+    return npg_carving_see(s->empty, s->skin, &seen);
 }
 
 static size_t most_cells(const npg_facts *facts)
@@ -215,8 +212,8 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->normals, key->count));
     NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
                            most_cells(facts)));
-    NPG_TRY(npg_carry_back_open(&s->carry, facts->reference));
-    if (facts->sensor_count_max && npg_carry_back_is_open(s->carry))
+    NPG_TRY(npg_skin_open(&s->skin, facts->reference));
+    if (facts->sensor_count_max && npg_skin_is_open(s->skin))
         s->grow_dist =
             GROW_SIZE * npg_points_diagonal(facts->reference->vert_pos, facts->reference->vert_count);
     return NPG_OK;
@@ -227,11 +224,11 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     state *s = npg_worker_state(worker);
     double median;
     NPG_TRY(open_cloud(c, worker, frame));
-    if (!s->carry) NPG_TRY(open_gathering(worker, c));
+    if (!s->skin) NPG_TRY(open_gathering(worker, c));
     if (c->colours && !s->colours)
         NPG_TRY(npg_colour_cells_open(&s->colours, COLOUR_SIDE * s->spacing, COLOURS_MOST));
-    NPG_TRY(npg_carry_back_move(s->carry, frame->vert_unit));
-    NPG_TRY(npg_carry_back_points(s->carry, c->carried, c->points, c->normals, c->count));
+    NPG_TRY(npg_skin_move(s->skin, frame->vert_unit));
+    NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
     if (s->frames > 1 && median > MISALIGNED * s->usual) {
         s->misaligned++;
@@ -305,12 +302,12 @@ static npg_status collect_colours(const state *s, npg_fused *fused)
 
 static npg_status collect_empty(const state *s, npg_fused *fused)
 {
-    size_t most = s->empty ? npg_empty_cells_count(s->empty) : 0;
+    size_t most = s->empty ? npg_carving_count(s->empty) : 0;
     if (!most) return NPG_OK;
     NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
-    fused->empty_side = npg_empty_cells_side(s->empty);
-    fused->empty_count = npg_empty_cells_find(s->empty, fused->empty,
-                                              s->frames < 2 * EMPTY_FRAMES ? 1 : EMPTY_FRAMES, EMPTY_SHARE);
+    fused->empty_side = npg_carving_side(s->empty);
+    fused->empty_count = npg_carving_find(s->empty, fused->empty,
+                                          s->frames < 2 * EMPTY_FRAMES ? 1 : EMPTY_FRAMES, EMPTY_SHARE);
     return NPG_OK;
 }
 
@@ -425,9 +422,9 @@ static npg_status flush(npg_worker *worker)
 static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    npg_carry_back_close(&s->carry);
+    npg_skin_close(&s->skin);
     npg_cells_close(&s->cells);
-    npg_empty_cells_close(&s->empty);
+    npg_carving_close(&s->empty);
     npg_colour_cells_close(&s->colours);
 }
 
@@ -447,9 +444,9 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     *chunks_held = 1;
     size_t colours =
         npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(COLOURS_MOST);
-    size_t empty = facts->sensor_count_max ? npg_empty_cells_memory(EMPTY_MOST) : 0;
+    size_t empty = facts->sensor_count_max ? npg_carving_memory(EMPTY_MOST) : 0;
     return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
-           npg_carry_back_memory(npg_worker_verts_at_most(worker), points);
+           npg_skin_memory(npg_worker_verts_at_most(worker), points);
 }
 
 extern const npg_stage npg_stage_fuse;

@@ -30,7 +30,7 @@ size_t npg_kdtree_memory(size_t point_count);
 npg_status npg_kdtree_nearest(const npg_kdtree *tree, uint32_t *index, float *dist_sq, const float *queries,
                               size_t query_count, size_t k, int threads);
 
-/* The k nearest of N points (N x 3) of each query, by a tree that lives no longer than the call, on all cores. */
+/* The k nearest of N points (N x 3) of each query, by a tree for this call alone, on all cores. */
 npg_status npg_points_nearest(uint32_t *index, float *dist_sq, const float *points, size_t point_count,
                               const float *queries, size_t query_count, size_t k);
 

@@ -5,7 +5,7 @@
 #include <jansson.h>
 
 #include "align/tracker.h"
-#include "geometry/cube_set.h"
+#include "geometry/cells.h"
 #include "geometry/patch.h"
 #include "mesh/surface.h"
 #include "pipeline/frame_box.h"

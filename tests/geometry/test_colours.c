@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "fuse/colour_cells.h"
+#include "fuse/fuse_internal.h"
 #include "geometry/colours.h"
 #include "tests/support/shapes.h"
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/cube_set.h"
+#include "geometry/cells.h"
 #include "geometry/depth_map.h"
 #include "pipeline/memory.h"
 

@@ -1,5 +1,5 @@
-/* Carry back: rotations of the surface, and points through them. */
-#include "fuse/carry_back.h"
+/* Skinning: rotations of the surface, and points through them. */
+#include "geometry/skinning.h"
 
 #include <string.h>
 
@@ -11,52 +11,55 @@
 #define SMOOTHINGS 2 /* of the rotations, over the corners of faces: noise of a face is not its motion */
 #define PARTS_MAX  8
 
-struct npg_carry_back {
+struct npg_skin {
     npg_mesh *mesh;        /* counted reference; V, F */
-    uint8_t *is_border;    /* V */
-    bool is_open;          /* there is one */
     npg_surface *surface;  /* where it is now */
+    npg_arena arena;       /* of the next five */
+    uint8_t *is_border;    /* V */
     float *now, *normals;  /* V x 3: positions and normals there */
     float *turns, *spread; /* V x 9: rotation of the neighbourhood, rows */
-    npg_surface_hit *hits; /* of the points at work */
+    bool is_open;          /* there is a border */
+    npg_surface_hit *hits; /* of the points at work; owned */
     size_t hit_capacity;
 };
 
-npg_status npg_carry_back_open(npg_carry_back **out, npg_mesh *reference)
+npg_status npg_skin_open(npg_skin **out, npg_mesh *reference)
 {
-    npg_carry_back *c;
+    npg_skin *c;
     size_t v = reference->vert_count;
     *out = NULL;
     NPG_REQUIRE(reference->vert_normals);
     NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
     c->mesh = npg_mesh_ref(reference);
-    npg_status status =
-        npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces, reference->face_count);
-    if (!status) status = npg_alloc(&c->is_border, NPG_FOR_MESH, v);
+    c->arena.purpose = NPG_FOR_MESH;
+    c->is_border = npg_arena_take(&c->arena, v, 1);
+    c->now = npg_arena_take(&c->arena, v, 3 * sizeof *c->now);
+    c->normals = npg_arena_take(&c->arena, v, 3 * sizeof *c->normals);
+    c->turns = npg_arena_take(&c->arena, v, 9 * sizeof *c->turns);
+    c->spread = npg_arena_take(&c->arena, v, 9 * sizeof *c->spread);
+    npg_status status = npg_arena_status(&c->arena);
     if (!status) status = npg_mesh_border(c->is_border, &c->is_open, reference);
-    if (!status) status = npg_alloc_array(&c->now, NPG_FOR_MESH, v, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&c->normals, NPG_FOR_MESH, v, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&c->turns, NPG_FOR_MESH, v, 9 * sizeof(float));
-    if (!status) status = npg_alloc_array(&c->spread, NPG_FOR_MESH, v, 9 * sizeof(float));
-    if (status) npg_carry_back_close(&c);
+    if (!status)
+        status =
+            npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces, reference->face_count);
+    if (status) npg_skin_close(&c);
     *out = c;
     return status;
 }
 
-void npg_carry_back_close(npg_carry_back **slot)
+void npg_skin_close(npg_skin **slot)
 {
     if (!slot || !*slot) return;
-    npg_carry_back *c = *slot;
-    npg_surface_close(&c->surface);
-    npg_mesh_unref(&c->mesh);
-    void *all[] = {&c->is_border, &c->now, &c->normals, &c->turns, &c->spread, &c->hits};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
+    npg_surface_close(&(*slot)->surface);
+    npg_mesh_unref(&(*slot)->mesh);
+    npg_release(&(*slot)->hits);
+    npg_arena_release(&(*slot)->arena);
     npg_release(slot);
 }
 
-bool npg_carry_back_is_open(const npg_carry_back *carry)
+bool npg_skin_is_open(const npg_skin *skin)
 {
-    return carry->is_open;
+    return skin->is_open;
 }
 
 /* ---- rotations ---- */
@@ -81,7 +84,7 @@ static void face_frame(float frame[9], const float *vert_pos, const uint32_t *fa
 }
 
 /* turns[corner] += now rest^T, times the face's area at rest. */
-static void add_face(const npg_carry_back *c, const uint32_t *face)
+static void add_face(const npg_skin *c, const uint32_t *face)
 {
     float rest[9], now[9], turn[9];
     float area = (float)npg_face_area(c->mesh->vert_pos, face);
@@ -96,7 +99,7 @@ static void add_face(const npg_carry_back *c, const uint32_t *face)
         for (int i = 0; i < 9; i++) c->turns[9 * (size_t)face[corner] + (size_t)i] += turn[i];
 }
 
-static void smooth_turns(npg_carry_back *c)
+static void smooth_turns(npg_skin *c)
 {
     const npg_mesh *mesh = c->mesh;
     memset(c->spread, 0, mesh->vert_count * 9 * sizeof(float));
@@ -113,7 +116,7 @@ static void smooth_turns(npg_carry_back *c)
     c->spread = last;
 }
 
-npg_status npg_carry_back_move(npg_carry_back *c, const float *vert_unit)
+npg_status npg_skin_move(npg_skin *c, const float *vert_unit)
 {
     const npg_mesh *mesh = c->mesh;
     memcpy(c->now, vert_unit, mesh->vert_count * 3 * sizeof(float));
@@ -128,8 +131,7 @@ npg_status npg_carry_back_move(npg_carry_back *c, const float *vert_unit)
 /* ---- points ---- */
 
 /* out = the mean over a face's corners of rows (V x width), by a hit's weights. */
-static void at_hit(float *out, const npg_carry_back *c, const npg_surface_hit *hit, const float *rows,
-                   size_t width)
+static void at_hit(float *out, const npg_skin *c, const npg_surface_hit *hit, const float *rows, size_t width)
 {
     for (size_t i = 0; i < width; i++) {
         out[i] = 0;
@@ -155,8 +157,8 @@ static void turn_back(float out[3], const float turn[9], const float v[3])
     for (int i = 0; i < 3; i++) out[i] = turn[i] * v[0] + turn[3 + i] * v[1] + turn[6 + i] * v[2];
 }
 
-static void carry(npg_carried *out, const npg_carry_back *c, const npg_surface_hit *hit, const float *point,
-                  const float *normal)
+static void to_rest(npg_skinned *out, const npg_skin *c, const npg_surface_hit *hit, const float *point,
+                    const float *normal)
 {
     float now[3], facing_now[3], turn[9], away[3];
     at_hit(now, c, hit, c->now, 3);
@@ -180,31 +182,31 @@ static void carry(npg_carried *out, const npg_carry_back *c, const npg_surface_h
         memcpy(out->normal, out->facing, sizeof out->normal);
 }
 
-typedef struct carrying {
-    npg_carry_back *c;
-    npg_carried *out;
+typedef struct batch {
+    npg_skin *c;
+    npg_skinned *out;
     const float *points, *normals;
     size_t count, parts;
-} carrying;
+} batch;
 
-static npg_status carry_part(void *user, size_t part)
+static npg_status part_to_rest(void *user, size_t part)
 {
-    const carrying *w = user;
+    const batch *w = user;
     for (size_t i = part * w->count / w->parts; i < (part + 1) * w->count / w->parts; i++)
-        carry(&w->out[i], w->c, &w->c->hits[i], w->points + 3 * i, w->normals ? w->normals + 3 * i : NULL);
+        to_rest(&w->out[i], w->c, &w->c->hits[i], w->points + 3 * i, w->normals ? w->normals + 3 * i : NULL);
     return NPG_OK;
 }
 
-npg_status npg_carry_back_points(npg_carry_back *c, npg_carried *out, const float *points,
-                                 const float *normals, size_t count)
+npg_status npg_skin_to_rest(npg_skin *c, npg_skinned *out, const float *points, const float *normals,
+                            size_t count)
 {
     NPG_TRY(npg_grow(&c->hits, &c->hit_capacity, count, sizeof *c->hits, NPG_FOR_MESH));
     NPG_TRY(npg_surface_closest(c->surface, c->hits, points, count));
-    carrying w = {c, out, points, normals, count, npg_parallel_parts(count, 1000, PARTS_MAX)};
-    return npg_parallel(carry_part, &w, w.parts);
+    batch w = {c, out, points, normals, count, npg_parallel_parts(count, 1000, PARTS_MAX)};
+    return npg_parallel(part_to_rest, &w, w.parts);
 }
 
-void npg_carry_out(const npg_carry_back *c, float now[3], const npg_surface_hit *hit, const float place[3])
+void npg_skin_from_rest(const npg_skin *c, float now[3], const npg_surface_hit *hit, const float place[3])
 {
     float rest[3], turn[9];
     at_hit(rest, c, hit, c->mesh->vert_pos, 3);
@@ -216,7 +218,7 @@ void npg_carry_out(const npg_carry_back *c, float now[3], const npg_surface_hit 
 }
 
 /* Positions, normals, rotations twice, Embree's tree (about 100 bytes a face, two faces a vertex); hits. */
-size_t npg_carry_back_memory(size_t vert_count, size_t points)
+size_t npg_skin_memory(size_t vert_count, size_t points)
 {
-    return vert_count * (24 * sizeof(float) + 200) + points * (sizeof(npg_surface_hit) + sizeof(npg_carried));
+    return vert_count * (24 * sizeof(float) + 200) + points * (sizeof(npg_surface_hit) + sizeof(npg_skinned));
 }

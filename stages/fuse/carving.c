@@ -1,5 +1,5 @@
-/* Empty cells: a band of cubes around the surface, and their votes. */
-#include "fuse/empty_cells.h"
+/* Free-space carving: a band of cubes around the surface, and their votes. */
+#include "fuse/fuse_internal.h"
 
 #include <math.h>
 #include <string.h>
@@ -21,7 +21,7 @@ typedef struct cell {
     uint8_t says;           /* the frame at work */
 } cell;
 
-struct npg_empty_cells {
+struct npg_carving {
     double side;
     size_t count;
     npg_arena arena;
@@ -73,7 +73,7 @@ static size_t mark_around(grid *g, const float vertex[3], double reach)
     return marked;
 }
 
-static npg_status take_cells(npg_empty_cells *c, const grid *g, size_t count)
+static npg_status take_cells(npg_carving *c, const grid *g, size_t count)
 {
     c->arena.purpose = NPG_FOR_MESH;
     c->cells = npg_arena_take(&c->arena, count, sizeof *c->cells);
@@ -91,16 +91,15 @@ static npg_status take_cells(npg_empty_cells *c, const grid *g, size_t count)
 }
 
 /* The points of the surface that the cells hang on. */
-static npg_status bind(npg_empty_cells *c, const npg_mesh *mesh)
+static npg_status bind(npg_carving *c, const npg_mesh *mesh)
 {
     for (size_t i = 0; i < c->count; i++) memcpy(c->now + 3 * i, c->cells[i].place, sizeof c->cells[i].place);
     return npg_mesh_closest(c->hits, mesh, c->now, c->count);
 }
 
-npg_status npg_empty_cells_open(npg_empty_cells **out, const npg_mesh *mesh, double side, double band,
-                                size_t most)
+npg_status npg_carving_open(npg_carving **out, const npg_mesh *mesh, double side, double band, size_t most)
 {
-    npg_empty_cells *c;
+    npg_carving *c;
     *out = NULL;
     NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
     npg_status status = NPG_OK;
@@ -116,12 +115,12 @@ npg_status npg_empty_cells_open(npg_empty_cells **out, const npg_mesh *mesh, dou
         npg_release(&g.bits);
     }
     if (!status) status = bind(c, mesh);
-    if (status) npg_empty_cells_close(&c);
+    if (status) npg_carving_close(&c);
     *out = c;
     return status;
 }
 
-void npg_empty_cells_close(npg_empty_cells **cells)
+void npg_carving_close(npg_carving **cells)
 {
     if (!cells || !*cells) return;
     npg_arena_release(&(*cells)->arena);
@@ -131,8 +130,8 @@ void npg_empty_cells_close(npg_empty_cells **cells)
 /* ---- a frame ---- */
 
 typedef struct looking {
-    npg_empty_cells *c;
-    const npg_carry_back *carry;
+    npg_carving *c;
+    const npg_skin *skin;
     const npg_depth_map *map;
     size_t parts;
 } looking;
@@ -145,9 +144,9 @@ static size_t first_of(const looking *l, size_t part)
 static npg_status move_part(void *user, size_t part)
 {
     const looking *l = user;
-    npg_empty_cells *c = l->c;
+    npg_carving *c = l->c;
     for (size_t i = first_of(l, part); i < first_of(l, part + 1); i++) {
-        npg_carry_out(l->carry, c->now + 3 * i, &c->hits[i], c->cells[i].place);
+        npg_skin_from_rest(l->skin, c->now + 3 * i, &c->hits[i], c->cells[i].place);
         c->cells[i].says = NOTHING;
     }
     return NPG_OK;
@@ -166,7 +165,7 @@ static npg_status look_part(void *user, size_t part)
     return NPG_OK;
 }
 
-static void count_frame(npg_empty_cells *c)
+static void count_frame(npg_carving *c)
 {
     for (size_t i = 0; i < c->count; i++) {
         cell *one = &c->cells[i];
@@ -176,9 +175,9 @@ static void count_frame(npg_empty_cells *c)
 }
 
 /* One map at a time: they are large. */
-npg_status npg_empty_cells_see(npg_empty_cells *c, const npg_carry_back *carry, const npg_seen *seen)
+npg_status npg_carving_see(npg_carving *c, const npg_skin *skin, const npg_seen *seen)
 {
-    looking l = {c, carry, NULL, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
+    looking l = {c, skin, NULL, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
     npg_status status = npg_parallel(move_part, &l, l.parts);
     for (size_t i = 0; i < seen->sensor_count && !status; i++) {
         const float *sensor = seen->sensors + 3 * i;
@@ -195,17 +194,17 @@ npg_status npg_empty_cells_see(npg_empty_cells *c, const npg_carry_back *carry, 
 
 /* ---- what came out ---- */
 
-size_t npg_empty_cells_count(const npg_empty_cells *c)
+size_t npg_carving_count(const npg_carving *c)
 {
     return c->count;
 }
 
-double npg_empty_cells_side(const npg_empty_cells *c)
+double npg_carving_side(const npg_carving *c)
 {
     return c->side;
 }
 
-size_t npg_empty_cells_find(const npg_empty_cells *c, float *places, int frames_least, double share)
+size_t npg_carving_find(const npg_carving *c, float *places, int frames_least, double share)
 {
     size_t count = 0;
     for (size_t i = 0; i < c->count; i++) {
@@ -216,7 +215,7 @@ size_t npg_empty_cells_find(const npg_empty_cells *c, float *places, int frames_
     return count;
 }
 
-size_t npg_empty_cells_memory(size_t most)
+size_t npg_carving_memory(size_t most)
 {
     return most * (sizeof(cell) + sizeof(npg_surface_hit) + 6 * sizeof(float)) + GRID_BITS_MOST / 8 +
            npg_depth_map_memory();

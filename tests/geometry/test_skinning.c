@@ -1,4 +1,4 @@
-/* Carry back: points near a moved surface are where they belong when it is at rest. */
+/* Skinning: points near a moved surface are where they belong when it is at rest. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "fuse/carry_back.h"
+#include "geometry/skinning.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/shapes.h"
 
@@ -35,11 +35,11 @@ static float dot(const float *a, const float *b)
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static npg_carry_back *carrying(npg_mesh *mesh, const float *moved)
+static npg_skin *carrying(npg_mesh *mesh, const float *moved)
 {
-    npg_carry_back *carry;
-    assert_int_equal(npg_carry_back_open(&carry, mesh), NPG_OK);
-    assert_int_equal(npg_carry_back_move(carry, moved), NPG_OK);
+    npg_skin *carry;
+    assert_int_equal(npg_skin_open(&carry, mesh), NPG_OK);
+    assert_int_equal(npg_skin_move(carry, moved), NPG_OK);
     return carry;
 }
 
@@ -83,7 +83,7 @@ static void scatter(cloud *c, const npg_mesh *mesh)
 static void a_rigid_motion_is_undone(void **state)
 {
     static cloud rest, now;
-    static npg_carried carried[POINTS];
+    static npg_skinned carried[POINTS];
     npg_mesh *ball = ball_mesh(30, 40);
     float *moved = alloc_like(ball);
     (void)state;
@@ -91,10 +91,10 @@ static void a_rigid_motion_is_undone(void **state)
     scatter(&rest, ball);
     move_rigidly(now.points, rest.points, POINTS, 1);
     move_rigidly(now.normals, rest.normals, POINTS, 0);
-    npg_carry_back *carry = carrying(ball, moved);
-    assert_int_equal(npg_carry_back_points(carry, carried, now.points, now.normals, POINTS), NPG_OK);
+    npg_skin *carry = carrying(ball, moved);
+    assert_int_equal(npg_skin_to_rest(carry, carried, now.points, now.normals, POINTS), NPG_OK);
     for (size_t i = 0; i < POINTS; i++) {
-        const npg_carried *p = &carried[i];
+        const npg_skinned *p = &carried[i];
         const float *x = rest.points + 3 * i;
         const float away[3] = {x[0] - p->foot[0], x[1] - p->foot[1], x[2] - p->foot[2]};
         assert_near(p->point, x, 1e-4f);
@@ -103,7 +103,7 @@ static void a_rigid_motion_is_undone(void **state)
         assert_true(fabsf(p->offset - dot(away, p->facing)) < 1e-4f);
         assert_true(fabsf(p->agreement - dot(rest.normals + 3 * i, p->facing)) < 1e-3f);
     }
-    npg_carry_back_close(&carry);
+    npg_skin_close(&carry);
     assert_null(carry);
     npg_release(&moved);
     npg_mesh_unref(&ball);
@@ -112,18 +112,18 @@ static void a_rigid_motion_is_undone(void **state)
 static void points_without_normals_get_the_surface_s(void **state)
 {
     static cloud rest;
-    static npg_carried carried[POINTS];
+    static npg_skinned carried[POINTS];
     npg_mesh *ball = ball_mesh(30, 40);
     (void)state;
     scatter(&rest, ball);
-    npg_carry_back *carry = carrying(ball, ball->vert_pos);
-    assert_int_equal(npg_carry_back_points(carry, carried, rest.points, NULL, POINTS), NPG_OK);
+    npg_skin *carry = carrying(ball, ball->vert_pos);
+    assert_int_equal(npg_skin_to_rest(carry, carried, rest.points, NULL, POINTS), NPG_OK);
     for (size_t i = 0; i < POINTS; i++) {
         assert_true(fabsf(length_of(carried[i].facing) - 1) < 1e-5f);
         assert_memory_equal(carried[i].normal, carried[i].facing, sizeof carried[i].facing);
         assert_true(carried[i].agreement == 1);
     }
-    npg_carry_back_close(&carry);
+    npg_skin_close(&carry);
     npg_mesh_unref(&ball);
 }
 
@@ -173,21 +173,21 @@ static void on_both(float *rest, float *now, const npg_mesh *mesh, const float *
 static void points_on_a_bent_bar_come_back_to_the_bar(void **state)
 {
     static cloud rest, now;
-    static npg_carried carried[POINTS];
+    static npg_skinned carried[POINTS];
     shape_random random = {9};
     npg_mesh *bar = bar_mesh(60, 40);
     float *bent = alloc_like(bar);
     (void)state;
     bend(bent, bar->vert_pos, bar->vert_count);
     for (size_t i = 0; i < POINTS; i++) on_both(rest.points + 3 * i, now.points + 3 * i, bar, bent, &random);
-    npg_carry_back *carry = carrying(bar, bent);
-    assert_int_equal(npg_carry_back_points(carry, carried, now.points, NULL, POINTS), NPG_OK);
+    npg_skin *carry = carrying(bar, bent);
+    assert_int_equal(npg_skin_to_rest(carry, carried, now.points, NULL, POINTS), NPG_OK);
     for (size_t i = 0; i < POINTS; i++) {
         assert_near(carried[i].point, rest.points + 3 * i, 1e-4f);
         assert_near(carried[i].foot, rest.points + 3 * i, 1e-4f);
         assert_true(carried[i].dist < 1e-5f);
     }
-    npg_carry_back_close(&carry);
+    npg_skin_close(&carry);
     npg_release(&bent);
     npg_mesh_unref(&bar);
 }
@@ -196,7 +196,7 @@ static void points_on_a_bent_bar_come_back_to_the_bar(void **state)
 static void points_off_a_bent_bar_keep_their_offset(void **state)
 {
     static cloud rest, straight, now;
-    static npg_carried carried[POINTS];
+    static npg_skinned carried[POINTS];
     shape_random random = {11};
     npg_mesh *bar = bar_mesh(60, 40);
     float *bent = alloc_like(bar);
@@ -213,8 +213,8 @@ static void points_off_a_bent_bar_keep_their_offset(void **state)
     bend(now.points, rest.points, POINTS);
     bend(straight.normals, straight.points, POINTS);
     for (size_t i = 0; i < 3 * POINTS; i++) now.normals[i] = straight.normals[i] - now.points[i];
-    npg_carry_back *carry = carrying(bar, bent);
-    assert_int_equal(npg_carry_back_points(carry, carried, now.points, now.normals, POINTS), NPG_OK);
+    npg_skin *carry = carrying(bar, bent);
+    assert_int_equal(npg_skin_to_rest(carry, carried, now.points, now.normals, POINTS), NPG_OK);
     for (size_t i = 0; i < POINTS; i++) {
         float out = sqrtf(dot(rest.points + 3 * i, rest.points + 3 * i) -
                           rest.points[3 * i + 2] * rest.points[3 * i + 2]);
@@ -223,7 +223,7 @@ static void points_off_a_bent_bar_keep_their_offset(void **state)
         assert_true(fabsf(carried[i].offset - (out - (float)RADIUS)) < 1e-3f);
         assert_true(carried[i].agreement > 0.98f);
     }
-    npg_carry_back_close(&carry);
+    npg_skin_close(&carry);
     npg_release(&bent);
     npg_mesh_unref(&bar);
     assert_int_equal(npg_memory_used(), 0);

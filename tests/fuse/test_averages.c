@@ -1,4 +1,4 @@
-/* Cells: means of many points over small cubes, in a table that may be too small for them. */
+/* Averages: means of many points over small cubes, in a table that may be too small for them. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "fuse/cells.h"
+#include "fuse/fuse_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/shapes.h"
 

@@ -1,4 +1,4 @@
-/* Empty cells: what sensors see around a body that moves, voted over frames. */
+/* Carving: what sensors see around a body that moves, voted over frames. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "fuse/empty_cells.h"
+#include "fuse/fuse_internal.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/shapes.h"
 
@@ -20,8 +20,8 @@ enum { FRAMES = 5, POINTS = 60000 };
 
 typedef struct capture {
     npg_mesh *mesh;
-    npg_carry_back *carry;
-    npg_empty_cells *cells;
+    npg_skin *carry;
+    npg_carving *cells;
     float *now; /* V x 3 */
     float points[3 * POINTS];
     size_t count;
@@ -31,14 +31,14 @@ static void open_capture(capture *c)
 {
     c->mesh = ball_mesh(40, 60);
     assert_int_equal(npg_alloc_array(&c->now, NPG_FOR_RUN, c->mesh->vert_count, 3 * sizeof(float)), NPG_OK);
-    assert_int_equal(npg_carry_back_open(&c->carry, c->mesh), NPG_OK);
-    assert_int_equal(npg_empty_cells_open(&c->cells, c->mesh, SIDE, 0.2, 100000), NPG_OK);
+    assert_int_equal(npg_skin_open(&c->carry, c->mesh), NPG_OK);
+    assert_int_equal(npg_carving_open(&c->cells, c->mesh, SIDE, 0.2, 100000), NPG_OK);
 }
 
 static void close_capture(capture *c)
 {
-    npg_empty_cells_close(&c->cells);
-    npg_carry_back_close(&c->carry);
+    npg_carving_close(&c->cells);
+    npg_skin_close(&c->carry);
     npg_release(&c->now);
     npg_mesh_unref(&c->mesh);
     assert_int_equal(npg_memory_used(), 0);
@@ -81,10 +81,10 @@ static npg_status see(capture *c, const float sensor[3], int frame)
 {
     npg_seen seen = {.sensors = sensor, .sensor_count = 1, .points = c->points, .bin = 0.02, .margin = 0.02};
     for (size_t v = 0; v < c->mesh->vert_count; v++) move(c->now + 3 * v, c->mesh->vert_pos + 3 * v, frame);
-    assert_int_equal(npg_carry_back_move(c->carry, c->now), NPG_OK);
+    assert_int_equal(npg_skin_move(c->carry, c->now), NPG_OK);
     see_body(c, sensor, frame);
     seen.point_count = c->count;
-    return npg_empty_cells_see(c->cells, c->carry, &seen);
+    return npg_carving_see(c->cells, c->carry, &seen);
 }
 
 /* Which of the empty cells lie in the pit, outside, and in the body. */
@@ -96,9 +96,9 @@ static sums find(const capture *c, int frames_least, double share)
 {
     sums s = {0, 0, 0};
     float *places;
-    assert_int_equal(
-        npg_alloc_array(&places, NPG_FOR_RUN, npg_empty_cells_count(c->cells), 3 * sizeof(float)), NPG_OK);
-    size_t count = npg_empty_cells_find(c->cells, places, frames_least, share);
+    assert_int_equal(npg_alloc_array(&places, NPG_FOR_RUN, npg_carving_count(c->cells), 3 * sizeof(float)),
+                     NPG_OK);
+    size_t count = npg_carving_find(c->cells, places, frames_least, share);
     for (size_t i = 0; i < count; i++) {
         const float *p = places + 3 * i;
         bool is_in_ball = p[0] * p[0] / 0.25f + p[1] * p[1] / 0.16f + p[2] * p[2] / 0.25f < 0.98f;
@@ -116,7 +116,7 @@ static void a_pit_is_seen_from_above(void **state)
     const float above[3] = {0.6f, 0.1f, 4};
     (void)state;
     open_capture(&c);
-    assert_true(npg_empty_cells_count(c.cells) > 5000);
+    assert_true(npg_carving_count(c.cells) > 5000);
     assert_int_equal(find(&c, 1, 0.5).outside, 0);
     for (int f = 0; f < FRAMES; f++) assert_int_equal(see(&c, above, f), NPG_OK);
     sums s = find(&c, 2, 0.6);
@@ -156,7 +156,7 @@ static void frames_vote(void **state)
     assert_int_equal(find(&c, 2, 0.6).pit, 0);
     for (size_t i = 0; i < POINTS; i++) c.points[3 * i + 2] = 0.45f; /* a lid: the cells below its height */
     npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.2};
-    for (int f = 0; f < 2; f++) assert_int_equal(npg_empty_cells_see(c.cells, c.carry, &seen), NPG_OK);
+    for (int f = 0; f < 2; f++) assert_int_equal(npg_carving_see(c.cells, c.carry, &seen), NPG_OK);
     assert_int_equal(find(&c, 1, 0.6).pit, 0);
     close_capture(&c);
 }
@@ -166,15 +166,15 @@ static void bounds_hold(void **state)
 {
     static capture c;
     const float nowhere[3] = {NAN, 0, 0};
-    npg_empty_cells *few;
+    npg_carving *few;
     (void)state;
     open_capture(&c);
     assert_int_equal(see(&c, nowhere, 0), NPG_OK);
     assert_int_equal(find(&c, 1, 0).pit, 0);
-    assert_int_equal(npg_empty_cells_open(&few, c.mesh, 1e-5, 0.2, 2000), NPG_OK);
-    assert_true(npg_empty_cells_count(few) <= 2000 && npg_empty_cells_count(few) > 500);
-    assert_true(npg_empty_cells_side(few) > 1e-5);
-    npg_empty_cells_close(&few);
+    assert_int_equal(npg_carving_open(&few, c.mesh, 1e-5, 0.2, 2000), NPG_OK);
+    assert_true(npg_carving_count(few) <= 2000 && npg_carving_count(few) > 500);
+    assert_true(npg_carving_side(few) > 1e-5);
+    npg_carving_close(&few);
     close_capture(&c);
 }
 
@@ -182,23 +182,23 @@ static void memory_that_fails_is_reported(void **state)
 {
     static capture c;
     const float above[3] = {0.6f, 0.1f, 4};
-    npg_empty_cells *cells;
+    npg_carving *cells;
     (void)state;
     open_capture(&c);
     size_t used = npg_memory_used();
     npg_status status = NPG_MEMORY;
     for (uint64_t n = 1; status == NPG_MEMORY; n++) {
         npg_memory_fail_at(n, false);
-        status = npg_empty_cells_open(&cells, c.mesh, SIDE, 0.2, 100000);
+        status = npg_carving_open(&cells, c.mesh, SIDE, 0.2, 100000);
         npg_memory_fail_at(0, false);
         if (status) assert_int_equal(npg_memory_used(), used);
     }
     assert_int_equal(status, NPG_OK);
-    npg_empty_cells_close(&cells);
+    npg_carving_close(&cells);
     assert_int_equal(see(&c, above, 0), NPG_OK);
     npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.02};
     npg_memory_fail_at(1, false);
-    assert_int_equal(npg_empty_cells_see(c.cells, c.carry, &seen), NPG_MEMORY);
+    assert_int_equal(npg_carving_see(c.cells, c.carry, &seen), NPG_MEMORY);
     npg_memory_fail_at(0, false);
     close_capture(&c);
 }
