@@ -32,7 +32,7 @@ typedef struct npg_cleaning {
 } npg_cleaning;
 
 /* Where the surface fails in one place, and not a little everywhere (evaluate/misfit.h). */
-enum { NPG_MISFIT_FAR, NPG_MISFIT_BARE, NPG_MISFIT_TORN, NPG_MISFIT_DESERTED, NPG_MISFITS };
+enum { NPG_MISFIT_FAR, NPG_MISFIT_UNSUPPORTED, NPG_MISFIT_STRETCHED, NPG_MISFIT_VACATED, NPG_MISFITS };
 typedef struct npg_misfit {
     double share; /* of the points, or of the surface, in the largest such place; NaN: not measured */
     double at[3]; /* its middle, in world coordinates; NaN where there is none                      */

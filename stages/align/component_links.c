@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "geometry/sets.h"
+#include "geometry/mesh_tools.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 

@@ -8,6 +8,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/robust.h"
 #include "geometry/thin.h"
 #include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
@@ -23,13 +24,12 @@
 #define MOVE_MAX    0.15  /* units                                                            */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Set by trial, like those above. */
-#define FACING_AWAY (-0.2) /* cosine of two normals below which a pair is of two sides of a part */
-#define SCHEDULE    1.5    /* stiffness and width are final after 2/3 of the steps; the last third settles */
-#define NOISE_WIDTH 2.5    /* mean distances of points that the robust weight is wide at least */
-#define SETTLED     0.01   /* of the graph's radius: a step that moves no node farther ends the fit */
-#define PAIR_WIDTHS 3.0    /* samples farther than so many widths from every point have no pair: a hole */
-#define ONE_SIDE    20     /* times the stiffness where one sensor leaves half of the body to the edges */
-#define SEEN_OFFSET 0.004  /* surface nearer than this hides nothing from a sensor */
+#define SCHEDULE    1.5   /* stiffness and width are final after 2/3 of the steps; the last third settles */
+#define NOISE_WIDTH 2.5   /* mean distances of points that the robust weight is wide at least */
+#define SETTLED     0.01  /* of the graph's radius: a step that moves no node farther ends the fit */
+#define PAIR_WIDTHS 3.0   /* samples farther than so many widths from every point have no pair: a hole */
+#define ONE_SIDE    20    /* times the stiffness where one sensor leaves half of the body to the edges */
+#define SEEN_OFFSET 0.004 /* surface nearer than this hides nothing from a sensor */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
 #define LENT_TERMS 0.18
@@ -252,8 +252,7 @@ static void add_pull(const npg_tracker *t, size_t part, const pull *p, const dou
         term.right[i] = p->target[i] - x[i];
         dist_sq += term.right[i] * term.right[i];
     }
-    double robust = 1 / (1 + dist_sq / (width * width));
-    weight *= robust * robust;
+    weight *= npg_geman_mcclure(dist_sq, width);
     for (; term.count < NPG_GRAPH_BIND && p->nodes[term.count] != UINT32_MAX; term.count++) {
         uint32_t node = p->nodes[term.count];
         term.nodes[term.count] = node;
@@ -288,7 +287,7 @@ static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, 
                           const float *point, const double normal[3])
 {
     return !npg_hit_on_border(hit, t->mesh->faces + 3 * (size_t)hit->face, t->is_border) &&
-           npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, FACING_AWAY);
+           npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, NPG_AGAINST);
 }
 
 /* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the mean of
@@ -310,7 +309,7 @@ static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_
         double facing = 0;
         for (size_t c = 0; c < 3 && with_normals; c++)
             facing += p.normal[c] * (double)t->target_normals[3 * i + c];
-        if (facing < FACING_AWAY) continue;
+        if (facing < NPG_AGAINST) continue;
         explained += (double)hit->dist_sq <= PAIR_WIDTHS * PAIR_WIDTHS * width * width;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
@@ -338,7 +337,7 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
             p.target[c] = (double)points[3 * (size_t)t->near[s] + c];
             if (normals) facing += p.normal[c] * (double)normals[3 * (size_t)t->near[s] + c];
         }
-        if (facing < FACING_AWAY || (double)t->near_sq[s] > PAIR_WIDTHS * PAIR_WIDTHS * width * width)
+        if (facing < NPG_AGAINST || (double)t->near_sq[s] > PAIR_WIDTHS * PAIR_WIDTHS * width * width)
             continue;
         memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
         memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);

@@ -1,22 +1,22 @@
 /* Alarm: notices from which frame on the reference no longer explains the capture. */
-#include "evaluate/alarm.h"
+#include "evaluate/evaluate_internal.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/robust.h"
 #include "pipeline/order.h"
 #include "pipeline/stage.h"
 
-/* Set by trial, but for NORMAL, on captures whose topology changes and on ones whose fit fails. */
-#define HISTORY  64     /* explained frames that the usual level is taken from        */
-#define SPREADS  6.0    /* of normal noise, above the usual level: the bound          */
-#define NORMAL   1.4826 /* standard deviations of normal noise per median deviation   */
-#define SUSPECT  0.5    /* of the bound                                               */
-#define LOST     3.0    /* times the points' distance in the keyframe: off everywhere */
-#define LOST_FIT 0.004  /* of the frame's diagonal: nearer than that it isn't         */
-#define CLEARLY  2.0    /* times the misfit on the other side                         */
+/* Set by trial, on captures whose topology changes and on ones whose fit fails. */
+#define HISTORY  64    /* explained frames that the usual level is taken from        */
+#define SPREADS  6.0   /* of normal noise, above the usual level: the bound          */
+#define SUSPECT  0.5   /* of the bound                                               */
+#define LOST     3.0   /* times the points' distance in the keyframe: off everywhere */
+#define LOST_FIT 0.004 /* of the frame's diagonal: nearer than that it isn't         */
+#define CLEARLY  2.0   /* times the misfit on the other side                         */
 #define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES) /* twice as many where each weighs half */
 
 /* clang-format off */
@@ -25,10 +25,10 @@ static const struct {
     double floor;  /* of the bound, where a capture has no misfit of its own; set by trial */
     double weight; /* of an unexplained frame among NPG_ALARM_FRAMES                       */
 } kinds[NPG_MISFITS] = {
-    {"far",      "of the points are far from the surface in one place",          0.01,  1},
-    {"bare",     "of the surface have no points near them in one place",         0.015, 1},
-    {"torn",     "of the surface are torn apart in one place",                   0.003, 0.5},
-    {"deserted", "of the surface are one part that has lost most of its points", 0.015, 1}};
+    {"far",         "of the points are far from the surface in one place",          0.01,  1},
+    {"unsupported", "of the surface have no points near them in one place",         0.015, 1},
+    {"stretched",   "of the surface are torn apart in one place",                   0.003, 0.5},
+    {"vacated",     "of the surface are one part that has lost most of its points", 0.015, 1}};
 /* clang-format on */
 
 typedef struct record {
@@ -94,7 +94,8 @@ static level level_of(const double *history, size_t ever, double floor)
     memcpy(values, history, count * sizeof *values);
     double usual = median_of(values, count);
     for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - usual);
-    return (level){usual, fmax(fmax(floor, SPREADS * NORMAL * median_of(values, count)), usual)};
+    return (level){usual,
+                   fmax(fmax(floor, SPREADS * NPG_DEVIATIONS_PER_MEDIAN * median_of(values, count)), usual)};
 }
 
 static void add_to_history(side *s, const record *r)
@@ -117,16 +118,16 @@ static bool is_lost(const side *s, const record *r)
 }
 
 /* Which misfits are a sign of another topology, and not of a surface that has lost the points: where points
- * and surface miss each other, much is far and much is bare. */
+ * and surface miss each other, much is far and much is unsupported. */
 static void select_misfits(bool counts[NPG_MISFITS], const side *s, const record *r, const level *levels)
 {
     double far = fmax(excess(r, levels, NPG_MISFIT_FAR), 0),
-           bare = fmax(excess(r, levels, NPG_MISFIT_BARE), 0);
+           unsupported = fmax(excess(r, levels, NPG_MISFIT_UNSUPPORTED), 0);
     bool is_off = is_lost(s, r);
-    counts[NPG_MISFIT_FAR] = far > CLEARLY * bare;
-    counts[NPG_MISFIT_BARE] = !is_off && bare > CLEARLY * far;
-    counts[NPG_MISFIT_TORN] = !is_off && far < SUSPECT * levels[NPG_MISFIT_FAR].bound;
-    counts[NPG_MISFIT_DESERTED] = counts[NPG_MISFIT_TORN];
+    counts[NPG_MISFIT_FAR] = far > CLEARLY * unsupported;
+    counts[NPG_MISFIT_UNSUPPORTED] = !is_off && unsupported > CLEARLY * far;
+    counts[NPG_MISFIT_STRETCHED] = !is_off && far < SUSPECT * levels[NPG_MISFIT_FAR].bound;
+    counts[NPG_MISFIT_VACATED] = counts[NPG_MISFIT_STRETCHED];
 }
 
 /* What a misfit of so many times its bound adds to a row of unexplained frames. */

@@ -5,8 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/measure.h"
-#include "evaluate/topology.h"
+#include "evaluate/evaluate_internal.h"
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "pipeline/file.h"

@@ -1,12 +1,11 @@
 /* Misfit: finds where in a frame the surface fails in one place. */
-#include "evaluate/misfit.h"
+#include "evaluate/evaluate_internal.h"
 
 #include <math.h>
 
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
-#include "geometry/sets.h"
 #include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 
@@ -19,12 +18,12 @@
 #define LINKS          6     /* neighbours that are searched for others of the cluster                */
 #define UNSEEN_MOST    0.02  /* of the reference: more than that, and it is of cameras that see parts */
 #define BESIDE_SIZE    0.15  /* of the diagonal: as far beyond a border lies surface not seen before  */
-#define TORN_STRETCH   1.5   /* times an edge's length in the reference                               */
-#define OFF_SHARE      0.6   /* of the reach: torn surface lies off the points                        */
+#define STRETCH_LEAST  1.5   /* times an edge's length in the reference                               */
+#define OFF_SHARE      0.6   /* of the reach: stretched surface lies off the points                        */
 #define LEAST_FAR      12    /* points in a place                                                     */
 #define LEAST_MISSED   20    /* points that would lie on a place of the surface                       */
 #define LEAST_VERTS    6     /* vertices whose mean area it has                                       */
-#define DESERTED_SHARE 0.6   /* of the points that a part should have                                 */
+#define VACATED_SHARE  0.6   /* of the points that a part should have                                 */
 
 struct npg_misfit_finder {
     const npg_mesh *reference; /* loan                                          */
@@ -190,7 +189,8 @@ static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misf
     largest_place(misfit, f, v, frame->area, least * frame->area);
 }
 
-static void find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame, double reach)
+static void find_unsupported(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                             double reach)
 {
     begin_places(f, f->reference->vert_count);
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
@@ -200,10 +200,11 @@ static void find_bare(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit
     add_flagged(f, misfit, frame);
 }
 
-/* Of the surface that is off the points only what is torn stays flagged. */
-static void find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame, double reach)
+/* Of the surface that is off the points only what is stretched stays flagged. */
+static void find_stretched(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                           double reach)
 {
-    enum { OFF = 1, ENDS_TORN = 2 };
+    enum { OFF = 1, ENDS_STRETCHED = 2 };
     size_t v = f->reference->vert_count;
     begin_places(f, v);
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
@@ -212,11 +213,12 @@ static void find_torn(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit
     for (size_t e = 0; e < f->edge_count; e++) {
         uint32_t a = f->edges[e][0], b = f->edges[e][1];
         if (!f->flags[a] || !f->flags[b]) continue;
-        if (!(length_of(frame->vert_unit, f->edges[e]) > TORN_STRETCH * (double)f->edge_lengths[e])) continue;
-        f->flags[a] |= ENDS_TORN;
-        f->flags[b] |= ENDS_TORN;
+        if (!(length_of(frame->vert_unit, f->edges[e]) > STRETCH_LEAST * (double)f->edge_lengths[e]))
+            continue;
+        f->flags[a] |= ENDS_STRETCHED;
+        f->flags[b] |= ENDS_STRETCHED;
     }
-    for (size_t i = 0; i < v; i++) f->flags[i] &= ENDS_TORN;
+    for (size_t i = 0; i < v; i++) f->flags[i] &= ENDS_STRETCHED;
     join_flagged(f);
     add_flagged(f, misfit, frame);
 }
@@ -240,7 +242,7 @@ static double sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
     return whole;
 }
 
-static void find_deserted(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
+static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
 {
     *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
     if (!f->is_closed || f->part_count < 2 || !frame->point_count) return;
@@ -250,7 +252,7 @@ static void find_deserted(npg_misfit_finder *f, npg_misfit *misfit, const npg_mi
         if (!(sum[0] > 0)) continue;
         double expected = (double)frame->point_count * sum[0] / whole, missing = expected - sum[4];
         double share = missing / (double)frame->point_count;
-        if (!(sum[4] < DESERTED_SHARE * expected) || missing < LEAST_MISSED || share <= misfit->share)
+        if (!(sum[4] < VACATED_SHARE * expected) || missing < LEAST_MISSED || share <= misfit->share)
             continue;
         misfit->share = share;
         for (size_t a = 0; a < 3; a++) misfit->at[a] = sum[1 + a] / sum[0];
@@ -269,9 +271,9 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
     npg_status status = npg_arena_status(&f->scratch);
     if (!status) status = find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link);
     if (!status) {
-        find_bare(f, &misfits[NPG_MISFIT_BARE], frame, reach);
-        find_deserted(f, &misfits[NPG_MISFIT_DESERTED], frame);
-        find_torn(f, &misfits[NPG_MISFIT_TORN], frame, OFF_SHARE * reach);
+        find_unsupported(f, &misfits[NPG_MISFIT_UNSUPPORTED], frame, reach);
+        find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame);
+        find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, OFF_SHARE * reach);
     }
     npg_arena_release(&f->scratch);
     return status;

@@ -1,7 +1,6 @@
 /* Topology: what a run does when its reference stops to explain the capture. */
-#include "evaluate/topology.h"
 
-#include "evaluate/alarm.h"
+#include "evaluate/evaluate_internal.h"
 #include "pipeline/json_file.h"
 
 static const char *const directions[NPG_DIRECTIONS] = {"forward", "backward"};

@@ -20,6 +20,7 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
+#include "geometry/robust.h"
 #include "mesh/surface.h"
 #include "pipeline/cost.h"
 #include "pipeline/options.h"
@@ -30,7 +31,6 @@
 #define SIDE_LEAST      0.25 /* ... but for its side, in spacings of the keyframe's points             */
 #define NEAR_MEDIANS    2.5  /* median distances within which a point lies on the surface but for noise */
 #define FAR_SPACINGS    2.5  /* spacings beyond which a point belongs to nothing that is known         */
-#define AGREEMENT       0.3  /* least cosine of a point's normal and the surface's                     */
 #define MISALIGNED      2.5  /* usual median distances: a frame that is farther off has lost its way   */
 #define FRAMES_SHARE    0.05 /* of all frames must have seen a place, ...                              */
 #define FRAMES_AT_LEAST 2    /* ... and so many                                                        */
@@ -155,7 +155,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
             NPG_TRY(npg_cells_add(s->cells, p->point, p->normal, p->point, p->normal, GROW_WEIGHT, frame));
             continue;
         }
-        if ((double)p->dist > far_dist || p->agreement < (float)AGREEMENT) {
+        if ((double)p->dist > far_dist || p->agreement < NPG_SAME_SIDE) {
             s->strays++;
             continue;
         }

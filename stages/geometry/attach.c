@@ -5,11 +5,13 @@
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
+#include "geometry/metrics.h"
 #include "geometry/query.h"
 #include "geometry/vec3.h"
 
 struct npg_attachment {
     npg_mesh *rest;      /* reference held               */
+    npg_arena arena;     /* of the arrays                */
     size_t point_count;  /* N                            */
     npg_surface_hit *at; /* N: face, weights, distance²  */
     float *offset;       /* N x 3: p - c at rest         */
@@ -107,10 +109,10 @@ static bool looks_along(const npg_mesh *rest, uint32_t face_number, const float 
 static npg_status tie_by_rays(npg_attachment *t, const npg_surface *surface, const float *points,
                               const uint32_t *wrong, size_t wrong_count, float reach)
 {
-    npg_ray *rays;
-    npg_ray_hit *hits = NULL;
-    npg_status status = npg_alloc_array(&rays, NPG_FOR_MESH, 2 * wrong_count, sizeof *rays);
-    if (!status) status = npg_alloc_array(&hits, NPG_FOR_MESH, 2 * wrong_count, sizeof *hits);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    npg_ray *rays = npg_arena_take(&scratch, 2 * wrong_count, sizeof *rays);
+    npg_ray_hit *hits = npg_arena_take(&scratch, 2 * wrong_count, sizeof *hits);
+    npg_status status = npg_arena_status(&scratch);
     for (size_t i = 0; i < 2 * wrong_count && !status; i++) {
         rays[i] = (npg_ray){.t_max = reach};
         for (size_t a = 0; a < 3; a++) {
@@ -128,23 +130,8 @@ static npg_status tie_by_rays(npg_attachment *t, const npg_surface *surface, con
         *at = (npg_surface_hit){.face = hit->face, .dist_sq = hit->t * hit->t};
         memcpy(at->weights, hit->weights, sizeof at->weights);
     }
-    npg_release(&rays);
-    npg_release(&hits);
+    npg_arena_release(&scratch);
     return status;
-}
-
-static double diagonal_of(const npg_mesh *mesh)
-{
-    double sum = 0;
-    for (size_t a = 0; a < 3; a++) {
-        float lo = INFINITY, hi = -INFINITY;
-        for (size_t i = 0; i < mesh->vert_count; i++) {
-            lo = fminf(lo, mesh->vert_pos[3 * i + a]);
-            hi = fmaxf(hi, mesh->vert_pos[3 * i + a]);
-        }
-        sum += ((double)hi - (double)lo) * ((double)hi - (double)lo);
-    }
-    return sqrt(sum);
 }
 
 static npg_status tie_to_right_sides(npg_attachment *t, const npg_surface *surface, const float *points)
@@ -154,7 +141,7 @@ static npg_status tie_to_right_sides(npg_attachment *t, const npg_surface *surfa
     NPG_TRY(npg_alloc_array(&wrong, NPG_FOR_MESH, t->point_count, sizeof *wrong));
     for (size_t i = 0; i < t->point_count; i++)
         if (!looks_along(t->rest, t->at[i].face, t->normals + 3 * i)) wrong[wrong_count++] = (uint32_t)i;
-    float reach = (float)(NPG_ATTACH_REACH * diagonal_of(t->rest));
+    float reach = (float)(NPG_ATTACH_REACH * npg_points_diagonal(t->rest->vert_pos, t->rest->vert_count));
     npg_status status = wrong_count ? tie_by_rays(t, surface, points, wrong, wrong_count, reach) : NPG_OK;
     npg_release(&wrong);
     return status;
@@ -178,19 +165,6 @@ static npg_status tie_points(npg_attachment *t, const float *points)
     return status;
 }
 
-static npg_status alloc_arrays(npg_attachment *t, const float *normals)
-{
-    size_t n = t->point_count, v = t->rest->vert_count;
-    NPG_TRY(npg_alloc_array(&t->at, NPG_FOR_MESH, n, sizeof *t->at));
-    NPG_TRY(npg_alloc_array(&t->offset, NPG_FOR_MESH, n, 3 * sizeof *t->offset));
-    NPG_TRY(npg_alloc_array(&t->rest_normals, NPG_FOR_MESH, v, 3 * sizeof *t->rest_normals));
-    NPG_TRY(npg_alloc_array(&t->now_normals, NPG_FOR_MESH, v, 3 * sizeof *t->now_normals));
-    if (!normals) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&t->normals, NPG_FOR_MESH, n, 3 * sizeof *t->normals));
-    if (n) memcpy(t->normals, normals, n * 3 * sizeof *normals);
-    return NPG_OK;
-}
-
 npg_status npg_attach_open(npg_attachment **out, npg_mesh *rest, const float *points, const float *normals,
                            size_t point_count)
 {
@@ -201,7 +175,13 @@ npg_status npg_attach_open(npg_attachment **out, npg_mesh *rest, const float *po
     NPG_TRY(npg_alloc(&t, NPG_FOR_MESH, sizeof *t));
     t->rest = npg_mesh_ref(rest);
     t->point_count = point_count;
-    npg_status status = alloc_arrays(t, normals);
+    t->arena.purpose = NPG_FOR_MESH;
+    t->at = npg_arena_take(&t->arena, point_count, sizeof *t->at);
+    t->offset = npg_arena_take(&t->arena, point_count, 3 * sizeof *t->offset);
+    t->rest_normals = npg_arena_take(&t->arena, rest->vert_count, 3 * sizeof *t->rest_normals);
+    t->now_normals = npg_arena_take(&t->arena, rest->vert_count, 3 * sizeof *t->now_normals);
+    if (normals) t->normals = npg_arena_copy(&t->arena, normals, point_count, 3 * sizeof *t->normals);
+    npg_status status = npg_arena_status(&t->arena);
     if (!status)
         npg_mesh_vertex_normals(t->rest_normals, rest->vert_pos, rest->vert_count, rest->faces,
                                 rest->face_count);
@@ -213,14 +193,9 @@ npg_status npg_attach_open(npg_attachment **out, npg_mesh *rest, const float *po
 
 void npg_attach_close(npg_attachment **slot)
 {
-    npg_attachment *t = *slot;
-    if (!t) return;
-    npg_mesh_unref(&t->rest);
-    npg_release(&t->at);
-    npg_release(&t->offset);
-    npg_release(&t->normals);
-    npg_release(&t->rest_normals);
-    npg_release(&t->now_normals);
+    if (!*slot) return;
+    npg_mesh_unref(&(*slot)->rest);
+    npg_arena_release(&(*slot)->arena);
     npg_release(slot);
 }
 

@@ -19,8 +19,9 @@ typedef enum npg_sight_kind {
     NPG_SEEN_BESIDE   /* outside of the outline: no point in its bin, around it, or on some way out */
 } npg_sight_kind;
 
-/* sensor and points (N x 3) in the same coordinates.  side: of a bin, as a length at the points' mean distance;
- * margin: a length.  Points at the sensor itself are left out; without any point all is unknown.  NPG_MEMORY. */
+/* sensor and points (N x 3) in the same coordinates.  side: of a bin, as a length at the points' mean
+ * distance; margin: a length.  Points at the sensor itself are left out; without any point all is unknown.
+ * NPG_MEMORY. */
 npg_status npg_depth_map_open(npg_depth_map **map, const float sensor[3], const float *points,
                               size_t point_count, double side, double margin);
 void npg_depth_map_close(npg_depth_map **map);

@@ -493,12 +493,10 @@ npg_status npg_kdtree_each(const npg_kdtree *tree, size_t k, const uint8_t *only
 
 typedef struct search {
     const npg_kdtree *tree;
-    uint32_t *index; /* or the counts */
+    uint32_t *index;
     float *dist_sq;
     const float *queries;
     size_t count, k, parts;
-    float radius_sq;
-    uint32_t enough;
 } search;
 
 NPG_WIDE static void search_nearest(const search *s, uint64_t *keys, size_t first, size_t end)
@@ -557,47 +555,6 @@ npg_status npg_neighbours_take(npg_neighbours *out, npg_arena *arena, const floa
     out->dist_sq = npg_arena_take(arena, query_count, k * sizeof *out->dist_sq);
     NPG_TRY(npg_arena_status(arena));
     return npg_points_nearest(out->index, out->dist_sq, points, point_count, queries, query_count, k);
-}
-
-NPG_WIDE static void search_count(const search *s, size_t first, size_t end)
-{
-    float dist_sq[LANES];
-    for (size_t i = first; i < end; i++) {
-        const float *q = s->queries + 3 * i;
-        const leaf *l;
-        uint32_t count = 0;
-        walk w;
-        begin_walk(&w, s->tree, q);
-        while ((!s->enough || count < s->enough) && (l = next_leaf(&w, s->tree, q, s->radius_sq))) {
-            unsigned near = near_lanes(dist_sq, l, q, s->radius_sq);
-            for (; near; near &= near - 1) {
-                int lane = __builtin_ctz(near);
-                count += dist_sq[lane] < s->radius_sq && l->index[lane] != UINT32_MAX;
-            }
-        }
-        s->index[i] = s->enough && count > s->enough ? s->enough : count;
-    }
-}
-
-static npg_status count_share(void *user, size_t part)
-{
-    const search *s = user;
-    search_count(s, s->count * part / s->parts, s->count * (part + 1) / s->parts);
-    return NPG_OK;
-}
-
-npg_status npg_kdtree_count(const npg_kdtree *tree, uint32_t *count, const float *queries, size_t query_count,
-                            float radius, uint32_t enough, int threads)
-{
-    search s = {.tree = tree,
-                .index = count,
-                .queries = queries,
-                .count = query_count,
-                .radius_sq = radius * radius,
-                .enough = enough};
-    NPG_REQUIRE(threads >= 0);
-    s.parts = npg_parallel_parts(query_count, QUERIES_MIN, (size_t)threads);
-    return npg_parallel(count_share, &s, s.parts);
 }
 
 NPG_WIDE void npg_kdtree_any_within(const npg_kdtree *tree, uint8_t *yes, const float *queries,

@@ -42,10 +42,6 @@ typedef struct npg_neighbours {
 npg_status npg_neighbours_take(npg_neighbours *out, npg_arena *arena, const float *points, size_t point_count,
                                const float *queries, size_t query_count, size_t k);
 
-/* The number of points within a radius of each query, counted up to `enough` (0: all). */
-npg_status npg_kdtree_count(const npg_kdtree *tree, uint32_t *count, const float *queries, size_t query_count,
-                            float radius, uint32_t enough, int threads);
-
 /* yes[i] = whether query i has a point of the tree no farther than its own radius, given squared; in the
  * calling thread. */
 void npg_kdtree_any_within(const npg_kdtree *tree, uint8_t *yes, const float *queries, const float *radius_sq,

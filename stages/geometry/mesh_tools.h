@@ -95,4 +95,37 @@ size_t npg_points_spread(float *out, float *out_normals, size_t most, const floa
 /* Keep the points (N x 3), and their normals (or NULL), whose keep is not 0, in order; returns how many. */
 size_t npg_points_keep(float *points, float *normals, size_t point_count, const uint8_t *keep);
 
+/* Sets: which things belong together, as a forest of parents (union-find).
+ *
+ * parent[i] = i makes i a set of its own.  The lowest member of a set is its root, so that the result does
+ * not depend on the order of the joins. */
+
+/* The lowest member of i's set; the way there is shortened. */
+static inline uint32_t npg_set_root(uint32_t *parent, uint32_t i)
+{
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+static inline void npg_set_join(uint32_t *parent, uint32_t a, uint32_t b)
+{
+    a = npg_set_root(parent, a);
+    b = npg_set_root(parent, b);
+    parent[a > b ? a : b] = a > b ? b : a;
+}
+
+/* Patch: the largest connected part of a surface whose vertices are marked. */
+
+typedef struct npg_patch {
+    double share;  /* of the surface's area; 0 where no vertex is marked      */
+    float at[3];   /* mean of its vertices, weighted by area; NaN without any */
+    double radius; /* from there to its farthest vertex; 0 without any        */
+} npg_patch;
+
+/* The largest by area; marked vertices belong together where an edge of the mesh joins them.  is_marked: V;
+ * vert_pos: V x 3, the mesh in any pose; vert_areas: V, of that pose (npg_vertex_areas()); position, radius
+ * and areas in its unit.  NPG_MEMORY. */
+npg_status npg_patch_largest(npg_patch *patch, const uint8_t *is_marked, const float *vert_pos,
+                             const double *vert_areas, const npg_mesh *mesh);
+
 #endif

@@ -1,9 +1,8 @@
 /* Patch: marked vertices that edges join, and the largest such set. */
-#include "geometry/patch.h"
 
 #include <math.h>
 
-#include "geometry/sets.h"
+#include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
 
 static void join_marked(uint32_t *parents, const uint8_t *is_marked, const npg_mesh *mesh)

@@ -65,7 +65,7 @@ static json_t *json_of_figures(const npg_figures *f)
     return figures;
 }
 
-static const char *const misfit_names[NPG_MISFITS] = {"far", "bare", "torn", "deserted"};
+static const char *const misfit_names[NPG_MISFITS] = {"far", "unsupported", "stretched", "vacated"};
 
 static json_t *json_of_misfits(const npg_figures *f)
 {

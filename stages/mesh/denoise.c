@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/robust.h"
 #include "geometry/vec3.h"
 #include "outlier/normals.h"
 #include "pipeline/memory.h"
@@ -18,8 +19,7 @@
 #define ASKED_MAX   4000
 #define FLAT_LEAST  0.1 /* of the points, that are not of thin parts */
 #define TERMS       6
-#define SIDE_COS    0.3f /* neighbours whose normal is nearer than this belong to the same sheet */
-#define SUPPORT_MIN 9    /* neighbours of the same sheet that a quadric takes */
+#define SUPPORT_MIN 9 /* neighbours of the same sheet that a quadric takes */
 
 /* ---- noise ---- */
 
@@ -46,7 +46,7 @@ static double plane_residual(const float *points, const uint32_t *index, size_t 
 static bool is_thin(const float *normals, size_t point, const uint32_t *index)
 {
     for (size_t k = 0; k < WIDE; k++)
-        if (npg_vec3_dotf(normals + 3 * point, normals + 3 * (size_t)index[k]) < -SIDE_COS) return true;
+        if (npg_vec3_dotf(normals + 3 * point, normals + 3 * (size_t)index[k]) < -NPG_SAME_SIDE) return true;
     return false;
 }
 
@@ -147,7 +147,7 @@ static void fit(float *out_point, float *out_normal, size_t i, const float *poin
     span_plane(x, y, n);
     for (size_t j = 0; j < k && r > 0; j++) {
         const float *q = points + 3 * (size_t)index[j], *o = normals + 3 * (size_t)index[j];
-        if (npg_vec3_dotf(n, o) < SIDE_COS) continue;
+        if (npg_vec3_dotf(n, o) < NPG_SAME_SIDE) continue;
         double u = 0, v = 0, h = 0, weight = exp(-2 * (double)dist_sq[j] / (r * r));
         for (int a = 0; a < 3; a++) {
             double d = ((double)q[a] - (double)p[a]) / r;

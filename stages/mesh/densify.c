@@ -7,19 +7,18 @@
 #include <string.h>
 
 #include "geometry/kdtree.h"
+#include "geometry/robust.h"
 #include "geometry/vec3.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 
 /* By trial. */
-#define NEAR       48      /* points among which another side is looked for ...                    */
-#define THIN       1.2     /* ... no farther than this many spacings                               */
-#define OTHER_SIDE (-0.3F) /* cosine of two normals of different sides                             */
-#define AMONG      15      /* nearest points that ...                                              */
-#define PAIRS      5       /* ... so many neighbours on the same side are taken from               */
-#define SAME_SIDE  0.3F    /* cosine of two normals of one side                                    */
-#define ON_CIRCLE  0.7F    /* of one, and the other reflected halfway: 1 where both lie on a circle */
-#define STEEP      0.75F   /* cosine of a normal and the edge: beyond, the edge is no surface      */
+#define NEAR      48    /* points among which another side is looked for ...                    */
+#define THIN      1.2   /* ... no farther than this many spacings                               */
+#define AMONG     15    /* nearest points that ...                                              */
+#define PAIRS     5     /* ... so many neighbours on the same side are taken from               */
+#define ON_CIRCLE 0.7F  /* of one, and the other reflected halfway: 1 where both lie on a circle */
+#define STEEP     0.75F /* cosine of a normal and the edge: beyond, the edge is no surface      */
 
 /* Whether one of the near points is of another side, with the body in between. */
 static bool is_thin(const float *points, const float *normals, size_t i, const uint32_t *near,
@@ -29,7 +28,7 @@ static bool is_thin(const float *points, const float *normals, size_t i, const u
     for (size_t k = 0; k < NEAR && dist_sq[k] < far_sq; k++) {
         const float *q = points + 3 * (size_t)near[k], *m = normals + 3 * (size_t)near[k];
         float d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-        if (npg_vec3_dotf(n, m) < OTHER_SIDE && npg_vec3_dotf(d, n) < 0 && npg_vec3_dotf(d, m) > 0)
+        if (npg_vec3_dotf(n, m) < -NPG_SAME_SIDE && npg_vec3_dotf(d, n) < 0 && npg_vec3_dotf(d, m) > 0)
             return true;
     }
     return false;
@@ -42,7 +41,7 @@ static bool is_edge(const float *points, const float *normals, size_t i, size_t 
     float d[3], cosine = npg_vec3_dotf(n, m);
     for (size_t a = 0; a < 3; a++) d[a] = points[3 * j + a] - points[3 * i + a];
     float length_sq = npg_vec3_dotf(d, d), along = npg_vec3_dotf(n, d);
-    if (!(length_sq > 0) || cosine < SAME_SIDE) return false;
+    if (!(length_sq > 0) || cosine < NPG_SAME_SIDE) return false;
     float reflected = cosine - 2 * along * npg_vec3_dotf(m, d) / length_sq;
     return reflected >= ON_CIRCLE && fabsf(along) <= STEEP * sqrtf(length_sq);
 }

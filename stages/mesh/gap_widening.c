@@ -8,14 +8,14 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/robust.h"
 #include "geometry/vec3.h"
 
-#define NEIGHBOURS    48      /* in which a facing point is looked for */
-#define CONTACT_MOST  5000    /* points that contact is measured at                   */
-#define CONTACT_AMONG 24      /* of their neighbours, each                            */
-#define AGAINST       (-0.3f) /* cosine of two normals that face each other */
-#define ACROSS        0.5f    /* cosine of a normal and the way across the gap */
-#define SMOOTH_OVER   12      /* neighbours                            */
+#define NEIGHBOURS    48   /* in which a facing point is looked for */
+#define CONTACT_MOST  5000 /* points that contact is measured at                   */
+#define CONTACT_AMONG 24   /* of their neighbours, each                            */
+#define ACROSS        0.5f /* cosine of a normal and the way across the gap */
+#define SMOOTH_OVER   12   /* neighbours                            */
 #define SMOOTH_ROUNDS 3
 #define BACK_OVER     6  /* points around a vertex           */
 #define BACK_AMONG    16 /* nearest ones that they are among */
@@ -41,7 +41,7 @@ bool npg_points_face(const float *p, const float *n, const float *q, const float
         cosine += n[a] * m[a];
     }
     length = sqrtf(length);
-    return cosine < AGAINST && along_n > ACROSS * length && along_m < -ACROSS * length;
+    return cosine < -NPG_SAME_SIDE && along_n > ACROSS * length && along_m < -ACROSS * length;
 }
 
 /* How many points face one of their neighbours. */
@@ -101,7 +101,7 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
         for (size_t k = 0; k < SMOOTH_OVER; k++) {
             size_t j = near[NEIGHBOURS * i + k];
             if (j >= n) break;
-            if (npg_vec3_dotf(normals + 3 * i, normals + 3 * j) < 0.3f) continue;
+            if (npg_vec3_dotf(normals + 3 * i, normals + 3 * j) < NPG_SAME_SIDE) continue;
             sum += push[j];
             weight += 1;
         }

@@ -6,7 +6,7 @@
 
 #include "align/tracker.h"
 #include "geometry/cells.h"
-#include "geometry/patch.h"
+#include "geometry/mesh_tools.h"
 #include "mesh/surface.h"
 #include "pipeline/frame_box.h"
 

@@ -4,14 +4,13 @@
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
-#include "geometry/sets.h"
+#include "geometry/robust.h"
 #include "geometry/vec3.h"
 #include "mesh/mesh_internal.h"
 
 #define SMOOTH_ROUNDS 12
 #define MEND_ROUNDS   12
-#define HOLE_MAX      32     /* edges of a hole that is filled */
-#define FLIPPED_COS   (-0.2) /* against the mean normal of the faces around */
+#define HOLE_MAX      32 /* edges of a hole that is filled */
 
 /* ---- duplicate and degenerate faces ---- */
 
@@ -324,7 +323,7 @@ static bool is_turned(const double *sum, const npg_mesh *mesh, size_t f)
     for (size_t a = 0; a < 3; a++)
         for (size_t k = 0; k < 3; k++) others[a] += sum[3 * (size_t)mesh->faces[3 * f + k] + a] - n[a];
     double nn = npg_vec3_dot(n, n), oo = npg_vec3_dot(others, others);
-    return npg_vec3_dot(n, others) < FLIPPED_COS * sqrt(nn * oo);
+    return npg_vec3_dot(n, others) < NPG_AGAINST * sqrt(nn * oo);
 }
 
 static size_t find_flipped(uint8_t *is_flipped, double *sum, const npg_mesh *mesh)

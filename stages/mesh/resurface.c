@@ -7,11 +7,11 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/robust.h"
 #include "geometry/vec3.h"
 
 #define ROUNDS_MAX  4
-#define DRAFT_DEPTH 7 /* of the reconstructions that only serve the normals */
-#define CLEARLY     (-0.3f)
+#define DRAFT_DEPTH 7      /* of the reconstructions that only serve the normals */
 #define SETTLED     0.0005 /* share of turned normals that ends it */
 #define ALMOST      0.002  /* the same where a draft is all that is wanted */
 #define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
@@ -35,7 +35,7 @@ static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh
     NPG_TRY(npg_alloc_array(&hits, NPG_FOR_MESH, n, sizeof *hits));
     npg_status status = npg_mesh_closest(hits, mesh, points, n);
     for (size_t i = 0; i < n && !status; i++) {
-        if (side_at(mesh, &hits[i], normals + 3 * i) >= CLEARLY) continue;
+        if (side_at(mesh, &hits[i], normals + 3 * i) >= -NPG_SAME_SIDE) continue;
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
         ++*turned;
     }

@@ -7,10 +7,8 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/robust.h"
 #include "pipeline/order.h"
-
-#define OPPOSITE -0.2f  /* cosine below which a point's normal speaks against the surface's        */
-#define NORMAL   1.4826 /* standard deviation of a normal distribution, in median absolute values   */
 
 npg_status npg_joint_matcher_open(npg_joint_matcher *m, const npg_mesh *mesh, size_t most)
 {
@@ -52,7 +50,7 @@ npg_status npg_joint_measure(npg_joint_matcher *m, double *spread, const npg_joi
     if (!count) return NPG_OK;
     for (size_t i = 0; i < count; i++) m->dists[i] = sqrtf(m->hits[i].dist_sq);
     qsort(m->dists, count, sizeof *m->dists, npg_order_float);
-    *spread = NORMAL * (double)m->dists[count / 2];
+    *spread = NPG_DEVIATIONS_PER_MEDIAN * (double)m->dists[count / 2];
     return NPG_OK;
 }
 
@@ -60,8 +58,7 @@ static void set_pull(npg_joint_pull *p, const npg_joint_matcher *m, size_t i, co
                      double width)
 {
     const npg_surface_hit *hit = &m->hits[i];
-    double robust = 1 / (1 + (double)hit->dist_sq / (width * width));
-    *p = (npg_joint_pull){.strength = (float)(robust * robust)};
+    *p = (npg_joint_pull){.strength = (float)npg_geman_mcclure((double)hit->dist_sq, width)};
     memcpy(p->weight, hit->weights, sizeof p->weight);
     memcpy(p->offset, m->targets + 3 * i, sizeof p->offset);
     float length = 0;
@@ -90,7 +87,7 @@ npg_status npg_joint_match(npg_joint_matcher *m, npg_joint_pull *pulls, size_t *
         set_pull(p, m, i, frame->positions, width);
         for (size_t a = 0; a < 3 && frame->normals; a++)
             facing += p->normal[a] * m->target_normals[3 * i + a];
-        *count += facing >= OPPOSITE;
+        *count += facing >= (float)NPG_AGAINST;
     }
     return NPG_OK;
 }

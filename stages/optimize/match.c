@@ -8,10 +8,9 @@
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"
+#include "geometry/robust.h"
 #include "geometry/vec3.h"
 #include "pipeline/order.h"
-
-#define OPPOSITE -0.2 /* cosine below which a point's normal speaks against the surface's */
 
 struct npg_matcher {
     npg_match_settings settings;
@@ -94,12 +93,6 @@ static void face_point(float out[3], const float *vert_pos, const uint32_t *face
                  weights[2] * vert_pos[3 * (size_t)face[2] + i];
 }
 
-static float robust_weight(double dist_sq, double width)
-{
-    double share = 1 / (1 + dist_sq / (width * width));
-    return (float)(share * share);
-}
-
 static void pull_target(npg_matcher *m, npg_pull *pull, size_t i, const float *vert_unit,
                         const float *samples, float weight)
 {
@@ -126,9 +119,9 @@ static void match_targets(npg_matcher *m, npg_pull *pulls, size_t *count, const 
     double width = fmax(3 * median_of(m->sorted, m->target_count) + 1e-4, m->least_width);
     double share = m->settings.total / (double)m->target_count;
     for (size_t i = 0; i < m->target_count; i++) {
-        float weight = (float)share * robust_weight((double)m->hits[i].dist_sq, width);
+        float weight = (float)share * (float)npg_geman_mcclure((double)m->hits[i].dist_sq, width);
         pull_target(m, &pulls[*count], i, vert_unit, samples, weight);
-        if (with_normals && npg_vec3_dotf(pulls[*count].normal, m->normals + 3 * i) < (float)OPPOSITE)
+        if (with_normals && npg_vec3_dotf(pulls[*count].normal, m->normals + 3 * i) < (float)NPG_AGAINST)
             continue;
         ++*count;
     }
@@ -152,9 +145,9 @@ static npg_status match_samples(npg_matcher *m, npg_pull *pulls, size_t *count, 
         npg_pull pull = {.vertex = {(int32_t)s, (int32_t)s, (int32_t)s}, .share = {1, 0, 0}};
         memcpy(pull.normal, m->vert_normals + 3 * (size_t)m->skinning->samples->vertex[s],
                sizeof pull.normal);
-        if (normals && npg_vec3_dotf(pull.normal, normals + 3 * (size_t)m->near[s]) < (float)OPPOSITE)
+        if (normals && npg_vec3_dotf(pull.normal, normals + 3 * (size_t)m->near[s]) < (float)NPG_AGAINST)
             continue;
-        pull.weight = (float)share * robust_weight((double)m->near_sq[s], width);
+        pull.weight = (float)share * (float)npg_geman_mcclure((double)m->near_sq[s], width);
         pull.along = (float)m->settings.along;
         for (size_t k = 0; k < 3; k++) pull.constant[k] = -to[k];
         pulls[(*count)++] = pull;

@@ -11,8 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/alarm.h"
-#include "evaluate/misfit.h"
+#include "evaluate/evaluate_internal.h"
 
 /* ---- streams of figures ---- */
 
@@ -120,8 +119,8 @@ static void a_lasting_misfit_raises_the_alarm(void **state)
     for (int k = 0; k < NPG_MISFITS; k++) {
         expect(k, step_up, 37, -1);
         expect(k, step_up_behind, -1, 9);
-        expect(k, on_both_sides, 50, k == NPG_MISFIT_TORN ? -1 : 3); /* the last four frames backward */
-        expect(k, five_frames, k == NPG_MISFIT_TORN ? -1 : 40, -1);
+        expect(k, on_both_sides, 50, k == NPG_MISFIT_STRETCHED ? -1 : 3); /* the last four frames backward */
+        expect(k, five_frames, k == NPG_MISFIT_STRETCHED ? -1 : 40, -1);
         expect(k, step_above_noise, 33, -1);
     }
 }
@@ -147,7 +146,7 @@ static void what_creeps_raises_none(void **state)
 {
     (void)state;
     expect(NPG_MISFIT_FAR, creep, -1, -1);
-    expect(NPG_MISFIT_BARE, creep, -1, -1);
+    expect(NPG_MISFIT_UNSUPPORTED, creep, -1, -1);
 }
 
 /* Whether an alarm is raised by frames with these figures from index 30 on. */
@@ -157,8 +156,8 @@ static bool is_raised_by(double far, double bare, double torn, double fit)
     assert_int_equal(npg_alarm_open(&alarm, 0), NPG_OK);
     for (int64_t i = 0; i < FRAMES; i++) {
         npg_frame frame = frame_of(i, NPG_MISFIT_FAR, i < 30 ? 0 : far);
-        frame.figures.misfits[NPG_MISFIT_BARE].share = i < 30 ? 0 : bare;
-        frame.figures.misfits[NPG_MISFIT_TORN].share = i < 30 ? 0 : torn;
+        frame.figures.misfits[NPG_MISFIT_UNSUPPORTED].share = i < 30 ? 0 : bare;
+        frame.figures.misfits[NPG_MISFIT_STRETCHED].share = i < 30 ? 0 : torn;
         frame.figures.point_dist_median = i < 30 ? 0.002 : fit;
         assert_int_equal(npg_alarm_add(alarm, &frame), NPG_OK);
     }
@@ -188,7 +187,7 @@ static void frames_without_figures_are_passed_over(void **state)
     npg_alarm *alarm;
     assert_int_equal(npg_alarm_open(&alarm, 0), NPG_OK);
     for (int64_t i = 0; i < 20; i++) {
-        npg_frame frame = frame_of(i, NPG_MISFIT_BARE, i % 2 ? (double)NAN : i >= 10 ? 0.5 : 0);
+        npg_frame frame = frame_of(i, NPG_MISFIT_UNSUPPORTED, i % 2 ? (double)NAN : i >= 10 ? 0.5 : 0);
         if (i % 2) frame.figures.misfits[NPG_MISFIT_FAR].share = (double)NAN;
         assert_int_equal(npg_alarm_add(alarm, &frame), NPG_OK);
     }
@@ -325,12 +324,12 @@ static void bare_and_torn_surface_is_found(void **state)
         bare += is_right ? s.areas[v] : 0;
     }
     find(m, &s);
-    assert_true(fabs(m[NPG_MISFIT_BARE].share - bare) < 1e-9 && m[NPG_MISFIT_TORN].share == 0);
+    assert_true(fabs(m[NPG_MISFIT_UNSUPPORTED].share - bare) < 1e-9 && m[NPG_MISFIT_STRETCHED].share == 0);
     for (size_t v = 0; v < VERTS; v++)
         if (v % (SIDE + 1) > SIDE / 2) s.vert_unit[3 * v] = 0.5f + 3 * (s.vert_unit[3 * v] - 0.5f);
     find(m, &s);
-    assert_true(fabs(m[NPG_MISFIT_TORN].share - bare) < 1e-9);
-    assert_true(m[NPG_MISFIT_TORN].at[0] > 1);
+    assert_true(fabs(m[NPG_MISFIT_STRETCHED].share - bare) < 1e-9);
+    assert_true(m[NPG_MISFIT_STRETCHED].at[0] > 1);
     close_sheet(&s);
 }
 
@@ -349,7 +348,7 @@ static void what_no_sensor_has_in_sight_is_not_missing(void **state)
         s.vert_unit[3 * v] = 0.5f + 3 * (s.vert_unit[3 * v] - 0.5f);
     }
     find(m, &s);
-    assert_true(m[NPG_MISFIT_BARE].share > 0.4 && m[NPG_MISFIT_TORN].share > 0.4);
+    assert_true(m[NPG_MISFIT_UNSUPPORTED].share > 0.4 && m[NPG_MISFIT_STRETCHED].share > 0.4);
     s.frame.is_in_sight = is_in_sight;
     find(m, &s);
     for (int k = 0; k < NPG_MISFITS; k++) assert_true(m[k].share == 0);
@@ -368,10 +367,11 @@ static void what_sampling_or_a_border_explains_is_not_bare(void **state)
         open_sheet(&s, has_border);
         for (size_t v = 0; v < 19; v++) s.vert_dist_sq[v] = 1;
         find(m, &s);
-        assert_true(m[NPG_MISFIT_BARE].share == 0);
+        assert_true(m[NPG_MISFIT_UNSUPPORTED].share == 0);
         for (size_t v = 0; v < 21; v++) s.vert_dist_sq[v] = 1;
         find(m, &s);
-        assert_true(has_border ? m[NPG_MISFIT_BARE].share == 0 : m[NPG_MISFIT_BARE].share > 0.04);
+        assert_true(has_border ? m[NPG_MISFIT_UNSUPPORTED].share == 0
+                               : m[NPG_MISFIT_UNSUPPORTED].share > 0.04);
         close_sheet(&s);
     }
 }
@@ -394,14 +394,14 @@ static void a_part_without_points_of_its_own_is_deserted(void **state)
     for (uint32_t f = 0; f < s.mesh->face_count; f++) *(s.mesh->faces[3 * f] >= HALF ? &upper : &lower) = f;
     for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 2 ? lower : upper;
     find(m, &s);
-    assert_true(m[NPG_MISFIT_DESERTED].share == 0);
+    assert_true(m[NPG_MISFIT_VACATED].share == 0);
     for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 5 ? lower : upper;
     find(m, &s);
-    assert_true(fabs(m[NPG_MISFIT_DESERTED].share - 0.3) < 0.05 && m[NPG_MISFIT_DESERTED].at[1] > 0.5);
-    assert_true(m[NPG_MISFIT_BARE].share == 0 && m[NPG_MISFIT_TORN].share == 0);
+    assert_true(fabs(m[NPG_MISFIT_VACATED].share - 0.3) < 0.05 && m[NPG_MISFIT_VACATED].at[1] > 0.5);
+    assert_true(m[NPG_MISFIT_UNSUPPORTED].share == 0 && m[NPG_MISFIT_STRETCHED].share == 0);
     for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 3 ? lower : upper; /* 67 %: still its own */
     find(m, &s);
-    assert_true(m[NPG_MISFIT_DESERTED].share == 0);
+    assert_true(m[NPG_MISFIT_VACATED].share == 0);
     close_sheet(&s);
 }
 

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "evaluate/evaluate_shape.h"
+#include "evaluate/evaluate_internal.h"
 #include "export/forms/writer.h"
 #include "mesh/mesh_internal.h"
 #include "tests/support/group_folder.h"

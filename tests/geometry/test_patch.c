@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/patch.h"
+#include "geometry/mesh_tools.h"
 #include "geometry/thin.h"
 #include "job/state_mesh.h"
 #include "tests/support/ball_mesh.h"

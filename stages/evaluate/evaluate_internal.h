@@ -1,0 +1,202 @@
+/* The evaluate room within: what is measured of a frame, and when its topology has changed. */
+#ifndef NPG_EVALUATE_INTERNAL_H
+#define NPG_EVALUATE_INTERNAL_H
+
+#include <jansson.h>
+
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/mesh.h"
+#include "pipeline/stage.h"
+
+/* Shape: how a deformed mesh differs from its reference. */
+
+typedef struct npg_shape npg_shape;
+
+/* What is needed of the reference; the mesh is a loan that must outlive the shape. */
+npg_status npg_shape_open(npg_shape **shape, const npg_mesh *reference);
+void npg_shape_close(npg_shape **shape);
+
+/* Fill flipped_share, stretched_share and edge_change for V x 3 deformed vertices.
+ *
+ * A face is flipped when its normal points against the mean normal of the faces that share a vertex with it
+ * (weighted by their areas in the reference; cosine below -0.2) although it did not in the reference (cosine
+ * above 0.2): it was turned over against the rotation of its neighbourhood.  Faces that stand across a crease
+ * of the reference are not judged.  A face is stretched when its area is more than 10 or less than 0.1 times
+ * that in the reference.  edge_change is the mean of |length / reference length - 1|. */
+void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float *vert_unit);
+
+/* Misfit: finds where in a frame the surface fails in one place, which is how a change of topology shows:
+ * noise, outliers and a poor fit are spread all over.
+ *
+ *   far       points further from the surface than `reach`, near each other: something is there that the
+ *             reference does not have (what lies just beyond its border, where it has one, its frame did not
+ *             see)
+ *   unsupported  connected surface further than `reach` from all points: something is gone
+ *   stretched    connected surface whose edges are more than 1.5 times as long as in the reference, and
+ *                further than 0.6 x reach from all points: a web between parts that went apart
+ *   vacated      a part of the reference (one that hangs together) with fewer than 60 % of the points that
+ *                are its share by area: it is gone, though its surface has found a place on another part's
+ *                points, where it is neither unsupported nor stretched.  A point is its nearest part's; the
+ *                share counts what is missing
+ *
+ * reach = max(3 x spacing of the points on the surface, 1.5 % of the reference's diagonal), with noise
+ * 5 x the median distance of the points, but no more than twice as far; the places are the largest ones.
+ *
+ * What sampling can explain is nothing: a place of fewer than 12 points, and one on the surface
+ * where fewer than 20 points would be expected or that has fewer than 6 vertices' share of the area.
+ * A reference with a border, or one that saw only a part of its frame, is never unsupported, stretched or
+ * vacated: what cameras see differs.  Where it is known what of the surface they could see in a frame, the
+ * rest of it is neither unsupported nor stretched, and has no share of the points. */
+
+typedef struct npg_misfit_finder npg_misfit_finder;
+
+/* The mesh is a loan that must outlive the finder.  unseen_share: of its area that no point of its frame saw;
+ * above 2 % the capture is of cameras that see other parts in each frame. */
+npg_status npg_misfit_open(npg_misfit_finder **finder, const npg_mesh *reference, double unseen_share);
+void npg_misfit_close(npg_misfit_finder **finder);
+
+/* What is measured of a frame, in units. */
+typedef struct npg_misfit_frame {
+    const float *points;         /* N x 3                  */
+    const npg_surface_hit *hits; /* N, the closest surface */
+    size_t point_count;
+    double point_dist_median;
+    const float *vert_unit;    /* V x 3                           */
+    const float *vert_dist_sq; /* V, to the nearest point         */
+    const double *vert_areas;  /* V, in this frame, and their sum */
+    double area;
+    const uint8_t *is_in_sight; /* V: of a sensor, or NULL: no sensor is known */
+} npg_misfit_frame;
+
+/* Fill misfits[NPG_MISFITS]; `at` in units.  far's share is of the points, the others'
+ * of the area.  NPG_MEMORY. */
+npg_status npg_misfit_find(npg_misfit_finder *finder, npg_misfit *misfits, const npg_misfit_frame *frame);
+
+/* Measure: how well a deformed reference explains the points of its frame. */
+
+typedef struct npg_measure npg_measure;
+
+typedef struct npg_measure_settings {
+    double cover_dist;   /* a point that near covers the surface, in per cent of the diagonal */
+    int64_t point_limit; /* points of a frame that are asked for at most; 0: all               */
+} npg_measure_settings;
+
+/* The mesh is a loan that must outlive the measure.  unseen_share: of its area that no point of its frame saw,
+ * 0 to 1.  NPG_MEMORY; *measure is NULL after an error. */
+npg_status npg_measure_open(npg_measure **measure, const npg_mesh *reference, double unseen_share,
+                            const npg_measure_settings *settings);
+void npg_measure_close(npg_measure **measure);
+
+/* Fill the frame's figures from its vertices (V x 3, as the reference's) and its points: those of shape
+ * (npg_shape_measure()), and unless the frame is skipped or has no finite point
+ *
+ *   point_dist_*       of the points to the surface, in diagonals of the box
+ *   vertex_dist_mean   of the vertices to the nearest point, the same
+ *   chamfer            1e5 x half the sum of both mean squares
+ *   coverage           share of the area with a point within max(cover_dist, 2 x spacing of the points)
+ *   unsupported_*      share and largest place of what neither the reference's points nor these support
+ *   misfits            as npg_misfit_find(), in world coordinates
+ *
+ * What is not known stays as it is.  One thread at a time.  NPG_MEMORY. */
+npg_status npg_measure_frame(npg_measure *measure, npg_frame *frame, const npg_frame_box *box);
+
+/* Bytes that a measure takes, at most: points, hits and distances, with the k-d tree about as much again; per
+ * vertex of the reference the shape, the surface and its search tree. */
+size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_count, size_t vert_count);
+
+/* Alarm: notices from which frame on the reference no longer explains the capture, for each direction from
+ * the keyframe: its topology changed there.
+ *
+ * Each direction has a usual level of every misfit: median and median deviation of the last
+ * explained frames, outward from the keyframe.  A frame is suspect when a misfit exceeds its level by half of
+ *
+ *     bound = max(floor, 6 x 1.4826 x median deviation, median)
+ *
+ * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm (twice as
+ * many where each is merely stretched: an alignment that slips does that, too, until it is found again),
+ * if no more than NPG_ALARM_RISE suspect ones lead up to them: a topology changes at once, a fit that creeps
+ * away is another fault (the quality bar's).  It dates from the first of the suspect ones before them, by
+ * NPG_ALARM_BACK frames at most.  A frame or two alone (an outlier, a fast motion that the next frame has
+ * caught up with) raise none, and no level that is spread all over the surface or usual in the capture
+ * (noise, holes, what cameras don't see) does.
+ *
+ * Nor does a surface that has lost the points: that is a failed fit, which the quality bar reports.  It is
+ * known by two signs.  Points and surface miss each other: then there is much of both far and unsupported,
+ * so far counts only when its excess is more than twice that of unsupported, unsupported only when its excess
+ * is more than twice that of far, and stretched and vacated only where far is less than suspect.  Or the
+ * points are off everywhere: unsupported, stretched and vacated don't count when the points' median distance
+ * is above 0.4 % of the diagonal and above 3 times the keyframe's.  (A new part pulls the surface off the
+ * points, too, so far counts there.)
+ *
+ * Frames may come in any order: they are taken in order of their distance from the keyframe, so the result
+ * does not depend on it.  Memory: the frames that came ahead of their turn. */
+
+/* Set by trial; what each does stands above. */
+#define NPG_ALARM_FRAMES 3
+#define NPG_ALARM_BACK   3
+#define NPG_ALARM_RISE   6
+
+enum { NPG_FORWARD, NPG_BACKWARD, NPG_DIRECTIONS };
+
+typedef struct npg_alarm npg_alarm;
+
+/* key: index of the keyframe. */
+npg_status npg_alarm_open(npg_alarm **alarm, int64_t key);
+void npg_alarm_close(npg_alarm **alarm);
+
+/* A frame with its figures; one that was not measured is passed over.  Each index once. */
+npg_status npg_alarm_add(npg_alarm *alarm, const npg_frame *frame);
+
+/* No more frames come: what still waits for its turn is taken. */
+void npg_alarm_finish(npg_alarm *alarm);
+
+/* What raised it. */
+typedef struct npg_alarm_cause {
+    int64_t index, number;           /* of the first unexplained frame                    */
+    int64_t seen_index, seen_number; /* of the unexplained frame with the clearest misfit */
+    int misfit;                      /* NPG_MISFIT_*                                      */
+    double value, usual, bound;      /* shares, in the frame seen                         */
+    double at[3];                    /* where, in world coordinates                       */
+} npg_alarm_cause;
+
+/* NULL while it is not raised; a loan. */
+const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction);
+
+/* "12.5 % of the points are far from the surface in one place, around (0.1, 2, 3)
+ * in frame 17; usual is 0 %". */
+void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause);
+
+/* {from_frame, from_index, figure, value, usual, bound, frame, at, cause}; JSON null for NULL. */
+json_t *npg_alarm_json(const npg_alarm_cause *cause);
+
+/* Topology: what a run does when its reference no longer explains the capture (npg_alarm): it says from which
+ * frame, or ends there so that another reference can take over (option alarm = split;
+ * tools/segments/segments.h). */
+
+enum { NPG_ALARM_REPORT, NPG_ALARM_SPLIT }; /* the words of --alarm */
+
+typedef struct npg_topology_settings {
+    int mode;                          /* NPG_ALARM_*                                                   */
+    int64_t segment_min;               /* frames that a segment must have, for a run to end for another */
+    int64_t shared_first, shared_last; /* frames at the ends that other segments explain                */
+} npg_topology_settings;
+
+typedef struct npg_topology npg_topology;
+
+/* facts->plan is known. */
+npg_status npg_topology_open(npg_topology **topology, const npg_topology_settings *settings, int64_t key);
+void npg_topology_close(npg_topology **topology);
+
+/* Whether a frame belongs to another segment. */
+bool npg_topology_is_shared(const npg_topology_settings *settings, const npg_facts *facts, int64_t index);
+
+/* A frame with its figures; any order.  Warns when it makes the alarm go off.
+ * With NPG_ALARM_SPLIT, where both segments get their least number of frames: the place is written to
+ * OUT/topology.json and NPG_CHANGED returned. */
+npg_status npg_topology_add(npg_topology *topology, npg_worker *worker, const npg_frame *frame);
+
+/* After the last frame: the report's "topology", and facts->changed_at. */
+npg_status npg_topology_finish(npg_topology *topology, npg_worker *worker);
+
+#endif
