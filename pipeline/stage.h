@@ -68,7 +68,8 @@ typedef struct npg_facts {
     double explained_least; /* share of a frame's points that a growing reference that bends must have places
                                for: it is followed to the last frame before one of which it has fewer      */
     /* align, at the end of a fusing pass */
-    int64_t past_count; /* frames that see too much that the reference does not have, and those beyond them */
+    int64_t
+        unreached_count; /* frames that see too much that the reference does not have, and those beyond them */
     /* mesh */
     npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass
                             and in the solving one, before the first frame is passed on */
@@ -159,7 +160,7 @@ const npg_service *const *npg_services_of(const npg_stage *const *chain);
 void *npg_worker_state(const npg_worker *worker);
 const npg_facts *npg_worker_facts(const npg_worker *worker);
 
-/* A fact that the worker's stage owns, to be written: *npg_own(worker, past_count) = 3.  Of another's fact the
+/* A fact that the worker's stage owns, to be written: *npg_own(worker, unreached_count) = 3.  Of another's fact the
  * caller gets one that nobody reads, and the run fails with NPG_USAGE. */
 #define npg_own(worker, fact) (&npg_worker_own_facts((worker), offsetof(npg_facts, fact), #fact)->fact)
 npg_facts *npg_worker_own_facts(npg_worker *worker, size_t offset, const char *fact);

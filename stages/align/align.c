@@ -46,7 +46,7 @@ typedef struct state {
     npg_resume_points points; /* for states on disk */
     bool has_points;
     npg_group group;
-    int64_t past_count;           /* frames that a growing reference does not reach */
+    int64_t unreached_count;      /* frames that a growing reference does not reach */
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
     struct figures {
@@ -364,7 +364,7 @@ static npg_status pass_on(npg_worker *worker, npg_waiting *w)
     if (is_past(w)) {
         memcpy(frame->vert_unit, reference->vert_pos, reference->vert_count * 3 * sizeof(float));
         frame->point_count = 0; /* nothing of it can be compared with the surface */
-        s->past_count++;
+        s->unreached_count++;
     } else {
         npg_tracker_vertices(s->tracker, frame->vert_unit, w->pose);
     }
@@ -465,7 +465,7 @@ static npg_status flush(npg_worker *worker)
     NPG_TRY(close_group(worker, npg_plan_is_open(&npg_worker_facts(worker)->plan)));
     report_progress(worker);
     NPG_TRY(npg_pose_cache_leave(&s->cache, worker, &s->tracker));
-    if (npg_worker_pass(worker) == NPG_PASS_FUSE) *npg_own(worker, past_count) = s->past_count;
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) *npg_own(worker, unreached_count) = s->unreached_count;
     if (!s->sum.frames) return NPG_OK;
     json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
     json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));

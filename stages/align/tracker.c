@@ -7,9 +7,9 @@
 #include "align/align_internal.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/proxy.h"
 #include "geometry/query.h"
 #include "geometry/robust.h"
-#include "geometry/thin.h"
 #include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
@@ -42,7 +42,7 @@ struct npg_tracker {
     npg_tracker_settings settings;
     npg_mesh *reference; /* counted reference; V vertices, which the whole graph carries */
     npg_graph *whole;
-    npg_thin *thin;       /* the surface that is aligned: W vertices of it, which the graph carries */
+    npg_proxy *thin;      /* the surface that is aligned: W vertices of it, which the graph carries */
     const npg_mesh *mesh; /* the thin one's */
     npg_graph *graph;
     npg_block_system *system; /* its parts: TO_SURFACE, TO_POINTS */
@@ -94,7 +94,7 @@ void npg_tracker_close(npg_tracker **slot)
     npg_tracker *t = *slot;
     npg_graph_close(&t->graph);
     npg_graph_close(&t->whole);
-    npg_thin_close(&t->thin);
+    npg_proxy_close(&t->thin);
     npg_block_close(&t->system);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->reference);
@@ -118,7 +118,7 @@ static npg_status choose_samples(npg_tracker *t)
 static npg_status open_surface(npg_tracker *t)
 {
     NPG_TRY(npg_graph_open(&t->whole, t->reference, t->settings.nodes));
-    NPG_TRY(npg_thin_open(&t->thin, t->reference, NPG_THIN_SURFACE));
+    NPG_TRY(npg_proxy_open(&t->thin, t->reference, NPG_PROXY_SURFACE));
     t->mesh = t->thin->mesh;
     NPG_TRY(npg_graph_take(&t->graph, t->whole, t->thin->vertex, t->mesh->vert_count));
     return npg_surface_open(&t->surface, t->mesh->vert_pos, t->mesh->vert_count, t->mesh->faces,

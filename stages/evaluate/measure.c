@@ -1,5 +1,5 @@
 /* Measure: see measure.h.  Flipped and stretched faces are counted on the whole reference, distances measured
- * to a surface of at most about NPG_THIN_SURFACE of its vertices. */
+ * to a surface of at most about NPG_PROXY_SURFACE of its vertices. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,8 +8,8 @@
 #include "evaluate/evaluate_internal.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"
+#include "geometry/proxy.h"
 #include "geometry/robust.h"
-#include "geometry/thin.h"
 #include "geometry/vec3.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
@@ -134,7 +134,7 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
 
 struct npg_measure {
     npg_measure_settings settings;
-    npg_thin *thin;       /* W vertices of the reference: the surface that distances are to */
+    npg_proxy *proxy;     /* W vertices of the reference: the surface that distances are to */
     npg_surface *surface; /* moves from frame to frame */
     npg_shape *shape;
     npg_misfit_finder *finder;
@@ -154,8 +154,8 @@ struct npg_measure {
 static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_share)
 {
     NPG_TRY(npg_shape_open(&m->shape, reference));
-    NPG_TRY(npg_thin_open(&m->thin, reference, NPG_THIN_SURFACE));
-    npg_mesh *mesh = m->thin->mesh;
+    NPG_TRY(npg_proxy_open(&m->proxy, reference, NPG_PROXY_SURFACE));
+    npg_mesh *mesh = m->proxy->mesh;
     size_t w = mesh->vert_count;
     NPG_TRY(npg_misfit_open(&m->finder, mesh, unseen_share));
     m->arena.purpose = NPG_FOR_QUERY;
@@ -187,7 +187,7 @@ void npg_measure_close(npg_measure **measure)
     npg_measure *m = *measure;
     if (!m) return;
     npg_surface_close(&m->surface);
-    npg_thin_close(&m->thin);
+    npg_proxy_close(&m->proxy);
     npg_shape_close(&m->shape);
     npg_misfit_close(&m->finder);
     npg_release(&m->points);
@@ -283,7 +283,7 @@ static void place_misfits(npg_figures *figures, const npg_frame_box *box)
 static npg_status measure_unsupported(npg_measure *m, npg_figures *figures, const npg_frame_box *box,
                                       double radius, double whole)
 {
-    const npg_mesh *mesh = m->thin->mesh;
+    const npg_mesh *mesh = m->proxy->mesh;
     npg_patch patch;
     double sum = 0;
     if (!mesh->vert_unseen) return NPG_OK;
@@ -302,7 +302,7 @@ static npg_status measure_unsupported(npg_measure *m, npg_figures *figures, cons
 static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const npg_frame_box *box,
                                 double spacing)
 {
-    const npg_mesh *mesh = m->thin->mesh;
+    const npg_mesh *mesh = m->proxy->mesh;
     float sensors[3 * NPG_FRAME_SENSORS_MOST];
     npg_box_local_to_unit(box, sensors, frame->sensor_local, frame->sensor_count);
     npg_mesh_vertex_normals(m->normals, m->vert_unit, mesh->vert_count, mesh->faces, mesh->face_count);
@@ -314,7 +314,7 @@ static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const np
 static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_frame_box *box,
                                    size_t point_count, double per_unit, double *mean_sq)
 {
-    const npg_mesh *mesh = m->thin->mesh;
+    const npg_mesh *mesh = m->proxy->mesh;
     npg_figures *figures = &frame->figures;
     const float *vert_unit = m->vert_unit;
     size_t v = mesh->vert_count;
@@ -359,7 +359,7 @@ npg_status npg_measure_frame(npg_measure *measure, npg_frame *frame, const npg_f
     npg_shape_measure(m->shape, figures, frame->vert_unit);
     if (!frame->is_skipped) NPG_TRY(sample_points(m, box, frame, &point_count));
     if (!point_count) return NPG_OK;
-    npg_thin_gather(m->thin, m->vert_unit, frame->vert_unit);
+    npg_proxy_gather(m->proxy, m->vert_unit, frame->vert_unit);
     NPG_TRY(npg_surface_move(m->surface, m->vert_unit));
     NPG_TRY(measure_points(m, figures, point_count, per_unit, &points_sq));
     NPG_TRY(measure_vertices(m, frame, box, point_count, per_unit, &vertices_sq));

@@ -360,8 +360,8 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 
 /* What growth knows from pass to pass. */
 typedef struct growth {
-    int64_t past_before; /* frames that the reference did not reach in the pass before ...  */
-    int64_t in_vain;     /* ... and passes in a row that have reached no more since         */
+    int64_t unreached_before; /* frames that the reference did not reach in the pass before ...  */
+    int64_t in_vain;          /* ... and passes in a row that have reached no more since         */
 } growth;
 
 static void release_growth(void *thing)
@@ -387,19 +387,21 @@ static npg_status decide_growth(npg_worker *worker, bool *counts)
     const npg_facts *facts = npg_worker_facts(worker);
     growth *g;
     NPG_TRY(growth_of(worker, &g));
-    bool has_gained = !facts->growing_passes || facts->past_count < g->past_before;
-    bool is_whole_now = g->past_before && !facts->past_count;
+    bool has_gained = !facts->growing_passes || facts->unreached_count < g->unreached_before;
+    bool is_whole_now = g->unreached_before && !facts->unreached_count;
     bool asks_less = !has_gained && facts->explained_least > EXPLAINED_LAST + EXPLAINED_STEP / 2;
     if (asks_less)
         *npg_own(worker, explained_least) = fmax(facts->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
     g->in_vain = has_gained || asks_less ? 0 : g->in_vain + 1;
-    *npg_own(worker, is_growing) = facts->past_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
-    *npg_own(worker, growing_passes) += facts->past_count > 0;
-    g->past_before = facts->past_count;
-    if (facts->past_count)
-        npg_worker_log(
-            worker, NPG_LOG_INFO, -1, "%lld frames see too much that the reference does not have yet%s",
-            (long long)facts->past_count, facts->is_growing ? ": it grows, and they are followed again" : "");
+    *npg_own(worker, is_growing) =
+        facts->unreached_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
+    *npg_own(worker, growing_passes) += facts->unreached_count > 0;
+    g->unreached_before = facts->unreached_count;
+    if (facts->unreached_count)
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "%lld frames see too much that the reference does not have yet%s",
+                       (long long)facts->unreached_count,
+                       facts->is_growing ? ": it grows, and they are followed again" : "");
     *counts = !facts->is_growing && !is_whole_now;
     return NPG_OK;
 }

@@ -4,7 +4,6 @@
 
 #include <pthread.h>
 
-    #include "pipeline/chunk.h"
 #include "align/tracker.h"
 #include "mesh/surface.h"
 #include "pipeline/chunk.h"
@@ -12,14 +11,14 @@
 #include "pipeline/stage.h"
 #include "pipeline/store.h"
 
-    /* Likeness: how near a user's own mesh is to a frame's points, where it was put.
+/* Likeness: how near a user's own mesh is to a frame's points, where it was put.
  *
  *     d = mean_p |p - nearest vertex| + mean_v |v - nearest point|
  *
  * over at most about LOOKED_AT points p of the frame and as many vertices v.  The frame with the smallest d
  * is the one whose pose the mesh has: it is the keyframe that a run with the user's own mesh should have. */
 
-    typedef struct npg_likeness npg_likeness;
+typedef struct npg_likeness npg_likeness;
 
 /* Read the mesh (PLY or OBJ).  origin is known.  NPG_BAD_INPUT names the file. */
 npg_status npg_likeness_open(npg_likeness **likeness, const char *path, const npg_origin *origin,

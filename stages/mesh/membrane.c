@@ -97,7 +97,7 @@ static npg_status find_unseen(uint8_t *kind, size_t *unseen, const npg_mesh *mes
 {
     float *dist;
     NPG_TRY(npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist));
-    npg_status status = npg_mesh_point_dist(dist, mesh, points, point_count);
+    npg_status status = npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
     for (size_t v = 0; v < mesh->vert_count && !status; v++) {
         kind[v] = (double)dist[v] > seen_dist ? UNSEEN : STAYS;
         *unseen += kind[v] == UNSEEN;

@@ -24,11 +24,6 @@ npg_status npg_points_dist(float *dist, const float *queries, size_t query_count
     return status;
 }
 
-npg_status npg_mesh_point_dist(float *dist, const npg_mesh *mesh, const float *points, size_t point_count)
-{
-    return npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
-}
-
 /* Of the distances to k neighbours each the farthest; and of these the median.  Overwrites the list. */
 static float median_farthest(float *dist_sq, size_t count, size_t k)
 {
@@ -75,7 +70,7 @@ npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, si
     float *dist = npg_arena_take(&scratch, (*mesh)->vert_count, sizeof *dist);
     uint8_t *keep_face = npg_arena_take(&scratch, face_count, 1);
     npg_status status = npg_arena_status(&scratch);
-    if (!status) status = npg_mesh_point_dist(dist, *mesh, points, point_count);
+    if (!status) status = npg_points_dist(dist, (*mesh)->vert_pos, (*mesh)->vert_count, points, point_count);
     for (size_t f = 0; f < face_count && !status; f++)
         keep_face[f] = (double)npg_farthest_corner(dist, (*mesh)->faces + 3 * f) <= dist_max;
     if (!status) status = npg_mesh_keep_share(mesh, share, keep_face);
@@ -89,7 +84,7 @@ npg_status npg_mesh_unseen(double *share, const npg_mesh *mesh, const float *poi
     float *dist;
     double total = 0, unseen = 0;
     NPG_TRY(npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist));
-    npg_status status = npg_mesh_point_dist(dist, mesh, points, point_count);
+    npg_status status = npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
     for (size_t f = 0; f < mesh->face_count && !status; f++) {
         const uint32_t *face = mesh->faces + 3 * f;
         double area = npg_face_area(mesh->vert_pos, face);

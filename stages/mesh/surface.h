@@ -122,10 +122,7 @@ npg_status npg_cloud_contact(double *share, const float *points, const float *no
  * All functions replace *mesh by a new one (its normals are dropped, they would be stale) or leave it as it
  * was on failure.  Nothing here is random and nothing depends on the number of threads.  NPG_MEMORY. */
 
-/* Distance of every vertex to the nearest of N points.  dist: V. */
-npg_status npg_mesh_point_dist(float *dist, const npg_mesh *mesh, const float *points, size_t point_count);
-
-/* The same for any V places.  dist: V. */
+/* Distance of each of V places to the nearest of N points.  dist: V. */
 npg_status npg_points_dist(float *dist, const float *places, size_t place_count, const float *points,
                            size_t point_count);
 

@@ -13,7 +13,7 @@ npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t poin
     npg_release(&mesh->vert_unseen);
     NPG_TRY(npg_alloc(&mesh->vert_unseen, NPG_FOR_MESH, v));
     NPG_TRY(npg_alloc_array(&dist, NPG_FOR_MESH, v, sizeof *dist));
-    npg_status status = npg_mesh_point_dist(dist, mesh, points, point_count);
+    npg_status status = npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
     for (size_t i = 0; i < v && !status; i++) mesh->vert_unseen[i] = (double)dist[i] > dist_max;
     npg_release(&dist);
     return status;

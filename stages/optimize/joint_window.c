@@ -7,8 +7,8 @@
 #include "optimize/skinning.h"
 
 struct npg_joint_window {
-    npg_thin *surface; /* W vertices; owned */
-    size_t vert_count; /* V */
+    npg_proxy *surface; /* W vertices; owned */
+    size_t vert_count;  /* V */
     npg_joint *joint;
     npg_skin_weights *weights; /* V: corners of the surface's faces; owned */
 };
@@ -22,7 +22,7 @@ void npg_joint_window_close(npg_joint_window **slot)
 {
     if (!slot || !*slot) return;
     npg_joint_close(&(*slot)->joint);
-    npg_thin_close(&(*slot)->surface);
+    npg_proxy_close(&(*slot)->surface);
     npg_release(&(*slot)->weights);
     npg_release(slot);
 }
@@ -47,7 +47,7 @@ npg_status npg_joint_window_open(npg_joint_window **out, const npg_mesh *referen
     *out = NULL;
     NPG_TRY(npg_alloc(&window, NPG_FOR_FIT, sizeof *window));
     window->vert_count = reference->vert_count;
-    npg_status status = npg_thin_open(&window->surface, reference, NPG_THIN_SURFACE);
+    npg_status status = npg_proxy_open(&window->surface, reference, NPG_PROXY_SURFACE);
     if (!status) status = npg_joint_open(&window->joint, window->surface->mesh, settings);
     if (!status) status = bind(window, reference);
     if (status) npg_joint_window_close(&window);
@@ -68,7 +68,7 @@ static void fill_frames(npg_joint_window *window, const surfaces *s, npg_joint_f
     for (size_t t = 0; t < count; t++) {
         const npg_frame *frame = &held[t]->frame;
         const float *from = held[t]->solved ? held[t]->solved : frame->vert_unit;
-        npg_thin_gather(window->surface, s->before + t * size, from);
+        npg_proxy_gather(window->surface, s->before + t * size, from);
         frames[t] = (npg_joint_frame){s->now + t * size, points->all + 3 * points->start[t], frame->normals,
                                       frame->point_count, held[t]->solved != NULL};
     }
@@ -121,7 +121,7 @@ npg_status npg_joint_window_solve(npg_joint_window *window, npg_joint_result *re
 
 size_t npg_joint_window_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames)
 {
-    size_t surface = vert_count < 2 * NPG_THIN_SURFACE ? vert_count : NPG_THIN_SURFACE;
+    size_t surface = vert_count < 2 * NPG_PROXY_SURFACE ? vert_count : NPG_PROXY_SURFACE;
     return npg_joint_memory(settings, surface, frames) + 2 * frames * surface * 3 * sizeof(float) +
            vert_count * sizeof(npg_skin_weights);
 }

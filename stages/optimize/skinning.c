@@ -25,8 +25,8 @@ npg_status npg_skinning_open(npg_skinning **out, const npg_mesh *reference, size
     *out = NULL;
     NPG_TRY(npg_alloc(&skinning, NPG_FOR_MESH, sizeof *skinning));
     skinning->vert_count = reference->vert_count;
-    npg_status status = npg_thin_open(&skinning->surface, reference, surface_target);
-    if (!status) status = npg_thin_open(&skinning->samples, skinning->surface->mesh, sample_target);
+    npg_status status = npg_proxy_open(&skinning->surface, reference, surface_target);
+    if (!status) status = npg_proxy_open(&skinning->samples, skinning->surface->mesh, sample_target);
     if (!status) status = bind(skinning);
     if (status) npg_skinning_close(&skinning);
     *out = skinning;
@@ -37,8 +37,8 @@ void npg_skinning_close(npg_skinning **slot)
 {
     if (!slot || !*slot) return;
     npg_surface_close(&(*slot)->rest);
-    npg_thin_close(&(*slot)->surface);
-    npg_thin_close(&(*slot)->samples);
+    npg_proxy_close(&(*slot)->surface);
+    npg_proxy_close(&(*slot)->samples);
     npg_arena_release(&(*slot)->arrays);
     npg_release(slot);
 }

@@ -10,7 +10,7 @@
 #ifndef NPG_SKINNING_H
 #define NPG_SKINNING_H
 
-#include "geometry/thin.h"
+#include "geometry/proxy.h"
 
 typedef struct npg_skin_weights {
     int32_t sample[3];
@@ -18,8 +18,8 @@ typedef struct npg_skin_weights {
 } npg_skin_weights;
 
 typedef struct npg_skinning {
-    npg_thin *surface;                 /* W vertices: the surface that points are matched with */
-    npg_thin *samples;                 /* S: vertices of that surface                          */
+    npg_proxy *surface;                /* W vertices: the surface that points are matched with */
+    npg_proxy *samples;                /* S: vertices of that surface                          */
     uint32_t *vertex;                  /* S: which vertex of the reference each sample is      */
     npg_skin_weights *surface_weights; /* W                                                    */
     npg_surface *rest;                 /* of the samples, at rest                              */

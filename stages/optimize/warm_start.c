@@ -104,7 +104,7 @@ static npg_status open_samples(npg_warm *w)
 {
     size_t samples = w->settings.samples ? (size_t)w->settings.samples : SAMPLES;
     if (w->skinning) return NPG_OK;
-    NPG_TRY(npg_skinning_open(&w->skinning, w->facts->reference, samples, NPG_THIN_SURFACE));
+    NPG_TRY(npg_skinning_open(&w->skinning, w->facts->reference, samples, NPG_PROXY_SURFACE));
     w->samples = w->skinning->samples->mesh->vert_count;
     return open_matchers(w);
 }
@@ -240,9 +240,9 @@ typedef struct pulling {
 /* Where the surface is that points are matched with (W x 3). */
 static void place_surface(const npg_warm *w, float *surface, size_t place)
 {
-    const npg_thin *thin = w->skinning->surface;
+    const npg_proxy *thin = w->skinning->surface;
     if (w->wide) {
-        npg_thin_gather(thin, surface, w->wide + place * 3 * w->skinning->vert_count);
+        npg_proxy_gather(thin, surface, w->wide + place * 3 * w->skinning->vert_count);
         return;
     }
     memcpy(surface, thin->mesh->vert_pos, w->surface_verts * 3 * sizeof(float));

@@ -10,16 +10,16 @@
 #include <cmocka.h>
 
 #include "align/tracker.h"
-#include "geometry/thin.h"
+#include "geometry/proxy.h"
 #include "tests/support/ball_mesh.h"
 
 static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)
 {
-    npg_thin *thin;
+    npg_proxy *thin;
     npg_manifold m;
     npg_mesh *ball = ball_mesh(60, 80);
     (void)state;
-    assert_int_equal(npg_thin_open(&thin, ball, 1000), NPG_OK);
+    assert_int_equal(npg_proxy_open(&thin, ball, 1000), NPG_OK);
     assert_in_range(thin->mesh->vert_count, 900, 1010);
     for (size_t t = 0; t < thin->mesh->vert_count; t++) {
         size_t v = thin->vertex[t];
@@ -30,11 +30,11 @@ static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)
     assert_int_equal(npg_mesh_manifold(&m, thin->mesh), NPG_OK);
     assert_int_equal(m.border_edges + m.crowded_edges + m.misoriented_edges + m.unused_vertices, 0);
     assert_true(fabs(npg_mesh_volume(thin->mesh) / npg_mesh_volume(ball) - 1) < 0.02);
-    npg_thin_close(&thin);
-    assert_int_equal(npg_thin_open(&thin, ball, 0), NPG_OK);
+    npg_proxy_close(&thin);
+    assert_int_equal(npg_proxy_open(&thin, ball, 0), NPG_OK);
     assert_int_equal(thin->mesh->vert_count, ball->vert_count);
     assert_memory_equal(thin->mesh->faces, ball->faces, 3 * ball->face_count * sizeof *ball->faces);
-    npg_thin_close(&thin);
+    npg_proxy_close(&thin);
     npg_mesh_unref(&ball);
 }
 
@@ -49,7 +49,7 @@ static void a_fine_reference_is_aligned_whole(void **state)
     float *truth, *found, points[3 * POINTS];
     double *pose;
     (void)state;
-    assert_true(v > 2 * NPG_THIN_SURFACE - 10);
+    assert_true(v > 2 * NPG_PROXY_SURFACE - 10);
     assert_int_equal(npg_tracker_open(&tracker, ball, &settings), NPG_OK);
     nodes = npg_tracker_node_count(tracker);
     assert_int_equal(npg_alloc_array(&truth, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);

@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #include "geometry/mesh_tools.h"
-#include "geometry/thin.h"
+#include "geometry/proxy.h"
 #include "job/state_mesh.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_folder.h"
@@ -87,16 +87,16 @@ static void check_upper_half(const npg_mesh *mesh)
 static void the_mask_goes_with_its_mesh(void **state)
 {
     npg_mesh *mesh = sphere(RINGS, SPOKES), *copy;
-    npg_thin *thin;
+    npg_proxy *thin;
     uint8_t *keep;
     (void)state;
     mark_upper_half(mesh);
     assert_int_equal(npg_mesh_copy(&copy, mesh), NPG_OK);
     check_upper_half(copy);
-    assert_int_equal(npg_thin_open(&thin, mesh, 1000), NPG_OK);
+    assert_int_equal(npg_proxy_open(&thin, mesh, 1000), NPG_OK);
     assert_true(thin->mesh->vert_count < 1300);
     check_upper_half(thin->mesh);
-    npg_thin_close(&thin);
+    npg_proxy_close(&thin);
     assert_int_equal(npg_alloc(&keep, NPG_FOR_MESH, copy->face_count), NPG_OK);
     for (size_t f = 0; f < copy->face_count; f++) keep[f] = f % 3 == 0;
     assert_int_equal(npg_mesh_keep_faces(&copy, keep), NPG_OK);
