@@ -116,7 +116,7 @@ static void smooth_turns(npg_skin *c)
     c->spread = last;
 }
 
-npg_status npg_skin_move(npg_skin *c, const float *vert_unit)
+npg_status npg_skin_pose(npg_skin *c, const float *vert_unit)
 {
     const npg_mesh *mesh = c->mesh;
     memcpy(c->now, vert_unit, mesh->vert_count * 3 * sizeof(float));

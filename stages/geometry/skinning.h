@@ -33,7 +33,7 @@ void npg_skin_close(npg_skin **skin);
 bool npg_skin_is_open(const npg_skin *skin);
 
 /* The surface is now where vert_unit (V x 3) says.  NPG_MEMORY. */
-npg_status npg_skin_move(npg_skin *skin, const float *vert_unit);
+npg_status npg_skin_pose(npg_skin *skin, const float *vert_unit);
 
 /* out (N) of points (N x 3, unit) with their normals (N x 3, or NULL).  Uses all cores; the result does not
  * depend on how many.  NPG_MEMORY. */
@@ -41,7 +41,7 @@ npg_status npg_skin_to_rest(npg_skin *skin, npg_skinned *out, const float *point
                             size_t count);
 
 /* The other way: where a place near the surface at rest is now, p = c' + R (place - c).  hit: the point of
- * the reference that it hangs on.  Thread-safe but for npg_skin_move(). */
+ * the reference that it hangs on.  Thread-safe but for npg_skin_pose(). */
 void npg_skin_from_rest(const npg_skin *skin, float now[3], const npg_surface_hit *hit, const float place[3]);
 
 /* Bytes that it takes at most. */
