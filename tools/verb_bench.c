@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/geometry.h"
 #include "kernels/mlp.h"
 #include "kernels/motion.h"

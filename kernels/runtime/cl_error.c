@@ -1,5 +1,5 @@
 /* Names of OpenCL errors, and the status they become. */
-#include "kernels/runtime/cl_error.h"
+#include "kernels/runtime/device_internal.h"
 
 static const char *name_of(cl_int code)
 {

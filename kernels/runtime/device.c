@@ -6,10 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "kernels/runtime/cl_error.h"
 #include "kernels/runtime/device_internal.h"
-#include "kernels/runtime/kernel_cache.h"
-#include "kernels/runtime/probe.h"
 
 #define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
 

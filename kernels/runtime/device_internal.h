@@ -1,13 +1,20 @@
-/* Device: what its files share. */
-#ifndef NPG_DEVICE_INTERNAL_H
-#define NPG_DEVICE_INTERNAL_H
+#ifndef NPG_KERNELS_DEVICE_INTERNAL_H
+#define NPG_KERNELS_DEVICE_INTERNAL_H
 
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 #include <CL/cl_ext.h>
+#include <stdbool.h>
 
-#include "kernels/runtime/cl_error.h"
 #include "kernels/runtime/device.h"
+#include "pipeline/status.h"
+
+/* Names of OpenCL errors, and the status they become. */
+
+/* NPG_OK for CL_SUCCESS; else NPG_MEMORY or NPG_DEVICE with "what: CL_NAME (code)". */
+npg_status npg_cl_status(cl_int code, const char *what);
+
+/* Device: what its files share. */
 
 #define NPG_KERNELS_MAX 16 /* of one program; mlp has the most, 6 */
 
@@ -25,5 +32,43 @@ struct npg_device {
 /* Release all programs; those that were built from their text are put into the cache first, unless the device
  * is distrusted. */
 void npg_programs_close(npg_device *device);
+
+/* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
+ * between versions, so each version of neupig has its own folder, used by the process that holds its
+ * lock; any other process works in a private folder that is removed at the end, or, if it was killed, by a
+ * later one. */
+
+/* Point the driver at the folder.  Call before the first OpenCL call; later calls count only.  A cache folder
+ * that the user has set (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made. */
+npg_status npg_kernel_cache_enter(void);
+void npg_kernel_cache_leave(void);
+
+/* Path of a file in this version's folder, whether it is there or not; false when there is no such
+ * folder.  Only the process that holds the folder may write binaries there. */
+bool npg_kernel_cache_path(char *out, size_t size, const char *name);
+bool npg_kernel_cache_is_ours(void);
+
+/* The text of every .cl file, embedded by the build. */
+
+typedef struct npg_kernel_source {
+    const char *name, *text; /* "mlp", the whole file; the list ends with NULL */
+} npg_kernel_source;
+
+extern const npg_kernel_source npg_kernel_sources[];
+
+/* Probe: whether the OpenCL drivers can be asked for their devices at all. */
+
+/* More OpenCL platforms (drivers), and devices of all together, than these are neither asked nor listed. */
+#define NPG_PLATFORMS_MAX 16
+#define NPG_DEVICES_MAX   32
+
+/* What neupig-devices prints when it has got through. */
+#define NPG_PROBE_ANSWER "asked\n"
+
+/* Ask them first in a process of its own (devices_main.c): a driver that can't work on a machine may end
+ * the process that asks, as PoCL does in a root without /sys, and a library must not end its host.  Once
+ * per process when all is well, about 30 ms.  NPG_DEVICE with the driver's last line and what is missing;
+ * errors that a driver returns are left to the caller's own call.  Threads: any. */
+npg_status npg_probe_drivers(void);
 
 #endif

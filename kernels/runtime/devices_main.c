@@ -1,13 +1,13 @@
 /* neupig-devices: asks every OpenCL driver for its devices, in a process of its own,
  * because a driver may abort or hang there.  It prints one line when it has got through,
- * whatever errors the drivers returned (probe.h). */
+ * whatever errors the drivers returned (probe.c). */
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include "kernels/runtime/probe.h"
+#include "kernels/runtime/device_internal.h"
 
 static void ask_platform(cl_platform_id platform)
 {

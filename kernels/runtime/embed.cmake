@@ -6,7 +6,7 @@ function(bytes_of out file)
   set(${out} "${bytes}" PARENT_SCOPE)
 endfunction()
 
-set(text "/* generated from the .cl files of kernels */\n#include \"kernels/runtime/kernel_sources.h\"\n\n")
+set(text "/* generated from the .cl files of kernels */\n#include \"kernels/runtime/device_internal.h\"\n\n")
 set(table "")
 set(head "")
 foreach(part ${HEADS})

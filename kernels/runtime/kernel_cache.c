@@ -1,5 +1,5 @@
 /* Kernel cache: one folder per version behind a lock, private folders for everybody else. */
-#include "kernels/runtime/kernel_cache.h"
+#include "kernels/runtime/device_internal.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -14,7 +14,6 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "kernels/runtime/kernel_sources.h"
 #include "pipeline/file.h"
 #include "pipeline/folder.h"
 

@@ -1,5 +1,5 @@
 /* Probe: whether the OpenCL drivers can be asked for their devices at all. */
-#include "kernels/runtime/probe.h"
+#include "kernels/runtime/device_internal.h"
 
 #include <pthread.h>
 #include <stdbool.h>

@@ -10,8 +10,6 @@
 #include <xxhash.h>
 
 #include "kernels/runtime/device_internal.h"
-#include "kernels/runtime/kernel_cache.h"
-#include "kernels/runtime/kernel_sources.h"
 #include "pipeline/file.h"
 
 #define CONSTANTS_MAX 384        /* letters of the build constants; half of them from the tuning */

@@ -1,4 +1,4 @@
-/* align: brings the reference coarsely into every frame, from the pose of the frame before it (tracker.h).
+/* align: brings the reference coarsely into every frame, from the pose of the frame before it (tracking.h).
  *
  * Frames come from the key outward (plan.h), so that the neighbour towards the key is always known.  They
  * wait until their window is complete: then those that were lost are tried again from what is known around
@@ -10,7 +10,7 @@
 #include "align/align_internal.h"
 #include "align/pose_cache.h"
 #include "align/resume_points.h"
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"
 #include "job/job.h"

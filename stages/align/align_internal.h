@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/kdtree.h"
 #include "pipeline/chunk.h"
 #include "pipeline/memory.h"

@@ -1,5 +1,5 @@
 /* Candidate clouds: thinned frames, and following a surface through them. */
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Graph: choosing nodes and weights along the surface. */
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Occlusion prior: edges in the frame of their first end. */
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 #include <math.h>
 #include <string.h>

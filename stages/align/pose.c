@@ -1,5 +1,5 @@
 /* Pose: products of the nodes' rotations. */
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 #include <math.h>
 

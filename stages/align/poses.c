@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/query.h"
 #include "geometry/vec3.h"
 

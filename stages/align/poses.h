@@ -2,7 +2,7 @@
 #ifndef NPG_POSES_H
 #define NPG_POSES_H
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 /* Where each new node hangs on the old graph. */
 typedef struct npg_pose_map {

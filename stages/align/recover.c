@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: tests/bed/decisions.md, lost frames. */

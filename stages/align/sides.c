@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 npg_status npg_side_open(npg_side *side, npg_arena *arena, size_t node_count)
 {

@@ -1,5 +1,5 @@
 /* Tracker: correspondences and Gauss-Newton steps on the deformation graph. */
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 #include <math.h>
 #include <string.h>

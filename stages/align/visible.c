@@ -1,5 +1,5 @@
 /* Visible: rays from the surface to the sensors. */
-#include "align/tracker.h"
+#include "align/tracking.h"
 
 #include <math.h>
 #include <string.h>

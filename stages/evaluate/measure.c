@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "evaluate/evaluate_internal.h"
 #include "geometry/kdtree.h"
 #include "geometry/mesh_tools.h"

@@ -2,7 +2,7 @@
  * from standard input, from a folder that grows, or from those that are pushed. */
 #include "ingest/capture.h"
 #include "ingest/live_source.h"
-#include "ingest/rig/rig_report.h"
+#include "ingest/rig/rig.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/live_plan.h"

@@ -7,6 +7,6 @@
 #include "ingest/frame_names.h"    /* names in natural order                                       */
 #include "ingest/input_list.h"     /* the frames that the options of a run name                    */
 #include "ingest/probe.h"          /* what a capture holds, and what a run of it would take         */
-#include "ingest/rig/rig_report.h" /* what comparing a rig's sensors found                         */
+#include "ingest/rig/rig.h"
 
 #endif

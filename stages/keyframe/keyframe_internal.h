@@ -4,7 +4,7 @@
 
 #include <pthread.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "mesh/surface.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"

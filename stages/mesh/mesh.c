@@ -2,7 +2,7 @@
  * mesh instead, puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"

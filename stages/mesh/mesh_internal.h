@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/cells.h"
 #include "geometry/mesh_tools.h"
 #include "mesh/surface.h"

@@ -1,12 +1,12 @@
 /* Checkpoint: the state of a run after a closed window, to the job's folder and back. */
-#include "optimize/checkpoint.h"
+#include "optimize/vdb_grids.h"
+#include "optimize/window.h"
 
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "job/vdb_file.h"
-#include "optimize/vdb_grids.h"
 #include "pipeline/live_plan.h"
 
 typedef struct saved_progress {

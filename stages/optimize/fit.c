@@ -11,8 +11,6 @@
 #include "kernels/latent.h"
 #include "kernels/mlp.h"
 #include "kernels/sobolev.h"
-#include "optimize/fit_levels.h"
-#include "optimize/fit_weights.h"
 #include "pipeline/random.h"
 
 #define BATCH 4 /* frames whose second hidden layer is kept at a time */

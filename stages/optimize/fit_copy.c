@@ -1,5 +1,5 @@
 /* Copy: what a fit knows, on the host. */
-#include "optimize/fit_copy.h"
+#include "optimize/fit.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Fit levels: a hierarchy of grids or a hash table, and the grid over normal directions. */
-#include "optimize/fit_levels.h"
+#include "optimize/fit.h"
 
 #include <math.h>
 

@@ -1,5 +1,5 @@
 /* Weights: confidence and catch-up. */
-#include "optimize/fit_weights.h"
+#include "optimize/fit.h"
 
 #include <math.h>
 

@@ -6,8 +6,6 @@
 #include <string.h>
 
 #include "geometry/mesh_tools.h"
-#include "optimize/joint_match.h"
-#include "optimize/joint_system.h"
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 

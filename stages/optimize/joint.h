@@ -1,3 +1,10 @@
+#ifndef NPG_OPTIMIZE_JOINT_H
+#define NPG_OPTIMIZE_JOINT_H
+
+#include <stdbool.h>
+
+#include "pipeline/mesh.h"
+
 /* Joint: the surface of a window's frames, moved by the points of all of them at once.
  *
  *     E = sum_t sum_p w_p (n_p . (x(c_p) - p))^2                                 points
@@ -6,7 +13,7 @@
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
  *
  * y: the frames' own aligned poses; s: those, smoothed in time; lambda_v: how even a vertex's motion is,
- * found by cross-validation (time_smooth.h).  c_p: the closest point of the surface to the point p, n_p its
+ * found by cross-validation (time_smooth.c).  c_p: the closest point of the surface to the point p, n_p its
  * normal there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
  *     tie_v = e (least + trust / (1 + lambda_v median(lambda) / even^2))          c = e + tie_v
@@ -19,10 +26,6 @@
  * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic.  Conjugate
  * gradients over all frames, preconditioned by each vertex's own five diagonals in time.  Not in the paper:
  * tests/bed/decisions.md compares. */
-#ifndef NPG_JOINT_H
-#define NPG_JOINT_H
-
-#include "pipeline/mesh.h"
 
 typedef struct npg_joint_settings {
     int64_t points; /* most of a frame that pull                                           */
@@ -70,5 +73,137 @@ npg_status npg_joint_solve(npg_joint *joint, npg_joint_result *result, const npg
 
 /* Bytes that it takes at most. */
 size_t npg_joint_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames);
+
+/* Time smooth: positions over time, each frame's own error taken out, as far as the motion itself allows.
+ *
+ *     sum_t share_t |x_t - y_t|^2 + lambda sum_t |x_(t-1) - 2 x_t + x_(t+1)|^2
+ *
+ * is least at x = S y (Whittaker's smoother; five diagonals).  How much is too much says the motion: a frame
+ * left out must be predicted by the others.  The error of that prediction is (y_t - x_t) / (1 - S_tt), so no
+ * fit is repeated (leave-one-out cross-validation).  Its sum over the frames and over a neighbourhood on the
+ * surface chooses lambda for each vertex: still parts are smoothed far, fast ones hardly, clean captures
+ * hardly at all.  Motion that is too fast for the frames can't be predicted with any lambda, so the points
+ * have the last word: no lambda that moves the surface away from them by more than a fit to their noise had
+ * brought it nearer.  A fit to few points follows each of them, and had brought it nearer by more.
+ *
+ * Based on: Paul Eilers, A perfect smoother, 2003. */
+
+#define NPG_TIME_SMOOTH_LEAST 5 /* frames; of fewer the motion is not known */
+
+/* Frames of positions: T x W x 3, and what each frame's are worth. */
+typedef struct npg_time_frames {
+    size_t frame_count, vert_count; /* T, W */
+    float *positions;               /* T x W x 3 */
+    const float *shares;            /* T: 0 for a frame that says nothing, 1 for an ordinary one     */
+    const bool *is_known;           /* T: already smooth, so left out of the judgement               */
+    double points;                  /* of a frame that has some, in the mean                         */
+} npg_time_frames;
+
+/* What a frame's points say of a vertex' way d from where the frame has it: the mean square of their
+ * distances is (d^T A d - 2 b^T d + c) / weight, A = sum w n n^T, b = sum w r n, c = sum w r^2, over the
+ * points that are nearest to the faces around it; n: normal, r: signed distance. */
+typedef struct npg_time_quadric {
+    float a[6], b[3], c; /* A: xx, xy, xz, yy, yz, zz */
+} npg_time_quadric;
+
+void npg_time_quadric_add(npg_time_quadric *quadric, float weight, const float normal[3], float distance);
+
+/* lambda (W) by cross-validation over neighbourhoods of the mesh's edges (E pairs of its W vertices); 0 where
+ * there are fewer than NPG_TIME_SMOOTH_LEAST frames.  quadrics: T x W.  NPG_MEMORY. */
+npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames,
+                                  const npg_time_quadric *quadrics, const uint32_t (*edges)[2],
+                                  size_t edge_count);
+
+/* Replace the positions by smoothed ones. */
+npg_status npg_time_smooth_apply(const npg_time_frames *frames, const float *lambda);
+
+/* ---- five diagonals ---- */
+
+/* A symmetric matrix of five diagonals of n rows: main[i], near[i] = (i, i + 1), far[i] = (i, i + 2).
+ * Factored in place as L D L^T. */
+typedef struct npg_band {
+    size_t count;
+    double *main, *near, *far;
+} npg_band;
+
+/* Add lambda D^T D, D the second differences. */
+void npg_band_add_bend(npg_band *band, double lambda);
+void npg_band_factor(npg_band *band);
+
+/* x (every `stride`-th of n values) = the factored matrix's inverse times x. */
+void npg_band_solve(const npg_band *band, double *x, size_t stride);
+
+/* Joint system: the joint fit's normal equations (joint.h) and their solution. */
+
+/* A point that pulls: at the face's corners with these weights, normal there, and its strength. */
+typedef struct npg_joint_pull {
+    uint32_t corner[3];
+    float weight[3], normal[3], offset[3]; /* offset: target less the surface's point at the start */
+    float strength;
+} npg_joint_pull;
+
+/* Neighbours of each vertex by its edges. */
+typedef struct npg_joint_ring {
+    uint32_t *start, *neighbour; /* W + 1, 2 E */
+} npg_joint_ring;
+
+typedef struct npg_joint_system {
+    size_t frame_count, vert_count; /* T, W */
+    npg_joint_ring ring;            /* loan */
+    const float *lambda;            /* W: bend of the motion, times points per vertex; loan */
+    double shape;                   /* weight of an edge                            */
+    const npg_joint_pull *pulls;    /* `most` per frame; loan */
+    const size_t *pull_counts;      /* T; loan */
+    size_t most;
+    const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
+    const float *shares; /* T: of the frames' ties; loan                     */
+    /* T x W x 3 */
+    float *right, *step, *precond, *direction, *image; /* precond: main, near, far of the factors */
+    float *diagonal;                                   /* T x W */
+} npg_joint_system;
+
+/* Arrays for T frames of W vertices, from an arena whose status is to be asked. */
+void npg_joint_system_take(npg_joint_system *system, npg_arena *arena, size_t frame_count, size_t vert_count);
+size_t npg_joint_system_memory(size_t frame_count, size_t vert_count);
+
+/* Solve for `step` from `right`; both pieces of the left side are taken from the members.  Ends when the
+ * residual's preconditioned norm has fallen to `tolerance`, or after `most` steps; *taken of them.  watch may
+ * be NULL. */
+npg_status npg_joint_system_solve(npg_joint_system *system, double tolerance, int64_t most, int64_t *taken,
+                                  npg_joint_watch *watch, void *user);
+
+/* image_t += the part of the bend in time: sum_s B_ts lambda_v x_s, B = D^T D. */
+void npg_joint_bend(float *image, const npg_joint_system *system, const float *x, size_t t, float sign);
+
+/* image -= the shape's part: shape * sum_j (d_v - d_j), d = now - kept (W x 3 each). */
+void npg_joint_keep_shape(float *image, const npg_joint_system *system, const float *kept, const float *now);
+
+/* Rings of a mesh's edges, from an arena. */
+npg_status npg_joint_ring_take(npg_joint_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
+                               size_t edge_count, size_t vert_count);
+
+/* Joint match: a frame's points and the places of the surface that they pull at. */
+
+/* Searches one frame at a time. */
+typedef struct npg_joint_matcher {
+    const npg_mesh *mesh; /* loan */
+    size_t most;
+    npg_surface *surface;
+    float *targets, *target_normals, *vert_normals, *dists; /* M x 3, M x 3, W x 3, M */
+    npg_surface_hit *hits;                                  /* M */
+    npg_arena arrays;                                       /* holds these */
+} npg_joint_matcher;
+
+npg_status npg_joint_matcher_open(npg_joint_matcher *matcher, const npg_mesh *mesh, size_t most);
+void npg_joint_matcher_close(npg_joint_matcher *matcher);
+
+/* Median distance of the frame's points from the surface: as the standard deviation that it is of in a normal
+ * distribution. */
+npg_status npg_joint_measure(npg_joint_matcher *matcher, double *spread, const npg_joint_frame *frame);
+
+/* pulls (M) of the frame, *count of them; weights fall beyond `width`.  Points whose normal is opposite to
+ * the surface's do not pull. */
+npg_status npg_joint_match(npg_joint_matcher *matcher, npg_joint_pull *pulls, size_t *count,
+                           const npg_joint_frame *frame, double width);
 
 #endif

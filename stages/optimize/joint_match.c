@@ -1,5 +1,5 @@
 /* Joint match: closest points of the surface, weighed. */
-#include "optimize/joint_match.h"
+#include "optimize/joint.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Joint system: products, preconditioner, conjugate gradients. */
-#include "optimize/joint_system.h"
+#include "optimize/joint.h"
 
 #include <math.h>
 #include <string.h>

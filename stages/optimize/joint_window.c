@@ -1,10 +1,10 @@
 /* Joint window: the thinned surface there, the whole one back. */
-#include "optimize/joint_window.h"
+#include "optimize/window.h"
 
 #include <string.h>
 
 #include "geometry/query.h"
-#include "optimize/skinning.h"
+#include "optimize/fit.h"
 
 struct npg_joint_window {
     npg_proxy *surface; /* W vertices; owned */

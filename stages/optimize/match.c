@@ -1,5 +1,5 @@
 /* Match: correspondences by the closest surface point, and back. */
-#include "optimize/match.h"
+#include "optimize/fit.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -9,7 +9,6 @@
 
 #include "kernels/kernels.h"
 #include "kernels/mlp.h"
-#include "optimize/checkpoint.h"
 #include "optimize/window.h"
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"

@@ -1,5 +1,5 @@
 /* Skinning: choosing samples, and moving the dense surface with them. */
-#include "optimize/skinning.h"
+#include "optimize/fit.h"
 
 #include "geometry/mesh_tools.h"
 #include "geometry/query.h"

@@ -1,5 +1,5 @@
 /* Time code: functions of time that the decoder takes as input. */
-#include "optimize/time_code.h"
+#include "optimize/fit.h"
 
 #include <math.h>
 

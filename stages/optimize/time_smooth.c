@@ -1,5 +1,5 @@
 /* Time smooth: banded solutions, leave-one-out errors, and the choice of lambda. */
-#include "optimize/time_smooth.h"
+#include "optimize/joint.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Warm start: windows without alignment. */
-#include "optimize/warm_start.h"
+#include "optimize/fit.h"
 
 #include <math.h>
 #include <string.h>

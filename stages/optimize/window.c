@@ -4,8 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "optimize/joint_window.h"
-
 struct npg_window_solver {
     npg_window_settings settings;
     const npg_facts *facts;  /* loan */

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "tests/support/ball_mesh.h"
 
 #define TWIST 0.6 /* of the lower half against the upper one, radians */

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "tests/support/ball_mesh.h"
 
 static void turn_about_z(double *pose, double angle)

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "geometry/proxy.h"
 #include "tests/support/ball_mesh.h"
 

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "align/tracker.h"
+#include "align/tracking.h"
 #include "tests/support/ball_mesh.h"
 
 #define RADIUS 0.5f /* of the ball */

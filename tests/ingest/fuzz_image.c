@@ -1,6 +1,6 @@
 /* Fuzz target of the PNG and JPEG decoders, for libFuzzer: headers and all that follows.  The first byte says
  * what kind of image is expected. */
-#include "ingest/rig/image.h"
+#include "ingest/rig/rig_internal.h"
 #include "tests/support/fuzz_target.h"
 
 /* Sizes are checked before memory is taken: what is larger than this is never decoded here. */

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "ingest/rig/rig_report.h"
+#include "ingest/rig/rig.h"
 #include "pipeline/random.h"
 #include "tests/ingest/rig_helpers.h"
 

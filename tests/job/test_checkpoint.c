@@ -7,6 +7,7 @@
 #include <cmocka.h>
 
 #include "optimize/vdb_grids.h"
+#include "optimize/window.h"
 #include "pipeline/plan.h"
 #include "pipeline/random.h"
 #include "tests/job/read_levels.h"

@@ -10,7 +10,6 @@
 #include <cmocka.h>
 
 #include "optimize/joint.h"
-#include "optimize/time_smooth.h"
 #include "pipeline/random.h"
 #include "tests/support/ball_mesh.h"
 

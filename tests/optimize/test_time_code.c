@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "optimize/time_code.h"
+#include "optimize/fit.h"
 #include "pipeline/memory.h"
 
 enum { M = 3, N = 2 * M, T = 9 };

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "optimize/fit_weights.h"
+#include "optimize/fit.h"
 
 enum { FRAMES = 5, KEY = 10 };
 

@@ -14,7 +14,7 @@
 #include "kernels/check.h"
 #include "kernels/latent.h"
 #include "kernels/mlp.h"
-#include "optimize/match.h"
+#include "optimize/fit.h"
 #include "optimize/window.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_device.h"

@@ -40,10 +40,6 @@ OPEN_CIRCLES = [
     "kernels/runtime/device kernels/runtime/device_internal",
     "pipeline/method pipeline/options",
     "tools/cli tools/help",
-    "stages/align/align_internal stages/align/tracker",
-    "stages/optimize/fit stages/optimize/fit_levels stages/optimize/fit_weights",
-    "stages/optimize/joint stages/optimize/joint_match stages/optimize/joint_system",
-    "stages/optimize/joint_window stages/optimize/window",
 ]
 # Headers that need no room in front: the public one, and what the build makes.
 NO_ROOM = {"neupig.h", "kernels_embedded.c"}

@@ -1,11 +1,11 @@
 /* Camera: projection, its inverse, and rigid poses. */
-#include "ingest/rig/camera.h"
+#include "ingest/rig/rig.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "geometry/vec3.h"
-#include "ingest/rig/image.h"
+#include "ingest/rig/rig_internal.h"
 
 #define ROTATION_OFF 1e-3 /* |R R' - 1| that rounding in a file with few digits explains */
 #define RAY_STEPS    50   /* of the fixed point; lenses of rigs need about ten           */

@@ -1,5 +1,5 @@
 /* Image: the file's bytes, what kind it is, and the checks that hold for all kinds. */
-#include "ingest/rig/image.h"
+#include "ingest/rig/rig_internal.h"
 
 #include <string.h>
 

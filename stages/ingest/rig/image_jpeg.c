@@ -5,7 +5,7 @@
 
 #include <jpeglib.h>
 
-#include "ingest/rig/image.h"
+#include "ingest/rig/rig_internal.h"
 
 #define SCANS_MAX 100 /* of a progressive file: more only cost time, and real ones have about ten */
 

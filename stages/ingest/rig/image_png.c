@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/rig/image.h"
+#include "ingest/rig/rig_internal.h"
 #include "pipeline/memory.h"
 
 typedef struct decoder {

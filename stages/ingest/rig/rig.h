@@ -1,18 +1,64 @@
+#ifndef NPG_INGEST_RIG_H
+#define NPG_INGEST_RIG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
+#include "pipeline/json_file.h"
+#include "pipeline/status.h"
+
+/* Camera: pinhole with OpenCV's lens distortion.  Camera axes: x right, y down, z ahead; pixel (0, 0) is the
+ * centre of the upper left pixel.
+ *
+ *     x = X / Z, y = Y / Z, r2 = x x + y y
+ *     s = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
+ *     u = fx (x s + 2 p1 x y + p2 (r2 + 2 x x)) + cx
+ *     v = fy (y s + p1 (r2 + 2 y y) + 2 p2 x y) + cy
+ *
+ * Poses are 3 x 4, row-major, [R | t]: p' = R p + t. */
+
+enum { NPG_K1, NPG_K2, NPG_P1, NPG_P2, NPG_K3, NPG_K4, NPG_K5, NPG_K6, NPG_DISTORTIONS }; /* OpenCV's order */
+
+typedef struct npg_camera {
+    size_t width, height;  /* of the images that the intrinsics are of, pixels */
+    double fx, fy, cx, cy; /* pixels */
+    double distortion[NPG_DISTORTIONS];
+} npg_camera;
+
+/* NPG_BAD_INPUT when sizes or focal lengths are none that a camera has; `where` begins the text. */
+npg_status npg_camera_check(const npg_camera *camera, const char *where);
+
+/* Pixel that a point of the camera's space falls on; false where it is not in front of the camera. */
+bool npg_camera_project(const npg_camera *camera, double pixel[2], const double point[3]);
+
+/* The ray of a pixel as (x, y) = (X / Z, Y / Z); false where the distortion can't be undone there. */
+bool npg_camera_ray(const npg_camera *camera, double ray[2], const double pixel[2]);
+
+/* ---- poses ---- */
+
+void npg_pose_identity(double pose[12]);
+void npg_pose_apply(double out[3], const double pose[12], const double point[3]);
+/* out = a after b; out is neither of them. */
+void npg_pose_combine(double out[12], const double a[12], const double b[12]);
+void npg_pose_invert(double out[12], const double pose[12]); /* of a rotation; out is not pose */
+
+/* NPG_BAD_INPUT when the 3 x 3 part is no rotation (a scale, a shear, a mirror, numbers that are not finite);
+ * what is off by rounding in a file is made exact. */
+npg_status npg_pose_check(double pose[12], const char *where);
+
+/* [R | t] from a quaternion (any length but 0) and a translation. */
+npg_status npg_pose_of_quaternion(double pose[12], const double xyzw[4], const double t[3],
+                                  const char *where);
+
 /* Rig: depth sensors with their calibration, and which image of which sensor belongs to which frame.
  *
  * Conventions of all layouts, once they are loaded: lengths in one unit (metres, as a rule), camera axes as
- * in camera.h (x right, y down, z ahead), poses from sensor to world.
+ * in camera.c (x right, y down, z ahead), poses from sensor to world.
  *
  * A frame is what all sensors saw at one time.  A sensor whose image is missing then is a gap of that sensor,
  * not of the frame. */
-#ifndef NPG_RIG_H
-#define NPG_RIG_H
-
-#include <stdint.h>
-
-#include "ingest/rig/camera.h"
-#include "pipeline/chunk.h"
-#include "pipeline/frame_box.h"
 
 #define NPG_RIG_SENSORS_MAX NPG_FRAME_SENSORS_MOST
 #define NPG_RIG_SHOTS_MAX   4000000            /* images of one sensor: 18 hours at 60 a second           */
@@ -210,5 +256,17 @@ const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s,
 npg_status npg_opencv_open(char **text, const char *path);
 npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values,
                              size_t most, size_t *found);
+
+/* Rig report: what comparing sensors found, as JSON and text. */
+
+/* Put "pose" ("aligned", "off" ...), "shift", "turn_deg", their deviations, and "correction" (four rows of
+ * four, only where it is off) into a sensor's object; lengths in the rig's unit, null: not known. */
+void npg_rig_report_pose(json_t *sensor, const npg_rig_view *view);
+
+/* The same as one phrase: "off by 12.3 mm and 0.70 deg (deviation 0.8 mm, 0.03 deg)". */
+void npg_rig_describe_pose(char *text, size_t size, const npg_rig *rig, const npg_rig_view *view);
+
+/* A length in the rig's unit: "12.3 mm" where that is m, cm or mm. */
+void npg_rig_describe_length(char *text, size_t size, const npg_rig *rig, double length);
 
 #endif

@@ -1,5 +1,5 @@
 /* Rig alignment: Gauss-Newton over the corrections of all sensors at once. */
-#include "ingest/rig/rig_align.h"
+#include "ingest/rig/rig_internal.h"
 
 #include <math.h>
 #include <string.h>

@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "ingest/frame_inputs.h"
-#include "ingest/rig/image.h"
 #include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"

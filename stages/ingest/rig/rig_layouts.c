@@ -7,8 +7,8 @@
 #include <strings.h>
 
 #include "ingest/frame_names.h"
-#include "ingest/rig/image.h"
 #include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 

@@ -5,7 +5,7 @@
 
 #include "geometry/mesh_tools.h"
 #include "geometry/vec3.h"
-#include "ingest/rig/rig_align.h"
+#include "ingest/rig/rig_internal.h"
 #include "pipeline/memory.h"
 
 #define SIGHTS_MAX  256    /* read at once: a rig of many sensors is measured in fewer frames   */

@@ -6,7 +6,7 @@
  *
  * Based on: Blais, Levine, Registering multiview range data to create 3D computer objects, 1995 (projective
  * association); Rusinkiewicz, A symmetric objective function for ICP, 2019. */
-#include "ingest/rig/rig_sights.h"
+#include "ingest/rig/rig_internal.h"
 
 #include <math.h>
 #include <string.h>

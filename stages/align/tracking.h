@@ -1,6 +1,6 @@
 /* Align: following a surface into frames. What other rooms may call; align_internal.h has the rest. */
-#ifndef NPG_ALIGN_TRACKER_H
-#define NPG_ALIGN_TRACKER_H
+#ifndef NPG_ALIGN_TRACKING_H
+#define NPG_ALIGN_TRACKING_H
 
 #include "geometry/query.h"
 #include "pipeline/chunk.h"
@@ -252,7 +252,7 @@ void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const do
 /* Candidate clouds: the frames of the choosing pass, thinned, and how a surface made from one of them
  * fares in the others.
  *
- * A surface from one frame is followed from frame to frame by the coarse tracker (tracker.h), outward in both
+ * A surface from one frame is followed from frame to frame by the coarse tracker (tracking.h), outward in both
  * directions.  Where limbs that touch in its frame were welded, the weld must either hold other frames' limbs
  * together, away from their points, or stretch far: both can be seen. */
 
