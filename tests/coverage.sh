@@ -12,11 +12,11 @@ build=build/coverage
 
 # Parsers: captures, configurations.  Writers: meshes, exports, files.  State: jobs, checkpoints, fits.
 shopt -s nullglob
-files=(stages/ingest/formats/*.c stages/ingest/stream.c stages/ingest/frame_*.c stages/export/*.c stages/export/forms/*.c
+files=(stages/ingest/formats/*.c stages/ingest/stream.c stages/ingest/frame_*.c stages/export/*.c stages/export/exporters/*.c
     stages/job/*.c stages/optimize/checkpoint.c stages/optimize/fit_state.c stages/optimize/time_code.c
     pipeline/json_*.c pipeline/options.c pipeline/file.c pipeline/custom_stage.c)
 
-tests="test_readers test_bad_files test_writers test_forms test_time_code test_export test_store test_checkpoint test_frame_files
+tests="test_readers test_bad_files test_writers test_exporters test_time_code test_export test_store test_checkpoint test_frame_files
 test_options test_file test_ingest test_follow test_custom_stage test_abi input resume apply export exports formats live"
 
 cmake -G Ninja -B "$build" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_C_FLAGS_DEBUG="-O1 -g --coverage" \

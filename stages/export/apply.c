@@ -10,8 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "export/export_folder.h"
-#include "export/forms/writer.h"
+#include "export/files.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"

@@ -4,16 +4,12 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "export/export_folder.h"
-#include "export/forms/forms.h"
-#include "export/forms/placement.h"
-#include "export/forms/writer.h"
+#include "export/exporters/exporters_internal.h"
 #include "geometry/colours.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "job/frame_log.h"
 #include "job/job.h"
-#include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/options.h"
 #include "pipeline/order.h"
@@ -29,7 +25,7 @@ typedef struct export_state {
     /* of a pass */
     npg_placement map;
     npg_mesh_names names;
-    npg_form_choice choice;
+    npg_export_choice choice;
     const char *like; /* the user's own reference where it is OBJ: its lines are kept in OBJ files */
     int64_t *numbers; /* of all frames, while measuring; owned */
     size_t number_count, number_capacity;
@@ -66,7 +62,7 @@ static npg_status read_options(npg_worker *worker)
     NPG_TRY(npg_placement_parse(&state->map, state->axes));
     state->map.scale = state->scale;
     NPG_TRY(check_prefix(state->prefix));
-    NPG_TRY(npg_forms_choose(&state->choice, state->exports, false));
+    NPG_TRY(npg_exporters_choose(&state->choice, state->exports, false));
     if (reference[0]) format = npg_reader_for(reference);
     state->like = format && !strcmp(format, "obj") ? reference : NULL;
     state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
@@ -177,36 +173,37 @@ static npg_status check_for_live(const npg_worker *worker)
 
 static const double metres_per_unit[] = {1, 0.1, 0.01, 0.001, 1000, 0.0254, 0.3048};
 
-/* What forms may know; before the reference is there, counts are those that the run will have at most. */
-static npg_form_facts form_facts(const npg_worker *worker)
+/* What formats may know; before the reference is there, counts are those that the run will have at most. */
+static npg_export_facts export_facts(const npg_worker *worker)
 {
     const export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_frame_box *box = &facts->box;
     size_t verts = facts->reference ? facts->reference->vert_count : npg_worker_verts_at_most(worker);
     bool is_known = box->scale > 0;
-    return (npg_form_facts){.output = output_of(worker),
-                            .prefix = state->prefix,
-                            .width = state->names.width,
-                            .vert_count = verts,
-                            .face_count = facts->reference ? facts->reference->face_count : 2 * verts,
-                            .like = state->like,
-                            .turns_faces = state->map.is_mirror,
-                            .has_normals = state->with_normals,
-                            .pose_count = facts->frame_count,
-                            .last_index = facts->frame_count > 0 ? facts->frame_count - 1 : 0,
-                            .fps = state->fps,
-                            .metres_per_unit = metres_per_unit[state->unit],
-                            .is_z_up = state->up,
-                            .largest = is_known ? npg_place_largest(&state->map, box) : 0,
-                            .diagonal = is_known ? state->scale * box->diagonal : 0,
-                            .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
-                            .voxel_share = state->voxel_share,
-                            .has_grids = npg_job_of(worker) && !npg_worker_has_field(worker, NPG_FIELD_POSE),
-                            .placement = &state->map};
+    return (npg_export_facts){.output = output_of(worker),
+                              .prefix = state->prefix,
+                              .width = state->names.width,
+                              .vert_count = verts,
+                              .face_count = facts->reference ? facts->reference->face_count : 2 * verts,
+                              .like = state->like,
+                              .turns_faces = state->map.is_mirror,
+                              .has_normals = state->with_normals,
+                              .pose_count = facts->frame_count,
+                              .last_index = facts->frame_count > 0 ? facts->frame_count - 1 : 0,
+                              .fps = state->fps,
+                              .metres_per_unit = metres_per_unit[state->unit],
+                              .is_z_up = state->up,
+                              .largest = is_known ? npg_place_largest(&state->map, box) : 0,
+                              .diagonal = is_known ? state->scale * box->diagonal : 0,
+                              .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
+                              .voxel_share = state->voxel_share,
+                              .has_grids =
+                                  npg_job_of(worker) && !npg_worker_has_field(worker, NPG_FIELD_POSE),
+                              .placement = &state->map};
 }
 
-/* About what the meshes and forms take: binary PLY, or OBJ text with its longer numbers.
+/* About what the meshes and formats take: binary PLY, or OBJ text with its longer numbers.
  * 0 where it is not known. */
 static uint64_t bytes_of_meshes(const npg_worker *worker)
 {
@@ -217,39 +214,35 @@ static uint64_t bytes_of_meshes(const npg_worker *worker)
     if (facts->frame_count < 0 || npg_worker_settings(worker)->reference[0]) return 0;
     if (state->with_normals) per_vert *= 2;
     if (npg_worker_settings(worker)->colour != NPG_COLOUR_NO) per_vert += 4; /* if there are any */
-    npg_form_facts of_forms = form_facts(worker);
+    npg_export_facts of_exports = export_facts(worker);
     return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (is_obj ? 20 : 13)) +
-           npg_forms_bytes(&state->choice, &of_forms);
+           npg_exporters_bytes(&state->choice, &of_exports);
 }
 
-/* What a form can't hold is refused before the fit starts; of a live source as soon as its box is known. */
-static npg_status check_forms(npg_worker *worker)
+/* What a format can't hold is refused before the fit starts; of a live source as soon as its box is known. */
+static npg_status check_exporters(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     set_centre(state, &npg_worker_facts(worker)->box);
-    npg_form_facts of_forms = form_facts(worker);
-    return npg_forms_check(&state->choice, &of_forms);
+    npg_export_facts of_exports = export_facts(worker);
+    return npg_exporters_check(&state->choice, &of_exports);
 }
 
-/* The form vdb has the latent grids of all windows. */
+/* The format vdb has the latent grids of all windows. */
 static bool keeps_grids(const export_state *state)
 {
-    return npg_forms_name(state->exports, "vdb");
+    return npg_exporters_name(state->exports, "vdb");
 }
 
 static npg_status prepare_folder(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     const char *output = output_of(worker);
-    char *meshes;
     npg_job *job = npg_job_of(worker);
-    NPG_TRY(check_forms(worker));
+    NPG_TRY(check_exporters(worker));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     NPG_TRY(npg_folder_clear(output));
-    NPG_TRY(npg_join_path(&meshes, output, "meshes"));
-    npg_status status = npg_make_folder(meshes);
-    npg_release(&meshes);
-    NPG_TRY(status);
+    NPG_TRY(npg_export_folder(output, "meshes"));
     NPG_TRY(npg_frame_log_open(&state->list, output));
     return job ? npg_job_write(job, keeps_grids(state)) : NPG_OK;
 }
@@ -261,7 +254,7 @@ static npg_status resume_folder(npg_worker *worker)
     const char *output = output_of(worker);
     npg_job *job = npg_job_of(worker);
     int64_t count, bytes;
-    NPG_TRY(check_forms(worker));
+    NPG_TRY(check_exporters(worker));
     NPG_TRY(npg_folder_probe(output));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     npg_job_exported(job, &count, &bytes);
@@ -304,7 +297,7 @@ static npg_status begin_meshes(npg_worker *worker)
     const npg_mesh *reference = facts->reference;
     size_t v = reference->vert_count, f = reference->face_count;
     set_width(state, facts);
-    NPG_TRY(check_forms(worker));
+    NPG_TRY(check_exporters(worker));
     NPG_TRY(npg_alloc_array(&state->vert_world, NPG_FOR_FILES, v, 3 * sizeof *state->vert_world));
     NPG_TRY(npg_alloc_array(&state->vert_normals, NPG_FOR_FILES, v, 3 * sizeof *state->vert_normals));
     NPG_TRY(npg_alloc_array(&state->faces, NPG_FOR_FILES, f, 3 * sizeof *state->faces));
@@ -379,17 +372,17 @@ static void report_settings(json_t *object, const export_state *state)
     json_object_set_new(object, "fps", json_real(state->fps));
     json_object_set_new(object, "up", json_string(state->up ? "z" : "y"));
     json_object_set_new(object, "metres_per_unit", json_real(metres_per_unit[state->unit]));
-    json_object_set_new(object, "forms", npg_forms_json(&state->choice));
+    json_object_set_new(object, "forms", npg_exporters_json(&state->choice));
     if (state->is_centred)
         json_object_set_new(
             object, "centre",
             json_pack("[fff]", state->map.centre[0], state->map.centre[1], state->map.centre[2]));
 }
 
-/* ---- the other forms ---- */
+/* ---- the other formats ---- */
 
 /* What of the reference is the same in all poses. */
-static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, float **rest, float **corners)
+static npg_status place_reference(npg_worker *worker, npg_export_facts *facts, float **rest, float **corners)
 {
     export_state *state = npg_worker_state(worker);
     const npg_mesh *reference = npg_worker_facts(worker)->reference;
@@ -411,24 +404,24 @@ static npg_status place_reference(npg_worker *worker, npg_form_facts *facts, flo
     return NPG_OK;
 }
 
-/* From the meshes on disk, in the order of time (forms.h says why). */
-static npg_status write_forms(npg_worker *worker)
+/* From the meshes on disk, in the order of time (exporters_internal.h says why). */
+static npg_status write_exports(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    npg_form_watch watch = {.should_stop = npg_worker_should_stop, .user = worker};
+    npg_export_watch watch = {.should_stop = npg_worker_should_stop, .user = worker};
     float *rest = NULL, *corners = NULL;
-    if (!npg_forms_any(&state->choice)) return NPG_OK;
+    if (!npg_exporters_any(&state->choice)) return NPG_OK;
     if (!state->faces) NPG_TRY(begin_meshes(worker));
-    npg_form_facts facts = form_facts(worker);
+    npg_export_facts facts = export_facts(worker);
     npg_status status = place_reference(worker, &facts, &rest, &corners);
-    if (!status && facts.has_pose_colours && npg_forms_name(state->exports, "glb"))
+    if (!status && facts.has_pose_colours && npg_exporters_name(state->exports, "glb"))
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "motion.glb has the reference's colours: morph targets of colours are an option of "
                        "glTF that few programs read");
-    if (!status) status = npg_forms_write(&state->choice, &facts, &watch);
+    if (!status) status = npg_exporters_write(&state->choice, &facts, &watch);
     npg_release(&rest);
     npg_release(&corners);
-    if (!status && npg_forms_name(state->exports, "vdb") && !facts.has_grids)
+    if (!status && npg_exporters_name(state->exports, "vdb") && !facts.has_grids)
         npg_worker_warn(
             worker, false, -1,
             "vdb has no latent grids: only a run without alignment has any, and keeps them in a job folder "
@@ -450,7 +443,7 @@ static npg_status close_frames(npg_worker *worker)
     json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
     NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker)));
-    return write_forms(worker);
+    return write_exports(worker);
 }
 
 /* ---- the last files ---- */
@@ -482,7 +475,7 @@ static npg_status conclude(npg_worker *worker)
     json_object_set(head, "meshes", json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
     json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
-    if (!status) return npg_done_write(output_of(worker), head, npg_forms_any(&state->choice));
+    if (!status) return npg_done_write(output_of(worker), head, npg_exporters_any(&state->choice));
     json_decref(head);
     return status;
 }
@@ -552,9 +545,9 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     *chunks_held = 1;
     size_t verts = npg_worker_verts_at_most(worker);
     const export_state *state = npg_worker_state(worker);
-    bool has_forms = state->exports[0];
-    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + (60 + (has_forms ? 200 : 0)) * verts +
-           (has_forms ? 4 << 20 : 512 << 10);
+    bool has_exports = state->exports[0];
+    return 24 * (size_t)(frame_count > 0 ? frame_count : 0) + (60 + (has_exports ? 200 : 0)) * verts +
+           (has_exports ? 4 << 20 : 512 << 10);
 }
 
 #define AT(member) offsetof(export_state, member)

@@ -5,9 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "export/export_folder.h"
+#include "export/exporters/exporters_internal.h"
 #include "job/frame_log.h"
-#include "pipeline/file.h"
 #include "pipeline/json_file.h"
 
 static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)
@@ -30,7 +29,7 @@ static npg_status write_file_entry(npg_file *file, const char *output, const cha
     return status;
 }
 
-/* Sizes and checksums of the meshes or of the other forms' files, from the lines
+/* Sizes and checksums of the meshes or of the other formats' files, from the lines
  * of the list that has them. */
 static npg_status write_entries(npg_file *file, const char *output, const char *list_name, bool *is_first)
 {
@@ -59,7 +58,7 @@ static npg_status write_entries(npg_file *file, const char *output, const char *
     return status;
 }
 
-static npg_status write_done(npg_file *file, const char *output, const json_t *head, bool has_forms)
+static npg_status write_done(npg_file *file, const char *output, const json_t *head, bool has_exports)
 {
     static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
     bool is_first = true;
@@ -72,20 +71,20 @@ static npg_status write_done(npg_file *file, const char *output, const json_t *h
     for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++)
         status = write_file_entry(file, output, names[i], &is_first);
     if (!status) status = write_entries(file, output, "frames.jsonl", &is_first);
-    if (!status && has_forms) status = write_file_entry(file, output, "exports.jsonl", &is_first);
-    if (!status && has_forms) status = write_entries(file, output, "exports.jsonl", &is_first);
+    if (!status && has_exports) status = write_file_entry(file, output, "exports.jsonl", &is_first);
+    if (!status && has_exports) status = write_entries(file, output, "exports.jsonl", &is_first);
     return status ? status : npg_file_print(file, "\n  ]\n}\n");
 }
 
 /* The frame log is what an interrupted run is resumed from: it goes when nothing is left to resume. */
-npg_status npg_done_write(const char *output, json_t *head, bool has_forms)
+npg_status npg_done_write(const char *output, json_t *head, bool has_exports)
 {
     char *path = NULL, *log = NULL;
     npg_file *file = NULL;
     npg_status status = npg_join_path(&path, output, "done.json");
     if (!status) status = npg_join_path(&log, output, NPG_FRAME_LOG_NAME);
     if (!status) status = npg_file_open(&file, path);
-    if (!status) status = write_done(file, output, head, has_forms);
+    if (!status) status = write_done(file, output, head, has_exports);
     if (!status) {
         status = npg_file_commit(&file);
         if (status) unlink(path); /* whole it may be, but the run that fails at its last step is not done */

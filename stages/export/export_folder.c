@@ -9,9 +9,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-#include "export/export_folder.h"
-#include "export/forms/forms.h"
-#include "pipeline/file.h"
+#include "export/exporters/exporters_internal.h"
 #include "pipeline/order.h"
 
 #define PROBE_BYTES (256 << 10)
@@ -162,6 +160,6 @@ npg_status npg_folder_clear(const char *output)
     static const char *const names[] = {
         "done.json", "report.json", "frames.jsonl", "frames.partial.jsonl", "reference.ply", "topology.json"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(remove_file(output, names[i]));
-    NPG_TRY(npg_forms_clear(output));
+    NPG_TRY(npg_exporters_clear(output));
     return each_mesh(output, remove_mesh, NULL);
 }

@@ -1,4 +1,4 @@
-# Other forms of a run's meshes, read by programs that are not ours.
+# Other formats of a run's meshes, read by programs that are not ours.
 
 small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
@@ -112,7 +112,7 @@ END
     node "$BATS_TEST_DIRNAME/check_exports.mjs" "$modules" glb own/motion.glb
 }
 
-@test "a run killed while it writes forms goes on and gives the same bytes" {
+@test "a run killed while it writes formats goes on and gives the same bytes" {
     "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}" >killed.log 2>&1 &
     pid=$!
     while kill -0 $pid 2>/dev/null && [ ! -d killed/volumes ]; do sleep 0.005; done
@@ -127,7 +127,7 @@ END
     [ -z "$(find killed -name '.*.part')" ]
 }
 
-@test "what is no form, and what a form can't hold, is said before the fit" {
+@test "what is no format, and what a format can't hold, is said before the fit" {
     run "$NEUPIG" run capture/points -o no "${small[@]}" --export glb,fbx
     [ "$status" -eq 2 ]
     [[ "$output" == *'"fbx" is none of'* ]]

@@ -13,7 +13,7 @@
 #include <sys/wait.h>
 #include <xxhash.h>
 
-#include "export/export_folder.h"
+#include "export/exporters/exporters_internal.h"
 #include "geometry/mesh_tools.h"
 #include "ingest/formats/reader.h"
 #include "tests/support/group_folder.h"

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "export/forms/latent_features.h"
+#include "export/exporters/vdb.h"
 #include "kernels/sobolev.h"
 
 /* What the solve gives back must be what the matrix takes to the unknowns. */

@@ -7,7 +7,7 @@
 #include <cmocka.h>
 #include <math.h>
 
-#include "export/forms/writer.h"
+#include "export/files.h"
 #include "ingest/formats/reader.h"
 #include "tests/support/group_folder.h"
 

@@ -7,7 +7,7 @@
 #include <cmocka.h>
 #include <stdlib.h>
 
-#include "export/forms/zip_store.h"
+#include "export/exporters/exporters_internal.h"
 #include "tests/support/group_folder.h"
 
 static void large_archives_get_zip64(void **state)
@@ -34,7 +34,6 @@ static void large_archives_get_zip64(void **state)
                  path);
         assert_int_equal(system(command), 0);
     }
-    assert_int_equal(npg_crc32(npg_crc32(0, "12345", 5), "6789", 4), 0xcbf43926); /* the known check value */
 }
 
 static void an_archive_that_is_not_full_is_no_file(void **state)

@@ -51,7 +51,7 @@ numpy() {
     awk -v e="${output##* }" 'BEGIN { exit !(e < 9) }'
 }
 
-@test "colours are in every form" {
+@test "colours are in every format" {
     numpy
     has_colours out/reference.ply
     for mesh in out/meshes/*.ply; do has_colours "$mesh"; done

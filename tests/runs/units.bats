@@ -18,7 +18,7 @@ make_capture() { # FOLDER UNIT
     done
 }
 
-@test "a capture of another unit gives the same bytes in every form, where the unit is a power of two" {
+@test "a capture of another unit gives the same bytes in every format, where the unit is a power of two" {
     make_capture one 1
     make_capture tiny "$(awk 'BEGIN { printf "%.17g", 2 ^ -39 }')"
     make_capture large "$(awk 'BEGIN { printf "%.17g", 2 ^ 38 }')"
@@ -34,7 +34,7 @@ make_capture() { # FOLDER UNIT
     [ -s tiny.grids/latents/window_000000.vdb ]
 }
 
-@test "a capture of 1e-12 units is written as it is; a form that can't hold it says so before the fit" {
+@test "a capture of 1e-12 units is written as it is; a format that can't hold it says so before the fit" {
     make_capture tiny 1e-12
     "$NEUPIG" run tiny -o out "${small[@]}" --export ply,obj,pc2,mdd,glb,usda,npz
     [ "$(find out/meshes -name '*.ply' | wc -l)" -eq 3 ]

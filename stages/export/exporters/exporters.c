@@ -1,0 +1,144 @@
+/* Exporters: the table, and whether what was asked for can be had. */
+#include "export/exporters/exporters_internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#define FLOAT_STEPS 16777216 /* 2^24: float rounds by at most 1 / this of the largest coordinate */
+#define KEPT_SHARE  1e-6     /* of the box: what positions may lose, a micrometre in a metre */
+
+extern const npg_exporter npg_exporter_obj, npg_exporter_pc2, npg_exporter_mdd, npg_exporter_glb,
+    npg_exporter_usda, npg_exporter_npz, npg_exporter_vdb;
+
+const npg_exporter *const npg_exporters[] = {&npg_exporter_obj,  /* beside PLY                           */
+                                             &npg_exporter_pc2,  /* 3ds Max, Blender, Marvelous Designer */
+                                             &npg_exporter_mdd,  /* LightWave, Blender, three.js         */
+                                             &npg_exporter_glb,  /* the web, Blender, Unreal             */
+                                             &npg_exporter_usda, /* USD tools, Unreal                    */
+                                             &npg_exporter_npz,  /* NumPy                                */
+                                             &npg_exporter_vdb,  /* Houdini, Blender                     */
+                                             NULL};
+
+/* ---- choosing ---- */
+
+static int find_exporter(const char *name, size_t length)
+{
+    for (int i = 0; npg_exporters[i]; i++)
+        if (strlen(npg_exporters[i]->name) == length && !strncmp(npg_exporters[i]->name, name, length))
+            return i;
+    return -1;
+}
+
+static npg_status refuse_name(const char *name, size_t length)
+{
+    char names[256] = "ply";
+    for (int i = 0; npg_exporters[i]; i++) {
+        size_t used = strlen(names);
+        snprintf(names + used, sizeof names - used, ", %s", npg_exporters[i]->name);
+    }
+    return npg_error(NPG_USAGE, "option export: \"%.*s\" is none of %s", (int)(length > 60 ? 60 : length),
+                     name, names);
+}
+
+npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, bool is_obj)
+{
+    bool has_ply = false;
+    int obj = find_exporter("obj", 3);
+    *choice = (npg_export_choice){.is_obj = is_obj};
+    for (const char *name = list; *name;) {
+        size_t length = strcspn(name, ",");
+        int at = find_exporter(name, length);
+        bool is_ply = length == 3 && !strncmp(name, "ply", 3);
+        if (at < 0 && !is_ply) return refuse_name(name, length);
+        has_ply = has_ply || is_ply;
+        if (at >= 0) choice->is_chosen[at] = true;
+        name += length;
+        if (*name == ',' && !*++name) return refuse_name(name, 0);
+    }
+    choice->is_obj = !has_ply && (is_obj || (obj >= 0 && choice->is_chosen[obj]));
+    if (obj >= 0) choice->is_chosen[obj] = has_ply && (is_obj || choice->is_chosen[obj]);
+    return NPG_OK;
+}
+
+bool npg_exporters_name(const char *list, const char *name)
+{
+    size_t length = strlen(name);
+    for (; *list; list += *list == ',') {
+        size_t size = strcspn(list, ",");
+        if (size == length && !strncmp(list, name, length)) return true;
+        list += size;
+    }
+    return false;
+}
+
+bool npg_exporters_any(const npg_export_choice *choice)
+{
+    for (int i = 0; npg_exporters[i]; i++)
+        if (choice->is_chosen[i]) return true;
+    return false;
+}
+
+json_t *npg_exporters_json(const npg_export_choice *choice)
+{
+    json_t *names = json_array();
+    json_array_append_new(names, json_string(choice->is_obj ? "obj" : "ply"));
+    for (int i = 0; npg_exporters[i]; i++)
+        if (choice->is_chosen[i]) json_array_append_new(names, json_string(npg_exporters[i]->name));
+    return names;
+}
+
+/* ---- what can be had ---- */
+
+/* Vertices may lie a little outside the box of the points; the bar has room for that. */
+static npg_status check_floats(const npg_exporter *exporter, const npg_export_facts *facts)
+{
+    if (facts->largest / FLOAT_STEPS <= KEPT_SHARE * facts->diagonal) return NPG_OK;
+    return npg_error(NPG_USAGE,
+                     "%s can't hold the capture: its numbers have 24 bits, "
+                     "and coordinates up to %g in a box of diagonal %g "
+                     "would lose more than a millionth of it; "
+                     "set centre to write them around 0",
+                     exporter->name, facts->largest, facts->diagonal);
+}
+
+npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export_facts *facts)
+{
+    for (int i = 0; npg_exporters[i]; i++) {
+        if (!choice->is_chosen[i]) continue;
+        if (npg_exporters[i]->is_float) NPG_TRY(check_floats(npg_exporters[i], facts));
+        if (npg_exporters[i]->check) NPG_TRY(npg_exporters[i]->check(facts));
+    }
+    return NPG_OK;
+}
+
+uint64_t npg_exporters_bytes(const npg_export_choice *choice, const npg_export_facts *facts)
+{
+    uint64_t sum = 0;
+    for (int i = 0; npg_exporters[i]; i++)
+        if (choice->is_chosen[i] && npg_exporters[i]->bytes) sum += npg_exporters[i]->bytes(facts);
+    return sum;
+}
+
+npg_status npg_export_open(npg_file **file, const char *output, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, output, name));
+    npg_status status = npg_file_open(file, path);
+    npg_release(&path);
+    return status;
+}
+
+npg_status npg_export_folder(const char *output, const char *name)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, output, name));
+    npg_status status = npg_make_folder(path);
+    npg_release(&path);
+    return status;
+}
+
+float npg_srgb_to_linear(uint8_t byte)
+{
+    double value = byte / 255.0;
+    return (float)(value <= 0.04045 ? value / 12.92 : pow((value + 0.055) / 1.055, 2.4));
+}

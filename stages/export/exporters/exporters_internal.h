@@ -1,0 +1,268 @@
+/* Exporters: what other programs read, made of a run's meshes in one pass over the frames.
+ *
+ *     OUT/motion.pc2, motion.mdd     point caches for OUT/reference.obj, same order of the vertices
+ *     OUT/motion.glb                 glTF with morph targets; motion_000.glb and so on when it is long
+ *     OUT/motion.usda                points as time samples
+ *     OUT/motion.npz                 arrays for NumPy
+ *     OUT/obj/<prefix>_0000.obj      a second sequence, where the first one is PLY
+ *     OUT/volumes/<prefix>_0000.vdb  level set of every frame
+ *     OUT/latents/window_000000.vdb  latent grids of every window
+ *     OUT/exports.jsonl              one line per file of these, with size and checksum
+ *
+ * The mesh sequence is written while frames are solved, which is not the order of time, and is what a
+ * resumed run continues.  The other formats are made from those files when all are there: one pass in the
+ * order of time writes all of them.  So no exporter needs a state of its own to be resumed, a broken-off
+ * pass is simply made again, and the bytes do not depend on how often that happened.  One file per
+ * format (write_<format>.c), one row per format in exporters.c.
+ *
+ * Threads: one pass belongs to one thread. */
+#ifndef NPG_EXPORTERS_INTERNAL_H
+#define NPG_EXPORTERS_INTERNAL_H
+
+#include <jansson.h>
+
+#include "export/files.h"
+#include "pipeline/bytes.h"
+#include "pipeline/file.h"
+
+#define NPG_EXPORTERS_MAX 16
+
+typedef struct npg_export_log npg_export_log;
+
+/* What a writer may know before the first pose.  Everything is as written: after axes, scale and centre. */
+typedef struct npg_export_facts {
+    const char *output;              /* OUT                                                  */
+    const char *prefix;              /* of files that are numbered                           */
+    int width;                       /* digits of their number at least                      */
+    size_t vert_count;               /* V                                                    */
+    size_t face_count;               /* F                                                    */
+    const uint32_t *faces;           /* F x 3, counter-clockwise from outside                */
+    const float *rest;               /* V x 3: the reference                                 */
+    const uint8_t *colours;          /* V x 4 RGBA, sRGB as scanners write it, or NULL       */
+    const float *uvs;                /* V x 2 or NULL                                        */
+    const float *corner_uvs;         /* F x 3 x 2 or NULL: where vertices have more than one */
+    const char *like;                /* OBJ file whose lines an OBJ keeps, or NULL           */
+    bool turns_faces;                /* and its faces are to be turned over                  */
+    bool has_normals;                /* poses have normals                                   */
+    bool has_pose_colours;           /* poses have colours of their own                      */
+    int64_t pose_count;              /* T, meshes there are; -1: not known yet               */
+    int64_t first_index, last_index; /* of the poses                                         */
+    double fps;
+    double metres_per_unit;
+    bool is_z_up;                          /* else y                                                      */
+    double largest, diagonal;              /* coordinate, and of the box; 0: not known yet                */
+    double longest;                        /* side of the box                                             */
+    double voxel_share;                    /* a level set's voxel, in longest sides                       */
+    bool has_grids;                        /* OUT/job holds the latent grids of this run's windows        */
+    const struct npg_placement *placement; /* the capture's coordinates to these; NULL: they are the same */
+    npg_export_log *log;                   /* where files are noted                                       */
+} npg_export_facts;
+
+typedef struct npg_pose {
+    int64_t index, number;  /* of the frame                */
+    const float *pos;       /* V x 3                       */
+    const float *normals;   /* V x 3 or NULL (has_normals) */
+    const uint8_t *colours; /* V x 4 or NULL (has_pose_colours) */
+} npg_pose;
+
+/* An exporter.  state is zeroed before open; close is called after open in any case and removes
+ * what is not finished. */
+typedef struct npg_exporter {
+    const char *name, *help;
+    bool is_float;       /* keeps positions as float: far from 0 that is too coarse                   */
+    bool has_fixed_rate; /* has no times of its own: a frame without a mesh repeats the one before it */
+    size_t state_size;
+    /* NPG_USAGE when the format can't hold such a capture (vert_count at most, pose_count -1 where unknown).
+     * May be NULL. */
+    npg_status (*check)(const npg_export_facts *facts);
+    uint64_t (*bytes)(const npg_export_facts *facts); /* on disk, about; 0: can't be told */
+    npg_status (*open)(void *state, const npg_export_facts *facts);
+    npg_status (*pose)(void *state, const npg_pose *pose); /* in the order of time */
+    npg_status (*finish)(void *state);
+    void (*close)(void *state);
+} npg_exporter;
+
+/* Ends with NULL. */
+extern const npg_exporter *const npg_exporters[];
+
+/* ---- what a run was asked for ---- */
+
+typedef struct npg_export_choice {
+    bool is_obj; /* the sequence of the run itself is OBJ, else PLY */
+    bool is_chosen[NPG_EXPORTERS_MAX];
+} npg_export_choice;
+
+/* list: "ply,glb,..." or "".  is_obj: the sequence's format where the list names none; obj beside ply becomes
+ * a sequence of its own.  NPG_USAGE names what is no format. */
+npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, bool is_obj);
+
+/* Whether a list that npg_exporters_choose() takes has this name. */
+bool npg_exporters_name(const char *list, const char *name);
+
+bool npg_exporters_any(const npg_export_choice *choice);
+
+/* Names of all that is made, the sequence first; a new array. */
+json_t *npg_exporters_json(const npg_export_choice *choice);
+
+/* NPG_USAGE when one of the formats can't hold the capture; the text says which and why. */
+npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export_facts *facts);
+
+/* On disk, about. */
+uint64_t npg_exporters_bytes(const npg_export_choice *choice, const npg_export_facts *facts);
+
+/* ---- making them ---- */
+
+typedef struct npg_export_watch {
+    bool (*should_stop)(void *user);
+    void *user;
+    int64_t repeated; /* out: frames without a mesh that formats of a fixed rate filled */
+} npg_export_watch;
+
+/* Remove all that formats of earlier runs left in OUT. */
+npg_status npg_exporters_clear(const char *output);
+
+/* Make them of the meshes that OUT/frames.jsonl lists.  Of facts pose_count, first_index, last_index and log
+ * are filled here.  NPG_DISK, NPG_BAD_INPUT (a mesh that is not the one listed), NPG_USAGE (a format
+ * can't hold what is there), NPG_STOPPED. */
+npg_status npg_exporters_write(const npg_export_choice *choice, npg_export_facts *facts,
+                               npg_export_watch *watch);
+
+/* A writer's word that OUT/<file> is in place with `pose_count` poses from index first on. */
+npg_status npg_export_made(npg_export_log *log, const char *format, const char *file, int64_t first,
+                           int64_t pose_count);
+
+/* Begin OUT/<file>; make OUT/<name>, a folder. */
+npg_status npg_export_open(npg_file **file, const char *output, const char *name);
+npg_status npg_export_folder(const char *output, const char *name);
+
+/* ---- the results' folder and its last file ---- */
+
+/* NPG_DISK when fewer bytes than these are free where OUT lies, with those of the earlier mesh files in OUT
+ * that will be removed. */
+npg_status npg_folder_has_room(const char *output, uint64_t bytes);
+
+/* NPG_USAGE when OUT/meshes holds mesh files that this run would not write over: their numbering would mix
+ * with the run's.  numbers: the frames' numbers, sorted; with none every mesh file is in the way. */
+npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,
+                            size_t number_count);
+
+/* ---- the last file ---- */
+
+/* OUT/done.json: version, status, settings, and every file of the run, with has_exports those that
+ * OUT/exports.jsonl lists too; the frame log goes.  head is consumed. */
+npg_status npg_done_write(const char *output, json_t *head, bool has_exports);
+
+/* ---- what the OBJ writers share ---- */
+
+/* Digits after the point that keep 1e-7 of the extent, and 9 digits where the extent is unknown. */
+int npg_obj_decimals_for(const npg_mesh_view *mesh);
+
+/* Append " <number>" for each value to a line of `size` bytes, with a decimal point in every locale. */
+void npg_obj_add_numbers(char *line, size_t size, int decimals, const double *values, int count);
+
+/* One pose of a capture (V x 3; normals may be NULL; colours V x 4, NULL: the reference's) as OBJ, with the
+ * lines of facts->like where there is one. */
+npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, const float *pos,
+                              const float *normals, const uint8_t *colours);
+
+/* ---- vertices doubled where their corners have more than one texture coordinate ---- */
+
+typedef struct npg_corner_split {
+    size_t count;      /* G >= V                                     */
+    uint32_t *vertex;  /* G: the vertex each one is a copy of, owned */
+    float *uvs;        /* G x 2 or NULL, owned                       */
+    uint32_t *indices; /* F x 3 of them, owned                       */
+} npg_corner_split;
+
+/* corner_uvs (F x 3 x 2) or uvs (V x 2) may be NULL; with both the corners' count.  Without corner_uvs the
+ * vertices stay as they are.  Vertices that no face uses are kept.  NPG_MEMORY. */
+npg_status npg_corner_split_make(npg_corner_split *split, size_t vert_count, const uint32_t *faces,
+                                 size_t face_count, const float *uvs, const float *corner_uvs);
+void npg_corner_split_clear(npg_corner_split *split);
+
+/* ---- faces that close the openings of a surface ---- */
+
+/* Fans over the loops of a mesh's border, turned as the faces around them, so that mesh and caps together are
+ * closed: 3 indices each, to be given to npg_release(); NULL where there is no border.  They need not be flat
+ * nor free of crossings.  The border's edges go in circles, as those of oriented faces do.  NPG_MEMORY. */
+npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, const uint32_t *faces, size_t face_count);
+
+/* ---- the latent grids of a run's windows ---- */
+
+/* OUT/latents/window_000000.vdb of every OUT/job/window_000000.vdb there is (vdb_latents.h says what is
+ * in them); nothing without facts->has_grids.  NPG_DISK, NPG_BAD_INPUT. */
+npg_status npg_latents_write(const npg_export_facts *facts);
+
+/* ---- the JSON part of a GLB with one animated mesh ---- */
+
+#define NPG_GLB_POSES 256 /* in one mesh: what WebGL2 holds for sure */
+
+typedef struct npg_glb_range { /* of an accessor */
+    float lo[3], hi[3];
+} npg_glb_range;
+
+/* The binary part, in this order, every piece at a multiple of 4:
+ *
+ *     indices 3F uint32 | base positions G float3 | base normals | colours G uint16x4 | uvs G float2 |
+ *     per further pose: position deltas G float3, normal deltas | times T float | weights T (T - 1) float */
+typedef struct npg_glb_layout {
+    const npg_export_facts *facts;
+    size_t vert_count;         /* G                                  */
+    size_t pose_count;         /* T of this mesh, NPG_GLB_POSES most */
+    int64_t first_index;       /* of its frames                      */
+    int64_t segment, segments; /* which of how many files            */
+    bool has_uvs;
+    npg_glb_range base, delta[NPG_GLB_POSES]; /* delta[0] is not used        */
+    float times[NPG_GLB_POSES];               /* seconds from the first pose */
+} npg_glb_layout;
+
+/* Offsets in the binary part. */
+typedef struct npg_glb_places {
+    uint64_t indices, positions, normals, colours, uvs, deltas, times, weights, end;
+    uint64_t delta_size; /* of one pose */
+} npg_glb_places;
+
+npg_glb_places npg_glb_places_of(const npg_glb_layout *layout);
+
+/* The JSON, padded with blanks to *length bytes; 0: to as many as it takes when ranges and times are known,
+ * too, so that they can be put in when all is written.  To be given to npg_release(). */
+npg_status npg_glb_text(char **text, size_t *length, const npg_glb_layout *layout);
+
+/* ---- a ZIP file of members that are not compressed ---- */
+
+#define NPG_ZIP_NAME 64
+
+typedef struct npg_zip_member {
+    char name[NPG_ZIP_NAME];
+    uint64_t size;
+    /* kept by the functions below */
+    uint64_t header_at, data_at, filled;
+    uint32_t crc;
+} npg_zip_member;
+
+typedef struct npg_zip {
+    npg_file *file;
+    npg_zip_member *members; /* a loan */
+    size_t count;
+    uint64_t large; /* numbers from here on take ZIP64 records: NPG_ZIP_LARGE but in tests */
+} npg_zip;
+
+#define NPG_ZIP_LARGE UINT64_C(0xffffffff)
+
+/* Begin the file: names and sizes of all members are set.  The last one is the longest for speed. */
+npg_status npg_zip_open(npg_zip *zip, const char *path, npg_zip_member *members, size_t count,
+                        uint64_t large);
+
+/* The next bytes of a member.  Those of the last one go straight to the end of the file. */
+npg_status npg_zip_put(npg_zip *zip, size_t member, const void *data, size_t size);
+
+/* All members must be full.  Closes in any case. */
+npg_status npg_zip_commit(npg_zip *zip);
+void npg_zip_discard(npg_zip *zip);
+
+/* ---- colours ---- */
+
+/* 0 .. 1, linear light, of sRGB as cameras and scanners write it (IEC 61966-2-1). */
+float npg_srgb_to_linear(uint8_t byte);
+
+#endif

@@ -1,0 +1,259 @@
+/* Exporters: the pass over a run's meshes in the order of time that writes all of them at once. */
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "export/exporters/exporters_internal.h"
+#include "geometry/mesh_tools.h"
+#include "ingest/formats/reader.h"
+#include "job/frame_log.h"
+#include "pipeline/json_file.h"
+
+struct npg_export_log {
+    const char *output;
+    npg_file *file;
+};
+
+typedef struct exporters_pass {
+    const npg_export_choice *choice;
+    npg_export_facts *facts;
+    npg_export_watch *watch;
+    npg_export_log log;
+    void *states[NPG_EXPORTERS_MAX]; /* of the chosen formats, owned; NULL: not open */
+    npg_mesh *mesh;                  /* of the pose before, owned */
+    int64_t index;                   /* its frame */
+} exporters_pass;
+
+/* ---- what earlier runs left ---- */
+
+static bool has_ending(const char *name, const char *const *endings)
+{
+    const char *dot = strrchr(name, '.');
+    for (; dot && *endings; endings++)
+        if (!strcmp(dot, *endings)) return true;
+    return false;
+}
+
+/* "motion.<ending>", "motion_000.<ending>". */
+static bool is_single(const char *name)
+{
+    static const char *const endings[] = {".pc2", ".mdd", ".glb", ".usda", ".npz", NULL};
+    if (strncmp(name, "motion", 6) != 0 || !has_ending(name, endings)) return false;
+    const char *rest = name + 6;
+    size_t digits = *rest == '_' ? strspn(rest + 1, "0123456789") : 0;
+    if (digits) rest += 1 + digits;
+    return rest == strrchr(name, '.');
+}
+
+/* "<word>_<four digits or more>.<ending>". */
+static bool is_numbered(const char *name)
+{
+    static const char *const endings[] = {".obj", ".vdb", NULL};
+    if (!has_ending(name, endings)) return false;
+    const char *dot = strrchr(name, '.'), *digits = dot;
+    while (digits > name && isdigit((unsigned char)digits[-1])) digits--;
+    if (dot - digits < 4) return false;
+    if (digits - name > 1 && digits[-1] == '-') digits--; /* numbers may be negative */
+    return digits - name > 1 && digits[-1] == '_';
+}
+
+static npg_status clear_folder(const char *folder, bool (*is_ours)(const char *name))
+{
+    npg_status status = NPG_OK;
+    DIR *listing = opendir(folder);
+    if (!listing) return errno == ENOENT ? NPG_OK : npg_error_errno(NPG_DISK, "can't list %s", folder);
+    for (struct dirent *entry; !status && (entry = readdir(listing));) {
+        char name[NAME_MAX + 1], *path;
+        size_t length = strlen(entry->d_name);
+        /* What a killed run left half-written (pipeline/file.h): ".<name>.part". */
+        bool is_part = entry->d_name[0] == '.' && length > 6 && !strcmp(entry->d_name + length - 5, ".part");
+        snprintf(name, sizeof name, "%.*s", (int)(is_part ? length - 6 : length), entry->d_name + is_part);
+        if (!is_ours(name)) continue;
+        status = npg_join_path(&path, folder, entry->d_name);
+        if (status) break;
+        if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
+        npg_release(&path);
+    }
+    closedir(listing);
+    return status;
+}
+
+static bool is_in_output(const char *name)
+{
+    return is_single(name) || !strcmp(name, "reference.obj") || !strcmp(name, "exports.jsonl");
+}
+
+npg_status npg_exporters_clear(const char *output)
+{
+    static const char *const folders[] = {"obj", "volumes", "latents"};
+    npg_status status = clear_folder(output, is_in_output);
+    for (size_t i = 0; i < sizeof folders / sizeof *folders && !status; i++) {
+        char *folder;
+        NPG_TRY(npg_join_path(&folder, output, folders[i]));
+        status = clear_folder(folder, is_numbered);
+        if (!status) rmdir(folder); /* stays where something else lies in it */
+        npg_release(&folder);
+    }
+    return status;
+}
+
+/* ---- the list of files ---- */
+
+npg_status npg_export_made(npg_export_log *log, const char *format, const char *file, int64_t first,
+                           int64_t pose_count)
+{
+    json_t *entry = json_pack("{ss ss sI sI}", "form", format, "file", file, "first", (json_int_t)first,
+                              "frames", (json_int_t)pose_count);
+    npg_status status = npg_file_facts(entry, log->output, file);
+    char *text = status ? NULL : json_dumps(entry, JSON_COMPACT);
+    json_decref(entry);
+    NPG_TRY(status);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for exports.jsonl");
+    npg_file_write(log->file, text, strlen(text));
+    status = npg_file_write(log->file, "\n", 1);
+    free(text);
+    return status;
+}
+
+static npg_status open_log(exporters_pass *p)
+{
+    p->log.output = p->facts->output;
+    p->facts->log = &p->log;
+    return npg_export_open(&p->log.file, p->facts->output, "exports.jsonl");
+}
+
+/* ---- poses ---- */
+
+static npg_status count_line(void *user, const json_t *frame, const char *line, size_t size)
+{
+    npg_export_facts *facts = user;
+    (void)line, (void)size;
+    if (!json_is_string(json_object_get(frame, "file"))) return NPG_OK;
+    facts->last_index = json_integer_value(json_object_get(frame, "index"));
+    if (!facts->pose_count++) facts->first_index = facts->last_index;
+    return NPG_OK;
+}
+
+static npg_status each_line(const npg_export_facts *facts, npg_json_line_visit *visit, void *user)
+{
+    struct stat info;
+    char *path;
+    NPG_TRY(npg_join_path(&path, facts->output, "frames.jsonl"));
+    npg_status status = NPG_OK;
+    if (stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    if (!status) status = npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
+    npg_release(&path);
+    return status;
+}
+
+static npg_status pass_pose(exporters_pass *p, int64_t index, int64_t number, bool fixed_rate_only)
+{
+    const npg_pose pose = {index, number, p->mesh->vert_pos, p->mesh->vert_normals,
+                           p->facts->has_pose_colours ? p->mesh->vert_colours : NULL};
+    for (int i = 0; npg_exporters[i]; i++)
+        if (p->states[i] && (!fixed_rate_only || npg_exporters[i]->has_fixed_rate))
+            NPG_TRY(npg_exporters[i]->pose(p->states[i], &pose));
+    return NPG_OK;
+}
+
+/* The floats of the file as they are: no origin is taken off. */
+static npg_status read_pose(exporters_pass *p, const char *file)
+{
+    const npg_export_facts *facts = p->facts;
+    npg_origin zero = {.known = true};
+    char *path;
+    NPG_TRY(npg_join_path(&path, facts->output, file));
+    npg_mesh_unref(&p->mesh);
+    npg_status status = npg_read_mesh(&p->mesh, path, &zero);
+    if (!status && (p->mesh->vert_count != facts->vert_count || p->mesh->face_count != facts->face_count ||
+                    (facts->has_normals && !p->mesh->vert_normals) ||
+                    (facts->has_pose_colours && !p->mesh->vert_colours)))
+        status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written: %zu vertices and %zu faces",
+                           path, p->mesh->vert_count, p->mesh->face_count);
+    if (!status) status = npg_mesh_require_finite(p->mesh, path);
+    npg_release(&path);
+    return status;
+}
+
+static bool any_fixed_rate(const npg_export_choice *choice)
+{
+    for (int i = 0; npg_exporters[i]; i++)
+        if (choice->is_chosen[i] && npg_exporters[i]->has_fixed_rate) return true;
+    return false;
+}
+
+static npg_status write_line_poses(void *user, const json_t *frame, const char *line, size_t size)
+{
+    exporters_pass *p = user;
+    const char *file = json_string_value(json_object_get(frame, "file"));
+    int64_t index = json_integer_value(json_object_get(frame, "index"));
+    (void)line, (void)size;
+    if (p->watch->should_stop && p->watch->should_stop(p->watch->user)) return NPG_STOPPED;
+    if (!file) return NPG_OK;
+    /* Frames without a mesh since the last one: formats of a fixed rate repeat the mesh before them. */
+    for (int64_t i = p->index + 1; p->mesh && any_fixed_rate(p->choice) && i < index; i++) {
+        NPG_TRY(pass_pose(p, i, i, true));
+        p->watch->repeated++;
+    }
+    NPG_TRY(read_pose(p, file));
+    p->index = index;
+    return pass_pose(p, index, json_integer_value(json_object_get(frame, "number")), false);
+}
+
+/* ---- the pass ---- */
+
+static npg_status open_writers(exporters_pass *p)
+{
+    for (int i = 0; npg_exporters[i]; i++) {
+        if (!p->choice->is_chosen[i]) continue;
+        NPG_TRY(npg_alloc(&p->states[i], NPG_FOR_FILES, npg_exporters[i]->state_size));
+        NPG_TRY(npg_exporters[i]->open(p->states[i], p->facts));
+    }
+    return NPG_OK;
+}
+
+static npg_status finish_writers(exporters_pass *p)
+{
+    for (int i = 0; npg_exporters[i]; i++)
+        if (p->states[i] && npg_exporters[i]->finish) NPG_TRY(npg_exporters[i]->finish(p->states[i]));
+    return npg_file_commit(&p->log.file);
+}
+
+static void close_pass(exporters_pass *p)
+{
+    for (int i = 0; npg_exporters[i]; i++) {
+        if (p->states[i] && npg_exporters[i]->close) npg_exporters[i]->close(p->states[i]);
+        npg_release(&p->states[i]);
+    }
+    npg_file_discard(&p->log.file);
+    npg_mesh_unref(&p->mesh);
+}
+
+static npg_status write_exports(exporters_pass *p)
+{
+    npg_export_facts *facts = p->facts;
+    facts->pose_count = 0;
+    p->watch->repeated = 0;
+    NPG_TRY(npg_exporters_clear(facts->output));
+    NPG_TRY(each_line(facts, count_line, facts));
+    if (!facts->pose_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", facts->output);
+    NPG_TRY(npg_exporters_check(p->choice, facts));
+    NPG_TRY(open_log(p));
+    NPG_TRY(open_writers(p));
+    NPG_TRY(each_line(facts, write_line_poses, p));
+    return finish_writers(p);
+}
+
+npg_status npg_exporters_write(const npg_export_choice *choice, npg_export_facts *facts,
+                               npg_export_watch *watch)
+{
+    exporters_pass p = {.choice = choice, .facts = facts, .watch = watch};
+    npg_status status = write_exports(&p);
+    close_pass(&p);
+    return status;
+}

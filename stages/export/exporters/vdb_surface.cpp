@@ -1,0 +1,78 @@
+// Level sets of surfaces as OpenVDB files.
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetMeasure.h>
+#include <openvdb/tools/MeshToVolume.h>
+
+extern "C" {
+#include "export/exporters/vdb.h"
+}
+#include "geometry/guard.hpp"
+
+namespace
+{
+
+constexpr float HALF_WIDTH = 3; // of the narrow band, in voxels: OpenVDB's own default
+
+openvdb::FloatGrid::Ptr make_grid(const npg_vdb_surface &s)
+{
+    std::vector<openvdb::Vec3s> points(s.vert_count);
+    std::vector<openvdb::Vec3I> triangles(s.face_count);
+    for (size_t i = 0; i < s.vert_count; i++) points[i] = openvdb::Vec3s(s.points + 3 * i);
+    for (size_t f = 0; f < s.face_count; f++) triangles[f] = openvdb::Vec3I(s.faces + 3 * f);
+    auto transform = openvdb::math::Transform::createLinearTransform(s.voxel);
+    auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, points, triangles, HALF_WIDTH);
+    grid->setName("surface");
+    return grid;
+}
+
+bool has_inside(const openvdb::FloatGrid &grid)
+{
+    for (auto value = grid.cbeginValueOn(); value; ++value)
+        if (*value < 0) return true;
+    return false;
+}
+
+} // namespace
+
+npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *s)
+{
+    NPG_REQUIRE(path && s && s->voxel > 0);
+    return npg::guard("OpenVDB", [&] {
+        openvdb::initialize();
+        auto grid = make_grid(*s);
+        if (!has_inside(*grid))
+            return npg_error(NPG_FAILED,
+                             "OpenVDB: frame %lld: nothing is inside the surface; "
+                             "voxels of %g are too large for it",
+                             (long long)s->number, s->voxel);
+        openvdb::MetaMap about;
+        about.insertMeta("npg_version", openvdb::StringMetadata(npg_version()));
+        about.insertMeta("npg_index", openvdb::Int64Metadata(s->index));
+        about.insertMeta("npg_number", openvdb::Int64Metadata(s->number));
+        about.insertMeta("npg_fps", openvdb::DoubleMetadata(s->fps));
+        about.insertMeta("npg_metres_per_unit", openvdb::DoubleMetadata(s->metres_per_unit));
+        about.insertMeta("npg_up", openvdb::StringMetadata(s->is_z_up ? "z" : "y"));
+        openvdb::io::File file(path);
+        file.write(openvdb::GridCPtrVec{grid}, about);
+        file.close();
+        return NPG_OK;
+    });
+}
+
+npg_status npg_vdb_measure_surface(const char *path, double *area, double *volume, double *voxel)
+{
+    return npg::guard("OpenVDB", [&] {
+        openvdb::initialize();
+        openvdb::io::File file(path);
+        file.open(false);
+        auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("surface"));
+        file.close();
+        if (!grid || grid->getGridClass() != openvdb::GRID_LEVEL_SET)
+            return npg_error(NPG_BAD_INPUT, "%s: the grid surface is no level set", path);
+        *area = openvdb::tools::levelSetArea(*grid);
+        *volume = openvdb::tools::levelSetVolume(*grid);
+        *voxel = grid->voxelSize()[0];
+        return NPG_OK;
+    });
+}

@@ -1,0 +1,107 @@
+/* VDB writer: OUT/volumes/<prefix>_0000.vdb, the level set of every frame, and OUT/latents/window_000000.vdb,
+ * the latent grids of every window (write_latents.c).
+ *
+ * A level set needs a closed surface: openings are covered by fans over their rims, the same in every frame.
+ * The voxel is a share of the longest side of the capture's box. */
+#include <stdio.h>
+#include <string.h>
+
+#include "export/exporters/exporters_internal.h"
+#include "export/exporters/vdb.h"
+#include "job/vdb_file.h"
+
+typedef struct vdb_state {
+    const npg_export_facts *facts;
+    npg_mesh_names names;
+    uint32_t *faces; /* with the caps, owned */
+    size_t face_count;
+} vdb_state;
+
+/* A surface of two sides of the box: about six voxels around every one it crosses, stored in blocks of which
+ * half are active. */
+static uint64_t bytes(const npg_export_facts *facts)
+{
+    double cells = 2 / (facts->voxel_share * facts->voxel_share);
+    return facts->pose_count < 0 ? 0 : (uint64_t)((double)facts->pose_count * cells * 12);
+}
+
+static npg_status check(const npg_export_facts *facts)
+{
+    double voxel = facts->voxel_share * facts->longest;
+    if (!(voxel > 0) || voxel >= NPG_VDB_VOXEL_MIN) return NPG_OK;
+    return npg_error(
+        NPG_USAGE,
+        "vdb can't hold the capture: OpenVDB has no voxels below %g, and here they would be %g (vdb-voxel "
+        "%g of the longest side, %g); write the meshes %.1g times as large or larger (scale)",
+        NPG_VDB_VOXEL_MIN, voxel, facts->voxel_share, facts->longest, 1.1 * NPG_VDB_VOXEL_MIN / voxel);
+}
+
+static npg_status close_openings(vdb_state *s)
+{
+    const npg_export_facts *facts = s->facts;
+    uint32_t *caps;
+    size_t cap_count, size = facts->face_count * 3 * sizeof *caps;
+    NPG_TRY(npg_border_caps(&caps, &cap_count, facts->faces, facts->face_count));
+    s->face_count = facts->face_count + cap_count;
+    npg_status status = npg_alloc_array(&s->faces, NPG_FOR_FILES, s->face_count, 3 * sizeof *s->faces);
+    if (!status) memcpy(s->faces, facts->faces, size);
+    if (!status && cap_count) memcpy(s->faces + 3 * facts->face_count, caps, cap_count * 3 * sizeof *caps);
+    npg_release(&caps);
+    return status;
+}
+
+static npg_status open_vdb(void *state, const npg_export_facts *facts)
+{
+    vdb_state *s = state;
+    s->facts = facts;
+    s->names = (npg_mesh_names){facts->prefix, "vdb", facts->width};
+    NPG_TRY(npg_export_folder(facts->output, "volumes"));
+    return close_openings(s);
+}
+
+static npg_status save(void *user, const char *path)
+{
+    return npg_vdb_save_surface(path, user);
+}
+
+static npg_status write_pose(void *state, const npg_pose *pose)
+{
+    vdb_state *s = state;
+    const npg_export_facts *facts = s->facts;
+    char file[NPG_MESH_NAME_SIZE + 8] = "volumes/", *path;
+    npg_vdb_surface surface = {.points = pose->pos,
+                               .vert_count = facts->vert_count,
+                               .faces = s->faces,
+                               .face_count = s->face_count,
+                               .voxel = facts->voxel_share * facts->longest,
+                               .index = pose->index,
+                               .number = pose->number,
+                               .fps = facts->fps,
+                               .metres_per_unit = facts->metres_per_unit,
+                               .is_z_up = facts->is_z_up};
+    npg_mesh_name(file + strlen(file), &s->names, pose->number);
+    NPG_TRY(npg_join_path(&path, facts->output, file));
+    npg_status status = npg_vdb_file_write(path, NULL, save, &surface);
+    npg_release(&path);
+    return status ? status : npg_export_made(facts->log, "vdb", file, pose->index, 1);
+}
+
+static npg_status finish_vdb(void *state)
+{
+    return npg_latents_write(((vdb_state *)state)->facts);
+}
+
+static void close_vdb(void *state)
+{
+    npg_release(&((vdb_state *)state)->faces);
+}
+
+const npg_exporter npg_exporter_vdb = {.name = "vdb",
+                                       .help = "OpenVDB level set per frame, latent grids per window",
+                                       .state_size = sizeof(vdb_state),
+                                       .check = check,
+                                       .bytes = bytes,
+                                       .open = open_vdb,
+                                       .pose = write_pose,
+                                       .finish = finish_vdb,
+                                       .close = close_vdb};
