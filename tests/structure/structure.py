@@ -5,7 +5,7 @@
     structure.py --prove ROOT copies the tree, breaks every rule once, and expects each to be named
 
 A room is a folder of stages/: ingest, mesh, job ...  An include names the room of what it includes:
-"mesh/poisson.h" is stages/mesh/poisson.h, "pipeline/mesh.h" is pipeline's.
+"mesh/surface.h" is stages/mesh/surface.h, "pipeline/mesh.h" is pipeline's.
 """
 
 import pathlib
