@@ -31,7 +31,7 @@ typedef struct npg_cleaning {
     size_t normals_given, normals_flipped, normals_estimated;
 } npg_cleaning;
 
-/* Where the surface fails in one place, and not a little everywhere (evaluate/misfit.h). */
+/* Where the surface fails in one place, and not a little everywhere (stages/evaluate/misfit.c). */
 enum { NPG_MISFIT_FAR, NPG_MISFIT_UNSUPPORTED, NPG_MISFIT_STRETCHED, NPG_MISFIT_VACATED, NPG_MISFITS };
 typedef struct npg_misfit {
     double share; /* of the points, or of the surface, in the largest such place; NaN: not measured */

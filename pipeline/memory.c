@@ -65,10 +65,6 @@ size_t npg_memory_used_for(npg_purpose purpose)
 {
     return atomic_load(&used[purpose]);
 }
-uint64_t npg_memory_requests(void)
-{
-    return atomic_load(&requests);
-}
 void npg_memory_set_limit(size_t bytes)
 {
     atomic_store(&limit_all, bytes);

@@ -79,9 +79,6 @@ void npg_memory_set_limit(size_t bytes);
  * `from_then_on`; 0 ends that. */
 void npg_memory_fail_at(uint64_t n, bool from_then_on);
 
-/* Requests so far. */
-uint64_t npg_memory_requests(void);
-
 #ifdef __cplusplus
 }
 #endif

@@ -9,7 +9,7 @@
 #include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 
-/* Set by trial.  misfit.h says how they are used. */
+/* Set by trial.  evaluate_internal.h says how they are used. */
 #define REACH_SPACINGS 3.0   /* of the points on the surface                                          */
 #define REACH_SIZE     0.015 /* of the reference's diagonal                                           */
 #define REACH_MEDIANS  5.0   /* times the points' median distance: noise                              */

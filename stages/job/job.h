@@ -59,9 +59,6 @@ int64_t npg_job_frame_count(const npg_job *job);
 /* The newest state that is whole, NULL when there is none (NPG_JOB_FRESH); a loan. */
 const npg_record *npg_job_state(const npg_job *job);
 
-/* Its latent grids; NULL for a state inside a window, which has them itself. */
-const char *npg_job_grids_path(const npg_job *job);
-
 /* From now on the job is of this run: forget older states and write job.json.  keeps_grids:
  * those of all windows stay.  Any thread. */
 npg_status npg_job_write(npg_job *job, bool keeps_grids);

@@ -31,7 +31,6 @@ struct npg_job {
     npg_store *store;    /* owned */
     npg_store *frames;   /* of a live source (ingest/spool.h); owned, or NULL */
     npg_record *state;   /* that the run is resumed from; owned */
-    char *grids_path;    /* of the state, owned */
     int64_t serial;      /* of the newest state in place, -1: none */
     int64_t forward_serial;
     uint64_t poses_of; /* what the poses that states go with were found from */
@@ -262,15 +261,13 @@ static npg_status open_state(npg_job *job, const char *kind, int64_t serial, boo
     if (!status && with_log) status = check_log(job, state);
     if (!status && with_log) status = check_frames(job, state);
     if (!status) status = npg_record_get(state, "forward", &forward, sizeof forward);
+    npg_release(&grids);
     if (status) {
         npg_record_close(&state);
-        npg_release(&grids);
         return status;
     }
     npg_record_close(&job->state);
-    npg_release(&job->grids_path);
     job->state = state;
-    job->grids_path = grids;
     job->forward_serial = forward;
     return NPG_OK;
 }
@@ -335,11 +332,6 @@ int64_t npg_job_frame_count(const npg_job *job)
 const npg_record *npg_job_state(const npg_job *job)
 {
     return job->state;
-}
-
-const char *npg_job_grids_path(const npg_job *job)
-{
-    return job->grids_path;
 }
 
 npg_status npg_job_open_forward(npg_job *job)
@@ -456,7 +448,6 @@ void npg_job_close(npg_job **slot)
     npg_record_close(&job->state);
     npg_store_close(&job->store);
     npg_store_close(&job->frames);
-    npg_release(&job->grids_path);
     json_decref(job->then);
     json_decref(job->now);
     if (job->source && job->folder && !job->is_written) remove_file(job, FRAMES_NEW);

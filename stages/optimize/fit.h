@@ -86,9 +86,6 @@ typedef struct npg_fit_settings {
     double feature_start;     /* grid features begin evenly spread over +- this before smoothing; paper: 0 */
 } npg_fit_settings;
 
-/* The values that the options have now (table of the optimize stage). */
-void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *options);
-
 /* One frame of a window.  All frames of a window have bases (and follow by pulls), or none has: then those
  * that are tied follow their tie, the others their points by Chamfer distance.  Tied frames are nearer to the
  * key than all others: what an earlier window solved. */

@@ -129,13 +129,6 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
-void npg_fit_settings_fill(npg_fit_settings *settings, const npg_options *from)
-{
-    state filled = {0};
-    npg_options_fill(from, options, &filled);
-    *settings = filled.window_settings.fit;
-}
-
 /* ---- opening ---- */
 
 static npg_status keep_inside(void *user);

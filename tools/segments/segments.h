@@ -1,7 +1,7 @@
 /* Segments: a capture whose topology changes, as several runs with a reference each
  * (neupig run --segments auto).
  *
- * The first run is that of the whole capture, in OUT itself.  Where its alarm goes off (evaluate/alarm.h)
+ * The first run is that of the whole capture, in OUT itself.  Where its alarm goes off (stages/evaluate/alarm.c)
  * it ends; the frames on the keyframe's side are solved again with the same keyframe, the others become a
  * segment with its own keyframe, and so on until every segment explains its frames.  The newer segment
  * also solves the --overlap frames before the cut that its neighbour explains ("shared" in its
