@@ -1,11 +1,9 @@
 /* Busy: clocks of the process and of its children. */
-#include "pipeline/busy.h"
+#include "pipeline/clock.h"
 
 #include <sys/resource.h>
 #include <sys/time.h>
 #include <unistd.h>
-
-#include "pipeline/clock.h"
 
 static double seconds_of(struct timeval time)
 {

@@ -1,8 +1,10 @@
-/* Clocks that never go back. */
-#ifndef NPG_CLOCK_H
-#define NPG_CLOCK_H
+#ifndef NPG_PIPELINE_CLOCK_H
+#define NPG_PIPELINE_CLOCK_H
 
+#include <jansson.h>
 #include <time.h>
+
+/* Clocks that never go back. */
 
 static inline double npg_clock_of(clockid_t clock)
 {
@@ -26,5 +28,17 @@ static inline double npg_clock_process_s(void)
 {
     return npg_clock_of(CLOCK_PROCESS_CPUTIME_ID);
 }
+
+/* Busy: how much of the machine a run keeps at work. */
+
+typedef struct npg_busy {
+    double wall_s, cpu_s, children_s; /* children: helper processes that have ended */
+} npg_busy;
+
+npg_busy npg_busy_now(void);
+
+/* What went by since then: {wall_s, process_cpu_s, children_cpu_s, busy_share}.  busy_share is processor
+ * time, children's included, over wall time times cores: 1 where no core ever waited. */
+json_t *npg_busy_since(const npg_busy *then);
 
 #endif

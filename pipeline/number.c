@@ -1,5 +1,5 @@
 /* Number: decimal numbers from text, fast and the same under every locale. */
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 #include <ctype.h>
 #include <locale.h>

@@ -8,7 +8,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "pipeline/busy.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"

@@ -6,7 +6,7 @@
 #include <semaphore.h>
 #include <stdatomic.h>
 
-#include "pipeline/busy.h"
+#include "pipeline/clock.h"
 #include "pipeline/ring.h"
 #include "pipeline/stage.h"
 

@@ -12,7 +12,6 @@
 
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
-#include "pipeline/number.h"
 
 #define WINDOW_SIZE  ((size_t)256 << 10) /* set by trial */
 #define STOP_POLL_MS 250                 /* a stop is noticed within that; source.h says so */

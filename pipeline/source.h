@@ -1,13 +1,68 @@
+#ifndef NPG_PIPELINE_SOURCE_H
+#define NPG_PIPELINE_SOURCE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "pipeline/status.h"
+
+/* Number: decimal numbers from text, fast and the same under every locale. */
+
+/* The number that begins at text (no leading space): [+-]digits[.digits][e[+-]digits], nan, inf, infinity and
+ * what older Windows libraries print for them (1.#IND, 1.#INF).  Returns the first byte after it, NULL when
+ * there is none or it does not end before a space, a separator (',', ';') or the end.
+ * Correctly rounded up to 19 digits and moderate exponents, save for halfway cases that extended precision
+ * can't tell apart (off by at most one last place); beyond that the C library decides. */
+const char *npg_number_parse(const char *text, const char *end, double *value);
+
+/* A number as printf writes it with this format (one double), with a decimal point in every locale;
+ * returns the length. */
+size_t npg_number_print(char *out, size_t size, const char *format, double value);
+
+/* The first byte at or after text that is neither space, tab nor carriage return. */
+static inline const char *npg_skip_blanks(const char *text, const char *end)
+{
+    while (text < end && (*text == ' ' || *text == '\t' || *text == '\r' || *text == '\v' || *text == '\f'))
+        text++;
+    return text;
+}
+
+/* Bytes: numbers in the byte order that a file format asks for, on any machine. */
+
+/* The low `size` bytes of a number, least significant first; returns size. */
+static inline size_t npg_put_little(unsigned char *out, uint64_t bits, size_t size)
+{
+    for (size_t i = 0; i < size; i++) out[i] = (unsigned char)(bits >> (8 * i));
+    return size;
+}
+
+/* The same, most significant first. */
+static inline size_t npg_put_big(unsigned char *out, uint64_t bits, size_t size)
+{
+    for (size_t i = 0; i < size; i++) out[i] = (unsigned char)(bits >> (8 * (size - 1 - i)));
+    return size;
+}
+
+static inline uint32_t npg_float_bits(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+static inline uint64_t npg_double_bits(double value)
+{
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
 /* Source: the bytes of one file or stream through a sliding window, with byte and line for messages.
  *
  * A source never holds more than its window, which grows only while one line or one binary row that really is
  * in the file needs it.  Failures are NPG_BAD_INPUT with the source's name.  Threads: one user at a time. */
-#ifndef NPG_SOURCE_H
-#define NPG_SOURCE_H
-
-#include <stdbool.h>
-
-#include "pipeline/status.h"
 
 #define NPG_LINE_MAX ((size_t)1 << 20) /* longer lines are refused */
 

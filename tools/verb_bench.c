@@ -11,7 +11,7 @@
 #include "kernels/motion.h"
 #include "mesh/surface.h"
 #include "optimize/joint.h"
-#include "pipeline/busy.h"
+#include "pipeline/clock.h"
 #include "pipeline/order.h"
 #include "tools/cli.h"
 #include "tools/synth/synth.h"

@@ -8,8 +8,6 @@
 #include <string.h>
 
 #include "align/align_internal.h"
-#include "align/pose_cache.h"
-#include "align/resume_points.h"
 #include "align/tracking.h"
 #include "geometry/mesh_tools.h"
 #include "geometry/metrics.h"

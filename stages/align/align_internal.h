@@ -1,14 +1,18 @@
-/* Align: what the files of the room share. */
 #ifndef NPG_ALIGN_INTERNAL_H
 #define NPG_ALIGN_INTERNAL_H
 
+#include <pthread.h>
 #include <stdint.h>
 
 #include "align/tracking.h"
 #include "geometry/kdtree.h"
 #include "pipeline/chunk.h"
 #include "pipeline/memory.h"
+#include "pipeline/stage.h"
 #include "pipeline/status.h"
+#include "pipeline/store.h"
+
+/* Align: what the files of the room share. */
 
 /* Block system: the normal equations of a graph's nodes, 6 unknowns each (a turn and a move), and their
  * solution by conjugate gradients.
@@ -243,5 +247,100 @@ size_t npg_group_list(const npg_group *group, npg_recover_frame *frames);
 /* What was made of that list: the frames that wait are tracked so, and the sides end with the outermost of
  * them; what follows starts from there. */
 void npg_group_take(npg_group *group, npg_recover_frame *frames, size_t count);
+
+/* Pose map: the way of a pose from the nodes of one reference to those of another. */
+
+/* Where each new node hangs on the old graph. */
+typedef struct npg_pose_map {
+    size_t count;                     /* K', new nodes */
+    uint32_t (*node)[NPG_GRAPH_BIND]; /* old nodes, UINT32_MAX where there are fewer; owned */
+    float (*weight)[NPG_GRAPH_BIND];  /* owned */
+    size_t old_count;                 /* K */
+    float *old_pos;                   /* K x 3, at rest; owned */
+} npg_pose_map;
+
+/* A node of `to` hangs on what carries the nearest place of the surface of `from`.  NPG_MEMORY. */
+npg_status npg_pose_map_open(npg_pose_map *map, const npg_tracker *from, const npg_tracker *to);
+void npg_pose_map_close(npg_pose_map *map);
+
+/* out (K' x 12) of `to` from a pose (K x 12) of `from`: rotations blended, nodes where the old graph takes
+ * them. */
+void npg_pose_map_apply(const npg_pose_map *map, const npg_tracker *to, double *out, const double *pose);
+
+/* As one block for a state on disk, and back (NPG_BAD_INPUT).  *bytes is owned by the caller. */
+npg_status npg_pose_map_pack(const npg_pose_map *map, unsigned char **bytes, size_t *size);
+npg_status npg_pose_map_unpack(npg_pose_map *map, const unsigned char *bytes, size_t size);
+
+/* Resume points: what stage align needs behind the last frame that a window waits for, until the state of that
+ * window is written.  By then the stage is at work on later frames.  Any thread. */
+
+/* Zeros are an empty list, once its lock is open. */
+typedef struct npg_resume_points {
+    pthread_mutex_t lock;
+    struct npg_resume_point {
+        int64_t read; /* frames of the plan that came before */
+        unsigned char *bytes;
+        size_t size;
+    } * points; /* owned, with their bytes */
+    size_t count, capacity;
+} npg_resume_points;
+
+void npg_resume_points_open(npg_resume_points *list);
+void npg_resume_points_close(npg_resume_points *list);
+
+/* Takes the bytes, also where it fails. */
+npg_status npg_resume_points_add(npg_resume_points *list, int64_t read, unsigned char *bytes, size_t size);
+
+/* The point behind `read` frames as a block of a state; those before it go.  NPG_FAILED: there is none. */
+npg_status npg_resume_points_save(npg_resume_points *list, int64_t read, npg_store *out, const char *block);
+
+/* Pose cache: the poses that one pass over the frames leaves to the next, which has another reference.
+ *
+ * A fusing pass writes the pose of each frame to the job's store (pipeline/store.h), or without a job to one without
+ * a name, and keeps its tracker; the pass that follows starts from them, carried to its own nodes, and so does
+ * a resumed run.  With a job each group of frames is there with what the stage needs behind it, so that a run
+ * which is killed in a fusing pass does not follow these frames again: what it reads back is the same to the
+ * bit.  Memory does not grow with the capture, and what was found from another reference, or by another job, is
+ * not taken.
+ * One thread at a time; errors are those of the store. */
+
+/* Zeros are a pass that has nothing from another, and leaves nothing. */
+typedef struct npg_pose_cache {
+    npg_store *known, *found;    /* of the pass before, and of a fusing pass for the next one; or NULL */
+    uint64_t known_of, found_of; /* what their poses are of                                            */
+    bool owns;                   /* the stores: there is no job                                        */
+    npg_pose_map map;            /* from the nodes of `known` to this pass's                           */
+    double *known_pose;          /* K x 12 of its nodes; owned                                         */
+    size_t node_count;           /* K' of this pass                                                    */
+    int64_t group_at;            /* groups that were closed                                            */
+} npg_pose_cache;
+
+/* For the pass that `worker` is in; `tracker` is of its reference; group_bytes: of what the stage needs behind
+ * a group.  What was got is the cache's also where it fails.  NPG_BAD_INPUT, NPG_DISK, NPG_MEMORY. */
+npg_status npg_pose_cache_open(npg_pose_cache *cache, npg_worker *worker, const npg_tracker *tracker,
+                               size_t group_bytes);
+void npg_pose_cache_close(npg_pose_cache *cache);
+
+/* pose (K' x 12) becomes what the pass before found of the frame; where it has nothing, *is_known is false
+ * and the pose stays. */
+npg_status npg_pose_cache_start(const npg_pose_cache *cache, const npg_tracker *tracker, int64_t index,
+                                double *pose, bool *is_known);
+
+/* Whether an earlier run has followed the group at hand; then its frames and its end are read, else written. */
+bool npg_pose_cache_has_group(const npg_pose_cache *cache);
+npg_status npg_pose_cache_read(const npg_pose_cache *cache, int64_t index, double *pose);
+npg_status npg_pose_cache_read_end(npg_pose_cache *cache, void *state, size_t size);
+
+/* Keep a frame's pose (K' x 12) for the next pass, and the end of its group; nothing happens where no pass
+ * follows.  A pose that is no number is one that the next pass does not know. */
+npg_status npg_pose_cache_put(const npg_pose_cache *cache, int64_t index, const double *pose);
+npg_status npg_pose_cache_put_end(npg_pose_cache *cache, const void *state, size_t size);
+
+/* At the end of a fusing pass: its poses, and *tracker with them, become those of the pass before; nothing
+ * happens in others. */
+npg_status npg_pose_cache_leave(npg_pose_cache *cache, npg_worker *worker, npg_tracker **tracker);
+
+/* What a resumed run needs to find them, as blocks of a state. */
+npg_status npg_pose_cache_save(const npg_pose_cache *cache, npg_store *out);
 
 #endif

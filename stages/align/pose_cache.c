@@ -1,10 +1,9 @@
 /* Pose cache: in memory between two passes, in the job's store between two runs. */
-#include "align/pose_cache.h"
+#include "align/align_internal.h"
 
 #include <math.h>
 #include <xxhash.h>
 
-#include "align/align_internal.h"
 #include "job/job.h"
 
 #define BLOCK_POSE  "pose"        /* of a record of a frame                              */

@@ -1,5 +1,5 @@
 /* Pose map: the way of a pose from the nodes of one reference to those of another. */
-#include "align/poses.h"
+#include "align/align_internal.h"
 
 #include <math.h>
 #include <string.h>

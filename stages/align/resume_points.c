@@ -1,5 +1,5 @@
 /* Resume points: what stage align needs behind the last frame that a window waits for. */
-#include "align/resume_points.h"
+#include "align/align_internal.h"
 
 #include <string.h>
 

@@ -5,7 +5,6 @@
 #include <png.h>
 #include <string.h>
 
-#include "export/picture_scene.h"
 #include "geometry/geometry.h"
 #include "pipeline/file.h"
 

@@ -1,5 +1,5 @@
 /* Scenes to draw: a mesh, or a cloud as small balls, with colours. */
-#include "export/picture_scene.h"
+#include "export/picture.h"
 
 #include <errno.h>
 #include <math.h>

@@ -4,7 +4,6 @@
 
 #include "ingest/frame_files.h"
 #include "ingest/frame_store.h"
-#include "ingest/input_list.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/options.h"

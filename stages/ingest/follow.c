@@ -13,7 +13,7 @@
 
 #include "ingest/formats/formats_internal.h"
 #include "ingest/formats/reader.h"
-#include "ingest/frame_names.h"
+#include "ingest/frame_files.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 

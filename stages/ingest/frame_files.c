@@ -6,8 +6,6 @@
 #include <sys/stat.h>
 
 #include "ingest/formats/reader.h"
-#include "ingest/frame_inputs.h"
-#include "ingest/frame_names.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 

@@ -1,5 +1,5 @@
 /* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
-#include "ingest/frame_inputs.h"
+#include "ingest/frame_files.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -11,10 +11,9 @@
 #include <sys/stat.h>
 
 #include "ingest/formats/formats_internal.h"
-#include "ingest/frame_names.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 

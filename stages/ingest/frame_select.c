@@ -1,5 +1,5 @@
 /* Frame selection: the text of --frames. */
-#include "ingest/frame_select.h"
+#include "ingest/frame_files.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -8,13 +8,10 @@
 
 #include "ingest/follow.h"
 #include "ingest/formats/reader.h"
-#include "ingest/frame_names.h"
-#include "ingest/frame_select.h"
+#include "ingest/frame_files.h"
 #include "ingest/spool.h"
 #include "pipeline/file.h"
 #include "pipeline/live_plan.h"
-
-#include "pipeline/file.h"
 
 /* Frames of one gap.  Each becomes a frame of the run, so a number that is damaged or a time stamp must not
  * make millions; set far above what a capture loses. */

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "pipeline/file.h"
-#include "pipeline/number.h"
 #include "pipeline/source.h"
 
 #define FILE_MOST ((uint64_t)256 << 20) /* bytes */

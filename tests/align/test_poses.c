@@ -9,7 +9,6 @@
 #include <cmocka.h>
 
 #include "align/align_internal.h"
-#include "align/poses.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_folder.h"
 

@@ -8,7 +8,6 @@
 #include <cmocka.h>
 
 #include "ingest/frame_files.h"
-#include "ingest/frame_names.h"
 #include "pipeline/memory.h"
 #include "tests/support/group_folder.h"
 

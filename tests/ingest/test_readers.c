@@ -9,7 +9,7 @@
 #include <math.h>
 #include <sys/wait.h>
 
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 #include "tests/ingest/read_helpers.h"
 
 enum { N = 5 };

@@ -22,8 +22,8 @@
 #include <jansson.h>
 
 #include "export/files.h"
-#include "pipeline/bytes.h"
 #include "pipeline/file.h"
+#include "pipeline/source.h"
 
 #define NPG_EXPORTERS_MAX 16
 

@@ -5,7 +5,7 @@
 
 #include "export/exporters/exporters_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 /* Digits after the point that keep 1e-7 of the extent, and 9 digits at least where the extent is unknown. */
 int npg_obj_decimals_for(const npg_mesh_view *mesh)

@@ -3,7 +3,6 @@
 
 #include "export/exporters/exporters_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/number.h"
 #include "pipeline/source.h"
 
 typedef struct copying {

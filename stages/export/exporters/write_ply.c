@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "export/files.h"
-#include "pipeline/bytes.h"
 #include "pipeline/file.h"
+#include "pipeline/source.h"
 
 #define KEPT_SHARE 1e-6 /* of the extent: what positions may lose as float */
 

@@ -17,7 +17,7 @@
 
 #include "export/exporters/exporters_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 #define EXTENT_SIZE 144 /* bytes of one sample of the extent, padded with blanks          */
 #define COLOUR_SIZE 29  /* of one colour of a frame: "(0.12345, 0.12345, 0.12345), "       */

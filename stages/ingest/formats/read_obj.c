@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "ingest/formats/formats_internal.h"
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 #define CORNERS_MAX 1024 /* of a polygon; larger ones are damage (set by trial) */
 

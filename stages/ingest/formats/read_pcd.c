@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "ingest/formats/formats_internal.h"
-#include "pipeline/bytes.h"
+#include "pipeline/source.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 #define NONE        UINT64_MAX         /* the header has no such line     */

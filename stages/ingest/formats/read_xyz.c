@@ -6,7 +6,7 @@
 
 #include "geometry/vec3.h"
 #include "ingest/formats/formats_internal.h"
-#include "pipeline/number.h"
+#include "pipeline/source.h"
 
 #define COLUMNS_MAX    6
 #define UNIT_TOLERANCE 0.02 /* of a normal's length from 1; set by trial, as the next                   */

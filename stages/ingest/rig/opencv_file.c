@@ -5,7 +5,6 @@
 
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
-#include "pipeline/number.h"
 #include "pipeline/source.h"
 
 #define CAMERA_FILE_MAX ((size_t)1 << 20) /* bytes; a camera's file has about a thousand */

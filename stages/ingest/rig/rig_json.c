@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/frame_inputs.h"
+#include "ingest/frame_files.h"
 #include "ingest/rig/rig.h"
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"

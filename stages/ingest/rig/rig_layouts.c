@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "ingest/frame_names.h"
+#include "ingest/frame_files.h"
 #include "ingest/rig/rig.h"
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"

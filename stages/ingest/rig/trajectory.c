@@ -5,7 +5,6 @@
 
 #include "ingest/rig/rig.h"
 #include "pipeline/memory.h"
-#include "pipeline/number.h"
 #include "pipeline/source.h"
 
 void npg_stamped_clear(npg_stamped_list *list)
