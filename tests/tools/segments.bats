@@ -9,7 +9,11 @@ setup_file() {
     cd "$BATS_FILE_TMPDIR"
     # so coarse a surface is sometimes stretched over the ball as a whole, a failed fit that is no alarm: not with this seed
     "$NEUPIG" synth --body two --frames 14 --change 7 --points 1500 --cell 0.05 --seed 2 -o two >synth.log
-    for ((i = 0; i + 1 < ${#small[@]}; i += 2)); do printf '"%s": %s,\n' "${small[i]#--}" "${small[i + 1]}"; done >keys
+    for ((i = 0; i + 1 < ${#small[@]}; i += 2)); do # numbers and objects as they stand, words in quotes
+        value=${small[i + 1]}
+        [[ $value == [{0-9]* ]] || value="\"$value\""
+        printf '"%s": %s,\n' "${small[i]#--}" "$value"
+    done >keys
     echo "{\"output\": \"night\", \"defaults\": {$(cat keys) \"segments\": \"auto\"}, \"captures\": [
         {\"input\": \"two/points\", \"name\": \"two\", \"keyframe\": 3}]}" >night.json
     "$NEUPIG" batch night.json >night.table 2>night.log
