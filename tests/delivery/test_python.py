@@ -150,7 +150,8 @@ class Arrays(unittest.TestCase):
             self.assertIsNone(run.wanted_number())
             for t in range(9):
                 run.push(*ball(t), number=10 + t)
-            while not any((output / "job").glob("window_*.npg")):
+            store = output / "job" / "store.npg"
+            while not store.exists() or b"NPGREC01state" not in store.read_bytes():
                 time.sleep(0.02)
         with neupig.Run(output=output, **options) as run:
             wanted = run.wanted_number()

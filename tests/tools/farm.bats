@@ -18,11 +18,6 @@ setup() {
     export NEUPIG
 }
 
-# The options of a manifest as they stand on a command line.
-flags() {
-    tr -d ' \n"' <<<"$1" | sed 's/^/--/; s/,/ --/g; s/:/=/g'
-}
-
 @test "GNU parallel: what failed is done again, what is done is not" {
     command -v parallel || skip "parallel is not installed"
     cp -r broken second
@@ -59,8 +54,7 @@ flags() {
 @test "a watch folder runs what is complete, once, and goes on after it was stopped" {
     mkdir watched
     ln -s ../short watched/linked
-    # shellcheck disable=SC2046
-    watch() { SETTLE=2 POLL=0.2 "$samples/watch_folder.sh" watched watch-out $(flags "$tiny, $long") >>watch.log 2>&1; }
+    watch() { SETTLE=2 POLL=0.2 "$samples/watch_folder.sh" watched watch-out --method "{$tiny, $long}" >>watch.log 2>&1; }
     watch &
     pid=$!
     cp -r short watched/one
