@@ -165,7 +165,7 @@ static npg_status read_places(npg_store *s)
     bool is_there = true;
     npg_status status = fstat(s->fd, &info) ? fail(s, "look at") : NPG_OK;
     while (!status && is_there) status = read_next(s, info.st_size, &is_there);
-    if (!status && ftruncate(s->fd, s->end)) status = fail(s, "write");
+    if (!status && s->end < info.st_size && ftruncate(s->fd, s->end)) status = fail(s, "write");
     return status;
 }
 

@@ -156,7 +156,7 @@ END
     quiet() {
         local name=$1
         shift
-        "$NEUPIG" synth --frames 8 --cell 0.04 -o "$name" "$@"
+        "$NEUPIG" synth --frames 10 --cell 0.04 -o "$name" "$@"
         "$NEUPIG" run "$name/points" -o "$name-out" "${small[@]}" || [ $? -eq 7 ]
         [ "$(alarm "$name-out" forward)" = null ]
         [ "$(alarm "$name-out" backward)" = null ]
