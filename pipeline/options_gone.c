@@ -4,7 +4,7 @@
 #include "pipeline/options.h"
 
 /* clang-format off */
-static const char *const gone[][2] = {
+static const char *const gone[][2] = { /* "VERB NAME": of that verb alone */
     {"quality",        "--method best"},
     {"config",         "--method FILE"},
     {"voxel",              "thin the capture before the run; points-max of the method thins what is too dense"},
@@ -30,6 +30,13 @@ static const char *const gone[][2] = {
     {"follow-idle",    "--follow-end SECONDS"},
     {"format",         "--export obj"},
     {"rig",            "the rig is the input: neupig run rig.json"},
+    {"batch dry-run",  "neupig probe CAPTURE says what a capture costs"},
+    {"batch view",     "neupig view OUT/NAME, after the batch"},
+    {"view port",      "--live writes the page, and writes it anew as frames come"},
+    {"apply between",  "frames in between lie on curves through the run's meshes"},
+    {"apply device",   "it needs none"},
+    {"synth body",     "it is the walking figure"},
+    {"synth change",   "it is the walking figure, which doesn't change"},
 };
 /* clang-format on */
 

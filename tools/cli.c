@@ -143,8 +143,11 @@ static npg_status no_such_option(const npg_verb *verb, const char *name)
 static npg_status unknown_option(const npg_verb *verb, const char *name, const char *value)
 {
     npg_option_info info;
-    const char *gone = verb->with_run_options ? npg_option_gone(name) : NULL;
+    char of_verb[2 * NAME_LIMIT];
+    snprintf(of_verb, sizeof of_verb, "%s %s", verb->name, name);
+    const char *gone = npg_option_gone(of_verb);
     bool is_no = !strncmp(name, "no-", 3);
+    if (!gone && verb->with_run_options) gone = npg_option_gone(name);
     if (gone) return npg_error(NPG_USAGE, "option --%s went: %s", name, gone);
     if (!verb->with_run_options) return no_such_option(verb, name);
     if (find_in_run(&info, name)) return refuse_option(&info, value);

@@ -69,10 +69,10 @@ static npg_status open_figure(bench *b)
 {
     enum { SURFACE = 9 }; /* triangles' vertices in a square metre cell of the figure, measured */
     const size_t count = (size_t)b->s.frames;
-    npg_body *body;
+    npg_body body = {0};
     npg_scan scan = {.point_count = b->s.points, .noise = 0.1, .diagonal = 2};
-    NPG_TRY(npg_body_open(&body, NPG_BODY_WALKER, false, sqrt(SURFACE / (double)b->s.vertices)));
-    npg_status status = npg_mesh_copy(&b->mesh, npg_body_rest(body));
+    npg_status status = npg_walker.open(&body, sqrt(SURFACE / (double)b->s.vertices), false);
+    if (!status) status = npg_mesh_copy(&b->mesh, body.rest);
     b->poses = npg_arena_take(&b->arena, count, sizeof *b->poses);
     b->clouds = npg_arena_take(&b->arena, count, sizeof *b->clouds);
     if (!status) status = npg_arena_status(&b->arena);
@@ -81,7 +81,7 @@ static npg_status open_figure(bench *b)
     for (size_t t = count; t-- && !status;) { /* the mesh stays as it is in the first frame */
         const npg_moment moment = {.phase = (double)t / (double)count};
         npg_mesh *m = b->mesh;
-        npg_body_pose(body, m->vert_pos, &moment);
+        npg_walker.pose(&body, m->vert_pos, &moment);
         for (size_t v = 0; v < verts; v++) m->vert_pos[3 * v + 1] -= 0.9f; /* its middle */
         npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, verts, m->faces, m->face_count);
         b->poses[t] = npg_arena_take(&b->arena, 3 * verts, sizeof(float));
@@ -89,7 +89,8 @@ static npg_status open_figure(bench *b)
         if (!status) memcpy(b->poses[t], m->vert_pos, 3 * verts * sizeof(float));
         if (!status) status = npg_scan_frame(&b->clouds[t], &scan, m, t);
     }
-    npg_body_close(&body);
+    npg_mesh_unref(&body.rest);
+    npg_release(&body.weights);
     return status;
 }
 

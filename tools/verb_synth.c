@@ -12,8 +12,8 @@
 
 typedef struct settings {
     const char *output;
-    int body, format;
-    int64_t frames, change, points, holes, cameras, width, height, seed;
+    int format;
+    int64_t frames, points, holes, cameras, width, height, seed;
     double cell, cycles, travel, noise, outliers;
     bool vary, normals, rig;
     double depth_noise_mm;
@@ -26,12 +26,6 @@ const npg_option npg_synth_options[] = {
     /* type        name        place         default   least  most          shown as or words */
     NPG_ROW_TEXT  ("output",   AT(output),   "",       "DIR",
         "Folder for points/ and truth/ (also -o)"),
-    NPG_ROW_CHOICE("body",     AT(body),     "walker", "walker|bar|hands|two|gone",
-        "What moves: a walking figure, a bending bar, "
-        "a figure whose hand has grown into its hip and leaves it, "
-        "the bar that a ball comes to, or one beside which a ball disappears"),
-    NPG_ROW_INT   ("change",   AT(change),   "-1",     -1,    1e6,          "FRAME",
-        "The first frame in which the hand is off the hip, or the ball there or gone; -1: the middle one"),
     NPG_ROW_INT   ("frames",   AT(frames),   "24",     1,     1e6,          NULL,
         "Frames"),
     NPG_ROW_INT   ("points",   AT(points),   "5000",   1,     1e8,          NULL,
@@ -121,16 +115,18 @@ static npg_scan capture_of(const settings *s, const npg_mesh *first)
     return capture;
 }
 
-/* The body before its change or from it on, and a mesh to pose. */
-typedef struct figure {
-    npg_body *body;
+/* What moves, its surface, and a mesh to pose. */
+typedef struct moving {
+    const npg_figure *kind;
+    npg_body body;
     npg_mesh *mesh;
-} figure;
+} moving;
 
-static void close_figure(figure *f)
+static void close_moving(moving *f)
 {
     npg_mesh_unref(&f->mesh);
-    npg_body_close(&f->body);
+    npg_mesh_unref(&f->body.rest);
+    npg_release(&f->body.weights);
 }
 
 /* The texture at the vertices of a body at rest. */
@@ -145,21 +141,14 @@ static npg_status paint(npg_mesh *mesh)
     return NPG_OK;
 }
 
-static npg_status open_figure(figure *f, const settings *s, bool is_changed)
+static npg_status open_moving(moving *f, const settings *s, bool is_changed)
 {
-    close_figure(f);
-    NPG_TRY(npg_body_open(&f->body, s->body, is_changed, s->cell));
-    NPG_TRY(npg_mesh_copy(&f->mesh, npg_body_rest(f->body)));
+    close_moving(f);
+    NPG_TRY(f->kind->open(&f->body, s->cell, is_changed));
+    NPG_TRY(npg_mesh_copy(&f->mesh, f->body.rest));
     if (s->rig) NPG_TRY(paint(f->mesh));
     if (f->mesh->vert_normals) return NPG_OK;
     return npg_alloc_array(&f->mesh->vert_normals, NPG_FOR_MESH, f->mesh->vert_count, 3 * sizeof(float));
-}
-
-/* The frame of the change; behind the last one for bodies that have none. */
-static int64_t change_of(const settings *s)
-{
-    if (!npg_body_changes(s->body)) return s->frames;
-    return s->change < 0 ? s->frames / 2 : s->change;
 }
 
 static npg_status write_points(const settings *s, const npg_scan *capture, const npg_mesh *mesh,
@@ -170,27 +159,26 @@ static npg_status write_points(const settings *s, const npg_scan *capture, const
                         points->count, NULL);
 }
 
-static npg_status write_images(const settings *s, const npg_scan *capture, const figure *f, int64_t t)
+static npg_status write_images(const settings *s, const npg_scan *capture, const moving *f, int64_t t)
 {
     char *folder;
     NPG_TRY(npg_join_path(&folder, s->output, "rig"));
     npg_status status = t ? NPG_OK : npg_synth_rig_begin(folder, capture);
     if (!status)
-        status = npg_synth_rig_frame(folder, capture, f->mesh, npg_body_rest(f->body), t,
-                                     0.001 * s->depth_noise_mm);
+        status = npg_synth_rig_frame(folder, capture, f->mesh, f->body.rest, t, 0.001 * s->depth_noise_mm);
     npg_release(&folder);
     return status;
 }
 
-static npg_status make_frames(const settings *s, figure *f, npg_scanned *points, size_t *total)
+static npg_status make_frames(const settings *s, moving *f, npg_scanned *points, size_t *total)
 {
     npg_scan capture = {0};
-    int64_t change = change_of(s);
+    int64_t change = f->kind->changes ? f->kind->change : s->frames;
     for (int64_t t = 0; t < s->frames; t++) {
         npg_moment moment = {s->cycles * (double)t / (double)s->frames, s->travel, (double)(t - change)};
-        if (t == 0 || t == change) NPG_TRY(open_figure(f, s, t >= change));
+        if (t == 0 || t == change) NPG_TRY(open_moving(f, s, t >= change));
         npg_mesh *mesh = f->mesh;
-        npg_body_pose(f->body, mesh->vert_pos, &moment);
+        f->kind->pose(&f->body, mesh->vert_pos, &moment);
         npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
                                 mesh->face_count);
         if (t == 0) capture = capture_of(s, mesh);
@@ -202,13 +190,14 @@ static npg_status make_frames(const settings *s, figure *f, npg_scanned *points,
     return NPG_OK;
 }
 
-static npg_status make_capture(const settings *s)
+static npg_status make_capture(const settings *s, npg_figure *kind)
 {
-    figure f = {0};
+    moving f = {kind, {0}, NULL};
     npg_scanned points = {0};
     size_t total = 0;
     if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
     if (s->rig && !s->cameras) return npg_error(NPG_USAGE, "a rig needs cameras: --cameras 4, say");
+    if (kind->change < 0) kind->change = s->frames / 2;
     npg_status status = make_folders(s);
     if (!status) status = make_frames(s, &f, &points, &total);
     if (!status && s->rig)
@@ -221,17 +210,22 @@ static npg_status make_capture(const settings *s)
                "points  %s/points\ntruth   %s/truth\n",
                (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count,
                f.mesh->face_count, s->output, s->output);
-    if (!status && change_of(s) < s->frames) printf("changes at frame %lld\n", (long long)change_of(s));
     npg_scanned_close(&points);
-    close_figure(&f);
+    close_moving(&f);
     return status;
+}
+
+int npg_synth(int argc, char **argv, npg_figure *figure)
+{
+    settings s;
+    npg_cli cli;
+    npg_status status = npg_cli_parse(&cli, "synth", &s, NULL, argc, argv);
+    if (!status) status = make_capture(&s, figure);
+    return npg_cli_end("synth", status);
 }
 
 int npg_verb_synth(int argc, char **argv)
 {
-    settings s;
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) status = make_capture(&s);
-    return npg_cli_end(argv[0], status);
+    npg_figure walker = npg_walker;
+    return npg_synth(argc, argv, &walker);
 }

@@ -50,7 +50,7 @@ setup() {
 }
 
 @test "the installed library finds its helper program and runs, from a program that lies elsewhere" {
-    "$prefix/bin/neupig" synth --body bar --frames 2 --points 600 -o capture >/dev/null
+    "$prefix/bin/neupig" synth --cell 0.06 --frames 2 --points 600 -o capture >/dev/null
     # shellcheck disable=SC2046
     cc -std=c11 -Wall -Werror "$(dirname "$(dirname "$BATS_TEST_DIRNAME")")/samples/run_folder.c" -o run_folder \
         $(pkg-config --cflags --libs neupig)

@@ -123,12 +123,13 @@ provide_mesh() {
 # Make what the command names and what is not there yet.
 provide() { # COMMAND
     case $1 in *my-capture*) [ -e my-capture ] || synth my-capture --frames 5 --cycles 0.3 --noise 0.1 ;; esac
+    case $1 in *entering/*) [ -e entering ] || neupig-bodies --body two --frames 18 --points 1200 -o entering >/dev/null ;; esac
     case $1 in *scan.obj* | *my-model.obj*) provide_mesh ;; esac
     case $1 in
     *captures/* | *night.json* | *dancer* | *horse*)
         [ -e captures ] || {
-            synth captures/dancer --body bar --frames 3 --cycles 0.2
-            synth captures/horse --body bar --frames 3 --cycles 0.3 --seed 1
+            synth captures/dancer --cell 0.06 --frames 3 --cycles 0.2
+            synth captures/horse --cell 0.06 --frames 3 --cycles 0.3 --seed 1
             rm -r captures/*.truth
         }
         ;;

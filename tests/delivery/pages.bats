@@ -145,7 +145,7 @@ copy_tree() { # FOLDER
 
 @test "figures are measured once, on captures that are at hand, and measuring resumes" {
     command -v python3 >/dev/null || skip "python3 is not installed"
-    "$NEUPIG" synth --body bar --frames 3 --points 800 -o small >/dev/null
+    "$NEUPIG-bodies" --body bar --frames 3 --points 800 -o small >/dev/null
     measure() { "$root/tools/figures.py" --file mine.json --work work --only dancer17 --table quality --at-most 1 "$@"; }
     run measure --capture dancer17=small/points,small/truth
     echo "$output"

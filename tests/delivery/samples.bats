@@ -2,7 +2,7 @@
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 3 --points 800 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 3 --points 800 -o capture >synth.log
 }
 
 setup() {

@@ -7,8 +7,8 @@ small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 14 --points 800 --cycles 0.3 --cameras 1 --width 64 --format obj -o one >synth.log
-    "$NEUPIG" synth --body bar --frames 14 --points 800 --cycles 0.3 -o clean >synth.log
+    "$NEUPIG-bodies" --body bar --frames 14 --points 800 --cycles 0.3 --cameras 1 --width 64 --format obj -o one >synth.log
+    "$NEUPIG-bodies" --body bar --frames 14 --points 800 --cycles 0.3 -o clean >synth.log
     for capture in one clean; do
         code=0
         "$NEUPIG" run $capture/points -o $capture-out --unseen keep "${small[@]}" >$capture.log 2>&1 || code=$?
@@ -65,7 +65,7 @@ lumpy() {
 }
 
 @test "a mesh that is given with lumps on its flank: a figure with place for it and for every frame, exit code 7" {
-    "$NEUPIG" synth --body bar --frames 8 --points 2000 --cycles 0.3 --format obj -o solid >synth.log
+    "$NEUPIG-bodies" --body bar --frames 8 --points 2000 --cycles 0.3 --format obj -o solid >synth.log
     for height in 0 0.3; do
         lumpy $height >lumpy-$height.obj
         code=0

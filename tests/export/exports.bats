@@ -7,7 +7,7 @@ forms=(--method '{"align": false, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,g
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 9 --points 400 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 9 --points 400 -o capture >synth.log
     # Whether so few points are fitted well, which differs between builds, is no matter here: 7 says they are not.
     "$NEUPIG" run capture/points -o whole "${small[@]}" "${forms[@]}" >whole.log
 }

@@ -8,9 +8,9 @@ small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     for seed in "" 1 2; do
-        "$NEUPIG" synth --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 --seed "${seed:-0}" -o noisy$seed >synth.log
+        "$NEUPIG-bodies" --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 --seed "${seed:-0}" -o noisy$seed >synth.log
     done
-    "$NEUPIG" synth --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
+    "$NEUPIG-bodies" --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
     for capture in noisy noisy1 noisy2 parts; do
         for from in key all; do
             "$NEUPIG" run $capture/points -o $capture-$from --method "{\"reference-from\": \"$from\"}" "${small[@]}" >$capture-$from.log 2>&1

@@ -7,7 +7,7 @@ small=(--method '{"epochs": 4, "width-1": 32, "width-2": 32, "poisson-depth": 6,
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 3 --points 900 --format obj --no-normals -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 3 --points 900 --format obj --no-normals -o capture >synth.log
 }
 
 setup() {

@@ -5,7 +5,7 @@ small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5,
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 2 --points 400 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 2 --points 400 -o capture >synth.log
 }
 
 setup() {

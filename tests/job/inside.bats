@@ -11,7 +11,7 @@ surface=(--method '{"preset": "grids", "window": 5, "overlap": 2, "epochs": 6}')
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 8 --points 500 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 8 --points 500 -o capture >synth.log
 }
 
 setup() {
@@ -79,8 +79,8 @@ check_killed() {
 }
 
 @test "windows that a warm start lost are counted over all that a run was broken off" {
-    "$NEUPIG" synth --body bar --frames 11 --points 500 -o lost-capture >lost.log
-    "$NEUPIG" synth --body bar --frames 11 --points 500 --noise 4 -o noisy-capture >>lost.log
+    "$NEUPIG-bodies" --body bar --frames 11 --points 500 -o lost-capture >lost.log
+    "$NEUPIG-bodies" --body bar --frames 11 --points 500 --noise 4 -o noisy-capture >>lost.log
     cp noisy-capture/points/*000[567].ply lost-capture/points/
     mv capture whole-capture
     mv lost-capture capture

@@ -9,7 +9,7 @@ open=(--method '{"window": 4, "overlap": 1}' --look-ahead 6 --follow-end 0)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 14 --points 400 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 14 --points 400 -o capture >synth.log
     cat capture/points/*.ply >stream
     cp -r capture/points all
     : >all/capture.end

@@ -9,7 +9,7 @@ small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5
 # What a run that was killed with two states left is in "broken".
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 12 --points 500 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 12 --points 500 -o capture >synth.log
     "$NEUPIG" run capture/points -o whole "${small[@]}" >whole.log
     kill_at broken KILL 2
     [ ! -e broken/done.json ]

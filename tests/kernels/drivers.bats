@@ -2,7 +2,7 @@
 
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
-    "$NEUPIG" synth --body bar --frames 2 --points 300 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 2 --points 300 -o capture >synth.log
     small=(align=no epochs=2 width-1=32 width-2=32 faces=200 poisson-depth=5)
 }
 

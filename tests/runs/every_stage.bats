@@ -6,7 +6,7 @@ small=(--faces 500 --method '{"poisson-depth": 5, "align-nodes": 60, "align-step
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 6 --cycles 0.3 --points 500 --cell 0.05 --noise 0.2 --outliers 0.5 --no-normals \
+    "$NEUPIG-bodies" --body bar --frames 6 --cycles 0.3 --points 500 --cell 0.05 --noise 0.2 --outliers 0.5 --no-normals \
         -o capture >synth.log
     "$NEUPIG" run capture/points -o out --method '{"window": 4, "overlap": 1}' --export ply,obj,pc2,glb,usda "${small[@]}"
 }
@@ -41,14 +41,14 @@ meshes() { # OUT COUNT
 }
 
 @test "depth images of several sensors, with colours" {
-    "$NEUPIG" synth --body bar --rig --cameras 3 --frames 3 --cycles 0.1 --width 80 --height 60 --cell 0.06 -o seen >>synth.log
+    "$NEUPIG-bodies" --body bar --rig --cameras 3 --frames 3 --cycles 0.1 --width 80 --height 60 --cell 0.06 -o seen >>synth.log
     "$NEUPIG" run seen/rig -o rig "${small[@]}"
     meshes rig 3
     head -c 400 rig/reference.ply | grep -aq "property uchar red"
 }
 
 @test "a body that turns before one sensor" {
-    "$NEUPIG" synth --body bar --cameras 1 --frames 4 --cycles 0.2 --width 48 --cell 0.06 -o side >>synth.log
+    "$NEUPIG-bodies" --body bar --cameras 1 --frames 4 --cycles 0.2 --width 48 --cell 0.06 -o side >>synth.log
     "$NEUPIG" run side/points -o grown "${small[@]}"
     meshes grown 4
 }
@@ -60,7 +60,7 @@ meshes() { # OUT COUNT
 }
 
 @test "an object that comes: segments" {
-    "$NEUPIG" synth --body two --frames 10 --change 5 --points 500 --cell 0.06 --seed 2 -o two >>synth.log
+    "$NEUPIG-bodies" --body two --frames 10 --change 5 --points 500 --cell 0.06 --seed 2 -o two >>synth.log
     "$NEUPIG" run two/points -o two.out --segments auto --method '{"segment-min": 3}' --keyframe 2 "${small[@]}" --bars coverage=0 || [ $? -eq 7 ]
     [ -s two.out/segments.json ] && [ -s two.out/done.json ]
 }

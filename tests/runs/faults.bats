@@ -47,7 +47,7 @@ programs() {
 @test "a kernel that computes wrong is named, the exit code is 4, and it is not kept" {
     needs_shim
     mkdir cache && export XDG_CACHE_HOME="$PWD/cache"
-    "$NEUPIG" synth --body bar --frames 2 --points 300 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 2 --points 300 -o capture >synth.log
     run env LD_PRELOAD="$shim" NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" run capture/points -o out --quiet \
         --method '{"align": false}'
     echo "$output"
@@ -91,7 +91,7 @@ programs() {
 
 @test "a clock that jumps an hour to and fro changes nothing" {
     needs_shim
-    "$NEUPIG" synth --body bar --frames 3 --points 400 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 3 --points 400 -o capture >synth.log
     small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet
         --bars residual=100,flipped=100,stretched=100)
     "$NEUPIG" run capture/points -o plain "${small[@]}"

@@ -19,7 +19,7 @@ small=(epochs 2 width-1 32 width-2 32 faces 200 poisson-depth 5 grid-levels 3 al
 bad=0
 
 capture() {
-    "$neupig" synth --body bar --frames 4 --points 400 -o capture >synth.log
+    "$neupig-bodies" --body bar --frames 4 --points 400 -o capture >synth.log
 }
 
 work() { # OUT: one run; its exit code is in $status

@@ -2,7 +2,7 @@
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR" || return 1
-    "$NEUPIG" synth -o capture --body bar --frames 5 --points 1500 --cell 0.05 --cycles 0.4 >/dev/null
+    "$NEUPIG-bodies" -o capture --body bar --frames 5 --points 1500 --cell 0.05 --cycles 0.4 >/dev/null
 }
 
 setup() {

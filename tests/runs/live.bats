@@ -6,7 +6,7 @@ small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6,
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 16 --points 600 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 16 --points 600 -o capture >synth.log
     cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" >piped.log
 }
 
@@ -135,7 +135,7 @@ await() {
 }
 
 @test "memory does not grow with the length of the source" {
-    "$NEUPIG" synth --body bar --frames 12 --points 600 -o loop >loop.log
+    "$NEUPIG-bodies" --body bar --frames 12 --points 600 -o loop >loop.log
     for times in 1 5; do # there and back, so that nothing leaps
         for i in $(seq $times); do cat loop/points/*.ply $(ls -r loop/points/*.ply); done |
             "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "grid-levels": 3, "align": false}' >long.log

@@ -9,7 +9,7 @@ setup_file() {
     local capture from
     for seed in {0..9}; do
         capture=noisy$seed
-        "$NEUPIG" synth --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 --seed $seed -o $capture >synth.log
+        "$NEUPIG-bodies" --body bar --frames 14 --points 800 --noise 1 --cycles 0.5 --seed $seed -o $capture >synth.log
         : >$capture/points/capture.end
         for from in key all; do
             cat $capture/points/*.ply | "$NEUPIG" run - -o $capture-$from "${small[@]}" "${open[@]}" \

@@ -4,7 +4,7 @@ small=(--method '{"epochs": 8, "width-1": 64, "width-2": 64, "poisson-depth": 7}
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 5 --points 1200 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 5 --points 1200 -o capture >synth.log
     "$NEUPIG" run capture/points -o first "${small[@]}" --bars residual=100 >first.log
 }
 

@@ -2,7 +2,7 @@
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 5 --points 1200 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 5 --points 1200 -o capture >synth.log
     "$NEUPIG" run capture/points -o job --keyframe 0 --method '{"reference-from": "key", "epochs": 8, "width-1": 64,
         "width-2": 64, "poisson-depth": 7}' --faces 800 \
         --quiet --bars residual=100 >job.log || [ $? -eq 7 ]
@@ -89,7 +89,7 @@ odd_error() {
 # Twice as many frames as the run sees: what lies between has a truth.
 fine_and_coarse() {
     [ -d fine ] && return
-    "$NEUPIG" synth --body bar --frames 17 --points 1500 -o fine >/dev/null
+    "$NEUPIG-bodies" --body bar --frames 17 --points 1500 -o fine >/dev/null
     mkdir coarse
     for t in 0 1 2 3 4 5 6 7 8; do cp "fine/points/frame_00$(printf %02d $((2 * t))).ply" coarse/frame_000$t.ply; done
 }

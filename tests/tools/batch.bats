@@ -8,7 +8,7 @@ endless='"align": "no", "epochs": 1000000, "width-1": 32, "width-2": 32, "faces"
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     mkdir set
-    "$NEUPIG" synth --body bar --frames 3 --points 300 -o set/one >synth.log
+    "$NEUPIG-bodies" --body bar --frames 3 --points 300 -o set/one >synth.log
     cp -r set/one set/two
     cp -r set/one/points set/broken
     truncate -s 3000 set/broken/frame_0001.ply
@@ -134,7 +134,7 @@ setup() {
 }
 
 @test "SIGTERM: the runs write their states, the exit code is 75, and the next start goes on" {
-    "$NEUPIG" synth --body bar --frames 10 --points 300 -o long >synth.log
+    "$NEUPIG-bodies" --body bar --frames 10 --points 300 -o long >synth.log
     echo "{\"output\": \"stopped\", \"defaults\": {$tiny, \"epochs\": 60, \"window\": 4, \"overlap\": 1}, \"captures\": [
         {\"input\": \"long\"}, {\"input\": \"set/one\", \"name\": \"later\"}]}" >stopped.json
     "$NEUPIG" batch stopped.json >stopped.table 2>stopped.log &

@@ -47,9 +47,9 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
     [[ "$output" == *"frames"*"outside"* ]]
     run "$NEUPIG" synth -o out --frames 2x
     [ "$status" -eq 2 ]
-    run "$NEUPIG" synth -o out --body horse
+    run "$NEUPIG" synth -o out --format horse
     [ "$status" -eq 2 ]
-    [[ "$output" == *"walker|bar"* ]]
+    [[ "$output" == *"ply|obj"* ]]
     [ ! -e out ]
 }
 
@@ -167,6 +167,14 @@ EOF
     run "$NEUPIG" run in -o out --rotation=cayley
     [ "$status" -eq 2 ]
     [[ "$output" == *"went: "*quaternion* ]]
+    run "$NEUPIG" batch in -o out --dry-run
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"option --dry-run went: neupig probe"* ]]
+    run "$NEUPIG" view out --port=8000
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"option --port went: --live"* ]]
+    run "$NEUPIG" run in -o out --port=8000
+    [[ "$output" == *"there is no option --port"* ]]
     run "$NEUPIG" run in -o out --pull
     [ "$status" -eq 2 ]
     [[ "$output" == *"for programs"* ]]

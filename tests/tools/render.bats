@@ -2,7 +2,7 @@
 
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
-    "$NEUPIG" synth -o s --body bar --frames 5 --points 500 --cell 0.05 >/dev/null
+    "$NEUPIG-bodies" -o s --body bar --frames 5 --points 500 --cell 0.05 >/dev/null
     unset DISPLAY
 }
 

@@ -8,7 +8,7 @@ small=(--method '{"epochs": 10, "width-1": 64, "width-2": 64, "poisson-depth": 6
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     # so coarse a surface is sometimes stretched over the ball as a whole, a failed fit that is no alarm: not with this seed
-    "$NEUPIG" synth --body two --frames 14 --change 7 --points 1500 --cell 0.05 --seed 2 -o two >synth.log
+    "$NEUPIG-bodies" --body two --frames 14 --change 7 --points 1500 --cell 0.05 --seed 2 -o two >synth.log
     for ((i = 0; i + 1 < ${#small[@]}; i += 2)); do # numbers and objects as they stand, words in quotes
         value=${small[i + 1]}
         [[ $value == [{0-9]* ]] || value="\"$value\""
@@ -133,7 +133,7 @@ END
 }
 
 @test "a ball that disappears raises it, though its surface hides on the bar's points" {
-    "$NEUPIG" synth --body gone --frames 16 --change 8 --points 1500 --cell 0.05 -o gone >>synth.log
+    "$NEUPIG-bodies" --body gone --frames 16 --change 8 --points 1500 --cell 0.05 -o gone >>synth.log
     for key in 3 6; do
         run "$NEUPIG" run gone/points -o gone$key "${small[@]}" --keyframe $key
         echo "$output"
@@ -145,7 +145,7 @@ END
 }
 
 @test "a hand that leaves the hip raises the alarm, unless the weld was cut" {
-    "$NEUPIG" synth --body hands --frames 14 --change 6 --points 1500 --cell 0.04 -o hands
+    "$NEUPIG-bodies" --body hands --frames 14 --change 6 --points 1500 --cell 0.04 -o hands
     run "$NEUPIG" run hands/points -o welded "${small[@]}" --keyframe 3 --method '{"welds": "keep"}'
     echo "$output"
     [ "$status" -eq 7 ]
@@ -154,17 +154,17 @@ END
 
 @test "noise, outliers, holes and cameras raise none" {
     quiet() {
-        local name=$1
-        shift
-        "$NEUPIG" synth --frames 10 --cell 0.04 -o "$name" "$@"
+        local name=$1 body=$2
+        shift 2
+        "$NEUPIG-bodies" --body "$body" --frames 10 --cell 0.04 -o "$name" "$@"
         "$NEUPIG" run "$name/points" -o "$name-out" "${small[@]}" || [ $? -eq 7 ]
         [ "$(alarm "$name-out" forward)" = null ]
         [ "$(alarm "$name-out" backward)" = null ]
     }
-    quiet noisy --points 1200 --noise 0.5 --outliers 5
-    quiet holes --body bar --points 1000 --holes 3
-    quiet ring --points 1200 --cameras 5 --width 64
-    quiet camera --points 1200 --cameras 1 --width 96
+    quiet noisy walker --points 1200 --noise 0.5 --outliers 5
+    quiet holes bar --points 1000 --holes 3
+    quiet ring walker --points 1200 --cameras 5 --width 64
+    quiet camera walker --points 1200 --cameras 1 --width 96
 }
 
 @test "each segment explains its frames, and the overlap is told" {
@@ -285,7 +285,7 @@ END
 }
 
 @test "a capture that does not change is one segment, byte for byte that of a run without segments" {
-    "$NEUPIG" synth --body bar --frames 9 --points 500 --cell 0.06 -o bar
+    "$NEUPIG-bodies" --body bar --frames 9 --points 500 --cell 0.06 -o bar
     "$NEUPIG" run bar/points -o bar-one "${small[@]}"
     "$NEUPIG" run bar/points -o bar-auto "${small[@]}" --segments auto
     diff -r bar-one/meshes bar-auto/meshes
@@ -295,7 +295,7 @@ END
     run "$NEUPIG" run bar/points -o bar-auto "${small[@]}"
     [ "$status" -eq 0 ]
     # frames that come later: as without segments
-    "$NEUPIG" synth --body bar --frames 11 --points 500 --cell 0.06 -o longer
+    "$NEUPIG-bodies" --body bar --frames 11 --points 500 --cell 0.06 -o longer
     cp longer/points/frame_0009.ply longer/points/frame_0010.ply bar/points
     "$NEUPIG" append bar-auto -q
     [ "$(ls bar-auto/meshes | wc -l)" -eq 11 ]

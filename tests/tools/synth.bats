@@ -14,7 +14,7 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
 
 @test "truth keeps its faces while the body moves" {
     for body in walker bar; do
-        "$NEUPIG" synth -o $body --body $body --frames 4 --points 100
+        "$NEUPIG-bodies" -o $body --body $body --frames 4 --points 100
         run "$NEUPIG" eval $body/truth $body/truth --samples 2000
         [ "$status" -eq 0 ]
         [[ "$output" == *"Corr 0.00000"*"constant topology yes"* ]]
@@ -46,8 +46,8 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
 }
 
 @test "cameras see one side each" {
-    "$NEUPIG" synth -o one --body bar --frames 1 --points 2000 --cameras 1 --width 64
-    "$NEUPIG" synth -o six --body bar --frames 1 --points 2000 --cameras 6 --width 64
+    "$NEUPIG-bodies" -o one --body bar --frames 1 --points 2000 --cameras 1 --width 64
+    "$NEUPIG-bodies" -o six --body bar --frames 1 --points 2000 --cameras 6 --width 64
     one=$("$NEUPIG" eval one/truth one/points --points-only | sed 's/.*to truth \([0-9.]*\).*/\1/;q')
     six=$("$NEUPIG" eval six/truth six/points --points-only | sed 's/.*to truth \([0-9.]*\).*/\1/;q')
     awk -v one="$one" -v six="$six" 'BEGIN { exit !(one > 3 * six) }'
@@ -64,13 +64,13 @@ setup() { cd "$BATS_TEST_TMPDIR" || return 1; }
 @test "bodies that change do so at their frame and not else" {
     faces() { grep -a "^element face" "$1"; }
     for body in hands two; do
-        "$NEUPIG" synth -o $body --body $body --frames 6 --change 4 --points 200 --cell 0.04 | grep -q "changes at frame 4"
+        "$NEUPIG-bodies" -o $body --body $body --frames 6 --change 4 --points 200 --cell 0.04 | grep -q "changes at frame 4"
         [ "$(faces $body/truth/frame_0000.ply)" = "$(faces $body/truth/frame_0003.ply)" ]
         [ "$(faces $body/truth/frame_0004.ply)" = "$(faces $body/truth/frame_0005.ply)" ]
         [ "$(faces $body/truth/frame_0003.ply)" != "$(faces $body/truth/frame_0004.ply)" ]
         "$NEUPIG" eval $body/truth $body/truth --frames 0:4 --samples 1000 | grep -q "constant topology yes"
     done
-    "$NEUPIG" synth -o bar --body bar --frames 4 --points 200 --cell 0.06
-    "$NEUPIG" synth -o early --body two --frames 4 --change 4 --points 200 --cell 0.06
+    "$NEUPIG-bodies" -o bar --body bar --frames 4 --points 200 --cell 0.06
+    "$NEUPIG-bodies" -o early --body two --frames 4 --change 4 --points 200 --cell 0.06
     diff -r bar early
 }

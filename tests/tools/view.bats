@@ -2,7 +2,7 @@
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 20 --points 600 --cell 0.06 --cycles 0.4 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 20 --points 600 --cell 0.06 --cycles 0.4 -o capture >synth.log
     python3 "$BATS_TEST_DIRNAME/view/made_result.py" capture made
 }
 

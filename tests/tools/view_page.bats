@@ -13,7 +13,7 @@ setup_file() {
     browser=$(command -v chromium)
     export modules browser here
     cd "$BATS_FILE_TMPDIR"
-    "$NEUPIG" synth --body bar --frames 20 --points 600 --cell 0.06 --cycles 0.4 -o capture >synth.log
+    "$NEUPIG-bodies" --body bar --frames 20 --points 600 --cell 0.06 --cycles 0.4 -o capture >synth.log
     python3 "$here/made_result.py" capture made
     "$NEUPIG" view made
 }

@@ -5,37 +5,40 @@
 #include "pipeline/memory.h"
 #include "pipeline/mesh.h"
 
-/* ---- bodies: a closed surface and its exact motion; some change their topology once ---- */
+/* ---- figures: a closed surface and its exact motion ---- */
 
-/* The words of --body.  HANDS: a walker whose right hand has grown into its hip and leaves it at the change.
- * TWO: the bar, beside which a ball appears at the change.  GONE: the bar with a ball
- * that disappears there. */
-enum { NPG_BODY_WALKER, NPG_BODY_BAR, NPG_BODY_HANDS, NPG_BODY_TWO, NPG_BODY_GONE, NPG_BODIES };
+/* The walker's bones. */
+enum { NPG_BONES = 13 };
 
-typedef struct npg_body npg_body;
-
-/* The body at rest, meshed with cells of `cell` metres.  Metres, y up.  Closed manifold parts, outward faces.
- * is_changed: as it is from the change on (bodies that change). */
-npg_status npg_body_open(npg_body **body, int kind, bool is_changed, double cell);
-void npg_body_close(npg_body **body);
-
-/* Whether a kind changes its topology. */
-bool npg_body_changes(int kind);
-
-/* Its surface at rest; a loan. */
-const npg_mesh *npg_body_rest(const npg_body *body);
+/* A surface at rest, and what its motion needs. */
+typedef struct npg_body {
+    npg_mesh *rest; /* metres, y up; closed manifold parts, outward faces */
+    float *weights; /* V x NPG_BONES, rows sum to 1; of walking figures   */
+} npg_body;
 
 /* A moment of the motion. */
 typedef struct npg_moment {
     double phase;  /* cycles, starting at rest's neighbourhood            */
     double travel; /* metres that a walking figure goes forward per cycle */
-    double since;  /* frames since the change; only for a changed body    */
+    double since;  /* frames since the change; negative before it         */
 } npg_moment;
 
-/* The positions of its V vertices (V x 3) at a moment. */
-void npg_body_pose(const npg_body *body, float *vert_pos, const npg_moment *moment);
+/* What moves: the command's walker, or a test's (tests/support/bodies.c). */
+typedef struct npg_figure {
+    /* The surface, meshed with cells of `cell` metres: before the change, or from it on. */
+    npg_status (*open)(npg_body *body, double cell, bool is_changed);
+    /* The positions of its V vertices (V x 3) at a moment. */
+    void (*pose)(const npg_body *body, float *vert_pos, const npg_moment *moment);
+    bool changes;   /* its topology, once          */
+    int64_t change; /* in this frame; -1: half way */
+} npg_figure;
 
-/* ---- between the files of a body ---- */
+extern const npg_figure npg_walker;
+
+/* The verb, of any figure; figure->change is then the frame. */
+int npg_synth(int argc, char **argv, npg_figure *figure);
+
+/* ---- what figures are made of ---- */
 
 /* Signed distance of a rest shape, negative inside; Lipschitz constant about 1. */
 typedef double npg_distance_fn(const double p[3], const void *user);
@@ -45,23 +48,23 @@ typedef double npg_distance_fn(const double p[3], const void *user);
 npg_status npg_body_mesh(npg_mesh **mesh, npg_distance_fn *distance, const void *user, const double lo[3],
                          const double hi[3], double cell);
 
-/* The walker's bones. */
-enum { NPG_BONES = 13 };
-
 /* Rotation (row-major) and shift of every bone from rest to a pose: p' = R p + t. */
 typedef struct npg_bone_pose {
     double rotation[9], shift[3];
 } npg_bone_pose;
 
-/* user: the pose the distance is of, NPG_BONES of npg_bone_pose; NULL: at rest. */
-double npg_walker_distance(const double p[3], const void *user);
-int npg_walker_nearest_bone(const double p[3], const npg_bone_pose *pose);
+/* Angles of a bone (about x, y, z; radians) at a moment. */
+typedef void npg_gait_fn(double angles[3], int bone, const npg_moment *moment);
+npg_gait_fn npg_walker_gait;
 
-/* The walker's gait; with at_hip >= 0 that of the body HANDS, its right hand on the hip by that share. */
-void npg_walker_pose(npg_bone_pose bones[NPG_BONES], double phase, double travel, double at_hip);
+/* Where a gait takes the bones. */
+void npg_walker_bones(npg_bone_pose bones[NPG_BONES], npg_gait_fn *gait, const npg_moment *moment);
 
-/* at = motion after the inverse of `rest`: what takes a surface that lies in the pose `rest` to `motion`. */
-void npg_bone_between(npg_bone_pose *at, const npg_bone_pose *rest, const npg_bone_pose *motion);
+/* A walking figure's surface and weights, as its bones lie in `pose`; NULL: at rest. */
+npg_status npg_walker_open(npg_body *body, double cell, const npg_bone_pose *pose);
+
+/* Bend it: every vertex goes with its bones, by its weights. */
+void npg_walker_bend(const npg_body *body, float *vert_pos, const npg_bone_pose bones[NPG_BONES]);
 
 /* ---- captures: from an exact surface to the points a scanner would have seen ---- */
 

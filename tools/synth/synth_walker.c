@@ -1,7 +1,8 @@
-/* Synthetic walker: a skeleton of tapered capsules, its shape as a distance field, and its gait. */
+/* Synthetic walker: a skeleton of tapered capsules, its shape as a distance field, its gait and its skin. */
 #include <math.h>
 #include <string.h>
 
+#include "geometry/geometry.h"
 #include "tools/synth/synth.h"
 
 #define PI 3.14159265358979323846
@@ -14,7 +15,7 @@ typedef struct bone {
 } bone;
 
 /* 0 pelvis, 1 chest, 2 head, 3/4 upper arms, 5/6 lower arms, 7/8 upper legs, 9/10 lower legs, 11/12 feet */
-static const bone bones[NPG_BONES] = {
+static const bone skeleton[NPG_BONES] = {
     {-1, {0, 0.96, 0}, {-0.05, 0.96, 0}, {0.05, 0.96, 0}, 0.125, 0.125},
     {0, {0, 1.05, 0}, {0, 1.12, 0}, {0, 1.34, 0}, 0.125, 0.15},
     {1, {0, 1.46, 0}, {0, 1.50, 0}, {0, 1.68, 0.02}, 0.055, 0.10},
@@ -59,23 +60,23 @@ static double bone_distance(const bone *rest, const npg_bone_pose *pose, const d
 }
 
 /* The smooth minimum of the distances to all bones: -k log sum exp(-d / k). */
-double npg_walker_distance(const double p[3], const void *user)
+static double distance_to_bones(const double p[3], const void *user)
 {
     const double softness = 0.018; /* metres: how round limbs join; set by eye */
     double sum = 0, distances[NPG_BONES], least = INFINITY;
     const npg_bone_pose *pose = user;
     for (int b = 0; b < NPG_BONES; b++)
-        least = fmin(least, distances[b] = bone_distance(&bones[b], pose ? &pose[b] : NULL, p));
+        least = fmin(least, distances[b] = bone_distance(&skeleton[b], pose ? &pose[b] : NULL, p));
     for (int b = 0; b < NPG_BONES; b++) sum += exp((least - distances[b]) / softness);
     return least - softness * log(sum);
 }
 
-int npg_walker_nearest_bone(const double p[3], const npg_bone_pose *pose)
+static int nearest_bone(const double p[3], const npg_bone_pose *pose)
 {
     int nearest = 0;
     double least = INFINITY;
     for (int b = 0; b < NPG_BONES; b++) {
-        double distance = bone_distance(&bones[b], pose ? &pose[b] : NULL, p);
+        double distance = bone_distance(&skeleton[b], pose ? &pose[b] : NULL, p);
         if (distance >= least) continue;
         least = distance;
         nearest = b;
@@ -104,10 +105,10 @@ static void turn_about(double out[9], int axis, double angle)
     out[3 * j + i] = sin(angle);
 }
 
-/* Angles (about x, y, z; radians) of a bone at a phase in cycles; forward is +z, a limb swings forward with a
- * negative angle about x. */
-static void bone_angles(double angles[3], int b, double phase)
+/* Forward is +z, a limb swings forward with a negative angle about x. */
+void npg_walker_gait(double angles[3], int b, const npg_moment *moment)
 {
+    double phase = moment->phase;
     bool right = b >= 3 && b % 2 == 0;
     double side = right ? -1 : 1, cycle = 2 * PI * phase + (right ? PI : 0), swing = sin(cycle);
     angles[0] = angles[1] = angles[2] = 0;
@@ -130,41 +131,12 @@ static void bone_angles(double angles[3], int b, double phase)
     }
 }
 
-/* The same of the body HANDS.  What bears the arm is stiff, so that the hand can stay where it is on the hip:
- * with the upper arm as at rest, the lower arm turned in by this angle ends inside the pelvis. */
-static void hands_angles(double angles[3], int b, double phase, double at_hip)
-{
-    const double turned_in = 1.55;
-    bone_angles(angles, b, phase);
-    if (b != 1 && (b < 3 || b > 6)) return;
-    angles[0] = angles[1] = angles[2] = 0;
-    if (b == 3) angles[0] = 0.35 * sin(2 * PI * phase);
-    if (b == 4) angles[0] = 0.5 * (1 - at_hip) * sin(2 * PI * phase);
-    if (b == 6) angles[2] = turned_in * at_hip;
-}
-
-void npg_bone_between(npg_bone_pose *at, const npg_bone_pose *rest, const npg_bone_pose *motion)
-{
-    double back[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) back[3 * i + j] = rest->rotation[3 * j + i];
-    multiply(at->rotation, motion->rotation, back);
-    for (int k = 0; k < 3; k++) {
-        const double *row = at->rotation + 3 * k;
-        at->shift[k] =
-            motion->shift[k] - (row[0] * rest->shift[0] + row[1] * rest->shift[1] + row[2] * rest->shift[2]);
-    }
-}
-
-void npg_walker_pose(npg_bone_pose out[NPG_BONES], double phase, double travel, double at_hip)
+void npg_walker_bones(npg_bone_pose out[NPG_BONES], npg_gait_fn *gait, const npg_moment *moment)
 {
     for (int b = 0; b < NPG_BONES; b++) {
-        const bone *it = &bones[b];
+        const bone *it = &skeleton[b];
         double angles[3], turn[9], local[9], moved_joint[3];
-        if (at_hip >= 0)
-            hands_angles(angles, b, phase, at_hip);
-        else
-            bone_angles(angles, b, phase);
+        gait(angles, b, moment);
         turn_about(local, 0, angles[0]);
         for (int axis = 1; axis < 3; axis++) {
             turn_about(turn, axis, angles[axis]);
@@ -182,8 +154,8 @@ void npg_walker_pose(npg_bone_pose out[NPG_BONES], double phase, double travel, 
             multiply(out[b].rotation, parent->rotation, local);
         else {
             memcpy(out[b].rotation, local, sizeof local);
-            moved_joint[1] += 0.02 * cos(4 * PI * phase);
-            moved_joint[2] += travel * phase;
+            moved_joint[1] += 0.02 * cos(4 * PI * moment->phase);
+            moved_joint[2] += moment->travel * moment->phase;
         }
         for (int k = 0; k < 3; k++) {
             const double *row = out[b].rotation + 3 * k;
@@ -192,3 +164,85 @@ void npg_walker_pose(npg_bone_pose out[NPG_BONES], double phase, double travel, 
         }
     }
 }
+
+/* ---- skin ---- */
+
+/* Every vertex begins with its nearest bone; then the weights spread over the surface (never through the air
+ * between two limbs) as heat would, over about `reach` metres. */
+static npg_status open_weights(npg_body *body, double cell, const npg_bone_pose *pose)
+{
+    const double reach = 0.07; /* metres over which elbows and knees bend; set by eye */
+    const npg_mesh *rest = body->rest;
+    size_t edge_count, size = rest->vert_count * NPG_BONES;
+    uint32_t(*edges)[2];
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    int rounds =
+        (int)ceil(reach * reach / (cell * cell)); /* a round carries heat one cell, n rounds sqrt(n) */
+    NPG_TRY(npg_alloc_array(&body->weights, NPG_FOR_MESH, size, sizeof(float)));
+    NPG_TRY(npg_mesh_edges(&edges, &edge_count, rest->faces, rest->face_count));
+    float *next = npg_arena_take(&scratch, size, sizeof *next);
+    float *degree = npg_arena_take(&scratch, rest->vert_count, sizeof *degree);
+    npg_status status = npg_arena_status(&scratch);
+    for (size_t v = 0; v < rest->vert_count && !status; v++) {
+        const float *p = rest->vert_pos + 3 * v;
+        int b = nearest_bone((double[3]){(double)p[0], (double)p[1], (double)p[2]}, pose);
+        body->weights[v * NPG_BONES + (size_t)b] = 1;
+    }
+    for (size_t e = 0; e < edge_count && !status; e++) {
+        degree[edges[e][0]] += 1;
+        degree[edges[e][1]] += 1;
+    }
+    for (int round = 0; round < rounds && !status; round++) {
+        memset(next, 0, size * sizeof *next);
+        for (size_t e = 0; e < edge_count; e++)
+            for (int end = 0; end < 2; end++) {
+                size_t to = edges[e][end] * (size_t)NPG_BONES, from = edges[e][!end] * (size_t)NPG_BONES;
+                for (int b = 0; b < NPG_BONES; b++) next[to + (size_t)b] += body->weights[from + (size_t)b];
+            }
+        for (size_t i = 0; i < size; i++)
+            body->weights[i] = 0.5f * body->weights[i] + 0.5f * next[i] / degree[i / NPG_BONES];
+    }
+    npg_arena_release(&scratch);
+    npg_release(&edges);
+    return status;
+}
+
+npg_status npg_walker_open(npg_body *body, double cell, const npg_bone_pose *pose)
+{
+    static const double lo[3] = {-0.75, -0.1, -0.35}, hi[3] = {0.75, 1.9, 0.35};
+    NPG_TRY(npg_body_mesh(&body->rest, distance_to_bones, pose, lo, hi, cell));
+    return open_weights(body, cell, pose);
+}
+
+void npg_walker_bend(const npg_body *body, float *vert_pos, const npg_bone_pose bones[NPG_BONES])
+{
+    for (size_t v = 0; v < body->rest->vert_count; v++) {
+        const float *p = body->rest->vert_pos + 3 * v, *weights = body->weights + v * NPG_BONES;
+        double moved[3] = {0}, sum = 0;
+        for (int b = 0; b < NPG_BONES; b++) {
+            double weight = (double)weights[b];
+            sum += weight;
+            for (int k = 0; k < 3 && weight > 0; k++) {
+                const double *row = bones[b].rotation + 3 * k;
+                moved[k] += weight * (row[0] * (double)p[0] + row[1] * (double)p[1] + row[2] * (double)p[2] +
+                                      bones[b].shift[k]);
+            }
+        }
+        for (int k = 0; k < 3; k++) vert_pos[3 * v + k] = (float)(moved[k] / sum);
+    }
+}
+
+static npg_status open_walker(npg_body *body, double cell, bool is_changed)
+{
+    (void)is_changed;
+    return npg_walker_open(body, cell, NULL);
+}
+
+static void pose_walker(const npg_body *body, float *vert_pos, const npg_moment *moment)
+{
+    npg_bone_pose bones[NPG_BONES];
+    npg_walker_bones(bones, npg_walker_gait, moment);
+    npg_walker_bend(body, vert_pos, bones);
+}
+
+const npg_figure npg_walker = {.open = open_walker, .pose = pose_walker};
