@@ -9,8 +9,7 @@
 
 #include "align/align_internal.h"
 #include "align/tracking.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
 #include "pipeline/live_plan.h"

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "align/tracking.h"
-#include "geometry/kdtree.h"
+#include "geometry/geometry.h"
 #include "pipeline/chunk.h"
 #include "pipeline/memory.h"
 #include "pipeline/stage.h"

@@ -8,8 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/cholesky.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/parallel.h"
 
 #define LANES 8           /* of a column */

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 #define FLIPPED_MOST                                                                                         \
     0.1 /* share of given normals on the wrong side, beyond which those of other frames are not used */

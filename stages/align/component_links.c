@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 

@@ -3,8 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/rigid.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 
 void npg_pose_straighten(double m[9])

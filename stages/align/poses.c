@@ -5,8 +5,7 @@
 #include <string.h>
 
 #include "align/tracking.h"
-#include "geometry/query.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 static npg_status alloc_map(npg_pose_map *map, size_t count, size_t old_count)
 {

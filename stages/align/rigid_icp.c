@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/rigid.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 

@@ -5,12 +5,7 @@
 #include <string.h>
 
 #include "align/align_internal.h"
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/proxy.h"
-#include "geometry/query.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 

@@ -2,7 +2,7 @@
 #ifndef NPG_ALIGN_TRACKING_H
 #define NPG_ALIGN_TRACKING_H
 
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"

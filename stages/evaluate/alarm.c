@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/robust.h"
+#include "geometry/geometry.h"
 #include "pipeline/order.h"
 #include "pipeline/stage.h"
 

@@ -2,7 +2,7 @@
 #ifndef NPG_EVALUATE_H
 #define NPG_EVALUATE_H
 
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 
 typedef struct npg_sequence npg_sequence;
 

@@ -6,11 +6,7 @@
 
 #include "align/tracking.h"
 #include "evaluate/evaluate_internal.h"
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/proxy.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 

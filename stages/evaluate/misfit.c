@@ -3,10 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
 
 /* Set by trial.  evaluate_internal.h says how they are used. */

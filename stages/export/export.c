@@ -5,8 +5,7 @@
 #include <sys/stat.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "geometry/colours.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/reader.h"
 #include "job/frame_log.h"
 #include "job/job.h"

@@ -2,9 +2,7 @@
 #include <math.h>
 
 #include "fuse/fuse_internal.h"
-#include "geometry/cells.h"
-#include "geometry/colours.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 #define VOTE_CELLS  4 /* sides of the cubes over which frames are counted, in cells */
 #define SIDE_LEAST  1e-5

@@ -4,8 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/depth_map.h"
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 

@@ -1,7 +1,7 @@
 /* fuse: gathers what all frames saw of the body, for a reference that no single frame could give.
  *
  * In a fusing pass the reference so far is aligned with every frame.  Each frame's points are then warped to
- * the keyframe's pose by that motion (geometry/skinning.h) and averaged with those of the other frames
+ * the keyframe's pose by that motion (geometry/skinning.c) and averaged with those of the other frames
  * (averages.c); stage mesh makes the next reference from what comes out.  Parts that touch in a frame are
  * told apart by the surface that each point belongs to, so one frame's contact joins nothing.
  *
@@ -17,10 +17,7 @@
 #include <string.h>
 
 #include "fuse/fuse_internal.h"
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
-#include "geometry/robust.h"
+#include "geometry/geometry.h"
 #include "mesh/surface.h"
 #include "pipeline/cost.h"
 #include "pipeline/options.h"

@@ -2,7 +2,7 @@
 #ifndef NPG_FUSE_INTERNAL_H
 #define NPG_FUSE_INTERNAL_H
 
-#include "geometry/skinning.h"
+#include "geometry/geometry.h"
 
 /* Cells: averages of many points over small cubes, in memory that does not grow with the points.
  *
@@ -66,7 +66,7 @@ size_t npg_colour_cells_memory(size_t most);
 /* Free-space carving: places near the reference that sensors have seen to be empty.
  *
  * Cubes of one size within a band around the surface.  Each hangs on the point of the surface that is closest
- * to it at rest, as a frame's points do (geometry/skinning.h), and goes with it; in every frame it is looked up
+ * to it at rest, as a frame's points do (geometry/skinning.c), and goes with it; in every frame it is looked up
  * in the depth map of every sensor (depth_map.h).  A frame says
  *
  *     filled   where a sensor saw something there, within the margin

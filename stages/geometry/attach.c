@@ -1,13 +1,8 @@
 /* Attach: points tied to a surface by weights in a face and an offset that turns with it. */
-#include "geometry/attach.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
-#include "geometry/query.h"
-#include "geometry/vec3.h"
 
 struct npg_attachment {
     npg_mesh *rest;      /* reference held               */

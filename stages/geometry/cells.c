@@ -1,5 +1,5 @@
 /* Cells: keys of cubes, their table, and sets of cubes. */
-#include "geometry/cells.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 #include <string.h>

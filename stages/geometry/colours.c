@@ -1,12 +1,8 @@
 /* Colours: robust means, and from points to vertices. */
-#include "geometry/colours.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
 
 #define NEAREST  12   /* points that a vertex is coloured from                                   */
 #define FACING   0.2f /* least cosine of the normals: the other side of a thin part has its own  */

@@ -1,10 +1,9 @@
 /* Depth map: nearest distances by direction, and the outline of what was seen. */
-#include "geometry/depth_map.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "geometry/vec3.h"
 #include "pipeline/memory.h"
 
 #define BINS_LEAST  16    /* along a side of the map */

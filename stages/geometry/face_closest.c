@@ -3,8 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "geometry/query.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 /* Squared distance from the origin to the segment a..b; *t is where on it. */
 static double segment(double *t, const double a[3], const double b[3])

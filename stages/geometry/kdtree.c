@@ -1,5 +1,5 @@
 /* k-d tree of N points: a balanced tree over leaves of up to 16 points. */
-#include "geometry/kdtree.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 #include <stdbool.h>

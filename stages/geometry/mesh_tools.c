@@ -1,11 +1,9 @@
 /* Mesh tools: small facts about a triangle mesh that several stages need. */
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "geometry/vec3.h"
 
 void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,
                              size_t face_count)

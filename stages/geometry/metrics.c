@@ -1,11 +1,9 @@
 /* Metrics: how close a predicted mesh sequence is to a ground truth, by the measures
  * of the method's paper. */
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 
 #include <math.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/vec3.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/random.h"
 

@@ -2,8 +2,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 static void join_marked(uint32_t *parents, const uint8_t *is_marked, const npg_mesh *mesh)
 {

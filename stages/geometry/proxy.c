@@ -1,11 +1,9 @@
 /* Proxy: decimation that only leaves vertices out. */
-#include "geometry/proxy.h"
+#include "geometry/geometry.h"
 
 #include <string.h>
 
 #include <meshoptimizer.h>
-
-#include "geometry/mesh_tools.h"
 
 /* Faces that remain, still over the whole's vertices. */
 static npg_status decimate(uint32_t **faces, size_t *face_count, const npg_mesh *whole, size_t vert_target)

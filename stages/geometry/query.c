@@ -1,13 +1,12 @@
 /* Query: nearest surface point and rays, by Embree on a bounding volume hierarchy that is refitted when the
  * vertices move. */
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 
 #include <embree3/rtcore.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
-#include "geometry/vec3.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 

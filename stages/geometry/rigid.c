@@ -1,5 +1,5 @@
 /* Rigid: the rotation and translation that take one set of points closest to another. */
-#include "geometry/rigid.h"
+#include "geometry/geometry.h"
 
 #include "kernels/jacobi.h"
 

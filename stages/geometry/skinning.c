@@ -1,11 +1,8 @@
 /* Skinning: rotations of the surface, and points through them. */
-#include "geometry/skinning.h"
+#include "geometry/geometry.h"
 
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
-#include "geometry/vec3.h"
 #include "pipeline/parallel.h"
 
 #define SMOOTHINGS 2 /* of the rotations, over the corners of faces: noise of a face is not its motion */

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "mesh/surface.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"

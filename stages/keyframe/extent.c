@@ -2,8 +2,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "mesh/surface.h"
 #include "pipeline/memory.h"
 

@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "job/job.h"
 #include "keyframe/keyframe_internal.h"
 #include "pipeline/cost.h"

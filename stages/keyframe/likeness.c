@@ -3,9 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/reader.h"
 
 #define LOOKED_AT 1000

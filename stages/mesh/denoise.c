@@ -6,9 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "outlier/normals.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"

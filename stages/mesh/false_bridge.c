@@ -4,8 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 #define LONGER          2.0 /* times its length: an edge that speaks against its face    */
 #define FAR_SPACINGS    1.0 /* mean distance of a face's corners from the points         */

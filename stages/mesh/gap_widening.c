@@ -5,11 +5,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 #define NEIGHBOURS    48   /* in which a facing point is looked for */
 #define CONTACT_MOST  5000 /* points that contact is measured at                   */

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 #define SWEEPS_MOST   400
 #define RELAXATION    1.7  /* beyond the mean: successive over-relaxation */

@@ -3,8 +3,7 @@
 #include <math.h>
 
 #include "align/tracking.h"
-#include "geometry/colours.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/reader.h"
 #include "mesh/mesh_internal.h"
 #include "pipeline/clock.h"

@@ -6,8 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "pipeline/order.h"
 
 #define SPACING_NEIGHBOUR 8

@@ -5,8 +5,7 @@
 #include <jansson.h>
 
 #include "align/tracking.h"
-#include "geometry/cells.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "mesh/surface.h"
 #include "pipeline/frame_box.h"
 

@@ -3,9 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "mesh/mesh_internal.h"
 
 #define SMOOTH_ROUNDS 12

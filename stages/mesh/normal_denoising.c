@@ -4,9 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 /* By trial (tests/bed/decisions.md, "Noise in the reference"). */
 #define NEAR       16   /* points that a face asks                                      */

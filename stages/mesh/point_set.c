@@ -3,8 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 #include "pipeline/cost.h"
 
 #define POINTS_MAX    80000

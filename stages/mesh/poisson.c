@@ -4,10 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/metrics.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "mesh/poisson_wire.h"
 #include "pipeline/child.h"
 #include "pipeline/frame_box.h"

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "mesh/vdb.h"
 #include "pipeline/clock.h"
 

@@ -5,10 +5,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 
 #define ROUNDS_MAX  4
 #define DRAFT_DEPTH 7      /* of the reconstructions that only serve the normals */

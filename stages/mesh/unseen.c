@@ -4,7 +4,7 @@
 #include <stdio.h>
 
 #include "align/tracking.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t point_count, double dist_max)
 {

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "kernels/adam.h"
 #include "kernels/latent.h"
 #include "kernels/mlp.h"

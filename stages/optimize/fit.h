@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "geometry/proxy.h"
+#include "geometry/geometry.h"
 #include "kernels/levels.h"
 #include "kernels/motion.h"
 #include "kernels/runtime/device.h"

@@ -5,9 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
-#include "geometry/robust.h"
+#include "geometry/geometry.h"
 #include "pipeline/order.h"
 
 npg_status npg_joint_matcher_open(npg_joint_matcher *m, const npg_mesh *mesh, size_t most)

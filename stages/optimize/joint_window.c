@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 #include "optimize/fit.h"
 
 struct npg_joint_window {

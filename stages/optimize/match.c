@@ -5,11 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
-#include "geometry/robust.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/order.h"
 
 struct npg_matcher {

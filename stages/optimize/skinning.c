@@ -1,8 +1,7 @@
 /* Skinning: choosing samples, and moving the dense surface with them. */
 #include "optimize/fit.h"
 
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 
 static npg_status bind(npg_skinning *skinning)
 {

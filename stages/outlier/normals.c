@@ -4,9 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "kernels/jacobi.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"

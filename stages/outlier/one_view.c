@@ -3,8 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 

@@ -12,9 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "outlier/normals.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"

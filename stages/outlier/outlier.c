@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "ingest/frame_store.h"
 #include "outlier/normals.h"
 #include "outlier/outlier_internal.h"

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 
 #define ROUNDS 8 /* of the filter, each on what the one before has left; set by trial */

@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #include "align/align_internal.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "align/tracking.h"
-#include "geometry/proxy.h"
+#include "geometry/geometry.h"
 #include "tests/support/ball_mesh.h"
 
 static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)

@@ -14,7 +14,7 @@
 #include <xxhash.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/reader.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"

@@ -15,8 +15,7 @@
 
 #include "export/exporters/exporters_internal.h"
 #include "export/exporters/vdb.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/rigid.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/reader.h"
 #include "tests/support/group_folder.h"
 

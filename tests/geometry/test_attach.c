@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/attach.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "tests/support/shapes.h"
 

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "fuse/fuse_internal.h"
-#include "geometry/colours.h"
+#include "geometry/geometry.h"
 #include "tests/support/shapes.h"
 
 static void a_mean_is_exact(void **state)

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/kdtree.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 
 #define MOST 5000

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/metrics.h"
+#include "geometry/geometry.h"
 #include "pipeline/random.h"
 
 /* Two triangles that make the rectangle 0..width x 0..1 at height z. */

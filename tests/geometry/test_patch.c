@@ -7,8 +7,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/proxy.h"
+#include "geometry/geometry.h"
 #include "job/state_mesh.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_folder.h"

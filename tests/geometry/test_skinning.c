@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/skinning.h"
+#include "geometry/geometry.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/shapes.h"
 

@@ -5,7 +5,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "mesh/mesh_internal.h"
 #include "tests/support/legs.h"
 

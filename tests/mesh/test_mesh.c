@@ -9,8 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 #include "mesh/surface.h"
 #include "mesh/vdb.h"
 #include "pipeline/child.h"

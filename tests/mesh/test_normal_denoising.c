@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "mesh/mesh_internal.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/shapes.h"

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "kernels/check.h"
 #include "kernels/latent.h"
 #include "kernels/mlp.h"

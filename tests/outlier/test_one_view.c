@@ -8,8 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/shapes.h"

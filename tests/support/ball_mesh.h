@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 static inline void put_face(npg_mesh *mesh, size_t *count, uint32_t a, uint32_t b, uint32_t c)
 {

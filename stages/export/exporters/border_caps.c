@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 
 typedef struct border { /* an edge as a cap has it: against the face beside it */
     uint32_t from, to;

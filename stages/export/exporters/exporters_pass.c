@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/reader.h"
 #include "job/frame_log.h"
 #include "pipeline/json_file.h"

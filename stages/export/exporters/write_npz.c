@@ -18,7 +18,7 @@
 #include <stdio.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "geometry/rigid.h"
+#include "geometry/geometry.h"
 
 enum {
     FACES,

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/order.h"
 
 /* A number beyond this is damage, not a place: as origin it would swallow every other point. */

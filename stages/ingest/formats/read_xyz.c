@@ -4,7 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "ingest/formats/formats_internal.h"
 #include "pipeline/source.h"
 

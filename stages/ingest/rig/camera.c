@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "ingest/rig/rig_internal.h"
 
 #define ROTATION_OFF 1e-3 /* |R R' - 1| that rounding in a file with few digits explains */

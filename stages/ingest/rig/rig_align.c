@@ -4,8 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/cholesky.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 

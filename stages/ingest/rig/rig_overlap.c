@@ -3,8 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/mesh_tools.h"
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/memory.h"
 

@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
