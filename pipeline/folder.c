@@ -1,5 +1,5 @@
 /* Folder: listing and removing. */
-#include "pipeline/folder.h"
+#include "pipeline/file.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,11 +1,17 @@
-/* JSON files that people write: with comments, with the place of an error. */
+/* JSON: files that people write, with comments and the place of an error; files that the program writes and reads
+ * back; and values from data that JSON can't hold as it is. */
 #include "pipeline/json_file.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "pipeline/file.h"
 #include "pipeline/memory.h"
 
 /* Blank out comments in place, so that line numbers stay. */
@@ -66,4 +72,141 @@ npg_status npg_json_read(json_t **root, char **text, const char *path, size_t li
     npg_status status = npg_json_parse(root, *text, path);
     if (status) npg_release(text);
     return status;
+}
+
+/* ---- values ---- */
+
+/* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
+/* Bounds as in RFC 3629: c0, c1 and e0 8x, f0 8x would be too long, ed ax a surrogate, f4 9x beyond
+ * 10ffff. */
+static size_t sequence_length(const unsigned char *text)
+{
+    unsigned char c = text[0];
+    size_t length = c < 0x80                ? 1
+                    : c >= 0xc2 && c < 0xe0 ? 2
+                    : c >= 0xe0 && c < 0xf0 ? 3
+                    : c >= 0xf0 && c < 0xf5 ? 4
+                                            : 0;
+    for (size_t i = 1; i < length; i++)
+        if ((text[i] & 0xc0) != 0x80) return 0;
+    if (c == 0xe0 && text[1] < 0xa0) return 0;
+    if (c == 0xed && text[1] >= 0xa0) return 0;
+    if (c == 0xf0 && text[1] < 0x90) return 0;
+    if (c == 0xf4 && text[1] >= 0x90) return 0;
+    return length;
+}
+
+json_t *npg_json_text(const char *text)
+{
+    if (!text) return json_null();
+    json_t *value = json_string(text);
+    if (value) return value;
+    char *copy;
+    if (npg_copy_text(&copy, text)) return NULL;
+    for (unsigned char *c = (unsigned char *)copy; *c;) {
+        size_t length = sequence_length(c);
+        if (!length) *c = '?';
+        c += length ? length : 1;
+    }
+    value = json_string(copy);
+    npg_release(&copy);
+    return value;
+}
+
+json_t *npg_json_real(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+npg_status npg_json_save(const char *path, const json_t *value)
+{
+    char *text = json_dumps(value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    npg_file *file = NULL;
+    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", path);
+    npg_status status = npg_file_open(&file, path);
+    if (!status) {
+        npg_file_write(file, text, strlen(text));
+        npg_file_write(file, "\n", 1);
+        status = npg_file_commit(&file);
+    }
+    free(text);
+    return status;
+}
+
+npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
+{
+    char *path;
+    NPG_TRY(npg_join_path(&path, folder, name));
+    npg_status status = npg_json_save(path, value);
+    npg_release(&path);
+    return status;
+}
+
+/* ---- lines ---- */
+
+static npg_status read_lines(FILE *file, const char *path, int64_t bytes, npg_json_line_visit *visit,
+                             void *user)
+{
+    char *line = NULL;
+    size_t capacity = 0;
+    npg_status status = NPG_OK;
+    for (int64_t at = 0; at < bytes && !status;) {
+        ssize_t size = getline(&line, &capacity, file);
+        json_t *object = size > 0 ? json_loadb(line, (size_t)size, 0, NULL) : NULL;
+        if (!json_is_object(object) || at + size > bytes)
+            status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written (byte %lld)", path,
+                               (long long)at);
+        if (!status) status = visit(user, object, line, (size_t)size);
+        at += size;
+        json_decref(object);
+    }
+    free(line);
+    return status;
+}
+
+npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user)
+{
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_DISK));
+    FILE *file = fdopen(fd, "r");
+    npg_status status = file ? read_lines(file, path, bytes, visit, user)
+                             : npg_error_errno(NPG_DISK, "can't read back %s", path);
+    if (file)
+        fclose(file);
+    else
+        close(fd);
+    return status;
+}
+
+/* ---- what lists say of files ---- */
+
+npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
+{
+    char *path, text[17];
+    uint64_t hash;
+    struct stat info;
+    NPG_TRY(npg_join_path(&path, output, file));
+    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
+    if (!status && stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
+    npg_release(&path);
+    NPG_TRY(status);
+    snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)info.st_size));
+    json_object_set_new(entry, "xxh3", json_string(text));
+    return NPG_OK;
+}
+
+npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
+{
+    if (!npg_path_stays(file))
+        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
+    json_t *now = json_object();
+    npg_status status = npg_file_facts(now, output, file);
+    if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
+                    !json_equal(json_object_get(now, "xxh3"), json_object_get(entry, "xxh3"))))
+        status = npg_error(NPG_BAD_INPUT,
+                           "%s/%s was changed since it was written; --restart discards what is there", output,
+                           file);
+    json_decref(now);
+    return status == NPG_DISK ? NPG_BAD_INPUT : status;
 }

@@ -2,7 +2,7 @@
  *
  * That code solves (I + lambda L) u = z by conjugate gradients and names the choice and its neighbourhood;
  * the solve is exact here, so these keys have no counterpart.  Features have a fixed width of 30 + 2. */
-#include "pipeline/method.h"
+#include "pipeline/options.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -12,7 +12,6 @@
 
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
-#include "pipeline/options.h"
 
 typedef struct word {
     const char *published, *option, *own; /* option NULL: what is done anyway */

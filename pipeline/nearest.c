@@ -1,5 +1,5 @@
 /* The word that a mistyped one was meant to be. */
-#include "pipeline/nearest.h"
+#include "pipeline/options.h"
 
 #include <string.h>
 

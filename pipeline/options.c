@@ -12,10 +12,7 @@
 #include <string.h>
 
 #include "pipeline/memory.h"
-#include "pipeline/method.h"
-#include "pipeline/nearest.h"
-#include "pipeline/run_internal.h"
-#include "pipeline/run_settings.h"
+#include "pipeline/stage.h"
 #include "pipeline/struct_size.h"
 
 struct npg_options {

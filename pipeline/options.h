@@ -128,6 +128,10 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options);
 /* The i-th stage that a program added, a loan; NULL after the last. */
 const npg_custom_stage *npg_options_custom_stage(const npg_options *options, size_t i);
 
+/* Beside the chain's; what a program gives is checked: name, place in the chain, callback.  NPG_USAGE. */
+#define NPG_CUSTOM_STAGES_MAX 6
+npg_status npg_custom_check(const npg_custom_stage *given, const struct npg_stage *const *chain);
+
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
 
@@ -149,8 +153,31 @@ const char *npg_option_gone(const char *name);
 /* Check `text` against an option; NPG_USAGE says what it takes. */
 npg_status npg_option_check(const npg_option *option, const char *text);
 
-/* The run's own options (run_settings.h), and the named sets of values (stages/chain.c). */
+/* The run's own options (npg_settings), and the named sets of values (stages/chain.c). */
 extern const npg_option npg_run_options[];
 extern const npg_preset npg_presets[];
+
+/* ---- methods: what the option "method" takes beside the names of npg_presets (method.c) ---- */
+
+/* Set options from a JSON object as text, or from a file of one.  The object holds options by their names
+ * ("preset" is the method that they are added to), or is a configuration of the paper's published code, known
+ * by its sections "optimization", "grid" and "mlp": that chooses the method "paper" and sets what has a
+ * counterpart; npg_options_ignored() then says what has none.  NPG_USAGE names place and cause. */
+npg_status npg_method_set(npg_options *options, const char *value);
+
+/* The same for an object that was read; errors name it as `place`. */
+npg_status npg_method_apply(npg_options *options, const struct json_t *object, const char *place);
+
+/* ---- the word that a mistyped one was meant to be (nearest.c) ---- */
+
+typedef struct npg_nearest {
+    const char *wanted, *word; /* word: the nearest so far, NULL: none is near; loans */
+    size_t edits;              /* that are too many                                  */
+} npg_nearest;
+
+npg_nearest npg_nearest_to(const char *wanted);
+
+/* One more word that could have been meant. */
+void npg_nearest_offer(npg_nearest *nearest, const char *word);
 
 #endif

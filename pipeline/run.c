@@ -10,7 +10,6 @@
 
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
-#include "pipeline/options.h"
 #include "pipeline/run_internal.h"
 #include "pipeline/struct_size.h"
 

@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 
 #include "pipeline/clock.h"
+#include "pipeline/options.h"
 #include "pipeline/ring.h"
 #include "pipeline/stage.h"
 
@@ -20,8 +21,6 @@
 
 /* ---- stages that a program adds (custom_stage.c) ---- */
 
-#define NPG_CUSTOM_STAGES_MAX 6 /* beside the chain's */
-
 typedef struct npg_custom {
     npg_stage stage; /* first: what the worker points to */
     npg_custom_stage given;
@@ -31,9 +30,6 @@ typedef struct npg_custom {
 /* A stage for `given` (a loan that outlives it), to stand right after `before` in a chain that has `fields`
  * there. */
 npg_custom npg_custom_make(const npg_custom_stage *given, const npg_stage *before, uint32_t fields);
-
-/* Check what a program gives: name, place in the chain, callback.  NPG_USAGE. */
-npg_status npg_custom_check(const npg_custom_stage *given, const npg_stage *const *chain);
 
 /* ---- a run ---- */
 

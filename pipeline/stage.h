@@ -11,10 +11,26 @@
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/json_file.h"
-#include "pipeline/latch.h"
 #include "pipeline/mesh.h"
 #include "pipeline/plan.h"
-#include "pipeline/run_settings.h"
+#include "pipeline/ring.h"
+
+/* What becomes of the colours of the points. */
+typedef enum npg_colour_mode { NPG_COLOUR_REFERENCE, NPG_COLOUR_FRAMES, NPG_COLOUR_NO } npg_colour_mode;
+
+/* The options of the run itself, those that no single stage owns. */
+typedef struct npg_settings {
+    const char *input, *follow, *output, *device;
+    const char *reference; /* the user's own mesh; "": one is to be made */
+    int method, colour;    /* place of its word; npg_colour_mode */
+    int64_t seed;
+    int64_t ring_capacity;  /* chunks per ring                       */
+    int64_t chunk_frames;   /* frames per chunk                      */
+    int64_t max_memory_mib; /* 0: no limit                           */
+    bool keep_going;        /* skip frames that can't be used        */
+    bool confine;           /* refuse what lies outside its folder   */
+    bool pull;              /* finished frames are also to be pulled */
+} npg_settings;
 
 /* A pass is one walk of the capture through the stages that take part in it.  Of a live source the passes
  * before SOLVE walk the look-ahead, as if it were the capture; SOLVE goes on behind it. */
@@ -40,7 +56,7 @@ typedef struct npg_choice {
  * and by nobody else (npg_own), before it passes on the first chunk (or ends the pass) that depends on it; the
  * rings' locks publish it downstream.  A service that resumes a run writes all of them, before the passes.
  * Where a live source goes on behind the look-ahead, number_min, number_max, point_count_max and bounds_local
- * are those of the look-ahead, and plan is an open one (pipeline/live_plan.h) in all passes. */
+ * are those of the look-ahead, and plan is an open one (pipeline/plan.h) in all passes. */
 typedef struct npg_facts {
     /* ingest */
     bool is_live;          /* frames come once, and how many is not known before   */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "pipeline/nearest.h"
+#include "pipeline/options.h"
 #include "pipeline/stage.h"
 #include "tools/help.h"
 

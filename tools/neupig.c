@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "pipeline/nearest.h"
+#include "pipeline/options.h"
 #include "tools/help.h"
 
 const npg_verb npg_verbs[] = {

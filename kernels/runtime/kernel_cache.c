@@ -15,7 +15,6 @@
 #include <xxhash.h>
 
 #include "pipeline/file.h"
-#include "pipeline/folder.h"
 
 #define PRIVATE_PREFIX "neupig-kernels-"
 #define PRIVATE_LOCK   "owner"

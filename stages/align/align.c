@@ -12,8 +12,8 @@
 #include "geometry/geometry.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
-#include "pipeline/live_plan.h"
 #include "pipeline/options.h"
+#include "pipeline/plan.h"
 
 #define BLOCK_ALIGN "align" /* of a state on disk */
 
@@ -128,16 +128,16 @@ static npg_status restore_state(npg_worker *worker)
     return NPG_OK;
 }
 
-/* Whether the last frame read is the last that a window waits for.  total: as in pipeline/live_plan.h. */
+/* Whether the last frame read is the last that a window waits for.  total: as in pipeline/plan.h. */
 static bool closes_window(state *s, const npg_plan *plan, int64_t total)
 {
     if (!npg_plan_is_open(plan)) {
-        for (int64_t w = 0; w < npg_plan_window_count(plan); w++)
-            if (npg_plan_read_before(plan, w) == s->read) return true;
+        for (int64_t w = 0; w < npg_plan_window_count(plan, -1); w++)
+            if (npg_plan_read_before(plan, w, -1) == s->read) return true;
         return false;
     }
     while (s->closes_at < s->read || !s->window_at) {
-        npg_window window = npg_live_window(plan, s->window_at++, total);
+        npg_window window = npg_plan_window(plan, s->window_at++, total);
         s->closes_at += window.new_last - window.new_first + 1;
     }
     return s->closes_at == s->read;
@@ -492,7 +492,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     size_t verts = npg_worker_verts_at_most(worker), nodes = (size_t)s->nodes;
-    npg_window window = npg_live_window(&facts->plan, 0, -1);
+    npg_window window = npg_plan_window(&facts->plan, 0, -1);
     int64_t length = ends_late(facts, NPG_PASS_FUSE) ? GROUP_MOST : window.last - window.first + 1;
     int64_t most = length < GROUP_MOST ? length : GROUP_MOST;
     size_t group = (size_t)most, chunk = (size_t)npg_worker_settings(worker)->chunk_frames;

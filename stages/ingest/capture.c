@@ -1,5 +1,5 @@
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
-#include "ingest/capture.h"
+#include "ingest/ingest_internal.h"
 
 static npg_status refuse_gaps(const npg_capture *capture, const char *input)
 {

@@ -1,5 +1,5 @@
 /* Follow: the frames of a folder that grows. */
-#include "ingest/follow.h"
+#include "ingest/ingest_internal.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -11,9 +11,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "ingest/formats/formats_internal.h"
-#include "ingest/formats/reader.h"
-#include "ingest/frame_files.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 

@@ -1,13 +1,11 @@
 /* Frame files: which files are the frames of a capture, in time order, gaps included. */
-#include "ingest/frame_files.h"
+#include "ingest/ingest_internal.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 
-#include "ingest/formats/reader.h"
 #include "pipeline/file.h"
-#include "pipeline/memory.h"
 
 /* Slots are made for gaps as well.  Names that hold dates or identities instead of frame numbers would ask
  * for billions of them; the limit itself is a round number far above any capture. */

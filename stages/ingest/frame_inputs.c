@@ -1,5 +1,5 @@
 /* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
-#include "ingest/frame_files.h"
+#include "ingest/ingest_internal.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -10,10 +10,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "ingest/formats/formats_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/memory.h"
-#include "pipeline/source.h"
 
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 

@@ -1,5 +1,5 @@
 /* Frame names: natural order, and the frame number inside a file's name. */
-#include "ingest/frame_files.h"
+#include "ingest/ingest_internal.h"
 
 #include <ctype.h>
 #include <stdlib.h>

@@ -1,10 +1,8 @@
 /* Frame selection: the text of --frames. */
-#include "ingest/frame_files.h"
+#include "ingest/ingest_internal.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "pipeline/memory.h"
 
 /* Larger numbers count as this one, so that sums of two stay far from overflow. */
 #define NUMBER_MAX ((int64_t)1 << 53)

@@ -1,5 +1,5 @@
 /* Frame store: entries in memory or on disk. */
-#include "ingest/frame_store.h"
+#include "ingest/ingest_internal.h"
 
 #include <fcntl.h>
 #include <pthread.h>

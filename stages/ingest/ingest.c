@@ -1,12 +1,7 @@
 /* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
  * from standard input, from a folder that grows, or from those that are pushed. */
-#include "ingest/capture.h"
-#include "ingest/live_source.h"
-#include "ingest/rig/rig.h"
+#include "ingest/ingest_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/json_file.h"
-#include "pipeline/live_plan.h"
-#include "pipeline/stage.h"
 
 typedef struct state {
     const char *frames, *follow_end;
@@ -258,7 +253,7 @@ static int64_t place_count(const npg_worker *worker)
     if (pass == NPG_PASS_CHOOSE) return (int64_t)facts->choice.count;
     if (pass != NPG_PASS_SOLVE && pass != NPG_PASS_FUSE) return facts->planned_count;
     if (!npg_plan_is_open(&facts->plan)) return npg_plan_read_count(&facts->plan);
-    return total < 0 ? INT64_MAX : npg_live_next_place(&facts->plan, total, total);
+    return total < 0 ? INT64_MAX : npg_plan_next_place(&facts->plan, total, total);
 }
 
 /* Index of the frame at this place; under an open plan there may be none with it. */
@@ -267,7 +262,7 @@ static int64_t index_at(const npg_worker *worker, int64_t place)
     const npg_facts *facts = npg_worker_facts(worker);
     npg_pass pass = npg_worker_pass(worker);
     if (pass == NPG_PASS_CHOOSE) return facts->choice.frames[place];
-    return pass == NPG_PASS_SOLVE || pass == NPG_PASS_FUSE ? npg_live_frame(&facts->plan, place) : place;
+    return pass == NPG_PASS_SOLVE || pass == NPG_PASS_FUSE ? npg_plan_frame(&facts->plan, place) : place;
 }
 
 static npg_status next_from_files(npg_worker *worker, npg_chunk *chunk)
@@ -337,7 +332,7 @@ static npg_status next_from_source(npg_worker *worker, npg_chunk *chunk)
 /* Under an open plan frames behind the end never came. */
 static int64_t resumed_place(const npg_facts *facts)
 {
-    return facts->is_live ? npg_live_next_place(&facts->plan, facts->resumed_read, facts->frame_count)
+    return facts->is_live ? npg_plan_next_place(&facts->plan, facts->resumed_read, facts->frame_count)
                           : facts->resumed_read;
 }
 

@@ -1,17 +1,12 @@
 /* Live source: frames that come one after the other. */
-#include "ingest/live_source.h"
+#include "ingest/ingest_internal.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "ingest/follow.h"
-#include "ingest/formats/reader.h"
-#include "ingest/frame_files.h"
-#include "ingest/spool.h"
 #include "pipeline/file.h"
-#include "pipeline/live_plan.h"
 
 /* Frames of one gap.  Each becomes a frame of the run, so a number that is damaged or a time stamp must not
  * make millions; set far above what a capture loses. */
@@ -576,7 +571,7 @@ static npg_status walk_again(npg_live_source *live, bool is_done)
         NPG_TRY(npg_spool_get(live->spool, i, &entry, &record));
         bool is_needed =
             !is_done && entry.index >= 0 &&
-            !npg_live_is_read(&facts->plan, entry.index, facts->resumed_read, facts->frame_count);
+            !npg_plan_is_read(&facts->plan, entry.index, facts->resumed_read, facts->frame_count);
         bool is_repeated = !is_done && holds(live) && i == live->came - 1;
         npg_status status = pass_over(live, &entry, record, &place, is_needed || is_repeated, &gone);
         npg_record_close(&record);

@@ -1,5 +1,5 @@
 /* Probe: what a capture holds, and what a run of it would take. */
-#include "ingest/probe.h"
+#include "ingest/ingest_internal.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -9,9 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "ingest/formats/reader.h"
 #include "pipeline/cost.h"
-#include "pipeline/plan.h"
 
 void npg_probe_init(npg_probe *probe)
 {

@@ -1,5 +1,5 @@
 /* Spool: what came from a live source, in a store. */
-#include "ingest/spool.h"
+#include "ingest/ingest_internal.h"
 
 #include <string.h>
 #include <xxhash.h>

@@ -1,8 +1,7 @@
 /* Stream: frames one after the other from a pipe. */
 #include <string.h>
 
-#include "ingest/formats/formats_internal.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest_internal.h"
 
 struct npg_stream {
     npg_source *source; /* owned */

@@ -7,8 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "ingest/live_source.h"
-#include "ingest/spool.h"
+#include "ingest/ingest.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"
@@ -102,8 +101,8 @@ static npg_status begin_append(npg_worker *worker, npg_job *job)
     *npg_own(worker, resumed_read) = 0;
     NPG_TRY(npg_job_extend(job));
     NPG_TRY(remove_done(worker));
-    NPG_TRY(npg_frame_log_shorten(npg_worker_settings(worker)->output, npg_plan_window(&facts->plan, 0).first,
-                                  &lines, &bytes));
+    NPG_TRY(npg_frame_log_shorten(npg_worker_settings(worker)->output,
+                                  npg_plan_window(&facts->plan, 0, -1).first, &lines, &bytes));
     npg_job_set_exported(job, lines, bytes);
     return NPG_OK;
 }

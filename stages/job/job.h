@@ -5,7 +5,7 @@
  *                                  process
  *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
  *                                  sizes, times and checksums
- *     OUT/job/frames.npg           what came from a live source, frame by frame (ingest/spool.h)
+ *     OUT/job/frames.npg           what came from a live source, frame by frame (ingest/spool.c)
  *     OUT/job/store.npg            one file of records with checksums, each whole or not there (store.h): after
  *                                  each solved window a state, with the facts of the capture, the reference
  *                                  mesh in unit coordinates, what stages need to be resumed, the optimiser,
@@ -130,7 +130,7 @@ npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment);
 int64_t npg_job_serial(const npg_job *job);         /* of the newest window's state, -1 while there is none */
 int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
 
-/* ---- the frames of a live run (ingest/spool.h) ---- */
+/* ---- the frames of a live run (ingest/spool.c) ---- */
 
 #define NPG_BLOCK_FRAMES "frames" /* of a state: how many had come */
 

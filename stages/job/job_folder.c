@@ -13,7 +13,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "ingest/spool.h"
+#include "ingest/ingest.h"
 #include "job/frame_log.h"
 #include "pipeline/file.h"
 
@@ -29,7 +29,7 @@ struct npg_job {
     json_t *then, *now;  /* owned; what an earlier run was made of, and this one; NULL once written */
     int64_t frame_count; /* of the input, gaps included */
     npg_store *store;    /* owned */
-    npg_store *frames;   /* of a live source (ingest/spool.h); owned, or NULL */
+    npg_store *frames;   /* of a live source (ingest/spool.c); owned, or NULL */
     npg_record *state;   /* that the run is resumed from; owned */
     int64_t serial;      /* of the newest state in place, -1: none */
     int64_t forward_serial;

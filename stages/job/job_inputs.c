@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "ingest/capture.h"
+#include "ingest/ingest.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 

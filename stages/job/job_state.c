@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/spool.h"
+#include "ingest/ingest.h"
 #include "job/frame_log.h"
 #include "job/job.h"
 #include "job/state_mesh.h"

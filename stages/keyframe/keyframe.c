@@ -19,8 +19,8 @@
 #include "job/job.h"
 #include "keyframe/keyframe_internal.h"
 #include "pipeline/cost.h"
-#include "pipeline/live_plan.h"
 #include "pipeline/order.h"
+#include "pipeline/plan.h"
 
 #define SHOWN_SCORES 5
 #define NO_NUMBER    (-1)
@@ -278,7 +278,7 @@ static void report_windows(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     if (is_open(facts)) return;
     json_object_set_new(npg_worker_report(worker), "windows",
-                        json_integer((json_int_t)npg_live_window_count(&facts->plan, facts->frame_count)));
+                        json_integer((json_int_t)npg_plan_window_count(&facts->plan, facts->frame_count)));
 }
 
 static npg_plan plan_around(const keyframe_state *state, const npg_facts *facts, int64_t key)

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 
 #define LOOKED_AT 1000
 #define KEPT      20000 /* vertices, and points of a frame, that may be the nearest */

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "pipeline/live_plan.h"
+#include "pipeline/plan.h"
 
 #define BLOCK     1024 /* points turned into unit coordinates at a time */
 #define TOLD_EACH 5    /* frames outside the box that are named one by one */
@@ -88,7 +88,7 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
     for (size_t i = 0; saved && i < size / sizeof *saved; i++) {
         npg_outside_frame one;
         memcpy(&one, saved + i, sizeof one);
-        if (npg_live_is_read(&facts->plan, one.index, facts->resumed_read, facts->frame_count))
+        if (npg_plan_is_read(&facts->plan, one.index, facts->resumed_read, facts->frame_count))
             NPG_TRY(add(outside, &one));
     }
     return NPG_OK;

@@ -4,7 +4,7 @@
 
 #include "align/tracking.h"
 #include "geometry/geometry.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "mesh/mesh_internal.h"
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "job/vdb_file.h"
-#include "pipeline/live_plan.h"
+#include "pipeline/plan.h"
 
 typedef struct saved_progress {
     int64_t window_at, is_aligned, total;
@@ -87,7 +87,7 @@ static npg_status put_hand(npg_store *out, const npg_facts *facts, const npg_han
 
 static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
 {
-    npg_window window = npg_live_window(&facts->plan, hand->window_at, hand->total);
+    npg_window window = npg_plan_window(&facts->plan, hand->window_at, hand->total);
     npg_vdb_place place = {.unit_per_world = facts->box.scale,
                            .frame_first = window.first,
                            .frame_last = window.last,
@@ -98,7 +98,7 @@ static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
 
 static npg_status put_first(npg_store *out, const npg_facts *facts, const npg_hand *hand)
 {
-    bool is_needed = npg_live_is_first_needed_after(&facts->plan, hand->window_at, hand->total);
+    bool is_needed = npg_plan_is_first_needed_after(&facts->plan, hand->window_at, hand->total);
     if (!hand->warm || !is_needed) return NPG_OK;
     return npg_fit_copy_save(npg_warm_first(hand->warm), out, "first");
 }
@@ -152,7 +152,7 @@ static npg_job_moment moment_of(const npg_plan *plan, const npg_hand *hand)
 {
     npg_job_moment moment = {.emitted = hand->emitted};
     if (hand->window_at < 0) return moment;
-    moment.read = npg_live_read_before(plan, hand->window_at, hand->total);
+    moment.read = npg_plan_read_before(plan, hand->window_at, hand->total);
     return moment;
 }
 
@@ -237,7 +237,7 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     NPG_TRY(npg_record_get(in, "progress", &progress, sizeof progress));
     NPG_TRY(npg_record_get(in, "planned", &planned, sizeof planned));
     bool is_appending = planned < facts->plan.frame_count;
-    if (is_appending) first_index = npg_plan_window(&facts->plan, 0).first;
+    if (is_appending) first_index = npg_plan_window(&facts->plan, 0, -1).first;
     hand->window_at = is_appending ? -1 : progress.window_at;
     hand->is_aligned = progress.is_aligned != 0;
     hand->total = progress.total;

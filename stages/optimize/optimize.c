@@ -13,8 +13,8 @@
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
 #include "pipeline/json_file.h"
-#include "pipeline/live_plan.h"
 #include "pipeline/options.h"
+#include "pipeline/plan.h"
 
 typedef struct state {
     npg_window_settings window_settings;
@@ -209,8 +209,8 @@ static npg_status open_solver(npg_worker *worker, bool is_aligned)
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     s->is_aligned = is_aligned;
-    s->window_count = npg_live_window_count(&facts->plan, s->total);
-    s->window = npg_live_window(&facts->plan, 0, s->total);
+    s->window_count = npg_plan_window_count(&facts->plan, s->total);
+    s->window = npg_plan_window(&facts->plan, 0, s->total);
     NPG_TRY(npg_window_solver_open(&s->solver, s->device, &s->window_settings, facts,
                                    (uint64_t)npg_worker_settings(worker)->seed, is_aligned));
     if (npg_window_warm(s->solver)) npg_warm_set_keep(npg_window_warm(s->solver), keep_inside);
@@ -323,7 +323,7 @@ static bool is_needed_later(npg_worker *worker, int64_t index)
 {
     state *s = npg_worker_state(worker);
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    return npg_live_is_needed_after(plan, index, s->window_at, s->total);
+    return npg_plan_is_needed_after(plan, index, s->window_at, s->total);
 }
 
 /* Pass a solved frame on; its vertices are now the solved ones. */
@@ -421,7 +421,7 @@ static npg_status resume(npg_worker *worker)
     npg_window_set_noise(s->solver, hand.noise);
     s->window_at = hand.window_at;
     if (s->window_at >= 0) NPG_TRY(emit_done(worker));
-    if (++s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
+    if (++s->window_at < s->window_count) s->window = npg_plan_window(&facts->plan, s->window_at, s->total);
     return NPG_OK;
 }
 
@@ -433,7 +433,7 @@ static npg_status solve_complete_windows(npg_worker *worker)
         NPG_TRY(save_state(worker));
         NPG_TRY(emit_done(worker));
         if (++s->window_at < s->window_count)
-            s->window = npg_live_window(&npg_worker_facts(worker)->plan, s->window_at, s->total);
+            s->window = npg_plan_window(&npg_worker_facts(worker)->plan, s->window_at, s->total);
     }
     return NPG_OK;
 }
@@ -444,8 +444,8 @@ static npg_status solve_the_rest(npg_worker *worker)
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     s->total = facts->frame_count;
-    s->window_count = npg_live_window_count(&facts->plan, s->total);
-    if (s->window_at < s->window_count) s->window = npg_live_window(&facts->plan, s->window_at, s->total);
+    s->window_count = npg_plan_window_count(&facts->plan, s->total);
+    if (s->window_at < s->window_count) s->window = npg_plan_window(&facts->plan, s->window_at, s->total);
     NPG_TRY(solve_complete_windows(worker));
     return emit_done(worker);
 }
@@ -490,7 +490,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_plan *plan = &facts->plan;
-    npg_window window = npg_live_window(plan, 0, -1);
+    npg_window window = npg_plan_window(plan, 0, -1);
     size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;

@@ -106,7 +106,7 @@ static npg_status take_points(npg_window_solver *s, npg_held *const *held)
  * window, so that frames which two windows share mean the same to both.  That window goes from 0 to span. */
 static double time_of(const npg_plan *plan, double span, double index)
 {
-    npg_window first = npg_plan_key_window(plan);
+    npg_window first = npg_plan_key_window(plan, -1);
     int64_t length = first.last - first.first;
     return length ? span * (index - (double)first.first) / (double)length : 0;
 }

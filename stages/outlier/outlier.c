@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "ingest/frame_store.h"
+#include "ingest/ingest.h"
 #include "outlier/normals.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/clock.h"

@@ -15,7 +15,7 @@
 
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"
 

@@ -16,7 +16,7 @@
 #include "export/exporters/exporters_internal.h"
 #include "export/exporters/vdb.h"
 #include "geometry/geometry.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "tests/support/group_folder.h"
 
 enum { V = 5, F = 6 }; /* two tetrahedra on one base: closed */

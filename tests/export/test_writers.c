@@ -8,7 +8,7 @@
 #include <math.h>
 
 #include "export/files.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "tests/support/group_folder.h"
 
 enum { V = 6, F = 4 };

@@ -1,5 +1,5 @@
 /* Fuzz target of the readers, for libFuzzer.  NPG_FUZZ_NAME ("a.ply") says which reader. */
-#include "ingest/formats/reader.h"
+#include "ingest/ingest_internal.h"
 #include "tests/support/fuzz_target.h"
 
 static void read_as_cloud(const char *path)

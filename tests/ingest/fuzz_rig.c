@@ -1,7 +1,7 @@
 /* Fuzz target of rig.json, for libFuzzer: any bytes as the description; the images it names are not there. */
 #include <string.h>
 
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 #include "tests/support/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -2,7 +2,7 @@
  * libFuzzer.  The first byte says which. */
 #include <math.h>
 
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 #include "outlier/outlier_internal.h"
 #include "tests/support/fuzz_target.h"
 

@@ -3,7 +3,7 @@
 #ifndef NPG_TEST_READ_HELPERS_H
 #define NPG_TEST_READ_HELPERS_H
 
-#include "ingest/formats/reader.h"
+#include "ingest/ingest_internal.h"
 #include "tests/support/temp_folder.h"
 
 static temp_folder folder;

@@ -7,7 +7,6 @@
 
 #include <jpeglib.h>
 
-#include "ingest/rig/rig.h"
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/temp_folder.h"

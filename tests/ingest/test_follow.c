@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "ingest/follow.h"
+#include "ingest/ingest_internal.h"
 #include "tests/support/temp_folder.h"
 #include "tests/support/test_chain.h"
 

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "ingest/frame_files.h"
+#include "ingest/ingest_internal.h"
 #include "pipeline/memory.h"
 #include "tests/support/group_folder.h"
 

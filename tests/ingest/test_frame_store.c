@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "ingest/frame_store.h"
+#include "ingest/ingest_internal.h"
 
 enum { FRAMES = 6, POINTS = 100 };
 

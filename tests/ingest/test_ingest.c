@@ -7,7 +7,7 @@
 #include <cmocka.h>
 #include <fcntl.h>
 
-#include "ingest/capture.h"
+#include "ingest/ingest_internal.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"
 

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 #include "pipeline/random.h"
 #include "tests/ingest/rig_helpers.h"
 

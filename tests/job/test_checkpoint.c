@@ -62,14 +62,14 @@ static void check_appended(npg_plan plan)
 {
     int64_t next = 0, solved = plan.appended_at;
     assert_int_equal(npg_plan_read_count(&plan), plan.frame_count - plan.appended_at);
-    for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
-        npg_window window = npg_plan_window(&plan, w);
+    for (int64_t w = 0; w < npg_plan_window_count(&plan, -1); w++) {
+        npg_window window = npg_plan_window(&plan, w, -1);
         assert_int_equal(window.new_first, solved);
         assert_true(window.first >= window.new_first - plan.overlap && window.first >= 0);
         assert_int_equal(window.last, window.new_last);
         for (int64_t i = window.new_first; i <= window.new_last; i++)
             assert_int_equal(npg_plan_frame(&plan, next++), i);
-        assert_int_equal(npg_plan_read_before(&plan, w), next);
+        assert_int_equal(npg_plan_read_before(&plan, w, -1), next);
         solved = window.new_last + 1;
         assert_int_equal(npg_plan_is_last_forward(&plan, w), solved == plan.frame_count);
     }
@@ -86,7 +86,7 @@ static void appended_frames_get_windows_of_their_own(void **state)
                     npg_plan first = {.frame_count = frames, .key = key, .window = 6, .overlap = overlap};
                     npg_plan longer = npg_plan_append(&first, frames + more);
                     npg_plan longest = npg_plan_append(&longer, frames + more + 3);
-                    npg_window was = npg_plan_key_window(&first), is = npg_plan_key_window(&longest);
+                    npg_window was = npg_plan_key_window(&first, -1), is = npg_plan_key_window(&longest, -1);
                     check_appended(longer);
                     check_appended(longest);
                     assert_int_equal(was.first, is.first);
@@ -101,10 +101,10 @@ static void windows_say_what_is_read_before_them(void **state)
         for (int64_t key = 0; key < frames; key++) {
             npg_plan plan = {.frame_count = frames, .key = key, .window = 6, .overlap = 2};
             int64_t sum = 0, ends = 0;
-            for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
-                npg_window window = npg_plan_window(&plan, w);
+            for (int64_t w = 0; w < npg_plan_window_count(&plan, -1); w++) {
+                npg_window window = npg_plan_window(&plan, w, -1);
                 sum += window.new_last - window.new_first + 1;
-                assert_int_equal(npg_plan_read_before(&plan, w), sum);
+                assert_int_equal(npg_plan_read_before(&plan, w, -1), sum);
                 ends += npg_plan_is_last_forward(&plan, w);
             }
             assert_int_equal(ends, 1);

@@ -13,7 +13,6 @@
 #include <sys/wait.h>
 
 #include "pipeline/file.h"
-#include "pipeline/folder.h"
 #include "pipeline/memory.h"
 #include "pipeline/stage.h"
 #include "tests/support/group_folder.h"

@@ -9,7 +9,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include "pipeline/latch.h"
+#include "pipeline/ring.h"
 
 typedef struct waiter {
     npg_latch *latch;

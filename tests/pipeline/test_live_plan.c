@@ -8,7 +8,7 @@
 #include <cmocka.h>
 #include <stdlib.h>
 
-#include "pipeline/live_plan.h"
+#include "pipeline/plan.h"
 
 enum { FRAMES_MAX = 60 };
 
@@ -37,7 +37,7 @@ static void solve(solver *s, const npg_window *window)
     }
     assert_true(window->from < s->window_at);
     if (window->from >= 0) {
-        npg_window from = npg_live_window(&s->plan, window->from, s->total);
+        npg_window from = npg_plan_window(&s->plan, window->from, s->total);
         int64_t first = from.first > window->first ? from.first : window->first;
         int64_t last = from.last < window->last ? from.last : window->last;
         assert_true(last - first + 1 >= s->plan.overlap);
@@ -48,7 +48,7 @@ static void let_go(solver *s, int64_t solved_window)
 {
     for (int64_t t = 0; t < FRAMES_MAX; t++)
         if (s->is_held[t] && s->is_solved[t] &&
-            !npg_live_is_needed_after(&s->plan, t, solved_window, s->total)) {
+            !npg_plan_is_needed_after(&s->plan, t, solved_window, s->total)) {
             s->is_held[t] = 0;
             s->held_count--;
         }
@@ -57,22 +57,22 @@ static void let_go(solver *s, int64_t solved_window)
 /* What a state on disk says of the windows so far: the frames that came for them, and no other. */
 static void check_state(const solver *s)
 {
-    int64_t read = npg_live_read_before(&s->plan, s->window_at, s->total), count = 0;
-    int64_t place = npg_live_next_place(&s->plan, read, s->total);
+    int64_t read = npg_plan_read_before(&s->plan, s->window_at, s->total), count = 0;
+    int64_t place = npg_plan_next_place(&s->plan, read, s->total);
     for (int64_t t = 0; t < FRAMES_MAX && (s->total < 0 || t < s->total); t++) {
-        assert_int_equal(npg_live_is_read(&s->plan, t, read, s->total), s->is_solved[t]);
+        assert_int_equal(npg_plan_is_read(&s->plan, t, read, s->total), s->is_solved[t]);
         count += s->is_solved[t];
     }
     assert_int_equal(read, count);
-    assert_int_equal(npg_live_frame(&s->plan, place - 1), s->came[read - 1]);
+    assert_int_equal(npg_plan_frame(&s->plan, place - 1), s->came[read - 1]);
     if (read < s->came_count && s->total < 0)
-        assert_int_equal(npg_live_frame(&s->plan, place), s->came[read]);
+        assert_int_equal(npg_plan_frame(&s->plan, place), s->came[read]);
 }
 
 static void solve_what_is_complete(solver *s)
 {
-    while (s->window_at < npg_live_window_count(&s->plan, s->total)) {
-        npg_window window = npg_live_window(&s->plan, s->window_at, s->total);
+    while (s->window_at < npg_plan_window_count(&s->plan, s->total)) {
+        npg_window window = npg_plan_window(&s->plan, s->window_at, s->total);
         if (!is_complete(s, &window)) return;
         solve(s, &window);
         check_state(s);
@@ -95,9 +95,9 @@ static void check(npg_plan plan, int64_t total)
     solver s = {.plan = plan, .total = -1};
     int64_t came = 0;
     for (int64_t i = 0; came < total; i++) {
-        int64_t index = npg_live_frame(&plan, i);
+        int64_t index = npg_plan_frame(&plan, i);
         assert_true(index >= 0 && (i || index == plan.key));
-        assert_int_equal(npg_live_place(&plan, index), i);
+        assert_int_equal(npg_plan_place(&plan, index), i);
         if (index >= total) continue;
         take(&s, index);
         came++;
@@ -105,10 +105,10 @@ static void check(npg_plan plan, int64_t total)
     s.total = total;
     solve_what_is_complete(&s);
     let_go(&s, s.window_at - 1); /* what waited for a window that never came */
-    assert_int_equal(s.window_at, npg_live_window_count(&plan, total));
+    assert_int_equal(s.window_at, npg_plan_window_count(&plan, total));
     assert_int_equal(s.held_count, 0);
     for (int64_t t = 0; t < total; t++) assert_true(s.is_solved[t]);
-    int ends_in_first = total <= npg_live_window(&plan, 0, -1).last;
+    int ends_in_first = total <= npg_plan_window(&plan, 0, -1).last;
     assert_true(s.held_max <= (ends_in_first ? plan.key + plan.window : 2 * plan.window));
 }
 
@@ -131,22 +131,22 @@ static void ordinary_plans_are_as_they_were(void **state)
 {
     (void)state;
     npg_plan plan = {.frame_count = 50, .key = 20, .window = 12, .overlap = 4};
-    assert_int_equal(npg_live_window_count(&plan, -1), npg_plan_window_count(&plan));
+    assert_int_equal(npg_plan_window_count(&plan, -1), npg_plan_window_count(&plan, -1));
     for (int64_t i = 0; i < plan.frame_count; i++) {
-        assert_int_equal(npg_live_frame(&plan, i), npg_plan_frame(&plan, i));
-        assert_int_equal(npg_live_place(&plan, npg_plan_frame(&plan, i)), i);
+        assert_int_equal(npg_plan_frame(&plan, i), npg_plan_frame(&plan, i));
+        assert_int_equal(npg_plan_place(&plan, npg_plan_frame(&plan, i)), i);
     }
-    for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
-        npg_window a = npg_live_window(&plan, w, -1), b = npg_plan_window(&plan, w);
+    for (int64_t w = 0; w < npg_plan_window_count(&plan, -1); w++) {
+        npg_window a = npg_plan_window(&plan, w, -1), b = npg_plan_window(&plan, w, -1);
         assert_true(a.first == b.first && a.last == b.last && a.from == b.from);
         assert_true(a.new_first == b.new_first && a.new_last == b.new_last && a.direction == b.direction);
         for (int64_t t = 0; t < plan.frame_count; t++) {
             int is_needed = 0;
-            for (int64_t later = w + 1; later < npg_plan_window_count(&plan); later++) {
-                npg_window window = npg_plan_window(&plan, later);
+            for (int64_t later = w + 1; later < npg_plan_window_count(&plan, -1); later++) {
+                npg_window window = npg_plan_window(&plan, later, -1);
                 is_needed |= t >= window.first && t <= window.last;
             }
-            assert_int_equal(npg_live_is_needed_after(&plan, t, w, -1), is_needed);
+            assert_int_equal(npg_plan_is_needed_after(&plan, t, w, -1), is_needed);
         }
     }
 }

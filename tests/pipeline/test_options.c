@@ -10,7 +10,6 @@
 
 #include "pipeline/memory.h"
 #include "pipeline/options.h"
-#include "pipeline/run_settings.h"
 #include "pipeline/stage.h"
 #include "tests/support/group_folder.h"
 

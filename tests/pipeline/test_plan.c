@@ -13,8 +13,8 @@ static void check_plan(npg_plan plan)
 {
     char *read = calloc((size_t)plan.frame_count, 1), *solved = calloc((size_t)plan.frame_count, 1);
     int64_t next = 0;
-    for (int64_t w = 0; w < npg_plan_window_count(&plan); w++) {
-        npg_window window = npg_plan_window(&plan, w);
+    for (int64_t w = 0; w < npg_plan_window_count(&plan, -1); w++) {
+        npg_window window = npg_plan_window(&plan, w, -1);
         assert_true(window.first >= 0 && window.last < plan.frame_count && window.first <= window.last);
         assert_true(window.from < w);
         for (int64_t i = window.new_first; i <= window.new_last; i++) {

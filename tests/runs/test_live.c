@@ -12,7 +12,7 @@
 #include <stdatomic.h>
 #include <time.h>
 
-#include "pipeline/live_plan.h"
+#include "pipeline/plan.h"
 #include "pipeline/run_internal.h"
 #include "tests/support/test_chain.h"
 
@@ -65,7 +65,7 @@ static npg_status pass_on(npg_worker *worker, int64_t solved_window)
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
     for (size_t i = 0; i < s->count;) {
         npg_frame *frame = &s->held[i];
-        bool is_needed = npg_live_is_needed_after(plan, frame->index, solved_window, s->total);
+        bool is_needed = npg_plan_is_needed_after(plan, frame->index, solved_window, s->total);
         if (!frame->vert_unit || is_needed) {
             i++;
             continue;
@@ -86,8 +86,8 @@ static npg_status solve_complete(npg_worker *worker)
 {
     windower_state *s = npg_worker_state(worker);
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    while (s->window_at < npg_live_window_count(plan, s->total)) {
-        npg_window window = npg_live_window(plan, s->window_at, s->total);
+    while (s->window_at < npg_plan_window_count(plan, s->total)) {
+        npg_window window = npg_plan_window(plan, s->window_at, s->total);
         for (int64_t t = window.first; t <= window.last; t++)
             if (!held_at(s, t)) return NPG_OK;
         NPG_TRY(solve(worker, &window));

@@ -10,7 +10,8 @@
 
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
-#include "pipeline/run_settings.h"
+#include "pipeline/options.h"
+#include "pipeline/stage.h"
 
 npg_status npg_path_from(char **path, const char *folder, const char *text)
 {

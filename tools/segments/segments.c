@@ -11,7 +11,8 @@
 #include <unistd.h>
 
 #include "pipeline/file.h"
-#include "pipeline/run_settings.h"
+#include "pipeline/options.h"
+#include "pipeline/stage.h"
 
 static void log_info(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
 static void log_info(npg_reporter *reporter, const char *format, ...)

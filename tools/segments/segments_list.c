@@ -9,7 +9,6 @@
 
 #include "export/export.h"
 #include "pipeline/file.h"
-#include "pipeline/folder.h"
 #include "pipeline/json_file.h"
 #include "tools/listing.h"
 #include "tools/segments/segments.h"

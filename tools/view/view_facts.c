@@ -75,8 +75,8 @@ static json_t *json_of_windows(const npg_view_part *part)
     if (plan.window <= 0 || plan.window > plan.frame_count) plan.window = plan.frame_count;
     if (plan.overlap >= plan.window) plan.overlap = plan.window - 1;
     if (plan.key < 0 || plan.frame_count > 1000000 || plan.overlap < 0) return windows;
-    for (int64_t i = 0; i < npg_plan_window_count(&plan); i++) {
-        npg_window window = npg_plan_window(&plan, i);
+    for (int64_t i = 0; i < npg_plan_window_count(&plan, -1); i++) {
+        npg_window window = npg_plan_window(&plan, i, -1);
         json_array_append_new(windows, json_pack("[II]", (json_int_t)window.first, (json_int_t)window.last));
     }
     return windows;

@@ -10,7 +10,7 @@
 
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
-#include "ingest/formats/reader.h"
+#include "ingest/ingest.h"
 #include "job/frame_log.h"
 #include "pipeline/json_file.h"
 

@@ -5,7 +5,7 @@
 
 #include "export/exporters/vdb.h"
 #include "job/vdb_file.h"
-#include "pipeline/folder.h"
+#include "pipeline/file.h"
 
 typedef struct latents {
     const char *grids_path;

@@ -1,5 +1,5 @@
 /* Mesh builder: what a reader collects a mesh in. */
-#include "ingest/formats/formats_internal.h"
+#include "ingest/ingest_internal.h"
 
 npg_status npg_builder_reserve(npg_mesh_builder *b, size_t vertices, size_t triangles)
 {

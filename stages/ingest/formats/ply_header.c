@@ -1,5 +1,5 @@
 /* PLY header: what the elements of a PLY file are made of. */
-#include "ingest/formats/formats_internal.h"
+#include "ingest/ingest_internal.h"
 
 #include <string.h>
 

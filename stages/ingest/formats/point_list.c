@@ -1,5 +1,5 @@
 /* Point list: what a reader collects a cloud in. */
-#include "ingest/formats/formats_internal.h"
+#include "ingest/ingest_internal.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/formats_internal.h"
+#include "ingest/ingest_internal.h"
 
 #define HEADER_MAX  65536 /* what version 1 can say; later versions only lift that for field lists */
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */

@@ -3,8 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/formats_internal.h"
-#include "pipeline/source.h"
+#include "ingest/ingest_internal.h"
 
 #define CORNERS_MAX 1024 /* of a polygon; larger ones are damage (set by trial) */
 

@@ -5,8 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ingest/formats/formats_internal.h"
-#include "pipeline/source.h"
+#include "ingest/ingest_internal.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 #define NONE        UINT64_MAX         /* the header has no such line     */

@@ -2,8 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/formats/formats_internal.h"
-#include "pipeline/source.h"
+#include "ingest/ingest_internal.h"
 
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 #define CORNERS_MAX 1024               /* of a polygon; larger ones are damage (set by trial) */

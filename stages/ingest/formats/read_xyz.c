@@ -5,8 +5,7 @@
 #include <strings.h>
 
 #include "geometry/geometry.h"
-#include "ingest/formats/formats_internal.h"
-#include "pipeline/source.h"
+#include "ingest/ingest_internal.h"
 
 #define COLUMNS_MAX    6
 #define UNIT_TOLERANCE 0.02 /* of a normal's length from 1; set by trial, as the next                   */

@@ -1,11 +1,9 @@
 /* Readers: which format a file has, and the calls that do not care. */
-#include "ingest/formats/reader.h"
+#include "ingest/ingest_internal.h"
 
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
-
-#include "ingest/formats/formats_internal.h"
 
 typedef npg_status (*cloud_reader)(npg_frame *frame, npg_source *source, npg_origin *origin);
 

@@ -1,11 +1,10 @@
 /* Camera: projection, its inverse, and rigid poses. */
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "ingest/rig/rig_internal.h"
 
 #define ROTATION_OFF 1e-3 /* |R R' - 1| that rounding in a file with few digits explains */
 #define RAY_STEPS    50   /* of the fixed point; lenses of rigs need about ten           */

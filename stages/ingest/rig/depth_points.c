@@ -15,9 +15,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/rig/rig.h"
 #include "ingest/rig/rig_internal.h"
-#include "pipeline/memory.h"
 
 #define WINDOW    3 /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
 #define FIT_MIN   8 /* pixels of a window that a plane needs                                               */

@@ -3,9 +3,6 @@
 
 #include <string.h>
 
-#include "pipeline/memory.h"
-#include "pipeline/source.h"
-
 void npg_image_clear(npg_image *image)
 {
     npg_release(&image->depth);

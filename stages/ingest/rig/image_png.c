@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "ingest/rig/rig_internal.h"
-#include "pipeline/memory.h"
 
 typedef struct decoder {
     const npg_image_job *job;

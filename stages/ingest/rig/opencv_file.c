@@ -3,9 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/rig/rig.h"
-#include "pipeline/memory.h"
-#include "pipeline/source.h"
+#include "ingest/rig/rig_internal.h"
 
 #define CAMERA_FILE_MAX ((size_t)1 << 20) /* bytes; a camera's file has about a thousand */
 

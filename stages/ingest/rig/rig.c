@@ -1,5 +1,5 @@
 /* Rig: which layout a path is, its frames, and the pose of every shot. */
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 
 #include <dirent.h>
 #include <math.h>
@@ -10,7 +10,6 @@
 #include <xxhash.h>
 
 #include "pipeline/file.h"
-#include "pipeline/memory.h"
 #include "pipeline/order.h"
 
 /* ---- which layout ---- */

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
 #define SOURCES_MAX 4000   /* points of a sight that are looked up in the others             */

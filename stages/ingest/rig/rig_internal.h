@@ -1,10 +1,109 @@
-#ifndef NPG_INGEST_RIG_INTERNAL_H
-#define NPG_INGEST_RIG_INTERNAL_H
+/* Rig, inside: cameras and poses, images, files of others, and the comparison of sensors. */
+#ifndef NPG_RIG_INTERNAL_H
+#define NPG_RIG_INTERNAL_H
 
-#include <stdint.h>
+#include "ingest/ingest_internal.h"
 
-#include "ingest/rig/rig.h"
-#include "pipeline/status.h"
+/* ---- cameras ---- */
+
+/* NPG_BAD_INPUT when sizes or focal lengths are none that a camera has; `where` begins the text. */
+npg_status npg_camera_check(const npg_camera *camera, const char *where);
+
+/* Pixel that a point of the camera's space falls on; false where it is not in front of the camera. */
+bool npg_camera_project(const npg_camera *camera, double pixel[2], const double point[3]);
+
+/* The ray of a pixel as (x, y) = (X / Z, Y / Z); false where the distortion can't be undone there. */
+bool npg_camera_ray(const npg_camera *camera, double ray[2], const double pixel[2]);
+
+/* ---- poses ---- */
+
+void npg_pose_identity(double pose[12]);
+void npg_pose_apply(double out[3], const double pose[12], const double point[3]);
+/* out = a after b; out is neither of them. */
+void npg_pose_combine(double out[12], const double a[12], const double b[12]);
+void npg_pose_invert(double out[12], const double pose[12]); /* of a rotation; out is not pose */
+
+/* NPG_BAD_INPUT when the 3 x 3 part is no rotation (a scale, a shear, a mirror, numbers that are not finite);
+ * what is off by rounding in a file is made exact. */
+npg_status npg_pose_check(double pose[12], const char *where);
+
+/* [R | t] from a quaternion (any length but 0) and a translation. */
+npg_status npg_pose_of_quaternion(double pose[12], const double xyzw[4], const double t[3],
+                                  const char *where);
+
+#define NPG_RIG_SHOTS_MAX 4000000            /* images of one sensor: 18 hours at 60 a second           */
+#define NPG_RIG_TEXT_MAX  ((size_t)64 << 20) /* bytes of a calibration or trajectory file    */
+
+/* ---- between the files of a rig ---- */
+
+npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **sensor, const char *name);
+
+/* Add an image; the paths are copied (NULL stays NULL). */
+npg_status npg_rig_add_shot(npg_rig_sensor *sensor, const npg_rig_shot *shot);
+
+/* Once all shots are there: frames by number or time.  NPG_BAD_INPUT when no image is left, or numbers or
+ * times do not grow. */
+npg_status npg_rig_join(npg_rig *rig);
+
+npg_status npg_rig_load_json(npg_rig *rig);
+npg_status npg_rig_load_redwood(npg_rig *rig);
+npg_status npg_rig_load_tum(npg_rig *rig);
+npg_status npg_rig_load_opencv(npg_rig *rig);
+
+/* Images by lists of "time path" lines (paths from the list's folder), poses by a trajectory with times, or
+ * none (NULL); colours are those nearest in time.  Images without a pose are left out and counted. */
+npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *depth, const char *colour,
+                              const char *poses);
+
+bool npg_rig_ends_with(const char *name, const char *ending);
+
+/* "<rig's folder>/<name>", refused under confine where it leads out; NPG_BAD_INPUT where it is not there and
+ * must be. */
+npg_status npg_rig_path(const npg_rig *rig, char **path, const char *name, bool must_be);
+
+/* intrinsic.json as Open3D writes it: {"width", "height", "intrinsic_matrix": nine numbers, columns first}.
+ * NPG_BAD_INPUT. */
+npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path);
+
+/* Where images are timed, or trajectories come in order: files of "time path" lines and of poses. */
+typedef struct npg_stamped {
+    double time_s;
+    char *path;      /* of lists, owned */
+    double pose[12]; /* of trajectories */
+} npg_stamped;
+
+typedef struct npg_stamped_list {
+    npg_stamped *items; /* owned */
+    size_t count, capacity;
+} npg_stamped_list;
+
+/* "time path" lines as TUM RGB-D has them; # begins a comment; times must grow. */
+npg_status npg_read_image_list(npg_stamped_list *list, const char *path);
+/* "time tx ty tz qx qy qz qw" lines (TUM), or blocks of three integers and a 4 x 4 matrix (Redwood; time_s is
+ * then the place in the file).  The ending .log says Redwood. */
+npg_status npg_read_trajectory(npg_stamped_list *list, const char *path);
+void npg_stamped_clear(npg_stamped_list *list);
+/* The nearest in time within the tolerance, NULL without one. */
+const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s, double tolerance_s);
+
+/* OpenCV's FileStorage, XML or YAML: matrices by name, numbers in rows.  *found is how many numbers there
+ * are, 0 where the name is not in the file; more than `most` is NPG_BAD_INPUT. */
+npg_status npg_opencv_open(char **text, const char *path);
+npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values,
+                             size_t most, size_t *found);
+
+/* What one depth image gave, in the sensor's own axes. */
+typedef struct npg_depth_points {
+    size_t count, capacity;
+    float *pos, *normals; /* N x 3 each, owned                      */
+    uint8_t *colours;     /* N x 4, sRGB, alpha 0: not seen; owned  */
+    uint32_t *pixels;     /* N, y x width + x, growing; owned       */
+    bool has_colours;
+} npg_depth_points;
+
+npg_status npg_depth_points_read(npg_depth_points *points, npg_rig *rig, size_t sensor,
+                                 const npg_rig_shot *shot);
+void npg_depth_points_clear(npg_depth_points *points);
 
 /* Image: depth, mask and colour images of a rig, decoded whole; libpng and libjpeg-turbo do the work.
  *

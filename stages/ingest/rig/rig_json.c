@@ -5,13 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/frame_files.h"
-#include "ingest/rig/rig.h"
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/json_file.h"
-#include "pipeline/memory.h"
-#include "pipeline/source.h"
 
 typedef struct place {
     const char *file;

@@ -6,11 +6,8 @@
 #include <string.h>
 #include <strings.h>
 
-#include "ingest/frame_files.h"
-#include "ingest/rig/rig.h"
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"
-#include "pipeline/memory.h"
 
 /* ---- names of images in a folder ---- */
 

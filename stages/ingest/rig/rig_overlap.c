@@ -5,7 +5,6 @@
 
 #include "geometry/geometry.h"
 #include "ingest/rig/rig_internal.h"
-#include "pipeline/memory.h"
 
 #define SIGHTS_MAX  256    /* read at once: a rig of many sensors is measured in fewer frames   */
 #define SOURCES_MAX 1500   /* points of a sight that are looked up in the others for the overlap */

@@ -2,9 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ingest/formats/formats_internal.h"
-#include "ingest/rig/rig.h"
-#include "pipeline/memory.h"
+#include "ingest/rig/rig_internal.h"
 #include "pipeline/parallel.h"
 
 typedef struct reading {

@@ -1,5 +1,5 @@
 /* Rig report: what comparing sensors found, as JSON and text. */
-#include "ingest/rig/rig.h"
+#include "ingest/rig/rig_internal.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -12,7 +12,6 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
 #define POINTS_MAX 30000 /* of a sight; images with more are thinned to every 2nd, 3rd ... row and column */

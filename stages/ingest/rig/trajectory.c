@@ -3,9 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ingest/rig/rig.h"
-#include "pipeline/memory.h"
-#include "pipeline/source.h"
+#include "ingest/rig/rig_internal.h"
 
 void npg_stamped_clear(npg_stamped_list *list)
 {
