@@ -333,6 +333,133 @@ NPG_API npg_status npg_surface_closest(const npg_surface *surface, npg_surface_h
                                        size_t point_count);
 NPG_API void npg_surface_close(npg_surface **surface);
 
+/* ---- what a capture holds ---- */
+
+/* Of all frames of an input, as neupig probe shows it.  Counts are of frames, or of points. */
+typedef struct npg_capture_facts {
+    size_t struct_size;
+    size_t frames, missing, unreadable; /* those that could not be read are among the frames */
+    size_t with_normals;
+    size_t points_least, points_median, points_most, points_total;
+    size_t not_finite;                       /* points with a coordinate that is no number                */
+    size_t attention;                        /* things that a run would stumble over: in text and json    */
+    double box_low[3], box_high[3];          /* of finite points, world coordinates; infinite without any */
+    uint64_t bytes;                          /* of the files                                              */
+    size_t vertices, window;                 /* that a run with these options would have: V, frames       */
+    double memory_bytes, disk_bytes, time_s; /* what it would take, about, on this machine                */
+    const char *text, *json; /* all of it in lines, and as one JSON object with each frame and sensor     */
+} npg_capture_facts;
+
+/* Read every frame of option input as a run with these options would.  NPG_PARTIAL: something needs attention.
+ * NPG_BAD_INPUT: nothing is there, or (then with *facts, the text is that of the first) frames can't be read
+ * and option keep-going is not set.  NPG_USAGE, NPG_MEMORY.  Takes as long as reading the files; *facts is the
+ * caller's.  Thread-safe. */
+NPG_API npg_status npg_capture_probe(npg_capture_facts **facts, const npg_options *options);
+NPG_API void npg_capture_facts_close(npg_capture_facts **facts);
+
+/* ---- a mesh sequence against a ground truth ---- */
+
+/* Both surfaces are sampled evenly by area.  With a the samples of the prediction, b those of the truth, d the
+ * distance from a sample to the nearest one of the other side, in diagonals of the first truth's box, n their
+ * normals:
+ *
+ *     CD    0.5 (mean d(a,b)^2 + mean d(b,a)^2) x 1e5
+ *     NC    0.5 (mean |n_a . n_b| both ways)
+ *     F     harmonic mean of precision (share of a with d <= tau) and recall (share of b with d <= tau)
+ *     Corr  each vertex is tied to the truth's nearest one in the first frame; their mean distance later on
+ *
+ * What can't be told is NaN: NC without normals, Corr and what follows it without constant topology. */
+typedef struct npg_eval_figures {
+    size_t struct_size;
+    int64_t frames; /* how many; of one frame: its place, from 0 */
+    double cd, cd_to_truth, cd_from_truth, nc, f, precision, recall, corr;
+    size_t vertices, faces, truth_vertices, truth_faces;
+    double diagonal; /* of the first truth's box, in its unit; this and the rest: of the sequence alone */
+    double jitter;   /* mean |p(t-1) - 2 p(t) + p(t+1)| of the vertices, in diagonals                   */
+    double edge;     /* mean |length(t) / length(0) - 1| of the edges                                   */
+    /* how far a vertex and its neighbours are from having moved as one rigid piece: root mean square of what is
+     * left, in their root mean square distance; mean over vertices and frames */
+    double rigidity;
+    double bad_area; /* share of (face, frame) with an area above 10 or below 0.1 times the face's median */
+    int constant_topology; /* of the predicted meshes */
+} npg_eval_figures;
+
+typedef struct npg_eval_settings {
+    size_t struct_size;
+    const char *predicted; /* a folder of meshes, or of a run's results                              */
+    const char *truth;     /* a folder of meshes, as many, or one that has them in truth/ or gt/     */
+    const char *frames;    /* which of the truth: "a:b:step", or places like "1-5,8"; NULL: all      */
+    int points_only;       /* the truth is point clouds: all its points are samples, without Corr    */
+    size_t samples;        /* on either side; 0: 100000                                              */
+    double tau;            /* of F, in diagonals                                                     */
+    uint64_t seed;         /* the same one gives the same figures                                    */
+    void *user;            /* for the callback: the figures of each frame in turn, a loan; or NULL   */
+    void (*frame)(void *user, const npg_eval_figures *figures);
+} npg_eval_settings;
+
+/* The means over all frames.  NPG_BAD_INPUT: not as many meshes, one that is damaged or has no area;
+ * NPG_USAGE, NPG_MEMORY.  Thread-safe. */
+NPG_API npg_status npg_eval(npg_eval_figures *all, const npg_eval_settings *settings);
+
+/* ---- another mesh, or points, through a run that is done ---- */
+
+/* A point p hangs on the closest place c of the reference (face and weights): in a frame it is
+ * c' + R (p - c), R the rotation of the surface there. */
+typedef struct npg_apply_settings {
+    size_t struct_size;
+    const char *job;    /* output folder of the run; its meshes are still there                           */
+    const char *mesh;   /* a file of a mesh or of points, in the coordinates of the job's reference.ply   */
+    const char *output; /* folder for <prefix>_<number>.<ending>, and done.json, which comes last         */
+    const char *prefix; /* NULL: "frame"                                                                  */
+    const char *ending; /* "ply", "obj", or NULL: as the mesh's own, ply for other points                 */
+    int64_t fps_scale;  /* steps from each frame to the next; above 1 the files are numbered 0, 1, 2 ...  */
+    double far_share;   /* of the reference's diagonal: points farther from it are counted                */
+    int overwrite;      /* files of the same prefix that lie there are removed; else they are refused     */
+} npg_apply_settings;
+
+typedef struct npg_applied {
+    size_t struct_size;
+    size_t frames;                  /* written                                             */
+    size_t point_count, far_count;  /* of the mesh; those too far from the reference       */
+    size_t worst;                   /* the farthest, and how far it is: in the reference's */
+    double worst_dist, worst_share; /* unit, and in its diagonals                          */
+} npg_applied;
+
+/* Filled as far as it got, also on failure.  NPG_USAGE, NPG_BAD_INPUT, NPG_DISK, NPG_MEMORY.  Thread-safe for
+ * different output folders. */
+NPG_API npg_status npg_apply(npg_applied *applied, const npg_apply_settings *settings);
+
+/* ---- pictures of meshes and clouds, without a display ---- */
+
+typedef enum npg_picture_colour {
+    NPG_PICTURE_PLAIN,
+    NPG_PICTURE_VERTEX,  /* the file's own                                                             */
+    NPG_PICTURE_NORMAL,  /* by the direction of the surface                                            */
+    NPG_PICTURE_IDENTITY /* by place in the first mesh: shows that vertices keep their place on the body */
+} npg_picture_colour;
+
+typedef struct npg_picture_settings {
+    size_t struct_size;
+    int64_t width, height;     /* of a tile, pixels; width 0: as what is drawn needs            */
+    int64_t columns;           /* tiles in a row; 0: 8                                          */
+    int64_t samples;           /* rays per pixel and axis; 0: 2                                 */
+    double azimuth, elevation; /* of the eye, degrees; azimuth 0: from the front (+z), 90: from +x */
+    int is_z_up;               /* then from the front is from -y                                */
+    npg_picture_colour colour;
+    double point_size; /* radius of a cloud's points, in diagonals */
+} npg_picture_settings;
+
+typedef struct npg_picture {
+    size_t struct_size;
+    int64_t width, height;             /* pixels                                                       */
+    size_t points_total, points_drawn; /* of the cloud with the most: no more than 200 000 are drawn   */
+} npg_picture;
+
+/* Draw each of `count` files (a mesh or a cloud) into one tile of a PNG at path; all share one camera.
+ * NPG_USAGE: larger than 2^28 pixels; NPG_BAD_INPUT, NPG_DISK, NPG_MEMORY.  Thread-safe. */
+NPG_API npg_status npg_picture_write(npg_picture *picture, const char *path, const char *const *files,
+                                     size_t count, const npg_picture_settings *settings);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,7 +1,6 @@
 /* neupig apply: another mesh, or points, carried through all frames of a finished run. */
 #include <stddef.h>
 
-#include "export/export.h"
 #include "tools/cli.h"
 #include "tools/segments/segments.h"
 
@@ -39,8 +38,8 @@ const npg_option npg_apply_options[] = {
 static npg_status apply(npg_applied *applied, const settings *s, const char *job)
 {
     static const char *const endings[] = {NULL, "ply", "obj"}; /* as the words of --format */
-    const npg_apply_settings all = {job,          s->mesh,      s->output,   s->prefix, endings[s->format],
-                                    s->fps_scale, s->far_share, s->overwrite};
+    const npg_apply_settings all = {sizeof all,         job,          s->mesh,      s->output,   s->prefix,
+                                    endings[s->format], s->fps_scale, s->far_share, s->overwrite};
     NPG_TRY(npg_segments_refuse(job, "apply", false));
     npg_status status = npg_apply(applied, &all);
     if (applied->far_count)
@@ -58,7 +57,7 @@ int npg_verb_apply(int argc, char **argv)
 {
     settings s;
     npg_cli cli;
-    npg_applied applied = {0};
+    npg_applied applied = {.struct_size = sizeof applied};
     npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
     if (!status) status = apply(&applied, &s, cli.operands[0]);
     return npg_cli_end(argv[0], status);

@@ -5,11 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "evaluate/evaluate.h"
-#include "geometry/geometry.h"
-#include "ingest/ingest.h"
+#include "neupig.h"
 #include "tools/cli.h"
-#include "tools/listing.h"
 
 typedef struct settings {
     bool points_only, json, per_frame;
@@ -41,181 +38,107 @@ const npg_option npg_eval_options[] = {
     {0}};
 /* clang-format on */
 
-typedef struct evaluation {
-    settings s;
-    npg_listing predicted, truth;
-    npg_origin origin;
-    npg_sequence *sequence;
-    npg_sequence_figures all;
-    double sizes[4]; /* vertices and faces of prediction and truth */
-    json_t *per_frame;
-} evaluation;
-
-/* ---- input ---- */
-
-static npg_status read_truth(npg_mesh **mesh, const char *path, evaluation *e)
-{
-    return e->s.points_only ? npg_read_points(mesh, path, &e->origin) : npg_read_mesh(mesh, path, &e->origin);
-}
-
-static npg_status list_side(npg_listing *listing, const char *folder, const char *subfolders,
-                            const char *endings)
-{
-    char *path;
-    NPG_TRY(npg_subfolder(&path, folder, subfolders));
-    npg_status status = npg_listing_add(listing, path, endings);
-    npg_release(&path);
-    return status;
-}
-
-static npg_status select_frames(evaluation *e)
-{
-    npg_selection selection;
-    size_t whole = e->truth.count;
-    NPG_TRY(npg_selection_parse(&selection, e->s.frames));
-    if (e->predicted.count == whole) npg_listing_keep(&e->predicted, &selection);
-    npg_listing_keep(&e->truth, &selection);
-    npg_selection_clear(&selection);
-    if (!e->truth.count)
-        return npg_error(NPG_USAGE, "option frames: %s selects none of %zu frames", e->s.frames, whole);
-    return NPG_OK;
-}
-
-static npg_status list_both(evaluation *e, const npg_cli *cli)
-{
-    static const char meshes[] = ".ply .obj", clouds[] = ".ply .obj .xyz .xyzn .txt .pts .npy .pcd";
-    bool points = e->s.points_only;
-    NPG_TRY(list_side(&e->predicted, cli->operands[0], "meshes", meshes));
-    NPG_TRY(list_side(&e->truth, cli->operands[1], points ? "points" : "truth gt", points ? clouds : meshes));
-    size_t whole = e->truth.count;
-    NPG_TRY(select_frames(e));
-    if (e->predicted.count != e->truth.count)
-        return npg_error(NPG_BAD_INPUT,
-                         "%s has %zu meshes, %s has %zu frames (%zu in all); select with --frames",
-                         cli->operands[0], e->predicted.count, cli->operands[1], e->truth.count, whole);
-    return NPG_OK;
-}
-
-/* ---- figures ---- */
+/* ---- output ---- */
 
 static void set_real(json_t *object, const char *name, double value)
 {
     json_object_set_new(object, name, isfinite(value) ? json_real(value) : json_null());
 }
 
-static json_t *json_of_metrics(const npg_frame_metrics *m)
+static json_t *json_of_figures(const npg_eval_figures *m)
 {
+    const struct {
+        const char *name;
+        double value;
+    } figures[] = {{"CD", m->cd},
+                   {"CD_pred_to_gt", m->cd_to_truth},
+                   {"CD_gt_to_pred", m->cd_from_truth},
+                   {"NC", m->nc},
+                   {"F", m->f},
+                   {"precision", m->precision},
+                   {"recall", m->recall}};
     json_t *object = json_object();
-    set_real(object, "CD", m->cd);
-    set_real(object, "CD_pred_to_gt", m->cd_to_truth);
-    set_real(object, "CD_gt_to_pred", m->cd_from_truth);
-    set_real(object, "NC", m->nc);
-    set_real(object, "F", m->f);
-    set_real(object, "precision", m->precision);
-    set_real(object, "recall", m->recall);
+    for (size_t i = 0; i < sizeof figures / sizeof *figures; i++)
+        set_real(object, figures[i].name, figures[i].value);
     return object;
 }
 
-static void tell_frame(evaluation *e, size_t t, const npg_frame_metrics *m, double corr)
+typedef struct told {
+    const settings *s;
+    json_t *frames;
+} told;
+
+static void tell_frame(void *user, const npg_eval_figures *m)
 {
-    json_t *line = json_of_metrics(m);
-    json_object_set_new(line, "frame", json_integer((json_int_t)t));
-    set_real(line, "Corr", corr);
-    json_array_append_new(e->per_frame, line);
-    if (!e->s.per_frame || e->s.json) return;
-    printf("%5zu  CD %9.4f  NC %7.5f  F %7.5f", t, m->cd, m->nc, m->f);
-    if (isfinite(corr)) printf("  Corr %8.6f", corr);
+    told *t = user;
+    json_t *line = json_of_figures(m);
+    json_object_set_new(line, "frame", json_integer(m->frames));
+    set_real(line, "Corr", m->corr);
+    json_array_append_new(t->frames, line);
+    if (!t->s->per_frame || t->s->json) return;
+    printf("%5lld  CD %9.4f  NC %7.5f  F %7.5f", (long long)m->frames, m->cd, m->nc, m->f);
+    if (isfinite(m->corr)) printf("  Corr %8.6f", m->corr);
     putchar('\n');
 }
 
-static npg_status eval_frame(evaluation *e, size_t t, npg_mesh *predicted, npg_mesh *truth)
+static void print_json(const npg_eval_figures *e, const told *t)
 {
-    npg_frame_metrics m;
-    double corr;
-    if (t == 0) {
-        e->sizes[0] = (double)predicted->vert_count;
-        e->sizes[1] = (double)predicted->face_count;
-        e->sizes[2] = (double)truth->vert_count;
-        e->sizes[3] = (double)truth->face_count;
-    }
-    NPG_TRY(npg_error_prefix(npg_sequence_add(e->sequence, &m, &corr, predicted, truth), "%s, %s",
-                             e->predicted.paths[t], e->truth.paths[t]));
-    tell_frame(e, t, &m, corr);
-    return NPG_OK;
-}
-
-static npg_status eval_all(evaluation *e)
-{
-    const npg_metrics_settings asked = {
-        .sample_count = (size_t)e->s.samples, .tau = e->s.tau, .seed = (uint64_t)e->s.seed};
-    NPG_TRY(npg_sequence_open(&e->sequence, &asked, e->s.points_only));
-    for (size_t t = 0; t < e->truth.count; t++) {
-        npg_mesh *predicted = NULL, *truth = NULL;
-        npg_status status = read_truth(&truth, e->truth.paths[t], e);
-        if (!status) status = npg_read_mesh(&predicted, e->predicted.paths[t], &e->origin);
-        if (!status) status = npg_mesh_require_finite(predicted, e->predicted.paths[t]);
-        if (!status) status = npg_mesh_require_finite(truth, e->truth.paths[t]);
-        if (!status) status = eval_frame(e, t, predicted, truth);
-        npg_mesh_unref(&predicted);
-        npg_mesh_unref(&truth);
-        NPG_TRY(status);
-    }
-    return npg_sequence_figures_of(&e->all, e->sequence);
-}
-
-/* ---- output ---- */
-
-static void print_json(const evaluation *e)
-{
-    const npg_sequence_figures *all = &e->all;
-    json_t *object = json_of_metrics(&all->mean);
-    json_object_set_new(object, "frames", json_integer((json_int_t)e->truth.count));
-    json_object_set_new(object, "samples", json_integer((json_int_t)e->s.samples));
-    set_real(object, "tau", e->s.tau);
-    set_real(object, "diagonal", all->diagonal);
-    set_real(object, "Corr", all->corr);
-    set_real(object, "jitter", all->jitter);
-    set_real(object, "edge", all->edge);
-    set_real(object, "rigidity", all->rigid);
-    set_real(object, "bad_area", all->bad);
-    json_object_set_new(object, "pred_constant_topology", json_boolean(all->topology_last));
-    static const char *const names[] = {"pred_vertices", "pred_faces", "gt_vertices", "gt_faces"};
-    for (int i = 0; i < 4; i++) json_object_set_new(object, names[i], json_integer((json_int_t)e->sizes[i]));
-    json_object_set(object, "per_frame", e->per_frame);
+    json_t *object = json_of_figures(e);
+    json_t *more =
+        json_pack("{sI sI sI sI sI sI sb}", "frames", (json_int_t)e->frames, "samples",
+                  (json_int_t)t->s->samples, "pred_vertices", (json_int_t)e->vertices, "pred_faces",
+                  (json_int_t)e->faces, "gt_vertices", (json_int_t)e->truth_vertices, "gt_faces",
+                  (json_int_t)e->truth_faces, "pred_constant_topology", e->constant_topology);
+    set_real(more, "tau", t->s->tau);
+    set_real(more, "diagonal", e->diagonal);
+    set_real(more, "Corr", e->corr);
+    set_real(more, "jitter", e->jitter);
+    set_real(more, "edge", e->edge);
+    set_real(more, "rigidity", e->rigidity);
+    set_real(more, "bad_area", e->bad_area);
+    json_object_update(object, more);
+    json_object_set(object, "per_frame", t->frames);
     char *text = json_dumps(object, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     puts(text ? text : "{}");
     free(text);
+    json_decref(more);
     json_decref(object);
 }
 
-static void print_text(const evaluation *e)
+static void print_text(const npg_eval_figures *e, const settings *s)
 {
-    const npg_sequence_figures *all = &e->all;
-    const npg_frame_metrics *mean = &all->mean;
-    printf("frames %zu  CD %.4f (to truth %.4f, from truth %.4f)", e->truth.count, mean->cd,
-           mean->cd_to_truth, mean->cd_from_truth);
-    if (isfinite(mean->nc)) printf("  NC %.4f", mean->nc);
-    printf("  F-%g%% %.4f", 100 * e->s.tau, mean->f);
-    if (isfinite(all->corr)) printf("  Corr %.5f", all->corr);
-    printf("\nconstant topology %s", all->topology_last ? "yes" : "no");
-    if (isfinite(all->jitter)) printf("  jitter %.3g", all->jitter);
-    if (isfinite(all->edge))
-        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", all->edge, all->rigid, all->bad);
+    printf("frames %lld  CD %.4f (to truth %.4f, from truth %.4f)", (long long)e->frames, e->cd,
+           e->cd_to_truth, e->cd_from_truth);
+    if (isfinite(e->nc)) printf("  NC %.4f", e->nc);
+    printf("  F-%g%% %.4f", 100 * s->tau, e->f);
+    if (isfinite(e->corr)) printf("  Corr %.5f", e->corr);
+    printf("\nconstant topology %s", e->constant_topology ? "yes" : "no");
+    if (isfinite(e->jitter)) printf("  jitter %.3g", e->jitter);
+    if (isfinite(e->edge))
+        printf("  edge change %.3g  rigidity %.3g  bad areas %.3g", e->edge, e->rigidity, e->bad_area);
     putchar('\n');
 }
 
 int npg_verb_eval(int argc, char **argv)
 {
-    evaluation e = {.per_frame = json_array()};
+    settings s;
     npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &e.s, NULL, argc, argv);
-    if (!status) status = list_both(&e, &cli);
-    if (!status) status = eval_all(&e);
-    if (!status && e.s.json) print_json(&e);
-    if (!status && !e.s.json) print_text(&e);
-    npg_listing_close(&e.predicted);
-    npg_listing_close(&e.truth);
-    npg_sequence_close(&e.sequence);
-    json_decref(e.per_frame);
+    npg_eval_figures found = {.struct_size = sizeof found};
+    told t = {&s, json_array()};
+    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
+    if (!status)
+        status = npg_eval(&found, &(npg_eval_settings){.struct_size = sizeof(npg_eval_settings),
+                                                       .predicted = cli.operands[0],
+                                                       .truth = cli.operands[1],
+                                                       .frames = s.frames,
+                                                       .points_only = s.points_only,
+                                                       .samples = (size_t)s.samples,
+                                                       .seed = (uint64_t)s.seed,
+                                                       .tau = s.tau,
+                                                       .user = &t,
+                                                       .frame = tell_frame});
+    if (!status && s.json) print_json(&found, &t);
+    if (!status && !s.json) print_text(&found, &s);
+    json_decref(t.frames);
     return npg_cli_end(argv[0], status);
 }

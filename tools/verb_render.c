@@ -1,9 +1,8 @@
 /* neupig render: meshes and clouds to a PNG, without a display. */
 #include <stddef.h>
 
-#include "export/export.h"
+#include "ingest/ingest.h"
 #include "tools/cli.h"
-#include "tools/listing.h"
 
 typedef struct settings {
     const char *output;
@@ -61,9 +60,9 @@ static void thin_out(npg_listing *files, size_t count)
 
 static npg_status list_files(npg_listing *files, const settings *s, const npg_cli *cli)
 {
-    static const char endings[] = ".ply .obj .xyz .xyzn .txt .pts .npy .pcd";
     if (!s->output[0]) return npg_error(NPG_USAGE, "no picture to write; say where with -o FILE.png");
-    for (int i = 0; i < cli->operand_count; i++) NPG_TRY(npg_listing_add(files, cli->operands[i], endings));
+    for (int i = 0; i < cli->operand_count; i++)
+        NPG_TRY(npg_listing_add(files, cli->operands[i], NPG_CLOUDS));
     thin_out(files, (size_t)s->count);
     return NPG_OK;
 }
@@ -72,17 +71,18 @@ static npg_status draw(const npg_listing *files, const settings *s)
 {
     /* as the words of --view */
     static const double angles[][2] = {{0, 0}, {0, 0}, {180, 0}, {-90, 0}, {90, 0}, {0, 90}, {0, -90}};
-    const npg_picture_settings all = {.width = s->width,
+    const npg_picture_settings all = {.struct_size = sizeof all,
+                                      .width = s->width,
                                       .height = s->height,
-                                      .columns = s->columns ? s->columns : 8,
+                                      .columns = s->columns,
                                       .samples = s->samples,
                                       .azimuth = s->view ? angles[s->view][0] : s->azimuth,
                                       .elevation = s->view ? angles[s->view][1] : s->elevation,
                                       .is_z_up = s->up,
-                                      .colour = s->colour,
+                                      .colour = (npg_picture_colour)s->colour,
                                       .point_size = 0.01 * s->point_size};
-    npg_picture picture;
-    NPG_TRY(npg_picture_write(&picture, s->output, files->paths, files->count, &all));
+    npg_picture picture = {.struct_size = sizeof picture};
+    NPG_TRY(npg_picture_write(&picture, s->output, (const char *const *)files->paths, files->count, &all));
     if (picture.points_drawn < picture.points_total)
         fprintf(stderr, "neupig render: drew %zu of %zu points\n", picture.points_drawn,
                 picture.points_total);

@@ -1,6 +1,4 @@
 /* Apply: another mesh, or points, carried through all frames of a finished run. */
-#include "export/apply.h"
-
 #include <dirent.h>
 #include <errno.h>
 #include <jansson.h>
@@ -15,6 +13,7 @@
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
+#include "pipeline/struct_size.h"
 
 #define PATH_SIZE 4096
 
@@ -25,7 +24,7 @@ typedef struct moment { /* a solved frame */
 } moment;
 
 typedef struct applying {
-    const npg_apply_settings *s;
+    const npg_apply_settings *s; /* prefix and steps are known */
     npg_arena arena;
     npg_origin origin;
     npg_mesh *reference, *carried;
@@ -398,13 +397,21 @@ static npg_status apply(applying *a)
 
 npg_status npg_apply(npg_applied *applied, const npg_apply_settings *settings)
 {
-    applying a = {.s = settings, .applied = applied, .arena = {.purpose = NPG_FOR_MESH}};
-    *applied = (npg_applied){0};
+    npg_apply_settings own;
+    npg_applied found = {.struct_size = sizeof found};
+    NPG_TRY(npg_struct_take(&own, sizeof own, settings, NPG_SIZE_UP_TO(npg_apply_settings, overwrite),
+                            "the settings"));
+    NPG_REQUIRE(applied && own.job && own.mesh && own.output);
+    if (!own.prefix) own.prefix = "frame";
+    if (own.fps_scale < 1) own.fps_scale = 1;
+    applying a = {.s = &own, .applied = &found, .arena = {.purpose = NPG_FOR_MESH}};
     npg_status status = apply(&a);
     npg_file_discard(&a.done);
     npg_attach_close(&a.attachment);
     npg_mesh_unref(&a.reference);
     npg_mesh_unref(&a.carried);
     npg_arena_release(&a.arena);
-    return status;
+    npg_status given =
+        npg_struct_give(applied, &found, sizeof found, NPG_SIZE_UP_TO(npg_applied, worst_share), "applied");
+    return status ? status : given;
 }

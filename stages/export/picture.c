@@ -1,5 +1,5 @@
 /* Pictures: cameras that fit a box, tiles traced by rays, PNG files. */
-#include "export/picture.h"
+#include "export/exporters/exporters_internal.h"
 
 #include <math.h>
 #include <png.h>
@@ -7,6 +7,7 @@
 
 #include "geometry/geometry.h"
 #include "pipeline/file.h"
+#include "pipeline/struct_size.h"
 
 #define RADIANS (3.14159265358979323846 / 180)
 
@@ -23,7 +24,7 @@ typedef struct camera {
 typedef struct drawing {
     const npg_picture_settings *s;
     npg_picture *picture;
-    char *const *files;
+    const char *const *files;
     npg_origin origin;
     npg_bounds reach; /* along the eye's axes */
     camera eye;
@@ -247,17 +248,25 @@ static npg_status draw(drawing *d, const char *path, size_t count)
     return write_png(d, path);
 }
 
-npg_status npg_picture_write(npg_picture *picture, const char *path, char *const *files, size_t count,
+npg_status npg_picture_write(npg_picture *picture, const char *path, const char *const *files, size_t count,
                              const npg_picture_settings *settings)
 {
-    drawing d = {.s = settings,
-                 .picture = picture,
+    npg_picture_settings own;
+    npg_picture made = {.struct_size = sizeof made};
+    drawing d = {.s = &own,
+                 .picture = &made,
                  .files = files,
                  .reach = npg_bounds_empty(),
                  .arena = {.purpose = NPG_FOR_FILES}};
-    *picture = (npg_picture){0};
+    NPG_TRY(npg_struct_take(&own, sizeof own, settings, NPG_SIZE_UP_TO(npg_picture_settings, point_size),
+                            "the settings"));
+    NPG_REQUIRE(picture && path && files && count && own.height > 0);
+    if (own.columns < 1) own.columns = 8;
+    if (own.samples < 1) own.samples = 2;
     npg_status status = draw(&d, path, count);
     npg_mesh_unref(&d.first);
     npg_arena_release(&d.arena);
-    return status;
+    NPG_TRY(status);
+    return npg_struct_give(picture, &made, sizeof made, NPG_SIZE_UP_TO(npg_picture, points_drawn),
+                           "the picture");
 }

@@ -1,5 +1,5 @@
 /* Scenes to draw: a mesh, or a cloud as small balls, with colours. */
-#include "export/picture.h"
+#include "export/exporters/exporters_internal.h"
 
 #include <errno.h>
 #include <math.h>
@@ -105,11 +105,11 @@ static void colour_vertex(float *colour, const npg_mesh *mesh, size_t v, int kin
     for (size_t k = 0; k < 3; k++) {
         double extent = bounds->hi[k] - bounds->lo[k];
         colour[k] = plain[k];
-        if (kind == NPG_COLOUR_VERTEX && mesh->vert_colours)
+        if (kind == NPG_PICTURE_VERTEX && mesh->vert_colours)
             colour[k] = (float)mesh->vert_colours[4 * v + k] / 255;
-        if (kind == NPG_COLOUR_NORMAL && mesh->vert_normals)
+        if (kind == NPG_PICTURE_NORMAL && mesh->vert_normals)
             colour[k] = 0.5f + 0.5f * mesh->vert_normals[3 * v + k];
-        if (kind == NPG_COLOUR_IDENTITY && extent > 0)
+        if (kind == NPG_PICTURE_IDENTITY && extent > 0)
             colour[k] =
                 (float)(0.15 + 0.8 * ((double)identity->vert_pos[3 * v + k] - bounds->lo[k]) / extent);
     }
@@ -176,7 +176,7 @@ static npg_status make_balls(npg_scene *scene, npg_mesh *cloud, double radius)
 /* ---- scenes ---- */
 
 npg_status npg_scene_open(npg_scene *scene, const char *path, npg_origin *origin, double ball_radius,
-                          int colour, const npg_mesh *first)
+                          npg_picture_colour colour, const npg_mesh *first)
 {
     npg_mesh *mesh = NULL;
     bool faces;

@@ -308,6 +308,27 @@ npg_status npg_capture_list(npg_frame_files **list, const npg_options *options);
 /* The same with another selection than option frames says, and with the gaps of that selection. */
 npg_status npg_capture_select(npg_frame_files **list, const npg_options *options, const char *selection);
 
+/* Listing: files of a folder in natural order. */
+
+#define NPG_CLOUDS ".ply .obj .xyz .xyzn .txt .pts .npy .pcd" /* endings of all that is read */
+
+typedef struct npg_listing {
+    char **paths; /* count of them, owned */
+    size_t count, room;
+} npg_listing;
+
+/* Add a file, or the files of a folder whose names end in one of `endings` (".ply .obj"), numbers in names
+ * compared as numbers.  NPG_BAD_INPUT when the path does not exist or the folder has no such file. */
+npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings);
+void npg_listing_close(npg_listing *listing);
+
+/* Keep the entries at the selected positions; a number in the selection is a position too, counted from 0. */
+void npg_listing_keep(npg_listing *listing, const npg_selection *selection);
+
+/* Where `folder` has a sub-folder of one of `names` ("truth gt"), that one's path, else the folder's own;
+ * to be given to npg_release(). */
+npg_status npg_subfolder(char **out, const char *folder, const char *names);
+
 /* Frame store: frames kept for the passes that bring them again, in memory up to a limit and beyond it in a
  * file without a name, which is gone with the run whatever ends it.
  *

@@ -58,6 +58,11 @@ setup() {
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     [ -s out/done.json ]
+    # shellcheck disable=SC2046
+    cc -std=c11 -Wall -Werror "$consumer/results.c" -o results $(pkg-config --cflags --libs neupig)
+    ./results capture out
+    [ -s carried/done.json ]
+    [ -s two.png ]
 }
 
 @test "nothing that is installed names the folder it was built in" {

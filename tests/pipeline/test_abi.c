@@ -106,6 +106,41 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_result, coverage, 64),
                                  AT(npg_result, vertex_colours, 72),
                                  SIZE(npg_result, 80),
+                                 AT(npg_capture_facts, points_least, 40),
+                                 AT(npg_capture_facts, box_low, 88),
+                                 AT(npg_capture_facts, bytes, 136),
+                                 AT(npg_capture_facts, time_s, 176),
+                                 AT(npg_capture_facts, json, 192),
+                                 SIZE(npg_capture_facts, 200),
+                                 AT(npg_eval_figures, cd, 16),
+                                 AT(npg_eval_figures, corr, 72),
+                                 AT(npg_eval_figures, vertices, 80),
+                                 AT(npg_eval_figures, diagonal, 112),
+                                 AT(npg_eval_figures, constant_topology, 152),
+                                 SIZE(npg_eval_figures, 160),
+                                 AT(npg_eval_settings, predicted, 8),
+                                 AT(npg_eval_settings, points_only, 32),
+                                 AT(npg_eval_settings, samples, 40),
+                                 AT(npg_eval_settings, seed, 56),
+                                 AT(npg_eval_settings, frame, 72),
+                                 SIZE(npg_eval_settings, 80),
+                                 AT(npg_apply_settings, job, 8),
+                                 AT(npg_apply_settings, ending, 40),
+                                 AT(npg_apply_settings, fps_scale, 48),
+                                 AT(npg_apply_settings, overwrite, 64),
+                                 SIZE(npg_apply_settings, 72),
+                                 AT(npg_applied, frames, 8),
+                                 AT(npg_applied, worst_share, 48),
+                                 SIZE(npg_applied, 56),
+                                 AT(npg_picture_settings, width, 8),
+                                 AT(npg_picture_settings, azimuth, 40),
+                                 AT(npg_picture_settings, is_z_up, 56),
+                                 AT(npg_picture_settings, colour, 60),
+                                 AT(npg_picture_settings, point_size, 64),
+                                 SIZE(npg_picture_settings, 72),
+                                 AT(npg_picture, width, 8),
+                                 AT(npg_picture, points_drawn, 32),
+                                 SIZE(npg_picture, 40),
                                  AT(npg_surface_hit, face, 0),
                                  AT(npg_surface_hit, weights, 4),
                                  AT(npg_surface_hit, dist_sq, 16),
@@ -288,6 +323,48 @@ static void surfaces_that_are_not_there(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
+static void results_that_are_not_there(void **state)
+{
+    const char *const files[] = {"/nowhere.ply"};
+    npg_options *options = NULL;
+    npg_capture_facts *facts = NULL;
+    npg_eval_figures figures = {.struct_size = sizeof figures};
+    npg_eval_settings asked = {.struct_size = sizeof asked, .predicted = "/nowhere", .truth = "/nowhere"};
+    npg_applied applied = {.struct_size = sizeof applied};
+    npg_apply_settings apply = {
+        .struct_size = sizeof apply, .job = "/nowhere", .mesh = "a.ply", .output = "out"};
+    npg_picture picture = {.struct_size = sizeof picture};
+    npg_picture_settings draw = {.struct_size = sizeof draw, .height = 64};
+    (void)state;
+    assert_int_equal(npg_capture_probe(&facts, NULL), NPG_USAGE);
+    assert_int_equal(npg_options_open(&options), NPG_OK);
+    assert_int_equal(npg_options_set(options, "input", "/nowhere"), NPG_OK);
+    assert_int_equal(npg_capture_probe(NULL, options), NPG_USAGE);
+    assert_int_equal(npg_capture_probe(&facts, options), NPG_BAD_INPUT);
+    assert_null(facts);
+    npg_capture_facts_close(&facts);
+    npg_capture_facts_close(NULL);
+    npg_options_close(&options);
+
+    assert_int_equal(npg_eval(NULL, &asked), NPG_USAGE);
+    assert_int_equal(npg_eval(&figures, NULL), NPG_USAGE);
+    assert_int_equal(npg_eval(&figures, &asked), NPG_BAD_INPUT);
+    asked.truth = NULL;
+    assert_int_equal(npg_eval(&figures, &asked), NPG_USAGE);
+
+    assert_int_equal(npg_apply(NULL, &apply), NPG_USAGE);
+    assert_int_equal(npg_apply(&applied, NULL), NPG_USAGE);
+    assert_int_equal(npg_apply(&applied, &apply), NPG_USAGE);
+    apply.mesh = NULL;
+    assert_int_equal(npg_apply(&applied, &apply), NPG_USAGE);
+
+    assert_int_equal(npg_picture_write(NULL, "a.png", files, 1, &draw), NPG_USAGE);
+    assert_int_equal(npg_picture_write(&picture, "a.png", files, 1, NULL), NPG_USAGE);
+    assert_int_equal(npg_picture_write(&picture, "a.png", NULL, 0, &draw), NPG_USAGE);
+    assert_int_equal(npg_picture_write(&picture, "a.png", files, 1, &draw), NPG_BAD_INPUT);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -298,6 +375,7 @@ int main(void)
         cmocka_unit_test(words_are_never_null),
         cmocka_unit_test(options_that_are_not_there),
         cmocka_unit_test(runs_that_are_not_there),
-        cmocka_unit_test(surfaces_that_are_not_there)};
+        cmocka_unit_test(surfaces_that_are_not_there),
+        cmocka_unit_test(results_that_are_not_there)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,7 +13,6 @@
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 #include "tools/batch/batch.h"
-#include "tools/listing.h"
 
 #define CLOUD_ENDINGS ".ply .obj .xyz .xyzn .txt .pts .npy .pcd"
 #define MESH_ENDINGS  ".ply .obj"

@@ -8,9 +8,9 @@
 #include <unistd.h>
 
 #include "export/export.h"
+#include "ingest/ingest.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
-#include "tools/listing.h"
 #include "tools/segments/segments.h"
 
 #define WHOLE   "segments.json"

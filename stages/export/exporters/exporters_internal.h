@@ -260,6 +260,26 @@ npg_status npg_zip_put(npg_zip *zip, size_t member, const void *data, size_t siz
 npg_status npg_zip_commit(npg_zip *zip);
 void npg_zip_discard(npg_zip *zip);
 
+/* ---- scenes to draw: a mesh, or a cloud as small balls, with colours ---- */
+
+typedef struct npg_scene {
+    npg_mesh *mesh; /* what rays meet, with vertex normals; owned */
+    float *colours; /* V x 3, 0..1, owned                         */
+    float
+        *ball_middle; /* clouds: the middle of each ball, owned; ball b has faces 8 b .. 8 b + 7; else NULL */
+    size_t shown, total; /* clouds: points drawn and points there */
+} npg_scene;
+
+/* Read only what a file fills of the space, along three axes (rows of unit length); points that are not
+ * finite are left out.  Added to *reach. */
+npg_status npg_scene_measure(npg_bounds *reach, const char *path, npg_origin *origin, const double axes[9]);
+
+/* Read a file to draw it.  ball_radius: of a cloud's points, in the file's unit.  first: the mesh whose
+ * positions give the identity colours (NULL: this one's own); used when the vertex counts are equal. */
+npg_status npg_scene_open(npg_scene *scene, const char *path, npg_origin *origin, double ball_radius,
+                          npg_picture_colour colour, const npg_mesh *first);
+void npg_scene_close(npg_scene *scene);
+
 /* ---- colours ---- */
 
 /* 0 .. 1, linear light, of sRGB as cameras and scanners write it (IEC 61966-2-1). */

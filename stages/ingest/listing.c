@@ -1,5 +1,5 @@
-/* Listing: files of a folder in natural order, for the verbs that take folders of meshes or clouds. */
-#include "tools/listing.h"
+/* Listing: files of a folder in natural order, for those who take folders of meshes or clouds. */
+#include "ingest/ingest.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -9,7 +9,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "ingest/ingest.h"
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 

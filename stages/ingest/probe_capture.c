@@ -1,0 +1,315 @@
+/* What a capture holds, what a run would trip over, what it would cost: all of it, as numbers and as text
+ * (npg_capture_probe()). */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "ingest/ingest.h"
+#include "pipeline/clock.h"
+#include "pipeline/json_file.h"
+
+typedef struct job {
+    const npg_options *options;
+    const char *input;
+    npg_frame_files *list; /* NULL for standard input             */
+    npg_rig_view *views;   /* per sensor of a rig; owned, or NULL */
+    npg_rig_view *before;  /* the same before option align-sensors; owned, or NULL */
+    npg_probe probe;
+} job;
+
+static bool option_on(const npg_options *options, const char *name)
+{
+    const char *text = npg_options_get(options, name);
+    return text &&
+           (!strcmp(text, "yes") || !strcmp(text, "true") || !strcmp(text, "on") || !strcmp(text, "1"));
+}
+
+/* ---- reading ---- */
+
+static npg_status read_stream(job *j)
+{
+    npg_stream *stream;
+    npg_status status = NPG_OK;
+    double begin_s = npg_clock_s();
+    NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input"));
+    for (int64_t number = 0; !status; number++) {
+        npg_frame frame = {0};
+        status = npg_stream_next(stream, &frame, &j->probe.origin);
+        if (status == NPG_END) break;
+        bool broken = status == NPG_BAD_INPUT; /* nothing behind it can be found again */
+        status = npg_probe_count(&j->probe, status, &frame, "stream", number);
+        if (broken) break;
+    }
+    npg_stream_close(&stream);
+    j->probe.read_s = npg_clock_s() - begin_s;
+    return status == NPG_END ? NPG_OK : status;
+}
+
+#define APART_MOST    0.004 /* of the depth, between what two sensors see: 1 cm at 2.5 m, more than noise */
+#define OVERLAP_LEAST 0.02
+
+/* Sensors against each other; with option align-sensors what they are then read with. */
+static npg_status compare_sensors(job *j, npg_rig_view **views)
+{
+    NPG_TRY(npg_alloc_array(views, NPG_FOR_FILES, j->list->rig->sensor_count, sizeof **views));
+    return npg_frame_files_compare(j->list, *views);
+}
+
+static npg_status align_sensors(job *j)
+{
+    if (!j->list->rig || !option_on(j->options, "align-sensors")) return NPG_OK;
+    NPG_TRY(compare_sensors(j, &j->before));
+    npg_rig_correct(j->list->rig, j->before);
+    return NPG_OK;
+}
+
+static void warn_of_sensor(job *j, size_t s, bool is_any_off)
+{
+    const npg_rig *rig = j->list->rig;
+    const npg_rig_view *v = &j->views[s];
+    const char *name = rig->sensors[s].name;
+    char text[160];
+    npg_rig_describe_pose(text, sizeof text, rig, v);
+    if (v->verdict == NPG_RIG_OFF)
+        npg_probe_warn(&j->probe, "sensor %s: its pose is %s; --align-sensors corrects it", name, text);
+    npg_rig_describe_length(text, sizeof text, rig, v->apart);
+    if (!is_any_off && v->apart > APART_MOST * v->depth)
+        npg_probe_warn(&j->probe, "sensor %s sees surfaces %s beside those that others see: its pose?", name,
+                       text);
+    if (rig->sensor_count > 1 && v->frames && v->overlap < OVERLAP_LEAST)
+        npg_probe_warn(&j->probe, "sensor %s sees almost nothing that others see: its pose?", name);
+}
+
+/* A sensor that is off makes the others seem apart from it, too: then only that one is named. */
+static void warn_of_sensors(job *j)
+{
+    bool is_any_off = false;
+    size_t count = j->list->rig->sensor_count;
+    for (size_t s = 0; s < count; s++) is_any_off = is_any_off || j->views[s].verdict == NPG_RIG_OFF;
+    for (size_t s = 0; s < count; s++) warn_of_sensor(j, s, is_any_off);
+}
+
+static npg_status read_files(job *j)
+{
+    NPG_TRY(npg_capture_list(&j->list, j->options));
+    NPG_TRY(align_sensors(j));
+    double begin_s = npg_clock_s();
+    npg_status status = npg_probe_files(&j->probe, j->list);
+    j->probe.read_s = npg_clock_s() - begin_s;
+    if (!status && j->list->rig) status = compare_sensors(j, &j->views);
+    if (!status && j->list->rig) warn_of_sensors(j);
+    return status;
+}
+
+static npg_status read_all(job *j)
+{
+    npg_status status = strcmp(j->input, "-") ? read_files(j) : read_stream(j);
+    if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
+    return status;
+}
+
+/* ---- output ---- */
+
+static size_t images_of(const npg_rig *rig, size_t s)
+{
+    size_t count = 0;
+    for (size_t f = 0; f < rig->frame_count; f++) count += npg_rig_shot_of(rig, f, s) != NULL;
+    return count;
+}
+
+static void print_pose(FILE *out, const job *j, size_t s)
+{
+    const npg_rig *rig = j->list->rig;
+    char text[160];
+    if (j->before && j->before[s].verdict == NPG_RIG_OFF) {
+        npg_rig_describe_pose(text, sizeof text, rig, &j->before[s]);
+        fprintf(out, "pose      %-12s %s, corrected; then\n", rig->sensors[s].name, text);
+    }
+    npg_rig_describe_pose(text, sizeof text, rig, &j->views[s]);
+    fprintf(out, "pose      %-12s %s\n", rig->sensors[s].name, text);
+}
+
+static void print_sensors(FILE *out, const job *j)
+{
+    const npg_rig *rig = j->list ? j->list->rig : NULL;
+    for (size_t s = 0; rig && j->views && s < rig->sensor_count; s++) {
+        const npg_rig_view *v = &j->views[s];
+        fprintf(out, "sensor    %-12s %zu images, %zu points each", rig->sensors[s].name, images_of(rig, s),
+                v->frames ? v->points / v->frames : 0);
+        char text[160];
+        npg_rig_describe_length(text, sizeof text, rig, v->apart);
+        if (rig->sensor_count > 1)
+            fprintf(out, "; overlap %.0f %%, there %s beside the others", 100 * v->overlap, text);
+        fputc('\n', out);
+    }
+    for (size_t s = 0; rig && j->views && rig->sensor_count > 1 && s < rig->sensor_count; s++)
+        print_pose(out, j, s);
+}
+
+static json_t *json_of_sensors(const job *j)
+{
+    json_t *list = json_array();
+    const npg_rig *rig = j->list->rig;
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        const npg_rig_view *v = &j->views[s];
+        json_t *one = json_pack("{so sI sI sf sf}", "name", npg_json_text(rig->sensors[s].name), "images",
+                                (json_int_t)images_of(rig, s), "points",
+                                (json_int_t)(v->frames ? v->points / v->frames : 0), "overlap", v->overlap,
+                                "apart", v->apart);
+        npg_rig_report_pose(one, v);
+        if (j->before) {
+            json_t *before = json_object();
+            npg_rig_report_pose(before, &j->before[s]);
+            json_object_set_new(one, "before", before);
+        }
+        json_array_append_new(list, one);
+    }
+    return list;
+}
+
+static npg_status set_json(npg_capture_facts *facts, job *j, const npg_estimate *e)
+{
+    npg_probe *p = &j->probe;
+    npg_probe_spread counts = npg_probe_counts(p);
+    const double *origin = p->origin.world, *lo = p->bounds.lo, *hi = p->bounds.hi;
+    bool has_box = lo[0] <= hi[0];
+    json_t *box = has_box ? json_pack("{s:[fff],s:[fff],s:f}", "low", origin[0] + lo[0], origin[1] + lo[1],
+                                      origin[2] + lo[2], "high", origin[0] + hi[0], origin[1] + hi[1],
+                                      origin[2] + hi[2], "diagonal", npg_bounds_diagonal(&p->bounds))
+                          : json_null();
+    json_t *all = json_pack(
+        "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:O,s:{s:I,s:I,s:f,s:f,s:f},s:O}",
+        "input", j->input, "frames", (json_int_t)p->frames, "gaps",
+        (json_int_t)(j->list ? j->list->gap_count : 0), "unreadable", (json_int_t)p->unreadable, "formats",
+        p->formats, "points", "least", (json_int_t)counts.least, "median", (json_int_t)counts.median, "most",
+        (json_int_t)counts.most, "total", (json_int_t)p->point_total, "not_finite", (json_int_t)p->not_finite,
+        "frames_with_normals", (json_int_t)p->with_normals, "box", box, "bytes", (json_int_t)p->bytes,
+        "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
+        "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes, "disk_bytes", e->disk_bytes,
+        "time_s", e->time_s, "per_frame", p->per_frame);
+    if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
+    char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
+    npg_status status =
+        text ? npg_copy_text((char **)&facts->json, text) : npg_error(NPG_MEMORY, "no memory");
+    free(text);
+    json_decref(all);
+    return status;
+}
+
+static void print_text(FILE *out, job *j, const npg_estimate *e)
+{
+    npg_probe *p = &j->probe;
+    npg_probe_spread counts = npg_probe_counts(p);
+    const char *format;
+    json_t *value;
+    size_t i;
+    fprintf(out, "frames    %zu", p->frames);
+    json_object_foreach(p->formats, format, value)
+        fprintf(out, ", %s %d", format, (int)json_integer_value(value));
+    fprintf(out, "; missing %zu, unreadable %zu\n", j->list ? j->list->gap_count : 0, p->unreadable);
+    fprintf(out, "points    %zu to %zu per frame, median %zu; %zu not finite\n", counts.least, counts.most,
+            counts.median, p->not_finite);
+    fprintf(out, "normals   in %zu of %zu frames\n", p->with_normals, p->frames - p->unreadable);
+    if (p->bounds.lo[0] <= p->bounds.hi[0]) {
+        const double *o = p->origin.world, *lo = p->bounds.lo, *hi = p->bounds.hi;
+        fprintf(out, "box       %.6g %.6g %.6g .. %.6g %.6g %.6g, diagonal %.6g\n", o[0] + lo[0],
+                o[1] + lo[1], o[2] + lo[2], o[0] + hi[0], o[1] + hi[1], o[2] + hi[2],
+                npg_bounds_diagonal(&p->bounds));
+    }
+    fprintf(out, "files     %.1f MiB, read in %.2f s\n", (double)p->bytes / 0x1p20, p->read_s);
+    fprintf(out,
+            "estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s "
+            "(%zu vertices, windows of %zu frames; bodies that move fast take twice the time)\n",
+            e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->window);
+    print_sensors(out, j);
+    json_array_foreach(p->attention, i, value) fprintf(out, "attention %s\n", json_string_value(value));
+}
+
+/* Unreadable frames are bad input unless the run would continue without them. */
+static npg_status status_of(const job *j)
+{
+    if (j->probe.unreadable && !option_on(j->options, "keep-going"))
+        return npg_error(NPG_BAD_INPUT, "%s", j->probe.first_fault);
+    return json_array_size(j->probe.attention) ? NPG_PARTIAL : NPG_OK;
+}
+
+static npg_status set_text(npg_capture_facts *facts, job *j, const npg_estimate *e)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *out = open_memstream(&text, &size);
+    if (out) print_text(out, j, e);
+    bool is_whole = out && fclose(out) == 0;
+    npg_status status =
+        is_whole ? npg_copy_text((char **)&facts->text, text) : npg_error(NPG_MEMORY, "no memory");
+    free(text);
+    return status;
+}
+
+static void set_numbers(npg_capture_facts *facts, job *j, const npg_estimate *e)
+{
+    const npg_probe *p = &j->probe;
+    npg_probe_spread counts = npg_probe_counts(&j->probe);
+    facts->frames = p->frames;
+    facts->missing = j->list ? j->list->gap_count : 0;
+    facts->unreadable = p->unreadable;
+    facts->with_normals = p->with_normals;
+    facts->points_least = counts.least;
+    facts->points_median = counts.median;
+    facts->points_most = counts.most;
+    facts->points_total = p->point_total;
+    facts->not_finite = p->not_finite;
+    facts->attention = json_array_size(p->attention);
+    for (int a = 0; a < 3; a++) {
+        facts->box_low[a] = p->origin.world[a] + p->bounds.lo[a];
+        facts->box_high[a] = p->origin.world[a] + p->bounds.hi[a];
+    }
+    facts->bytes = p->bytes;
+    facts->vertices = e->vertices;
+    facts->window = e->window;
+    facts->memory_bytes = e->memory_bytes;
+    facts->disk_bytes = e->disk_bytes;
+    facts->time_s = e->time_s;
+}
+
+static npg_status look(npg_capture_facts *facts, job *j)
+{
+    NPG_TRY(read_all(j));
+    npg_probe_warn_of_all(&j->probe);
+    npg_estimate estimate = npg_probe_estimate(&j->probe, j->options);
+    set_numbers(facts, j, &estimate);
+    NPG_TRY(set_json(facts, j, &estimate));
+    return set_text(facts, j, &estimate);
+}
+
+npg_status npg_capture_probe(npg_capture_facts **out, const npg_options *options)
+{
+    npg_capture_facts *facts = NULL;
+    job j = {.options = options};
+    NPG_REQUIRE(out && options);
+    *out = NULL;
+    j.input = npg_options_get(options, "input");
+    npg_probe_init(&j.probe);
+    npg_status status = npg_alloc(&facts, NPG_FOR_FILES, sizeof *facts);
+    if (!status) facts->struct_size = sizeof *facts;
+    if (!status) status = look(facts, &j);
+    if (status)
+        npg_capture_facts_close(&facts);
+    else
+        status = status_of(&j);
+    *out = facts;
+    npg_release(&j.views);
+    npg_release(&j.before);
+    npg_frame_files_close(&j.list);
+    npg_probe_uninit(&j.probe);
+    return status;
+}
+
+void npg_capture_facts_close(npg_capture_facts **slot)
+{
+    if (!slot || !*slot) return;
+    npg_release((char **)&(*slot)->text);
+    npg_release((char **)&(*slot)->json);
+    npg_release(slot);
+}
