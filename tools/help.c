@@ -227,3 +227,36 @@ void npg_help_method_json(FILE *out)
                               "title", "method of neupig run", "type", "object", "properties", properties,
                               "additionalProperties", 0));
 }
+
+/* ---- files of a run ---- */
+
+static void print_keys(FILE *out, const json_t *schema, const char *path)
+{
+    const char *key;
+    json_t *value, *items = json_object_get(schema, "items");
+    char name[256];
+    json_object_foreach(json_object_get(schema, "properties"), key, value)
+    {
+        const char *help = json_string_value(json_object_get(value, "description"));
+        snprintf(name, sizeof name, "%s%s%s", path, *path ? "." : "", key);
+        fprintf(out, "  %-42s %s\n", name, help ? help : "");
+        print_keys(out, value, name);
+    }
+    snprintf(name, sizeof name, "%s[]", path);
+    if (items) print_keys(out, items, name);
+}
+
+bool npg_help_file(FILE *out, const char *name, bool as_json)
+{
+    bool is_done = !strcmp(name, "done");
+    const char *text = is_done ? npg_schema_of_done : npg_schema_of_report;
+    if (!is_done && strcmp(name, "report") != 0) return false;
+    json_t *schema = as_json ? NULL : json_loads(text, 0, NULL);
+    if (as_json)
+        fputs(text, out);
+    else
+        fprintf(out, "%s.json: %s\n\n", name, json_string_value(json_object_get(schema, "description")));
+    print_keys(out, schema, "");
+    json_decref(schema);
+    return true;
+}

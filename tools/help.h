@@ -23,4 +23,9 @@ void npg_help_spell(char *out, size_t size, const npg_option_info *option);
 /* What an option takes: default, range and words, in one line; "" when there are none. */
 void npg_help_limits(char *out, size_t size, const npg_option_info *option);
 
+/* What report.json ("report") or done.json ("done") of a run has in it, or its JSON schema (tools/schemas/); false for
+ * another name. */
+bool npg_help_file(FILE *out, const char *name, bool as_json);
+extern const char npg_schema_of_report[], npg_schema_of_done[];
+
 #endif

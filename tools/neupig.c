@@ -90,9 +90,10 @@ const npg_verb npg_verbs[] = {
      "every kernel on each device with its plain twin.  "
      "Exit code 4 when there is no device or one computes wrong.",
      npg_doctor_options, false, npg_verb_doctor},
-    {"help", "[VERB|method]", 0, 1, "Show the verbs, the options of one, or the keys of the method",
+    {"help", "[VERB|method|report|done]", 0, 1,
+     "Show the verbs, the options of one, the keys of the method, or of a run's files",
      "Without VERB, lists the verbs; with one, its usage and options.  "
-     "help method lists what --method of run takes.",
+     "help method lists what --method of run takes, help report and help done what these files of a run hold.",
      npg_help_options, false, npg_verb_help},
     {"man", "", 0, 0, "Print the manual page",
      "Prints the manual page in roff, made from the same tables as the help.  "
@@ -132,7 +133,7 @@ const npg_option npg_help_options[] = {
     NPG_ROW_FLAG("help-all", offsetof(help_settings, all),  "no",
         "All options of neupig run, not only those that most need"),
     NPG_ROW_FLAG("json",     offsetof(help_settings, json), "no",
-        "The same as JSON; of method a JSON schema of what it takes"),
+        "The same as JSON; of method, report and done a JSON schema"),
     {0}};
 /* clang-format on */
 
@@ -145,6 +146,7 @@ int npg_verb_help(int argc, char **argv)
     const char *subject = cli.operand_count ? cli.operands[0] : "";
     bool is_method = !strcmp(subject, "method");
     const npg_verb *verb = npg_verb_find(subject);
+    if (npg_help_file(stdout, subject, s.json)) return 0;
     if (!verb && !is_method && *subject) return unknown_verb(subject);
     if (!*subject)
         npg_help_verbs(stdout);

@@ -35,6 +35,17 @@ meshes() { # OUT COUNT
     [[ "$output" == *"done already"* ]]
 }
 
+@test "report.json and done.json are what their schemas say, and no figure is without a word" {
+    for name in report done; do
+        "$NEUPIG" help $name --json >$name.schema
+        python3 "$BATS_TEST_DIRNAME/check_schema.py" $name.schema out/$name.json
+        "$NEUPIG" help $name | grep -q "^  files\[\].path  *in the folder$\|^  stages.mesh.vertices  *V$"
+    done
+    sed 's/"exit_code": [0-9]*/"exit_code": "none"/; s/"cores"/"kernels"/' out/report.json >wrong.json
+    ended 1 python3 "$BATS_TEST_DIRNAME/check_schema.py" report.schema wrong.json
+    [[ "$output" == *"exit_code: str"*"kernels: not in the schema"*"cores: missing"* ]]
+}
+
 @test "frames on standard input" {
     cat capture/points/* | "$NEUPIG" run - -o live --look-ahead 3 "${small[@]}"
     meshes live 6
