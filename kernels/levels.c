@@ -4,37 +4,19 @@
 #include <assert.h>
 #include <math.h>
 
-static size_t cube(size_t n)
-{
-    return n * n * n;
-}
-
-void npg_levels_add(npg_levels *levels, npg_level level, size_t table_rows)
+void npg_levels_add(npg_levels *levels, npg_level level)
 {
     assert(levels->count < NPG_LEVELS_MAX && level.nodes >= 2);
     level.first_row = levels->row_count;
-    level.row_count = cube((size_t)level.nodes);
-    if (level.kind == NPG_LEVEL_HASHED && level.row_count > table_rows) level.row_count = table_rows;
+    level.row_count = (size_t)level.nodes * (size_t)level.nodes * (size_t)level.nodes;
     levels->row_count += level.row_count;
     levels->level[levels->count++] = level;
-}
-
-/* Spatial hash of Teschner et al., "Optimized Spatial Hashing", 2003, with the primes of instant-ngp. */
-static uint32_t hash_of(const uint32_t at[3])
-{
-    return at[0] ^ (at[1] * 2654435761u) ^ (at[2] * 805459861u);
-}
-
-static size_t row_of(const npg_level *level, const uint32_t at[3])
-{
-    size_t n = (size_t)level->nodes;
-    if (level->row_count < cube(n)) return level->first_row + hash_of(at) % level->row_count;
-    return level->first_row + (at[0] * n + at[1]) * n + at[2];
 }
 
 void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[NPG_CELL_NODES],
                       float weights[NPG_CELL_NODES])
 {
+    size_t n = (size_t)level->nodes;
     uint32_t cell[3];
     float part[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -52,7 +34,7 @@ void npg_level_sample(const npg_level *level, const float point[3], int32_t rows
             at[axis] = cell[axis] + up;
             weight *= up ? part[axis] : 1 - part[axis];
         }
-        rows[corner] = (int32_t)row_of(level, at);
+        rows[corner] = (int32_t)(level->first_row + (at[0] * n + at[1]) * n + at[2]);
         weights[corner] = weight;
     }
 }

@@ -13,14 +13,13 @@
 
 typedef enum npg_level_kind {
     NPG_LEVEL_POSITION, /* dense grid over [-1, 1]^3, sampled at positions */
-    NPG_LEVEL_NORMAL,   /* dense grid over [-1, 1]^3, sampled at normals   */
-    NPG_LEVEL_HASHED    /* nodes of a position grid hashed into a table    */
+    NPG_LEVEL_NORMAL    /* dense grid over [-1, 1]^3, sampled at normals   */
 } npg_level_kind;
 
 typedef struct npg_level {
     npg_level_kind kind;
     int nodes;                      /* n per axis                                           */
-    size_t first_row, row_count;    /* in the table; row_count = n^3 for dense grids        */
+    size_t first_row, row_count;    /* in the table; row_count = n^3                        */
     int channel_first, channel_end; /* the channels it fills                                */
     double share;                   /* weight of its value: 1 / L where levels are averaged */
     double lambda;                  /* strength of the smoothing, 0: none                   */
@@ -35,9 +34,8 @@ typedef struct npg_levels {
     size_t row_count; /* of all levels */
 } npg_levels;
 
-/* Append a level; fills first_row and row_count.  table_rows is for hashed levels:
- * the most rows it may take. */
-void npg_levels_add(npg_levels *levels, npg_level level, size_t table_rows);
+/* Append a level; fills first_row and row_count. */
+void npg_levels_add(npg_levels *levels, npg_level level);
 
 /* The eight nodes around a point (clamped to [-1, 1]^3) of a level and their trilinear weights:
  * rows of the whole table.  Nodes lie at the corners of the cube ("align corners");

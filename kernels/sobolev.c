@@ -12,7 +12,7 @@ typedef struct tables {
 
 static bool is_smoothed(const npg_level *level)
 {
-    return level->lambda > 0 && level->kind != NPG_LEVEL_HASHED;
+    return level->lambda > 0;
 }
 
 static void fill_tables(tables *t, const npg_levels *levels)

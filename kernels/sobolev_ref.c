@@ -25,7 +25,7 @@ void npg_sobolev_apply_ref(double *y, const double *x, const npg_levels *levels)
     for (int l = 0; l < levels->count; l++) {
         const npg_level *level = &levels->level[l];
         double *to = y + level->first_row * NPG_LATENT_CHANNELS;
-        if (level->kind == NPG_LEVEL_HASHED || level->lambda <= 0) {
+        if (level->lambda <= 0) {
             for (size_t i = 0; i < level->row_count * NPG_LATENT_CHANNELS; i++)
                 to[i] = x[level->first_row * NPG_LATENT_CHANNELS + i];
             continue;

@@ -25,23 +25,15 @@ static const word rotations[] = {
     {"quaternions", NULL, NULL},
     {0}};
 static const word time_codes[] = {
-    {"fourier_features2", "time-code", "fourier"},
-    {"gaussian_fourier",  "time-code", "gaussian"},
-    {"poly",              "time-code", "polynomial"},
-    {"mlp",               "time-code", "learned"},
+    {"fourier_features2", NULL, NULL},
     {0}};
 static const word confidences[] = {
     {"pdg",         "confidence", "cumulative"},
-    {"direct",      "confidence", "single"},
-    {"delta_based", "confidence", "delta"},
     {"constant",    "confidence", "constant"},
     {0}};
 /* "none" leaves every frame its full weight, whatever the confidence is */
 static const word catch_ups[] = {
-    {"pdg",         "catch-up",   "root"},
-    {"exponential", "catch-up",   "exponential"},
-    {"lerp",        "catch-up",   "interpolated"},
-    {"linear",      "catch-up",   "linear"},
+    {"pdg",         NULL,         NULL},
     {"none",        "confidence", "constant"},
     {0}};
 static const word descriptors[] = {{"surface", NULL, NULL}, {0}};

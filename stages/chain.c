@@ -32,12 +32,6 @@ static const npg_preset_value paper[] = {
     {"welds",           "keep"},       /* nothing is cut */
     {"window",          "-1"},         /* all frames at once, up to 60 */
     {"epochs",          "250"},        /* of every vertex */
-    {"isometry",        "100"},
-    {"confidence",      "cumulative"},
-    {"smoothing",       "doubled"},    /* as in the published code */
-    {"rate-end",        "1"},
-    {"feature-start",   "0"},
-    {"time-span",       "1"},
     {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {
     {"align",           "no"},
@@ -48,23 +42,13 @@ static const npg_preset_value paper_1000[] = {
     {"welds",           "keep"},
     {"window",          "-1"},
     {"epochs",          "1000"},       /* the paper's slower setting; the rest as above */
-    {"isometry",        "100"},
-    {"confidence",      "cumulative"},
-    {"smoothing",       "doubled"},
-    {"rate-end",        "1"},
-    {"feature-start",   "0"},
-    {"time-span",       "1"},
     {NULL, NULL}};
 static const npg_preset_value grids[] = {
-    {"align",           "no"},         /* grids and decoder alone carry the motion */
-    {"distance",        "surface"},    /* of few samples */
-    {"width-1",         "256"},        /* a third of the cost, as good: tests/bed/decisions.md */
-    {"width-2",         "256"},
-    {"grid-rate",       "0.015"},      /* with few samples larger steps pay */
-    {"mlp-rate",        "0.002"},
-    {"window",          "12"},         /* new frames are opened from fitted ones */
-    {"epochs",          "200"},        /* of the few samples: a tenth of the cost */
-    {"rounds",          "8"},
+    {"solver",    "grids"}, /* over aligned poses */
+    {"width-1",   "64"},    /* ways from the smoothed poses are small and smooth: */
+    {"width-2",   "64"},    /* 128 takes three times as long for hardly more      */
+    {"grid-rate", "0.03"},
+    {"mlp-rate",  "0.004"},
     {NULL, NULL}};
 static const npg_preset_value best[] = {
     {"reference-rounds", "2"}, /* a finer graph gains nothing: tests/bed/decisions.md */
@@ -79,6 +63,7 @@ const npg_preset npg_presets[] = {
     {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
      paper},
     {"paper-1000", "the same with its 1000 epochs", paper_1000},
-    {"grids", "the paper's grids and decoder with our distance and warm starts: no alignment, windows",
+    {"grids",
+     "the same as default, the fit of windows by the paper's grids and decoder over the aligned poses",
      grids},
     {NULL, NULL, NULL}};

@@ -10,7 +10,7 @@
 #include "kernels/mlp.h"
 #include "kernels/motion.h"
 #include "mesh/surface.h"
-#include "optimize/joint.h"
+#include "optimize/solver.h"
 #include "pipeline/clock.h"
 #include "pipeline/order.h"
 #include "tools/cli.h"
@@ -59,8 +59,10 @@ typedef struct bench {
     npg_surface *surface; /* closest */
     npg_surface_hit *hits;
     npg_tracker *tracker; /* track */
-    npg_joint *joint;     /* joint */
-    npg_joint_frame *window;
+    void *joint;          /* joint */
+    npg_energy *energy;
+    npg_energy_frame *window;
+    float *ways;
 } bench;
 
 /* ---- the figure ---- */
@@ -177,27 +179,29 @@ static npg_status track(bench *b)
 
 static npg_status open_joint(bench *b)
 {
-    static const npg_joint_settings usual = {.points = 5000, .steps = 60, .shape = 0.1};
-    size_t verts = b->mesh->vert_count, count = (size_t)b->s.frames;
+    static const npg_solver_settings usual = {.epochs = 60, .energy = {.points = 5000, .shape = 0.1}};
+    const npg_solver_setup setup = {.settings = &usual, .surface = b->mesh};
+    size_t count = (size_t)b->s.frames;
     b->window = npg_arena_take(&b->arena, count, sizeof *b->window);
-    float *all = npg_arena_take(&b->arena, count * verts, 3 * sizeof *all);
+    b->ways = npg_arena_take(&b->arena, count * b->mesh->vert_count, 3 * sizeof(float));
     NPG_TRY(npg_arena_status(&b->arena));
     for (size_t t = 0; t < count; t++)
-        b->window[t] = (npg_joint_frame){.positions = all + t * 3 * verts,
-                                         .points = b->clouds[t].pos,
-                                         .normals = b->clouds[t].normals,
-                                         .point_count = b->clouds[t].count};
-    return npg_joint_open(&b->joint, b->mesh, &usual);
+        b->window[t] = (npg_energy_frame){.positions = b->poses[t],
+                                          .points = b->clouds[t].pos,
+                                          .normals = b->clouds[t].normals,
+                                          .point_count = b->clouds[t].count};
+    NPG_TRY(npg_solver_joint.open(&b->joint, &setup));
+    return npg_energy_open(&b->energy, b->mesh, &usual.energy);
 }
 
 /* The whole window, always from the same poses. */
 static npg_status joint(bench *b)
 {
-    npg_joint_result result;
-    for (size_t t = 0; t < (size_t)b->s.frames; t++)
-        memcpy(b->window[t].positions, b->poses[t], b->mesh->vert_count * 3 * sizeof(float));
-    npg_joint_set_noise(b->joint, 0);
-    return npg_joint_solve(b->joint, &result, b->window, (size_t)b->s.frames, NULL, NULL);
+    npg_solved solved;
+    const npg_problem problem = {.count = (size_t)b->s.frames, .energy = b->energy, .result = b->ways};
+    npg_energy_set_noise(b->energy, 0);
+    NPG_TRY(npg_energy_set(b->energy, b->window, problem.count));
+    return npg_solver_joint.solve(b->joint, &solved, &problem, NULL, NULL);
 }
 
 static npg_status open_nothing(bench *b)
@@ -321,7 +325,8 @@ static void print_table(const bench *b)
 
 static void close_bench(bench *b)
 {
-    npg_joint_close(&b->joint);
+    if (b->joint) npg_solver_joint.close(&b->joint);
+    npg_energy_close(&b->energy);
     npg_tracker_close(&b->tracker);
     npg_surface_close(&b->surface);
     npg_motion_close(&b->motion);

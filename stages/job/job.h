@@ -13,7 +13,7 @@
  *                                  work, where that takes long; and what stage align found in fusing passes
  *     OUT/job/store.new            that of a run which has no state yet: until then what an earlier run left
  *                                  stays
- *     OUT/job/window_000012.vdb    the latent grids of the 12th state (optimize/vdb_grids.h)
+ *     OUT/job/window_000012.vdb    the latent grids of the 12th state (optimize/grids/vdb_grids.h)
  *
  * The two newest states stay, and the one that later frames start from (neupig append); where grids are to be
  * exported, those of all.  A state names the checksum of its grids and of the frame log, so that a damaged one

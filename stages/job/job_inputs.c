@@ -17,7 +17,7 @@
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
 static const char *const free_options[] = {
     "input",   "output",  "ring",   "chunk", "max-memory",  "pull",        "cache",  "overwrite",
-    "confine", "restart", "append", "alarm", "segment-min", "state-every", "follow", NULL};
+    "confine", "restart", "append", "alarm", "segment-min", "follow", NULL};
 /* Of a live source: what ends it.  Kept for npg_options_load_job(), not compared. */
 static const char *const end_options[] = {"follow-end.name", "follow-end.idle", NULL};
 

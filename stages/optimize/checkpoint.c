@@ -1,5 +1,4 @@
 /* Checkpoint: the state of a run after a closed window, to the job's folder and back. */
-#include "optimize/vdb_grids.h"
 #include "optimize/window.h"
 
 #include <stddef.h>
@@ -10,8 +9,8 @@
 #include "pipeline/plan.h"
 
 typedef struct saved_progress {
-    int64_t window_at, is_aligned, total;
-    double last_chamfer, last_isometry, noise;
+    int64_t window_at, total;
+    npg_solved last;
 } saved_progress;
 
 static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t index)
@@ -75,123 +74,39 @@ static npg_status put_frames(npg_store *out, const npg_hand *hand, size_t vert_c
 
 /* ---- saving: all of it ---- */
 
-static npg_status put_hand(npg_store *out, const npg_facts *facts, const npg_hand *hand)
-{
-    const saved_progress progress = {hand->window_at,    hand->is_aligned,    hand->total,
-                                     hand->last_chamfer, hand->last_isometry, hand->noise};
-    NPG_TRY(npg_store_put(out, "progress", &progress, sizeof progress));
-    if (hand->usual > 0) NPG_TRY(npg_store_put(out, "usual", &hand->usual, sizeof hand->usual));
-    if (hand->lost_count) NPG_TRY(npg_store_put(out, "lost", &hand->lost_count, sizeof hand->lost_count));
-    return put_frames(out, hand, facts->reference->vert_count);
-}
-
-static npg_vdb_place place_of(const npg_facts *facts, const npg_hand *hand)
-{
-    npg_window window = npg_plan_window(&facts->plan, hand->window_at, hand->total);
-    npg_vdb_place place = {.unit_per_world = facts->box.scale,
-                           .frame_first = window.first,
-                           .frame_last = window.last,
-                           .window = hand->window_at};
-    for (int a = 0; a < 3; a++) place.world_centre[a] = facts->box.origin[a] + facts->box.centre[a];
-    return place;
-}
-
-static npg_status put_first(npg_store *out, const npg_facts *facts, const npg_hand *hand)
-{
-    bool is_needed = npg_plan_is_first_needed_after(&facts->plan, hand->window_at, hand->total);
-    if (!hand->warm || !is_needed) return NPG_OK;
-    return npg_fit_copy_save(npg_warm_first(hand->warm), out, "first");
-}
-
-typedef struct grids {
-    const npg_levels *levels;
-    const float *rows;
-    const npg_vdb_place *place;
-} grids;
-
-static npg_status save_levels(void *user, const char *path)
-{
-    const grids *g = user;
-    return npg_vdb_save_levels(path, g->levels, g->rows, g->place);
-}
-
-/* The latent grids for other programs, in a file beside the store; the state itself has them, too. */
-static npg_status put_grids(npg_store *out, npg_fit *fit, const char *path, const npg_vdb_place *place)
-{
-    npg_fit_parts parts = npg_fit_open_parts(fit);
-    float *rows;
-    uint64_t hash;
-    NPG_TRY(npg_alloc(&rows, NPG_FOR_FILES, parts.u->size));
-    npg_status status = npg_buffer_read(parts.u, 0, rows, parts.u->size);
-    if (!status) status = npg_vdb_file_write(path, &hash, save_levels, &(grids){parts.levels, rows, place});
-    if (!status) status = npg_store_put(out, "grids.hash", &hash, sizeof hash);
-    npg_release(&rows);
-    return status;
-}
-
 /* What npg_job_save_state() has written by us. */
 typedef struct saving {
     npg_worker *worker;
     const npg_hand *hand;
-    npg_fit *fit; /* or NULL */
+    npg_window_solver *solver;
+    bool is_inside;
 } saving;
 
 static npg_status write_state(void *user, npg_store *out, const char *grids_path)
 {
     const saving *s = user;
     const npg_facts *facts = npg_worker_facts(s->worker);
-    npg_vdb_place place = place_of(facts, s->hand);
-    NPG_TRY(put_hand(out, facts, s->hand));
-    if (!s->fit) return NPG_OK;
-    NPG_TRY(put_first(out, facts, s->hand));
-    NPG_TRY(put_grids(out, s->fit, grids_path, &place));
-    return npg_fit_save(s->fit, out, "fit");
+    const npg_hand *hand = s->hand;
+    const saved_progress progress = {hand->window_at, hand->total, hand->last};
+    npg_solver_moment moment = {s->is_inside,
+                                npg_plan_is_first_needed_after(&facts->plan, hand->window_at, hand->total),
+                                hand->window_at, .grids_path = grids_path};
+    if (hand->window_at >= 0) moment.window = npg_plan_window(&facts->plan, hand->window_at, hand->total);
+    NPG_TRY(npg_store_put(out, "progress", &progress, sizeof progress));
+    NPG_TRY(put_frames(out, hand, facts->reference->vert_count));
+    return npg_window_save(s->solver, out, &moment);
 }
 
-static npg_job_moment moment_of(const npg_plan *plan, const npg_hand *hand)
-{
-    npg_job_moment moment = {.emitted = hand->emitted};
-    if (hand->window_at < 0) return moment;
-    moment.read = npg_plan_read_before(plan, hand->window_at, hand->total);
-    return moment;
-}
-
-npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_fit *fit)
+npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_window_solver *solver,
+                               bool is_inside)
 {
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    npg_job_moment moment = moment_of(plan, hand);
-    moment.is_forward_end = !npg_plan_is_open(plan) && npg_plan_is_last_forward(plan, hand->window_at);
-    saving s = {worker, hand, fit};
+    npg_job_moment moment = {.emitted = hand->emitted, .is_inside = is_inside};
+    if (hand->window_at >= 0) moment.read = npg_plan_read_before(plan, hand->window_at, hand->total);
+    moment.is_forward_end =
+        !is_inside && !npg_plan_is_open(plan) && npg_plan_is_last_forward(plan, hand->window_at);
+    saving s = {worker, hand, solver, is_inside};
     return npg_job_save_state(worker, &moment, write_state, &s);
-}
-
-static npg_status write_inside(void *user, npg_store *out, const char *grids_path)
-{
-    const saving *s = user;
-    const npg_facts *facts = npg_worker_facts(s->worker);
-    (void)grids_path;
-    NPG_TRY(put_hand(out, facts, s->hand));
-    NPG_TRY(put_first(out, facts, s->hand));
-    return npg_warm_save(s->hand->warm, out);
-}
-
-npg_status npg_checkpoint_save_inside(npg_worker *worker, const npg_hand *hand)
-{
-    npg_job_moment moment = moment_of(&npg_worker_facts(worker)->plan, hand);
-    moment.is_inside = true;
-    saving s = {worker, hand, NULL};
-    return npg_job_save_state(worker, &moment, write_inside, &s);
-}
-
-/* ---- restoring: the fit ---- */
-
-npg_status npg_checkpoint_restore_fit(npg_worker *worker, npg_fit *fit, npg_warm *warm)
-{
-    const npg_record *in = npg_job_state(npg_job_of(worker));
-    size_t size;
-    if (warm) NPG_TRY(npg_fit_copy_load(npg_warm_first(warm), in, "first"));
-    if (!npg_record_find(in, "inside", &size)) return npg_fit_restore(fit, in, "fit");
-    return warm ? npg_warm_restore(warm, fit, in) : npg_error(NPG_BAD_INPUT, "a block that is not expected");
 }
 
 /* ---- restoring: frames ---- */
@@ -227,7 +142,7 @@ static npg_status get_frames(npg_hand *hand, const npg_record *in, int64_t first
     return NPG_OK;
 }
 
-npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
+npg_status npg_checkpoint_restore(npg_worker *worker, npg_hand *hand)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_job *job = npg_job_of(worker);
@@ -239,16 +154,8 @@ npg_status npg_checkpoint_restore_hand(npg_worker *worker, npg_hand *hand)
     bool is_appending = planned < facts->plan.frame_count;
     if (is_appending) first_index = npg_plan_window(&facts->plan, 0, -1).first;
     hand->window_at = is_appending ? -1 : progress.window_at;
-    hand->is_aligned = progress.is_aligned != 0;
     hand->total = progress.total;
-    hand->noise = progress.noise;
-    hand->last_chamfer = progress.last_chamfer;
-    hand->last_isometry = progress.last_isometry;
-    size_t size;
-    if (npg_record_find(in, "usual", &size))
-        NPG_TRY(npg_record_get(in, "usual", &hand->usual, sizeof hand->usual));
-    if (npg_record_find(in, "lost", &size))
-        NPG_TRY(npg_record_get(in, "lost", &hand->lost_count, sizeof hand->lost_count));
+    hand->last = progress.last;
     npg_job_exported(job, &hand->emitted, &log_bytes);
     return get_frames(hand, in, first_index, facts->reference->vert_count);
 }

@@ -1,5 +1,5 @@
 /* Time smooth: banded solutions, leave-one-out errors, and the choice of lambda. */
-#include "optimize/joint.h"
+#include "optimize/energy.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,130 +1,116 @@
-/* Window: solving one, from aligned frames or as in the paper. */
+/* Window: its frames to a solver's problem, and the solution back. */
 #include "optimize/window.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "geometry/geometry.h"
+#include "optimize/carry.h"
+
 struct npg_window_solver {
-    npg_window_settings settings;
-    const npg_facts *facts;  /* loan */
-    npg_fit *fit;            /* of frames without alignment, or NULL */
-    npg_warm *warm;          /* of the same, or NULL                 */
-    npg_joint_window *joint; /* of aligned ones, or NULL             */
-    npg_joint_result result; /* of that                              */
-    /* of the window at work, owned */
-    float *points;       /* all frames' points in units     */
-    size_t *point_start; /* count + 1                       */
-    float *now;          /* count x V x 3                   */
-    npg_fit_frame *frames;
-    size_t count;
+    const npg_solver *row;
+    void *solver; /* of the row, owned */
+    npg_solver_settings settings;
+    const npg_facts *facts; /* loan */
+    size_t vert_count;      /* V    */
+    /* with poses */
+    npg_proxy *surface;    /* W vertices; owned */
+    npg_carrier *carriers; /* V, owned          */
+    npg_energy *energy;    /* owned             */
+    /* of the window at work */
+    npg_arena window;         /* holds these                                         */
+    size_t count, size;       /* T, and floats of a frame's result: 3 W or 3 V       */
+    npg_solver_frame *frames; /* T                                                   */
+    npg_energy_frame *posed;  /* T                                                   */
+    float *before, *result;   /* T x W x 3 aligned poses; the problem's result       */
 };
-
-const npg_joint_result *npg_window_result(const npg_window_solver *solver)
-{
-    return solver->joint ? &solver->result : NULL;
-}
-
-void npg_window_set_noise(npg_window_solver *solver, double noise)
-{
-    if (!solver->joint) return;
-    solver->result.noise = noise;
-    npg_joint_window_set_noise(solver->joint, noise);
-}
-
-npg_fit *npg_window_fit(npg_window_solver *solver)
-{
-    return solver->fit;
-}
-
-npg_warm *npg_window_warm(npg_window_solver *solver)
-{
-    return solver->warm;
-}
-
-static void close_frames(npg_window_solver *s)
-{
-    void *all[] = {&s->points, &s->point_start, &s->now, &s->frames};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
-}
 
 void npg_window_solver_close(npg_window_solver **slot)
 {
     if (!slot || !*slot) return;
-    close_frames(*slot);
-    npg_fit_close(&(*slot)->fit);
-    npg_warm_close(&(*slot)->warm);
-    npg_joint_window_close(&(*slot)->joint);
+    npg_window_solver *s = *slot;
+    npg_arena_release(&s->window);
+    if (s->solver) s->row->close(&s->solver);
+    npg_energy_close(&s->energy);
+    npg_proxy_close(&s->surface);
+    npg_release(&s->carriers);
     npg_release(slot);
 }
 
-npg_status npg_window_solver_open(npg_window_solver **out, npg_device *device,
-                                  const npg_window_settings *settings, const npg_facts *facts, uint64_t seed,
-                                  bool is_aligned)
+static npg_status open_surface(npg_window_solver *s)
+{
+    const npg_mesh *reference = s->facts->reference;
+    NPG_TRY(npg_proxy_open(&s->surface, reference, NPG_PROXY_SURFACE));
+    NPG_TRY(npg_energy_open(&s->energy, s->surface->mesh, &s->settings.energy));
+    NPG_TRY(npg_alloc_array(&s->carriers, NPG_FOR_FIT, s->vert_count, sizeof *s->carriers));
+    return npg_carriers_bind(s->carriers, s->surface->mesh, reference->vert_pos, s->vert_count);
+}
+
+npg_status npg_window_solver_open(npg_window_solver **out, const npg_solver *row, struct npg_device *device,
+                                  const npg_solver_settings *settings, const npg_facts *facts, uint64_t seed)
 {
     npg_window_solver *s;
     *out = NULL;
     NPG_TRY(npg_alloc(&s, NPG_FOR_FIT, sizeof *s));
+    s->row = row;
     s->settings = *settings;
-    s->settings.joint.steps = settings->fit.epochs;
     s->facts = facts;
-    npg_status status = is_aligned ? npg_joint_window_open(&s->joint, facts->reference, &s->settings.joint)
-                                   : npg_fit_open(&s->fit, device, &s->settings.fit, facts->reference, seed);
-    if (!status && !is_aligned)
-        status = npg_warm_open(&s->warm, device, &s->settings.warm, &s->settings.fit, facts, seed);
+    s->vert_count = facts->reference->vert_count;
+    s->window.purpose = NPG_FOR_FIT;
+    npg_status status = row->needs_poses ? open_surface(s) : NPG_OK;
+    const npg_solver_setup setup = {&s->settings, facts, s->surface ? s->surface->mesh : facts->reference,
+                                    device, seed};
+    if (!status) status = row->open(&s->solver, &setup);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
 }
 
-#define UNITS 2 /* of the device, whose scratch memory counts: on more the drivers' own counts more */
-
-size_t npg_window_memory(const npg_window_settings *settings, bool is_aligned, size_t vert_count,
+size_t npg_window_memory(const npg_solver *row, const npg_solver_settings *settings, size_t vert_count,
                          size_t frames, size_t points)
 {
     const size_t vector = 3 * sizeof(float);
+    size_t surface = vert_count < 2 * NPG_PROXY_SURFACE ? vert_count : NPG_PROXY_SURFACE;
     size_t solved = frames * vert_count * vector, clouds = frames * points * vector;
-    if (is_aligned) return solved + clouds + npg_joint_window_memory(&settings->joint, vert_count, frames);
-    return solved + clouds + npg_fit_memory(&settings->fit, vert_count, frames, points, UNITS) +
-           npg_warm_memory(&settings->warm, &settings->fit, vert_count, frames);
+    if (!row->needs_poses) return 2 * solved + clouds + row->memory(settings, vert_count, frames, points);
+    return solved + clouds + 2 * frames * surface * vector + vert_count * sizeof(npg_carrier) +
+           npg_energy_memory(&settings->energy, surface, frames) +
+           row->memory(settings, surface, frames, points);
 }
 
 /* ---- the window's frames ---- */
 
-static npg_status take_points(npg_window_solver *s, npg_held *const *held)
+static npg_status take_frames(npg_window_solver *s, npg_held *const *held)
 {
-    NPG_TRY(npg_alloc_array(&s->point_start, NPG_FOR_FIT, s->count + 1, sizeof *s->point_start));
-    for (size_t i = 0; i < s->count; i++)
-        s->point_start[i + 1] = s->point_start[i] + held[i]->frame.point_count;
-    NPG_TRY(npg_alloc_array(&s->points, NPG_FOR_FIT, s->point_start[s->count] + 1, 3 * sizeof(float)));
-    for (size_t i = 0; i < s->count; i++)
-        npg_box_local_to_unit(&s->facts->box, s->points + 3 * s->point_start[i], held[i]->frame.pos_local,
-                              held[i]->frame.point_count);
-    return NPG_OK;
-}
-
-/* What the time code is a function of: the absolute frame with a fixed period, the length of the first
- * window, so that frames which two windows share mean the same to both.  That window goes from 0 to span. */
-static double time_of(const npg_plan *plan, double span, double index)
-{
-    npg_window first = npg_plan_key_window(plan, -1);
-    int64_t length = first.last - first.first;
-    return length ? span * (index - (double)first.first) / (double)length : 0;
-}
-
-static npg_status open_frames(npg_window_solver *s, npg_held *const *held)
-{
-    size_t verts = s->facts->reference->vert_count;
-    NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FIT, s->count, sizeof *s->frames));
-    NPG_TRY(npg_alloc_array(&s->now, NPG_FOR_FIT, s->count * verts, 3 * sizeof(float)));
-    for (size_t i = 0; i < s->count; i++) {
-        const npg_frame *frame = &held[i]->frame;
-        s->frames[i] =
-            (npg_fit_frame){.index = frame->index,
-                            .time = time_of(&s->facts->plan, s->settings.fit.time_span, (double)frame->index),
-                            .points = s->points + 3 * s->point_start[i],
-                            .count = frame->point_count};
+    size_t points = 0;
+    for (size_t t = 0; t < s->count; t++) points += held[t]->frame.point_count;
+    float *at = npg_arena_take(&s->window, points + 1, 3 * sizeof *at);
+    s->frames = npg_arena_take(&s->window, s->count, sizeof *s->frames);
+    s->posed = npg_arena_take(&s->window, s->count, sizeof *s->posed);
+    s->before = npg_arena_take(&s->window, s->energy ? s->count * s->size : 1, sizeof(float));
+    s->result = npg_arena_take(&s->window, s->count * s->size, sizeof(float));
+    NPG_TRY(npg_arena_status(&s->window));
+    for (size_t t = 0; t < s->count; t++) {
+        const npg_frame *frame = &held[t]->frame;
+        npg_box_local_to_unit(&s->facts->box, at, frame->pos_local, frame->point_count);
+        s->frames[t] =
+            (npg_solver_frame){frame->index, at, frame->normals, held[t]->solved, frame->point_count};
+        at += 3 * frame->point_count;
     }
     return NPG_OK;
+}
+
+/* The thinned surface in the aligned poses, and the energy from there. */
+static npg_status set_energy(npg_window_solver *s, npg_held *const *held)
+{
+    for (size_t t = 0; t < s->count; t++) {
+        const npg_solver_frame *frame = &s->frames[t];
+        float *before = s->before + t * s->size;
+        npg_proxy_gather(s->surface, before, frame->solved ? frame->solved : held[t]->frame.vert_unit);
+        s->posed[t] = (npg_energy_frame){before, frame->points, frame->normals, frame->point_count,
+                                         frame->solved != NULL};
+    }
+    return npg_energy_set(s->energy, s->posed, s->count);
 }
 
 double npg_window_share(const npg_window *window, double index)
@@ -137,60 +123,112 @@ double npg_window_share(const npg_window *window, double index)
     return fmin(1, fmax(0, ((double)overlap + 1 - away) / (double)(overlap + 1)));
 }
 
-/* ---- solving ---- */
+/* ---- the solution back ---- */
 
-static npg_status keep_solved(npg_held *held, const float *now, size_t verts, float share)
+/* The result becomes each vertex' way from its pose; how long it is in the mean. */
+static npg_status add_smoothing(npg_window_solver *s, double *moved)
 {
+    const float *smoothed = npg_energy_smoothed(s->energy);
+    double sum = 0;
+    for (size_t i = 0; i < s->count * s->size; i += 3) {
+        double sq = 0;
+        for (size_t k = i; k < i + 3; k++) {
+            if (!isfinite(s->result[k])) return npg_error(NPG_DIVERGED, "the fit is not finite");
+            s->result[k] = smoothed[k] + s->result[k] - s->before[k];
+            sq += (double)s->result[k] * (double)s->result[k];
+        }
+        sum += sqrt(sq);
+    }
+    *moved = 3 * sum / (double)(s->count * s->size);
+    return NPG_OK;
+}
+
+static void take_pose(npg_held *held)
+{
+    if (held->solved) return;
+    held->solved = held->frame.vert_unit;
+    held->frame.vert_unit = NULL;
+}
+
+static void keep_posed(npg_window_solver *s, npg_held *held, size_t t, float share)
+{
+    const float *before = s->before + t * s->size;
+    float *way = s->result + t * s->size;
+    for (size_t i = 0; i < s->size && held->solved; i++) way[i] = before[i] + share * way[i] - before[i];
+    take_pose(held);
+    npg_carry(s->carriers, s->vert_count, held->solved, way);
+}
+
+static npg_status keep_unposed(npg_window_solver *s, npg_held *held, size_t t, float share)
+{
+    const float *now = s->result + t * s->size;
     if (!held->solved) {
-        NPG_TRY(npg_alloc_array(&held->solved, NPG_FOR_FRAMES, verts, 3 * sizeof(float)));
-        memcpy(held->solved, now, verts * 3 * sizeof(float));
+        NPG_TRY(npg_alloc_array(&held->solved, NPG_FOR_FRAMES, s->vert_count, 3 * sizeof(float)));
+        memcpy(held->solved, now, s->size * sizeof(float));
         return NPG_OK;
     }
-    for (size_t i = 0; i < 3 * verts; i++) held->solved[i] += share * (now[i] - held->solved[i]);
+    for (size_t i = 0; i < s->size; i++) held->solved[i] += share * (now[i] - held->solved[i]);
     return NPG_OK;
 }
 
-static npg_status fit_unaligned(npg_window_solver *s, npg_held *const *held, const npg_window *window,
-                                npg_fit_watch *watch, void *user)
+static npg_status keep(npg_window_solver *s, npg_window_result *result, npg_held *const *held,
+                       const npg_window *window)
 {
-    const float **both;
-    NPG_TRY(npg_alloc_array(&both, NPG_FOR_FIT, 2 * s->count, sizeof *both));
-    for (size_t i = 0; i < s->count; i++) {
-        both[i] = held[i]->frame.normals;
-        both[s->count + i] = held[i]->solved;
-    }
-    const npg_warm_frames frames = {s->frames, both, both + s->count, s->count};
-    npg_status status = npg_warm_solve(s->warm, s->fit, &frames, window, watch, user);
-    npg_release(&both);
-    return status;
-}
-
-/* All vertices from the reference. */
-static npg_status solve_unaligned(npg_window_solver *s, npg_held *const *held, const npg_window *window,
-                                  npg_fit_watch *watch, void *user)
-{
-    size_t verts = s->facts->reference->vert_count;
-    NPG_TRY(open_frames(s, held));
-    NPG_TRY(fit_unaligned(s, held, window, watch, user));
-    for (size_t i = 0; i < s->count; i++) {
-        float *now = s->now + i * verts * 3;
-        NPG_TRY(npg_fit_vertices(s->fit, now, i));
-        NPG_TRY(
-            keep_solved(held[i], now, verts, (float)npg_window_share(window, (double)held[i]->frame.index)));
+    if (s->energy) NPG_TRY(add_smoothing(s, &result->moved));
+    for (size_t t = 0; t < s->count; t++) {
+        float share = (float)npg_window_share(window, (double)held[t]->frame.index);
+        if (s->energy)
+            keep_posed(s, held[t], t, share);
+        else
+            NPG_TRY(keep_unposed(s, held[t], t, share));
     }
     return NPG_OK;
 }
 
-npg_status npg_window_solve(npg_window_solver *s, npg_held *const *held, const npg_window *window,
-                            npg_fit_watch *watch, void *user)
+/* ---- solving ---- */
+
+npg_status npg_window_solve(npg_window_solver *s, npg_window_result *result, npg_held *const *held,
+                            const npg_window *window, npg_solver_watch *watch, void *user)
 {
-    close_frames(s);
+    *result = (npg_window_result){.noise = s->energy ? npg_energy_noise(s->energy) : 0};
     s->count = (size_t)(window->last - window->first + 1);
-    npg_status status = take_points(s, held);
-    const npg_joint_points points = {s->points, s->point_start};
-    if (!status)
-        status = s->joint ? npg_joint_window_solve(s->joint, &s->result, held, window, &points, watch, user)
-                          : solve_unaligned(s, held, window, watch, user);
-    close_frames(s);
+    s->size = 3 * (s->surface ? s->surface->mesh->vert_count : s->vert_count);
+    if (s->energy && !s->settings.epochs) {
+        for (size_t t = 0; t < s->count; t++) take_pose(held[t]);
+        return NPG_OK;
+    }
+    npg_status status = take_frames(s, held);
+    const npg_problem problem = {window, s->frames, s->count, s->energy, s->result};
+    if (!status && s->energy) status = set_energy(s, held);
+    if (!status) status = s->row->solve(s->solver, &result->solved, &problem, watch, user);
+    if (!status) status = keep(s, result, held, window);
+    if (s->energy) result->noise = npg_energy_noise(s->energy);
+    npg_arena_release(&s->window);
     return status;
+}
+
+/* ---- states ---- */
+
+npg_status npg_window_save(npg_window_solver *s, npg_store *store, const npg_solver_moment *moment)
+{
+    if (s->energy) {
+        double noise = npg_energy_noise(s->energy);
+        NPG_TRY(npg_store_put(store, "noise", &noise, sizeof noise));
+    }
+    return s->row->save ? s->row->save(s->solver, store, moment) : NPG_OK;
+}
+
+bool npg_window_keeps_inside(const npg_window_solver *s)
+{
+    return s->row->keeps_inside && s->row->keeps_inside(s->solver);
+}
+
+npg_status npg_window_restore(npg_window_solver *s, const npg_record *record)
+{
+    double noise;
+    if (s->energy) {
+        NPG_TRY(npg_record_get(record, "noise", &noise, sizeof noise));
+        npg_energy_set_noise(s->energy, noise);
+    }
+    return s->row->restore ? s->row->restore(s->solver, record) : NPG_OK;
 }

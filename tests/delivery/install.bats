@@ -54,7 +54,7 @@ setup() {
     # shellcheck disable=SC2046
     cc -std=c11 -Wall -Werror "$(dirname "$(dirname "$BATS_TEST_DIRNAME")")/samples/run_folder.c" -o run_folder \
         $(pkg-config --cflags --libs neupig)
-    run ./run_folder capture/points out epochs=2 faces=300 width-1=32 width-2=32
+    run ./run_folder capture/points out epochs=2 faces=300
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     [ -s out/done.json ]

@@ -29,7 +29,7 @@ setup() {
 
 @test "unpacked anywhere it runs a capture to its end" {
     root/usr/bin/neupig synth --cell 0.06 --frames 2 --points 600 -o capture >/dev/null
-    run root/usr/bin/neupig run capture/points -o out --method '{"epochs": 2, "width-1": 32, "width-2": 32}' --faces 300 -q
+    run root/usr/bin/neupig run capture/points -o out --method '{"epochs": 2}' --faces 300 -q
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     [ -s out/done.json ]

@@ -20,7 +20,7 @@ run_for() {
 }
 
 @test "a whole run in one call" {
-    run_for "0 7" "$samples/sample_run_folder" capture/points out epochs=5 faces=500 width-1=32 width-2=32
+    run_for "0 7" "$samples/sample_run_folder" capture/points out epochs=5 faces=500
     [[ "$output" == *"100 %"* ]]
     [ "$(ls out/meshes | wc -l)" -eq 3 ]
     [ -s out/done.json ]
@@ -53,7 +53,7 @@ highest() { sed -n 's/.*highest vertex at y = //p' <<<"$output"; }
 
 @test "a run does not go on from one with other stages" {
     run_for "0 7" "$samples/sample_custom_stage" capture/points again -5
-    run_for 2 "$NEUPIG" run capture/points -o again --method '{"epochs": 10, "width-1": 64, "width-2": 64}' --faces 800
+    run_for 2 "$NEUPIG" run capture/points -o again --method '{"epochs": 10}' --faces 800
     [[ "$output" == *"the stages that the program added"* ]]
     run_for "0 7" "$samples/sample_custom_stage" capture/points again -5
 }

@@ -1,9 +1,9 @@
 # Other formats of a run's meshes, read by programs that are not ours.
 
-small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
-                  "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
+small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
+                  "align-nodes": 40, "align-steps": 6}' --faces 400
     --bars residual=100,flipped=100 --quiet)
-forms=(--method '{"align": false, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,glb,usda,npz,vdb --unit cm --up z --fps 24)
+forms=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,glb,usda,npz,vdb --unit cm --up z --fps 24)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

@@ -25,7 +25,7 @@ static void features_invert_the_grid_matrix(void **state)
                            .lambda = 3,
                            .screen = screen,
                            .degree = degree};
-        npg_levels_add(&levels, level, 0);
+        npg_levels_add(&levels, level);
         size_t count = levels.row_count * NPG_LATENT_CHANNELS;
         double *unknowns = calloc(count, sizeof *unknowns), *x = calloc(count, sizeof *x),
                *again = calloc(count, sizeof *again);

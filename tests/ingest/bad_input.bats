@@ -2,7 +2,7 @@
 # with the documented exit code.  (Folders, headers, frames without a surface: run.bats; lists, selections,
 # standard input: input.bats; checkpoints, disks, jobs: resume.bats; sources that stop: live.bats.)
 
-small=(--method '{"epochs": 4, "width-1": 32, "width-2": 32, "poisson-depth": 6, "grid-levels": 3}' --faces 600 --quiet
+small=(--method '{"epochs": 4, "poisson-depth": 6}' --faces 600 --quiet
     --bars flipped=100,stretched=100)
 
 setup_file() {

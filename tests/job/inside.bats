@@ -1,13 +1,13 @@
-# Runs without alignment that are killed inside a window: they continue there, with the same bytes.
+# Runs over grids that are killed inside a window: with the same bytes they continue there, or begin it again where
+# windows are short.
 
 load ../support/store
 
-small=(--method '{"align": false, "width-1": 32, "width-2": 32, "poisson-depth": 5, "samples": 100,
-                  "grid-levels": 3, "state-every": 0}' --faces 400 --bars residual=100,flipped=100
-    --quiet)
-joint=(--method '{"window": 0, "epochs": 240}')
-warm=(--method '{"window": 5, "overlap": 2, "epochs": 30}')
-surface=(--method '{"preset": "grids", "window": 5, "overlap": 2, "epochs": 6}')
+small=(--method '{"width-1": 32, "width-2": 32, "poisson-depth": 5, "grid-levels": 3}' --faces 400
+    --bars residual=100,flipped=100,stretched=100 --quiet)
+joint=(--method '{"align": false, "window": 0, "epochs": 600}')
+warm=(--method '{"align": false, "window": 5, "overlap": 2, "epochs": 600}')
+grids=(--method '{"preset": "grids", "window": 5, "overlap": 2, "epochs": 200, "align-nodes": 40, "align-steps": 6}')
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -54,15 +54,28 @@ check_killed() {
 }
 
 @test "one joint window that is killed twice gives the same bytes" {
-    check_killed joint "5 9" "${joint[@]}"
+    check_killed joint "2 3" "${joint[@]}"
 }
 
 @test "windows by vertices that are killed inside give the same bytes" {
-    check_killed warm "3 12" "${warm[@]}"
+    check_killed warm "1 3" "${warm[@]}"
 }
 
-@test "windows by the surface that are killed inside give the same bytes" {
-    check_killed surface "2 3" "${surface[@]}"
+@test "windows of grids over aligned poses that are killed inside give the same bytes" {
+    "$NEUPIG" run capture/points -o grids-whole "${small[@]}" "${grids[@]}" >grids.log
+    for state in 0 1; do
+        "$NEUPIG" run capture/points -o grids "${small[@]}" "${grids[@]}" >grids.log 2>&1 &
+        local pid=$! at
+        until at=$(newest_state grids) && [ "${at:--1}" -ge $state ]; do kill -0 $pid; done
+        kill -KILL $pid
+        wait $pid || true
+        [ ! -e grids/done.json ]
+    done
+    "$NEUPIG" run capture/points -o grids "${small[@]}" "${grids[@]}"
+    grep -q resumed_frames grids/report.json
+    grep -q '"solver": "grids"' grids/report.json
+    cmp grids-whole/frames.jsonl grids/frames.jsonl
+    diff -r grids-whole/meshes grids/meshes
 }
 
 @test "SIGTERM inside a window keeps what was done" {
@@ -76,25 +89,4 @@ check_killed() {
     truncate -s -100 hurt/job/store.npg
     run "$NEUPIG" run capture/points -o hurt "${small[@]}" "${joint[@]}" --method '{"epochs": 5000}' --restart=no --max-memory 1
     [[ "$output" == *"store.npg is damaged"* ]]
-}
-
-@test "windows that a warm start lost are counted over all that a run was broken off" {
-    "$NEUPIG-bodies" --body bar --frames 11 --points 500 -o lost-capture >lost.log
-    "$NEUPIG-bodies" --body bar --frames 11 --points 500 --noise 4 -o noisy-capture >>lost.log
-    cp noisy-capture/points/*000[567].ply lost-capture/points/
-    mv capture whole-capture
-    mv lost-capture capture
-    "$NEUPIG" run capture/points -o lost-whole "${small[@]}" "${warm[@]}" --keyframe 2 >>lost.log
-    grep -q '"windows_lost": [1-9]' lost-whole/report.json
-    "$NEUPIG" run capture/points -o lost "${small[@]}" "${warm[@]}" --keyframe 2 >>lost.log 2>&1 &
-    local pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(newest_state lost)" != 1 ]; do :; done
-    kill -KILL $pid 2>/dev/null || true
-    wait $pid || true
-    [ ! -e lost/done.json ]
-    "$NEUPIG" run capture/points -o lost "${small[@]}" "${warm[@]}" --keyframe 2
-    grep -q resumed_frames lost/report.json
-    [ "$(grep windows_lost lost/report.json)" = "$(grep windows_lost lost-whole/report.json)" ]
-    mv capture lost-capture
-    mv whole-capture capture
 }

@@ -3,8 +3,8 @@
 
 load ../support/store
 
-small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 6, "align-nodes": 40,
-                  "align-steps": 6, "grid-levels": 3}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100)
+small=(--method '{"epochs": 2, "poisson-depth": 6, "align-nodes": 40,
+                  "align-steps": 6}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100)
 open=(--method '{"window": 4, "overlap": 1}' --look-ahead 6 --follow-end 0)
 
 setup_file() {
@@ -99,7 +99,7 @@ check_killed() {
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--method '{"align": false, "samples": 100, "state-every": 0, "epochs": 80}')
+    local free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 400}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
     for place in 1 2; do

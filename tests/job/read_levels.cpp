@@ -6,7 +6,7 @@
 #include <string>
 
 extern "C" {
-#include "optimize/vdb_grids.h"
+#include "optimize/grids/vdb_grids.h"
 #include "tests/job/read_levels.h"
 }
 

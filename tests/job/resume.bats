@@ -2,9 +2,10 @@
 
 load ../support/store
 
-small=(--method '{"epochs": 10, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 5, "overlap": 2,
-                  "align-nodes": 40, "align-steps": 6, "grid-levels": 3}' --faces 400
+small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
+                  "align-nodes": 40, "align-steps": 6}' --faces 400
     --keyframe 6 --bars residual=100,flipped=100 --quiet)
+free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3}')
 
 # What a run that was killed with two states left is in "broken".
 setup_file() {
@@ -92,10 +93,10 @@ same() {
 }
 
 @test "damaged latent grids, of frames without alignment, are said likewise" {
-    "$NEUPIG" run capture/points -o free "${small[@]}" --method '{"align": false}' >free.log
-    kill_at grids KILL 2 --method '{"align": false}'
+    "$NEUPIG" run capture/points -o free "${small[@]}" "${free[@]}" >free.log
+    kill_at grids KILL 2 "${free[@]}"
     printf '\x5a\xa5' | dd of="$(ls grids/job/window_*.vdb | tail -1)" bs=1 seek=3000 conv=notrunc status=none
-    go_on grids --method '{"align": false}'
+    go_on grids "${free[@]}"
     [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
     diff -r free/meshes grids/meshes
 }

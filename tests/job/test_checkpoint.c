@@ -6,8 +6,7 @@
 
 #include <cmocka.h>
 
-#include "optimize/vdb_grids.h"
-#include "optimize/window.h"
+#include "optimize/grids/vdb_grids.h"
 #include "pipeline/plan.h"
 #include "pipeline/random.h"
 #include "tests/job/read_levels.h"
@@ -18,11 +17,10 @@
 static npg_levels some_levels(void)
 {
     npg_levels levels = {0};
-    npg_levels_add(&levels, (npg_level){.nodes = 2, .channel_end = 30, .lambda = 0.4}, 0);
-    npg_levels_add(&levels, (npg_level){.nodes = 11, .channel_end = 30, .lambda = 0.6}, 0);
+    npg_levels_add(&levels, (npg_level){.nodes = 2, .channel_end = 30, .lambda = 0.4});
+    npg_levels_add(&levels, (npg_level){.nodes = 11, .channel_end = 30, .lambda = 0.6});
     npg_levels_add(&levels,
-                   (npg_level){.kind = NPG_LEVEL_NORMAL, .nodes = 4, .channel_first = 30, .channel_end = 32},
-                   0);
+                   (npg_level){.kind = NPG_LEVEL_NORMAL, .nodes = 4, .channel_first = 30, .channel_end = 32});
     return levels;
 }
 

@@ -9,13 +9,13 @@
 
 #include <cmocka.h>
 
-#include "optimize/joint.h"
+#include "optimize/solver.h"
 #include "pipeline/random.h"
 #include "tests/support/ball_mesh.h"
 
 enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 12 };
 
-static const npg_joint_settings usual = {.points = 1000, .steps = 60, .shape = 0.2};
+static const npg_solver_settings usual = {.epochs = 60, .energy = {.points = 1000, .shape = 0.2}};
 
 static float noise_of(npg_random *random)
 {
@@ -73,35 +73,52 @@ static double error_of(const capture *c, int first, int last)
     return sqrt(sum / ((last - first + 1) * VERTS));
 }
 
-static void fill_frames(npg_joint_frame *frames, capture *c)
+static void fill_frames(npg_energy_frame *frames, capture *c)
 {
     for (int t = 0; t < FRAMES; t++)
-        frames[t] = (npg_joint_frame){.positions = c->pose[t], .points = c->points[t], .point_count = VERTS};
+        frames[t] = (npg_energy_frame){.positions = c->pose[t], .points = c->points[t], .point_count = VERTS};
 }
 
-static npg_joint_result solve(capture *c, const npg_joint_frame *frames)
+/* The frames' positions become the solved ones; *lambda: how smooth the motion was found to be. */
+static void solve_some(capture *c, const npg_energy_frame *frames, size_t count, double *lambda)
 {
-    npg_joint *joint;
-    npg_joint_result result;
-    assert_int_equal(npg_joint_open(&joint, c->ball, &usual), NPG_OK);
-    assert_int_equal(npg_joint_solve(joint, &result, frames, FRAMES, NULL, NULL), NPG_OK);
-    npg_joint_close(&joint);
-    return result;
+    static float ways[FRAMES * 3 * VERTS];
+    npg_energy *energy;
+    void *joint;
+    npg_solved solved;
+    const npg_solver_setup setup = {.settings = &usual, .surface = c->ball};
+    assert_int_equal(npg_energy_open(&energy, c->ball, &usual.energy), NPG_OK);
+    assert_int_equal(npg_solver_joint.open(&joint, &setup), NPG_OK);
+    assert_int_equal(npg_energy_set(energy, frames, count), NPG_OK);
+    const npg_problem problem = {.count = count, .energy = energy, .result = ways};
+    assert_int_equal(npg_solver_joint.solve(joint, &solved, &problem, NULL, NULL), NPG_OK);
+    for (size_t i = 0; i < 3 * VERTS * count; i++)
+        frames[i / (3 * VERTS)].positions[i % (3 * VERTS)] = npg_energy_smoothed(energy)[i] + ways[i];
+    if (lambda) *lambda = npg_energy_lambda(energy);
+    npg_solver_joint.close(&joint);
+    npg_energy_close(&energy);
+}
+
+static double solve(capture *c, const npg_energy_frame *frames)
+{
+    double lambda;
+    solve_some(c, frames, FRAMES, &lambda);
+    return lambda;
 }
 
 /* Cross-validation smooths noise far and a clean motion hardly. */
 static void smoothing_follows_the_noise(void **state)
 {
     static capture noisy, clean;
-    npg_joint_frame frames[FRAMES];
+    npg_energy_frame frames[FRAMES];
     (void)state;
     make_capture(&noisy, 0.01f, 0.01f);
     make_capture(&clean, 1e-5f, 0);
     fill_frames(frames, &noisy);
-    double before = error_of(&noisy, 0, FRAMES - 1), noisy_lambda = solve(&noisy, frames).lambda;
+    double before = error_of(&noisy, 0, FRAMES - 1), noisy_lambda = solve(&noisy, frames);
     double after = error_of(&noisy, 0, FRAMES - 1);
     fill_frames(frames, &clean);
-    double clean_lambda = solve(&clean, frames).lambda;
+    double clean_lambda = solve(&clean, frames);
     print_message("noisy: lambda %.3g, error %.4f, then %.4f; clean: lambda %.3g, error %.6f\n", noisy_lambda,
                   before, after, clean_lambda, error_of(&clean, 0, FRAMES - 1));
     assert_true(after < 0.75 * before && clean_lambda < 0.2 * noisy_lambda);
@@ -114,7 +131,7 @@ static void smoothing_follows_the_noise(void **state)
 static void neighbours_carry_what_is_not_seen(void **state)
 {
     static capture c;
-    npg_joint_frame frames[FRAMES];
+    npg_energy_frame frames[FRAMES];
     (void)state;
     make_capture(&c, 0.003f, 0.003f);
     fill_frames(frames, &c);
@@ -129,7 +146,7 @@ static void neighbours_carry_what_is_not_seen(void **state)
 static void equal_input_gives_equal_bits(void **state)
 {
     static capture a, b;
-    npg_joint_frame frames[FRAMES];
+    npg_energy_frame frames[FRAMES];
     (void)state;
     make_capture(&a, 0.01f, 0.005f);
     make_capture(&b, 0.01f, 0.005f);
@@ -146,19 +163,14 @@ static void equal_input_gives_equal_bits(void **state)
 static void short_windows_work(void **state)
 {
     static capture c;
-    npg_joint_frame frames[FRAMES];
-    npg_joint *joint;
-    npg_joint_result result;
+    npg_energy_frame frames[FRAMES];
     (void)state;
     make_capture(&c, 0.001f, 0);
     fill_frames(frames, &c);
-    assert_int_equal(npg_joint_open(&joint, c.ball, &usual), NPG_OK);
-    for (size_t count = 1; count <= 5; count++)
-        assert_int_equal(npg_joint_solve(joint, &result, frames, count, NULL, NULL), NPG_OK);
+    for (size_t count = 1; count <= 5; count++) solve_some(&c, frames, count, NULL);
     for (int t = 0; t < 3; t++) frames[t].point_count = 0;
-    assert_int_equal(npg_joint_solve(joint, &result, frames, 3, NULL, NULL), NPG_OK);
+    solve_some(&c, frames, 3, NULL);
     assert_true(error_of(&c, 0, 4) < 0.005);
-    npg_joint_close(&joint);
     npg_mesh_unref(&c.ball);
 }
 

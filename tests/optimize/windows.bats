@@ -1,6 +1,6 @@
 # Windows against one joint window over the same short capture: as near the truth, and no seam between them.
 
-small=(--method '{"poisson-depth": 6, "width-1": 64, "width-2": 64, "align-nodes": 120}' --faces 1000
+small=(--method '{"poisson-depth": 6, "align-nodes": 120}' --faces 1000
     --bars residual=100,flipped=100
     --export obj --quiet)
 

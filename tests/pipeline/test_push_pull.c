@@ -40,8 +40,8 @@ static void make_ball(double *points, float *normals, int64_t frame)
 
 static npg_options *open_options(void)
 {
-    const char *const settings[][2] = {{"pull", "yes"},   {"epochs", "40"},       {"width-1", "64"},
-                                       {"width-2", "64"}, {"faces", "600"},       {"poisson-depth", "6"},
+    const char *const settings[][2] = {{"pull", "yes"},   {"epochs", "40"},
+                                       {"faces", "600"},       {"poisson-depth", "6"},
                                        {"output", ""},    {"bars.residual", "5"}, {"keyframe", "12"}};
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);

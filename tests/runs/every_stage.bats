@@ -66,7 +66,7 @@ meshes() { # OUT COUNT
 
 @test "grids on the device" {
     "$NEUPIG" run capture/points -o grids --frames 0:3 "${small[@]}" \
-        --method '{"align": false, "epochs": 2, "width-1": 32, "width-2": 32, "grid-levels": 3, "samples": 100}'
+        --method '{"align": false, "epochs": 2, "width-1": 32, "width-2": 32, "grid-levels": 3}'
     meshes grids 3
 }
 

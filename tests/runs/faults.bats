@@ -49,7 +49,7 @@ programs() {
     mkdir cache && export XDG_CACHE_HOME="$PWD/cache"
     "$NEUPIG-bodies" --body bar --frames 2 --points 300 -o capture >synth.log
     run env LD_PRELOAD="$shim" NPG_FAULT_KERNEL="sum += fabs(change)=>sum += change" "$NEUPIG" run capture/points -o out --quiet \
-        --method '{"align": false}'
+        --method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3}'
     echo "$output"
     [ "$status" -eq 4 ]
     [[ "$output" == *"computes op isometry wrong"* ]]
@@ -92,7 +92,7 @@ programs() {
 @test "a clock that jumps an hour to and fro changes nothing" {
     needs_shim
     "$NEUPIG-bodies" --body bar --frames 3 --points 400 -o capture >synth.log
-    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet
+    small=(--method '{"epochs": 2, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet
         --bars residual=100,flipped=100,stretched=100)
     "$NEUPIG" run capture/points -o plain "${small[@]}"
     LD_PRELOAD=$shim NPG_FAULT_CLOCK=3600 timeout 60 "$NEUPIG" run capture/points -o jumps "${small[@]}"

@@ -2,7 +2,7 @@
 
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
-    small=(--method '{"epochs": 2, "width-1": 32, "width-2": 32, "poisson-depth": 5}' --faces 300 --quiet
+    small=(--method '{"epochs": 2, "poisson-depth": 5}' --faces 300 --quiet
         --bars residual=100,flipped=100,stretched=100)
 }
 
@@ -30,7 +30,7 @@ make_capture() { # FOLDER UNIT
         diff -r "one.out/$name" "tiny.out/$name"
         diff -r "one.out/$name" "large.out/$name"
     done
-    "$NEUPIG" run tiny -o tiny.grids "${small[@]}" --method '{"align": false}' --export vdb --scale 549755813888
+    "$NEUPIG" run tiny -o tiny.grids "${small[@]}" --method '{"align": false, "width-1": 32, "width-2": 32}' --export vdb --scale 549755813888
     [ -s tiny.grids/latents/window_000000.vdb ]
 }
 

@@ -200,7 +200,7 @@ setup() {
     done
     cat >fit.json <<'CONFIG'
 {"descriptor": "surface", "time_encoding": "fourier_features2", "rotation_method": "cayley",
- "optimization": {"epochs": 2, "edgeloss": 50, "time_smoothing": "direct", "catchup_scaling": "pdg"},
+ "optimization": {"epochs": 2, "edgeloss": 50, "time_smoothing": "pdg", "catchup_scaling": "pdg"},
  "grid": {"base_res": 2, "increase_per_level": 3, "n_level": 2, "lr_adapt": 2.5, "local_lambda_adapt": 1.25,
           "neighbours": 3, "smoothness": 0.25, "lr": 0.004, "solver": "CG"},
  "mlp": {"hidden": 64, "layers": 4, "point_dim": 30, "time_dim": 6, "normal_dim": 1}}
@@ -216,7 +216,7 @@ CONFIG
     echo "$output"
     [ "$status" -eq 0 ]
     [[ "$output" == *'jump: warning: '*'their vertices are the points'* ]]
-    for option in '"method": "paper"' '"epochs": "2"' '"isometry": "50"' '"confidence": "single"' '"catch-up": "root"' \
+    for option in '"method": "paper"' '"epochs": "2"' '"isometry": "50"' '"confidence": "cumulative"' \
         '"time-frequencies": "3"' '"grid-levels": "2"' '"lambda-growth": "1.25"' \
         '"lambda": "0.25"' '"normal-channels": "1"' '"grid-rate": "0.004"' '"width-1": "64"' '"width-2": "64"'; do
         grep -q "$option" results/crane/done.json

@@ -1,8 +1,8 @@
 # What the tests of batches share.
 
 # Options of a manifest with which a capture takes seconds.
-tiny='"keyframe": 1, "width-1": 32, "width-2": 32, "faces": 200, "poisson-depth": 5, "samples": 60, "align-nodes": 20,
-    "align-steps": 3, "grid-levels": 2, "bars": "residual=100,flipped=100,stretched=100,coverage=0"'
+tiny='"keyframe": 1, "faces": 200, "poisson-depth": 5, "align-nodes": 20,
+    "align-steps": 3, "bars": "residual=100,flipped=100,stretched=100,coverage=0"'
 small="\"epochs\": 2, $tiny"
 
 # await PID COMMAND...: until the command succeeds, as long as the process lives

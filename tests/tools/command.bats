@@ -161,9 +161,9 @@ EOF
     run "$NEUPIG" probe in --no-align
     [ "$status" -eq 2 ]
     [[ "$output" == *"--method '{\"align\": false}'"* ]]
-    run "$NEUPIG" run in -o out --catch-up=linear
+    run "$NEUPIG" run in -o out --confidence=constant
     [ "$status" -eq 2 ]
-    [[ "$output" == *"--method '{\"catch-up\": \"linear\"}'"* ]]
+    [[ "$output" == *"--method '{\"confidence\": \"constant\"}'"* ]]
     run "$NEUPIG" run in -o out --rotation=cayley
     [ "$status" -eq 2 ]
     [[ "$output" == *"went: "*quaternion* ]]

@@ -1,7 +1,7 @@
 # Captures whose topology changes: the alarm, a reference per segment, their overlap, and going on after a kill.
 
-small=(--method '{"epochs": 10, "width-1": 64, "width-2": 64, "poisson-depth": 6, "window": 10, "overlap": 2,
-                  "align-nodes": 300, "align-steps": 8, "grid-levels": 4, "segment-min": 4}' --faces 2000
+small=(--method '{"epochs": 10, "poisson-depth": 6, "window": 10, "overlap": 2,
+                  "align-nodes": 300, "align-steps": 8, "segment-min": 4}' --faces 2000
     --bars residual=100,flipped=100,coverage=0
     --quiet)
 

@@ -24,7 +24,7 @@ typedef struct npg_vdb_place {
  * metadata npg_level, npg_nodes, npg_lambda, npg_screen and npg_degree (a and b of a I + lambda (b D - A)),
  * npg_channel_first, npg_frame_first, npg_frame_last; the file has npg_window, npg_levels, npg_world_centre,
  * npg_unit_per_world.  Values are the unknowns of the fit, differential coordinates: the features are that
- * matrix, inverted, times them.  Single precision, exact.  Hashed levels are not written. */
+ * matrix, inverted, times them.  Single precision, exact.. */
 npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const float *rows,
                                const npg_vdb_place *place);
 

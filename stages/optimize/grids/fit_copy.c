@@ -1,11 +1,11 @@
 /* Copy: what a fit knows, on the host. */
-#include "optimize/fit.h"
+#include "optimize/grids/fit.h"
 
 #include <string.h>
 
 #include "kernels/adam.h"
 
-#define PARTS_MAX 10
+#define PARTS_MAX 8
 
 /* A part of the state: on the device or on the host. */
 typedef struct part {
@@ -17,9 +17,7 @@ typedef struct part {
 static size_t parts_of(part parts[PARTS_MAX], npg_fit *fit)
 {
     npg_fit_parts p = npg_fit_open_parts(fit);
-    size_t code_count, adam = p.param_count * sizeof(float);
-    int64_t *code_step;
-    double *code = npg_time_code_parts(p.time_code, &code_count, &code_step);
+    size_t adam = p.param_count * sizeof(float);
     const part all[] = {{p.u, NULL, p.u->size},
                         {&p.grid_adam->first, NULL, p.u->size},
                         {&p.grid_adam->second, NULL, p.u->size},
@@ -27,9 +25,7 @@ static size_t parts_of(part parts[PARTS_MAX], npg_fit *fit)
                         {NULL, p.params, adam},
                         {&p.mlp_adam->first, NULL, adam},
                         {&p.mlp_adam->second, NULL, adam},
-                        {NULL, &p.mlp_adam->step, sizeof p.mlp_adam->step},
-                        {NULL, code, code_count * sizeof *code},
-                        {NULL, code_step, sizeof *code_step}};
+                        {NULL, &p.mlp_adam->step, sizeof p.mlp_adam->step}};
     memcpy(parts, all, sizeof all);
     return sizeof all / sizeof *all;
 }
@@ -78,16 +74,10 @@ void npg_fit_copy_clear(npg_fit_copy *copy)
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from)
 {
     npg_fit_parts source = npg_fit_open_parts(from), target = npg_fit_open_parts(to);
-    size_t count, same;
-    int64_t *step;
     float *rows;
     NPG_TRY(npg_fit_read_params(from));
-    const double *code = npg_time_code_parts(source.time_code, &count, &step);
-    double *to_code = npg_time_code_parts(target.time_code, &same, &step);
-    NPG_REQUIRE(source.u->size == target.u->size && source.param_count == target.param_count &&
-                same == count);
+    NPG_REQUIRE(source.u->size == target.u->size && source.param_count == target.param_count);
     memcpy(target.params, source.params, source.param_count * sizeof(float));
-    if (count) memcpy(to_code, code, count * sizeof *code);
     NPG_TRY(npg_alloc(&rows, NPG_FOR_FIT, source.u->size));
     npg_status status = npg_buffer_read(source.u, 0, rows, source.u->size);
     if (!status) status = npg_buffer_write(target.u, 0, rows, source.u->size);

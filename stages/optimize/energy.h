@@ -1,11 +1,11 @@
-#ifndef NPG_OPTIMIZE_JOINT_H
-#define NPG_OPTIMIZE_JOINT_H
+#ifndef NPG_OPTIMIZE_ENERGY_H
+#define NPG_OPTIMIZE_ENERGY_H
 
 #include <stdbool.h>
 
 #include "pipeline/mesh.h"
 
-/* Joint: the surface of a window's frames, moved by the points of all of them at once.
+/* Energy: what a window of aligned frames is moved by: the points of all of them at once.
  *
  *     E = sum_t sum_p w_p (n_p . (x(c_p) - p))^2                                 points
  *       + c sum_v sum_t lambda_v |x_(t-1) - 2 x_t + x_(t+1)|^2                   motion
@@ -23,56 +23,49 @@
  * motion is even.  share_t: small where the frame's pose is far from its points, 0 without points: its
  * neighbours in time carry it.
  *
- * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic.  Conjugate
- * gradients over all frames, preconditioned by each vertex's own five diagonals in time.  Not in the paper:
- * tests/bed/decisions.md compares. */
+ * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic in the way
+ * d = x - s from there: E = E(s) + d^T A d - 2 r^T d.  Not in the paper: tests/bed/decisions.md compares. */
 
-typedef struct npg_joint_settings {
-    int64_t points; /* most of a frame that pull                                           */
-    int64_t steps;  /* of conjugate gradients, at most; 0: the frames are left as they are */
-    double shape;   /* weight of an edge's change against a point's distance               */
-} npg_joint_settings;
+typedef struct npg_energy_settings {
+    int64_t points; /* most of a frame that pull                             */
+    double shape;   /* weight of an edge's change against a point's distance */
+} npg_energy_settings;
 
 /* A frame: where the surface is (W x 3, owned by the caller, moved), and its points (N x 3; normals may be
  * NULL).  A known one was part of an earlier solve: its noise is gone, so it does not speak for how much
  * there is. */
-typedef struct npg_joint_frame {
+typedef struct npg_energy_frame {
     float *positions;
     const float *points, *normals;
     size_t point_count;
     bool is_known;
-} npg_joint_frame;
+} npg_energy_frame;
 
-/* What a solve did; lengths in units. */
-typedef struct npg_joint_result {
-    double noise;  /* median distance of points from the smoothed poses, as a standard deviation */
-    double lambda; /* median of lambda                                   */
-    double moved;  /* mean way of a vertex                               */
-    int64_t steps; /* of conjugate gradients                             */
-} npg_joint_result;
-
-typedef struct npg_joint npg_joint;
+typedef struct npg_energy npg_energy;
 
 /* surface: W vertices at rest, with faces; counted reference kept. */
-npg_status npg_joint_open(npg_joint **joint, npg_mesh *surface, const npg_joint_settings *settings);
-void npg_joint_close(npg_joint **joint);
+npg_status npg_energy_open(npg_energy **energy, npg_mesh *surface, const npg_energy_settings *settings);
+void npg_energy_close(npg_energy **energy);
 
-/* Asked after each step of conjugate gradients: how many there were, how many there will be at most, and what
- * is left of the first residual (1 .. 0).  Anything but NPG_OK ends the solve with that status. */
-typedef npg_status npg_joint_watch(void *user, int64_t step, int64_t most, double residual);
+/* Median distance of points from the smoothed poses, as a standard deviation.  What the window before came to
+ * is within what the next one first matches; a resumed run sets that of its state. */
+double npg_energy_noise(const npg_energy *energy);
+void npg_energy_set_noise(npg_energy *energy, double noise);
 
-/* The noise that the window before came to (npg_joint_result): the next one first matches within it.  A solve
- * sets it; a resumed run starts with that of its state. */
-void npg_joint_set_noise(npg_joint *joint, double noise);
+/* The energy of these frames (loans until the next call), in order of time; equal input (that noise, too)
+ * gives equal bits, however many threads.  NPG_MEMORY. */
+npg_status npg_energy_set(npg_energy *energy, const npg_energy_frame *frames, size_t frame_count);
 
-/* Move the frames' surfaces, in order of time; those are left alone where it fails or there are no steps.
- * Equal input (that noise, too) gives equal bits, however many threads.  watch may be NULL.  NPG_MEMORY,
- * NPG_DIVERGED, the watch's. */
-npg_status npg_joint_solve(npg_joint *joint, npg_joint_result *result, const npg_joint_frame *frames,
-                           size_t frame_count, npg_joint_watch *watch, void *user);
+/* Of the frames that were set: s (T x W x 3), median of lambda, and A and r. */
+const float *npg_energy_smoothed(const npg_energy *energy);
+double npg_energy_lambda(const npg_energy *energy);
+struct npg_energy_system *npg_energy_system_of(npg_energy *energy);
+
+/* E(s). */
+double npg_energy_at_start(const npg_energy *energy);
 
 /* Bytes that it takes at most. */
-size_t npg_joint_memory(const npg_joint_settings *settings, size_t vert_count, size_t frames);
+size_t npg_energy_memory(const npg_energy_settings *settings, size_t vert_count, size_t frames);
 
 /* Time smooth: positions over time, each frame's own error taken out, as far as the motion itself allows.
  *
@@ -133,77 +126,66 @@ void npg_band_factor(npg_band *band);
 /* x (every `stride`-th of n values) = the factored matrix's inverse times x. */
 void npg_band_solve(const npg_band *band, double *x, size_t stride);
 
-/* Joint system: the joint fit's normal equations (joint.h) and their solution. */
+/* System: A and r of the energy. */
 
 /* A point that pulls: at the face's corners with these weights, normal there, and its strength. */
-typedef struct npg_joint_pull {
+typedef struct npg_point_pull {
     uint32_t corner[3];
     float weight[3], normal[3], offset[3]; /* offset: target less the surface's point at the start */
     float strength;
-} npg_joint_pull;
+} npg_point_pull;
 
 /* Neighbours of each vertex by its edges. */
-typedef struct npg_joint_ring {
+typedef struct npg_edge_ring {
     uint32_t *start, *neighbour; /* W + 1, 2 E */
-} npg_joint_ring;
+} npg_edge_ring;
 
-typedef struct npg_joint_system {
+typedef struct npg_energy_system {
     size_t frame_count, vert_count; /* T, W */
-    npg_joint_ring ring;            /* loan */
+    npg_edge_ring ring;             /* loan */
     const float *lambda;            /* W: bend of the motion, times points per vertex; loan */
     double shape;                   /* weight of an edge                            */
-    const npg_joint_pull *pulls;    /* `most` per frame; loan */
+    const npg_point_pull *pulls;    /* `most` per frame; loan */
     const size_t *pull_counts;      /* T; loan */
     size_t most;
     const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
     const float *shares; /* T: of the frames' ties; loan                     */
-    /* T x W x 3 */
-    float *right, *step, *precond, *direction, *image; /* precond: main, near, far of the factors */
-    float *diagonal;                                   /* T x W */
-} npg_joint_system;
+    float *right;        /* T x W x 3: r                                     */
+} npg_energy_system;
 
-/* Arrays for T frames of W vertices, from an arena whose status is to be asked. */
-void npg_joint_system_take(npg_joint_system *system, npg_arena *arena, size_t frame_count, size_t vert_count);
-size_t npg_joint_system_memory(size_t frame_count, size_t vert_count);
-
-/* Solve for `step` from `right`; both pieces of the left side are taken from the members.  Ends when the
- * residual's preconditioned norm has fallen to `tolerance`, or after `most` steps; *taken of them.  watch may
- * be NULL. */
-npg_status npg_joint_system_solve(npg_joint_system *system, double tolerance, int64_t most, int64_t *taken,
-                                  npg_joint_watch *watch, void *user);
+/* image_t = the rows of A d that belong to frame t; d and image: T x W x 3. */
+void npg_energy_multiply(float *image, const npg_energy_system *system, const float *d, size_t t);
 
 /* image_t += the part of the bend in time: sum_s B_ts lambda_v x_s, B = D^T D. */
-void npg_joint_bend(float *image, const npg_joint_system *system, const float *x, size_t t, float sign);
-
-/* image -= the shape's part: shape * sum_j (d_v - d_j), d = now - kept (W x 3 each). */
-void npg_joint_keep_shape(float *image, const npg_joint_system *system, const float *kept, const float *now);
+void npg_energy_bend(float *image, const npg_energy_system *system, const float *x, size_t t, float sign);
 
 /* Rings of a mesh's edges, from an arena. */
-npg_status npg_joint_ring_take(npg_joint_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
-                               size_t edge_count, size_t vert_count);
+npg_status npg_edge_ring_take(npg_edge_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
+                              size_t edge_count, size_t vert_count);
 
-/* Joint match: a frame's points and the places of the surface that they pull at. */
+/* Match: a frame's points and the places of the surface that they pull at. */
 
 /* Searches one frame at a time. */
-typedef struct npg_joint_matcher {
+typedef struct npg_point_matcher {
     const npg_mesh *mesh; /* loan */
     size_t most;
     npg_surface *surface;
     float *targets, *target_normals, *vert_normals, *dists; /* M x 3, M x 3, W x 3, M */
     npg_surface_hit *hits;                                  /* M */
     npg_arena arrays;                                       /* holds these */
-} npg_joint_matcher;
+} npg_point_matcher;
 
-npg_status npg_joint_matcher_open(npg_joint_matcher *matcher, const npg_mesh *mesh, size_t most);
-void npg_joint_matcher_close(npg_joint_matcher *matcher);
+npg_status npg_point_matcher_open(npg_point_matcher *matcher, const npg_mesh *mesh, size_t most);
+void npg_point_matcher_close(npg_point_matcher *matcher);
 
 /* Median distance of the frame's points from the surface: as the standard deviation that it is of in a normal
  * distribution. */
-npg_status npg_joint_measure(npg_joint_matcher *matcher, double *spread, const npg_joint_frame *frame);
+npg_status npg_point_matcher_measure(npg_point_matcher *matcher, double *spread,
+                                     const npg_energy_frame *frame);
 
 /* pulls (M) of the frame, *count of them; weights fall beyond `width`.  Points whose normal is opposite to
  * the surface's do not pull. */
-npg_status npg_joint_match(npg_joint_matcher *matcher, npg_joint_pull *pulls, size_t *count,
-                           const npg_joint_frame *frame, double width);
+npg_status npg_point_matcher_match(npg_point_matcher *matcher, npg_point_pull *pulls, size_t *count,
+                                   const npg_energy_frame *frame, double width);
 
 #endif

@@ -1,7 +1,5 @@
 /* Fit: grids, decoder and motion put together; one epoch is a walk over all frames,
  * in batches from the key outward. */
-#include "optimize/fit.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +9,7 @@
 #include "kernels/latent.h"
 #include "kernels/mlp.h"
 #include "kernels/sobolev.h"
+#include "optimize/grids/fit.h"
 #include "pipeline/random.h"
 
 #define BATCH 4 /* frames whose second hidden layer is kept at a time */
@@ -30,21 +29,21 @@ struct npg_fit {
     npg_sobolev sobolev;
     npg_buffer u, nodes, dnodes; /* differential coordinates, features, gradient: [nodes][32] */
     npg_adam grid_adam, mlp_adam;
-    npg_time_code *time_code;
     float *params; /* decoder's parameters between windows */
     uint64_t seed;
     npg_arena window; /* holds the arrays of the window */
     npg_mlp mlp;
     npg_motion motion;
-    npg_buffer dcode;
     size_t frame_count;
-    bool is_pulled;                     /* by known correspondences, from bases */
+    npg_fit_measure *measure;           /* or NULL: by distances */
+    void *user;                         /* its user */
     size_t tied_count;                  /* frames, the first outward, that follow their tie */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward */
     size_t *rank;                       /* its inverse */
     int64_t *index;                     /* by k */
     double *times;                      /* by k */
-    float *cd, *gains, *codes, *packed; /* by k; packed: one frame's positions */
+    float *cd, *gains, *codes, *packed; /* by k; packed: one frame's positions, of measured ones all */
+    float *now, *gradient;              /* of measured frames: T x V x 3 in the caller's order */
     bool *has_points;                   /* by k */
 };
 
@@ -120,7 +119,7 @@ static npg_status open_grids(npg_fit *fit, const float *normals)
     return open_grid_adam(fit);
 }
 
-static npg_mlp_shape shape_of(const npg_fit_settings *s)
+static npg_mlp_shape shape_of(const npg_grid_settings *s)
 {
     return (npg_mlp_shape){(size_t)s->width_1, (size_t)s->width_2, 2 * (size_t)s->frequencies};
 }
@@ -151,7 +150,7 @@ static void draw_layers(float *to, const npg_mlp_shape *s, size_t inputs, npg_ra
 
 static npg_status draw_params(npg_fit *fit)
 {
-    const npg_fit_settings *settings = &fit->settings;
+    const npg_grid_settings *settings = &fit->settings.grid;
     npg_mlp_shape s = shape_of(settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
     size_t count = npg_mlp_param_count(&s);
@@ -177,13 +176,11 @@ npg_status npg_fit_open(npg_fit **out, npg_device *device, const npg_fit_setting
     fit->arrays.purpose = fit->window.purpose = NPG_FOR_FIT;
     fit->real = reference->vert_count;
     fit->rows = npg_mlp_rows(device, fit->real);
-    npg_fit_levels(&fit->levels, settings);
+    npg_fit_levels(&fit->levels, &settings->grid);
     npg_status status = sort_vertices(fit, reference, &normals);
     if (!status) status = open_grids(fit, normals);
     if (!status) status = draw_params(fit);
-    if (!status)
-        status = npg_time_code_open(&fit->time_code, (npg_time_kind)settings->time_code,
-                                    (size_t)settings->frequencies, seed);
+    if (!status && settings->is_of_ways) memset(fit->rest, 0, fit->real * 3 * sizeof *fit->rest);
     npg_release(&normals);
     if (status) npg_fit_close(&fit);
     *out = fit;
@@ -194,7 +191,6 @@ static void close_window(npg_fit *fit)
 {
     npg_mlp_close(&fit->mlp);
     npg_motion_close(&fit->motion);
-    npg_buffer_close(&fit->dcode);
     npg_arena_release(&fit->window);
     fit->frame_count = fit->tied_count = 0;
 }
@@ -211,7 +207,6 @@ void npg_fit_close(npg_fit **slot)
     npg_buffer_close(&fit->u);
     npg_buffer_close(&fit->nodes);
     npg_buffer_close(&fit->dnodes);
-    npg_time_code_close(&fit->time_code);
     npg_release(&fit->edges);
     npg_arena_release(&fit->arrays);
     npg_release(slot);
@@ -221,7 +216,7 @@ void npg_fit_close(npg_fit **slot)
 
 static npg_status alloc_window(npg_fit *fit, size_t count)
 {
-    size_t code = 2 * (size_t)fit->settings.frequencies;
+    size_t code = 2 * (size_t)fit->settings.grid.frequencies, all = fit->measure ? count : 1;
     npg_arena *a = &fit->window;
     fit->place = npg_arena_take(a, count, sizeof(size_t));
     fit->rank = npg_arena_take(a, count, sizeof(size_t));
@@ -230,7 +225,9 @@ static npg_status alloc_window(npg_fit *fit, size_t count)
     fit->cd = npg_arena_take(a, count, sizeof(float));
     fit->gains = npg_arena_take(a, count, sizeof(float));
     fit->codes = npg_arena_take(a, count * code, sizeof(float));
-    fit->packed = npg_arena_take(a, fit->rows, 3 * sizeof(float));
+    fit->packed = npg_arena_take(a, all * fit->rows, 3 * sizeof(float));
+    fit->now = npg_arena_take(a, all * fit->real, 3 * sizeof(float));
+    fit->gradient = npg_arena_take(a, all * fit->real, 3 * sizeof(float));
     fit->has_points = npg_arena_take(a, count, sizeof(bool));
     return npg_arena_status(a);
 }
@@ -322,66 +319,51 @@ static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
     return status ? status : set_ties(fit, frames);
 }
 
-/* The bases in the order of rows and outward. */
-static npg_status open_bases(npg_fit *fit, const npg_fit_frame *frames)
+static npg_status begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key, size_t batch)
 {
-    float *bases;
-    size_t size = 3 * fit->real;
-    NPG_TRY(open_motion_on(fit, NULL));
-    NPG_TRY(npg_alloc_array(&bases, NPG_FOR_FIT, fit->frame_count, size * sizeof(float)));
-    for (size_t k = 0; k < fit->frame_count; k++)
-        for (size_t i = 0; i < size; i++)
-            bases[k * size + i] = frames[fit->place[k]].base[3 * fit->order[i / 3] + i % 3];
-    npg_status status = npg_motion_set_bases(&fit->motion, bases);
-    npg_release(&bases);
-    return status;
+    npg_mlp_shape shape = shape_of(&fit->settings.grid);
+    fit->frame_count = count;
+    NPG_TRY(alloc_window(fit, count));
+    sort_outward(fit, frames, count, key);
+    NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count, batch));
+    return npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float));
 }
 
 npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
 {
     NPG_REQUIRE(fit && frames && count);
-    npg_mlp_shape shape = shape_of(&fit->settings);
-    size_t batch = count < BATCH ? count : BATCH;
     close_window(fit);
-    fit->frame_count = count;
-    fit->is_pulled = frames[0].base != NULL;
-    NPG_TRY(alloc_window(fit, count));
-    sort_outward(fit, frames, count, key);
-    NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count, batch));
-    NPG_TRY(npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float)));
-    if (npg_time_code_learns(fit->time_code))
-        NPG_TRY(npg_buffer_open(&fit->dcode, fit->device, count * shape.code_size * sizeof(float)));
-    return fit->is_pulled ? open_bases(fit, frames) : open_targets(fit, frames);
+    fit->measure = NULL;
+    NPG_TRY(begin(fit, frames, count, key, count < BATCH ? count : BATCH));
+    return open_targets(fit, frames);
 }
 
-npg_status npg_fit_set_pulls(npg_fit *fit, npg_pull *pulls, const size_t *start)
+npg_status npg_fit_begin_measured(npg_fit *fit, const npg_fit_frame *frames, size_t count,
+                                  npg_fit_measure *measure, void *user)
 {
-    npg_pull *sorted;
-    int32_t *starts;
-    size_t count = fit->frame_count, at = 0;
-    NPG_REQUIRE(fit->is_pulled && start[count] < INT32_MAX);
-    NPG_TRY(npg_alloc_array(&sorted, NPG_FOR_FIT, start[count] + 1, sizeof *sorted));
-    npg_status status = npg_alloc_array(&starts, NPG_FOR_FIT, count + 1, sizeof *starts);
-    for (size_t k = 0; k < count && !status; k++) {
-        size_t from = fit->place[k];
-        for (size_t i = start[from]; i < start[from + 1]; i++) {
-            for (int c = 0; c < 3; c++) pulls[i].vertex[c] = (int32_t)fit->row_of[pulls[i].vertex[c]];
-            sorted[at++] = pulls[i];
+    NPG_REQUIRE(fit && frames && count && measure);
+    close_window(fit);
+    fit->measure = measure;
+    fit->user = user;
+    NPG_TRY(begin(fit, frames, count, frames[0].index, count));
+    return open_motion_on(fit, NULL);
+}
+
+void npg_time_code(float *codes, const double *times, size_t count, size_t frequencies)
+{
+    for (size_t i = 0; i < count; i++)
+        for (size_t j = 0; j < frequencies; j++) {
+            double at = M_PI * (double)(1 << j) * times[i];
+            codes[2 * i * frequencies + j] = (float)sin(at);
+            codes[(2 * i + 1) * frequencies + j] = (float)cos(at);
         }
-        starts[k + 1] = (int32_t)at;
-        fit->has_points[k] = start[from + 1] > start[from];
-    }
-    if (!status) status = npg_motion_set_pulls(&fit->motion, sorted, starts);
-    npg_release(&sorted);
-    npg_release(&starts);
-    return status;
 }
 
 /* ---- one epoch ---- */
 
 static npg_status begin_epoch(npg_fit *fit)
 {
-    npg_time_code_fill(fit->time_code, fit->codes, fit->times, fit->frame_count);
+    npg_time_code(fit->codes, fit->times, fit->frame_count, (size_t)fit->settings.grid.frequencies);
     NPG_TRY(npg_buffer_write(&fit->mlp.code, 0, fit->codes,
                              fit->frame_count * fit->mlp.shape.code_size * sizeof(float)));
     NPG_TRY(npg_sobolev_solve(&fit->sobolev, &fit->nodes, &fit->u));
@@ -402,17 +384,16 @@ static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, i
 static npg_status measure_frames(npg_fit *fit, size_t first, size_t count)
 {
     size_t tied = first < fit->tied_count ? fit->tied_count - first : 0;
-    size_t pulled = fit->is_pulled || tied > count ? count : tied;
+    size_t pulled = tied > count ? count : tied;
     if (pulled) NPG_TRY(npg_motion_pull(&fit->motion, first, pulled));
     if (pulled == count) return NPG_OK;
-    return npg_motion_chamfer(&fit->motion, fit->settings.alpha, first + pulled, count - pulled);
+    return npg_motion_chamfer(&fit->motion, fit->settings.paper.welsch, first + pulled, count - pulled);
 }
 
 /* Positions, losses, and the gradient at the decoder's end. */
 static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first, size_t count, int64_t epoch)
 {
-    const npg_fit_settings *s = &fit->settings;
-    double iso = s->isometry / ((double)fit->frame_count * (double)fit->edge_count);
+    double iso = fit->settings.paper.isometry / ((double)fit->frame_count * (double)fit->edge_count);
     NPG_TRY(npg_mlp_forward(&fit->mlp, first, count));
     NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, first, count));
     NPG_TRY(measure_frames(fit, first, count));
@@ -426,22 +407,11 @@ static npg_status measure_batch(npg_fit *fit, npg_weights *weights, size_t first
                            count);
 }
 
-static npg_status step_time_code(npg_fit *fit)
-{
-    if (!npg_time_code_learns(fit->time_code)) return NPG_OK;
-    size_t bytes = fit->frame_count * fit->mlp.shape.code_size * sizeof(float);
-    NPG_TRY(npg_mlp_code_back(&fit->mlp, &fit->dcode));
-    NPG_TRY(npg_buffer_read(&fit->dcode, 0, fit->codes, bytes));
-    return npg_time_code_step(fit->time_code, fit->codes, fit->times, fit->frame_count,
-                              fit->settings.mlp_rate);
-}
-
 static npg_status end_epoch(npg_fit *fit)
 {
     NPG_TRY(npg_mlp_end(&fit->mlp));
     NPG_TRY(npg_latent_back(&fit->latent, &fit->dnodes, &fit->mlp.dz, &fit->mlp.z));
     NPG_TRY(npg_sobolev_solve(&fit->sobolev, &fit->dnodes, &fit->dnodes));
-    NPG_TRY(step_time_code(fit));
     NPG_TRY(npg_adam_step(&fit->grid_adam, &fit->u, &fit->dnodes));
     return npg_adam_step(&fit->mlp_adam, &fit->mlp.params, &fit->mlp.grad);
 }
@@ -464,8 +434,41 @@ static npg_status sum_up(npg_fit *fit, npg_fit_step *step)
     }
     step->chamfer /= solved ? (double)solved : 1;
     step->isometry = 0.5 * sum / ((double)fit->frame_count * (double)fit->edge_count);
-    step->loss = weighted + fit->settings.isometry * step->isometry;
+    step->loss = weighted + fit->settings.paper.isometry * step->isometry;
     return status;
+}
+
+/* Between the device's rows, outward, and the caller's order. */
+static void sort_rows(npg_fit *fit, bool is_to_device)
+{
+    for (size_t k = 0; k < fit->frame_count; k++)
+        for (size_t row = 0; row < fit->rows; row++)
+            for (size_t axis = 0; axis < 3; axis++) {
+                float *packed = fit->packed + 3 * k * fit->rows + NPG_POINT_AT(row) + axis * NPG_LANES;
+                size_t at = 3 * (fit->place[k] * fit->real + (row < fit->real ? fit->order[row] : 0)) + axis;
+                if (is_to_device)
+                    *packed = row < fit->real ? fit->gradient[at] : 0;
+                else if (row < fit->real)
+                    fit->now[at] = *packed;
+            }
+}
+
+/* All frames at once, by the caller's loss. */
+static npg_status measure_by_caller(npg_fit *fit, npg_fit_step *step)
+{
+    size_t count = fit->frame_count, bytes = count * fit->rows * 3 * sizeof(float);
+    NPG_TRY(npg_mlp_forward(&fit->mlp, 0, count));
+    NPG_TRY(npg_motion_apply(&fit->motion, &fit->mlp.out, 0, count));
+    NPG_TRY(npg_buffer_read(&fit->motion.x, 0, fit->packed, bytes));
+    sort_rows(fit, false);
+    NPG_TRY(fit->measure(fit->user, &step->loss, fit->gradient, fit->now));
+    if (!isfinite(step->loss))
+        return npg_error(NPG_DIVERGED, "the loss is not finite in epoch %lld", (long long)step->epoch);
+    sort_rows(fit, true);
+    NPG_TRY(npg_buffer_write(&fit->motion.g, 0, fit->packed, bytes));
+    for (size_t k = 0; k < count; k++) fit->gains[k] = 1;
+    NPG_TRY(npg_motion_back(&fit->motion, &fit->mlp.dout, &fit->mlp.out, fit->gains, 0, 0, count));
+    return npg_mlp_backward(&fit->mlp, 0, count);
 }
 
 /* What the present state measures, and the gradients for a step. */
@@ -473,8 +476,10 @@ static npg_status measure_epoch(npg_fit *fit, npg_fit_step *step)
 {
     npg_weights weights;
     double progress = (double)step->epoch / (double)step->epochs;
-    npg_weights_begin(&weights, &fit->settings, progress, fit->index[0], fit->frame_count);
     NPG_TRY(begin_epoch(fit));
+    if (fit->measure) return measure_by_caller(fit, step);
+    npg_weights_begin(&weights, (npg_confidence)fit->settings.paper.confidence, progress, fit->index[0],
+                      fit->frame_count);
     for (size_t first = 0; first < fit->frame_count; first += fit->mlp.batch) {
         size_t left = fit->frame_count - first, count = left < fit->mlp.batch ? left : fit->mlp.batch;
         NPG_TRY(measure_batch(fit, &weights, first, count, step->epoch));
@@ -496,51 +501,27 @@ static npg_status decode(npg_fit *fit)
 }
 
 /* Half a cosine from 1 down to rate_end. */
-static double rate_at(const npg_fit_settings *s, int64_t epoch)
+static double rate_at(double rate_end, const npg_fit_step *step)
 {
-    double part = s->epochs > 1 ? (double)epoch / (double)(s->epochs - 1) : 0;
-    return s->rate_end + (1 - s->rate_end) * 0.5 * (1 + cos(M_PI * part));
+    double part = step->epochs > 1 ? (double)step->epoch / (double)(step->epochs - 1) : 0;
+    return rate_end + (1 - rate_end) * 0.5 * (1 + cos(M_PI * part));
 }
 
-static npg_status run_epochs(npg_fit *fit, npg_fit_step *step, int64_t end, npg_fit_watch *watch, void *user)
+void npg_fit_set_pace(npg_fit *fit, npg_confidence confidence, double rate_end)
 {
-    for (; step->epoch < end; step->epoch++) {
-        fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(&fit->settings, step->epoch);
-        NPG_TRY(measure_epoch(fit, step));
-        NPG_TRY(end_epoch(fit));
-        npg_status status = watch ? watch(user, step) : NPG_OK;
-        if (status == NPG_END)
-            end = step->epoch + 1;
-        else
-            NPG_TRY(status);
-    }
-    return NPG_OK;
-}
-
-void npg_fit_set_isometry(npg_fit *fit, double weight)
-{
-    fit->settings.isometry = weight;
-}
-
-void npg_fit_set_confidence(npg_fit *fit, npg_confidence confidence)
-{
-    fit->settings.confidence = (int)confidence;
-}
-
-void npg_fit_set_rate_end(npg_fit *fit, double share)
-{
-    fit->settings.rate_end = share;
-}
-
-void npg_fit_set_epochs(npg_fit *fit, int64_t epochs)
-{
-    fit->settings.epochs = epochs;
+    fit->settings.paper.confidence = confidence;
+    fit->settings.rate_end = rate_end;
 }
 
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
 {
-    npg_fit_step step = {.epoch = first, .epochs = fit->settings.epochs};
-    NPG_TRY(run_epochs(fit, &step, end, watch, user));
+    npg_fit_step step = {.epoch = first, .epochs = end};
+    for (; step.epoch < end; step.epoch++) {
+        fit->grid_adam.scale = fit->mlp_adam.scale = rate_at(fit->settings.rate_end, &step);
+        NPG_TRY(measure_epoch(fit, &step));
+        NPG_TRY(end_epoch(fit));
+        if (watch) NPG_TRY(watch(user, &step));
+    }
     NPG_TRY(npg_fit_read_params(fit));
     return decode(fit);
 }
@@ -573,23 +554,24 @@ npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i)
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit)
 {
-    npg_mlp_shape shape = shape_of(&fit->settings);
+    npg_mlp_shape shape = shape_of(&fit->settings.grid);
     return (npg_fit_parts){&fit->levels,   &fit->u,     &fit->grid_adam,
-                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape),
-                           fit->time_code};
+                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape)};
 }
 
-size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frames, size_t points, int units)
+#define UNITS 2 /* of the device, whose scratch memory counts: on more the drivers' own counts more */
+
+size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frames, size_t points)
 {
     npg_levels levels = {0};
-    npg_mlp_shape shape = shape_of(s);
-    npg_fit_levels(&levels, s);
+    npg_mlp_shape shape = shape_of(&s->grid);
+    npg_fit_levels(&levels, &s->grid);
     const npg_tuning *tuning = &npg_tuning_wide; /* a processor: elsewhere the device has memory of its own */
-    size_t block = (size_t)tuning->mlp_rows, groups = (size_t)(tuning->mlp_groups * units);
+    size_t block = (size_t)tuning->mlp_rows, groups = (size_t)(tuning->mlp_groups * UNITS);
     size_t rows = (vert_count + block - 1) / block * block;
-    size_t batch = frames < BATCH ? frames : BATCH;
+    size_t batch = frames < BATCH || s->is_of_ways ? frames : BATCH;
     size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
-    size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4) + points * 8 + groups * shape.w1;
+    size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4 + 9) + points * 8 + groups * shape.w1;
     size_t per_group = npg_mlp_param_count(&shape) + npg_mlp_scratch(&shape, block);
     size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_param_count(&shape) * 7;
     return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);

@@ -6,7 +6,7 @@
 
 extern "C" {
 #include "job/vdb_file.h"
-#include "optimize/vdb_grids.h"
+#include "optimize/grids/vdb_grids.h"
 }
 #include "geometry/guard.hpp"
 #include "job/vdb_writer.hpp"
@@ -106,7 +106,7 @@ int32_t grid_count(const npg_levels *levels)
     int32_t count = 0;
     for (int at = 0; at < levels->count; at++) {
         int channels = levels->level[at].channel_end - levels->level[at].channel_first;
-        if (levels->level[at].kind != NPG_LEVEL_HASHED) count += channels / 3 + channels % 3;
+        count += channels / 3 + channels % 3;
     }
     return count;
 }
@@ -126,8 +126,7 @@ npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const
         about.insertMeta("npg_unit_per_world", openvdb::DoubleMetadata(place->unit_per_world));
         npg::vdb_writer file(path, about, grid_count(levels));
         for (int at = 0; at < levels->count; at++)
-            if (levels->level[at].kind != NPG_LEVEL_HASHED)
-                add_level(file, levels->level[at], at, rows, *place);
+            add_level(file, levels->level[at], at, rows, *place);
         file.close();
         return NPG_OK;
     });

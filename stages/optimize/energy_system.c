@@ -1,0 +1,89 @@
+/* System: products with the energy's matrix. */
+#include <string.h>
+
+#include "optimize/energy.h"
+
+npg_status npg_edge_ring_take(npg_edge_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
+                              size_t edge_count, size_t vert_count)
+{
+    ring->start = npg_arena_take(arena, vert_count + 2, sizeof *ring->start);
+    ring->neighbour = npg_arena_take(arena, 2 * edge_count + 1, sizeof *ring->neighbour);
+    NPG_TRY(npg_arena_status(arena));
+    uint32_t *at = ring->start + 1; /* shifted by one while it is filled */
+    for (size_t e = 0; e < 2 * edge_count; e++) at[edges[e / 2][e % 2] + 1]++;
+    for (size_t v = 0; v < vert_count; v++) at[v + 1] += at[v];
+    for (size_t e = 0; e < 2 * edge_count; e++)
+        ring->neighbour[at[edges[e / 2][e % 2]]++] = edges[e / 2][1 - e % 2];
+    return NPG_OK;
+}
+
+/* ---- products ---- */
+
+/* Row t of B = D^T D for T frames: coefficient of frame t + k, k = -2 .. 2. */
+static float bend_of(size_t frames, size_t t, int k)
+{
+    static const float second[3] = {1, -2, 1};
+    float sum = 0;
+    if (frames < 3) return 0;
+    for (int a = 0; a < 3; a++) { /* the difference in which t is the a-th and t + k the (a + k)-th */
+        int64_t first = (int64_t)t - a;
+        if (first < 0 || first + 2 >= (int64_t)frames || a + k < 0 || a + k > 2) continue;
+        sum += second[a] * second[a + k];
+    }
+    return sum;
+}
+
+void npg_energy_bend(float *image, const npg_energy_system *s, const float *x, size_t t, float sign)
+{
+    size_t w = s->vert_count;
+    for (int k = -2; k <= 2; k++) {
+        int64_t at = (int64_t)t + k;
+        if (at < 0 || at >= (int64_t)s->frame_count) continue;
+        float share = sign * bend_of(s->frame_count, t, k);
+        const float *from = x + (size_t)at * w * 3;
+        for (size_t i = 0; i < 3 * w; i++) image[i] += share * s->lambda[i / 3] * from[i];
+    }
+}
+
+static void add_shape(float *restrict image, const npg_energy_system *s, const float *restrict x)
+{
+    float shape = (float)s->shape;
+    for (size_t v = 0; v < s->vert_count; v++) {
+        float degree = (float)(s->ring.start[v + 1] - s->ring.start[v]);
+        float sum[3] = {degree * x[3 * v], degree * x[3 * v + 1], degree * x[3 * v + 2]};
+        for (uint32_t k = s->ring.start[v]; k < s->ring.start[v + 1]; k++) {
+            const float *other = x + 3 * (size_t)s->ring.neighbour[k];
+            for (int a = 0; a < 3; a++) sum[a] -= other[a];
+        }
+        for (size_t a = 0; a < 3; a++) image[3 * v + a] += shape * sum[a];
+    }
+}
+
+static void add_tie(float *restrict image, const npg_energy_system *s, const float *restrict x, size_t t)
+{
+    for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += s->shares[t] * s->ties[i / 3] * x[i];
+}
+
+static void add_pull(float *image, const npg_point_pull *p, const float *x)
+{
+    float at[3] = {0}, across = 0;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t a = 0; a < 3; a++) at[a] += p->weight[c] * x[3 * (size_t)p->corner[c] + a];
+    for (int a = 0; a < 3; a++) across += p->normal[a] * at[a];
+    across *= p->strength;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t a = 0; a < 3; a++)
+            image[3 * (size_t)p->corner[c] + a] += p->weight[c] * across * p->normal[a];
+}
+
+void npg_energy_multiply(float *image, const npg_energy_system *s, const float *d, size_t t)
+{
+    size_t size = 3 * s->vert_count;
+    const float *x = d + t * size;
+    image += t * size;
+    memset(image, 0, size * sizeof *image);
+    add_shape(image, s, x);
+    npg_energy_bend(image, s, d, t, 1);
+    add_tie(image, s, x, t);
+    for (size_t i = 0; i < s->pull_counts[t]; i++) add_pull(image, &s->pulls[t * s->most + i], x);
+}

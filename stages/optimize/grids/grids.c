@@ -1,0 +1,281 @@
+/* Grids: the energy's least over fields: latent grids and decoder give the ways of few vertices of the surface
+ * from the smoothed poses, and these carry the others.
+ *
+ *     d(v, t) = sum_i b_i(v) (f(i, t) - f_0(i, t)),   E(s + d) = E(s) + d^T A d - 2 r^T d
+ *
+ * f_0: what the field had before the window, so that it starts at the smoothed poses whatever it knows.  The
+ * state of least energy is kept, and goes as far along its way as is best. */
+#include <math.h>
+#include <string.h>
+
+#include "geometry/geometry.h"
+#include "job/vdb_file.h"
+#include "optimize/carry.h"
+#include "optimize/grids/fit.h"
+#include "optimize/grids/vdb_grids.h"
+#include "pipeline/parallel.h"
+
+#define SAMPLES       1500 /* vertices that the field moves */
+#define TIME_SPAN     0.8  /* of the time code: that of 1 is nearly that of 0 */
+#define FEATURE_START 3
+#define RATE_END      0.1
+#define THREADS_MAX   64
+
+typedef struct grids {
+    const npg_facts *facts; /* loan */
+    int64_t epochs;
+    npg_proxy *samples;    /* S vertices of the surface; owned */
+    size_t vert_count;     /* W                                */
+    npg_carrier *carriers; /* W, owned                         */
+    npg_fit *fit;          /* over the samples                 */
+    npg_fit_copy first;    /* after window 0                   */
+    /* of the window at work */
+    npg_energy_system *system; /* loan                                           */
+    double at_start, least;    /* E(s), and the least so far                     */
+    size_t threads;
+    float *before;              /* T x S x 3: f_0                                 */
+    float *gradient;            /* T x S x 3; loan                                */
+    const float *field;         /* T x S x 3: f; loan                             */
+    float *ways, *image, *best; /* T x W x 3: d, A d, and the best d so far      */
+    double *sums;               /* T x 2: d A d, r d                              */
+    npg_arena window;           /* holds these                                    */
+    npg_solver_watch *watch;
+    void *user;
+} grids;
+
+static void grids_close(void **slot)
+{
+    grids *g = *slot;
+    npg_arena_release(&g->window);
+    npg_fit_close(&g->fit);
+    npg_fit_copy_clear(&g->first);
+    npg_proxy_close(&g->samples);
+    npg_release(&g->carriers);
+    npg_release(slot);
+}
+
+static npg_fit_settings settings_of(const npg_solver_settings *settings)
+{
+    return (npg_fit_settings){
+        .grid = settings->grid, .is_of_ways = true, .rate_end = RATE_END, .feature_start = FEATURE_START};
+}
+
+static npg_status grids_open(void **out, const npg_solver_setup *setup)
+{
+    grids *g;
+    const npg_fit_settings settings = settings_of(setup->settings);
+    const npg_mesh *surface = setup->surface;
+    NPG_TRY(npg_alloc(&g, NPG_FOR_FIT, sizeof *g));
+    *out = g;
+    g->facts = setup->facts;
+    g->epochs = setup->settings->epochs;
+    g->window.purpose = NPG_FOR_FIT;
+    g->vert_count = surface->vert_count;
+    NPG_TRY(npg_proxy_open(&g->samples, surface, SAMPLES));
+    NPG_TRY(npg_alloc_array(&g->carriers, NPG_FOR_FIT, g->vert_count, sizeof *g->carriers));
+    NPG_TRY(npg_carriers_bind(g->carriers, g->samples->mesh, surface->vert_pos, g->vert_count));
+    return npg_fit_open(&g->fit, setup->device, &settings, g->samples->mesh, setup->seed);
+}
+
+/* ---- the energy ---- */
+
+static npg_status carry_frames(void *user, size_t part)
+{
+    grids *g = user;
+    size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
+    for (size_t t = part; t < g->system->frame_count; t += g->threads) {
+        float *way = g->gradient + t * s; /* scratch until the energy's is there */
+        for (size_t i = 0; i < s; i++) way[i] = g->field[t * s + i] - g->before[t * s + i];
+        memset(g->ways + t * w, 0, w * sizeof(float));
+        npg_carry(g->carriers, g->vert_count, g->ways + t * w, way);
+    }
+    return NPG_OK;
+}
+
+static npg_status measure_frames(void *user, size_t part)
+{
+    grids *g = user;
+    size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
+    for (size_t t = part; t < g->system->frame_count; t += g->threads) {
+        const float *way = g->ways + t * w, *right = g->system->right + t * w;
+        float *image = g->image + t * w;
+        double *sums = g->sums + 2 * t;
+        npg_energy_multiply(g->image, g->system, g->ways, t);
+        sums[0] = sums[1] = 0;
+        for (size_t i = 0; i < w; i++) {
+            sums[0] += (double)way[i] * (double)image[i];
+            sums[1] += (double)way[i] * (double)right[i];
+            image[i] = 2 * (image[i] - right[i]);
+        }
+        memset(g->gradient + t * s, 0, s * sizeof(float));
+        npg_carry_back(g->carriers, g->vert_count, g->gradient + t * s, image);
+    }
+    return NPG_OK;
+}
+
+static npg_status measure(void *user, double *loss, float *gradient, const float *field)
+{
+    grids *g = user;
+    double bent = 0, along = 0;
+    g->gradient = gradient;
+    g->field = field;
+    NPG_TRY(npg_parallel(carry_frames, g, g->threads));
+    NPG_TRY(npg_parallel(measure_frames, g, g->threads));
+    for (size_t t = 0; t < g->system->frame_count; t++) {
+        bent += g->sums[2 * t];
+        along += g->sums[2 * t + 1];
+    }
+    double share = bent > 0 ? fmax(0, along / bent) : 0; /* of the way, where E is least on it */
+    double best = g->at_start - share * along;
+    *loss = g->at_start + bent - 2 * along;
+    if (best >= g->least) return NPG_OK;
+    g->least = best;
+    for (size_t i = 0; i < g->system->frame_count * 3 * g->vert_count; i++)
+        g->best[i] = (float)share * g->ways[i];
+    return NPG_OK;
+}
+
+/* ---- a window ---- */
+
+static npg_status watch_epoch(void *user, const npg_fit_step *step)
+{
+    const grids *g = user;
+    const npg_solver_step at = {step->epoch, step->epochs, step->loss};
+    return g->watch ? g->watch(g->user, &at) : NPG_OK;
+}
+
+double npg_grids_time(const npg_plan *plan, double span, int64_t index)
+{
+    npg_window first = npg_plan_key_window(plan, -1);
+    int64_t length = first.last - first.first;
+    return length ? span * (double)(index - first.first) / (double)length : 0;
+}
+
+static npg_status begin(grids *g, const npg_problem *problem)
+{
+    npg_fit_frame *frames;
+    size_t s = 3 * g->samples->mesh->vert_count;
+    const npg_window *window = problem->window;
+    if (window->from == 0 && g->first.bytes) NPG_TRY(npg_fit_copy_give(&g->first, g->fit));
+    NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, problem->count, sizeof *frames));
+    for (size_t t = 0; t < problem->count; t++)
+        frames[t] =
+            (npg_fit_frame){.index = problem->frames[t].index,
+                            .time = npg_grids_time(&g->facts->plan, TIME_SPAN, problem->frames[t].index)};
+    npg_status status = npg_fit_begin_measured(g->fit, frames, problem->count, measure, g);
+    if (!status) status = npg_fit_run(g->fit, 0, 0, NULL, NULL);
+    for (size_t t = 0; t < problem->count && !status; t++)
+        status = npg_fit_vertices(g->fit, g->before + t * s, t);
+    npg_release(&frames);
+    return status;
+}
+
+/* The result is the best so far from the beginning on: none. */
+static npg_status take_window(grids *g, const npg_problem *problem)
+{
+    size_t count = problem->count, wide = count * g->vert_count, few = count * g->samples->mesh->vert_count;
+    g->system = npg_energy_system_of(problem->energy);
+    g->at_start = g->least = npg_energy_at_start(problem->energy);
+    g->threads = npg_parallel_parts(count, 1, THREADS_MAX);
+    g->before = npg_arena_take(&g->window, few, 3 * sizeof(float));
+    g->ways = npg_arena_take(&g->window, wide, 3 * sizeof(float));
+    g->image = npg_arena_take(&g->window, wide, 3 * sizeof(float));
+    g->sums = npg_arena_take(&g->window, 2 * count, sizeof(double));
+    g->best = problem->result;
+    memset(g->best, 0, 3 * wide * sizeof(float));
+    return npg_arena_status(&g->window);
+}
+
+static npg_status grids_solve(void *solver, npg_solved *solved, const npg_problem *problem,
+                              npg_solver_watch *watch, void *user)
+{
+    grids *g = solver;
+    g->watch = watch;
+    g->user = user;
+    npg_status status = take_window(g, problem);
+    if (!status) status = begin(g, problem);
+    if (!status) status = npg_fit_run(g->fit, 0, g->epochs, watch_epoch, g);
+    if (!status && !problem->window->direction) status = npg_fit_copy_take(&g->first, g->fit);
+    *solved = (npg_solved){.steps = g->epochs, .energy = g->at_start > 0 ? g->least / g->at_start : 1};
+    npg_arena_release(&g->window);
+    return status;
+}
+
+static size_t grids_memory(const npg_solver_settings *settings, size_t verts, size_t frames, size_t points)
+{
+    const npg_fit_settings fit = settings_of(settings);
+    size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
+    (void)points;
+    return npg_fit_memory(&fit, samples, frames, 0) + frames * (2 * verts + samples) * 3 * sizeof(float) +
+           verts * sizeof(npg_carrier);
+}
+
+/* ---- states ---- */
+
+typedef struct latent_grids {
+    const npg_levels *levels;
+    const float *rows;
+    npg_vdb_place place;
+} latent_grids;
+
+static npg_status write_latents(void *user, const char *path)
+{
+    const latent_grids *g = user;
+    return npg_vdb_save_levels(path, g->levels, g->rows, &g->place);
+}
+
+/* The latent grids for other programs, in a file beside the store; the state itself has them, too. */
+static npg_status put_latents(npg_fit *fit, const npg_facts *facts, npg_store *store,
+                              const npg_solver_moment *moment)
+{
+    npg_fit_parts parts = npg_fit_open_parts(fit);
+    const npg_frame_box *box = &facts->box;
+    float *rows;
+    uint64_t hash;
+    NPG_TRY(npg_alloc(&rows, NPG_FOR_FILES, parts.u->size));
+    latent_grids g = {parts.levels,
+                      rows,
+                      {.unit_per_world = box->scale,
+                       .frame_first = moment->window.first,
+                       .frame_last = moment->window.last,
+                       .window = moment->at}};
+    for (int a = 0; a < 3; a++) g.place.world_centre[a] = box->origin[a] + box->centre[a];
+    npg_status status = npg_buffer_read(parts.u, 0, rows, parts.u->size);
+    if (!status) status = npg_vdb_file_write(moment->grids_path, &hash, write_latents, &g);
+    if (!status) status = npg_store_put(store, "grids.hash", &hash, sizeof hash);
+    npg_release(&rows);
+    return status;
+}
+
+npg_status npg_grids_save(npg_fit *fit, const npg_fit_copy *first, const npg_facts *facts, npg_store *store,
+                          const npg_solver_moment *moment)
+{
+    if (moment->is_first_needed) NPG_TRY(npg_fit_copy_save(first, store, "first"));
+    if (!moment->is_inside) NPG_TRY(put_latents(fit, facts, store, moment));
+    return npg_fit_save(fit, store, "fit");
+}
+
+static npg_status grids_save(void *solver, npg_store *store, const npg_solver_moment *moment)
+{
+    grids *g = solver;
+    return npg_grids_save(g->fit, &g->first, g->facts, store, moment);
+}
+
+static npg_status grids_restore(void *solver, const npg_record *record)
+{
+    grids *g = solver;
+    NPG_TRY(npg_fit_copy_load(&g->first, record, "first"));
+    return npg_fit_restore(g->fit, record, "fit");
+}
+
+const npg_solver npg_solver_grids = {
+    .name = "grids",
+    .needs_device = true,
+    .needs_poses = true,
+    .open = grids_open,
+    .solve = grids_solve,
+    .memory = grids_memory,
+    .save = grids_save,
+    .restore = grids_restore,
+    .close = grids_close,
+};
