@@ -25,14 +25,30 @@ struct npg_file {
     uint64_t flushed; /* bytes that left the buffer */
 };
 
-npg_status npg_join_path(char **out, const char *folder, const char *name)
+static size_t path_size(const char *folder, const char *name)
 {
-    size_t size = strlen(folder) + strlen(name) + 2;
-    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, size));
+    return strlen(folder) + strlen(name) + 2;
+}
+
+static void print_path(char *path, const char *folder, const char *name)
+{
     size_t length = strlen(folder);
     const char *slash = length && folder[length - 1] == '/' ? "" : "/";
-    snprintf(*out, size, "%s%s%s", folder, slash, name);
+    snprintf(path, path_size(folder, name), "%s%s%s", folder, slash, name);
+}
+
+npg_status npg_join_path(char **out, const char *folder, const char *name)
+{
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, path_size(folder, name)));
+    print_path(*out, folder, name);
     return NPG_OK;
+}
+
+char *npg_arena_path(npg_arena *arena, const char *folder, const char *name)
+{
+    char *path = npg_arena_take(arena, path_size(folder, name), 1);
+    if (path) print_path(path, folder, name);
+    return path;
 }
 
 bool npg_write_at(int fd, const void *data, size_t size, int64_t at)
@@ -252,6 +268,26 @@ npg_status npg_file_open_plain(int *out, const char *path, npg_status failure)
     if (fd >= 0) close(fd);
     return npg_error(cause == ENOMEM && !is_other ? NPG_MEMORY : failure, "%s: can't be read: %s", path,
                      is_other ? "a pipe or a device, not a file" : strerror(cause));
+}
+
+npg_status npg_file_whole(npg_arena *arena, void *bytes, size_t *size, const char *path, size_t limit,
+                          const char *kind)
+{
+    struct stat info;
+    int fd;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
+    npg_status status = fstat(fd, &info) ? npg_error_errno(NPG_BAD_INPUT, "can't read %s", path) : NPG_OK;
+    *size = status ? 0 : (size_t)info.st_size;
+    if (*size > limit)
+        status =
+            npg_error(NPG_BAD_INPUT, "%s: no %s file, or one of more than %zu MiB", path, kind, limit >> 20);
+    void *taken = status ? NULL : npg_arena_take(arena, *size + 1, 1);
+    if (!status) status = npg_arena_status(arena);
+    if (!status && !npg_read_at(fd, taken, size, 0))
+        status = npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
+    close(fd);
+    *(void **)bytes = taken;
+    return status;
 }
 
 bool npg_path_stays(const char *name)

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pipeline/status.h"
+#include "pipeline/memory.h"
 
 typedef struct npg_file npg_file;
 
@@ -60,6 +60,14 @@ npg_status npg_join_path(char **out, const char *folder, const char *name);
  * there are up to the file's end.  False: errno says why. */
 bool npg_write_at(int fd, const void *data, size_t size, int64_t at);
 bool npg_read_at(int fd, void *data, size_t *size, int64_t at);
+
+/* The whole of a plain file, and a 0 behind it.  NPG_BAD_INPUT: it can't be read, or is larger than `limit`, as no
+ * file of this kind ("camera") is. */
+npg_status npg_file_whole(npg_arena *arena, void *bytes, size_t *size, const char *path, size_t limit,
+                          const char *kind);
+
+/* "<folder>/<name>" as text of the arena; NULL once a take was refused. */
+char *npg_arena_path(npg_arena *arena, const char *folder, const char *name);
 
 /* XXH3 of the first `limit` bytes of a file (UINT64_MAX: all).  NPG_DISK when it can't be read, NPG_BAD_INPUT
  * when it is shorter than a limit. */

@@ -13,7 +13,7 @@
 typedef struct head { /* sits in the 64 bytes before every block */
     size_t size;
     npg_purpose purpose;
-    void *before; /* in an arena: the block taken before this one */
+    void *before, *after; /* in an arena: the blocks taken before and after this one */
 } head;
 
 _Static_assert(sizeof(head) <= ALIGN, "the head must fit before the block");
@@ -120,7 +120,7 @@ npg_status npg_alloc(void *out, npg_purpose purpose, size_t size)
         return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, npg_purpose_name(purpose));
     }
     memset(block, 0, size + ALIGN);
-    *(head *)(void *)block = (head){size, purpose, NULL};
+    *(head *)(void *)block = (head){.size = size, .purpose = purpose};
     *result = block + ALIGN;
     return NPG_OK;
 }
@@ -178,7 +178,23 @@ void *npg_arena_take(npg_arena *arena, size_t count, size_t size)
     if (!arena->status) arena->status = npg_alloc_array(&taken, arena->purpose, count, size);
     if (arena->status || !taken) return NULL;
     head_of(taken)->before = arena->last;
+    if (arena->last) head_of(arena->last)->after = taken;
     return arena->last = taken;
+}
+
+npg_status npg_arena_grow(npg_arena *arena, void *array, size_t *capacity, size_t need, size_t size)
+{
+    void **slot = array;
+    if (arena->status || need <= *capacity) return arena->status;
+    const head links = *slot ? *head_of(*slot) : (head){.before = arena->last};
+    arena->status = npg_grow(slot, capacity, need, size, arena->purpose);
+    if (arena->status) return arena->status;
+    head_of(*slot)->before = links.before;
+    head_of(*slot)->after = links.after;
+    if (links.before) head_of(links.before)->after = *slot;
+    if (links.after) head_of(links.after)->before = *slot;
+    if (!links.after) arena->last = *slot;
+    return NPG_OK;
 }
 
 void *npg_arena_copy(npg_arena *arena, const void *from, size_t count, size_t size)
@@ -206,4 +222,19 @@ void npg_arena_release(npg_arena *arena)
         npg_release(&taken);
     }
     arena->status = NPG_OK;
+}
+
+npg_status npg_object_open(void *out, npg_purpose purpose, size_t size)
+{
+    npg_arena **object = out;
+    NPG_TRY(npg_alloc(object, purpose, size));
+    (*object)->purpose = purpose;
+    return NPG_OK;
+}
+
+void npg_object_close(void *object)
+{
+    npg_arena **slot = object;
+    if (*slot) npg_arena_release(*slot);
+    npg_release(slot);
 }

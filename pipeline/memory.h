@@ -56,6 +56,9 @@ void *npg_arena_take(npg_arena *arena, size_t count, size_t size);
 /* The same, filled with a copy of what lies at `from` (NULL: zeroes). */
 void *npg_arena_copy(npg_arena *arena, const void *from, size_t count, size_t size);
 
+/* npg_grow() of an array that is NULL or was grown in this arena; NPG_MEMORY once a take was refused. */
+npg_status npg_arena_grow(npg_arena *arena, void *array, size_t *capacity, size_t need, size_t size);
+
 /* A copy of text. */
 char *npg_arena_text(npg_arena *arena, const char *text);
 
@@ -64,6 +67,10 @@ npg_status npg_arena_status(const npg_arena *arena);
 
 /* Free all that was taken; the arena is empty again and good, with the same purpose. */
 void npg_arena_release(npg_arena *arena);
+
+/* An object whose first member is the arena of all that it has; and free both (NULL inside is fine). */
+npg_status npg_object_open(void *out, npg_purpose purpose, size_t size);
+void npg_object_close(void *object);
 
 /* Count bytes that another library holds for us; negative gives them back.  NPG_MEMORY when the limit is
  * passed (the count is then unchanged). */

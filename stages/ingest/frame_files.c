@@ -19,12 +19,11 @@ static int64_t step_of(const int64_t *numbers, size_t count)
     return step ? step : 1;
 }
 
-static npg_status add_slot(npg_frame_files *list, size_t *capacity, char **path, int64_t number)
+static npg_status add_slot(npg_frame_files *list, size_t *capacity, char *path, int64_t number)
 {
-    NPG_TRY(npg_grow(&list->slots, capacity, list->count + 1, sizeof *list->slots, NPG_FOR_FILES));
-    list->slots[list->count++] = (npg_frame_slot){path ? *path : NULL, number};
+    NPG_TRY(npg_arena_grow(&list->arena, &list->slots, capacity, list->count + 1, sizeof *list->slots));
+    list->slots[list->count++] = (npg_frame_slot){path, number};
     list->gap_count += !path;
-    if (path) *path = NULL;
     return NPG_OK;
 }
 
@@ -78,7 +77,7 @@ static npg_status fill_slots(npg_frame_files *list, npg_paths *paths, const int6
             NPG_TRY(add_gaps(list, &capacity, selection, &position, numbers[i - 1] + step, numbers[i], step,
                              count));
         if (npg_selection_takes(selection, position++, numbers[i], count))
-            NPG_TRY(add_slot(list, &capacity, &paths->paths[i], numbers[i]));
+            NPG_TRY(add_slot(list, &capacity, paths->paths[i], numbers[i]));
     }
     return finds_gaps ? add_outside(list, &capacity, selection, first, last, step, false) : NPG_OK;
 }
@@ -87,8 +86,8 @@ static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
 {
     list->is_numbered = true;
     if (paths->numbers) return NPG_OK;
-    NPG_TRY(npg_grow(&paths->numbers, &paths->number_capacity, paths->count, sizeof *paths->numbers,
-                     NPG_FOR_FILES));
+    paths->numbers = npg_arena_take(&list->arena, paths->count, sizeof *paths->numbers);
+    NPG_TRY(npg_arena_status(&list->arena));
     return npg_number_paths(paths->numbers, &list->is_numbered, paths->paths, paths->count,
                             !paths->is_listed);
 }
@@ -96,49 +95,43 @@ static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
 /* The frames of a rig as if each were a file of its own: its first depth image. */
 static npg_status find_in_rig(npg_paths *paths, const npg_rig *rig)
 {
-    size_t count = rig->frame_count;
-    NPG_TRY(npg_grow(&paths->paths, &paths->capacity, count, sizeof *paths->paths, NPG_FOR_FILES));
-    NPG_TRY(npg_grow(&paths->numbers, &paths->number_capacity, count, sizeof *paths->numbers, NPG_FOR_FILES));
-    for (size_t f = 0; f < count; f++) {
-        const npg_rig_shot *shot = NULL;
-        for (size_t s = 0; s < rig->sensor_count && !shot; s++) shot = npg_rig_shot_of(rig, f, s);
-        NPG_TRY(npg_copy_text(&paths->paths[f], shot->depth));
-        paths->numbers[f] = rig->numbers[f];
-        paths->count++;
-    }
+    paths->count = rig->frame_count;
+    paths->paths = npg_arena_take(paths->arena, paths->count, sizeof *paths->paths);
+    paths->numbers = npg_arena_copy(paths->arena, rig->numbers, paths->count, sizeof *paths->numbers);
+    NPG_TRY(npg_arena_status(paths->arena));
+    for (size_t f = 0; f < paths->count; f++)
+        for (size_t s = 0; s < rig->sensor_count && !paths->paths[f]; s++) {
+            const npg_rig_shot *shot = npg_rig_shot_of(rig, f, s);
+            if (shot) paths->paths[f] = shot->depth;
+        }
     return NPG_OK;
 }
 
-static npg_status fill(npg_frame_files *list, npg_paths *paths, const char *input,
-                       const npg_selection *selection, bool finds_gaps)
+static npg_status fill(npg_frame_files *list, const char *input, const npg_selection *selection,
+                       bool finds_gaps, const npg_rig_settings *rig)
 {
-    NPG_TRY(list->rig ? find_in_rig(paths, list->rig) : npg_paths_find(paths, input));
-    NPG_TRY(number_frames(list, paths));
-    list->left_out = paths->left_out;
-    NPG_TRY(fill_slots(list, paths, paths->numbers, selection, finds_gaps && list->is_numbered));
+    npg_paths paths = {.arena = &list->arena};
+    if (rig) NPG_TRY(npg_rig_open(&list->rig, input, rig));
+    NPG_TRY(rig ? find_in_rig(&paths, list->rig) : npg_paths_find(&paths, input));
+    NPG_TRY(number_frames(list, &paths));
+    list->left_out = paths.left_out;
+    NPG_TRY(fill_slots(list, &paths, paths.numbers, selection, finds_gaps && list->is_numbered));
     if (list->count == list->gap_count)
         return npg_error(
             NPG_USAGE, "option frames: chooses none of the %zu frames of %s (numbers %lld to %lld)",
-            paths->count, input, (long long)paths->numbers[0], (long long)paths->numbers[paths->count - 1]);
+            paths.count, input, (long long)paths.numbers[0], (long long)paths.numbers[paths.count - 1]);
     return NPG_OK;
 }
 
 static npg_status open_list(npg_frame_files **out, const char *input, const char *text, bool finds_gaps,
                             const npg_rig_settings *rig)
 {
-    npg_frame_files *list;
     npg_selection selection;
-    npg_paths paths = {0};
     *out = NULL;
     NPG_TRY(npg_selection_parse(&selection, text));
-    npg_status status = npg_alloc(&list, NPG_FOR_FILES, sizeof *list);
-    if (!status) {
-        if (rig) status = npg_rig_open(&list->rig, input, rig);
-        if (!status) status = fill(list, &paths, input, &selection, finds_gaps);
-        if (status) npg_frame_files_close(&list);
-        *out = list;
-    }
-    npg_paths_clear(&paths);
+    npg_status status = npg_object_open(out, NPG_FOR_FILES, sizeof **out);
+    if (!status) status = fill(*out, input, &selection, finds_gaps, rig);
+    if (status) npg_frame_files_close(out);
     npg_selection_clear(&selection);
     return status;
 }
@@ -209,13 +202,10 @@ npg_status npg_frame_files_confine(const npg_frame_files *list, const char *inpu
     return status;
 }
 
-void npg_frame_files_close(npg_frame_files **slot)
+void npg_frame_files_close(npg_frame_files **list)
 {
-    if (!*slot) return;
-    for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->slots[i].path);
-    npg_release(&(*slot)->slots);
-    npg_rig_close(&(*slot)->rig);
-    npg_release(slot);
+    if (*list) npg_rig_close(&(*list)->rig);
+    npg_object_close(list);
 }
 
 void npg_frame_files_gaps(char *text, size_t size, const npg_frame_files *list)

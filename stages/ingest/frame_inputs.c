@@ -14,19 +14,10 @@
 
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 
-void npg_paths_clear(npg_paths *list)
+static npg_status add_path(npg_paths *list, char *path)
 {
-    for (size_t i = 0; i < list->count; i++) npg_release(&list->paths[i]);
-    npg_release(&list->paths);
-    npg_release(&list->numbers);
-    *list = (npg_paths){0};
-}
-
-static npg_status add_path(npg_paths *list, const char *path)
-{
-    NPG_TRY(npg_grow(&list->paths, &list->capacity, list->count + 1, sizeof *list->paths, NPG_FOR_FILES));
-    NPG_TRY(npg_copy_text(&list->paths[list->count], path));
-    list->count++;
+    NPG_TRY(npg_arena_grow(list->arena, &list->paths, &list->capacity, list->count + 1, sizeof path));
+    list->paths[list->count++] = path;
     return NPG_OK;
 }
 
@@ -50,24 +41,41 @@ static bool is_folder(const char *path)
 
 /* ---- a folder ---- */
 
-/* Names in a folder that do not begin with a dot: the sub-folders, or the files with a known ending. */
-static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders)
+static bool has_ending(const char *name, const char *const *endings)
+{
+    size_t length = strlen(name);
+    for (; *endings; endings++) {
+        size_t size = strlen(*endings);
+        if (length > size && !strcasecmp(name + length - size, *endings)) return true;
+    }
+    return false;
+}
+
+/* Names in a folder that do not begin with a dot: the sub-folders, or the files with one of the endings (NULL: with
+ * one that readers know). */
+static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders,
+                              const char *const *endings)
 {
     DIR *directory = opendir(folder);
     npg_status status = NPG_OK;
     if (!directory) return npg_error(NPG_BAD_INPUT, "%s: can't be read: %s", folder, strerror(errno));
     for (struct dirent *entry; !status && (entry = readdir(directory));) {
-        char *path;
-        if (entry->d_name[0] == '.') continue;
-        if (!wants_folders && !npg_format_by_ending(entry->d_name)) continue;
-        status = npg_join_path(&path, folder, entry->d_name);
-        if (status) break;
-        if (is_folder(path) == wants_folders) status = add_path(out, path);
-        npg_release(&path);
+        const char *name = entry->d_name;
+        bool is_wanted =
+            wants_folders || (endings ? has_ending(name, endings) : !!npg_format_by_ending(name));
+        if (name[0] == '.' || !is_wanted) continue;
+        char *path = npg_arena_path(out->arena, folder, name);
+        status = npg_arena_status(out->arena);
+        if (!status && (endings || is_folder(path) == wants_folders)) status = add_path(out, path);
     }
     closedir(directory);
     sort_paths(out);
     return status;
+}
+
+npg_status npg_paths_list(npg_paths *out, const char *folder, const char *const *endings)
+{
+    return list_folder(out, folder, false, endings);
 }
 
 static const char *ending_of(const char *path)
@@ -114,48 +122,39 @@ static npg_status keep_one_ending(npg_paths *list, const char *folder)
             NPG_BAD_INPUT, "%s: holds %zu files *%s and as many *%s; say which with a pattern such as %s/*%s",
             folder, counts[0].count, counts[0].ending, counts[1].ending, folder, counts[0].ending);
     snprintf(ending, sizeof ending, "%s", counts[0].ending);
-    for (size_t i = 0; i < list->count; i++) {
-        if (!strcasecmp(ending_of(list->paths[i]), ending)) {
-            list->paths[kept++] = list->paths[i];
-        } else {
-            npg_release(&list->paths[i]);
-            list->left_out++;
-        }
-    }
+    for (size_t i = 0; i < list->count; i++)
+        if (!strcasecmp(ending_of(list->paths[i]), ending)) list->paths[kept++] = list->paths[i];
+    list->left_out += list->count - kept;
     list->count = kept;
     return NPG_OK;
 }
 
 /* Captures often keep their clouds one level down: in points/ (ours, and that of neupig synth), in
  * point_clouds/ (the paper's data), or in an only sub-folder. */
-static npg_status find_sub_folder(char **out, const char *folder)
+static npg_status find_sub_folder(npg_arena *arena, const char **out, const char *folder)
 {
     static const char *const usual[] = {"points", "point_clouds"};
-    npg_paths folders = {0};
-    npg_status status = list_folder(&folders, folder, true);
+    npg_paths folders = {.arena = arena};
+    NPG_TRY(list_folder(&folders, folder, true, NULL));
     const char *found = folders.count == 1 ? folders.paths[0] : NULL;
     for (size_t u = 0; u < 2; u++)
         for (size_t i = 0; i < folders.count; i++)
             if (!strcmp(strrchr(folders.paths[i], '/') + 1, usual[u]) && (!found || folders.count > 1))
                 if (!found || strcmp(strrchr(found, '/') + 1, usual[0]) != 0) found = folders.paths[i];
-    *out = NULL;
-    if (!status && found) status = npg_copy_text(out, found);
-    npg_paths_clear(&folders);
-    return status;
+    *out = found;
+    return NPG_OK;
 }
 
 static npg_status find_in_folder(npg_paths *out, const char *folder)
 {
-    char *inner = NULL;
-    NPG_TRY(list_folder(out, folder, false));
-    if (!out->count) NPG_TRY(find_sub_folder(&inner, folder));
-    npg_status status = inner ? list_folder(out, inner, false) : NPG_OK;
-    if (!status) status = keep_one_ending(out, inner ? inner : folder);
-    if (!status && !out->count)
-        status = npg_error(NPG_BAD_INPUT, "%s: no file here has a format that can be read (" FORMATS_TEXT ")",
-                           inner ? inner : folder);
-    npg_release(&inner);
-    return status;
+    const char *inner = NULL;
+    NPG_TRY(list_folder(out, folder, false, NULL));
+    if (!out->count) NPG_TRY(find_sub_folder(out->arena, &inner, folder));
+    if (inner) NPG_TRY(list_folder(out, inner, false, NULL));
+    NPG_TRY(keep_one_ending(out, inner ? inner : folder));
+    if (out->count) return NPG_OK;
+    return npg_error(NPG_BAD_INPUT, "%s: no file here has a format that can be read (" FORMATS_TEXT ")",
+                     inner ? inner : folder);
 }
 
 /* ---- a glob ---- */
@@ -167,7 +166,8 @@ static npg_status find_by_glob(npg_paths *out, const char *pattern)
     int result = glob(pattern, GLOB_NOSORT, NULL, &found);
     if (result == GLOB_NOSPACE) status = npg_error(NPG_MEMORY, "%s: no memory for the names", pattern);
     for (size_t i = 0; i < found.gl_pathc && !status && !result; i++)
-        if (!is_folder(found.gl_pathv[i])) status = add_path(out, found.gl_pathv[i]);
+        if (!is_folder(found.gl_pathv[i]))
+            status = add_path(out, npg_arena_text(out->arena, found.gl_pathv[i]));
     globfree(&found);
     sort_paths(out);
     return status;
@@ -177,15 +177,10 @@ static npg_status find_by_glob(npg_paths *out, const char *pattern)
 
 /* The place of the number in a pattern: everything before it, its least width, everything after it. */
 typedef struct pattern {
-    char *before, *after; /* owned */
+    char *before;
+    const char *after;
     int width;
 } pattern;
-
-static void clear_pattern(pattern *p)
-{
-    npg_release(&p->before);
-    npg_release(&p->after);
-}
 
 /* Finds %d, %04d or ####.  *length is that of the conversion, 0 without one; a width of more than three
  * digits is longer than any file name. */
@@ -208,30 +203,32 @@ static const char *find_conversion(const char *text, size_t *length, int *width)
     return NULL;
 }
 
-static npg_status parse_pattern(pattern *p, const char *text)
+static npg_status parse_pattern(npg_arena *arena, pattern *p, const char *text)
 {
     size_t length, other;
     int unused;
     const char *at = find_conversion(text, &length, &p->width);
     if (find_conversion(at + length, &other, &unused))
         return npg_error(NPG_USAGE, "%s: a pattern has one place for the number, not two", text);
-    NPG_TRY(npg_copy_text(&p->before, text));
+    p->before = npg_arena_copy(arena, text, (size_t)(at - text) + 1, 1);
+    p->after = at + length;
+    NPG_TRY(npg_arena_status(arena));
     p->before[at - text] = 0;
-    return npg_copy_text(&p->after, at + length);
+    return NPG_OK;
 }
 
-static npg_status pattern_as_glob(char **out, const pattern *p)
+static char *pattern_as_glob(npg_arena *arena, const pattern *p)
 {
     size_t at = 0;
-    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, 2 * (strlen(p->before) + strlen(p->after)) + 2));
-    for (int part = 0; part < 2; part++) {
+    char *out = npg_arena_take(arena, 2 * (strlen(p->before) + strlen(p->after)) + 2, 1);
+    for (int part = 0; part < 2 && out; part++) {
         for (const char *c = part ? p->after : p->before; *c; c++) {
-            if (strchr("*?[\\", *c)) (*out)[at++] = '\\';
-            (*out)[at++] = *c;
+            if (strchr("*?[\\", *c)) out[at++] = '\\';
+            out[at++] = *c;
         }
-        if (part == 0) (*out)[at++] = '*';
+        if (part == 0) out[at++] = '*';
     }
-    return NPG_OK;
+    return out;
 }
 
 /* The number a path has under the pattern, -1 when it does not fit ("frame_12b.ply", a wrong width). */
@@ -249,14 +246,11 @@ static int64_t number_under(const pattern *p, const char *path)
 static npg_status keep_fitting(npg_paths *list, const pattern *p)
 {
     size_t kept = 0;
-    NPG_TRY(
-        npg_grow(&list->numbers, &list->number_capacity, list->count, sizeof *list->numbers, NPG_FOR_FILES));
+    list->numbers = npg_arena_take(list->arena, list->count + 1, sizeof *list->numbers);
+    NPG_TRY(npg_arena_status(list->arena));
     for (size_t i = 0; i < list->count; i++) {
         int64_t number = number_under(p, list->paths[i]);
-        if (number < 0) {
-            npg_release(&list->paths[i]);
-            continue;
-        }
+        if (number < 0) continue;
         list->numbers[kept] = number;
         list->paths[kept++] = list->paths[i];
     }
@@ -267,88 +261,72 @@ static npg_status keep_fitting(npg_paths *list, const pattern *p)
 static npg_status find_by_pattern(npg_paths *out, const char *text)
 {
     pattern p = {0};
-    char *as_glob = NULL;
-    npg_status status = parse_pattern(&p, text);
-    if (!status) status = pattern_as_glob(&as_glob, &p);
-    if (!status) status = find_by_glob(out, as_glob);
-    if (!status) status = keep_fitting(out, &p);
-    npg_release(&as_glob);
-    clear_pattern(&p);
-    return status;
+    NPG_TRY(parse_pattern(out->arena, &p, text));
+    char *as_glob = pattern_as_glob(out->arena, &p);
+    NPG_TRY(npg_arena_status(out->arena));
+    NPG_TRY(find_by_glob(out, as_glob));
+    return keep_fitting(out, &p);
 }
 
 /* ---- a list file ---- */
 
-/* A line's path as it can be opened: as it stands or beside the list; *out is NULL when it is not there. */
-static npg_status resolve(char **out, const char *list_path, const char *line)
+/* A line's path as it can be opened: as it stands or beside the list; NULL when it is not there. */
+static char *resolve(npg_arena *arena, const char *list_path, char *line)
 {
     const char *slash = strrchr(list_path, '/');
-    *out = NULL;
     if (*line != '/' && slash) {
-        char *folder;
-        NPG_TRY(npg_copy_text(&folder, list_path));
+        char *folder = npg_arena_text(arena, list_path);
+        if (!folder) return NULL;
         folder[slash == list_path ? 1 : slash - list_path] = 0;
-        npg_status status = npg_join_path(out, folder, line);
-        npg_release(&folder);
-        if (status) return status;
-        if (npg_is_there(*out)) return NPG_OK;
-        npg_release(out);
+        char *path = npg_arena_path(arena, folder, line);
+        if (path && npg_is_there(path)) return path;
     }
-    return npg_is_there(line) ? npg_copy_text(out, line) : NPG_OK;
+    return npg_is_there(line) ? line : NULL;
 }
 
 /* The next line that says something, as text of its own; NPG_END. */
-static npg_status next_entry(char **out, npg_source *source)
+static npg_status next_entry(npg_arena *arena, char **out, npg_source *source)
 {
-    const char *text;
-    size_t length;
+    const char *at, *end;
     do {
-        NPG_TRY(npg_source_line(source, &text, &length));
-        while (length && (*text == ' ' || *text == '\t')) {
-            text++;
-            length--;
-        }
-        while (length && (text[length - 1] == ' ' || text[length - 1] == '\t')) length--;
-    } while (!length || *text == '#');
-    if (length > 4096 || memchr(text, 0, length)) return npg_source_bad_line(source, "not a path");
-    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, length + 1));
-    memcpy(*out, text, length);
-    return NPG_OK;
+        NPG_TRY(npg_source_row(source, &at, &end));
+    } while (*at == '#');
+    while (end > at && (end[-1] == ' ' || end[-1] == '\t')) end--;
+    size_t length = (size_t)(end - at);
+    if (length > 4096 || memchr(at, 0, length)) return npg_source_bad_line(source, "not a path");
+    *out = npg_arena_take(arena, length + 1, 1);
+    if (*out) memcpy(*out, at, length);
+    return npg_arena_status(arena);
 }
 
 static npg_status read_list(npg_paths *out, npg_source *source)
 {
     for (;;) {
-        char *line = NULL, *path = NULL;
-        npg_status status = next_entry(&line, source);
-        if (status == NPG_END) return NPG_OK;
-        if (!status) status = resolve(&path, source->name, line);
-        if (!status && !path) status = npg_source_bad_line(source, "there is no file %s", line);
-        if (!status) status = add_path(out, path);
-        npg_release(&line);
-        npg_release(&path);
-        if (status) return status;
+        char *line;
+        npg_status status = next_entry(out->arena, &line, source);
+        if (status) return status == NPG_END ? NPG_OK : status;
+        char *path = resolve(out->arena, source->name, line);
+        NPG_TRY(npg_arena_status(out->arena));
+        if (!path) return npg_source_bad_line(source, "there is no file %s", line);
+        NPG_TRY(add_path(out, path));
     }
 }
 
 /* A list, if its first line is the path of a file; any .lst or .list is one. */
-static npg_status is_list(bool *out, const char *path)
+static npg_status is_list(npg_arena *arena, bool *out, const char *path)
 {
     npg_source *source;
     const char *dot = strrchr(path, '.');
-    char *line = NULL, *found = NULL;
+    char *line;
     *out = dot && (!strcasecmp(dot, ".lst") || !strcasecmp(dot, ".list"));
     /* Of the endings that readers know only those of plain text may be a list. */
     const char *format = npg_format_by_ending(path);
     if (*out || (format && strcmp(format, "xyz") != 0)) return NPG_OK;
     NPG_TRY(npg_source_open_file(&source, path));
-    npg_status status = next_entry(&line, source);
-    if (!status) status = resolve(&found, path, line);
-    *out = !status && found;
-    npg_release(&line);
-    npg_release(&found);
+    npg_status status = next_entry(arena, &line, source);
+    *out = !status && resolve(arena, path, line);
     npg_source_close(&source);
-    return status == NPG_MEMORY ? status : NPG_OK; /* what is no text is no list */
+    return status == NPG_MEMORY ? status : npg_arena_status(arena); /* what is no text is no list */
 }
 
 static npg_status find_in_list(npg_paths *out, const char *path)
@@ -371,8 +349,8 @@ static npg_status find_file(npg_paths *out, const char *path)
     if (!stat(path, &info) && !S_ISREG(info.st_mode))
         return npg_error(NPG_BAD_INPUT, "%s: neither a file nor a folder; for a pipe use - (standard input)",
                          path);
-    NPG_TRY(is_list(&list, path));
-    return list ? find_in_list(out, path) : add_path(out, path);
+    NPG_TRY(is_list(out->arena, &list, path));
+    return list ? find_in_list(out, path) : add_path(out, npg_arena_text(out->arena, path));
 }
 
 static npg_status find_matches(npg_paths *out, const char *input)
@@ -391,10 +369,7 @@ static npg_status find_matches(npg_paths *out, const char *input)
 
 npg_status npg_paths_find(npg_paths *out, const char *input)
 {
-    *out = (npg_paths){0};
-    npg_status status = is_folder(input)      ? find_in_folder(out, input)
-                        : npg_is_there(input) ? find_file(out, input)
-                                              : find_matches(out, input);
-    if (status) npg_paths_clear(out);
-    return status;
+    return is_folder(input)      ? find_in_folder(out, input)
+           : npg_is_there(input) ? find_file(out, input)
+                                 : find_matches(out, input);
 }

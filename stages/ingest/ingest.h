@@ -96,7 +96,7 @@ typedef struct npg_rig_settings {
 
 /* Images of one sensor at one time. */
 typedef struct npg_rig_shot {
-    char *depth, *colour, *mask; /* paths, owned; colour and mask may be NULL */
+    char *depth, *colour, *mask; /* paths; colour and mask may be NULL        */
     int64_t number;              /* of the frame, where images are numbered   */
     double time_s;               /* where they are timed                      */
     bool has_pose;
@@ -104,7 +104,7 @@ typedef struct npg_rig_shot {
 } npg_rig_shot;
 
 typedef struct npg_rig_sensor {
-    char *name; /* owned */
+    char *name;
     npg_camera camera;
     bool has_colour_camera; /* else colours lie on the depth image pixel by pixel */
     npg_camera colour_camera;
@@ -115,21 +115,22 @@ typedef struct npg_rig_sensor {
     double pose[12];            /* sensor to world, where it stands still              */
     bool is_corrected;
     double correction[12]; /* world to world, after the pose; of npg_rig_correct() */
-    npg_rig_shot *shots;   /* in order; owned */
+    npg_rig_shot *shots;   /* in order */
     size_t shot_count, shot_capacity;
     float *rays; /* H x W x 2, NaN where there is none; made at the first use, owned */
 } npg_rig_sensor;
 
 typedef struct npg_rig {
-    char *path, *folder; /* as given; the folder that its names start from; owned */
-    const char *layout;  /* "rig.json", "redwood", "tum", "opencv"                */
-    char *unit;          /* of lengths, as rig.json names it; owned, NULL: "m"    */
+    npg_arena arena;     /* of all that it has, but the rays of its sensors */
+    char *path, *folder; /* as given; the folder that its names start from  */
+    const char *layout;  /* "rig.json", "redwood", "tum", "opencv"          */
+    char *unit;          /* of lengths, as rig.json names it; NULL: "m"     */
     npg_rig_settings settings;
     bool is_timed; /* frames are matched by time, else by number */
     npg_rig_sensor *sensors;
     size_t sensor_count, sensor_capacity;
     size_t frame_count;
-    int64_t *numbers; /* per frame, growing; owned               */
+    int64_t *numbers; /* per frame, growing                      */
     int32_t *shot_of; /* frame_count x sensor_count, -1: a gap   */
     size_t left_out;  /* images without a pose or without a time */
 } npg_rig;
@@ -252,16 +253,17 @@ bool npg_selection_needs_count(const npg_selection *selection);
  * name; the step of the numbering is the largest that all numbers share, and what it leaves out is a gap. */
 
 typedef struct npg_frame_slot {
-    char *path; /* owned; NULL: a gap */
+    char *path; /* NULL: a gap */
     int64_t number;
 } npg_frame_slot;
 
 typedef struct npg_frame_files {
+    npg_arena arena;         /* of slots and paths                                                */
     size_t count, gap_count; /* slots, and how many of them are gaps                              */
-    npg_frame_slot *slots;   /* owned                                                             */
-    size_t left_out;         /* files of a folder with another ending that could have been frames */
-    bool is_numbered;        /* numbers come from the names, so gaps could be found               */
-    npg_rig *rig;            /* whose frames these are; owned, or NULL for files                  */
+    npg_frame_slot *slots;
+    size_t left_out;  /* files of a folder with another ending that could have been frames */
+    bool is_numbered; /* numbers come from the names, so gaps could be found               */
+    npg_rig *rig;     /* whose frames these are; owned, or NULL for files                  */
 } npg_frame_files;
 
 /* finds_gaps false: frames follow each other whatever their numbers are.

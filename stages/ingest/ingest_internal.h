@@ -158,16 +158,19 @@ int64_t npg_common_divisor(int64_t a, int64_t b);
 /* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
 
 typedef struct npg_paths {
-    char **paths;     /* each owned */
-    int64_t *numbers; /* owned; NULL unless the input itself says the numbers (a pattern) */
-    size_t count, capacity, number_capacity;
+    npg_arena *arena; /* a loan, set before anything else: what paths and numbers are of */
+    char **paths;
+    int64_t *numbers; /* NULL unless the input itself says the numbers (a pattern) */
+    size_t count, capacity;
     size_t left_out; /* see npg_frame_files                     */
     bool is_listed;  /* in the order of a list file, not sorted */
 } npg_paths;
 
 /* In time order, at least one.  See npg_frame_files_open. */
 npg_status npg_paths_find(npg_paths *out, const char *input);
-void npg_paths_clear(npg_paths *paths);
+
+/* The files of a folder with one of these endings, whatever its case, in natural order. */
+npg_status npg_paths_list(npg_paths *out, const char *folder, const char *const *endings);
 
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 

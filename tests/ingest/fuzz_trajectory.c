@@ -9,18 +9,21 @@
 static void read_list(const char *path, bool is_trajectory)
 {
     npg_stamped_list list;
-    npg_status status = is_trajectory ? npg_read_trajectory(&list, path) : npg_read_image_list(&list, path);
+    npg_arena arena = {.purpose = NPG_FOR_FILES};
+    npg_status status =
+        is_trajectory ? npg_read_trajectory(&list, &arena, path) : npg_read_image_list(&list, &arena, path);
     expect(status == NPG_OK || status == NPG_BAD_INPUT, "list");
-    for (size_t i = 0; is_trajectory && i < list.count; i++)
+    for (size_t i = 0; !status && is_trajectory && i < list.count; i++)
         for (int k = 0; k < 12; k++) expect(isfinite(list.items[i].pose[k]), "a pose that is not finite");
-    npg_stamped_clear(&list);
+    npg_arena_release(&arena);
 }
 
 static void read_camera(const char *path)
 {
     static const char *const names[] = {"intrinsic", "K", "R", "t"};
     char *text;
-    npg_status status = npg_opencv_open(&text, path);
+    npg_arena arena = {.purpose = NPG_FOR_FILES};
+    npg_status status = npg_opencv_open(&arena, &text, path);
     expect(status == NPG_OK || status == NPG_BAD_INPUT, "camera file");
     for (size_t i = 0; !status && i < sizeof names / sizeof *names; i++) {
         double values[9];
@@ -29,7 +32,7 @@ static void read_camera(const char *path)
         expect(of_one == NPG_OK || of_one == NPG_BAD_INPUT, "matrix");
         expect(found <= 9, "too many numbers");
     }
-    npg_release(&text);
+    npg_arena_release(&arena);
 }
 
 static void read_sensors(const char *path)

@@ -390,9 +390,11 @@ static void bad_trajectories_are_refused(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof bad_trajectories / sizeof *bad_trajectories; i++) {
         npg_stamped_list list;
+        npg_arena arena = {.purpose = NPG_FOR_FILES};
         const char *path = in_folder(&folder, bad_trajectories[i].name);
         write_text(bad_trajectories[i].name, bad_trajectories[i].text);
-        assert_int_equal(npg_read_trajectory(&list, path), NPG_BAD_INPUT);
+        assert_int_equal(npg_read_trajectory(&list, &arena, path), NPG_BAD_INPUT);
+        npg_arena_release(&arena);
         if (!strstr(npg_error_text(), bad_trajectories[i].message) || !strstr(npg_error_text(), path))
             fail_msg("%s\nbut not: %s", npg_error_text(), bad_trajectories[i].message);
     }

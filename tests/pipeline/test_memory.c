@@ -151,6 +151,48 @@ static void an_arena_remembers_the_first_refusal(void **state)
     npg_arena_release(&arena);
 }
 
+static void arrays_of_an_arena_grow_in_their_place(void **state)
+{
+    (void)state;
+    enum { ARRAYS = 3 };
+    npg_arena arena = {.purpose = NPG_FOR_FIT};
+    int *arrays[ARRAYS] = {NULL};
+    size_t capacities[ARRAYS] = {0};
+    assert_non_null(npg_arena_take(&arena, 1, 1));
+    for (int i = 0; i < 300; i++)
+        for (int k = 0; k < ARRAYS; k++) { /* the first, the middle and the last of the arena */
+            assert_int_equal(npg_arena_grow(&arena, &arrays[k], &capacities[k], (size_t)i + 1, sizeof(int)),
+                             NPG_OK);
+            arrays[k][i] = 10 * i + k;
+        }
+    for (int i = 0; i < 300; i++)
+        for (int k = 0; k < ARRAYS; k++) assert_int_equal(arrays[k][i], 10 * i + k);
+    assert_int_equal(npg_memory_used(), 1 + (capacities[0] + capacities[1] + capacities[2]) * sizeof(int));
+    npg_memory_fail_at(1, false);
+    assert_int_equal(npg_arena_grow(&arena, &arrays[1], &capacities[1], 100000, sizeof(int)), NPG_MEMORY);
+    assert_int_equal(arrays[1][299], 2991);
+    assert_int_equal(npg_arena_status(&arena), NPG_MEMORY);
+    npg_arena_release(&arena);
+}
+
+static void an_object_goes_with_its_arena(void **state)
+{
+    (void)state;
+    struct thing {
+        npg_arena arena;
+        char *name;
+    } * thing;
+    assert_int_equal(npg_object_open(&thing, NPG_FOR_FILES, sizeof *thing), NPG_OK);
+    thing->name = npg_arena_text(&thing->arena, "walker");
+    assert_int_equal(npg_memory_used_for(NPG_FOR_FILES), sizeof *thing + 7);
+    npg_object_close(&thing);
+    assert_null(thing);
+    npg_object_close(&thing);
+    npg_memory_fail_at(1, false);
+    assert_int_equal(npg_object_open(&thing, NPG_FOR_FILES, sizeof *thing), NPG_MEMORY);
+    assert_null(thing);
+}
+
 /* ---- an allocator of the user's ---- */
 
 static size_t live_blocks;
@@ -223,6 +265,8 @@ int main(void)
         cmocka_unit_test_teardown(the_nth_request_fails, nothing_left),
         cmocka_unit_test_teardown(an_arena_frees_all_at_once, nothing_left),
         cmocka_unit_test_teardown(an_arena_remembers_the_first_refusal, nothing_left),
+        cmocka_unit_test_teardown(arrays_of_an_arena_grow_in_their_place, nothing_left),
+        cmocka_unit_test_teardown(an_object_goes_with_its_arena, nothing_left),
         cmocka_unit_test_teardown(the_users_allocator_is_asked, nothing_left),
         cmocka_unit_test_teardown(counters_survive_threads, nothing_left),
     };

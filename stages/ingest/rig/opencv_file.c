@@ -4,28 +4,16 @@
 #include <string.h>
 
 #include "ingest/rig/rig_internal.h"
+#include "pipeline/file.h"
 
 #define CAMERA_FILE_MAX ((size_t)1 << 20) /* bytes; a camera's file has about a thousand */
 
-npg_status npg_opencv_open(char **text, const char *path)
+npg_status npg_opencv_open(npg_arena *arena, char **text, const char *path)
 {
-    npg_source *source;
-    unsigned char *bytes = NULL;
-    size_t size = 0;
-    *text = NULL;
-    NPG_TRY(npg_source_open_file(&source, path));
-    uint64_t left = npg_source_left(source);
-    npg_status status = left > CAMERA_FILE_MAX
-                            ? npg_error(NPG_BAD_INPUT, "%s: no camera file, or one of more than 1 MiB", path)
-                            : npg_source_read(source, &bytes, (size_t)left, &size);
-    if (!status) status = npg_alloc(text, NPG_FOR_FILES, size + 1);
-    if (!status && size) memcpy(*text, bytes, size);
-    if (!status && strlen(*text) != size)
-        status = npg_error(NPG_BAD_INPUT, "%s: byte %zu is 0: no text file", path, strlen(*text));
-    npg_release(&bytes);
-    npg_source_close(&source);
-    if (status) npg_release(text);
-    return status;
+    size_t size;
+    NPG_TRY(npg_file_whole(arena, text, &size, path, CAMERA_FILE_MAX, "camera"));
+    if (strlen(*text) == size) return NPG_OK;
+    return npg_error(NPG_BAD_INPUT, "%s: byte %zu is 0: no text file", path, strlen(*text));
 }
 
 static size_t line_of(const char *text, const char *at)

@@ -77,18 +77,14 @@ npg_rig_settings npg_rig_defaults(void)
 }
 
 /* The folder that names start from: the path itself, or the one its file lies in. */
-static npg_status find_folder(npg_rig *rig)
+static char *find_folder(npg_rig *rig)
 {
     struct stat info;
-    NPG_TRY(npg_copy_text(&rig->folder, rig->path));
-    if (!stat(rig->path, &info) && S_ISDIR(info.st_mode)) return NPG_OK;
-    char *slash = strrchr(rig->folder, '/');
-    if (slash) {
-        slash[slash == rig->folder] = 0;
-        return NPG_OK;
-    }
-    npg_release(&rig->folder);
-    return npg_copy_text(&rig->folder, ".");
+    char *folder = npg_arena_text(&rig->arena, rig->path), *slash = folder ? strrchr(folder, '/') : NULL;
+    if (!folder || (!stat(folder, &info) && S_ISDIR(info.st_mode))) return folder;
+    if (!slash) return npg_arena_text(&rig->arena, ".");
+    slash[slash == folder] = 0;
+    return folder;
 }
 
 static npg_status load(npg_rig *rig, const char *path)
@@ -99,64 +95,37 @@ static npg_status load(npg_rig *rig, const char *path)
                          "%s: no rig: neither a rig.json, nor a folder with depth.txt (TUM), "
                          "depth/ and intrinsic.json (Redwood), or *_camera.xml (OpenCV)",
                          path);
-    NPG_TRY(npg_copy_text(&rig->path, path));
-    NPG_TRY(find_folder(rig));
+    rig->path = npg_arena_text(&rig->arena, path);
+    rig->folder = rig->path ? find_folder(rig) : NULL;
+    NPG_TRY(npg_arena_status(&rig->arena));
     NPG_TRY(read(rig));
     return npg_rig_join(rig);
 }
 
 npg_status npg_rig_open(npg_rig **out, const char *path, const npg_rig_settings *settings)
 {
-    npg_rig *rig;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&rig, NPG_FOR_FILES, sizeof *rig));
-    rig->settings = *settings;
-    npg_status status = load(rig, path);
-    if (status) npg_rig_close(&rig);
-    *out = rig;
+    NPG_TRY(npg_object_open(out, NPG_FOR_FILES, sizeof **out));
+    (*out)->settings = *settings;
+    npg_status status = load(*out, path);
+    if (status) npg_rig_close(out);
     return status;
 }
 
-static void clear_sensor(npg_rig_sensor *sensor)
+void npg_rig_close(npg_rig **rig)
 {
-    for (size_t i = 0; i < sensor->shot_count; i++) {
-        npg_release(&sensor->shots[i].depth);
-        npg_release(&sensor->shots[i].colour);
-        npg_release(&sensor->shots[i].mask);
-    }
-    npg_release(&sensor->shots);
-    npg_release(&sensor->name);
-    npg_release(&sensor->rays);
+    for (size_t s = 0; *rig && s < (*rig)->sensor_count; s++) npg_release(&(*rig)->sensors[s].rays);
+    npg_object_close(rig);
 }
 
-void npg_rig_close(npg_rig **slot)
-{
-    npg_rig *rig = *slot;
-    if (!rig) return;
-    for (size_t s = 0; s < rig->sensor_count; s++) clear_sensor(&rig->sensors[s]);
-    npg_release(&rig->sensors);
-    npg_release(&rig->numbers);
-    npg_release(&rig->shot_of);
-    npg_release(&rig->path);
-    npg_release(&rig->folder);
-    npg_release(&rig->unit);
-    npg_release(slot);
-}
-
-npg_status npg_rig_path(const npg_rig *rig, char **path, const char *name, bool must_be)
+npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_be)
 {
     struct stat info;
-    *path = NULL;
-    if (name[0] == '/')
-        NPG_TRY(npg_copy_text(path, name));
-    else
-        NPG_TRY(npg_join_path(path, rig->folder, name));
-    npg_status status = NPG_OK;
-    if (must_be && stat(*path, &info)) status = npg_error_errno(NPG_BAD_INPUT, "can't read %s", *path);
-    if (!status && rig->settings.confine && !stat(*path, &info))
-        status = npg_path_confine(*path, rig->folder);
-    if (status) npg_release(path);
-    return status;
+    *path =
+        name[0] == '/' ? npg_arena_text(&rig->arena, name) : npg_arena_path(&rig->arena, rig->folder, name);
+    NPG_TRY(npg_arena_status(&rig->arena));
+    bool is_there = !stat(*path, &info);
+    if (must_be && !is_there) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", *path);
+    return rig->settings.confine && is_there ? npg_path_confine(*path, rig->folder) : NPG_OK;
 }
 
 /* ---- sensors and shots ---- */
@@ -165,31 +134,24 @@ npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out, const char *na
 {
     if (rig->sensor_count >= NPG_RIG_SENSORS_MAX)
         return npg_error(NPG_BAD_INPUT, "%s: more than %d sensors", rig->path, NPG_RIG_SENSORS_MAX);
-    NPG_TRY(npg_grow(&rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1, sizeof *rig->sensors,
-                     NPG_FOR_FILES));
-    npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count];
-    *sensor = (npg_rig_sensor){.scale = 0.001};
+    NPG_TRY(npg_arena_grow(&rig->arena, &rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1,
+                           sizeof *rig->sensors));
+    npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count++];
+    *sensor = (npg_rig_sensor){.scale = 0.001, .name = npg_arena_text(&rig->arena, name)};
     npg_pose_identity(sensor->pose);
     npg_pose_identity(sensor->depth_to_colour);
-    NPG_TRY(npg_copy_text(&sensor->name, name));
-    rig->sensor_count++;
     *out = sensor;
-    return NPG_OK;
+    return npg_arena_status(&rig->arena);
 }
 
-npg_status npg_rig_add_shot(npg_rig_sensor *sensor, const npg_rig_shot *shot)
+npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot)
 {
     if (sensor->shot_count >= NPG_RIG_SHOTS_MAX)
         return npg_error(NPG_BAD_INPUT, "sensor %s: more than %d images", sensor->name, NPG_RIG_SHOTS_MAX);
-    NPG_TRY(npg_grow(&sensor->shots, &sensor->shot_capacity, sensor->shot_count + 1, sizeof *sensor->shots,
-                     NPG_FOR_FILES));
-    npg_rig_shot *added = &sensor->shots[sensor->shot_count];
-    *added = *shot;
-    added->depth = added->colour = added->mask = NULL;
-    sensor->shot_count++;
-    NPG_TRY(npg_copy_text(&added->depth, shot->depth));
-    if (shot->colour) NPG_TRY(npg_copy_text(&added->colour, shot->colour));
-    return shot->mask ? npg_copy_text(&added->mask, shot->mask) : NPG_OK;
+    NPG_TRY(npg_arena_grow(&rig->arena, &sensor->shots, &sensor->shot_capacity, sensor->shot_count + 1,
+                           sizeof *sensor->shots));
+    sensor->shots[sensor->shot_count++] = *shot;
+    return NPG_OK;
 }
 
 /* ---- frames ---- */
@@ -198,7 +160,8 @@ static npg_status list_numbers(npg_rig *rig)
 {
     size_t all = 0, count = 0;
     for (size_t s = 0; s < rig->sensor_count; s++) all += rig->sensors[s].shot_count;
-    NPG_TRY(npg_alloc_array(&rig->numbers, NPG_FOR_FILES, all + 1, sizeof *rig->numbers));
+    rig->numbers = npg_arena_take(&rig->arena, all + 1, sizeof *rig->numbers);
+    NPG_TRY(npg_arena_status(&rig->arena));
     for (size_t s = 0; s < rig->sensor_count; s++)
         for (size_t i = 0; i < rig->sensors[s].shot_count; i++)
             rig->numbers[count++] = rig->sensors[s].shots[i].number;
@@ -213,7 +176,8 @@ static npg_status list_numbers(npg_rig *rig)
 static npg_status list_times(npg_rig *rig)
 {
     rig->frame_count = rig->sensors[0].shot_count;
-    NPG_TRY(npg_alloc_array(&rig->numbers, NPG_FOR_FILES, rig->frame_count + 1, sizeof *rig->numbers));
+    rig->numbers = npg_arena_take(&rig->arena, rig->frame_count + 1, sizeof *rig->numbers);
+    NPG_TRY(npg_arena_status(&rig->arena));
     for (size_t f = 0; f < rig->frame_count; f++) {
         rig->numbers[f] = (int64_t)f;
         rig->sensors[0].shots[f].number = (int64_t)f;
@@ -274,8 +238,8 @@ npg_status npg_rig_join(npg_rig *rig)
     NPG_TRY(check_order(rig));
     NPG_TRY(rig->is_timed ? list_times(rig) : list_numbers(rig));
     if (!rig->frame_count) return npg_error(NPG_BAD_INPUT, "%s: there is no depth image", rig->path);
-    NPG_TRY(npg_alloc_array(&rig->shot_of, NPG_FOR_FILES, rig->frame_count * rig->sensor_count,
-                            sizeof *rig->shot_of));
+    rig->shot_of = npg_arena_take(&rig->arena, rig->frame_count * rig->sensor_count, sizeof *rig->shot_of);
+    NPG_TRY(npg_arena_status(&rig->arena));
     for (size_t f = 0; f < rig->frame_count; f++)
         for (size_t s = 0; s < rig->sensor_count; s++)
             rig->shot_of[f * rig->sensor_count + s] =

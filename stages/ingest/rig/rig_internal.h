@@ -38,8 +38,8 @@ npg_status npg_pose_of_quaternion(double pose[12], const double xyzw[4], const d
 
 npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **sensor, const char *name);
 
-/* Add an image; the paths are copied (NULL stays NULL). */
-npg_status npg_rig_add_shot(npg_rig_sensor *sensor, const npg_rig_shot *shot);
+/* Add an image, whose paths are the rig's. */
+npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot);
 
 /* Once all shots are there: frames by number or time.  NPG_BAD_INPUT when no image is left, or numbers or
  * times do not grow. */
@@ -57,9 +57,9 @@ npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *
 
 bool npg_rig_ends_with(const char *name, const char *ending);
 
-/* "<rig's folder>/<name>", refused under confine where it leads out; NPG_BAD_INPUT where it is not there and
- * must be. */
-npg_status npg_rig_path(const npg_rig *rig, char **path, const char *name, bool must_be);
+/* "<rig's folder>/<name>", a text of the rig's, refused under confine where it leads out; NPG_BAD_INPUT where it is
+ * not there and must be. */
+npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_be);
 
 /* intrinsic.json as Open3D writes it: {"width", "height", "intrinsic_matrix": nine numbers, columns first}.
  * NPG_BAD_INPUT. */
@@ -68,27 +68,27 @@ npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path);
 /* Where images are timed, or trajectories come in order: files of "time path" lines and of poses. */
 typedef struct npg_stamped {
     double time_s;
-    char *path;      /* of lists, owned */
+    char *path;      /* of lists        */
     double pose[12]; /* of trajectories */
 } npg_stamped;
 
 typedef struct npg_stamped_list {
-    npg_stamped *items; /* owned */
+    npg_arena *arena; /* a loan: what the items and their paths are of */
+    npg_stamped *items;
     size_t count, capacity;
 } npg_stamped_list;
 
 /* "time path" lines as TUM RGB-D has them; # begins a comment; times must grow. */
-npg_status npg_read_image_list(npg_stamped_list *list, const char *path);
+npg_status npg_read_image_list(npg_stamped_list *list, npg_arena *arena, const char *path);
 /* "time tx ty tz qx qy qz qw" lines (TUM), or blocks of three integers and a 4 x 4 matrix (Redwood; time_s is
  * then the place in the file).  The ending .log says Redwood. */
-npg_status npg_read_trajectory(npg_stamped_list *list, const char *path);
-void npg_stamped_clear(npg_stamped_list *list);
+npg_status npg_read_trajectory(npg_stamped_list *list, npg_arena *arena, const char *path);
 /* The nearest in time within the tolerance, NULL without one. */
 const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s, double tolerance_s);
 
 /* OpenCV's FileStorage, XML or YAML: matrices by name, numbers in rows.  *found is how many numbers there
  * are, 0 where the name is not in the file; more than `most` is NPG_BAD_INPUT. */
-npg_status npg_opencv_open(char **text, const char *path);
+npg_status npg_opencv_open(npg_arena *arena, char **text, const char *path);
 npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values,
                              size_t most, size_t *found);
 
@@ -134,27 +134,6 @@ npg_status npg_image_read(npg_image *image, const char *path, npg_image_kind kin
 npg_status npg_image_size(size_t *width, size_t *height, const char *path);
 
 void npg_image_clear(npg_image *image);
-
-/* ---- between image.c, image_png.c and image_jpeg.c ---- */
-
-/* What a decoder is asked for.  A decoder fills image->width and height, calls npg_image_accept() and then
- * decodes; with header_only it stops there. */
-typedef struct npg_image_job {
-    const char *path;
-    const unsigned char *data;
-    size_t size;
-    npg_image_kind kind;
-    size_t width, height; /* wanted; 0: any */
-    int header_only;
-    npg_image *image;
-} npg_image_job;
-
-/* NPG_BAD_INPUT for a size that is not the wanted one or beyond the limit; else the memory of the pixels
- * (none with header_only). */
-npg_status npg_image_accept(const npg_image_job *job, size_t width, size_t height);
-
-npg_status npg_png_decode(const npg_image_job *job);
-npg_status npg_jpeg_decode(const npg_image_job *job);
 
 /* Sights: what the sensors of a rig saw in a few frames, on the grids of their images, so that a point of one
  * sensor can be looked up in the image of another. */

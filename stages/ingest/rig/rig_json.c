@@ -3,10 +3,12 @@
  *     {"neupig_rig": 1, "sensors": [{"depth": "front/depth_%04d.png", "camera": {...}, "pose": [...]}]} */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/file.h"
+#include "pipeline/order.h"
 
 typedef struct place {
     const char *file;
@@ -106,29 +108,35 @@ static npg_status get_pose(const place *p, const json_t *object, const char *key
 
 /* ---- cameras ---- */
 
+/* Width and height; *is_good is false where they are none of an image. */
+static npg_status get_size(const place *p, const json_t *object, npg_camera *camera, bool must_be_whole,
+                           bool *is_good)
+{
+    double width = 0, height = 0;
+    NPG_TRY(get_number(p, object, "width", true, &width));
+    NPG_TRY(get_number(p, object, "height", true, &height));
+    *is_good = width >= 1 && height >= 1 && width <= NPG_IMAGE_SIDE_MAX && height <= NPG_IMAGE_SIDE_MAX &&
+               (!must_be_whole || (width == floor(width) && height == floor(height)));
+    camera->width = *is_good ? (size_t)width : 0;
+    camera->height = *is_good ? (size_t)height : 0;
+    return NPG_OK;
+}
+
 static npg_status get_camera(const place *p, const json_t *object, npg_camera *camera, bool is_colour,
                              double from_depth[12])
 {
     static const char *const keys[] = {"width", "height", "fx", "fy", "cx", "cy", "distortion", NULL};
     static const char *const colour_keys[] = {"width", "height",     "fx",         "fy", "cx",
                                               "cy",    "distortion", "from_depth", NULL};
-    double width = 0, height = 0;
+    double *const values[] = {&camera->fx, &camera->fy, &camera->cx, &camera->cy};
     size_t count;
     char where[512];
-    bool is_there;
+    bool is_there, is_good;
     *camera = (npg_camera){0};
     NPG_TRY(check_keys(p, object, is_colour ? colour_keys : keys));
-    NPG_TRY(get_number(p, object, "width", true, &width));
-    NPG_TRY(get_number(p, object, "height", true, &height));
-    if (width != floor(width) || height != floor(height) || width < 1 || height < 1 ||
-        width > NPG_IMAGE_SIDE_MAX || height > NPG_IMAGE_SIDE_MAX)
-        return bad(p, "width", "and height must be whole numbers of pixels");
-    camera->width = (size_t)width;
-    camera->height = (size_t)height;
-    NPG_TRY(get_number(p, object, "fx", true, &camera->fx));
-    NPG_TRY(get_number(p, object, "fy", true, &camera->fy));
-    NPG_TRY(get_number(p, object, "cx", true, &camera->cx));
-    NPG_TRY(get_number(p, object, "cy", true, &camera->cy));
+    NPG_TRY(get_size(p, object, camera, true, &is_good));
+    if (!is_good) return bad(p, "width", "and height must be whole numbers of pixels");
+    for (size_t i = 0; i < 4; i++) NPG_TRY(get_number(p, object, keys[2 + i], true, values[i]));
     NPG_TRY(get_numbers(p, object, "distortion", camera->distortion, NPG_DISTORTIONS, &count));
     if (count && count != 4 && count != 5 && count != 8)
         return bad(p, "distortion", "must be 4, 5 or 8 numbers: k1 k2 p1 p2 [k3 [k4 k5 k6]]");
@@ -144,13 +152,12 @@ static npg_status find_numbered(npg_rig *rig, const place *p, const char *key, c
                                 npg_paths *paths)
 {
     char *path;
-    *paths = (npg_paths){0};
+    *paths = (npg_paths){.arena = &rig->arena};
     if (!strchr(pattern, '%') && !strchr(pattern, '#'))
         return bad(p, key,
                    "must be a pattern with the frame's number, such as depth_%04d.png, or a list *.txt");
     NPG_TRY(npg_rig_path(rig, &path, pattern, false));
     npg_status status = npg_paths_find(paths, path);
-    npg_release(&path);
     if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
     if (!status && !paths->numbers) status = bad(p, key, "must be a pattern with the frame's number");
     return status < 0 ? npg_error_prefix(status, "%s: %s.%s", p->file, p->at, key) : status;
@@ -158,15 +165,9 @@ static npg_status find_numbered(npg_rig *rig, const place *p, const char *key, c
 
 static char *path_of_number(const npg_paths *paths, int64_t number)
 {
-    for (size_t lo = 0, hi = paths->count; lo < hi;) {
-        size_t middle = (lo + hi) / 2;
-        if (paths->numbers[middle] == number) return paths->paths[middle];
-        if (paths->numbers[middle] < number)
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
-    return NULL;
+    const int64_t *found =
+        paths->count ? bsearch(&number, paths->numbers, paths->count, sizeof number, npg_order_int64) : NULL;
+    return found ? paths->paths[found - paths->numbers] : NULL;
 }
 
 /* Poses in a file: by the frame's number, or in the order of the images. */
@@ -195,51 +196,45 @@ static npg_status give_poses(npg_rig_sensor *sensor, const place *p, const npg_s
 static npg_status read_poses(npg_rig *rig, npg_rig_sensor *sensor, const place *p, const char *name)
 {
     char *path;
-    npg_stamped_list poses = {0};
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    npg_stamped_list poses;
     NPG_TRY(npg_rig_path(rig, &path, name, true));
-    npg_status status = npg_read_trajectory(&poses, path);
-    npg_release(&path);
+    npg_status status = npg_read_trajectory(&poses, &scratch, path);
     if (!status) status = give_poses(sensor, p, &poses, npg_rig_ends_with(name, ".log"));
-    npg_stamped_clear(&poses);
+    npg_arena_release(&scratch);
     return status;
 }
 
+static const char *const image_keys[] = {"depth", "colour", "mask"};
+
 /* Every depth image needs its colour image and mask, if there are any for this sensor: where one is missing
  * the recording is out of step. */
-static npg_status add_numbered(npg_rig_sensor *sensor, const place *p, const npg_paths lists[3],
-                               const bool has[3])
+static npg_status add_numbered(npg_rig *rig, npg_rig_sensor *sensor, const place *p, const npg_paths lists[3],
+                               const char *names[3])
 {
-    static const char *const keys[] = {"depth", "colour", "mask"};
     for (size_t i = 0; i < lists[0].count; i++) {
         npg_rig_shot shot = {.number = lists[0].numbers[i], .depth = lists[0].paths[i]};
         char **paths[] = {NULL, &shot.colour, &shot.mask};
         for (size_t k = 1; k < 3; k++) {
-            if (!has[k]) continue;
+            if (!names[k]) continue;
             *paths[k] = path_of_number(&lists[k], shot.number);
             if (*paths[k]) continue;
             char what[160];
             snprintf(what, sizeof what, "frame %lld has a depth image, but none of these",
                      (long long)shot.number);
-            return bad(p, keys[k], what);
+            return bad(p, image_keys[k], what);
         }
-        NPG_TRY(npg_rig_add_shot(sensor, &shot));
+        NPG_TRY(npg_rig_add_shot(rig, sensor, &shot));
     }
     return NPG_OK;
 }
 
 static npg_status load_numbered(npg_rig *rig, npg_rig_sensor *sensor, const place *p, const char *names[3])
 {
-    static const char *const keys[] = {"depth", "colour", "mask"};
-    npg_paths lists[3] = {{0}};
-    bool has[3];
-    npg_status status = NPG_OK;
-    for (size_t k = 0; k < 3 && !status; k++) {
-        has[k] = names[k] != NULL;
-        if (has[k]) status = find_numbered(rig, p, keys[k], names[k], &lists[k]);
-    }
-    if (!status) status = add_numbered(sensor, p, lists, has);
-    for (size_t k = 0; k < 3; k++) npg_paths_clear(&lists[k]);
-    return status;
+    npg_paths lists[3];
+    for (size_t k = 0; k < 3; k++)
+        if (names[k]) NPG_TRY(find_numbered(rig, p, image_keys[k], names[k], &lists[k]));
+    return add_numbered(rig, sensor, p, lists, names);
 }
 
 static bool is_list(const char *name)
@@ -252,9 +247,7 @@ static bool is_list(const char *name)
 static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place *p, const json_t *object)
 {
     const char *names[3], *poses;
-    NPG_TRY(get_text(p, object, "depth", &names[0]));
-    NPG_TRY(get_text(p, object, "colour", &names[1]));
-    NPG_TRY(get_text(p, object, "mask", &names[2]));
+    for (size_t k = 0; k < 3; k++) NPG_TRY(get_text(p, object, image_keys[k], &names[k]));
     NPG_TRY(get_text(p, object, "poses", &poses));
     if (!names[0]) return bad(p, "depth", "is missing");
     bool is_timed = is_list(names[0]);
@@ -316,7 +309,7 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
     NPG_TRY(get_text(&top, root, "axes", &axes));
     NPG_TRY(get_text(&top, root, "comment", &text));
     NPG_TRY(get_text(&top, root, "unit", &text));
-    if (text) NPG_TRY(npg_copy_text(&rig->unit, text));
+    if (text) rig->unit = npg_arena_text(&rig->arena, text);
     if (axes && strcmp(axes, "opencv") != 0 && strcmp(axes, "opengl") != 0)
         return bad(&top, "axes",
                    "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
@@ -341,37 +334,44 @@ static npg_status read_json(json_t **root, char **text, const char *path)
 npg_status npg_rig_load_json(npg_rig *rig)
 {
     json_t *root;
-    char *text, *file;
-    NPG_TRY(npg_rig_ends_with(rig->path, ".json") ? npg_copy_text(&file, rig->path)
-                                                  : npg_join_path(&file, rig->path, "rig.json"));
-    npg_status status = read_json(&root, &text, file);
-    if (!status) status = load_root(rig, file, root);
-    if (!status || root) json_decref(root);
+    char *text, *file = npg_rig_ends_with(rig->path, ".json")
+                            ? rig->path
+                            : npg_arena_path(&rig->arena, rig->path, "rig.json");
+    NPG_TRY(npg_arena_status(&rig->arena));
+    NPG_TRY(read_json(&root, &text, file));
+    npg_status status = load_root(rig, file, root);
+    json_decref(root);
     npg_release(&text);
-    npg_release(&file);
     return status;
 }
 
 /* ---- Open3D's intrinsics ---- */
 
+static npg_status get_intrinsic(const place *p, const json_t *root, npg_camera *camera)
+{
+    double m[9];
+    size_t count;
+    bool is_good;
+    NPG_TRY(get_size(p, root, camera, false, &is_good));
+    NPG_TRY(get_numbers(p, root, "intrinsic_matrix", m, 9, &count));
+    if (count != 9) return bad(p, "intrinsic_matrix", "must be nine numbers, columns first");
+    if (!is_good) return bad(p, "width", "and height must be pixels");
+    camera->fx = m[0];
+    camera->fy = m[4];
+    camera->cx = m[6];
+    camera->cy = m[7];
+    return npg_camera_check(camera, p->file);
+}
+
 npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path)
 {
     json_t *root;
     char *text;
-    double m[9] = {0}, width = 0, height = 0;
-    size_t count = 0;
     const place p = {.file = path};
+    *camera = (npg_camera){0};
     NPG_TRY(read_json(&root, &text, path));
-    npg_status status = get_number(&p, root, "width", true, &width);
-    if (!status) status = get_number(&p, root, "height", true, &height);
-    if (!status) status = get_numbers(&p, root, "intrinsic_matrix", m, 9, &count);
-    if (!status && count != 9) status = bad(&p, "intrinsic_matrix", "must be nine numbers, columns first");
-    if (!status && (width < 1 || height < 1 || width > NPG_IMAGE_SIDE_MAX || height > NPG_IMAGE_SIDE_MAX))
-        status = bad(&p, "width", "and height must be pixels");
+    npg_status status = get_intrinsic(&p, root, camera);
     json_decref(root);
     npg_release(&text);
-    NPG_TRY(status);
-    *camera = (npg_camera){
-        .width = (size_t)width, .height = (size_t)height, .fx = m[0], .fy = m[4], .cx = m[6], .cy = m[7]};
-    return npg_camera_check(camera, path);
+    return status;
 }
