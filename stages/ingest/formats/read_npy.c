@@ -5,8 +5,7 @@
 
 #include "ingest/ingest_internal.h"
 
-#define HEADER_MAX  65536 /* what version 1 can say; later versions only lift that for field lists */
-#define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
+#define HEADER_MAX 65536 /* what version 1 can say; later versions only lift that for field lists */
 
 typedef struct array {
     npg_ply_type type; /* NPG_PLY_FLOAT or NPG_PLY_DOUBLE */
@@ -117,56 +116,39 @@ static npg_status read_header(array *a, npg_source *source)
     return NPG_OK;
 }
 
-/* Rows whose values lie row_step and column_step bytes apart. */
-static void add_rows(npg_point_list *points, const array *a, const unsigned char *data, size_t rows,
-                     size_t row_step, size_t column_step)
-{
-    double values[6] = {0};
-    for (size_t i = 0; i < rows; i++, data += row_step) {
-        for (size_t c = 0; c < a->columns; c++)
-            values[c] = npg_ply_value(data + c * column_step, a->type, a->order);
-        npg_points_add(points, values, values + 3);
-    }
-}
-
 static npg_status ends_early(const array *a, const npg_source *source, uint64_t row)
 {
     return npg_source_bad_byte(source, "the file ends in row %llu of %llu", (unsigned long long)row,
                                (unsigned long long)a->rows);
 }
 
-static npg_status read_c_order(npg_point_list *points, const array *a, npg_source *source)
+/* Columns come one after the other, so all bytes are needed before the first point is whole. */
+static npg_status read_fortran_order(npg_builder *b, const npg_columns *columns, const array *a,
+                                     npg_source *source, size_t size)
 {
-    size_t item = npg_ply_type_size(a->type), row_size = item * a->columns, block = BLOCK_BYTES / row_size;
-    if (npg_source_left(source) != UINT64_MAX) NPG_TRY(npg_points_reserve(points, (size_t)a->rows));
-    for (uint64_t done = 0; done < a->rows;) {
-        size_t available, rows = a->rows - done < block ? (size_t)(a->rows - done) : block;
-        NPG_TRY(npg_source_fill(source, rows * row_size, &available));
-        if (available < rows * row_size) return ends_early(a, source, done + available / row_size);
-        NPG_TRY(npg_points_reserve(points, rows));
-        add_rows(points, a, npg_source_data(source), rows, row_size, item);
-        npg_source_take(source, rows * row_size);
-        done += rows;
-    }
+    size_t available;
+    NPG_TRY(npg_source_fill(source, size, &available));
+    if (available < size) return ends_early(a, source, 0);
+    NPG_TRY(npg_builder_reserve(b, (size_t)a->rows, 0));
+    npg_rows_add(b, columns, npg_source_data(source), (size_t)a->rows);
+    npg_source_take(source, size);
     return NPG_OK;
 }
 
-/* Columns come one after the other, so all bytes are needed before the first point is whole. */
-static npg_status read_fortran_order(npg_point_list *points, const array *a, npg_source *source)
-{
-    unsigned char *data = NULL;
-    size_t item = npg_ply_type_size(a->type), size = (size_t)a->rows * a->columns * item, got;
-    NPG_TRY(npg_source_read(source, &data, size, &got));
-    npg_status status = got < size ? ends_early(a, source, 0) : npg_points_reserve(points, (size_t)a->rows);
-    if (!status) add_rows(points, a, data, (size_t)a->rows, item, item * (size_t)a->rows);
-    npg_release(&data);
-    return status;
-}
-
-npg_status npg_npy_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin)
+npg_status npg_npy_read(npg_builder *b, npg_source *source)
 {
     array a = {0};
+    uint64_t done;
     NPG_TRY(read_header(&a, source));
-    npg_point_list points = {.frame = frame, .origin = origin, .has_normals = a.columns == 6};
-    return a.is_fortran ? read_fortran_order(&points, &a, source) : read_c_order(&points, &a, source);
+    npg_columns columns = {.format = a.order};
+    size_t item = npg_ply_type_size(a.type), row_size = item * a.columns, rows = (size_t)a.rows;
+    for (size_t c = 0; c < a.columns; c++)
+        columns.of[c] = (npg_column){.is_there = true,
+                                     .type = a.type,
+                                     .offset = a.is_fortran ? c * item * rows : c * item,
+                                     .step = a.is_fortran ? item : row_size};
+    b->has_normals = a.columns == 6;
+    if (a.is_fortran) return read_fortran_order(b, &columns, &a, source, rows * row_size);
+    npg_status status = npg_rows_read(b, source, &columns, a.rows, row_size, &done);
+    return status == NPG_END ? ends_early(&a, source, done) : status;
 }

@@ -11,8 +11,7 @@ enum { POSITION, UV, NORMAL, KINDS };
 
 typedef struct reader {
     npg_source *source;
-    bool wants_faces;
-    npg_mesh_builder builder;
+    npg_builder *builder;
     size_t total[KINDS]; /* of the whole file; of what was read so far where it can't be read twice */
     size_t triangles;
     size_t normal_count, normal_capacity, uv_count, uv_capacity, link_capacity[KINDS];
@@ -74,7 +73,7 @@ static npg_status count_lines(reader *r)
         length = next_word(&word, &at, end);
         int kind = kind_of(word, length);
         if (kind < KINDS) r->total[kind]++;
-        if (r->wants_faces && is_word(word, length, "f")) {
+        if (r->builder->wants_faces && is_word(word, length, "f")) {
             size_t corners = count_words(at, end);
             r->triangles += corners > 2 ? corners - 2 : 0;
         }
@@ -97,26 +96,22 @@ static npg_status parse_values(reader *r, double *values, int least, int most, i
 
 /* ---- v, vn, vt ---- */
 
-static uint8_t colour_byte(double value)
-{
-    return value >= 1 ? 255 : value > 0 ? (uint8_t)(value * 255 + 0.5) : 0;
-}
-
 static npg_status add_position(reader *r, const char *at, const char *end)
 {
-    npg_mesh_builder *b = &r->builder;
-    double values[8];
+    npg_builder *b = r->builder;
+    double values[8], slots[NPG_SLOTS] = {0};
     int count;
     NPG_TRY(parse_values(r, values, 3, 8, &count, at, end));
     /* x y z [w] r g b, an extension of the format; the first vertex settles whether it is used. */
     if (b->vert_count == 0) b->has_colours = count >= 6;
-    if (b->vert_count == b->pos_capacity || !b->vert_count)
+    if (b->vert_count == b->vert_capacity || !b->vert_count)
         NPG_TRY(npg_builder_reserve(b, b->vert_count < r->total[POSITION] ? r->total[POSITION] : 1,
                                     b->face_count < r->triangles ? r->triangles : 0));
-    size_t vertex = npg_builder_vertex(b, values);
-    for (int c = 0; c < 4 && b->has_colours; c++)
-        b->vert_colours[4 * vertex + (size_t)c] =
-            c < 3 && count >= 6 ? colour_byte(values[count - 3 + c]) : 255;
+    memcpy(slots, values, 3 * sizeof *values);
+    for (int c = 0; c < 4; c++)
+        slots[NPG_RED + c] =
+            c < 3 && count >= 6 ? npg_colour_value(values[count - 3 + c], NPG_PLY_FLOAT) : 255;
+    npg_builder_add(b, slots);
     return NPG_OK;
 }
 
@@ -136,7 +131,7 @@ static npg_status add_uv(reader *r, const char *at, const char *end)
     double values[3] = {0};
     int count;
     NPG_TRY(parse_values(r, values, 1, 3, &count, at, end));
-    if (!r->wants_faces) return NPG_OK;
+    if (!r->builder->wants_faces) return NPG_OK;
     size_t need = r->uv_count < r->total[UV] ? r->total[UV] : r->uv_count + 1;
     NPG_TRY(npg_grow(&r->uvs, &r->uv_capacity, need, 2 * sizeof(float), NPG_FOR_FILES));
     r->uvs[2 * r->uv_count] = (float)values[0];
@@ -150,7 +145,7 @@ static npg_status add_uv(reader *r, const char *at, const char *end)
 static npg_status parse_index(reader *r, uint32_t *index, int kind, const char **at, const char *end)
 {
     static const char *const names[] = {"vertex", "texture coordinate", "normal"};
-    size_t so_far[] = {r->builder.vert_count, r->uv_count, r->normal_count};
+    size_t so_far[] = {r->builder->vert_count, r->uv_count, r->normal_count};
     size_t there = r->total[kind] > so_far[kind] ? r->total[kind] : so_far[kind];
     bool negative = *at < end && **at == '-';
     const char *first = *at += negative;
@@ -188,7 +183,8 @@ static npg_status parse_corner(reader *r, uint32_t *vertex, uint32_t *uv, const 
         if (*at < end && **at == '/' && kind == UV) continue;
         if (*at == end || **at == ' ' || **at == '\t') break;
         const char *before = *at;
-        bool is_unread = kind == UV && !r->wants_faces; /* a cloud has no use for texture coordinates */
+        bool is_unread =
+            kind == UV && !r->builder->wants_faces; /* a cloud has no use for texture coordinates */
         if (is_unread) {
             while (*at < end && **at != '/' && **at != ' ' && **at != '\t') ++*at;
             if (*at == before) break;
@@ -207,7 +203,7 @@ static npg_status parse_corner(reader *r, uint32_t *vertex, uint32_t *uv, const 
 /* The corners' texture coordinates, cut into the triangles of the fan that the builder makes next. */
 static npg_status keep_corner_uvs(reader *r, const uint32_t *uvs, size_t count)
 {
-    size_t first = r->builder.face_count, faces = first + count - 2;
+    size_t first = r->builder->face_count, faces = first + count - 2;
     size_t need = r->triangles > faces ? r->triangles : faces;
     if (!r->uv_count) return NPG_OK;
     NPG_TRY(npg_grow(&r->corner_uv, &r->corner_capacity, need, 3 * sizeof(uint32_t), NPG_FOR_FILES));
@@ -226,9 +222,9 @@ static npg_status add_face(reader *r, const char *at, const char *end)
         NPG_TRY(parse_corner(r, &corners[count], &uvs[count], &at, end));
     if (at < end) return npg_source_bad_line(r->source, "a face of more than %d corners", CORNERS_MAX);
     if (count < 3) return npg_source_bad_line(r->source, "a face of %zu corners", count);
-    if (!r->wants_faces) return NPG_OK;
+    if (!r->builder->wants_faces) return NPG_OK;
     NPG_TRY(keep_corner_uvs(r, uvs, count));
-    return npg_builder_polygon(&r->builder, corners, count);
+    return npg_builder_polygon(r->builder, corners, count);
 }
 
 /* ---- the whole ---- */
@@ -266,7 +262,7 @@ static npg_status read_lines(reader *r)
 /* Values of the linked vn or vt lines, one row of `width` floats per vertex; 0 where a vertex has none. */
 static npg_status gather(float **out, const reader *r, int kind, const float *rows, size_t width)
 {
-    size_t count = r->builder.vert_count;
+    size_t count = r->builder->vert_count;
     NPG_TRY(npg_alloc_array(out, NPG_FOR_MESH, count, width * sizeof(float)));
     for (size_t i = 0; i < count && i < r->link_capacity[kind]; i++)
         if (r->link[kind][i])
@@ -277,7 +273,7 @@ static npg_status gather(float **out, const reader *r, int kind, const float *ro
 /* One row per corner of a triangle, 0 where it has none. */
 static npg_status gather_corners(reader *r)
 {
-    npg_mesh_builder *b = &r->builder;
+    npg_builder *b = r->builder;
     NPG_TRY(npg_alloc_array(&b->corner_uvs, NPG_FOR_MESH, b->face_count, 6 * sizeof(float)));
     for (size_t i = 0; i < 3 * b->face_count && i < 3 * r->corner_capacity; i++)
         if (r->corner_uv[i])
@@ -288,51 +284,26 @@ static npg_status gather_corners(reader *r)
 /* Without faces the i-th vn belongs to the i-th v when there are as many. */
 static npg_status set_vertex_data(reader *r)
 {
-    npg_mesh_builder *b = &r->builder;
-    if (r->link[UV]) NPG_TRY(gather(&b->vert_uvs, r, UV, r->uvs, 2));
+    npg_builder *b = r->builder;
+    if (r->link[UV]) NPG_TRY(gather(&b->uvs, r, UV, r->uvs, 2));
     if (r->has_seams) NPG_TRY(gather_corners(r));
-    if (r->link[NORMAL]) return gather(&b->vert_normals, r, NORMAL, r->normals, 3);
+    if (r->link[NORMAL]) return gather(&b->normals, r, NORMAL, r->normals, 3);
     if (r->normal_count && r->normal_count == b->vert_count) {
-        b->vert_normals = r->normals;
+        b->normals = r->normals;
         r->normals = NULL;
     }
     return NPG_OK;
 }
 
-static void clear_reader(reader *r)
+npg_status npg_obj_read(npg_builder *b, npg_source *source)
 {
-    npg_builder_clear(&r->builder);
-    npg_release(&r->normals);
-    npg_release(&r->uvs);
-    npg_release(&r->corner_uv);
-    npg_release(&r->link[UV]);
-    npg_release(&r->link[NORMAL]);
-}
-
-npg_status npg_obj_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin)
-{
-    reader r = {.source = source, .builder = {.origin = origin}};
+    reader r = {.source = source, .builder = b};
     npg_status status = read_lines(&r);
     if (!status) status = set_vertex_data(&r);
-    if (!status) {
-        frame->pos_local = r.builder.vert_pos;
-        frame->normals = r.builder.vert_normals;
-        frame->colours = r.builder.vert_colours;
-        frame->point_count = r.builder.vert_count;
-        r.builder.vert_pos = r.builder.vert_normals = NULL;
-        r.builder.vert_colours = NULL;
-    }
-    clear_reader(&r);
-    return status;
-}
-
-npg_status npg_obj_read_mesh(npg_mesh **mesh, npg_source *source, npg_origin *origin, bool may_be_points)
-{
-    reader r = {
-        .source = source, .wants_faces = true, .builder = {.origin = origin, .may_be_points = may_be_points}};
-    npg_status status = read_lines(&r);
-    if (!status) status = set_vertex_data(&r);
-    if (!status) status = npg_builder_finish(mesh, &r.builder, source->name);
-    clear_reader(&r);
+    npg_release(&r.normals);
+    npg_release(&r.uvs);
+    npg_release(&r.corner_uv);
+    npg_release(&r.link[UV]);
+    npg_release(&r.link[NORMAL]);
     return status;
 }

@@ -7,11 +7,7 @@
 
 #include "ingest/ingest_internal.h"
 
-#define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
-#define NONE        UINT64_MAX         /* the header has no such line     */
-
-/* What a field can mean. */
-enum { X, Y, Z, NX, NY, NZ, RGB, SLOTS };
+#define NONE UINT64_MAX /* the header has no such line     */
 
 typedef struct field {
     char name[32], type;
@@ -139,21 +135,16 @@ static npg_status read_header(pcd_header *h, npg_source *source)
 
 /* ---- columns: where the values of a point lie ---- */
 
-typedef struct column {
-    bool is_there;
-    npg_ply_type type;
-    size_t value;        /* its number in an ascii row                                  */
-    size_t offset, step; /* of a point's value from the block's beginning, and the next */
-} column;
-
-typedef struct body {
-    column slots[SLOTS];
+typedef struct pcd_body {
+    npg_columns columns;
+    size_t value[NPG_SLOTS]; /* its number in an ascii row; that of the colour at NPG_RED */
+    npg_ply_type colour;
     size_t row_values, row_size;
     bool is_packed;
-    npg_point_list points;
-} body;
+} pcd_body;
 
-static npg_status set_column(column *c, const field *f, const npg_source *source)
+/* Of the field's first value. */
+static npg_status set_type(npg_ply_type *type, const field *f, const npg_source *source)
 {
     static const npg_ply_type whole[2][3] = {{NPG_PLY_INT8, NPG_PLY_INT16, NPG_PLY_INT32},
                                              {NPG_PLY_UINT8, NPG_PLY_UINT16, NPG_PLY_UINT32}};
@@ -161,8 +152,7 @@ static npg_status set_column(column *c, const field *f, const npg_source *source
     if (is_float ? f->size < 4 : f->size > 4)
         return npg_source_bad_line(source, "field \"%s\" is a %s of %zu bytes", f->name,
                                    is_float ? "float" : "whole number", f->size);
-    c->is_there = true;
-    c->type = is_float ? f->size == 8 ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT : whole[f->type == 'U'][f->size / 2];
+    *type = is_float ? f->size == 8 ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT : whole[f->type == 'U'][f->size / 2];
     return NPG_OK;
 }
 
@@ -174,47 +164,38 @@ static size_t find_colour(const pcd_header *h)
     return i < h->field_count && h->fields[i].size == 4 && h->fields[i].count == 1 ? i : h->field_count;
 }
 
-static npg_status set_columns(body *b, const pcd_header *h, const npg_source *source)
+static npg_status set_columns(npg_builder *b, pcd_body *body, const pcd_header *h, const npg_source *source)
 {
     static const char *const names[] = {"x", "y", "z", "normal_x", "normal_y", "normal_z"};
+    npg_column *of = body->columns.of;
     for (size_t i = 0; i < h->field_count; i++) {
-        for (size_t slot = X; slot < SLOTS; slot++) {
-            column *c = &b->slots[slot];
-            if (i != (slot == RGB ? find_colour(h) : find(h, names[slot]))) continue;
-            NPG_TRY(set_column(c, &h->fields[i], source));
-            c->value = b->row_values;
-            c->offset = b->is_packed ? b->row_size * (size_t)h->points : b->row_size;
-            c->step = h->fields[i].size * h->fields[i].count; /* of packed columns */
+        const size_t bytes = h->fields[i].size * h->fields[i].count;
+        /* packed: columns come one after the other */
+        npg_column column = {.is_there = true,
+                             .offset = body->is_packed ? body->row_size * (size_t)h->points : body->row_size,
+                             .step = bytes};
+        for (size_t slot = NPG_X; slot <= NPG_NZ; slot++) {
+            if (i != find(h, names[slot])) continue;
+            NPG_TRY(set_type(&column.type, &h->fields[i], source));
+            of[slot] = column;
+            body->value[slot] = body->row_values;
         }
-        b->row_size += h->fields[i].size * h->fields[i].count;
-        b->row_values += h->fields[i].count;
+        if (i == find_colour(h)) {
+            NPG_TRY(set_type(&body->colour, &h->fields[i], source));
+            body->value[NPG_RED] = body->row_values;
+            for (size_t c = 0; c < 3; c++) { /* the lowest byte is blue */
+                of[NPG_RED + c] = column;
+                of[NPG_RED + c].type = NPG_PLY_UINT8;
+                of[NPG_RED + c].offset += 2 - c;
+            }
+        }
+        body->row_size += bytes;
+        body->row_values += h->fields[i].count;
     }
-    for (size_t slot = X; slot < SLOTS && !b->is_packed; slot++) b->slots[slot].step = b->row_size;
-    b->points.has_normals = b->slots[NX].is_there && b->slots[NY].is_there && b->slots[NZ].is_there;
-    b->points.has_colours = b->slots[RGB].is_there;
+    for (size_t slot = 0; slot < NPG_SLOTS && !body->is_packed; slot++) of[slot].step = body->row_size;
+    b->has_normals = of[NPG_NX].is_there && of[NPG_NY].is_there && of[NPG_NZ].is_there;
+    b->has_colours = of[NPG_RED].is_there;
     return NPG_OK;
-}
-
-static void add_point(body *b, const double values[SLOTS], uint32_t argb)
-{
-    npg_points_add(&b->points, values + X, values + NX);
-    if (!b->points.has_colours) return;
-    const uint8_t rgba[4] = {(uint8_t)(argb >> 16), (uint8_t)(argb >> 8), (uint8_t)argb, 255};
-    npg_points_colour(&b->points, rgba);
-}
-
-static void add_rows(body *b, const unsigned char *data, size_t count)
-{
-    for (size_t i = 0; i < count; i++) {
-        double values[SLOTS] = {0};
-        for (size_t slot = X; slot < SLOTS; slot++) {
-            const column *c = &b->slots[slot];
-            npg_ply_type type = slot == RGB ? NPG_PLY_UINT32 : c->type;
-            if (c->is_there)
-                values[slot] = npg_ply_value(data + c->offset + i * c->step, type, NPG_PLY_LITTLE);
-        }
-        add_point(b, values, (uint32_t)values[RGB]);
-    }
 }
 
 /* ---- the body ---- */
@@ -226,81 +207,78 @@ static npg_status refuse_claim(const pcd_header *h, const npg_source *source, ui
                                (unsigned long long)npg_source_left(source));
 }
 
-static npg_status read_row(body *b, const npg_source *source, const char *at, const char *end)
+static npg_status read_row(npg_builder *b, const pcd_body *body, const npg_source *source, const char *at,
+                           const char *end)
 {
-    double values[SLOTS] = {0};
+    double values[NPG_SLOTS] = {[NPG_ALPHA] = 255}, value, colour = 0;
     size_t count = 0;
     for (; at < end; count++) {
-        double value;
         NPG_TRY(npg_source_number(source, &value, &at, end));
-        for (size_t slot = X; slot < SLOTS; slot++)
-            if (b->slots[slot].is_there && b->slots[slot].value == count) values[slot] = value;
+        for (size_t slot = NPG_X; slot <= NPG_NZ; slot++) {
+            const npg_column *c = &body->columns.of[slot];
+            if (!c->is_there || body->value[slot] != count) continue;
+            values[slot] = c->type == NPG_PLY_FLOAT ? (double)(float)value : value;
+        }
+        if (b->has_colours && body->value[NPG_RED] == count) colour = value;
     }
-    if (count != b->row_values)
-        return npg_source_bad_line(source, "%zu values where a point has %zu", count, b->row_values);
-    for (size_t slot = X; slot < RGB; slot++)
-        if (b->slots[slot].type == NPG_PLY_FLOAT) values[slot] = (double)(float)values[slot];
+    if (count != body->row_values)
+        return npg_source_bad_line(source, "%zu values where a point has %zu", count, body->row_values);
     /* A colour is the bits of its number. */
     uint32_t argb = 0;
-    if (b->slots[RGB].type == NPG_PLY_FLOAT)
-        argb = npg_float_bits((float)values[RGB]);
-    else if (fabs(values[RGB]) <= UINT32_MAX)
-        argb = (uint32_t)(int64_t)values[RGB];
-    NPG_TRY(npg_points_reserve(&b->points, 1));
-    add_point(b, values, argb);
+    if (body->colour == NPG_PLY_FLOAT)
+        argb = npg_float_bits((float)colour);
+    else if (fabs(colour) <= UINT32_MAX)
+        argb = (uint32_t)(int64_t)colour;
+    for (int c = 0; c < 3; c++) values[NPG_RED + c] = argb >> (16 - 8 * c) & 0xff;
+    NPG_TRY(npg_builder_reserve(b, 1, 0));
+    npg_builder_add(b, values);
     return NPG_OK;
 }
 
-static npg_status read_ascii(body *b, const pcd_header *h, npg_source *source)
+static npg_status read_ascii(npg_builder *b, const pcd_body *body, const pcd_header *h, npg_source *source)
 {
     const char *at, *end;
     npg_status status;
     uint64_t rows = 0,
-             most = npg_source_left(source) / (2 * b->row_values) + 1; /* a digit and a blank each */
-    NPG_TRY(npg_points_reserve(&b->points, (size_t)(h->points < most ? h->points : most)));
+             most = npg_source_left(source) / (2 * body->row_values) + 1; /* a digit and a blank each */
+    NPG_TRY(npg_builder_reserve(b, (size_t)(h->points < most ? h->points : most), 0));
     while (!(status = npg_source_row(source, &at, &end)))
-        if (rows++ < h->points) NPG_TRY(read_row(b, source, at, end));
+        if (rows++ < h->points) NPG_TRY(read_row(b, body, source, at, end));
     if (status != NPG_END) return status;
     if (rows == h->points) return NPG_OK;
     return npg_source_bad_line(source, "the header claims %llu points, but %llu rows follow",
                                (unsigned long long)h->points, (unsigned long long)rows);
 }
 
-static npg_status read_binary(body *b, const pcd_header *h, npg_source *source)
+static npg_status read_binary(npg_builder *b, const pcd_body *body, const pcd_header *h, npg_source *source)
 {
-    size_t count = (size_t)h->points, block = BLOCK_BYTES / b->row_size + 1, available;
-    if (h->points * b->row_size != npg_source_left(source))
-        return refuse_claim(h, source, h->points * b->row_size);
-    NPG_TRY(npg_points_reserve(&b->points, count));
-    for (size_t done = 0; done < count; done += block) {
-        size_t rows = count - done < block ? count - done : block;
-        NPG_TRY(npg_source_fill(source, rows * b->row_size, &available));
-        if (available < rows * b->row_size) return npg_source_bad_byte(source, "the file ends in the data");
-        add_rows(b, npg_source_data(source), rows);
-        npg_source_take(source, rows * b->row_size);
-    }
-    return NPG_OK;
+    uint64_t done;
+    if (h->points * body->row_size != npg_source_left(source))
+        return refuse_claim(h, source, h->points * body->row_size);
+    npg_status status = npg_rows_read(b, source, &body->columns, h->points, body->row_size, &done);
+    return status == NPG_END ? npg_source_bad_byte(source, "the file ends in the data") : status;
 }
 
-static npg_status unpack(body *b, npg_arena *scratch, const pcd_header *h, npg_source *source,
-                         uint32_t packed_size)
+static npg_status unpack(npg_builder *b, const pcd_body *body, npg_arena *scratch, const pcd_header *h,
+                         npg_source *source, uint32_t packed_size)
 {
-    size_t need = (size_t)h->points * b->row_size, available;
+    size_t need = (size_t)h->points * body->row_size, available;
     unsigned char *data = npg_arena_take(scratch, need, 1);
     NPG_TRY(npg_arena_status(scratch));
     NPG_TRY(npg_source_fill(source, packed_size, &available));
     if (available < packed_size ||
         (need && lzf_decompress(npg_source_data(source), packed_size, data, (unsigned)need) != need))
         return npg_source_bad_byte(source, "the compressed data is damaged");
-    NPG_TRY(npg_points_reserve(&b->points, (size_t)h->points));
-    add_rows(b, data, (size_t)h->points);
+    NPG_TRY(npg_builder_reserve(b, (size_t)h->points, 0));
+    npg_rows_add(b, &body->columns, data, (size_t)h->points);
     return NPG_OK;
 }
 
-static npg_status read_packed(body *b, const pcd_header *h, npg_source *source)
+static npg_status read_packed(npg_builder *b, const pcd_body *body, npg_arena *scratch, const pcd_header *h,
+                              npg_source *source)
 {
     size_t available;
-    uint64_t need = h->points * b->row_size;
+    uint64_t need = h->points * body->row_size;
     NPG_TRY(npg_source_fill(source, 8, &available));
     if (available < 8) return npg_source_bad_byte(source, "the file ends before the data");
     uint32_t packed = (uint32_t)npg_ply_value(npg_source_data(source), NPG_PLY_UINT32, NPG_PLY_LITTLE);
@@ -311,33 +289,30 @@ static npg_status read_packed(body *b, const pcd_header *h, npg_source *source)
     if (packed > npg_source_left(source) || need / 264 > packed)
         return npg_source_bad_byte(source, "%u compressed bytes can't be in the %llu that follow", packed,
                                    (unsigned long long)npg_source_left(source));
-    npg_arena scratch = {.purpose = NPG_FOR_FILES};
-    npg_status status = unpack(b, &scratch, h, source, packed);
-    npg_arena_release(&scratch);
-    return status;
+    return unpack(b, body, scratch, h, source, packed);
 }
 
-static npg_status read_body(body *b, const pcd_header *h, npg_source *source)
+static npg_status read_all(npg_builder *b, npg_arena *scratch, npg_source *source)
 {
+    pcd_header *h = npg_arena_take(scratch, 1, sizeof *h);
+    NPG_TRY(npg_arena_status(scratch));
+    NPG_TRY(read_header(h, source));
     /* So that points times bytes of a row can't overflow. */
     if (h->points > (uint64_t)1 << 36) return refuse_claim(h, source, UINT64_MAX);
-    b->is_packed = !strcmp(h->data, "binary_compressed");
-    NPG_TRY(set_columns(b, h, source));
-    if (b->is_packed) return read_packed(b, h, source);
-    if (!strcmp(h->data, "ascii")) return read_ascii(b, h, source);
-    if (!strcmp(h->data, "binary")) return read_binary(b, h, source);
+    pcd_body body = {.columns.format = NPG_PLY_LITTLE, .is_packed = !strcmp(h->data, "binary_compressed")};
+    NPG_TRY(set_columns(b, &body, h, source));
+    if (body.is_packed) return read_packed(b, &body, scratch, h, source);
+    if (!strcmp(h->data, "ascii")) return read_ascii(b, &body, h, source);
+    if (!strcmp(h->data, "binary")) return read_binary(b, &body, h, source);
     return npg_source_bad_line(source, "unknown DATA \"%s\"", h->data);
 }
 
-npg_status npg_pcd_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin)
+npg_status npg_pcd_read(npg_builder *b, npg_source *source)
 {
-    pcd_header *header;
-    body b = {.points = {.frame = frame, .origin = origin}};
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
     if (!source->is_seekable)
         return npg_error(NPG_BAD_INPUT, "%s: PCD can't be read from a pipe", source->name);
-    NPG_TRY(npg_alloc(&header, NPG_FOR_FILES, sizeof *header));
-    npg_status status = read_header(header, source);
-    if (!status) status = read_body(&b, header, source);
-    npg_release(&header);
+    npg_status status = read_all(b, &scratch, source);
+    npg_arena_release(&scratch);
     return status;
 }

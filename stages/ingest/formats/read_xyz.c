@@ -13,7 +13,7 @@
 
 typedef struct reader {
     npg_source *source;
-    npg_point_list points;
+    npg_builder *points;
     bool wants_normals;
     int columns;                    /* of the first row, at most COLUMNS_MAX; 0 before it */
     uint64_t claimed_count;         /* .pts: its first line; UINT64_MAX without           */
@@ -83,8 +83,9 @@ static npg_status begin_rows(reader *r, const double *values, int columns, size_
     if (r->wants_normals && columns < 6)
         return npg_source_bad_line(r->source, "%d values where a point with a normal has 6", columns);
     r->columns = columns;
-    r->points.has_normals = columns == 6 && (r->wants_normals || is_unit(values + 3) || is_blank(values + 3));
-    return npg_points_reserve(&r->points, rows);
+    r->points->has_normals =
+        columns == 6 && (r->wants_normals || is_unit(values + 3) || is_blank(values + 3));
+    return npg_builder_reserve(r->points, rows, 0);
 }
 
 static npg_status add_row(reader *r, const double *values, int columns, size_t rows)
@@ -93,18 +94,18 @@ static npg_status add_row(reader *r, const double *values, int columns, size_t r
     if (columns != r->columns)
         return npg_source_bad_line(r->source, "%d value%s where the first row has %d", columns,
                                    columns == 1 ? "" : "s", r->columns);
-    if (r->points.has_normals) {
+    if (r->points->has_normals) {
         r->unit_rows += is_unit(values + 3);
         r->blank_rows += is_blank(values + 3);
     }
-    NPG_TRY(npg_points_reserve(&r->points, 1));
-    npg_points_add(&r->points, values, values + 3);
+    NPG_TRY(npg_builder_reserve(r->points, 1, 0));
+    npg_builder_add(r->points, values);
     return NPG_OK;
 }
 
 static npg_status parse_line(reader *r, const char *at, const char *end, size_t rows)
 {
-    double values[COLUMNS_MAX] = {0};
+    double values[NPG_SLOTS] = {0};
     int columns;
     if (is_comment(at, end)) return NPG_OK;
     if (!r->columns && r->claimed_count == UINT64_MAX && is_title(at, end)) return NPG_OK;
@@ -133,26 +134,33 @@ static npg_status read_rows(reader *r, size_t rows)
 
 static npg_status check_count_and_normals(reader *r)
 {
-    npg_frame *frame = r->points.frame;
-    if (r->claimed_count != UINT64_MAX && r->claimed_count != frame->point_count)
+    npg_builder *b = r->points;
+    if (r->claimed_count != UINT64_MAX && r->claimed_count != b->vert_count)
         return npg_error(NPG_BAD_INPUT, "%s: line 1: claims %llu points, but %zu follow", r->source->name,
-                         (unsigned long long)r->claimed_count, frame->point_count);
+                         (unsigned long long)r->claimed_count, b->vert_count);
     /* Points without a normal, which scanners write as 0 0 0 or nan, don't count. */
-    double directed = (double)(frame->point_count - r->blank_rows);
+    double directed = (double)(b->vert_count - r->blank_rows);
     bool are_normals = r->unit_rows && (double)r->unit_rows >= UNIT_SHARE * directed;
-    if (frame->normals && !r->wants_normals && !are_normals) npg_release(&frame->normals);
+    if (!r->wants_normals && !are_normals) npg_release(&b->normals);
     return NPG_OK;
 }
 
-npg_status npg_xyz_read_cloud(npg_frame *frame, npg_source *source, npg_origin *origin, bool wants_normals)
+static npg_status read_as(npg_builder *b, npg_source *source, bool wants_normals)
 {
-    reader r = {.source = source,
-                .points = {.frame = frame, .origin = origin},
-                .wants_normals = wants_normals,
-                .claimed_count = UINT64_MAX};
+    reader r = {.source = source, .points = b, .wants_normals = wants_normals, .claimed_count = UINT64_MAX};
     size_t rows = 0;
     NPG_TRY(npg_source_find_line_end(source));
     if (source->is_seekable) NPG_TRY(count_rows(source, &rows));
     NPG_TRY(read_rows(&r, rows));
     return check_count_and_normals(&r);
+}
+
+npg_status npg_xyz_read(npg_builder *b, npg_source *source)
+{
+    return read_as(b, source, false);
+}
+
+npg_status npg_xyzn_read(npg_builder *b, npg_source *source)
+{
+    return read_as(b, source, true);
 }

@@ -5,34 +5,22 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-typedef npg_status (*cloud_reader)(npg_frame *frame, npg_source *source, npg_origin *origin);
-
-static npg_status read_xyz(npg_frame *frame, npg_source *source, npg_origin *origin)
-{
-    return npg_xyz_read_cloud(frame, source, origin, false);
-}
-
-static npg_status read_xyzn(npg_frame *frame, npg_source *source, npg_origin *origin)
-{
-    return npg_xyz_read_cloud(frame, source, origin, true);
-}
-
 enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
 
 /* clang-format off */
 static const struct format {
     const char *ending, *name;
-    cloud_reader read;
+    npg_format_read *read;
     bool needs_whole; /* nothing but blanks may follow */
 } formats[FORMATS] = {
-    [PLY]  = {".ply",  "ply", npg_ply_read_cloud, true},
-    [OBJ]  = {".obj",  "obj", npg_obj_read_cloud, false},
-    [NPY]  = {".npy",  "npy", npg_npy_read_cloud, true},
-    [XYZ]  = {".xyz",  "xyz", read_xyz,           false},
-    [XYZN] = {".xyzn", "xyz", read_xyzn,          false},
-    [TXT]  = {".txt",  "xyz", read_xyz,           false},
-    [PTS]  = {".pts",  "xyz", read_xyz,           false},
-    [PCD]  = {".pcd",  "pcd", npg_pcd_read_cloud, false}};
+    [PLY]  = {".ply",  "ply", npg_ply_read, true},
+    [OBJ]  = {".obj",  "obj", npg_obj_read, false},
+    [NPY]  = {".npy",  "npy", npg_npy_read, true},
+    [XYZ]  = {".xyz",  "xyz", npg_xyz_read,           false},
+    [XYZN] = {".xyzn", "xyz", npg_xyzn_read,          false},
+    [TXT]  = {".txt",  "xyz", npg_xyz_read,           false},
+    [PTS]  = {".pts",  "xyz", npg_xyz_read,           false},
+    [PCD]  = {".pcd",  "pcd", npg_pcd_read, false}};
 /* clang-format on */
 
 static const struct format *by_ending(const char *path)
@@ -96,30 +84,47 @@ const char *npg_reader_for(const char *path)
     return format ? format->name : NULL;
 }
 
-/* Data after the end is as wrong as data that is missing: the header's count is not the file's. */
-static npg_status expect_end(npg_source *source)
+static npg_status skip_blanks(npg_source *source, size_t *available)
 {
-    size_t available;
     for (;;) {
-        NPG_TRY(npg_source_fill(source, 1, &available));
-        if (!available) return NPG_OK;
-        if (!memchr(" \t\r\n", npg_source_data(source)[0], 4))
-            return npg_source_bad_byte(source, "more data than the header declares");
+        NPG_TRY(npg_source_fill(source, 1, available));
+        if (!*available || !memchr(" \t\r\n", npg_source_data(source)[0], 4)) return NPG_OK;
         npg_source_take(source, 1);
     }
 }
 
-static npg_status read_points(npg_frame *frame, const char *path, npg_origin *origin)
+/* Data after the end is as wrong as data that is missing: the header's count is not the file's. */
+static npg_status expect_end(npg_source *source)
+{
+    size_t available;
+    NPG_TRY(skip_blanks(source, &available));
+    return available ? npg_source_bad_byte(source, "more data than the header declares") : NPG_OK;
+}
+
+/* All of a file; the builder is empty after a failure. */
+static npg_status read_file(npg_builder *b, const char *path)
 {
     npg_source *source = NULL;
     const struct format *format;
     npg_status status = npg_source_open_file(&source, path);
     if (!status) status = find_format(&format, source);
-    if (!status) status = format->read(frame, source, origin);
+    if (!status && b->wants_faces && format != &formats[PLY] && format != &formats[OBJ])
+        status = npg_error(NPG_BAD_INPUT, "%s: a mesh must be PLY or OBJ", path);
+    if (!status) status = format->read(b, source);
     if (!status && format->needs_whole) status = expect_end(source);
     if (status == NPG_END) status = npg_error(NPG_BAD_INPUT, "%s: the file is empty", path);
     npg_source_close(&source);
+    if (status) npg_builder_clear(b);
     return status;
+}
+
+static npg_status read_points(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    npg_builder b = {.origin = origin, .purpose = NPG_FOR_FRAMES};
+    NPG_TRY(read_file(&b, path));
+    npg_builder_frame(frame, &b);
+    npg_builder_clear(&b);
+    return NPG_OK;
 }
 
 /* The first file settles the origin.  Where its first point turns out to lie far off
@@ -139,37 +144,31 @@ static npg_status read_first(npg_frame *frame, const char *path, npg_origin *ori
     return NPG_OK;
 }
 
-npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin)
+/* What every frame that was read has. */
+static npg_status finish(npg_frame *frame, npg_status status, const char *path)
 {
-    npg_status status = origin->known ? read_points(frame, path, origin) : read_first(frame, path, origin);
     if (!status) status = npg_copy_text(&frame->path, path);
-    if (status) {
-        npg_frame_clear(frame);
-        return status;
-    }
+    if (status) npg_frame_clear(frame);
+    NPG_TRY(status);
     frame->cleaning.read = frame->point_count;
     frame->fields = NPG_FIELD_POINTS;
     return NPG_OK;
 }
 
+npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin)
+{
+    return finish(frame, origin->known ? read_points(frame, path, origin) : read_first(frame, path, origin),
+                  path);
+}
+
 static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin, bool may_be_points)
 {
-    npg_source *source = NULL;
-    const struct format *format;
+    npg_builder b = {
+        .origin = origin, .purpose = NPG_FOR_MESH, .wants_faces = true, .may_be_points = may_be_points};
     *mesh = NULL;
-    npg_status status = npg_source_open_file(&source, path);
-    if (!status) status = find_format(&format, source);
-    if (!status && format == &formats[PLY]) {
-        status = npg_ply_read_mesh(mesh, source, origin, may_be_points);
-        if (!status) status = expect_end(source);
-    } else if (!status && format == &formats[OBJ]) {
-        status = npg_obj_read_mesh(mesh, source, origin, may_be_points);
-    } else if (!status) {
-        status = npg_error(NPG_BAD_INPUT, "%s: a mesh must be PLY or OBJ", path);
-    }
-    if (status == NPG_END) status = npg_error(NPG_BAD_INPUT, "%s: the file is empty", path);
-    npg_source_close(&source);
-    if (status) npg_mesh_unref(mesh);
+    NPG_TRY(read_file(&b, path));
+    npg_status status = npg_builder_mesh(mesh, &b, path);
+    npg_builder_clear(&b);
     return status;
 }
 
@@ -208,4 +207,62 @@ npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
     *mesh = NULL;
     bool has_faces = !format || !strcmp(format, "ply") || !strcmp(format, "obj");
     return has_faces ? read_mesh(mesh, path, origin, true) : read_bare_shape(mesh, path, origin);
+}
+
+/* ---- frames one after the other from a pipe ---- */
+
+struct npg_stream {
+    npg_source *source; /* owned */
+    int64_t frames;
+};
+
+npg_status npg_stream_open(npg_stream **out, int fd, const char *name)
+{
+    npg_stream *stream;
+    *out = NULL;
+    NPG_TRY(npg_alloc(&stream, NPG_FOR_FILES, sizeof *stream));
+    npg_status status = npg_source_open_fd(&stream->source, fd, name);
+    if (status) npg_release(&stream);
+    *out = stream;
+    return status;
+}
+
+void npg_stream_close(npg_stream **slot)
+{
+    if (!*slot) return;
+    npg_source_close(&(*slot)->source);
+    npg_release(slot);
+}
+
+void npg_stream_set_stop(npg_stream *stream, bool (*stopping)(void *user), void *user)
+{
+    stream->source->stopping = stopping;
+    stream->source->user = user;
+}
+
+/* Only these two formats say in their header where they end. */
+static npg_status read_one(npg_stream *stream, npg_builder *b)
+{
+    npg_source *source = stream->source;
+    size_t available;
+    NPG_TRY(skip_blanks(source, &available)); /* blank lines may stand between two frames */
+    if (!available) return NPG_END;
+    NPG_TRY(npg_source_fill(source, 6, &available));
+    const unsigned char *data = npg_source_data(source);
+    if (available >= 3 && !memcmp(data, "ply", 3)) return npg_ply_read(b, source);
+    if (available >= 6 && !memcmp(data, "\x93NUMPY", 6)) return npg_npy_read(b, source);
+    return npg_source_bad_byte(source, "frame %lld begins neither as PLY nor as NPY",
+                               (long long)stream->frames);
+}
+
+npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *origin)
+{
+    npg_builder b = {.origin = origin, .purpose = NPG_FOR_FRAMES};
+    npg_status status = read_one(stream, &b);
+    if (status == NPG_BAD_INPUT) npg_error_prefix(status, "frame %lld", (long long)stream->frames);
+    if (!status) npg_builder_frame(frame, &b);
+    npg_builder_clear(&b);
+    NPG_TRY(finish(frame, status, stream->source->name));
+    frame->number = frame->index = stream->frames++;
+    return NPG_OK;
 }
