@@ -38,12 +38,28 @@ typedef struct npg_misfit {
     double at[3]; /* its middle, in world coordinates; NaN where there is none                      */
 } npg_misfit;
 
+/* What is wrong with a frame: of itself, and beside the others of its capture (stages/evaluate/verdict.c). */
+enum {
+    NPG_FAULT_NONE,
+    NPG_FAULT_MEDIAN,
+    NPG_FAULT_P95,
+    NPG_FAULT_COVERAGE,
+    NPG_FAULT_FLIPPED,
+    NPG_FAULT_STRETCHED,
+    NPG_FAULT_UNSUPPORTED,
+    NPG_FAULT_UNCOVERED,
+    NPG_FAULT_DISTANCE,
+    NPG_FAULT_JUMP,
+    NPG_FAULTS
+};
+enum { NPG_MARKS = 8 };
+
 /* How well a frame's surface explains its points.  Distances are in diagonals of the figure
  * (npg_frame_box). */
 typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
     double vertex_dist_mean;                                   /* surface vertices -> nearest point */
-    double coverage;        /* share of the surface area with points near it, 0..1 */
+    double coverage;        /* share of the surface area in sight with points near it, 0..1 */
     double flipped_share;   /* faces turned over against their neighbourhood's rotation, share of all */
     double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, share of all */
     double edge_change;     /* mean |length / reference length - 1| */
@@ -52,7 +68,10 @@ typedef struct npg_figures {
      * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
     double unsupported_share, unsupported_at[3];
     npg_misfit misfits[NPG_MISFITS];
-    bool good; /* the frame is above the quality bar */
+    float marks[3 * NPG_MARKS]; /* vertices far from each other, the same in all frames; unit coordinates
+                                   in diagonals; NaN: not measured */
+    int fault;                  /* NPG_FAULT_* of the frame by itself */
+    bool good;                  /* the frame is above the quality bar */
 } npg_figures;
 
 typedef struct npg_frame {

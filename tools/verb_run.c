@@ -1,5 +1,6 @@
 /* neupig run: the main job. */
 #include <errno.h>
+#include <jansson.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stddef.h>
@@ -136,6 +137,17 @@ static void end_watching(watcher *w)
 
 /* ---- the verb ---- */
 
+/* The last line: how good it is, and how to look at it. */
+static void print_verdict(const char *output)
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s/done.json", output);
+    json_t *done = json_load_file(path, 0, NULL);
+    const char *verdict = json_string_value(json_object_get(done, "verdict"));
+    if (verdict) printf("%s: neupig view %s\n", verdict, output);
+    json_decref(done);
+}
+
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
     static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl", "exports.jsonl",
@@ -154,6 +166,7 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
         if (npg_is_there(path)) printf("%-14s %s\n", names[i], path);
     }
+    print_verdict(output);
 }
 
 npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open)

@@ -37,10 +37,6 @@ typedef struct record {
     double fit; /* median distance of the points, in diagonals */
 } record;
 
-typedef struct level {
-    double usual, bound;
-} level;
-
 typedef struct side {
     int64_t next;    /* the index whose turn it is      */
     record *waiting; /* came ahead of their turn; owned */
@@ -87,15 +83,20 @@ static double median_of(double *values, size_t count)
     return count ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : 0;
 }
 
-static level level_of(const double *history, size_t ever, double floor)
+npg_level npg_level_of(double *values, size_t count, double floor)
+{
+    double usual = median_of(values, count);
+    for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - usual);
+    double spread = SPREADS * NPG_DEVIATIONS_PER_MEDIAN * median_of(values, count);
+    return (npg_level){usual, fmax(fmax(floor, spread), usual)};
+}
+
+static npg_level level_of(const double *history, size_t ever, double floor)
 {
     double values[HISTORY];
     size_t count = ever < HISTORY ? ever : HISTORY;
     memcpy(values, history, count * sizeof *values);
-    double usual = median_of(values, count);
-    for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - usual);
-    return (level){usual,
-                   fmax(fmax(floor, SPREADS * NPG_DEVIATIONS_PER_MEDIAN * median_of(values, count)), usual)};
+    return npg_level_of(values, count, floor);
 }
 
 static void add_to_history(side *s, const record *r)
@@ -107,7 +108,7 @@ static void add_to_history(side *s, const record *r)
 
 /* ---- one frame in its turn ---- */
 
-static double excess(const record *r, const level *levels, int kind)
+static double excess(const record *r, const npg_level *levels, int kind)
 {
     return r->misfits[kind].share - levels[kind].usual;
 }
@@ -119,7 +120,7 @@ static bool is_lost(const side *s, const record *r)
 
 /* Which misfits are a sign of another topology, and not of a surface that has lost the points: where points
  * and surface miss each other, much is far and much is unsupported. */
-static void select_misfits(bool counts[NPG_MISFITS], const side *s, const record *r, const level *levels)
+static void select_misfits(bool counts[NPG_MISFITS], const side *s, const record *r, const npg_level *levels)
 {
     double far = fmax(excess(r, levels, NPG_MISFIT_FAR), 0),
            unsupported = fmax(excess(r, levels, NPG_MISFIT_UNSUPPORTED), 0);
@@ -145,7 +146,7 @@ static bool is_clearer(int kind, double times, int than_kind, double than_times)
 /* The clearest misfit of a frame; the result is how many times its bound it lies above the usual. */
 static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
 {
-    level levels[NPG_MISFITS];
+    npg_level levels[NPG_MISFITS];
     bool counts[NPG_MISFITS];
     double most = -1;
     for (int k = 0; k < NPG_MISFITS; k++)

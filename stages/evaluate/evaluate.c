@@ -39,7 +39,12 @@ static const struct {
     {"edge_change",       offsetof(npg_figures, edge_change),       false},
     {"chamfer",           offsetof(npg_figures, chamfer),           false}};
 /* clang-format on */
-enum { SUMMED = sizeof summed / sizeof *summed };
+enum { MEDIAN = 0, P95 = 2, SUMMED = sizeof summed / sizeof *summed };
+
+typedef struct fault {
+    int kind;            /* NPG_FAULT_* */
+    double value, bound; /* in per cent */
+} fault;
 
 typedef struct evaluate_state {
     /* options; the shares in per cent */
@@ -49,9 +54,12 @@ typedef struct evaluate_state {
     /* of the run */
     npg_measure *measure; /* opened for the first frame that has a mesh */
     npg_topology *topology;
+    npg_verdict *verdict;
     aggregate sums[SUMMED];
     int64_t *bad; /* numbers of the frames below the bar; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
+    fault worst; /* of the bad ones, by how often it is the bar */
+    int64_t worst_number;
 } evaluate_state;
 
 /* ---- one frame ---- */
@@ -75,6 +83,8 @@ static npg_figures no_figures(void)
     for (int i = 0; i < NPG_MISFITS; i++)
         figures.misfits[i] = (npg_misfit){(double)NAN, {(double)NAN, (double)NAN, (double)NAN}};
     for (int a = 0; a < 3; a++) figures.unsupported_at[a] = (double)NAN;
+    for (size_t i = 0; i < 3 * NPG_MARKS; i++) figures.marks[i] = NAN;
+    figures.fault = NPG_FAULT_NONE;
     figures.good = false;
     return figures;
 }
@@ -91,40 +101,41 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 
 /* ---- the verdict ---- */
 
-#define ONE_SENSOR_SEES 0.5 /* of a body, at most: the bar on what points are near to is lower by that */
-
 /* Times the bar on the median, for 95 % of the points: good fits of noisy captures keep to half of it, a lost
  * limb and a surface that follows noise do not.  Set by trial. */
 #define NEARLY_ALL_WITHIN 2.0
 
-static const char unsupported_fault[] = "share of the surface that no points support, in %,";
+/* All in per cent. */
+static const char *const fault_texts[NPG_FAULTS] = {
+    "",
+    "median distance of the points to the surface, in % of the diagonal,",
+    "distance of 95 % of the points to the surface, at most, in % of the diagonal,",
+    "share of the surface with points near it, in %,",
+    "share of flipped faces, in %,",
+    "share of stretched faces, in %,",
+    "share of the surface that no points support, in %,",
+    "share of the surface without points near it, in %, unlike in other frames,",
+    "mean distance of the surface to the points, in % of the diagonal, unlike in other frames,",
+    "motion since the frame before, in % of the diagonal, unlike in the frames around,"};
 
-/* What is wrong with a frame, NULL when it is above the bar.  A comparison with NaN fails, as it should. */
-static const char *fault_of(const evaluate_state *state, const npg_frame *frame, double unseen_share,
-                            double *value, double *bound)
+/* What is wrong with a frame by itself.  A comparison with NaN fails, as it should, but for the support: there
+ * it means that nobody knows which points the reference is of. */
+static fault fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share)
 {
-    const npg_figures *f = &frame->figures;
-    double seen = frame->sensor_count == 1 ? ONE_SENSOR_SEES : 1;
-    *value = 100 * f->point_dist_median;
-    *bound = state->residual_max;
-    if (!(*value <= *bound)) return "median distance of the points to the surface, in % of the diagonal,";
-    *value = 100 * f->point_dist_p95;
-    *bound = NEARLY_ALL_WITHIN * state->residual_max;
-    if (!(*value <= *bound))
-        return "distance of 95 % of the points to the surface, at most, in % of the diagonal,";
-    *value = 100 * f->coverage;
-    *bound = state->coverage_min * seen * (1 - unseen_share); /* of what the keyframe saw */
-    if (!(*value >= *bound)) return "share of the surface with points near it, in %,";
-    *value = 100 * f->flipped_share;
-    *bound = state->flipped_max;
-    if (!(*value <= *bound)) return "share of flipped faces, in %,";
-    *value = 100 * f->stretched_share;
-    *bound = state->stretched_max;
-    if (!(*value <= *bound)) return "share of stretched faces, in %,";
-    *value = 100 * f->unsupported_share;
-    *bound = state->unsupported_max;
-    if (*value > *bound) return unsupported_fault; /* NaN: not known which points the reference is of */
-    return NULL;
+    const fault kinds[] = {{NPG_FAULT_MEDIAN, f->point_dist_median, state->residual_max},
+                           {NPG_FAULT_P95, f->point_dist_p95, NEARLY_ALL_WITHIN * state->residual_max},
+                           {NPG_FAULT_COVERAGE, f->coverage,
+                            state->coverage_min * (1 - unseen_share)}, /* of what the keyframe saw */
+                           {NPG_FAULT_FLIPPED, f->flipped_share, state->flipped_max},
+                           {NPG_FAULT_STRETCHED, f->stretched_share, state->stretched_max},
+                           {NPG_FAULT_UNSUPPORTED, isnan(f->unsupported_share) ? 0 : f->unsupported_share,
+                            state->unsupported_max}};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        double value = 100 * kinds[i].value, bound = kinds[i].bound;
+        bool is_above = kinds[i].kind == NPG_FAULT_COVERAGE ? value >= bound : value <= bound;
+        if (!is_above) return (fault){kinds[i].kind, value, bound};
+    }
+    return (fault){0};
 }
 
 static void add_up(evaluate_state *state, const npg_frame *frame)
@@ -143,39 +154,73 @@ static void add_up(evaluate_state *state, const npg_frame *frame)
     }
 }
 
-static npg_status note_bad(evaluate_state *state, int64_t number)
+/* How many times its bar a fault is. */
+static double times_of(const fault *f)
 {
+    return f->kind == NPG_FAULT_COVERAGE ? f->bound / fmax(f->value, 1e-9) : f->value / fmax(f->bound, 1e-9);
+}
+
+static npg_status note_bad(evaluate_state *state, int64_t number, const fault *f)
+{
+    double more = times_of(f) - times_of(&state->worst);
+    if (!state->bad_count || more > 0 || (more >= 0 && number < state->worst_number)) {
+        state->worst = *f;
+        state->worst_number = number;
+    }
     NPG_TRY(
         npg_grow(&state->bad, &state->bad_capacity, state->bad_count + 1, sizeof *state->bad, NPG_FOR_RUN));
     state->bad[state->bad_count++] = number;
     return NPG_OK;
 }
 
-/* A warning of its own for each of the first ones. */
-static void warn_of_bad(npg_worker *worker, const npg_frame *frame, const char *fault, double value,
-                        double bound)
+/* A warning of its own for each of the first ones.  at: the place of what has no support, or NULL. */
+static void warn_of_bad(npg_worker *worker, int64_t number, const fault *f, const double *at)
 {
-    const double *at = frame->figures.unsupported_at;
+    const evaluate_state *state = npg_worker_state(worker);
     char place[128] = "";
-    if (fault == unsupported_fault)
+    if (state->bad_count > WARNINGS_MAX) return;
+    if (at && f->kind == NPG_FAULT_UNSUPPORTED)
         snprintf(place, sizeof place, ", the largest part around (%.4g, %.4g, %.4g)", at[0], at[1], at[2]);
-    npg_worker_warn(worker, true, frame->number, "below the bar: %s is %.3g, the bar %.3g%s", fault, value,
-                    bound, place);
+    npg_worker_warn(worker, true, number, "below the bar: %s is %.3g, the bar %.3g%s", fault_texts[f->kind],
+                    f->value, f->bound, place);
 }
 
-static npg_status judge_frame(npg_worker *worker, npg_frame *frame)
+/* Of a frame that a resumed run restores, too: the same faults follow from the same figures. */
+static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
 {
     evaluate_state *state = npg_worker_state(worker);
-    double value, bound;
-    const char *fault = fault_of(state, frame, npg_worker_facts(worker)->unseen_share, &value, &bound);
-    frame->figures.good = !fault && !frame->is_skipped;
+    const npg_facts *facts = npg_worker_facts(worker);
+    fault found = fault_of(state, &frame->figures, facts->unseen_share);
+    const npg_verdict_bars bars = {(1 - state->coverage_min / 100) / 2, state->measured.cover_dist / 100};
+    frame->figures.fault = frame->is_skipped ? 0 : found.kind;
+    frame->figures.good = !found.kind && !frame->is_skipped;
     if (frame->is_shared) return NPG_OK;
     add_up(state, frame);
     state->good_count += frame->figures.good;
-    if (frame->is_skipped || !fault) return NPG_OK;
-    NPG_TRY(note_bad(state, frame->number));
-    if (state->bad_count <= WARNINGS_MAX) warn_of_bad(worker, frame, fault, value, bound);
-    return NPG_OK;
+    state->skipped_count += frame->is_skipped;
+    if (frame->is_skipped) return NPG_OK;
+    if (found.kind) NPG_TRY(note_bad(state, frame->number, &found));
+    if (found.kind && is_new) warn_of_bad(worker, frame->number, &found, frame->figures.unsupported_at);
+    if (!state->verdict) NPG_TRY(npg_verdict_open(&state->verdict, &bars, facts->plan.key));
+    return npg_verdict_add(state->verdict, frame);
+}
+
+/* When all frames are there: what is wrong with some beside the others. */
+static npg_status judge_together(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    npg_late_faults *late;
+    if (!state->verdict) return NPG_OK;
+    NPG_TRY(npg_alloc(&late, NPG_FOR_RUN, sizeof *late));
+    npg_status status = npg_verdict_finish(state->verdict, late);
+    for (size_t i = 0; i < late->count && !status; i++) {
+        const fault found = {late->faults[i].fault, late->faults[i].value, late->faults[i].bound};
+        status = note_bad(state, late->faults[i].number, &found);
+        if (!status) warn_of_bad(worker, late->faults[i].number, &found, NULL);
+    }
+    state->good_count -= late->count;
+    npg_status published = npg_worker_publish(worker, &npg_fact_late_faults, late);
+    return status ? status : published;
 }
 
 /* ---- the report ---- */
@@ -193,11 +238,33 @@ static json_t *json_of_sums(const evaluate_state *state)
     return figures;
 }
 
+/* The verdict in words. */
+static void put_into_words(json_t *report, const evaluate_state *state)
+{
+    const aggregate *median = &state->sums[MEDIAN], *p95 = &state->sums[P95];
+    size_t frames = state->good_count + state->bad_count + state->skipped_count;
+    char text[512];
+    int length = snprintf(text, sizeof text, "%zu of %zu frames good", state->good_count, frames);
+    if (median->count)
+        length += snprintf(text + length, sizeof text - (size_t)length, ", median %.2g %%",
+                           100 * median->sum / (double)median->count);
+    if (state->bad_count)
+        snprintf(text + length, sizeof text - (size_t)length,
+                 ", worst frame %" PRId64 " (%s %.3g, the bar %.3g)", state->worst_number,
+                 fault_texts[state->worst.kind], state->worst.value, state->worst.bound);
+    else if (p95->count)
+        snprintf(text + length, sizeof text - (size_t)length,
+                 ", worst frame %" PRId64 " (95 %% of its points within %.2g %%)", p95->worst_number,
+                 100 * p95->worst);
+    json_object_set_new(report, "verdict", json_string(text));
+}
+
 static npg_status flush(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     if (npg_worker_pass(worker) == NPG_PASS_FUSE)
         return state->topology ? npg_topology_finish(state->topology, worker) : NPG_OK;
+    NPG_TRY(judge_together(worker));
     json_t *report = npg_worker_report(worker), *bad = json_array();
     if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
     for (size_t i = 0; i < state->bad_count; i++)
@@ -206,6 +273,7 @@ static npg_status flush(npg_worker *worker)
     json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
     json_object_set_new(report, "bad", bad);
+    put_into_words(report, state);
     /* A resumed run has not warned itself of those that it restored. */
     if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))
         npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",
@@ -230,11 +298,11 @@ static npg_status watch_topology(npg_worker *worker, const npg_frame *frame)
 static npg_status restore_line(void *user, const json_t *line, const char *text, size_t size)
 {
     npg_worker *worker = user;
-    evaluate_state *state = npg_worker_state(worker);
     const json_t *figures = json_object_get(line, "figures");
     npg_frame frame = {.index = (int64_t)json_integer_value(json_object_get(line, "index")),
                        .number = (int64_t)json_integer_value(json_object_get(line, "number")),
                        .is_shared = json_is_true(json_object_get(line, "shared")),
+                       .is_skipped = json_is_true(json_object_get(line, "skipped")),
                        .figures = no_figures()};
     (void)text, (void)size;
     if (!figures || frame.is_shared) return NPG_OK;
@@ -243,13 +311,8 @@ static npg_status restore_line(void *user, const json_t *line, const char *text,
         if (json_is_number(value))
             *(double *)((char *)&frame.figures + summed[i].offset) = json_number_value(value);
     }
-    bool is_good = json_is_true(json_object_get(line, "good"));
-    bool is_skipped = json_is_true(json_object_get(line, "skipped"));
-    add_up(state, &frame);
-    state->good_count += is_good;
-    state->skipped_count += is_skipped;
-    if (!is_good && !is_skipped) NPG_TRY(note_bad(state, frame.number));
-    npg_frame_line_misfits(&frame.figures, json_object_get(line, "misfits"));
+    npg_frame_line_read(&frame.figures, line);
+    NPG_TRY(take_frame(worker, &frame, false));
     return watch_topology(worker, &frame);
 }
 
@@ -297,9 +360,8 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         frame->figures = no_figures();
         frame->fields |= NPG_FIELD_FIGURES;
         frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
-        state->skipped_count += frame->is_skipped && !frame->is_shared;
         if (has_mesh) NPG_TRY(measure_frame(worker, frame));
-        NPG_TRY(judge_frame(worker, frame));
+        NPG_TRY(take_frame(worker, frame, true));
         NPG_TRY(watch_topology(worker, frame));
     }
     return NPG_OK;
@@ -310,6 +372,7 @@ static void uninit(npg_worker *worker)
     evaluate_state *state = npg_worker_state(worker);
     npg_measure_close(&state->measure);
     npg_topology_close(&state->topology);
+    npg_verdict_close(&state->verdict);
     npg_release(&state->bad);
 }
 
@@ -330,8 +393,8 @@ static const npg_option options[] = {
         "most median distance of a frame's points to the surface, in per cent of the figure's diagonal; 95 "
         "% of them lie within twice that"),
     NPG_PART(REAL,          "bars.coverage",    AT(coverage_min),       "50",     0, 100,  "PERCENT",
-        "least share of the surface that the keyframe saw and that has points near it, in per cent; half as "
-        "much in frames that one sensor saw"),
+        "least share of the surface that the keyframe saw and that is in sight, with points near it, in per "
+        "cent. A frame in which half as much as may be without points, and is not in the others, is bad, too"),
     NPG_PART(REAL,          "bars.flipped",     AT(flipped_max),        "1",      0, 100,  "PERCENT",
         "most of its faces that are turned over, in per cent"),
     NPG_PART(REAL,          "bars.stretched",   AT(stretched_max),      "5",      0, 100,  "PERCENT",

@@ -4,6 +4,7 @@
 
 #include <jansson.h>
 
+#include "job/frame_log.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/mesh.h"
@@ -94,7 +95,9 @@ void npg_measure_close(npg_measure **measure);
  *   point_dist_*       of the points to the surface, in diagonals of the box
  *   vertex_dist_mean   of the vertices to the nearest point, the same
  *   chamfer            1e5 x half the sum of both mean squares
- *   coverage           share of the area with a point within max(cover_dist, 2 x spacing of the points)
+ *   marks              where eight vertices are, which lie far from each other
+ *   coverage           share of the area, in sight where sensors are known, with a point within
+ *                      max(cover_dist, 2 x spacing of the points)
  *   unsupported_*      share and largest place of what neither the reference's points nor these support
  *   misfits            as npg_misfit_find(), in world coordinates
  *
@@ -169,6 +172,42 @@ void npg_alarm_text(char *text, size_t size, const npg_alarm_cause *cause);
 
 /* {from_frame, from_index, figure, value, usual, bound, frame, at, cause}; JSON null for NULL. */
 json_t *npg_alarm_json(const npg_alarm_cause *cause);
+
+/* A level: what is usual among values, and how far above it one must lie to be out of the ordinary: by 6
+ * normal deviations, by as much again, and by a floor.  The values are left as their distances from the
+ * usual. */
+typedef struct npg_level {
+    double usual, bound;
+} npg_level;
+npg_level npg_level_of(double *values, size_t count, double floor);
+
+/* Verdict: faults that a frame has only beside the others of its capture.
+ *
+ *   uncovered  more of its surface in sight is without points than elsewhere in the capture (npg_level):
+ *              the points of half the body are not there, and what the surface does there is a guess
+ *   distance   its surface lies farther from the points than elsewhere, on average
+ *   jump       the body is not where it was in the frame before, by far more than it moves in the frames
+ *              around: a cut, a mirrored frame, another body.  Up to three odd frames after which it is where
+ *              it was before are the ones at fault; else the frame behind the jump, as seen from the keyframe.
+ *
+ * Four frames are the least that say what is usual.  Memory: 160 bytes a frame. */
+
+typedef struct npg_verdict npg_verdict;
+
+typedef struct npg_verdict_bars {
+    double uncovered;   /* share of the surface, the least that counts; 1: nothing does */
+    double vertex_dist; /* the same in diagonals                                        */
+} npg_verdict_bars;
+
+npg_status npg_verdict_open(npg_verdict **verdict, const npg_verdict_bars *bars, int64_t key);
+void npg_verdict_close(npg_verdict **verdict);
+
+/* A frame with its figures, in any order; one that was not measured, or is another segment's, is passed
+ * over. */
+npg_status npg_verdict_add(npg_verdict *verdict, const npg_frame *frame);
+
+/* After the last one: the frames that were good so far and are not; an array for the caller to release. */
+npg_status npg_verdict_finish(npg_verdict *verdict, npg_late_faults *late);
 
 /* Topology: what a run does when its reference no longer explains the capture (npg_alarm): it says from which
  * frame, or ends there so that another reference can take over (option alarm = split;

@@ -145,7 +145,30 @@ struct npg_measure {
     uint8_t *unsupported; /* W                   */
     float *normals;       /* W x 3, in the frame */
     uint8_t *is_in_sight; /* W                   */
+    size_t marks[NPG_MARKS];
 };
+
+/* Vertices far from each other, and the first one from the middle: where limbs end. */
+static void choose_marks(npg_measure *m, const npg_mesh *mesh)
+{
+    double middle[3] = {0}, *dist_sq = m->vert_areas; /* not in use yet */
+    size_t v = mesh->vert_count;
+    for (size_t i = 0; i < 3 * v; i++) middle[i % 3] += (double)mesh->vert_pos[i] / (double)v;
+    for (size_t i = 0; i < v; i++) dist_sq[i] = INFINITY;
+    for (size_t k = 0; k < NPG_MARKS; k++) {
+        const float *last = k ? mesh->vert_pos + 3 * m->marks[k - 1] : NULL;
+        m->marks[k] = 0;
+        for (size_t i = 0; i < v; i++) {
+            const float *p = mesh->vert_pos + 3 * i;
+            const double d[3] = {(double)p[0] - (last ? (double)last[0] : middle[0]),
+                                 (double)p[1] - (last ? (double)last[1] : middle[1]),
+                                 (double)p[2] - (last ? (double)last[2] : middle[2])};
+            double near_sq = npg_vec3_dot(d, d);
+            dist_sq[i] = k > 1 ? fmin(dist_sq[i], near_sq) : near_sq;
+            if (dist_sq[i] > dist_sq[m->marks[k]]) m->marks[k] = i;
+        }
+    }
+}
 
 static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_share)
 {
@@ -163,6 +186,7 @@ static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_
     m->normals = npg_arena_take(&m->arena, w, 3 * sizeof *m->normals);
     m->is_in_sight = npg_arena_take(&m->arena, w, 1);
     NPG_TRY(npg_arena_status(&m->arena));
+    choose_marks(m, mesh);
     return npg_surface_open(&m->surface, mesh->vert_pos, w, mesh->faces, mesh->face_count);
 }
 
@@ -317,19 +341,20 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     NPG_TRY(npg_grow(&m->dists, &m->dists_capacity, v, sizeof *m->dists, NPG_FOR_QUERY));
     NPG_TRY(npg_points_nearest(m->nearest, m->dists, m->points, point_count, vert_unit, v, 1));
     double area = npg_vertex_areas(m->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
-    double radius = cover_radius(m, area, point_count, per_unit), covered = 0, whole = 0, sum = 0, sum_sq = 0;
+    double radius = cover_radius(m, area, point_count, per_unit), covered = 0, seen = 0, sum = 0, sum_sq = 0;
+    if (frame->sensor_count) NPG_TRY(find_in_sight(m, frame, box, sqrt(area / (double)point_count)));
     for (size_t i = 0; i < v; i++) {
         double dist_sq = (double)m->dists[i];
         sum_sq += dist_sq;
         sum += sqrt(dist_sq);
-        whole += m->vert_areas[i];
+        if (frame->sensor_count && !m->is_in_sight[i]) continue;
+        seen += m->vert_areas[i];
         if (dist_sq <= radius * radius) covered += m->vert_areas[i];
     }
-    figures->coverage = whole > 0 ? covered / whole : 0;
+    figures->coverage = seen > 0 ? covered / seen : 0;
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
-    NPG_TRY(measure_unsupported(m, figures, box, radius, whole));
-    if (frame->sensor_count) NPG_TRY(find_in_sight(m, frame, box, sqrt(area / (double)point_count)));
+    NPG_TRY(measure_unsupported(m, figures, box, radius, area));
     npg_misfit_frame found = {.points = m->points,
                               .hits = m->hits,
                               .point_count = point_count,
@@ -356,6 +381,8 @@ npg_status npg_measure_frame(npg_measure *measure, npg_frame *frame, const npg_f
     if (!frame->is_skipped) NPG_TRY(sample_points(m, box, frame, &point_count));
     if (!point_count) return NPG_OK;
     npg_proxy_gather(m->proxy, m->vert_unit, frame->vert_unit);
+    for (size_t i = 0; i < 3 * NPG_MARKS; i++)
+        figures->marks[i] = (float)((double)m->vert_unit[3 * m->marks[i / 3] + i % 3] * per_unit);
     NPG_TRY(npg_surface_move(m->surface, m->vert_unit));
     NPG_TRY(measure_points(m, figures, point_count, per_unit, &points_sq));
     NPG_TRY(measure_vertices(m, frame, box, point_count, per_unit, &vertices_sq));

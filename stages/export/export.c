@@ -441,7 +441,8 @@ static npg_status close_frames(npg_worker *worker)
     report_settings(report, state);
     json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
     json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
-    NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker)));
+    NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker),
+                                 npg_worker_fact(worker, &npg_fact_late_faults)));
     return write_exports(worker);
 }
 
@@ -471,6 +472,9 @@ static npg_status conclude(npg_worker *worker)
     json_object_set(head, "status", json_object_get(whole, "status"));
     json_object_set(head, "exit_code", json_object_get(whole, "exit_code"));
     json_object_set_new(head, "frames", json_integer((json_int_t)npg_worker_facts(worker)->frame_count));
+    json_object_set(
+        head, "verdict",
+        json_object_get(json_object_get(json_object_get(whole, "stages"), "evaluate"), "verdict"));
     json_object_set(head, "meshes", json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
     json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));

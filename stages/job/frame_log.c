@@ -84,14 +84,29 @@ static double real_of(const json_t *value)
     return json_is_number(value) ? (double)(float)json_number_value(value) : (double)NAN;
 }
 
-void npg_frame_line_misfits(npg_figures *figures, const json_t *misfits)
+void npg_frame_line_read(npg_figures *figures, const json_t *line)
 {
+    const json_t *misfits = json_object_get(line, "misfits"), *marks = json_object_get(line, "marks");
+    for (size_t i = 0; i < 3 * NPG_MARKS; i++) figures->marks[i] = (float)real_of(json_array_get(marks, i));
     for (int i = 0; i < NPG_MISFITS; i++) {
         const json_t *misfit = json_object_get(misfits, misfit_names[i]);
         figures->misfits[i].share = real_of(json_object_get(misfit, "share"));
         for (size_t a = 0; a < 3; a++)
             figures->misfits[i].at[a] = real_of(json_array_get(json_object_get(misfit, "at"), a));
     }
+}
+
+/* Words of the faults; those of a bar are its name. */
+static const char *const fault_names[NPG_FAULTS] = {NULL,       "residual",  "residual",    "coverage",
+                                                    "flipped",  "stretched", "unsupported", "uncovered",
+                                                    "distance", "jump"};
+
+static json_t *json_of_marks(const npg_figures *f)
+{
+    json_t *marks = json_array();
+    for (size_t i = 0; i < 3 * NPG_MARKS; i++)
+        json_array_append_new(marks, npg_json_real((double)f->marks[i]));
+    return marks;
 }
 
 static json_t *json_of_frame(const npg_frame *frame, const char *file)
@@ -110,6 +125,9 @@ static json_t *json_of_frame(const npg_frame *frame, const char *file)
         json_object_set_new(line, "good", json_boolean(frame->figures.good));
         json_object_set_new(line, "figures", json_of_figures(&frame->figures));
         json_object_set_new(line, "misfits", json_of_misfits(&frame->figures));
+        json_object_set_new(line, "marks", json_of_marks(&frame->figures));
+        if (frame->figures.fault)
+            json_object_set_new(line, "fault", json_string(fault_names[frame->figures.fault]));
     }
     json_object_set_new(line, "file", npg_json_text(file));
     return line;
@@ -228,34 +246,57 @@ static bool is_unexplained(const npg_facts *facts, int64_t index)
            (facts->has_changed[1] && index <= facts->changed_at[1]);
 }
 
-/* A line, with the word that the reference does not explain its frame where it has none yet. */
-static npg_status write_line(npg_file *file, const char *line, size_t size, bool is_unexplained)
+/* A line, with words that it may have already: the reference does not explain its frame; it has a late fault
+ * (0: none), and so is not good. */
+static npg_status write_line(npg_file *file, char *line, size_t size, bool is_unexplained, int fault)
 {
-    static const char word[] = ",\"unexplained\":true";
-    bool has = memmem(line, size, word, sizeof word - 1) != NULL;
-    if (!is_unexplained || has || size < 2) return npg_file_write(file, line, size);
+    static const char good[] = "\"good\":true,";
+    char words[2][64] = {",\"unexplained\":true", ""};
+    char *is_good = fault ? memmem(line, size, good, sizeof good - 1) : NULL;
+    if (is_good) {
+        snprintf(words[1], sizeof words[1], ",\"fault\":\"%s\"", fault_names[fault]);
+        size_t at = (size_t)(is_good - line) + strlen("\"good\":");
+        NPG_TRY(npg_file_write(file, line, at));
+        NPG_TRY(npg_file_print(file, "false"));
+        line += at + strlen("true");
+        size -= at + strlen("true");
+    }
+    bool has = !is_unexplained || memmem(line, size, words[0], strlen(words[0]));
     NPG_TRY(npg_file_write(file, line, size - 2)); /* without brace and newline */
-    NPG_TRY(npg_file_write(file, word, sizeof word - 1));
-    return npg_file_write(file, "}\n", 2);
+    return npg_file_print(file, "%s%s}\n", has ? "" : words[0], words[1]);
 }
 
-static npg_status copy_lines(npg_frame_log *list, npg_file *file, const npg_facts *facts)
+static npg_status copy_lines(npg_frame_log *list, npg_file *file, const npg_facts *facts,
+                             const npg_late_faults *late)
 {
     char *line = NULL;
-    size_t capacity = 0;
+    size_t capacity = 0, at = 0;
     npg_status status = NPG_OK;
     for (size_t i = 0; i < list->line_count && !status; i++) {
         const line_place *place = &list->lines[i];
         status = npg_grow(&line, &capacity, place->size, 1, NPG_FOR_FILES);
         if (!status && pread(list->fd, line, place->size, place->offset) != (ssize_t)place->size)
             status = npg_error_errno(NPG_DISK, "can't read back %s", list->partial_path);
-        if (!status) status = write_line(file, line, place->size, is_unexplained(facts, place->index));
+        while (late && at < late->count && late->faults[at].index < place->index) at++;
+        bool is_late = late && at < late->count && late->faults[at].index == place->index;
+        if (!status)
+            status = write_line(file, line, place->size, is_unexplained(facts, place->index),
+                                is_late ? late->faults[at].fault : 0);
     }
     npg_release(&line);
     return status;
 }
 
-npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts)
+static void release_late(void *value)
+{
+    npg_late_faults *late = value;
+    if (late) npg_release(&late->faults);
+    npg_release(&late);
+}
+
+const npg_fact_kind npg_fact_late_faults = {"late_faults", "evaluate", release_late};
+
+npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts, const npg_late_faults *late)
 {
     npg_file *file;
     char *path;
@@ -264,7 +305,7 @@ npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts)
     npg_status status = npg_file_open(&file, path);
     npg_release(&path);
     NPG_TRY(status);
-    status = copy_lines(list, file, facts);
+    status = copy_lines(list, file, facts, late);
     if (status)
         npg_file_discard(&file);
     else

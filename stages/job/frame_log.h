@@ -34,9 +34,23 @@ npg_status npg_frame_log_add(npg_frame_log *log, const npg_frame *frame, const c
 /* Lines so far and their bytes. */
 void npg_frame_log_size(const npg_frame_log *log, int64_t *lines, int64_t *bytes);
 
+/* Faults that only showed when all frames were there, in the order of the indices. */
+typedef struct npg_late_faults {
+    struct npg_late_fault {
+        int64_t index, number;
+        int fault;           /* NPG_FAULT_*                                        */
+        double value, bound; /* in per cent of what the fault's text says, see evaluate.c */
+    } * faults;              /* owned */
+    size_t count;
+} npg_late_faults;
+
+/* Published by stage evaluate before the last frame's line is asked for. */
+extern const npg_fact_kind npg_fact_late_faults;
+
 /* Write OUT/frames.jsonl in the order of the indices; the partial one stays until the run is done.  Frames
- * that the reference does not explain (facts->changed_at) are marked. */
-npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts);
+ * that the reference does not explain (facts->changed_at), and those with late faults (NULL: none), are
+ * marked. */
+npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts, const npg_late_faults *late);
 
 /* ---- the log of an earlier run ---- */
 
@@ -44,8 +58,8 @@ npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts);
  * they are no such lines. */
 npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user);
 
-/* The misfits of a line, exactly as they were; NaN where it has none. */
-void npg_frame_line_misfits(npg_figures *figures, const json_t *misfits);
+/* Misfits and marks of a line, exactly as they were; NaN where it has none. */
+void npg_frame_line_read(npg_figures *figures, const json_t *line);
 
 /* Their bytes on disk for good, and their checksum.  NPG_DISK. */
 npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash);

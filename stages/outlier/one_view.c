@@ -29,6 +29,7 @@
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
+    double distance;   /* from the sensor to the middle */
     double half_width; /* tangent of half the angle */
     size_t cells;      /* per side */
     double cell_width; /* at the cloud's middle */
@@ -44,7 +45,7 @@ static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], 
         v->forward[a] = middle[a] - sensor[a];
         v->sensor[a] = sensor[a];
     }
-    double distance = npg_vec3_length(v->forward);
+    double distance = v->distance = npg_vec3_length(v->forward);
     if (!(distance > 1.15 * radius)) return false;
     int least = fabs(v->forward[0]) < fabs(v->forward[1]) ? 0 : 1;
     if (fabs(v->forward[2]) < fabs(v->forward[least])) least = 2;
@@ -60,14 +61,16 @@ static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], 
     return v->cells >= 4;
 }
 
-/* The cell a point falls into, and its depth. */
+/* The cell a point falls into, and its depth behind the cloud's middle: pictures hold floats, and from far
+ * away those of depths from the sensor would all be the same. */
 static size_t project(double *depth, const view *v, const float *p)
 {
     double d[3], at[2];
     for (int a = 0; a < 3; a++) d[a] = (double)p[a] - v->sensor[a];
-    *depth = npg_vec3_dot(d, v->forward);
-    at[0] = npg_vec3_dot(d, v->right) / *depth;
-    at[1] = npg_vec3_dot(d, v->up) / *depth;
+    double from_sensor = npg_vec3_dot(d, v->forward);
+    at[0] = npg_vec3_dot(d, v->right) / from_sensor;
+    at[1] = npg_vec3_dot(d, v->up) / from_sensor;
+    *depth = from_sensor - v->distance;
     size_t cell = 0;
     for (int i = 0; i < 2; i++) {
         double x = (at[i] / v->half_width + 1) / 2 * (double)v->cells;

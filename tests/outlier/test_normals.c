@@ -121,7 +121,7 @@ static void the_scale_does_not_matter(void **state)
 static void a_sensor_decides(void **state)
 {
     (void)state;
-    const double sensor[3] = {0, 0, -5}, inside[3] = {0, 0, 0};
+    const double sensor[3] = {0, 0, -5}, inside[3] = {0, 0, 0}, far[3] = {-1e9, -1e9, -1e9};
     size_t flipped, seen = 0;
     bool yes;
     shape_random r = {13};
@@ -130,6 +130,8 @@ static void a_sensor_decides(void **state)
     assert_false(yes); /* the far side is there as well */
     assert_int_equal(npg_cloud_is_single_view(&yes, points, N, inside), NPG_OK);
     assert_false(yes);
+    assert_int_equal(npg_cloud_is_single_view(&yes, points, N, far), NPG_OK);
+    assert_false(yes); /* depths from there don't differ in floats */
     for (size_t i = 0; i < N; i++)
         if (points[3 * i + 2] < -0.2f) {
             memmove(points + 3 * seen, points + 3 * i, 3 * sizeof(float));

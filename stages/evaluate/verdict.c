@@ -1,0 +1,180 @@
+/* Verdict: what is wrong with a frame shows, for some faults, only beside the others of its capture. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "evaluate/evaluate_internal.h"
+#include "geometry/geometry.h"
+#include "pipeline/order.h"
+
+/* Times the motion of the frames around: motions of dancers and animals, at an eighth of their frames too,
+ * reach 3.5; frames that are mirrored, cut, or of another body 6 to 28. */
+#define JUMP 4.0
+
+enum { AROUND = NPG_ALARM_FRAMES }; /* motions on either side that tell what is usual, odd frames in a row */
+
+typedef struct record {
+    int64_t index, number;
+    double uncovered, vertex_dist;
+    float marks[3 * NPG_MARKS];
+    int fault; /* NPG_FAULT_*: what the frame's own bars have found, then what is found here */
+    bool is_late;
+    double value, bound;
+} record;
+
+struct npg_verdict {
+    npg_verdict_bars bars;
+    int64_t key;
+    record *records; /* owned */
+    size_t count, room;
+};
+
+npg_status npg_verdict_open(npg_verdict **out, const npg_verdict_bars *bars, int64_t key)
+{
+    NPG_TRY(npg_alloc(out, NPG_FOR_RUN, sizeof **out));
+    **out = (npg_verdict){.bars = *bars, .key = key};
+    return NPG_OK;
+}
+
+void npg_verdict_close(npg_verdict **slot)
+{
+    if (!*slot) return;
+    npg_release(&(*slot)->records);
+    npg_release(slot);
+}
+
+npg_status npg_verdict_add(npg_verdict *verdict, const npg_frame *frame)
+{
+    const npg_figures *f = &frame->figures;
+    if (frame->is_shared || !isfinite(f->coverage)) return NPG_OK;
+    NPG_TRY(npg_grow(&verdict->records, &verdict->room, verdict->count + 1, sizeof *verdict->records,
+                     NPG_FOR_RUN));
+    record *r = &verdict->records[verdict->count++];
+    *r = (record){.index = frame->index,
+                  .number = frame->number,
+                  .uncovered = (double)(float)(1 - f->coverage), /* as a resumed run reads it back */
+                  .vertex_dist = (double)(float)f->vertex_dist_mean,
+                  .fault = f->fault};
+    memcpy(r->marks, f->marks, sizeof r->marks);
+    return NPG_OK;
+}
+
+/* ---- beside what is usual in the capture ---- */
+
+static npg_status level_of_all(npg_level *level, const npg_verdict *v, size_t offset, double floor)
+{
+    double *values;
+    NPG_TRY(npg_alloc_array(&values, NPG_FOR_RUN, v->count, sizeof *values));
+    for (size_t i = 0; i < v->count; i++)
+        values[i] = *(const double *)((const char *)&v->records[i] + offset);
+    *level = npg_level_of(values, v->count, floor);
+    npg_release(&values);
+    return NPG_OK;
+}
+
+static void find_fault(record *r, int fault, double value, double bound)
+{
+    if (r->fault || !(value > bound)) return;
+    r->fault = fault;
+    r->is_late = true;
+    r->value = value;
+    r->bound = bound;
+}
+
+static npg_status judge_levels(npg_verdict *v, npg_level *dist)
+{
+    npg_level open;
+    NPG_TRY(level_of_all(&open, v, offsetof(record, uncovered), v->bars.uncovered));
+    NPG_TRY(level_of_all(dist, v, offsetof(record, vertex_dist), v->bars.vertex_dist));
+    for (size_t i = 0; i < v->count; i++) {
+        record *r = &v->records[i];
+        find_fault(r, NPG_FAULT_UNCOVERED, r->uncovered, open.usual + open.bound);
+        find_fault(r, NPG_FAULT_DISTANCE, r->vertex_dist, dist->usual + 2 * dist->bound);
+    }
+    return NPG_OK;
+}
+
+/* ---- beside the frames around ---- */
+
+/* How far the marks have moved between two frames, on average and for each step in time. */
+static double motion_between(const record *a, const record *b)
+{
+    double sum = 0;
+    for (size_t k = 0; k < NPG_MARKS; k++) sum += npg_vec3_distance(a->marks + 3 * k, b->marks + 3 * k);
+    return sum / NPG_MARKS / (double)(b->index - a->index);
+}
+
+/* Of what the frames around move from one to the next, `at` and the one before it left out: the upper median,
+ * so that a body that begins to move does not jump. */
+static double motion_around(const npg_verdict *v, size_t at)
+{
+    double motions[2 * AROUND];
+    size_t count = 0;
+    for (size_t i = at > AROUND ? at - AROUND : 1; i <= at + AROUND && i < v->count; i++)
+        if (i != at) motions[count++] = motion_between(&v->records[i - 1], &v->records[i]);
+    qsort(motions, count, sizeof *motions, npg_order_double);
+    return count > 1 ? motions[count / 2] : (double)INFINITY;
+}
+
+/* Whether the body has jumped on its way to a frame.  Less than points lie from the surface is no motion. */
+static bool has_jumped(const npg_verdict *v, size_t at, double least, double *motion, double *bound)
+{
+    if (at < 1 || at >= v->count) return false;
+    *motion = motion_between(&v->records[at - 1], &v->records[at]);
+    *bound = fmax(JUMP * motion_around(v, at), least);
+    return *motion > *bound;
+}
+
+/* How many frames from `at` on are odd: after them the body is where it was before.  0: it stays away. */
+static size_t count_odd(const npg_verdict *v, size_t at, double bound)
+{
+    for (size_t odd = 1; odd <= AROUND && at + odd < v->count; odd++)
+        if (motion_between(&v->records[at - 1], &v->records[at + odd]) <= bound) return odd;
+    return 0;
+}
+
+/* Of two frames with a jump between them, the one farther from the keyframe is the first that can't be
+ * trusted. */
+static void judge_jumps(npg_verdict *v, double least)
+{
+    double motion, bound;
+    for (size_t i = 1; i < v->count; i++) {
+        if (!has_jumped(v, i, least, &motion, &bound)) continue;
+        size_t odd = count_odd(v, i, bound);
+        size_t first = !odd && v->records[i].index <= v->key ? i - 1 : i;
+        for (size_t k = first; k < first + (odd ? odd : 1); k++)
+            find_fault(&v->records[k], NPG_FAULT_JUMP, motion, bound);
+        i += odd; /* and the way back is none */
+    }
+}
+
+/* ---- all of it ---- */
+
+static int by_index(const void *left, const void *right)
+{
+    const record *a = left, *b = right;
+    return (a->index > b->index) - (a->index < b->index);
+}
+
+static npg_status list_faults(const npg_verdict *v, npg_late_faults *late)
+{
+    NPG_TRY(npg_alloc_array(&late->faults, NPG_FOR_RUN, v->count, sizeof *late->faults));
+    for (size_t i = 0; i < v->count; i++) {
+        const record *r = &v->records[i];
+        if (!r->is_late) continue;
+        late->faults[late->count++] =
+            (struct npg_late_fault){r->index, r->number, r->fault, 100 * r->value, 100 * r->bound};
+    }
+    return NPG_OK;
+}
+
+npg_status npg_verdict_finish(npg_verdict *v, npg_late_faults *late)
+{
+    npg_level dist;
+    *late = (npg_late_faults){0};
+    if (v->count <= NPG_ALARM_FRAMES) return NPG_OK; /* too few to say what is usual */
+    qsort(v->records, v->count, sizeof *v->records, by_index);
+    NPG_TRY(judge_levels(v, &dist));
+    judge_jumps(v, dist.usual);
+    return list_faults(v, late);
+}
