@@ -20,6 +20,6 @@ npg_status npg_check_buffer(double *error, const npg_buffer *got, const double *
 
 /* The cases, one per op. */
 npg_kernel_check npg_check_latent, npg_check_sobolev, npg_check_mlp, npg_check_adam, npg_check_transform,
-    npg_check_nearest, npg_check_chamfer, npg_check_isometry, npg_check_pull;
+    npg_check_nearest, npg_check_chamfer, npg_check_isometry;
 
 #endif

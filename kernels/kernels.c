@@ -3,7 +3,7 @@
 
 #include "kernels/check.h"
 
-static npg_status check_all(npg_device *device)
+npg_status npg_kernels_self_test(npg_device *device)
 {
     for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++) {
         double error = 0;
@@ -15,13 +15,6 @@ static npg_status check_all(npg_device *device)
     return NPG_OK;
 }
 
-npg_status npg_kernels_self_test(npg_device *device)
-{
-    npg_status status = check_all(device);
-    if (status == NPG_DEVICE) npg_device_distrust(device);
-    return status;
-}
-
 const npg_kernel_case npg_kernel_cases[] = {{"latent", npg_check_latent, 2e-5},
                                             {"sobolev", npg_check_sobolev, 1e-5},
                                             {"mlp", npg_check_mlp, 2e-5},
@@ -29,6 +22,5 @@ const npg_kernel_case npg_kernel_cases[] = {{"latent", npg_check_latent, 2e-5},
                                             {"transform", npg_check_transform, 2e-5},
                                             {"nearest", npg_check_nearest, 1e-6},
                                             {"chamfer", npg_check_chamfer, 2e-5},
-                                            {"pull", npg_check_pull, 2e-5},
                                             {"isometry", npg_check_isometry, 2e-5},
                                             {0}};

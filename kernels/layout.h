@@ -36,9 +36,6 @@
 #define NPG_SLOT_BOX_BLOCK   4 /* the first block of their boxes             */
 #define NPG_SLOT_RESULT      5 /* where the first answer goes; 6 and 7 are 0 */
 
-/* Floats of a known correspondence (op pull): npg_pull of motion.h. */
-#define NPG_PULL_FLOATS 16
-
 /* ---- grid features (latent, sobolev) ---- */
 
 /* Features of a grid node, and of a vertex: two vectors of 16. */

@@ -156,11 +156,3 @@ npg_status npg_mlp_end(npg_mlp *m)
                       NPG_BUF(&m->code), NPG_INT(at_w1t), NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1),
                       NPG_INT(m->frames), NPG_INT(m->groups));
 }
-
-npg_status npg_mlp_code_back(npg_mlp *m, const npg_buffer *dcode)
-{
-    return NPG_LAUNCH(m->time, "time_code_back", m->shape.code_size, m->frames, NPG_BUF(dcode),
-                      NPG_BUF(&m->dc), NPG_BUF(&m->params), NPG_INT(npg_mlp_at_w1t(&m->shape)),
-                      NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1), NPG_INT(m->frames),
-                      NPG_INT(m->groups));
-}

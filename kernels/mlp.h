@@ -69,14 +69,11 @@ npg_status npg_mlp_backward(npg_mlp *mlp, size_t first, size_t count);
 /* grad and dz, after all frames have gone backward. */
 npg_status npg_mlp_end(npg_mlp *mlp);
 
-/* dcode [frames][M], after npg_mlp_end: for a learned time code. */
-npg_status npg_mlp_code_back(npg_mlp *mlp, const npg_buffer *dcode);
-
 /* The plain twins, in double, for one vertex in one frame: out (7) of z (32) and code (M); and the gradients,
- * added to grad, dz, dcode. */
+ * added to grad and dz. */
 void npg_mlp_forward_ref(double *out, const double *z, const double *code, const double *params,
                          const npg_mlp_shape *shape);
-void npg_mlp_backward_ref(double *grad, double *dz, double *dcode, const double *dout, const double *z,
-                          const double *code, const double *params, const npg_mlp_shape *shape);
+void npg_mlp_backward_ref(double *grad, double *dz, const double *dout, const double *z, const double *code,
+                          const double *params, const npg_mlp_shape *shape);
 
 #endif

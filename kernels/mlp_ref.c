@@ -87,8 +87,8 @@ static void second_back(double *d1, double *grad, const double *d2, const double
     for (size_t n = 0; n < s->w2; n++) grad[npg_mlp_at_b2(s) + n] += d2[n];
 }
 
-static void first_back(double *grad, double *dz, double *dcode, const double *d1, const double *z,
-                       const double *code, const double *params, const npg_mlp_shape *s)
+static void first_back(double *grad, double *dz, const double *d1, const double *z, const double *code,
+                       const double *params, const npg_mlp_shape *s)
 {
     size_t at_z = npg_mlp_at_w1z(s), at_t = npg_mlp_at_w1t(s);
     for (size_t n = 0; n < s->w1; n++) {
@@ -98,20 +98,19 @@ static void first_back(double *grad, double *dz, double *dcode, const double *d1
             grad[at] += d1[n] * z[c];
         }
         for (size_t j = 0; j < s->code_size; j++) {
-            dcode[j] += d1[n] * params[at_t + j * s->w1 + n];
             grad[at_t + j * s->w1 + n] += d1[n] * code[j];
         }
         grad[npg_mlp_at_b1(s) + n] += d1[n];
     }
 }
 
-void npg_mlp_backward_ref(double *grad, double *dz, double *dcode, const double *dout, const double *z,
-                          const double *code, const double *params, const npg_mlp_shape *s)
+void npg_mlp_backward_ref(double *grad, double *dz, const double *dout, const double *z, const double *code,
+                          const double *params, const npg_mlp_shape *s)
 {
     layers in;
     double d1[WIDTH_MAX], d2[WIDTH_MAX];
     hidden(&in, z, code, params, s);
     head_back(d2, grad, dout, in.h2, params, s);
     second_back(d1, grad, d2, in.h1, params, s);
-    first_back(grad, dz, dcode, d1, z, code, params, s);
+    first_back(grad, dz, d1, z, code, params, s);
 }

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-_Static_assert(sizeof(npg_pull) == NPG_PULL_FLOATS * sizeof(float), "as pull.cl reads it");
 
 /* ---- layout ---- */
 
@@ -84,7 +83,6 @@ static npg_status open_programs(npg_motion *m, npg_device *device)
     NPG_TRY(npg_program_open(&m->transform, device, "transform", ""));
     NPG_TRY(npg_program_open(&m->nearest, device, "nearest", ""));
     NPG_TRY(npg_program_open(&m->chamfer, device, "chamfer", ""));
-    NPG_TRY(npg_program_open(&m->pull, device, "pull", ""));
     return npg_program_open(&m->isometry, device, "isometry", "");
 }
 
@@ -250,42 +248,15 @@ npg_status npg_motion_open(npg_motion *m, npg_device *device, const float *verti
 
 void npg_motion_close(npg_motion *m)
 {
-    npg_buffer *all[] = {&m->pulls,      &m->pull_start, &m->rest,        &m->x,         &m->g,
-                         &m->vert_boxes, &m->points,     &m->point_boxes, &m->to_points, &m->to_verts,
-                         &m->forward,    &m->reverse,    &m->start,       &m->neighbour, &m->edge_rest,
-                         &m->cd,         &m->part,       &m->gain};
+    npg_buffer *all[] = {&m->rest,      &m->x,           &m->g,         &m->vert_boxes,
+                         &m->points,    &m->point_boxes, &m->to_points, &m->to_verts,
+                         &m->forward,   &m->reverse,     &m->start,     &m->neighbour,
+                         &m->edge_rest, &m->cd,          &m->part,      &m->gain};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
     npg_program_close(&m->transform);
     npg_program_close(&m->nearest);
     npg_program_close(&m->chamfer);
     npg_program_close(&m->isometry);
-    npg_program_close(&m->pull);
-}
-
-npg_status npg_motion_set_bases(npg_motion *m, const float *bases)
-{
-    size_t size = m->rows * 3;
-    float *packed;
-    npg_buffer all;
-    npg_device *device = m->rest.device;
-    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, m->frames * size, sizeof(float)));
-    for (size_t t = 0; t < m->frames; t++)
-        npg_pack16(packed + t * size, bases + t * m->real * 3, m->real, m->rows);
-    npg_status status = npg_buffer_from(&all, device, packed, m->frames * size * sizeof(float));
-    npg_release(&packed);
-    NPG_TRY(status);
-    npg_buffer_close(&m->rest);
-    m->rest = all;
-    m->rest_stride = size;
-    return NPG_OK;
-}
-
-npg_status npg_motion_set_pulls(npg_motion *m, const npg_pull *pulls, const int32_t *start)
-{
-    npg_buffer_close(&m->pulls);
-    npg_buffer_close(&m->pull_start);
-    NPG_TRY(npg_buffer_from(&m->pulls, m->x.device, pulls, (size_t)start[m->frames] * sizeof *pulls));
-    return npg_buffer_from(&m->pull_start, m->x.device, start, (m->frames + 1) * sizeof *start);
 }
 
 /* ---- steps ---- */
@@ -293,8 +264,7 @@ npg_status npg_motion_set_pulls(npg_motion *m, const npg_pull *pulls, const int3
 npg_status npg_motion_apply(npg_motion *m, const npg_buffer *out, size_t first, size_t count)
 {
     return NPG_LAUNCH(m->transform, "transform_apply", m->rows, count, NPG_BUF(&m->x), NPG_BUF(out),
-                      NPG_BUF(&m->rest), NPG_INT(m->rest_stride), NPG_INT(m->rows), NPG_INT(first),
-                      NPG_INT(count));
+                      NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count));
 }
 
 npg_status npg_motion_chamfer(npg_motion *m, double alpha, size_t first, size_t count)
@@ -313,13 +283,6 @@ npg_status npg_motion_chamfer(npg_motion *m, double alpha, size_t first, size_t 
                              NPG_INT(first), NPG_INT(count));
 }
 
-npg_status npg_motion_pull(npg_motion *m, size_t first, size_t count)
-{
-    return NPG_LAUNCH_GROUPS(m->pull, "pull_frame", count, m->local, NPG_BUF(&m->cd), NPG_BUF(&m->g),
-                             NPG_BUF(&m->x), NPG_BUF(&m->pulls), NPG_BUF(&m->pull_start), NPG_INT(m->rows),
-                             NPG_INT(first), NPG_INT(count));
-}
-
 npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buffer *out, const float *gains,
                            double iso_gain, size_t first, size_t count)
 {
@@ -329,6 +292,6 @@ npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buff
                        NPG_BUF(&m->edge_rest), NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows),
                        NPG_INT(first), NPG_INT(count)));
     return NPG_LAUNCH(m->transform, "transform_back", m->rows, count, NPG_BUF(dout), NPG_BUF(&m->g),
-                      NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->rest_stride), NPG_INT(m->rows),
-                      NPG_INT(first), NPG_INT(count), NPG_INT(m->real));
+                      NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count),
+                      NPG_INT(m->real));
 }

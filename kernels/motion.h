@@ -1,4 +1,4 @@
-/* motion: what follows the decoder: transform, nearest, chamfer, pull, isometry;
+/* motion: what follows the decoder: transform, nearest, chamfer, isometry;
  * one .cl and one _ref.c for each.  Positions on the device are in blocks of 16 (layout.h). */
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H
@@ -17,24 +17,10 @@ npg_status npg_morton_order(uint32_t *order, const float *points, size_t count);
 /* Box blocks of the tree over `count` points. */
 size_t npg_tree_blocks(size_t count);
 
-/* A known correspondence: the surface point sum share x_vertex + constant, the target already taken off. */
-typedef struct npg_pull {
-    int32_t vertex[3];
-    float weight;      /* of the squared distance                                           */
-    float share[3];    /* of each vertex                                                    */
-    float along;       /* share of distances along the surface, 0..1                        */
-    float constant[3]; /* what the vertices leave out of the surface point, less the target */
-    float unused_1;
-    float normal[3];
-    float unused_2;
-} npg_pull;
-
 typedef struct npg_motion {
-    npg_program *transform, *nearest, *chamfer, *isometry, *pull;
+    npg_program *transform, *nearest, *chamfer, *isometry;
     size_t rows, real, frames;              /* V padded, V, T                                           */
-    npg_buffer rest;                        /* positions that are transformed, one set or one per frame */
-    size_t rest_stride;                     /* floats between the sets of two frames, 0: one set        */
-    npg_buffer pulls, pull_start;           /* only after npg_motion_set_pulls                          */
+    npg_buffer rest;                        /* positions that are transformed */
     npg_buffer x, g;                        /* [frames] positions and dL/dx                             */
     npg_buffer vert_boxes;                  /* [frames][tree blocks of V][96]                           */
     npg_buffer points, point_boxes;         /* all targets, and their trees                             */
@@ -59,15 +45,6 @@ npg_status npg_motion_open(npg_motion *motion, npg_device *device, const float *
                            const npg_target *targets, size_t frames);
 void npg_motion_close(npg_motion *motion);
 
-/* Give each frame positions of its own to transform (frames x real x 3, in the order of the vertices). */
-npg_status npg_motion_set_bases(npg_motion *motion, const float *bases);
-
-/* Known correspondences; frame f has pulls[start[f]] .. pulls[start[f + 1]].  Replaces those set before. */
-npg_status npg_motion_set_pulls(npg_motion *motion, const npg_pull *pulls, const int32_t *start);
-
-/* cd [frames] = loss of the pulls, g its gradient. */
-npg_status npg_motion_pull(npg_motion *motion, size_t first, size_t count);
-
 /* x of frames first .. first + count - 1 from the decoder's out [frames][rows][8]. */
 npg_status npg_motion_apply(npg_motion *motion, const npg_buffer *out, size_t first, size_t count);
 
@@ -87,8 +64,6 @@ size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *poi
 /* cd and its gradient g (real x 3, overwritten) of one frame with given correspondences. */
 double npg_chamfer_pairs_ref(double *g, const double *x, size_t real, const double *points, size_t count,
                              const size_t *to_points, const size_t *to_verts, double alpha);
-/* Loss of the pulls of one frame and its gradient g (real x 3, overwritten). */
-double npg_pull_ref(double *g, const double *x, size_t real, const npg_pull *pulls, size_t count);
 /* Sum over edges of | |x_i - x_j| - rest |, gradient added to g. */
 double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest,
                         size_t edge_count);

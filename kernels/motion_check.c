@@ -286,52 +286,6 @@ npg_status npg_check_chamfer(npg_device *device, int size, uint64_t seed, double
     return check_motion(device, size, seed, compare_chamfer, error);
 }
 
-/* ---- pull ---- */
-
-static npg_status make_pulls(npg_pull **pulls, int32_t start[FRAMES + 1], const motion_data *d, uint64_t seed)
-{
-    npg_random random = npg_random_stream(seed, 16, 0);
-    start[0] = 0;
-    for (size_t t = 0; t < FRAMES; t++) start[t + 1] = start[t] + (int32_t)(t == 1 ? 0 : d->count[t]);
-    NPG_TRY(npg_alloc_array(pulls, NPG_FOR_RUN, (size_t)start[FRAMES], sizeof **pulls));
-    for (int32_t k = 0; k < start[FRAMES]; k++) {
-        npg_pull *p = &(*pulls)[k];
-        for (int c = 0; c < 3; c++) {
-            p->vertex[c] = (int32_t)npg_random_below(&random, d->real);
-            p->share[c] = (float)npg_random_real(&random);
-            p->constant[c] = (float)(2 * npg_random_real(&random) - 1);
-            p->normal[c] = (float)(2 * npg_random_real(&random) - 1);
-        }
-        p->weight = (float)npg_random_real(&random);
-        p->along = (float)npg_random_real(&random);
-    }
-    return NPG_OK;
-}
-
-static npg_status compare_pull(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                               double *error)
-{
-    npg_pull *pulls;
-    int32_t start[FRAMES + 1];
-    double want[FRAMES];
-    NPG_TRY(open_motion(motion, out, device, d));
-    NPG_TRY(take_positions(motion, d));
-    NPG_TRY(make_pulls(&pulls, start, d, 1));
-    npg_status status = npg_motion_set_pulls(motion, pulls, start);
-    if (!status) status = npg_motion_pull(motion, 0, FRAMES);
-    for (size_t t = 0; t < FRAMES; t++)
-        want[t] = npg_pull_ref(d->g + t * d->real * 3, d->x + t * d->real * 3, d->real, pulls + start[t],
-                               (size_t)(start[t + 1] - start[t]));
-    npg_release(&pulls);
-    if (!status) status = npg_check_buffer(error, &motion->cd, want, FRAMES);
-    return status ? status : compare_frames(error, &motion->g, d->g, d);
-}
-
-npg_status npg_check_pull(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_motion(device, size, seed, compare_pull, error);
-}
-
 /* ---- isometry ---- */
 
 static npg_status compare_isometry(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,

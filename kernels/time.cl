@@ -29,18 +29,3 @@ kernel void time_back(global float *grad, global const float *dc, global const f
         grad[at + j * width + n] = sum;
     }
 }
-
-/* dcode [frames][M] = dc w^T, for a learned time code.  Global size: (M, frames). */
-kernel void time_code_back(global float *dcode, global const float *dc, global const float *params, int at, int M,
-                           int width, int frames, int groups)
-{
-    size_t j = get_global_id(0), t = get_global_id(1);
-    if (j >= (size_t)M || t >= (size_t)frames) return;
-    float sum = 0.0f;
-    for (int n = 0; n < width; n++) {
-        float d = 0.0f;
-        for (int g = 0; g < groups; g++) d += dc[((size_t)g * frames + t) * width + n];
-        sum += d * params[at + j * width + n];
-    }
-    dcode[t * M + j] = sum;
-}

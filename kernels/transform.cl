@@ -20,15 +20,13 @@ inline turn turn_of(float8 o)
     return (turn){s / norm, o.s123 / norm, 1.0f / norm};
 }
 
-/* x: [frames] x positions; rest: the positions to transform, `stride` floats
- * from frame to frame (0: the reference in all).  Global size: (rows, count). */
-kernel void transform_apply(global float *x, global const float *out, global const float *rest, int stride, int rows,
+/* x: [frames] x positions; rest: the positions to transform.  Global size: (rows, count). */
+kernel void transform_apply(global float *x, global const float *out, global const float *rest, int rows,
                             int first, int count)
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
     size_t at = NPG_POINT_AT(i);
-    rest += frame * stride;
     float8 o = vload8(frame * rows + i, out);
     turn q = turn_of(o);
     float3 v = POINT(rest, at);
@@ -42,13 +40,12 @@ kernel void transform_apply(global float *x, global const float *out, global con
 
 /* dout from g = dL/dx; rows from `real` on are padding and get 0.  Global size: (rows, count). */
 kernel void transform_back(global float *dout, global const float *g, global const float *out,
-                           global const float *rest, int stride, int rows, int first, int count, int real)
+                           global const float *rest, int rows, int first, int count, int real)
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
     size_t at = NPG_POINT_AT(i);
     global const float *from = g + frame * rows * 3;
-    rest += frame * stride;
     float8 o = vload8(frame * rows + i, out), d = 0.0f;
     if (i < (size_t)real) {
         turn q = turn_of(o);

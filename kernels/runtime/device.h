@@ -10,9 +10,6 @@
 #include "kernels/runtime/tuning.h"
 #include "pipeline/memory.h"
 
-/* Room for the path of a file in the kernel cache. */
-#define NPG_CACHE_PATH 4400
-
 typedef struct npg_device npg_device;
 typedef struct npg_program npg_program;
 
@@ -67,10 +64,6 @@ npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *d
 npg_status npg_program_open(npg_program **program, npg_device *device, const char *name,
                             const char *constants);
 void npg_program_close(npg_program **program);
-
-/* The device was found to compute wrong: nothing that was built on it is kept in the cache, and what came
- * from there is removed, so that the next process builds from the text. */
-void npg_device_distrust(npg_device *device);
 
 /* One argument of a kernel. */
 typedef struct npg_argument {

@@ -26,11 +26,8 @@ struct npg_device {
     cl_command_queue queue;
     npg_program *programs; /* built so far, owned                                             */
     bool is_in_cache;      /* the kernel cache has been entered and must be left              */
-    bool is_distrusted;    /* it has computed wrong: none of its programs goes into the cache */
 };
 
-/* Release all programs; those that were built from their text are put into the cache first, unless the device
- * is distrusted. */
 void npg_programs_close(npg_device *device);
 
 /* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
@@ -42,11 +39,6 @@ void npg_programs_close(npg_device *device);
  * that the user has set (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made. */
 npg_status npg_kernel_cache_enter(void);
 void npg_kernel_cache_leave(void);
-
-/* Path of a file in this version's folder, whether it is there or not; false when there is no such
- * folder.  Only the process that holds the folder may write binaries there. */
-bool npg_kernel_cache_path(char *out, size_t size, const char *name);
-bool npg_kernel_cache_is_ours(void);
 
 /* The text of every .cl file, embedded by the build. */
 

@@ -127,17 +127,6 @@ static npg_status choose_folder(void)
     return NPG_OK;
 }
 
-bool npg_kernel_cache_path(char *out, size_t size, const char *name)
-{
-    out[0] = 0;
-    return shared_folder[0] && (size_t)snprintf(out, size, "%s/%s", shared_folder, name) < size;
-}
-
-bool npg_kernel_cache_is_ours(void)
-{
-    return lock_fd >= 0;
-}
-
 npg_status npg_kernel_cache_enter(void)
 {
     static bool chosen;

@@ -1,27 +1,19 @@
 /* Programs and launches.
  *
- * A device owns the programs that were opened on it: the same text and constants are built once.  Built
- * programs are kept on disk as the driver's binaries, for to hand a driver the text again costs it a pass of
- * its compiler's front end even when its own cache has the rest.  In memory and on disk a program is known by
- * the hash of all that it is made from, never by its name alone. */
+ * A device owns the programs that were opened on it: the same text and constants are built once.  What a driver
+ * keeps of them on disk is its own (kernel_cache.c): to hand it the texts again costs 0.2 processor seconds. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <xxhash.h>
 
 #include "kernels/runtime/device_internal.h"
-#include "pipeline/file.h"
 
-#define CONSTANTS_MAX 384        /* letters of the build constants; half of them from the tuning */
-#define BINARY_MAX    (1u << 28) /* bytes; a larger file is none of ours */
+#define CONSTANTS_MAX 384 /* letters of the build constants; half of them from the tuning */
 
 struct npg_program {
     npg_program *next;
     npg_device *device; /* loan */
     const char *name;   /* of the source, static */
     char constants[CONSTANTS_MAX];
-    uint64_t key; /* hash of text, flags, constants, device and driver */
-    bool is_from_text;
     cl_program program;
     cl_kernel kernels[NPG_KERNELS_MAX];
     char kernel_names[NPG_KERNELS_MAX][48];
@@ -38,96 +30,6 @@ static const npg_kernel_source *source_of(const char *name)
     for (const npg_kernel_source *source = npg_kernel_sources; source->name; source++)
         if (!strcmp(source->name, name)) return source;
     return NULL;
-}
-
-static uint64_t key_of(const npg_device_info *info, const char *text, const char *constants)
-{
-    const char *parts[] = {text, FLAGS, constants, info->name, info->platform, info->version, info->driver};
-    XXH64_hash_t hash = 0;
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        hash = XXH64(parts[i], strlen(parts[i]) + 1, hash);
-    return hash;
-}
-
-/* ---- binaries on disk ---- */
-
-/* What stands before the driver's bytes. */
-typedef struct binary_head {
-    char magic[8];
-    uint64_t key;        /* of the program */
-    uint64_t size, hash; /* of the bytes that follow */
-} binary_head;
-
-static const char binary_magic[8] = "npgcl 2";
-
-/* The key decides which file it is; false: there is no cache. */
-static bool binary_path(char *out, size_t size, const npg_program *program)
-{
-    char name[64];
-    snprintf(name, sizeof name, "%s-%016llx.program", program->name, (unsigned long long)program->key);
-    return npg_kernel_cache_path(out, size, name);
-}
-
-/* The bytes, or NULL when there is no file that is whole and this program's. */
-static unsigned char *read_binary(const char *path, uint64_t key, size_t *size)
-{
-    binary_head head;
-    unsigned char *bytes = NULL;
-    FILE *file = fopen(path, "rb");
-    if (!file) return NULL;
-    bool good = fread(&head, sizeof head, 1, file) == 1 &&
-                !memcmp(head.magic, binary_magic, sizeof head.magic) && head.key == key && head.size &&
-                head.size < BINARY_MAX && !npg_alloc(&bytes, NPG_FOR_DEVICE, head.size);
-    good = good && fread(bytes, 1, head.size, file) == head.size && fgetc(file) == EOF &&
-           XXH64(bytes, head.size, 0) == head.hash;
-    fclose(file);
-    if (!good) npg_release(&bytes);
-    *size = good ? head.size : 0;
-    return bytes;
-}
-
-static bool create_from_binary(npg_program *program)
-{
-    char path[NPG_CACHE_PATH];
-    size_t size;
-    cl_int code = 0, status = 0;
-    if (!binary_path(path, sizeof path, program)) return false;
-    unsigned char *bytes = read_binary(path, program->key, &size);
-    if (!bytes) return false;
-    const unsigned char *loan = bytes;
-    program->program = clCreateProgramWithBinary(program->device->context, 1, &program->device->id, &size,
-                                                 &loan, &status, &code);
-    npg_release(&bytes);
-    if (!code && !status) return true;
-    if (program->program) clReleaseProgram(program->program);
-    program->program = NULL;
-    return false;
-}
-
-static npg_status write_binary(const char *path, uint64_t key, const unsigned char *bytes, size_t size)
-{
-    npg_file *file;
-    binary_head head = {.key = key, .size = size, .hash = XXH64(bytes, size, 0)};
-    memcpy(head.magic, binary_magic, sizeof head.magic);
-    NPG_TRY(npg_file_open(&file, path));
-    npg_file_write(file, &head, sizeof head);
-    npg_file_write(file, bytes, size);
-    return npg_file_commit(&file);
-}
-
-/* A cache that can't be written costs time, nothing else. */
-static void store_binary(const npg_program *program)
-{
-    char path[NPG_CACHE_PATH];
-    size_t size = 0;
-    unsigned char *bytes;
-    if (!npg_kernel_cache_is_ours() || !binary_path(path, sizeof path, program)) return;
-    if (clGetProgramInfo(program->program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, NULL) || !size)
-        return;
-    if (npg_alloc(&bytes, NPG_FOR_DEVICE, size)) return;
-    if (!clGetProgramInfo(program->program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, NULL))
-        write_binary(path, program->key, bytes, size);
-    npg_release(&bytes);
 }
 
 /* ---- building ---- */
@@ -159,12 +61,6 @@ static npg_status build_program(npg_program *program, const char *text)
     char flags[sizeof FLAGS + CONSTANTS_MAX];
     cl_int code = 0;
     snprintf(flags, sizeof flags, "%s%s", FLAGS, program->constants);
-    if (create_from_binary(program)) {
-        if (!clBuildProgram(program->program, 1, &program->device->id, flags, NULL, NULL))
-            return make_kernels(program);
-        clReleaseProgram(program->program);
-    }
-    program->is_from_text = true;
     program->program = clCreateProgramWithSource(program->device->context, 1, &text, NULL, &code);
     NPG_TRY(npg_cl_status(code, "clCreateProgramWithSource"));
     code = clBuildProgram(program->program, 1, &program->device->id, flags, NULL, NULL);
@@ -178,10 +74,11 @@ static void release_program(npg_program *program)
     npg_release(&program);
 }
 
-static npg_program *find_program(const npg_device *device, uint64_t key)
+static npg_program *find_program(const npg_device *device, const char *name, const char *constants)
 {
     npg_program *program = device->programs;
-    while (program && program->key != key) program = program->next;
+    while (program && (strcmp(program->name, name) || strcmp(program->constants, constants)))
+        program = program->next;
     return program;
 }
 
@@ -194,13 +91,11 @@ npg_status npg_program_open(npg_program **out, npg_device *device, const char *n
     if (!source) return npg_error(NPG_USAGE, "there are no kernels named %s", name);
     npg_tuning_constants(tuned, sizeof tuned, device->tuning, name);
     snprintf(all, sizeof all, "%s %s", tuned, constants);
-    uint64_t key = key_of(&device->info, source->text, all);
-    *out = find_program(device, key);
+    *out = find_program(device, name, all);
     if (*out) return NPG_OK;
     NPG_TRY(npg_alloc(&program, NPG_FOR_DEVICE, sizeof *program));
     program->device = device;
     program->name = source->name;
-    program->key = key;
     memcpy(program->constants, all, sizeof all);
     npg_status status = build_program(program, source->text);
     if (status) {
@@ -217,21 +112,11 @@ void npg_program_close(npg_program **slot)
     if (slot) *slot = NULL;
 }
 
-void npg_device_distrust(npg_device *device)
-{
-    char path[NPG_CACHE_PATH];
-    device->is_distrusted = true;
-    if (!npg_kernel_cache_is_ours()) return;
-    for (npg_program *program = device->programs; program; program = program->next)
-        if (!program->is_from_text && binary_path(path, sizeof path, program)) remove(path);
-}
-
 void npg_programs_close(npg_device *device)
 {
     while (device->programs) {
         npg_program *program = device->programs;
         device->programs = program->next;
-        if (program->is_from_text && !device->is_distrusted) store_binary(program);
         release_program(program);
     }
 }

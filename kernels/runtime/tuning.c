@@ -58,7 +58,6 @@ void npg_tuning_constants(char *out, size_t size, const npg_tuning *t, const cha
                  t->mlp_head_rows, t->mlp_local, t->span);
     if (!strcmp(program, "nearest"))
         snprintf(out, size, "-DQUERIES=%d -DLOCAL=%d", t->nearest_queries, t->frame_local);
-    if (!strcmp(program, "chamfer") || !strcmp(program, "pull"))
-        snprintf(out, size, "-DLOCAL=%d", t->frame_local);
+    if (!strcmp(program, "chamfer")) snprintf(out, size, "-DLOCAL=%d", t->frame_local);
     if (!strcmp(program, "adam")) snprintf(out, size, "-DSPAN=%d", t->span);
 }

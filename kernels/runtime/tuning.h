@@ -19,7 +19,7 @@ typedef struct npg_tuning {
     int mlp_local;        /* work-items that share a block                                       */
     int mlp_groups;       /* blocks under way for each compute unit                              */
     int nearest_queries;  /* searches that a work-item makes one after the other                 */
-    int frame_local;      /* work-items that share a frame: chamfer, pull, boxes of the searches */
+    int frame_local;      /* work-items that share a frame: chamfer, boxes of the searches       */
     int span;             /* values that a work-item takes in a row: adam, sums of the gradient  */
     int local;            /* work-group of the other kernels                                     */
 } npg_tuning;

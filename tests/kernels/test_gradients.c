@@ -140,16 +140,15 @@ static void mlp(void **state)
 {
     decoder d = {.shape = {64, 96, 2}};
     size_t count = npg_mlp_param_count(&d.shape);
-    double error = 0, *grad = zeros(count), *dz = zeros(CHANNELS), *dcode = zeros(2);
+    double error = 0, *grad = zeros(count), *dz = zeros(CHANNELS);
     (void)state;
     d.params = drawn(count, 0.125);
     d.z = drawn(CHANNELS, 1);
     d.code = drawn(2, 1);
     d.dout = drawn(NPG_MLP_USED, 1);
-    npg_mlp_backward_ref(grad, dz, dcode, d.dout, d.z, d.code, d.params, &d.shape);
+    npg_mlp_backward_ref(grad, dz, d.dout, d.z, d.code, d.params, &d.shape);
     check_slope(&error, d.params, grad, count, 13, 1e-6, value_of_decoder, &d);
     check_slope(&error, d.z, dz, CHANNELS, 1, 1e-6, value_of_decoder, &d);
-    check_slope(&error, d.code, dcode, 2, 1, 1e-6, value_of_decoder, &d);
     expect_slopes(error);
 }
 
@@ -188,7 +187,6 @@ typedef struct positions {
     double *x, *g;
     const double *points;
     size_t to_points[VERTS], to_verts[POINTS];
-    npg_pull pulls[POINTS];
     uint32_t edges[EDGES][2];
     double edge_rest[EDGES];
 } positions;
@@ -199,12 +197,6 @@ static double value_of_chamfer(void *user)
 {
     positions *p = user;
     return npg_chamfer_pairs_ref(p->g, p->x, VERTS, p->points, POINTS, p->to_points, p->to_verts, 0);
-}
-
-static double value_of_pulls(void *user)
-{
-    positions *p = user;
-    return npg_pull_ref(p->g, p->x, VERTS, p->pulls, POINTS);
 }
 
 static double value_of_isometry(void *user)
@@ -223,18 +215,6 @@ static void check_loss(slope_function *value, double h, positions *p)
     expect_slopes(error);
 }
 
-static void make_pull(npg_pull *pull)
-{
-    for (int c = 0; c < 3; c++) {
-        pull->vertex[c] = (int32_t)npg_random_below(&numbers, VERTS);
-        pull->share[c] = (float)npg_random_real(&numbers);
-        pull->constant[c] = (float)(2 * npg_random_real(&numbers) - 1);
-        pull->normal[c] = (float)(2 * npg_random_real(&numbers) - 1);
-    }
-    pull->weight = (float)npg_random_real(&numbers);
-    pull->along = (float)npg_random_real(&numbers);
-}
-
 static void losses(void **state)
 {
     static positions p;
@@ -245,17 +225,14 @@ static void losses(void **state)
     p.points = drawn(3 * POINTS, 0.7);
     for (size_t v = 0; v < VERTS; v++)
         p.to_points[v] = npg_nearest_ref(&dist_sq, p.x + 3 * v, p.points, POINTS);
-    for (size_t i = 0; i < POINTS; i++) {
+    for (size_t i = 0; i < POINTS; i++)
         p.to_verts[i] = npg_nearest_ref(&dist_sq, p.points + 3 * i, p.x, VERTS);
-        make_pull(&p.pulls[i]);
-    }
     for (uint32_t e = 0; e < EDGES; e++) { /* a strip: every vertex with the next two */
         p.edges[e][0] = e / 2;
         p.edges[e][1] = e / 2 + 1 + e % 2;
         p.edge_rest[e] = npg_random_real(&numbers);
     }
     check_loss(value_of_chamfer, 1e-5, &p);
-    check_loss(value_of_pulls, 1e-5, &p);
     check_loss(value_of_isometry, 1e-7, &p);
 }
 

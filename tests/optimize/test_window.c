@@ -1,5 +1,4 @@
-/* Window: the terms that tie frames which two windows share - their gradient through the whole decoder, what
- * they hold -, fields that follow a loss, the warm start, exact on the overlap, what two windows share of a frame,
+/* Window: fields that follow a loss and ties, the warm start, exact on the overlap, what two windows share of a frame,
  * and that both solvers find the same wherever the surface is. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,13 +11,10 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
-#include "kernels/check.h"
-#include "kernels/mlp.h"
 #include "optimize/grids/fit.h"
 #include "optimize/window.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_device.h"
-#include "tests/support/slope.h"
 
 enum { RINGS = 14, SPOKES = 20, VERTS = RINGS * SPOKES + 2, FRAMES = 3 };
 
@@ -35,174 +31,6 @@ static int close_all(void **state)
     npg_mesh_unref(&ball);
     npg_mesh_unref(&ball);
     return close_device(state);
-}
-
-/* ---- gradients through the overlap's terms ---- */
-
-/* One frame: loss(decoder, features, code) = sum of the ties at the samples that the decoder has moved. */
-typedef struct tied {
-    npg_mlp_shape shape;
-    size_t samples, param_count;
-    npg_pull *pulls;
-    size_t pull_count;
-    float *base, *solved; /* S x 3: aligned, and where the window before has put them */
-    double *params, *z, code[4], *base_wide, *x, *g, *out;
-    double *grad, *dz, dcode[4];
-} tied;
-
-static double tied_loss(void *user)
-{
-    tied *t = user;
-    for (size_t s = 0; s < t->samples; s++) {
-        npg_mlp_forward_ref(t->out + 7 * s, t->z + NPG_LATENT_CHANNELS * s, t->code, t->params, &t->shape);
-        npg_transform_ref(t->x + 3 * s, t->out + 7 * s, t->base_wide + 3 * s);
-    }
-    return npg_pull_ref(t->g, t->x, t->samples, t->pulls, t->pull_count);
-}
-
-/* By the twins' backward ways; after tied_loss(). */
-static void tied_slopes(tied *t)
-{
-    for (size_t s = 0; s < t->samples; s++) {
-        double dout[7] = {0};
-        npg_transform_back_ref(dout, t->g + 3 * s, t->out + 7 * s, t->base_wide + 3 * s);
-        npg_mlp_backward_ref(t->grad, t->dz + NPG_LATENT_CHANNELS * s, t->dcode, dout,
-                             t->z + NPG_LATENT_CHANNELS * s, t->code, t->params, &t->shape);
-    }
-}
-
-static double *wide_array(size_t count)
-{
-    double *values;
-    assert_int_equal(npg_alloc_array(&values, NPG_FOR_RUN, count, sizeof *values), 0);
-    return values;
-}
-
-static void fill(double *values, size_t count, double scale, npg_random *random)
-{
-    for (size_t i = 0; i < count; i++) values[i] = (double)(float)(scale * (2 * npg_random_real(random) - 1));
-}
-
-static void open_tied(tied *t)
-{
-    npg_random random = npg_random_stream(11, 0, 0);
-    *t = (tied){.shape = {32, 64, 4}, .samples = VERTS, .pull_count = VERTS};
-    t->param_count = npg_mlp_param_count(&t->shape);
-    assert_int_equal(npg_alloc_array(&t->base, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
-    assert_int_equal(npg_alloc_array(&t->solved, NPG_FOR_RUN, VERTS, 3 * sizeof(float)), 0);
-    assert_int_equal(npg_alloc_array(&t->pulls, NPG_FOR_RUN, VERTS, sizeof *t->pulls), 0);
-    pose_ball(t->base, ball->vert_pos, VERTS, 1);
-    pose_ball(t->solved, ball->vert_pos, VERTS, 1.5);
-    for (int v = 0; v < VERTS; v++) {
-        const float *at = t->solved + 3 * v;
-        t->pulls[v] = (npg_pull){.vertex = {v, v, v},
-                                 .share = {1, 0, 0},
-                                 .along = 1,
-                                 .weight = (float)(0.7 * 5000 / VERTS),
-                                 .constant = {-at[0], -at[1], -at[2]}};
-    }
-    t->params = wide_array(t->param_count), t->grad = wide_array(t->param_count);
-    t->z = wide_array(VERTS * NPG_LATENT_CHANNELS), t->dz = wide_array(VERTS * NPG_LATENT_CHANNELS);
-    t->base_wide = wide_array(3 * VERTS), t->x = wide_array(3 * VERTS), t->g = wide_array(3 * VERTS);
-    t->out = wide_array(7 * VERTS);
-    fill(t->params, t->param_count, 0.3, &random);
-    fill(t->z, VERTS * NPG_LATENT_CHANNELS, 0.9, &random);
-    fill(t->code, 4, 1, &random);
-    for (size_t i = 0; i < 3 * VERTS; i++) t->base_wide[i] = (double)t->base[i];
-}
-
-static void close_tied(tied *t)
-{
-    void *all[] = {&t->pulls, &t->base, &t->solved, &t->params, &t->z, &t->base_wide,
-                   &t->x,     &t->g,    &t->out,    &t->grad,   &t->dz};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_release(all[i]);
-}
-
-static void ties_are_the_squared_way_back(void **state)
-{
-    tied t;
-    double sum = 0;
-    (void)state;
-    open_tied(&t);
-    for (size_t i = 0; i < 3 * t.samples; i++) {
-        double off = (double)t.base[i] - (double)t.solved[i];
-        sum += off * off * 0.7 * 5000 / (double)t.samples;
-    }
-    assert_true(sum > 1);
-    assert_true(fabs(npg_pull_ref(t.g, t.base_wide, t.samples, t.pulls, t.pull_count) - sum) < 1e-4 * sum);
-    for (size_t i = 0; i < 3 * t.samples; i++) t.base_wide[i] = (double)t.solved[i];
-    assert_true(npg_pull_ref(t.g, t.base_wide, t.samples, t.pulls, t.pull_count) < 1e-9);
-    close_tied(&t);
-}
-
-static void gradients_through_the_ties_are_slopes(void **state)
-{
-    tied t;
-    double error = 0;
-    (void)state;
-    open_tied(&t);
-    assert_true(tied_loss(&t) > 1);
-    tied_slopes(&t);
-    check_slope(&error, t.params, t.grad, t.param_count, 7, 1e-6, tied_loss, &t);
-    check_slope(&error, t.z, t.dz, t.samples * NPG_LATENT_CHANNELS, 13, 1e-6, tied_loss, &t);
-    check_slope(&error, t.code, t.dcode, 4, 1, 1e-6, tied_loss, &t);
-    print_message("ties: gradient off by %.2g\n", error);
-    assert_true(error < 1e-5);
-    close_tied(&t);
-}
-
-/* The way back of the device through the same terms, against the twins'. */
-static npg_status device_slopes(tied *t, npg_mlp *mlp, npg_motion *motion)
-{
-    const size_t size = NPG_LATENT_CHANNELS * sizeof(float);
-    const int32_t start[2] = {0, (int32_t)t->pull_count};
-    const uint32_t edges[1][2] = {{0, 1}};
-    const float gain = 1;
-    size_t rows = npg_mlp_rows(device, t->samples);
-    float row[NPG_LATENT_CHANNELS], code[4], *params;
-    NPG_TRY(npg_mlp_open(mlp, device, &t->shape, rows, 1, 1));
-    NPG_TRY(npg_motion_open(motion, device, t->base, t->samples, rows, edges, 1, NULL, 1));
-    NPG_TRY(npg_alloc_array(&params, NPG_FOR_RUN, t->param_count, sizeof *params));
-    for (size_t i = 0; i < t->param_count; i++) params[i] = (float)t->params[i];
-    npg_status status = npg_buffer_write(&mlp->params, 0, params, t->param_count * sizeof *params);
-    npg_release(&params);
-    for (size_t r = 0; r < rows && !status; r++) {
-        size_t from = r < t->samples ? r : t->samples - 1;
-        for (size_t c = 0; c < NPG_LATENT_CHANNELS; c++) row[c] = (float)t->z[from * NPG_LATENT_CHANNELS + c];
-        status = npg_buffer_write(&mlp->z, r * size, row, size);
-    }
-    for (int c = 0; c < 4; c++) code[c] = (float)t->code[c];
-    if (!status) status = npg_buffer_write(&mlp->code, 0, code, sizeof code);
-    if (!status) status = npg_motion_set_pulls(motion, t->pulls, start);
-    if (!status) status = npg_mlp_begin(mlp);
-    if (!status) status = npg_mlp_forward(mlp, 0, 1);
-    if (!status) status = npg_motion_apply(motion, &mlp->out, 0, 1);
-    if (!status) status = npg_motion_pull(motion, 0, 1);
-    if (!status) status = npg_motion_back(motion, &mlp->dout, &mlp->out, &gain, 0, 0, 1);
-    if (!status) status = npg_mlp_backward(mlp, 0, 1);
-    return status ? status : npg_mlp_end(mlp);
-}
-
-static void the_device_has_the_same_gradient(void **state)
-{
-    tied t;
-    npg_mlp mlp = {0};
-    npg_motion motion = {0};
-    double loss, loss_error = 0, grad_error = 0, dz_error = 0;
-    (void)state;
-    open_tied(&t);
-    loss = tied_loss(&t);
-    tied_slopes(&t);
-    if (device_slopes(&t, &mlp, &motion)) fail_msg("%s", npg_error_text());
-    assert_int_equal(npg_check_buffer(&loss_error, &motion.cd, &loss, 1), 0);
-    assert_int_equal(npg_check_buffer(&grad_error, &mlp.grad, t.grad, t.param_count), 0);
-    assert_int_equal(npg_check_buffer(&dz_error, &mlp.dz, t.dz, t.samples * NPG_LATENT_CHANNELS), 0);
-    print_message("ties on the device: loss off by %.2g, decoder %.2g, features %.2g\n", loss_error,
-                  grad_error, dz_error);
-    assert_true(loss_error < 2e-5 && grad_error < 2e-5 && dz_error < 2e-5);
-    npg_mlp_close(&mlp);
-    npg_motion_close(&motion);
-    close_tied(&t);
 }
 
 /* ---- fields that follow a loss of the caller's ---- */
@@ -270,6 +98,33 @@ static void ways_follow_a_loss_of_the_callers(void **state)
     }
     print_message("loss %.4g, then %.4g; a way off by %.4f at most\n", losses[0], losses[1], (double)worst);
     assert_true(worst < 0.03f && losses[1] < 0.5 * losses[0]);
+    npg_fit_close(&fit);
+}
+
+/* A frame that is tied goes to its tie, whatever its points say. */
+static void tied_frames_follow_their_tie(void **state)
+{
+    const npg_fit_settings settings = {
+        .grid = small_grid, .paper = {NPG_CONFIDENCE_CONSTANT, 5, 0.3}, .rate_end = 0.1, .feature_start = 3};
+    npg_fit_frame frames[2] = {{.index = 0}, {.index = 1, .time = 0.5}};
+    float tie[3 * VERTS], points[3 * VERTS], end[3 * VERTS];
+    double before = 0, after = 0;
+    npg_fit *fit;
+    (void)state;
+    pose_ball(tie, ball->vert_pos, VERTS, 2);
+    pose_ball(points, ball->vert_pos, VERTS, -2);
+    frames[0].tie = tie;
+    for (int t = 0; t < 2; t++) frames[t].points = points, frames[t].count = VERTS;
+    assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, 2, 0), 0);
+    assert_int_equal(npg_fit_run(fit, 0, 200, NULL, NULL), 0);
+    assert_int_equal(npg_fit_vertices(fit, end, 0), 0);
+    for (int i = 0; i < 3 * VERTS; i++) {
+        before += pow((double)(ball->vert_pos[i] - tie[i]), 2);
+        after += pow((double)(end[i] - tie[i]), 2);
+    }
+    print_message("from its tie: %.4g, then %.4g\n", sqrt(before / VERTS), sqrt(after / VERTS));
+    assert_true(after < 0.01 * before);
     npg_fit_close(&fit);
 }
 
@@ -423,10 +278,8 @@ static void where_the_surface_is_does_not_matter(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ties_are_the_squared_way_back),
-        cmocka_unit_test(gradients_through_the_ties_are_slopes),
-        cmocka_unit_test(the_device_has_the_same_gradient),
         cmocka_unit_test(ways_follow_a_loss_of_the_callers),
+        cmocka_unit_test(tied_frames_follow_their_tie),
         cmocka_unit_test(the_warm_start_is_exact_on_the_overlap),
         cmocka_unit_test(a_window_has_its_share_of_solved_frames),
         cmocka_unit_test(where_the_surface_is_does_not_matter),

@@ -38,6 +38,7 @@ struct npg_fit {
     npg_fit_measure *measure;           /* or NULL: by distances */
     void *user;                         /* its user */
     size_t tied_count;                  /* frames, the first outward, that follow their tie */
+    float *ties;                        /* of these, x V x 3 in the order of rows */
     size_t *place;                      /* place[k]: which frame of the caller comes k-th outward */
     size_t *rank;                       /* its inverse */
     int64_t *index;                     /* by k */
@@ -277,33 +278,15 @@ static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
                            (const uint32_t(*)[2])fit->edges, fit->edge_count, targets, fit->frame_count);
 }
 
-/* Of the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
-#define TIE_WEIGHT 15000
-
-static npg_status set_ties(npg_fit *fit, const npg_fit_frame *frames)
+static npg_status take_ties(npg_fit *fit, const npg_fit_frame *frames)
 {
-    npg_pull *pulls;
-    int32_t *start;
-    size_t count = fit->tied_count * fit->real;
-    if (!count) return NPG_OK;
-    NPG_REQUIRE(count < INT32_MAX);
-    NPG_TRY(npg_alloc_array(&pulls, NPG_FOR_FIT, count, sizeof *pulls));
-    npg_status status = npg_alloc_array(&start, NPG_FOR_FIT, fit->frame_count + 1, sizeof *start);
-    for (size_t i = 0; !status && i < count; i++) {
-        int32_t row = (int32_t)(i % fit->real);
-        const float *at = frames[fit->place[i / fit->real]].tie + 3 * (size_t)fit->order[row];
-        pulls[i] = (npg_pull){.vertex = {row, row, row},
-                              .share = {1, 0, 0},
-                              .along = 1,
-                              .weight = (float)(TIE_WEIGHT / (double)fit->real),
-                              .constant = {-at[0], -at[1], -at[2]}};
-    }
-    for (size_t k = 0; !status && k < fit->frame_count; k++)
-        start[k + 1] = (int32_t)((k < fit->tied_count ? k + 1 : fit->tied_count) * fit->real);
-    if (!status) status = npg_motion_set_pulls(&fit->motion, pulls, start);
-    npg_release(&pulls);
-    npg_release(&start);
-    return status;
+    fit->ties = npg_arena_take(&fit->window, fit->tied_count * fit->real + 1, 3 * sizeof(float));
+    NPG_TRY(npg_arena_status(&fit->window));
+    for (size_t i = 0; i < fit->tied_count * fit->real; i++)
+        memcpy(fit->ties + 3 * i,
+               frames[fit->place[i / fit->real]].tie + 3 * (size_t)fit->order[i % fit->real],
+               3 * sizeof(float));
+    return NPG_OK;
 }
 
 static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
@@ -316,7 +299,7 @@ static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
     if (!status) status = open_motion_on(fit, targets);
     for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
     npg_release(&targets);
-    return status ? status : set_ties(fit, frames);
+    return status ? status : take_ties(fit, frames);
 }
 
 static npg_status begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key, size_t batch)
@@ -380,14 +363,34 @@ static npg_status check_losses(const npg_fit *fit, size_t first, size_t count, i
     return NPG_OK;
 }
 
+/* Of the mean over vertices of d^2: about what all distances of a frame of 5000 points weigh. */
+#define TIE_WEIGHT 15000
+
+/* Loss and gradient of a tied frame; the few there are go through the host. */
+static npg_status measure_tied(npg_fit *fit, size_t k)
+{
+    size_t bytes = fit->rows * 3 * sizeof(float);
+    const float *tie = fit->ties + k * fit->real * 3, weight = (float)(TIE_WEIGHT / (double)fit->real);
+    float sum = 0;
+    NPG_TRY(npg_buffer_read(&fit->motion.x, k * bytes, fit->packed, bytes));
+    for (size_t row = 0; row < fit->rows; row++)
+        for (size_t axis = 0; axis < 3; axis++) {
+            float *at = &fit->packed[NPG_POINT_AT(row) + axis * NPG_LANES];
+            float off = row < fit->real ? *at - tie[3 * row + axis] : 0;
+            sum += weight * off * off;
+            *at = 2 * weight * off;
+        }
+    NPG_TRY(npg_buffer_write(&fit->motion.g, k * bytes, fit->packed, bytes));
+    return npg_buffer_write(&fit->motion.cd, k * sizeof sum, &sum, sizeof sum);
+}
+
 /* Losses of the frames and their gradients by position: tied frames by their ties, the others by distance. */
 static npg_status measure_frames(npg_fit *fit, size_t first, size_t count)
 {
-    size_t tied = first < fit->tied_count ? fit->tied_count - first : 0;
-    size_t pulled = tied > count ? count : tied;
-    if (pulled) NPG_TRY(npg_motion_pull(&fit->motion, first, pulled));
-    if (pulled == count) return NPG_OK;
-    return npg_motion_chamfer(&fit->motion, fit->settings.paper.welsch, first + pulled, count - pulled);
+    size_t end = first + count;
+    for (; first < end && first < fit->tied_count; first++) NPG_TRY(measure_tied(fit, first));
+    if (first == end) return NPG_OK;
+    return npg_motion_chamfer(&fit->motion, fit->settings.paper.welsch, first, end - first);
 }
 
 /* Positions, losses, and the gradient at the decoder's end. */
