@@ -9,6 +9,7 @@
 #include "ingest/ingest.h"
 #include "job/frame_log.h"
 #include "job/job.h"
+#include "optimize/solver.h"
 #include "pipeline/json_file.h"
 #include "pipeline/options.h"
 #include "pipeline/order.h"
@@ -197,8 +198,7 @@ static npg_export_facts export_facts(const npg_worker *worker)
                               .diagonal = is_known ? state->scale * box->diagonal : 0,
                               .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
                               .voxel_share = state->voxel_share,
-                              .has_grids =
-                                  npg_job_of(worker) && !npg_worker_has_field(worker, NPG_FIELD_POSE),
+                              .has_grids = npg_job_of(worker) && npg_solver_of(worker)->needs_device,
                               .placement = &state->map};
 }
 
@@ -423,7 +423,7 @@ static npg_status write_exports(npg_worker *worker)
     if (!status && npg_exporters_name(state->exports, "vdb") && !facts.has_grids)
         npg_worker_warn(
             worker, false, -1,
-            "vdb has no latent grids: only a run without alignment has any, and keeps them in a job folder "
+            "vdb has no latent grids: only --method grids and paper have any, and keep them in a job folder "
             "(not pulled from)");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,

@@ -19,7 +19,7 @@
 
 typedef struct state {
     npg_solver_settings settings;
-    int named; /* option: which of solvers_of_poses */
+    int named; /* option solver */
     const npg_solver *row;
     npg_device *device;
     npg_window_solver *solver;
@@ -86,12 +86,12 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
-static const npg_solver *const solvers_of_poses[] = {&npg_solver_joint, &npg_solver_grids};
-
-static const npg_solver *row_of(const npg_worker *worker)
+const npg_solver *npg_solver_of(const npg_worker *worker)
 {
-    const state *s = npg_worker_state(worker);
-    return npg_worker_has_field(worker, NPG_FIELD_POSE) ? solvers_of_poses[s->named] : &npg_solver_paper;
+    static const npg_solver *const of_poses[] = {&npg_solver_joint, &npg_solver_grids};
+    const char *name = npg_options_get(npg_worker_options(worker), "solver");
+    if (!npg_worker_has_field(worker, NPG_FIELD_POSE)) return &npg_solver_paper;
+    return of_poses[strcmp(name, of_poses[0]->name) != 0];
 }
 
 /* ---- opening ---- */
@@ -155,7 +155,7 @@ static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     s->total = -1;
-    s->row = row_of(worker);
+    s->row = npg_solver_of(worker);
     NPG_TRY(check_widths(&s->settings.grid));
     NPG_TRY(refuse_unused(worker, s->row));
     if (s->row->needs_device) NPG_TRY(open_device(worker));
@@ -430,7 +430,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;
-    return npg_window_memory(row_of(worker), &s->settings, npg_worker_verts_at_most(worker), frames,
+    return npg_window_memory(npg_solver_of(worker), &s->settings, npg_worker_verts_at_most(worker), frames,
                              facts->point_count_max);
 }
 
@@ -441,7 +441,7 @@ static double expects(const npg_worker *worker, npg_pass pass)
     const double fit_s_per_frame = 0.08, cores = 2;
     double frames = (double)npg_worker_facts(worker)->frame_count;
     if (pass != NPG_PASS_SOLVE) return 0;
-    if (row_of(worker)->needs_poses) return fit_s_per_frame * frames;
+    if (npg_solver_of(worker)->needs_poses) return fit_s_per_frame * frames;
     double vertices = (double)npg_worker_verts_at_most(worker);
     double sample =
         npg_cost_decoder_flops((double)s->settings.grid.width_1, (double)s->settings.grid.width_2);

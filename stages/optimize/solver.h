@@ -102,6 +102,9 @@ typedef struct npg_solver {
     void (*close)(void **solver);
 } npg_solver;
 
+/* The row that a run's options and stages ask for. */
+const npg_solver *npg_solver_of(const npg_worker *worker);
+
 extern const npg_solver npg_solver_joint, npg_solver_grids, npg_solver_paper;
 
 #endif

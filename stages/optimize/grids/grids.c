@@ -1,10 +1,11 @@
 /* Grids: the energy's least over fields: latent grids and decoder give the ways of few vertices of the surface
  * from the smoothed poses, and these carry the others.
  *
- *     d(v, t) = sum_i b_i(v) (f(i, t) - f_0(i, t)),   E(s + d) = E(s) + d^T A d - 2 r^T d
+ *     d(v, t) = c sum_i b_i(v) (f(i, t) - f_0(i, t)),   E(s + d) = E(s) + d^T A d - 2 r^T d
  *
- * f_0: what the field had before the window, so that it starts at the smoothed poses whatever it knows.  The
- * state of least energy is kept, and goes as far along its way as is best. */
+ * c: the noise of the points, so that the field's values are of one size; f_0: what it had before the window, so
+ * that it starts at the smoothed poses whatever it knows.  The state of least energy is kept, and goes as far along
+ * its way as is best. */
 #include <math.h>
 #include <string.h>
 
@@ -19,6 +20,7 @@
 #define TIME_SPAN     0.8  /* of the time code: that of 1 is nearly that of 0 */
 #define FEATURE_START 3
 #define RATE_END      0.1
+#define NOISE_USUAL   0.01 /* units: of a capture that the learning rates were found with */
 #define THREADS_MAX   64
 
 typedef struct grids {
@@ -32,6 +34,7 @@ typedef struct grids {
     /* of the window at work */
     npg_energy_system *system; /* loan                                           */
     double at_start, least;    /* E(s), and the least so far                     */
+    float scale;               /* of ways to the field's values: rates are for those of the usual noise */
     size_t threads;
     float *before;              /* T x S x 3: f_0                                 */
     float *gradient;            /* T x S x 3; loan                                */
@@ -85,7 +88,7 @@ static npg_status carry_frames(void *user, size_t part)
     size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
     for (size_t t = part; t < g->system->frame_count; t += g->threads) {
         float *way = g->gradient + t * s; /* scratch until the energy's is there */
-        for (size_t i = 0; i < s; i++) way[i] = g->field[t * s + i] - g->before[t * s + i];
+        for (size_t i = 0; i < s; i++) way[i] = g->scale * (g->field[t * s + i] - g->before[t * s + i]);
         memset(g->ways + t * w, 0, w * sizeof(float));
         npg_carry(g->carriers, g->vert_count, g->ways + t * w, way);
     }
@@ -105,7 +108,7 @@ static npg_status measure_frames(void *user, size_t part)
         for (size_t i = 0; i < w; i++) {
             sums[0] += (double)way[i] * (double)image[i];
             sums[1] += (double)way[i] * (double)right[i];
-            image[i] = 2 * (image[i] - right[i]);
+            image[i] = 2 * g->scale * (image[i] - right[i]);
         }
         memset(g->gradient + t * s, 0, s * sizeof(float));
         npg_carry_back(g->carriers, g->vert_count, g->gradient + t * s, image);
@@ -177,6 +180,7 @@ static npg_status take_window(grids *g, const npg_problem *problem)
     g->system = npg_energy_system_of(problem->energy);
     g->at_start = g->least = npg_energy_at_start(problem->energy);
     g->threads = npg_parallel_parts(count, 1, THREADS_MAX);
+    g->scale = (float)(npg_energy_noise(problem->energy) / NOISE_USUAL);
     g->before = npg_arena_take(&g->window, few, 3 * sizeof(float));
     g->ways = npg_arena_take(&g->window, wide, 3 * sizeof(float));
     g->image = npg_arena_take(&g->window, wide, 3 * sizeof(float));

@@ -19,6 +19,14 @@
 #define RATE_END    0.1  /* of windows: those of the paper's own fit do not fall          */
 #define TIME_SPAN   0.8  /* of windows: the code of 1 is nearly that of 0; paper's own: 1 */
 
+/* Adam's steps keep their length, and what the last one leaves is one draw of many: the result is the state of
+ * least loss. */
+typedef struct progress {
+    int64_t next; /* epoch, 0 at the beginning */
+    npg_solved least;
+    double loss; /* of that state, without the confidence */
+} progress;
+
 typedef struct paper {
     npg_device *device;     /* loan */
     const npg_facts *facts; /* loan */
@@ -27,10 +35,11 @@ typedef struct paper {
     bool is_alone; /* one window over all frames */
     npg_fit *fit;  /* over all vertices */
     npg_fit_copy first;
-    int64_t resumed_at; /* epoch that a resumed run goes on from inside its window, 0: at its beginning */
+    progress at; /* of the window at work, or that a resumed run goes on from inside its own */
+    float *best; /* T x V x 3: where that state had the frames, owned                         */
+    size_t best_size;
     /* of the window at work */
     const npg_problem *problem; /* loan */
-    npg_fit_step at;            /* the last epoch */
     npg_solver_watch *watch;
     void *user;
     int64_t steps, opened; /* epochs of all kinds; those that opening took */
@@ -42,6 +51,7 @@ static void paper_close(void **slot)
     paper *p = *slot;
     npg_fit_close(&p->fit);
     npg_fit_copy_clear(&p->first);
+    npg_release(&p->best);
     npg_release(slot);
 }
 
@@ -65,11 +75,30 @@ static npg_status paper_open(void **out, const npg_solver_setup *setup)
     return npg_fit_open(&p->fit, p->device, &settings, setup->surface, p->seed);
 }
 
+/* The field's positions are those that the epoch measured. */
+static npg_status take_positions(paper *p)
+{
+    size_t row = 3 * p->facts->reference->vert_count;
+    for (size_t t = 0; t < p->problem->count; t++) NPG_TRY(npg_fit_vertices(p->fit, p->best + t * row, t));
+    return NPG_OK;
+}
+
+static npg_status offer(paper *p, const npg_fit_step *step)
+{
+    double loss = step->chamfer + p->settings.paper.isometry * step->isometry;
+    bool is_least = !p->at.next || loss < p->at.loss;
+    p->at.next = step->epoch + 1;
+    if (!is_least) return NPG_OK;
+    p->at.loss = loss;
+    p->at.least = (npg_solved){p->steps, 1, step->chamfer, step->isometry};
+    return take_positions(p);
+}
+
 static npg_status watch_epoch(void *user, const npg_fit_step *step)
 {
     paper *p = user;
-    p->at = *step;
     const npg_solver_step at = {p->opened + step->epoch, p->steps, step->loss};
+    if (p->is_opened) NPG_TRY(offer(p, step));
     return p->watch ? p->watch(p->user, &at) : NPG_OK;
 }
 
@@ -168,20 +197,31 @@ static npg_status begin(paper *p)
     return status;
 }
 
+static npg_status take_best(paper *p)
+{
+    size_t size = p->problem->count * p->facts->reference->vert_count * 3 * sizeof(float);
+    if (p->at.next)
+        return p->best_size == size ? NPG_OK
+                                    : npg_error(NPG_BAD_INPUT, "the state inside is of another window");
+    npg_release(&p->best);
+    p->best_size = size;
+    return npg_alloc(&p->best, NPG_FOR_FIT, size);
+}
+
 static npg_status solve(paper *p)
 {
     bool is_warm = p->problem->window->direction != 0;
-    int64_t first = p->resumed_at, epochs = p->settings.epochs;
-    p->resumed_at = 0;
+    int64_t epochs = p->settings.epochs;
     p->steps = epochs = is_warm ? (epochs + 2) / 3 : epochs;
-    if (is_warm && !first) {
+    if (is_warm && !p->at.next) {
         if (p->problem->window->from == 0 && p->first.bytes) NPG_TRY(npg_fit_copy_give(&p->first, p->fit));
         NPG_TRY(open_new(p));
     }
     if (is_warm) npg_fit_set_pace(p->fit, NPG_CONFIDENCE_CONSTANT, RATE_END);
     NPG_TRY(begin(p));
     p->is_opened = true;
-    return npg_fit_run(p->fit, first, epochs, watch_epoch, p);
+    NPG_TRY(npg_fit_run(p->fit, p->at.next, epochs, watch_epoch, p));
+    return p->at.next ? NPG_OK : take_positions(p);
 }
 
 static npg_status paper_solve(void *solver, npg_solved *solved, const npg_problem *problem,
@@ -193,12 +233,12 @@ static npg_status paper_solve(void *solver, npg_solved *solved, const npg_proble
     p->user = user;
     p->opened = 0;
     p->is_opened = false;
+    NPG_TRY(take_best(p));
     NPG_TRY(solve(p));
-    for (size_t t = 0; t < problem->count; t++)
-        NPG_TRY(npg_fit_vertices(p->fit, problem->result + t * 3 * p->facts->reference->vert_count, t));
-    if (!problem->window->direction) NPG_TRY(npg_fit_copy_take(&p->first, p->fit));
-    *solved = (npg_solved){p->steps, 1, p->at.chamfer, p->at.isometry};
-    return NPG_OK;
+    memcpy(problem->result, p->best, p->best_size);
+    *solved = p->at.least;
+    p->at = (progress){0};
+    return problem->window->direction ? NPG_OK : npg_fit_copy_take(&p->first, p->fit);
 }
 
 static size_t paper_memory(const npg_solver_settings *settings, size_t verts, size_t frames, size_t points)
@@ -206,7 +246,8 @@ static size_t paper_memory(const npg_solver_settings *settings, size_t verts, si
     const npg_fit_settings fit = settings_of(settings);
     size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
     return npg_fit_memory(&fit, verts, frames, points) +
-           npg_fit_memory(&fit, samples, NEAR + FAR + 1, points) + frames * samples * 3 * sizeof(float);
+           npg_fit_memory(&fit, samples, NEAR + FAR + 1, points) +
+           frames * (samples + verts) * 3 * sizeof(float);
 }
 
 /* ---- states ---- */
@@ -214,8 +255,10 @@ static size_t paper_memory(const npg_solver_settings *settings, size_t verts, si
 static npg_status paper_save(void *solver, npg_store *store, const npg_solver_moment *moment)
 {
     paper *p = solver;
-    int64_t next = p->at.epoch + 1;
-    if (moment->is_inside) NPG_TRY(npg_store_put(store, "inside", &next, sizeof next));
+    if (moment->is_inside) {
+        NPG_TRY(npg_store_put(store, "inside", &p->at, sizeof p->at));
+        NPG_TRY(npg_store_put(store, "inside.best", p->best, p->best_size));
+    }
     return npg_grids_save(p->fit, &p->first, p->facts, store, moment);
 }
 
@@ -226,7 +269,10 @@ static npg_status paper_restore(void *solver, const npg_record *record)
     NPG_TRY(npg_fit_copy_load(&p->first, record, "first"));
     NPG_TRY(npg_fit_restore(p->fit, record, "fit"));
     if (!npg_record_find(record, "inside", &size)) return NPG_OK;
-    return npg_record_get(record, "inside", &p->resumed_at, sizeof p->resumed_at);
+    NPG_TRY(npg_record_get(record, "inside", &p->at, sizeof p->at));
+    npg_record_find(record, "inside.best", &p->best_size);
+    NPG_TRY(npg_alloc(&p->best, NPG_FOR_FIT, p->best_size));
+    return npg_record_get(record, "inside.best", p->best, p->best_size);
 }
 
 /* While new frames are opened the fit over all vertices waits: nothing that could be gone on from. */
