@@ -1,4 +1,4 @@
-# The Debian package: made by CPack, unpacked into a folder, run from there; its list of dependencies is complete.
+# The Debian package, as samples/guide/technical_directors.md has it: made by CPack, unpacked into a folder, run from there; its list of dependencies is complete.
 
 setup_file() {
     build=$(dirname "$NEUPIG")

@@ -1,4 +1,4 @@
-# The Python module: installed without the network into an environment of its own, then its tests.
+# The Python module, installed as its README.md says (without the network, into an environment of its own), then its tests.
 
 python=/usr/bin/python3
 
