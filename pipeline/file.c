@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
@@ -35,6 +36,38 @@ static void print_path(char *path, const char *folder, const char *name)
     size_t length = strlen(folder);
     const char *slash = length && folder[length - 1] == '/' ? "" : "/";
     snprintf(path, path_size(folder, name), "%s%s%s", folder, slash, name);
+}
+
+npg_status npg_path_of(char path[NPG_PATH_SIZE], const char *folder, const char *name)
+{
+    size_t length = strlen(folder);
+    const char *slash = length && folder[length - 1] == '/' ? "" : "/";
+    if (snprintf(path, NPG_PATH_SIZE, "%s%s%s", folder, slash, name) < NPG_PATH_SIZE) return NPG_OK;
+    return npg_error(NPG_USAGE, "%s: the name is too long", folder);
+}
+
+npg_status npg_file_remove(const char *folder, const char *name)
+{
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, folder, name));
+    if (!unlink(path) || errno == ENOENT) return NPG_OK;
+    return npg_error_errno(NPG_DISK, "can't remove %s", path);
+}
+
+npg_status npg_file_lock(int *fd, const char *folder, const char *name, bool waits)
+{
+    char path[NPG_PATH_SIZE];
+    *fd = -1;
+    NPG_TRY(npg_make_folder(folder));
+    NPG_TRY(npg_path_of(path, folder, name));
+    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (*fd < 0) return npg_error_errno(NPG_DISK, "can't open %s", path);
+    while (flock(*fd, waits ? LOCK_EX : LOCK_EX | LOCK_NB)) {
+        if (errno == EINTR) continue;
+        if (waits) return npg_error_errno(NPG_DISK, "can't lock %s", path);
+        return npg_error(NPG_USAGE, "another run is at work on %s", folder);
+    }
+    return NPG_OK;
 }
 
 npg_status npg_join_path(char **out, const char *folder, const char *name)
@@ -84,11 +117,8 @@ bool npg_is_there(const char *path)
 
 bool npg_is_in_folder(const char *folder, const char *name)
 {
-    char *path;
-    if (npg_join_path(&path, folder, name)) return false;
-    bool is_there = npg_is_there(path);
-    npg_release(&path);
-    return is_there;
+    char path[NPG_PATH_SIZE];
+    return !npg_path_of(path, folder, name) && npg_is_there(path);
 }
 
 /* The folder part of a path, "." where there is none. */

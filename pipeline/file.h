@@ -53,7 +53,18 @@ npg_status npg_folder_is_own(const char *folder);
 /* Make a folder and its parents. */
 npg_status npg_make_folder(const char *path);
 
-/* "<folder>/<name>", to be given to npg_release(). */
+/* "<folder>/<name>".  NPG_USAGE where it is longer than the system takes. */
+#define NPG_PATH_SIZE 4096
+npg_status npg_path_of(char path[NPG_PATH_SIZE], const char *folder, const char *name);
+
+/* Remove a file of a folder, if it is there.  NPG_DISK. */
+npg_status npg_file_remove(const char *folder, const char *name);
+
+/* Make folder and file where they are not there, and lock it as long as *fd is open (-1: it is not).  NPG_USAGE where
+ * another process has it locked, unless this one waits; NPG_DISK. */
+npg_status npg_file_lock(int *fd, const char *folder, const char *name, bool waits);
+
+/* A path, to be given to npg_release(). */
 npg_status npg_join_path(char **out, const char *folder, const char *name);
 
 /* All of the bytes to a place of an open file, and back; whatever signals come between.  *size gets how many

@@ -210,3 +210,21 @@ npg_status npg_file_check(const json_t *entry, const char *output, const char *f
     json_decref(now);
     return status == NPG_DISK ? NPG_BAD_INPUT : status;
 }
+
+json_t *npg_json_in(const char *folder, const char *name)
+{
+    char path[NPG_PATH_SIZE];
+    return npg_path_of(path, folder, name) ? NULL : json_load_file(path, 0, NULL);
+}
+
+json_t *npg_json_at(const json_t *object, const char *names)
+{
+    char name[64];
+    for (const char *at = names; *at && object; at += *at == '.') {
+        size_t length = strcspn(at, ".");
+        snprintf(name, sizeof name, "%.*s", (int)length, at);
+        object = json_object_get(object, name);
+        at += length;
+    }
+    return (json_t *)object;
+}

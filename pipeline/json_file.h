@@ -21,6 +21,12 @@ npg_status npg_json_parse(json_t **root, char *text, const char *place);
  * lost.  NULL gives null. */
 json_t *npg_json_text(const char *text);
 
+/* The JSON file of a folder; NULL where there is none, or none that can be read. */
+json_t *npg_json_in(const char *folder, const char *name);
+
+/* What lies in objects in each other ("stages.evaluate.topology"): a loan, NULL where it is not there. */
+json_t *npg_json_at(const json_t *object, const char *names);
+
 /* A JSON number, or null for one that is not finite. */
 json_t *npg_json_real(double value);
 

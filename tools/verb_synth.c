@@ -88,10 +88,9 @@ static npg_status make_folders(const settings *s)
 {
     const char *const kinds[] = {s->rig ? "rig" : "points", "truth"};
     for (int i = 0; i < 2; i++) {
-        char *path;
-        NPG_TRY(npg_join_path(&path, s->output, kinds[i]));
+        char path[NPG_PATH_SIZE];
+        NPG_TRY(npg_path_of(path, s->output, kinds[i]));
         npg_status status = npg_make_folder(path);
-        npg_release(&path);
         NPG_TRY(status);
     }
     return NPG_OK;
@@ -161,12 +160,11 @@ static npg_status write_points(const settings *s, const npg_scan *capture, const
 
 static npg_status write_images(const settings *s, const npg_scan *capture, const moving *f, int64_t t)
 {
-    char *folder;
-    NPG_TRY(npg_join_path(&folder, s->output, "rig"));
+    char folder[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(folder, s->output, "rig"));
     npg_status status = t ? NPG_OK : npg_synth_rig_begin(folder, capture);
     if (!status)
         status = npg_synth_rig_frame(folder, capture, f->mesh, f->body.rest, t, 0.001 * s->depth_noise_mm);
-    npg_release(&folder);
     return status;
 }
 

@@ -15,8 +15,6 @@
 #include "pipeline/json_file.h"
 #include "pipeline/struct_size.h"
 
-#define PATH_SIZE 4096
-
 typedef struct moment { /* a solved frame */
     bool is_there;
     int64_t index, number;
@@ -47,15 +45,9 @@ typedef struct applying {
 
 /* ---- the job ---- */
 
-static npg_status path_of(char path[PATH_SIZE], const char *folder, const char *name)
-{
-    if ((size_t)snprintf(path, PATH_SIZE, "%s/%s", folder, name) < PATH_SIZE) return NPG_OK;
-    return npg_error(NPG_USAGE, "%s: the name is too long", folder);
-}
-
 static npg_status check_job(applying *a)
 {
-    char path[PATH_SIZE];
+    char path[NPG_PATH_SIZE];
     static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
                                          "job/job.json"};
     bool is_job = false;
@@ -65,7 +57,7 @@ static npg_status check_job(applying *a)
     if (!npg_is_in_folder(a->s->job, "done.json") || !npg_is_in_folder(a->s->job, "frames.jsonl"))
         return npg_error(NPG_BAD_INPUT, "%s: the run is not finished (there is no %s); run it again first",
                          a->s->job, npg_is_in_folder(a->s->job, "done.json") ? "frames.jsonl" : "done.json");
-    NPG_TRY(path_of(path, a->s->job, "done.json"));
+    NPG_TRY(npg_path_of(path, a->s->job, "done.json"));
     json_error_t error;
     int fd;
     NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
@@ -106,18 +98,18 @@ static int64_t file_size(const char *path)
 
 static npg_status each_line(const applying *a, npg_json_line_visit *visit, void *user)
 {
-    char path[PATH_SIZE];
-    NPG_TRY(path_of(path, a->s->job, "frames.jsonl"));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, a->s->job, "frames.jsonl"));
     return npg_json_lines_each(path, file_size(path), visit, user);
 }
 
 static npg_status open_job(applying *a)
 {
-    char path[PATH_SIZE];
+    char path[NPG_PATH_SIZE];
     NPG_TRY(check_job(a));
     NPG_TRY(each_line(a, count_line, a));
     if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->s->job);
-    NPG_TRY(path_of(path, a->s->job, "reference.ply"));
+    NPG_TRY(npg_path_of(path, a->s->job, "reference.ply"));
     return npg_read_mesh(&a->reference, path, &a->origin);
 }
 
@@ -138,12 +130,12 @@ static npg_status copy_positions(const applying *a, float *vert_pos, const npg_m
 
 static npg_status read_moment(const applying *a, moment *m, const char *file)
 {
-    char path[PATH_SIZE];
+    char path[NPG_PATH_SIZE];
     npg_origin origin = a->origin;
     npg_mesh *mesh;
     if (!npg_path_stays(file))
         return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names %s, which is not in the job", a->s->job, file);
-    NPG_TRY(path_of(path, a->s->job, file));
+    NPG_TRY(npg_path_of(path, a->s->job, file));
     NPG_TRY(npg_read_mesh(&mesh, path, &origin));
     npg_status status = copy_positions(a, m->vert_pos, mesh, path);
     npg_mesh_unref(&mesh);
@@ -207,13 +199,13 @@ static bool is_own_name(const applying *a, const char *name)
 /* Remove the mesh files of this prefix, or without overwrite refuse the first. */
 static npg_status clear_files(const applying *a)
 {
-    char path[PATH_SIZE];
+    char path[NPG_PATH_SIZE];
     npg_status status = NPG_OK;
     DIR *folder = opendir(a->s->output);
     if (!folder) return npg_error_errno(NPG_DISK, "can't list %s", a->s->output);
     for (struct dirent *entry; !status && (entry = readdir(folder));) {
         if (!is_own_name(a, entry->d_name)) continue;
-        status = path_of(path, a->s->output, entry->d_name);
+        status = npg_path_of(path, a->s->output, entry->d_name);
         if (!status && !a->s->overwrite)
             status = npg_error(NPG_USAGE,
                                "%s lies there already and would mix with the new files: "
@@ -239,12 +231,12 @@ static void choose_names(applying *a)
 
 static npg_status open_output(applying *a)
 {
-    char path[PATH_SIZE];
+    char path[NPG_PATH_SIZE];
     choose_names(a);
     NPG_TRY(npg_folder_probe(a->s->output));
     if (npg_is_in_folder(a->s->output, "frames.jsonl") || npg_is_in_folder(a->s->output, "job"))
         return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", a->s->output);
-    NPG_TRY(path_of(path, a->s->output, "done.json"));
+    NPG_TRY(npg_path_of(path, a->s->output, "done.json"));
     if (!a->s->overwrite) NPG_TRY(clear_files(a));
     if (unlink(path) && errno != ENOENT) return npg_error_errno(NPG_DISK, "can't remove %s", path);
     if (a->s->overwrite) NPG_TRY(clear_files(a)); /* after done.json: what is left can't pass for whole */
@@ -271,7 +263,7 @@ static npg_status list_file(applying *a, const char *name)
 /* The carried mesh as it is when the reference's vertices are at vert_pos. */
 static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
 {
-    char name[NPG_MESH_NAME_SIZE], path[PATH_SIZE];
+    char name[NPG_MESH_NAME_SIZE], path[NPG_PATH_SIZE];
     const npg_mesh *mesh = a->carried;
     NPG_TRY(npg_attach_move(a->attachment, vert_pos, a->pos, a->turns_normals ? a->normals : NULL));
     if (!a->turns_normals && a->normals) {
@@ -287,7 +279,7 @@ static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
                           .vert_colours = mesh->vert_colours,
                           .vert_uvs = mesh->vert_uvs};
     npg_mesh_name(name, &a->names, number);
-    NPG_TRY(path_of(path, a->s->output, name));
+    NPG_TRY(npg_path_of(path, a->s->output, name));
     NPG_TRY(a->is_like ? npg_write_obj_like(path, a->s->mesh, &view) : npg_write_mesh(path, &view));
     NPG_TRY(list_file(a, name));
     a->applied->frames++;
@@ -376,8 +368,8 @@ static npg_status write_done(applying *a)
     free(text);
     NPG_TRY(status);
     status = npg_file_commit(&a->done);
-    char path[PATH_SIZE];
-    if (status && path_of(path, a->s->output, "done.json") == NPG_OK)
+    char path[NPG_PATH_SIZE];
+    if (status && npg_path_of(path, a->s->output, "done.json") == NPG_OK)
         unlink(path); /* whole it may be, but what fails at its last step is not done */
     return status;
 }

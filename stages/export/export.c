@@ -98,19 +98,18 @@ static bool is_same_file(const char *a, const char *b)
 /* The results must not land among the frames they are made of. */
 static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
 {
-    char *folder, *meshes;
+    char *folder, meshes[NPG_PATH_SIZE];
     const char *output = output_of(worker), *slash = frame->path ? strrchr(frame->path, '/') : NULL;
     if (!slash || slash == frame->path) return NPG_OK;
     NPG_TRY(npg_copy_text(&folder, frame->path));
     folder[slash - frame->path] = 0;
-    npg_status status = npg_join_path(&meshes, output, "meshes");
+    npg_status status = npg_path_of(meshes, output, "meshes");
     if (!status && is_same_file(folder, meshes))
         status = npg_error(NPG_USAGE,
                            "%s is an input, and this run's meshes would be written over it: "
                            "choose another output folder than %s",
                            frame->path, output);
     npg_release(&folder);
-    npg_release(&meshes);
     return status;
 }
 
@@ -120,10 +119,9 @@ static npg_status check_reference(const npg_worker *worker)
     static const char *const names[] = {"reference.ply", "reference.obj"};
     const char *reference = npg_worker_settings(worker)->reference;
     for (size_t i = 0; reference[0] && i < sizeof names / sizeof *names; i++) {
-        char *path;
-        NPG_TRY(npg_join_path(&path, output_of(worker), names[i]));
+        char path[NPG_PATH_SIZE];
+        NPG_TRY(npg_path_of(path, output_of(worker), names[i]));
         bool is_ours = is_same_file(path, reference);
-        npg_release(&path);
         if (is_ours)
             return npg_error(NPG_USAGE,
                              "option reference: %s lies where this run writes: "
@@ -267,7 +265,7 @@ static npg_status write_mesh(npg_worker *worker, const char *file, const float *
     export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_mesh *reference = facts->reference;
-    char *path;
+    char path[NPG_PATH_SIZE];
     npg_place_points(&state->map, state->vert_world, &facts->box, vert_unit, reference->vert_count);
     if (with_normals) {
         npg_mesh_vertex_normals(state->vert_normals, vert_unit, reference->vert_count, reference->faces,
@@ -282,10 +280,8 @@ static npg_status write_mesh(npg_worker *worker, const char *file, const float *
                           .vert_colours = vert_colours ? vert_colours : reference->vert_colours,
                           .vert_uvs = reference->vert_uvs,
                           .turns_faces = state->map.is_mirror};
-    NPG_TRY(npg_join_path(&path, output_of(worker), file));
-    npg_status status = like ? npg_write_obj_like(path, like, &view) : npg_write_mesh(path, &view);
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_path_of(path, output_of(worker), file));
+    return like ? npg_write_obj_like(path, like, &view) : npg_write_mesh(path, &view);
 }
 
 /* Once the reference mesh is known: buffers, the faces as all files have them, reference.ply. */
@@ -490,10 +486,9 @@ static npg_status check_own(const npg_worker *worker)
     static const char *const names[] = {"meshes", "obj", "volumes", "latents"};
     npg_status status = NPG_OK;
     for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++) {
-        char *folder;
-        NPG_TRY(npg_join_path(&folder, output_of(worker), names[i]));
+        char folder[NPG_PATH_SIZE];
+        NPG_TRY(npg_path_of(folder, output_of(worker), names[i]));
         status = npg_folder_is_own(folder);
-        npg_release(&folder);
     }
     return status;
 }

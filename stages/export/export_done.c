@@ -33,10 +33,10 @@ static npg_status write_file_entry(npg_file *file, const char *output, const cha
  * of the list that has them. */
 static npg_status write_entries(npg_file *file, const char *output, const char *list_name, bool *is_first)
 {
-    char *path, *line = NULL;
+    char *line = NULL, path[NPG_PATH_SIZE];
     size_t capacity = 0;
     npg_status status = NPG_OK;
-    NPG_TRY(npg_join_path(&path, output, list_name));
+    NPG_TRY(npg_path_of(path, output, list_name));
     FILE *list = fopen(path, "re");
     if (!list) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     while (!status && getline(&line, &capacity, list) > 0) {
@@ -54,7 +54,6 @@ static npg_status write_entries(npg_file *file, const char *output, const char *
     if (list && !status && ferror(list)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     if (list) fclose(list);
     free(line);
-    npg_release(&path);
     return status;
 }
 
@@ -79,10 +78,10 @@ static npg_status write_done(npg_file *file, const char *output, const json_t *h
 /* The frame log is what an interrupted run is resumed from: it goes when nothing is left to resume. */
 npg_status npg_done_write(const char *output, json_t *head, bool has_exports)
 {
-    char *path = NULL, *log = NULL;
+    char path[NPG_PATH_SIZE], log[NPG_PATH_SIZE];
     npg_file *file = NULL;
-    npg_status status = npg_join_path(&path, output, "done.json");
-    if (!status) status = npg_join_path(&log, output, NPG_FRAME_LOG_NAME);
+    npg_status status = npg_path_of(path, output, "done.json");
+    if (!status) status = npg_path_of(log, output, NPG_FRAME_LOG_NAME);
     if (!status) status = npg_file_open(&file, path);
     if (!status) status = write_done(file, output, head, has_exports);
     if (!status) {
@@ -92,8 +91,6 @@ npg_status npg_done_write(const char *output, json_t *head, bool has_exports)
         npg_file_discard(&file);
     }
     if (!status && unlink(log) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", log);
-    npg_release(&path);
-    npg_release(&log);
     json_decref(head);
     return status;
 }

@@ -30,17 +30,16 @@ int npg_number_width(int64_t number_max)
 npg_status npg_folder_probe(const char *output)
 {
     static const char zeros[4096];
-    char *path;
+    char path[NPG_PATH_SIZE];
     npg_file *file;
     NPG_TRY(npg_make_folder(output));
-    NPG_TRY(npg_join_path(&path, output, ".write-test"));
+    NPG_TRY(npg_path_of(path, output, ".write-test"));
     npg_status status = npg_file_open(&file, path);
     if (!status) {
         for (size_t i = 0; i < PROBE_BYTES / sizeof zeros; i++) npg_file_write(file, zeros, sizeof zeros);
         status = npg_file_commit(&file);
         unlink(path);
     }
-    npg_release(&path);
     return status;
 }
 
@@ -68,16 +67,15 @@ typedef npg_status visit_mesh(void *user, const char *folder, const char *name, 
 
 static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
 {
-    char *folder;
+    char folder[NPG_PATH_SIZE];
     int64_t number;
     npg_status status = NPG_OK;
-    NPG_TRY(npg_join_path(&folder, output, "meshes"));
+    NPG_TRY(npg_path_of(folder, output, "meshes"));
     DIR *listing = opendir(folder);
     if (!listing && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't list %s", folder);
     for (struct dirent *entry; listing && !status && (entry = readdir(listing));)
         if (is_mesh_name(entry->d_name, &number)) status = visit(user, folder, entry->d_name, number);
     if (listing) closedir(listing);
-    npg_release(&folder);
     return status;
 }
 
@@ -114,11 +112,10 @@ static npg_status add_size(void *user, const char *folder, const char *name, int
 {
     uint64_t *sum = user;
     struct stat info;
-    char *path;
+    char path[NPG_PATH_SIZE];
     (void)number;
-    NPG_TRY(npg_join_path(&path, folder, name));
+    NPG_TRY(npg_path_of(path, folder, name));
     if (!stat(path, &info)) *sum += (uint64_t)info.st_size;
-    npg_release(&path);
     return NPG_OK;
 }
 
@@ -138,28 +135,18 @@ npg_status npg_folder_has_room(const char *output, uint64_t bytes)
 
 /* ---- removing ---- */
 
-static npg_status remove_file(const char *folder, const char *name)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = NPG_OK;
-    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    npg_release(&path);
-    return status;
-}
-
 static npg_status remove_mesh(void *user, const char *folder, const char *name, int64_t number)
 {
     (void)user;
     (void)number;
-    return remove_file(folder, name);
+    return npg_file_remove(folder, name);
 }
 
 npg_status npg_folder_clear(const char *output)
 {
     static const char *const names[] = {
         "done.json", "report.json", "frames.jsonl", "frames.partial.jsonl", "reference.ply", "topology.json"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(remove_file(output, names[i]));
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(npg_file_remove(output, names[i]));
     NPG_TRY(npg_exporters_clear(output));
     return each_mesh(output, remove_mesh, NULL);
 }

@@ -224,6 +224,7 @@ int main(int argc, char **argv)
         if (!code && figure.changes) printf("changes at frame %lld\n", (long long)figure.change);
         return code;
     }
-    fputs("neupig-bodies: --body walker|bar|hands|two|gone\n", stderr);
+    fputs("neupig-bodies: --body walker|bar|hands|two|gone [--change FRAME] [options of neupig synth]\n",
+          stderr);
     return 2;
 }

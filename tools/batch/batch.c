@@ -15,14 +15,12 @@
 
 npg_status npg_path_from(char **path, const char *folder, const char *text)
 {
-    char here[PATH_MAX], *joined;
+    char here[PATH_MAX], joined[NPG_PATH_SIZE];
     if (*text == '/') return npg_copy_text(path, text);
     if (*folder == '/') return npg_join_path(path, folder, text);
     if (!getcwd(here, sizeof here)) return npg_error_errno(NPG_FAILED, "the working folder has no name");
-    NPG_TRY(npg_join_path(&joined, here, strcmp(folder, ".") ? folder : ""));
-    npg_status status = npg_join_path(path, joined, text);
-    npg_release(&joined);
-    return status;
+    NPG_TRY(npg_path_of(joined, here, strcmp(folder, ".") ? folder : ""));
+    return npg_join_path(path, joined, text);
 }
 
 /* ---- captures ---- */

@@ -100,13 +100,12 @@ static int by_name(const void *a, const void *b)
 static npg_status is_capture(bool *yes, const npg_batch *batch, const char *name)
 {
     struct stat info, output;
-    char *path;
+    char path[NPG_PATH_SIZE];
     *yes = false;
     if (name[0] == '.') return NPG_OK;
-    NPG_TRY(npg_join_path(&path, batch->path, name));
+    NPG_TRY(npg_path_of(path, batch->path, name));
     if (!stat(path, &info) && S_ISDIR(info.st_mode))
         *yes = stat(batch->output, &output) || output.st_dev != info.st_dev || output.st_ino != info.st_ino;
-    npg_release(&path);
     return NPG_OK;
 }
 

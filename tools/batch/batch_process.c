@@ -87,27 +87,25 @@ static npg_status make_command(command *c, const npg_capture *capture, const cha
 
 static void stat_done(long long facts[3], const npg_capture *capture)
 {
-    char *path;
+    char path[NPG_PATH_SIZE];
     struct stat info;
     memset(facts, 0, 3 * sizeof *facts);
-    if (npg_join_path(&path, capture->output, "done.json")) return;
+    if (npg_path_of(path, capture->output, "done.json")) return;
     if (!stat(path, &info)) {
         facts[0] = (long long)info.st_dev;
         facts[1] = (long long)info.st_ino;
         facts[2] = (long long)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec;
     }
-    npg_release(&path);
 }
 
 static void log_record(const npg_capture *capture, json_t *record)
 {
-    char *path;
+    char path[NPG_PATH_SIZE];
     int fd = -1;
-    if (!npg_join_path(&path, capture->output, "log.jsonl"))
+    if (!npg_path_of(path, capture->output, "log.jsonl"))
         fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
     npg_log_file_write(&fd, record);
     if (fd >= 0) close(fd);
-    npg_release(&path);
 }
 
 static void log_command(const npg_capture *capture, const command *c)
@@ -173,17 +171,16 @@ static void clear(npg_process *p)
 npg_status npg_process_start(npg_process *p, npg_capture *capture)
 {
     command c = {0};
-    char *log_path = NULL;
+    char log_path[NPG_PATH_SIZE];
     *p = (npg_process){.capture = capture, .out = -1, .err = -1, .begun_s = npg_clock_s()};
     npg_status status = npg_make_folder(capture->output);
     if (!status) stat_done(p->done_before, capture);
     if (!status && !p->done_before[1]) status = npg_verdict_remove(capture);
-    if (!status) status = npg_join_path(&log_path, capture->output, "log.jsonl");
+    if (!status) status = npg_path_of(log_path, capture->output, "log.jsonl");
     if (!status) status = make_command(&c, capture, log_path);
     if (!status) log_command(capture, &c);
     if (!status) status = open_pipes(p, &c);
     clear_command(&c);
-    npg_release(&log_path);
     if (status) clear(p);
     return status;
 }

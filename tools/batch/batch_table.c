@@ -25,7 +25,7 @@ typedef struct figures {
 static npg_status add_frame(void *user, const json_t *line, const char *text, size_t size)
 {
     figures *f = user;
-    const json_t *error = json_object_get(json_object_get(line, "figures"), "point_dist_median");
+    const json_t *error = npg_json_at(line, "figures.point_dist_median");
     (void)text, (void)size;
     if (json_is_true(json_object_get(line, "shared"))) return NPG_OK; /* another segment has it as its own */
     f->frames++;
@@ -164,27 +164,13 @@ static npg_status write_json(const npg_batch *batch, const figures *all)
 
 /* ---- all of it ---- */
 
-static npg_status lock(int *fd, const npg_batch *batch)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, batch->output, ".batch.lock"));
-    npg_status status = NPG_OK;
-    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (*fd < 0) status = npg_error_errno(NPG_DISK, "can't open %s", path);
-    while (!status && flock(*fd, LOCK_EX))
-        if (errno != EINTR) status = npg_error_errno(NPG_DISK, "can't lock %s", path);
-    npg_release(&path);
-    return status;
-}
-
 npg_status npg_batch_report(npg_batch *batch, FILE *out)
 {
     npg_arena scratch = {.purpose = NPG_FOR_RUN};
     figures *all = npg_arena_take(&scratch, batch->count, sizeof *all);
     int fd = -1;
     npg_status status = npg_arena_status(&scratch);
-    if (!status) status = npg_make_folder(batch->output);
-    if (!status) status = lock(&fd, batch);
+    if (!status) status = npg_file_lock(&fd, batch->output, ".batch.lock", true);
     if (!status) status = read_all(all, batch);
     if (!status) status = write_json(batch, all);
     if (!status && out) print_table(out, batch, all);

@@ -39,11 +39,9 @@ static void set(npg_verdict *v, const char *word, int exit_code, const char *mes
 static void add_topology(npg_verdict *v, const npg_capture *capture)
 {
     static const char *const directions[] = {"forward", "backward"};
-    char *path;
-    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO || npg_join_path(&path, capture->output, "report.json"))
-        return;
-    json_t *report = json_load_file(path, 0, NULL), *stages = json_object_get(report, "stages");
-    const json_t *topology = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO) return;
+    json_t *report = npg_json_in(capture->output, "report.json");
+    const json_t *topology = npg_json_at(report, "stages.evaluate.topology");
     for (int d = 1; d >= 0; d--) {
         const json_t *alarm = json_object_get(topology, directions[d]);
         if (json_is_object(alarm))
@@ -53,7 +51,6 @@ static void add_topology(npg_verdict *v, const npg_capture *capture)
                      (long long)json_integer_value(json_object_get(alarm, "from_frame")), d ? "back" : "on");
     }
     json_decref(report);
-    npg_release(&path);
 }
 
 void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_stop_cause cause,
@@ -115,7 +112,7 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
 static json_t *json_of_segment(const json_t *entry)
 {
     const char *folder = NULL, *status = NULL;
-    const char *cause = json_string_value(json_object_get(json_object_get(entry, "alarm"), "cause"));
+    const char *cause = json_string_value(npg_json_at(entry, "alarm.cause"));
     json_int_t first = 0, last = 0, keyframe = 0;
     if (json_unpack((json_t *)entry, "{ss sI sI sI ss}", "folder", &folder, "first_frame", &first,
                     "last_frame", &last, "keyframe", &keyframe, "status", &status) ||
@@ -127,10 +124,8 @@ static json_t *json_of_segment(const json_t *entry)
 
 json_t *npg_capture_segments(const npg_capture *capture)
 {
-    char *path;
     if (capture->segments != NPG_BATCH_SEGMENTS_AUTO) return NULL;
-    if (npg_join_path(&path, capture->output, "segments.json")) return NULL;
-    json_t *saved = json_load_file(path, 0, NULL), *list = json_object_get(saved, "segments");
+    json_t *saved = npg_json_in(capture->output, "segments.json"), *list = json_object_get(saved, "segments");
     json_t *segments = json_array_size(list) ? json_array() : NULL;
     for (size_t i = 0; segments && i < json_array_size(list); i++)
         if (json_array_append_new(segments, json_of_segment(json_array_get(list, i)))) {
@@ -138,7 +133,6 @@ json_t *npg_capture_segments(const npg_capture *capture)
             segments = NULL;
         }
     json_decref(saved);
-    npg_release(&path);
     return segments;
 }
 
@@ -171,20 +165,13 @@ npg_status npg_verdict_write(const npg_capture *capture)
 
 npg_status npg_verdict_remove(const npg_capture *capture)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, capture->output, FILE_NAME));
-    npg_status status = NPG_OK;
-    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    npg_release(&path);
-    return status;
+    return npg_file_remove(capture->output, FILE_NAME);
 }
 
 void npg_verdict_read(npg_verdict *v, const npg_capture *capture)
 {
-    char *path;
     memset(v, 0, sizeof *v);
-    if (npg_join_path(&path, capture->output, FILE_NAME)) return;
-    json_t *object = json_load_file(path, 0, NULL);
+    json_t *object = npg_json_in(capture->output, FILE_NAME);
     const char *word = json_string_value(json_object_get(object, "verdict"));
     const char *message = json_string_value(json_object_get(object, "message"));
     if (word) {
@@ -194,5 +181,4 @@ void npg_verdict_read(npg_verdict *v, const npg_capture *capture)
         v->peak_bytes = (size_t)json_integer_value(json_object_get(object, "peak_memory_bytes"));
     }
     json_decref(object);
-    npg_release(&path);
 }

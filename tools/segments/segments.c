@@ -90,17 +90,15 @@ static npg_status set_number(npg_options *options, const char *name, int64_t val
 /* What makes the options of the whole those of a segment. */
 static npg_status set_segment_options(npg_options *options, const npg_segments *s, const npg_segment *segment)
 {
-    char *frames, *path;
+    char *frames, path[NPG_PATH_SIZE];
     if (!strcmp(segment->folder, ".")) return npg_options_set(options, "alarm", "split");
     NPG_TRY(frames_text(&frames, s, options, segment->first - segment->shared_first,
                         segment->last + segment->shared_last));
     npg_status status = npg_options_set(options, "frames", frames);
     npg_release(&frames);
     NPG_TRY(status);
-    NPG_TRY(npg_segment_path(&path, s, segment));
-    status = npg_options_set(options, "output", path);
-    npg_release(&path);
-    NPG_TRY(status);
+    NPG_TRY(npg_segment_path(path, s, segment));
+    NPG_TRY(npg_options_set(options, "output", path));
     NPG_TRY(set_number(options, "shared-first", segment->shared_first));
     NPG_TRY(set_number(options, "shared-last", segment->shared_last));
     NPG_TRY(set_number(options, "keyframe", segment->keyframe));
@@ -112,13 +110,11 @@ static npg_status set_segment_options(npg_options *options, const npg_segments *
 static npg_status refuse_link(const npg_segments *s, const npg_options *options, const char *name)
 {
     npg_settings settings;
-    char *folder;
+    char folder[NPG_PATH_SIZE];
     npg_options_fill(options, npg_run_options, &settings);
     if (!settings.confine || !strcmp(name, ".")) return NPG_OK;
-    NPG_TRY(npg_join_path(&folder, s->output, name));
-    npg_status status = npg_folder_is_own(folder);
-    npg_release(&folder);
-    return status;
+    NPG_TRY(npg_path_of(folder, s->output, name));
+    return npg_folder_is_own(folder);
 }
 
 static npg_status run_segment(const npg_segments *s, const npg_segment *segment, const npg_options *options,
@@ -142,17 +138,10 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
 
 static npg_status read_topology(json_t **topology, const npg_segments *s, const npg_segment *segment)
 {
-    char *folder, *path;
-    json_error_t error;
-    *topology = NULL;
-    NPG_TRY(npg_segment_path(&folder, s, segment));
-    npg_status status = npg_join_path(&path, folder, "topology.json");
-    npg_release(&folder);
-    NPG_TRY(status);
-    *topology = json_load_file(path, 0, &error);
-    if (!*topology) status = npg_error(NPG_DISK, "can't read back %s: %s", path, error.text);
-    npg_release(&path);
-    return status;
+    char folder[NPG_PATH_SIZE];
+    NPG_TRY(npg_segment_path(folder, s, segment));
+    *topology = npg_json_in(folder, "topology.json");
+    return *topology ? NPG_OK : npg_error(NPG_DISK, "can't read back %s/topology.json", folder);
 }
 
 static int64_t min_of(int64_t a, int64_t b)
@@ -248,21 +237,6 @@ static npg_status load_or_begin(npg_segments *s, const npg_options *options)
     return npg_segments_insert(s, 0, &whole);
 }
 
-static npg_status take_lock(int *fd, const char *output)
-{
-    char *path;
-    NPG_TRY(npg_make_folder(output));
-    NPG_TRY(npg_join_path(&path, output, ".segments.lock"));
-    npg_status status = NPG_OK;
-    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (*fd < 0)
-        status = npg_error_errno(NPG_DISK, "can't open %s", path);
-    else if (flock(*fd, LOCK_EX | LOCK_NB))
-        status = npg_error(NPG_USAGE, "another run is at work on %s", output);
-    npg_release(&path);
-    return status;
-}
-
 static npg_status run_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
     bool is_partial = false;
@@ -284,7 +258,7 @@ npg_status npg_segments_run(const npg_options *options, npg_reporter *reporter)
     if (!input[0] || !strcmp(input, "-"))
         status =
             npg_error(NPG_USAGE, "segments = auto reads frames again; a live source can't give them again");
-    if (!status) status = take_lock(&lock, s.output);
+    if (!status) status = npg_file_lock(&lock, s.output, ".segments.lock", false);
     if (!status) status = run_all(&s, options, reporter);
     if (lock >= 0) close(lock);
     npg_segments_clear(&s);

@@ -59,8 +59,8 @@ typedef struct npg_segments {
 
 void npg_segments_clear(npg_segments *s);
 
-/* The folder's path, to npg_release(). */
-npg_status npg_segment_path(char **path, const npg_segments *s, const npg_segment *segment);
+/* The folder's path (of NPG_PATH_SIZE). */
+npg_status npg_segment_path(char *path, const npg_segments *s, const npg_segment *segment);
 
 int64_t npg_segment_number(const npg_segments *s, int64_t place);
 

@@ -23,10 +23,9 @@ void npg_segments_clear(npg_segments *s)
     npg_frame_files_close(&s->frames);
 }
 
-npg_status npg_segment_path(char **path, const npg_segments *s, const npg_segment *segment)
+npg_status npg_segment_path(char *path, const npg_segments *s, const npg_segment *segment)
 {
-    if (!strcmp(segment->folder, ".")) return npg_copy_text(path, s->output);
-    return npg_join_path(path, s->output, segment->folder);
+    return npg_path_of(path, s->output, strcmp(segment->folder, ".") ? segment->folder : "");
 }
 
 int64_t npg_segment_number(const npg_segments *s, int64_t place)
@@ -83,9 +82,9 @@ static bool is_of_these(const npg_segments *s, const json_t *saved)
 
 static npg_status load(npg_segments *s, const char *name)
 {
-    char *path;
+    char path[NPG_PATH_SIZE];
     json_error_t error;
-    NPG_TRY(npg_join_path(&path, s->output, name));
+    NPG_TRY(npg_path_of(path, s->output, name));
     npg_status status = NPG_OK;
     json_t *saved = npg_is_there(path) ? json_load_file(path, 0, &error) : json_null();
     if (!saved)
@@ -100,7 +99,6 @@ static npg_status load(npg_segments *s, const char *name)
                            "give --restart to discard what is there, or choose another output folder",
                            s->output);
     json_decref(saved);
-    npg_release(&path);
     return status;
 }
 
@@ -110,25 +108,13 @@ npg_status npg_segments_load(npg_segments *s)
     return s->count ? NPG_OK : load(s, WHOLE);
 }
 
-/* NULL where there is none, or none that can be read. */
-static json_t *read_in(const char *folder, const char *name)
-{
-    char *path;
-    if (npg_join_path(&path, folder, name)) return NULL;
-    json_t *saved = json_load_file(path, 0, NULL);
-    npg_release(&path);
-    return saved;
-}
-
 bool npg_segments_was_alarmed(const npg_segments *s)
 {
-    json_t *done = read_in(s->output, "done.json"), *report = read_in(s->output, "report.json");
-    const char *mode = json_string_value(json_object_get(json_object_get(done, "options"), "alarm"));
-    const json_t *stages = json_object_get(report, "stages"),
-                 *saved = json_object_get(json_object_get(stages, "evaluate"), "topology");
+    json_t *done = npg_json_in(s->output, "done.json"), *report = npg_json_in(s->output, "report.json");
+    const char *mode = json_string_value(npg_json_at(done, "options.alarm"));
     bool was = mode && !strcmp(mode, "report") &&
-               (json_is_object(json_object_get(saved, "forward")) ||
-                json_is_object(json_object_get(saved, "backward")));
+               (json_is_object(npg_json_at(report, "stages.evaluate.topology.forward")) ||
+                json_is_object(npg_json_at(report, "stages.evaluate.topology.backward")));
     json_decref(done);
     json_decref(report);
     return was;
@@ -138,11 +124,9 @@ bool npg_segments_was_alarmed(const npg_segments *s)
 
 static npg_status remove_in(const char *folder, const char *name)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = npg_folder_remove(path);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, folder, name));
+    return npg_folder_remove(path);
 }
 
 /* ---- other verbs ---- */
@@ -155,7 +139,7 @@ static bool is_part(const char *folder)
     bool found = false;
     if (slash && slash > real && !npg_copy_text(&above, real)) {
         above[slash - real] = 0;
-        json_t *saved = read_in(above, WHOLE);
+        json_t *saved = npg_json_in(above, WHOLE);
         const json_t *list = json_object_get(saved, "segments");
         for (size_t i = 0; i < json_array_size(list); i++) {
             const char *name = json_string_value(json_object_get(json_array_get(list, i), "folder"));
@@ -183,7 +167,7 @@ static void describe_segments(char *text, size_t size, const json_t *list, const
 
 npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone)
 {
-    json_t *saved = read_in(folder, WHOLE), *open = read_in(folder, PARTIAL);
+    json_t *saved = npg_json_in(folder, WHOLE), *open = npg_json_in(folder, PARTIAL);
     const json_t *list = json_object_get(open ? open : saved, "segments");
     npg_status status = NPG_OK;
     char text[512];
@@ -213,7 +197,7 @@ npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alo
 
 npg_status npg_segments_drop_outdated(const char *output)
 {
-    json_t *saved = read_in(output, WHOLE), *done = read_in(output, "done.json");
+    json_t *saved = npg_json_in(output, WHOLE), *done = npg_json_in(output, "done.json");
     bool is_old = saved && number_in(saved, "frames") != number_in(done, "frames");
     json_decref(saved);
     json_decref(done);
@@ -256,10 +240,9 @@ npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment)
     if (strcmp(segment->folder, ".") != 0) return remove_in(s->output, segment->folder);
     NPG_TRY(remove_in(s->output, "job"));
     NPG_TRY(npg_folder_clear(s->output));
-    char *meshes;
-    NPG_TRY(npg_join_path(&meshes, s->output, "meshes"));
+    char meshes[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(meshes, s->output, "meshes"));
     rmdir(meshes); /* stays where it holds files of others */
-    npg_release(&meshes);
     return remove_in(s->output, "topology.json");
 }
 
@@ -277,37 +260,24 @@ npg_status npg_segments_remove(const npg_segments *s)
 /* What a reader wants to know of a segment without opening its folder. */
 static npg_status add_report(json_t *entry, const npg_segments *s, const npg_segment *segment)
 {
-    char *folder, *path = NULL;
-    NPG_TRY(npg_segment_path(&folder, s, segment));
-    npg_status status = npg_join_path(&path, folder, "report.json");
-    npg_release(&folder);
-    NPG_TRY(status);
-    json_t *report = json_load_file(path, 0, NULL), *stages = json_object_get(report, "stages");
-    if (!report) status = npg_error(NPG_DISK, "can't read back %s", path);
-    npg_release(&path);
+    char folder[NPG_PATH_SIZE];
+    NPG_TRY(npg_segment_path(folder, s, segment));
+    json_t *report = npg_json_in(folder, "report.json");
+    if (!report) return npg_error(NPG_DISK, "can't read back %s/report.json", folder);
     json_object_set(entry, "status", json_object_get(report, "status"));
-    json_object_set(entry, "keyframe",
-                    json_object_get(json_object_get(json_object_get(stages, "keyframe"), "key"), "number"));
-    json_object_set(entry, "topology", json_object_get(json_object_get(stages, "evaluate"), "topology"));
+    json_object_set(entry, "keyframe", npg_json_at(report, "stages.keyframe.key.number"));
+    json_object_set(entry, "topology", npg_json_at(report, "stages.evaluate.topology"));
     json_decref(report);
-    return status;
+    return NPG_OK;
 }
 
 /* What is there and says the same stays as it is: a capture that was done is not touched. */
 static npg_status write_if_new(const npg_segments *s, const char *name, const json_t *value)
 {
-    json_t *before = read_in(s->output, name);
+    json_t *before = npg_json_in(s->output, name);
     bool is_same = before && json_equal(before, value);
     json_decref(before);
     return is_same ? NPG_OK : npg_json_write(s->output, name, value);
-}
-
-static void remove_done(const npg_segments *s)
-{
-    char *path;
-    if (npg_join_path(&path, s->output, "done.json")) return;
-    unlink(path);
-    npg_release(&path);
 }
 
 static npg_status write_done(const npg_segments *s, bool is_partial)
@@ -325,7 +295,8 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
                              is_partial ? "partial" : "ok", "exit_code", is_partial ? 7 : 0, "frames",
                              (json_int_t)s->frames->count, "segments", (json_int_t)s->count, "files", files);
     if (!status) status = write_if_new(s, "done.json", done);
-    if (status) remove_done(s); /* whole it may be, but what fails at its last step is not done */
+    /* whole it may be, but what fails at its last step is not done */
+    if (status) npg_file_remove(s->output, "done.json");
     json_decref(done);
     return status;
 }

@@ -57,12 +57,10 @@ static json_t *json_of_camera(const npg_synth_camera *c, int64_t i)
 
 static npg_status make_folder(const char *folder, int64_t i)
 {
-    char name[32], *path;
+    char name[32], path[NPG_PATH_SIZE];
     snprintf(name, sizeof name, "camera%lld", (long long)i);
-    NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = npg_make_folder(path);
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_path_of(path, folder, name));
+    return npg_make_folder(path);
 }
 
 npg_status npg_synth_rig_begin(const char *folder, const npg_scan *capture)

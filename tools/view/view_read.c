@@ -32,16 +32,15 @@ npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *fra
 {
     npg_origin origin = frames->part->origin;
     npg_mesh *mesh = NULL;
-    char *path;
+    char path[NPG_PATH_SIZE];
     if (!frame->file) return NPG_OK;
     if (!npg_path_stays(frame->file))
         return npg_error(NPG_BAD_INPUT, "%s: its list of frames names %s, which is not in it",
                          frames->part->folder, frame->file);
-    NPG_TRY(npg_join_path(&path, frames->part->folder, frame->file));
+    NPG_TRY(npg_path_of(path, frames->part->folder, frame->file));
     npg_status status = npg_read_mesh(&mesh, path, &origin);
     if (!status) status = take_mesh(frames, mesh, path);
     npg_mesh_unref(&mesh);
-    npg_release(&path);
     return status;
 }
 

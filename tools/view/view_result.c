@@ -24,13 +24,12 @@ enum {
 
 npg_status npg_view_load_json(json_t **out, const char *folder, const char *name)
 {
-    char *path, *text = NULL;
+    char *text = NULL, path[NPG_PATH_SIZE];
     *out = NULL;
     if (!npg_is_in_folder(folder, name)) return NPG_OK;
-    NPG_TRY(npg_join_path(&path, folder, name));
+    NPG_TRY(npg_path_of(path, folder, name));
     npg_status status = npg_json_read(out, &text, path, JSON_SIZE_MAX);
     if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
-    npg_release(&path);
     npg_release(&text);
     return status;
 }
@@ -87,8 +86,8 @@ static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_em
     const char *name =
         npg_is_in_folder(part->folder, "frames.jsonl") ? "frames.jsonl" : "frames.partial.jsonl";
     reading r = {part, every};
-    char *path;
-    NPG_TRY(npg_join_path(&path, part->folder, name));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, part->folder, name));
     int64_t size = whole_lines(path);
     npg_status status = size ? npg_json_lines_each(path, size, add_frame, &r) : NPG_OK;
     if (status == NPG_DISK) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
@@ -99,7 +98,6 @@ static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_em
         if (part->frames[i].index == part->frames[i - 1].index)
             status =
                 npg_error(NPG_BAD_INPUT, "%s names frame %lld twice", path, (long long)part->frames[i].index);
-    npg_release(&path);
     return status;
 }
 
@@ -107,12 +105,11 @@ static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_em
 
 static npg_status read_reference(npg_view_part *part, bool may_be_empty)
 {
-    char *path;
+    char path[NPG_PATH_SIZE];
     if (may_be_empty && !npg_is_in_folder(part->folder, "reference.ply")) return NPG_OK;
-    NPG_TRY(npg_join_path(&path, part->folder, "reference.ply"));
+    NPG_TRY(npg_path_of(path, part->folder, "reference.ply"));
     npg_status status = npg_read_mesh(&part->reference, path, &part->origin);
     if (!status) status = npg_mesh_require_finite(part->reference, path);
-    npg_release(&path);
     if (!status) status = npg_view_links_open(&part->links, part->reference);
     if (!status) part->group = GROUP_VERTS / part->reference->vert_count;
     if (part->group < 1) part->group = 1;

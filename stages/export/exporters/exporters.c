@@ -121,20 +121,16 @@ uint64_t npg_exporters_bytes(const npg_export_choice *choice, const npg_export_f
 
 npg_status npg_export_open(npg_file **file, const char *output, const char *name)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, output, name));
-    npg_status status = npg_file_open(file, path);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, output, name));
+    return npg_file_open(file, path);
 }
 
 npg_status npg_export_folder(const char *output, const char *name)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, output, name));
-    npg_status status = npg_make_folder(path);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, output, name));
+    return npg_make_folder(path);
 }
 
 float npg_srgb_to_linear(uint8_t byte)

@@ -68,16 +68,12 @@ static npg_status clear_folder(const char *folder, bool (*is_ours)(const char *n
     DIR *listing = opendir(folder);
     if (!listing) return errno == ENOENT ? NPG_OK : npg_error_errno(NPG_DISK, "can't list %s", folder);
     for (struct dirent *entry; !status && (entry = readdir(listing));) {
-        char name[NAME_MAX + 1], *path;
+        char name[NAME_MAX + 1];
         size_t length = strlen(entry->d_name);
         /* What a killed run left half-written (pipeline/file.h): ".<name>.part". */
         bool is_part = entry->d_name[0] == '.' && length > 6 && !strcmp(entry->d_name + length - 5, ".part");
         snprintf(name, sizeof name, "%.*s", (int)(is_part ? length - 6 : length), entry->d_name + is_part);
-        if (!is_ours(name)) continue;
-        status = npg_join_path(&path, folder, entry->d_name);
-        if (status) break;
-        if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-        npg_release(&path);
+        if (is_ours(name)) status = npg_file_remove(folder, entry->d_name);
     }
     closedir(listing);
     return status;
@@ -93,11 +89,10 @@ npg_status npg_exporters_clear(const char *output)
     static const char *const folders[] = {"obj", "volumes", "latents"};
     npg_status status = clear_folder(output, is_in_output);
     for (size_t i = 0; i < sizeof folders / sizeof *folders && !status; i++) {
-        char *folder;
-        NPG_TRY(npg_join_path(&folder, output, folders[i]));
+        char folder[NPG_PATH_SIZE];
+        NPG_TRY(npg_path_of(folder, output, folders[i]));
         status = clear_folder(folder, is_numbered);
         if (!status) rmdir(folder); /* stays where something else lies in it */
-        npg_release(&folder);
     }
     return status;
 }
@@ -142,12 +137,11 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
 static npg_status each_line(const npg_export_facts *facts, npg_json_line_visit *visit, void *user)
 {
     struct stat info;
-    char *path;
-    NPG_TRY(npg_join_path(&path, facts->output, "frames.jsonl"));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, facts->output, "frames.jsonl"));
     npg_status status = NPG_OK;
     if (stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
     if (!status) status = npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
-    npg_release(&path);
     return status;
 }
 
@@ -166,8 +160,8 @@ static npg_status read_pose(exporters_pass *p, const char *file)
 {
     const npg_export_facts *facts = p->facts;
     npg_origin zero = {.known = true};
-    char *path;
-    NPG_TRY(npg_join_path(&path, facts->output, file));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, facts->output, file));
     npg_mesh_unref(&p->mesh);
     npg_status status = npg_read_mesh(&p->mesh, path, &zero);
     if (!status && (p->mesh->vert_count != facts->vert_count || p->mesh->face_count != facts->face_count ||
@@ -176,7 +170,6 @@ static npg_status read_pose(exporters_pass *p, const char *file)
         status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written: %zu vertices and %zu faces",
                            path, p->mesh->vert_count, p->mesh->face_count);
     if (!status) status = npg_mesh_require_finite(p->mesh, path);
-    npg_release(&path);
     return status;
 }
 

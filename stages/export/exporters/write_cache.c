@@ -108,14 +108,13 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 /* The mesh whose vertices the cache moves. */
 static npg_status write_reference(const npg_export_facts *facts)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, facts->output, "reference.obj"));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, facts->output, "reference.obj"));
     npg_status status = NPG_OK;
     if (!npg_is_there(path)) { /* the other point cache may have made it in this pass */
         status = npg_write_obj_pose(path, facts, facts->rest, NULL, NULL);
         if (!status) status = npg_export_made(facts->log, "obj", "reference.obj", facts->first_index, 1);
     }
-    npg_release(&path);
     return status;
 }
 

@@ -21,17 +21,15 @@ static npg_status save(void *user, const char *path)
 
 static npg_status write_window(const npg_export_facts *facts, const char *folder, int64_t serial)
 {
-    char name[64], file[80], *grids_path = NULL, *path = NULL;
+    char name[64], file[80], path[NPG_PATH_SIZE], grids_path[NPG_PATH_SIZE];
     snprintf(name, sizeof name, "window_%06lld.vdb", (long long)serial);
     snprintf(file, sizeof file, "latents/%s", name);
-    npg_status status = npg_join_path(&grids_path, folder, name);
-    if (!status) status = npg_join_path(&path, facts->output, file);
+    npg_status status = npg_path_of(grids_path, folder, name);
+    if (!status) status = npg_path_of(path, facts->output, file);
     latents l = {grids_path, facts->placement, {0}};
     if (!status) status = npg_vdb_file_write(path, NULL, save, &l);
     if (!status)
         status = npg_export_made(facts->log, "latents", file, l.span.first, l.span.last - l.span.first + 1);
-    npg_release(&grids_path);
-    npg_release(&path);
     return status;
 }
 
@@ -39,13 +37,12 @@ npg_status npg_latents_write(const npg_export_facts *facts)
 {
     int64_t *serials = NULL;
     size_t count = 0;
-    char *folder = NULL;
+    char folder[NPG_PATH_SIZE];
     if (!facts->has_grids) return NPG_OK;
-    npg_status status = npg_join_path(&folder, facts->output, "job");
+    npg_status status = npg_path_of(folder, facts->output, "job");
     if (!status) status = npg_export_folder(facts->output, "latents");
     if (!status) status = npg_folder_numbers(&serials, &count, folder, "window_", "vdb");
     for (size_t i = 0; i < count && !status; i++) status = write_window(facts, folder, serials[i]);
     npg_release(&serials);
-    npg_release(&folder);
     return status;
 }

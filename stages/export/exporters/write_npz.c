@@ -180,7 +180,7 @@ static npg_status check_npz(const npg_export_facts *facts)
 static npg_status open_npz(void *state, const npg_export_facts *facts)
 {
     npz_state *s = state;
-    char *path;
+    char path[NPG_PATH_SIZE];
     s->facts = facts;
     for (int i = 0; i < ARRAYS; i++) {
         array a = describe(i, facts);
@@ -190,9 +190,8 @@ static npg_status open_npz(void *state, const npg_export_facts *facts)
         snprintf(member->name, sizeof member->name, "%s.npy", a.name);
         member->size = HEADER + data_bytes(&a);
     }
-    NPG_TRY(npg_join_path(&path, facts->output, "motion.npz"));
+    NPG_TRY(npg_path_of(path, facts->output, "motion.npz"));
     npg_status status = npg_zip_open(&s->zip, path, s->members, s->member_count, NPG_ZIP_LARGE);
-    npg_release(&path);
     for (int i = 0; i < ARRAYS && !status; i++)
         if (s->at[i] >= 0) status = put_header(s, i);
     return status ? status : put_fixed(s);

@@ -45,11 +45,10 @@ static npg_status open_sequence(void *state, const npg_export_facts *facts)
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
     obj_state *s = state;
-    char file[NPG_MESH_NAME_SIZE + 8] = "obj/", *path;
+    char file[NPG_MESH_NAME_SIZE + 8] = "obj/", path[NPG_PATH_SIZE];
     npg_mesh_name(file + 4, &s->names, pose->number);
-    NPG_TRY(npg_join_path(&path, s->facts->output, file));
+    NPG_TRY(npg_path_of(path, s->facts->output, file));
     npg_status status = npg_write_obj_pose(path, s->facts, pose->pos, pose->normals, pose->colours);
-    npg_release(&path);
     return status ? status : npg_export_made(s->facts->log, "obj", file, pose->index, 1);
 }
 

@@ -68,7 +68,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 {
     vdb_state *s = state;
     const npg_export_facts *facts = s->facts;
-    char file[NPG_MESH_NAME_SIZE + 8] = "volumes/", *path;
+    char file[NPG_MESH_NAME_SIZE + 8] = "volumes/", path[NPG_PATH_SIZE];
     npg_vdb_surface surface = {.points = pose->pos,
                                .vert_count = facts->vert_count,
                                .faces = s->faces,
@@ -80,9 +80,8 @@ static npg_status write_pose(void *state, const npg_pose *pose)
                                .metres_per_unit = facts->metres_per_unit,
                                .is_z_up = facts->is_z_up};
     npg_mesh_name(file + strlen(file), &s->names, pose->number);
-    NPG_TRY(npg_join_path(&path, facts->output, file));
+    NPG_TRY(npg_path_of(path, facts->output, file));
     npg_status status = npg_vdb_file_write(path, NULL, save, &surface);
-    npg_release(&path);
     return status ? status : npg_export_made(facts->log, "vdb", file, pose->index, 1);
 }
 
