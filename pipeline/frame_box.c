@@ -80,12 +80,6 @@ void npg_box_local_to_unit(const npg_frame_box *box, float *unit, const float *l
         unit[i] = (float)(((double)local[i] - box->centre[i % 3]) * box->scale);
 }
 
-void npg_box_unit_to_local(const npg_frame_box *box, float *local, const float *unit, size_t point_count)
-{
-    for (size_t i = 0; i < 3 * point_count; i++)
-        local[i] = (float)((double)unit[i] / box->scale + box->centre[i % 3]);
-}
-
 void npg_box_unit_to_world(const npg_frame_box *box, double *world, const float *unit, size_t point_count)
 {
     for (size_t i = 0; i < 3 * point_count; i++)

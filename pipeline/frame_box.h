@@ -53,7 +53,6 @@ npg_status npg_frame_box_set(npg_frame_box *box, const npg_origin *origin, const
 
 /* N x 3 each; out may be the input. */
 void npg_box_local_to_unit(const npg_frame_box *box, float *unit, const float *local, size_t point_count);
-void npg_box_unit_to_local(const npg_frame_box *box, float *local, const float *unit, size_t point_count);
 void npg_box_unit_to_world(const npg_frame_box *box, double *world, const float *unit, size_t point_count);
 
 #endif

@@ -9,7 +9,7 @@ setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG-bodies" --body bar --frames 9 --points 400 -o capture >synth.log
     # Whether so few points are fitted well, which differs between builds, is no matter here: 7 says they are not.
-    "$NEUPIG" run capture/points -o whole "${small[@]}" "${forms[@]}" >whole.log
+    "$NEUPIG" run capture/points -o whole "${small[@]}" "${forms[@]}" >whole.log || [ $? -eq 7 ]
 }
 
 setup() {
@@ -119,7 +119,7 @@ END
     kill -KILL $pid 2>/dev/null || true
     wait $pid || true
     [ ! -e killed/done.json ]
-    "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}"
+    "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}" || [ $? -eq 7 ]
     grep -q resumed_frames killed/report.json
     for name in motion.pc2 motion.mdd motion.glb motion.usda motion.npz reference.obj exports.jsonl obj volumes latents; do
         diff -r whole/$name killed/$name

@@ -19,14 +19,17 @@ static void large_archives_get_zip64(void **state)
         npg_zip zip;
         char command[1200];
         const char *path = in_folder(&folder, "large.zip");
-        assert_int_equal(npg_zip_open(&zip, path, members, 3, large), NPG_OK);
+        npg_file *file;
+        assert_int_equal(npg_file_open(&file, path), NPG_OK);
+        assert_int_equal(npg_zip_open(&zip, file, members, 3, large), NPG_OK);
         for (int i = 0; i < 300; i++) {
             const char *text = "0123456789";
             if (i < 5) assert_int_equal(npg_zip_put(&zip, 0, text + i, 1), NPG_OK);
             if (i < 7) assert_int_equal(npg_zip_put(&zip, 2, text + i, 1), NPG_OK);
             assert_int_equal(npg_zip_put(&zip, 1, text + i % 10, 1), NPG_OK);
         }
-        assert_int_equal(npg_zip_commit(&zip), NPG_OK);
+        assert_int_equal(npg_zip_finish(&zip), NPG_OK);
+        assert_int_equal(npg_file_commit(&file), NPG_OK);
         snprintf(command, sizeof command,
                  "python3 -c \"import zipfile as z; f=z.ZipFile('%s'); assert f.testzip() is None; "
                  "assert f.read('a.bin')==b'01234' and f.read('b.bin')==b'0123456789'*30 and "
@@ -41,10 +44,13 @@ static void an_archive_that_is_not_full_is_no_file(void **state)
     npg_zip_member members[1] = {{.name = "a", .size = 5}};
     npg_zip zip;
     (void)state;
-    assert_int_equal(npg_zip_open(&zip, in_folder(&folder, "short.zip"), members, 1, NPG_ZIP_LARGE), NPG_OK);
+    npg_file *file;
+    assert_int_equal(npg_file_open(&file, in_folder(&folder, "short.zip")), NPG_OK);
+    assert_int_equal(npg_zip_open(&zip, file, members, 1, NPG_ZIP_LARGE), NPG_OK);
     assert_int_equal(npg_zip_put(&zip, 0, "123456", 6), NPG_USAGE);
     assert_int_equal(npg_zip_put(&zip, 0, "1234", 4), NPG_OK);
-    assert_int_equal(npg_zip_commit(&zip), NPG_USAGE);
+    assert_int_equal(npg_zip_finish(&zip), NPG_USAGE);
+    npg_file_discard(&file);
     assert_false(exists(in_folder(&folder, "short.zip")));
     assert_false(exists(in_folder(&folder, ".short.zip.part")));
 }

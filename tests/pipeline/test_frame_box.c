@@ -19,7 +19,7 @@ static void coordinates_go_there_and_back(void **state)
         npg_origin origin = {0};
         npg_bounds bounds = npg_bounds_empty();
         double world[300];
-        float local[300], unit[300], again[300];
+        float local[300], unit[300];
         for (size_t i = 0; i < 100; i++) { /* 2 m x 1 m x 0.5 m with millimetre detail */
             world[3 * i] = offsets[o] + 0.02 * (double)i;
             world[3 * i + 1] = offsets[o] * 2 + 0.001 * (double)(i * 37 % 1000);
@@ -33,12 +33,10 @@ static void coordinates_go_there_and_back(void **state)
         npg_frame_box box;
         assert_int_equal(npg_frame_box_set(&box, &origin, &bounds), NPG_OK);
         npg_box_local_to_unit(&box, unit, local, 100);
-        npg_box_unit_to_local(&box, again, unit, 100);
         double back[300], most = 0;
         npg_box_unit_to_world(&box, back, unit, 100);
         for (size_t i = 0; i < 300; i++) {
             assert_true(fabs(back[i] - world[i]) < 1e-6);
-            assert_true(fabsf(again[i] - local[i]) < 1e-6f);
             most = fmax(most, fabs((double)unit[i]));
         }
         assert_true(fabs(most - NPG_UNIT_EXTENT) < 1e-6);

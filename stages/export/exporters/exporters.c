@@ -106,6 +106,10 @@ npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export
     for (int i = 0; npg_exporters[i]; i++) {
         if (!choice->is_chosen[i]) continue;
         if (npg_exporters[i]->is_float) NPG_TRY(check_floats(npg_exporters[i], facts));
+        if (npg_exporters[i]->is_indexed && facts->vert_count > INT32_MAX)
+            return npg_error(NPG_USAGE,
+                             "%s can't hold the capture: it counts vertices in 31 bits, and there are %zu",
+                             npg_exporters[i]->name, facts->vert_count);
         if (npg_exporters[i]->check) NPG_TRY(npg_exporters[i]->check(facts));
     }
     return NPG_OK;

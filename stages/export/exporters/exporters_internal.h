@@ -65,18 +65,27 @@ typedef struct npg_pose {
     const uint8_t *colours; /* V x 4 or NULL (has_pose_colours) */
 } npg_pose;
 
-/* An exporter.  state is zeroed before open; close is called after open in any case and removes
- * what is not finished. */
+/* What every state begins with. */
+typedef struct npg_writer {
+    const npg_export_facts *facts;
+    npg_file *file; /* exporter->file, open; written and committed by the pass */
+} npg_writer;
+
+/* An exporter.  state is zeroed but for its npg_writer before open; close is called after open in any case and
+ * removes what is not finished. */
 typedef struct npg_exporter {
     const char *name, *help;
+    const char *file;    /* all poses in one file of this name; NULL: it makes its files itself            */
+    bool is_indexed;     /* counts vertices in 31 bits                                                     */
     bool is_float;       /* keeps positions as float: far from 0 that is too coarse                   */
+    bool with_reference; /* is of no use without OUT/reference.obj                                        */
     bool has_fixed_rate; /* has no times of its own: a frame without a mesh repeats the one before it */
     size_t state_size;
     /* NPG_USAGE when the format can't hold such a capture (vert_count at most, pose_count -1 where unknown).
      * May be NULL. */
     npg_status (*check)(const npg_export_facts *facts);
     uint64_t (*bytes)(const npg_export_facts *facts); /* on disk, about; 0: can't be told */
-    npg_status (*open)(void *state, const npg_export_facts *facts);
+    npg_status (*open)(void *state);
     npg_status (*pose)(void *state, const npg_pose *pose); /* in the order of time */
     npg_status (*finish)(void *state);
     void (*close)(void *state);
@@ -241,7 +250,7 @@ typedef struct npg_zip_member {
 } npg_zip_member;
 
 typedef struct npg_zip {
-    npg_file *file;
+    npg_file *file;          /* a loan */
     npg_zip_member *members; /* a loan */
     size_t count;
     uint64_t large; /* numbers from here on take ZIP64 records: NPG_ZIP_LARGE but in tests */
@@ -249,16 +258,14 @@ typedef struct npg_zip {
 
 #define NPG_ZIP_LARGE UINT64_C(0xffffffff)
 
-/* Begin the file: names and sizes of all members are set.  The last one is the longest for speed. */
-npg_status npg_zip_open(npg_zip *zip, const char *path, npg_zip_member *members, size_t count,
-                        uint64_t large);
+/* Begin an open file: names and sizes of all members are set.  The last one is the longest for speed. */
+npg_status npg_zip_open(npg_zip *zip, npg_file *file, npg_zip_member *members, size_t count, uint64_t large);
 
 /* The next bytes of a member.  Those of the last one go straight to the end of the file. */
 npg_status npg_zip_put(npg_zip *zip, size_t member, const void *data, size_t size);
 
-/* All members must be full.  Closes in any case. */
-npg_status npg_zip_commit(npg_zip *zip);
-void npg_zip_discard(npg_zip *zip);
+/* Write the directory; all members must be full. */
+npg_status npg_zip_finish(npg_zip *zip);
 
 /* ---- scenes to draw: a mesh, or a cloud as small balls, with colours ---- */
 

@@ -205,15 +205,46 @@ static npg_status open_writers(exporters_pass *p)
     for (int i = 0; npg_exporters[i]; i++) {
         if (!p->choice->is_chosen[i]) continue;
         NPG_TRY(npg_alloc(&p->states[i], NPG_FOR_FILES, npg_exporters[i]->state_size));
-        NPG_TRY(npg_exporters[i]->open(p->states[i], p->facts));
+        npg_writer *writer = p->states[i];
+        writer->facts = p->facts;
+        if (npg_exporters[i]->file)
+            NPG_TRY(npg_export_open(&writer->file, p->facts->output, npg_exporters[i]->file));
+        NPG_TRY(npg_exporters[i]->open(writer));
     }
     return NPG_OK;
 }
 
+/* The mesh whose vertices a point cache moves. */
+static npg_status write_reference(const npg_export_facts *facts)
+{
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, facts->output, "reference.obj"));
+    npg_status status = NPG_OK;
+    if (!npg_is_there(path)) { /* the other point cache may have made it in this pass */
+        status = npg_write_obj_pose(path, facts, facts->rest, NULL, NULL);
+        if (!status) status = npg_export_made(facts->log, "obj", "reference.obj", facts->first_index, 1);
+    }
+    return status;
+}
+
+/* The file that holds all poses is whole. */
+static npg_status end_file(const exporters_pass *p, const npg_exporter *exporter, npg_writer *writer)
+{
+    const npg_export_facts *facts = p->facts;
+    int64_t frames = facts->last_index - facts->first_index + 1;
+    NPG_TRY(npg_file_commit(&writer->file));
+    return npg_export_made(facts->log, exporter->name, exporter->file, facts->first_index,
+                           exporter->has_fixed_rate ? frames : facts->pose_count);
+}
+
 static npg_status finish_writers(exporters_pass *p)
 {
-    for (int i = 0; npg_exporters[i]; i++)
-        if (p->states[i] && npg_exporters[i]->finish) NPG_TRY(npg_exporters[i]->finish(p->states[i]));
+    for (int i = 0; npg_exporters[i]; i++) {
+        if (!p->states[i]) continue;
+        if (npg_exporters[i]->finish) NPG_TRY(npg_exporters[i]->finish(p->states[i]));
+        if (npg_exporters[i]->file) NPG_TRY(end_file(p, npg_exporters[i], p->states[i]));
+        if (npg_exporters[i]->with_reference) NPG_TRY(write_reference(p->facts));
+    }
     return npg_file_commit(&p->log.file);
 }
 
@@ -221,6 +252,7 @@ static void close_pass(exporters_pass *p)
 {
     for (int i = 0; npg_exporters[i]; i++) {
         if (p->states[i] && npg_exporters[i]->close) npg_exporters[i]->close(p->states[i]);
+        if (p->states[i]) npg_file_discard(&((npg_writer *)p->states[i])->file);
         npg_release(&p->states[i]);
     }
     npg_file_discard(&p->log.file);

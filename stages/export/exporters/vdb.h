@@ -26,9 +26,6 @@ typedef struct npg_vdb_surface { /* what is written, with what the file says abo
  * NPG_FAILED when nothing of it is inside, so that no surface would come out; NPG_MEMORY. */
 npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *surface);
 
-/* Area and volume of the surface that a file's grid "surface" stands for, and its voxel.  NPG_BAD_INPUT. */
-npg_status npg_vdb_measure_surface(const char *path, double *area, double *volume, double *voxel);
-
 /* ---- what the unknowns of a latent grid stand for, and the direction in which they differ most ---- */
 
 /* x = (screen I + lambda (degree D - A))^-1 y of a dense grid (kernels/levels.h): n^3 nodes with C channels

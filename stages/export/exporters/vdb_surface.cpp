@@ -1,7 +1,6 @@
 // Level sets of surfaces as OpenVDB files.
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/LevelSetMeasure.h>
 #include <openvdb/tools/MeshToVolume.h>
 
 extern "C" {
@@ -56,23 +55,6 @@ npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *s)
         openvdb::io::File file(path);
         file.write(openvdb::GridCPtrVec{grid}, about);
         file.close();
-        return NPG_OK;
-    });
-}
-
-npg_status npg_vdb_measure_surface(const char *path, double *area, double *volume, double *voxel)
-{
-    return npg::guard("OpenVDB", [&] {
-        openvdb::initialize();
-        openvdb::io::File file(path);
-        file.open(false);
-        auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("surface"));
-        file.close();
-        if (!grid || grid->getGridClass() != openvdb::GRID_LEVEL_SET)
-            return npg_error(NPG_BAD_INPUT, "%s: the grid surface is no level set", path);
-        *area = openvdb::tools::levelSetArea(*grid);
-        *volume = openvdb::tools::levelSetVolume(*grid);
-        *voxel = grid->voxelSize()[0];
         return NPG_OK;
     });
 }

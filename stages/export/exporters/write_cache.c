@@ -11,19 +11,10 @@
  *
  * PC2 has neither times nor units, and readers of MDD take its times as even: a frame without a mesh repeats
  * the one before it. */
-#include <stdio.h>
-#include <unistd.h>
-
 #include "export/exporters/exporters_internal.h"
 
-typedef size_t put_bytes(unsigned char *out, uint64_t bits, size_t size);
-
 typedef struct cache {
-    const npg_export_facts *facts;
-    const char *format;
-    put_bytes *put; /* the byte order */
-    char name[32];
-    npg_file *file;
+    npg_writer writer;
     unsigned char *row; /* one pose's bytes, owned */
 } cache;
 
@@ -32,27 +23,12 @@ static int64_t frames_of(const npg_export_facts *facts)
     return facts->last_index - facts->first_index + 1;
 }
 
-static npg_status check(const char *format, const npg_export_facts *facts)
+static npg_status check(const npg_export_facts *facts)
 {
-    if (facts->vert_count > INT32_MAX)
-        return npg_error(NPG_USAGE,
-                         "%s can't hold the capture: it counts vertices in 31 bits, and there are %zu",
-                         format, facts->vert_count);
-    if (facts->pose_count > INT32_MAX || frames_of(facts) > INT32_MAX)
-        return npg_error(NPG_USAGE,
-                         "%s can't hold the capture: it counts frames in 31 bits, and there are %lld", format,
-                         (long long)facts->pose_count);
-    return NPG_OK;
-}
-
-static npg_status check_pc2(const npg_export_facts *facts)
-{
-    return check("pc2", facts);
-}
-
-static npg_status check_mdd(const npg_export_facts *facts)
-{
-    return check("mdd", facts);
+    if (facts->pose_count <= INT32_MAX && frames_of(facts) <= INT32_MAX) return NPG_OK;
+    return npg_error(NPG_USAGE,
+                     "a point cache can't hold the capture: it counts frames in 31 bits, and there are %lld",
+                     (long long)facts->pose_count);
 }
 
 static uint64_t bytes(const npg_export_facts *facts)
@@ -60,99 +36,81 @@ static uint64_t bytes(const npg_export_facts *facts)
     return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * (12 * facts->vert_count + 4);
 }
 
-static npg_status open_cache(cache *c, const npg_export_facts *facts, const char *format, put_bytes *put)
-{
-    c->facts = facts;
-    c->format = format;
-    c->put = put;
-    snprintf(c->name, sizeof c->name, "motion.%s", format);
-    NPG_TRY(npg_alloc_array(&c->row, NPG_FOR_FILES, facts->vert_count, 12));
-    return npg_export_open(&c->file, facts->output, c->name);
-}
-
-static npg_status open_pc2(void *state, const npg_export_facts *facts)
+static npg_status open_pc2(void *state)
 {
     cache *c = state;
+    const npg_export_facts *facts = c->writer.facts;
     unsigned char header[32] = "POINTCACHE2";
-    NPG_TRY(open_cache(c, facts, "pc2", npg_put_little));
+    NPG_TRY(npg_alloc_array(&c->row, NPG_FOR_FILES, facts->vert_count, 12));
     npg_put_little(header + 12, 1, 4);
     npg_put_little(header + 16, facts->vert_count, 4);
     npg_put_little(header + 20, npg_float_bits((float)facts->first_index), 4);
     npg_put_little(header + 24, npg_float_bits(1), 4);
     npg_put_little(header + 28, (uint64_t)frames_of(facts), 4);
-    return npg_file_write(c->file, header, sizeof header);
+    return npg_file_write(c->writer.file, header, sizeof header);
 }
 
-static npg_status open_mdd(void *state, const npg_export_facts *facts)
+static npg_status open_mdd(void *state)
 {
     cache *c = state;
+    const npg_export_facts *facts = c->writer.facts;
     unsigned char word[4];
-    NPG_TRY(open_cache(c, facts, "mdd", npg_put_big));
-    npg_file_write(c->file, word, npg_put_big(word, (uint64_t)frames_of(facts), 4));
-    npg_file_write(c->file, word, npg_put_big(word, facts->vert_count, 4));
+    NPG_TRY(npg_alloc_array(&c->row, NPG_FOR_FILES, facts->vert_count, 12));
+    npg_file_write(c->writer.file, word, npg_put_big(word, (uint64_t)frames_of(facts), 4));
+    npg_file_write(c->writer.file, word, npg_put_big(word, facts->vert_count, 4));
     for (int64_t i = facts->first_index; i <= facts->last_index; i++) {
         float seconds = (float)((double)i / facts->fps);
-        npg_file_write(c->file, word, npg_put_big(word, npg_float_bits(seconds), 4));
+        npg_file_write(c->writer.file, word, npg_put_big(word, npg_float_bits(seconds), 4));
     }
     return NPG_OK;
 }
 
-static npg_status write_pose(void *state, const npg_pose *pose)
+static npg_status write_row(cache *c, const npg_pose *pose, size_t (*put)(unsigned char *, uint64_t, size_t))
 {
-    cache *c = state;
-    size_t count = 3 * c->facts->vert_count;
-    for (size_t i = 0; i < count; i++) c->put(c->row + 4 * i, npg_float_bits(pose->pos[i]), 4);
-    return npg_file_write(c->file, c->row, 4 * count);
+    size_t count = 3 * c->writer.facts->vert_count;
+    for (size_t i = 0; i < count; i++) put(c->row + 4 * i, npg_float_bits(pose->pos[i]), 4);
+    return npg_file_write(c->writer.file, c->row, 4 * count);
 }
 
-/* The mesh whose vertices the cache moves. */
-static npg_status write_reference(const npg_export_facts *facts)
+static npg_status write_pc2(void *state, const npg_pose *pose)
 {
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, facts->output, "reference.obj"));
-    npg_status status = NPG_OK;
-    if (!npg_is_there(path)) { /* the other point cache may have made it in this pass */
-        status = npg_write_obj_pose(path, facts, facts->rest, NULL, NULL);
-        if (!status) status = npg_export_made(facts->log, "obj", "reference.obj", facts->first_index, 1);
-    }
-    return status;
+    return write_row(state, pose, npg_put_little);
 }
 
-static npg_status finish(void *state)
+static npg_status write_mdd(void *state, const npg_pose *pose)
 {
-    cache *c = state;
-    NPG_TRY(npg_file_commit(&c->file));
-    NPG_TRY(npg_export_made(c->facts->log, c->format, c->name, c->facts->first_index, frames_of(c->facts)));
-    return write_reference(c->facts);
+    return write_row(state, pose, npg_put_big);
 }
 
 static void close_cache(void *state)
 {
-    cache *c = state;
-    npg_file_discard(&c->file);
-    npg_release(&c->row);
+    npg_release(&((cache *)state)->row);
 }
 
 const npg_exporter npg_exporter_pc2 = {.name = "pc2",
                                        .help = "PC2 point cache with reference.obj",
+                                       .file = "motion.pc2",
                                        .is_float = true,
+                                       .is_indexed = true,
                                        .has_fixed_rate = true,
+                                       .with_reference = true,
                                        .state_size = sizeof(cache),
-                                       .check = check_pc2,
+                                       .check = check,
                                        .bytes = bytes,
                                        .open = open_pc2,
-                                       .pose = write_pose,
-                                       .finish = finish,
+                                       .pose = write_pc2,
                                        .close = close_cache};
 
 const npg_exporter npg_exporter_mdd = {.name = "mdd",
                                        .help = "MDD point cache with reference.obj",
+                                       .file = "motion.mdd",
                                        .is_float = true,
+                                       .is_indexed = true,
                                        .has_fixed_rate = true,
+                                       .with_reference = true,
                                        .state_size = sizeof(cache),
-                                       .check = check_mdd,
+                                       .check = check,
                                        .bytes = bytes,
                                        .open = open_mdd,
-                                       .pose = write_pose,
-                                       .finish = finish,
+                                       .pose = write_mdd,
                                        .close = close_cache};

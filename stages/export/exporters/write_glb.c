@@ -18,14 +18,13 @@
 #define BYTES_MOST (UINT64_C(0xffffffff) - (1 << 20))
 
 typedef struct glb_state {
-    const npg_export_facts *facts;
+    npg_writer writer;
     npg_corner_split split;
     size_t poses_most;      /* in one file                 */
     int64_t done, segments; /* poses so far; files in all  */
     size_t at;              /* poses in the file under way */
     npg_glb_layout layout;
     char name[32];
-    npg_file *file;
     size_t text_length;
     float *base, *base_normals; /* V x 3, of the first pose of the file; owned */
 } glb_state;
@@ -87,27 +86,27 @@ static void write_rows(glb_state *s, npg_glb_range *range, const float *rows, co
         float row[3];
         for (size_t a = 0; a < 3; a++) row[a] = rows[v + a] - (base ? base[v + a] : 0);
         if (range) widen(range, row);
-        write_floats(s->file, row, 3);
+        write_floats(s->writer.file, row, 3);
     }
 }
 
 static void write_colours(glb_state *s)
 {
     for (size_t i = 0; i < s->split.count; i++) {
-        const uint8_t *colour = s->facts->colours + 4 * (size_t)s->split.vertex[i];
+        const uint8_t *colour = s->writer.facts->colours + 4 * (size_t)s->split.vertex[i];
         unsigned char row[8];
         for (size_t c = 0; c < 4; c++) {
             double value = c < 3 ? (double)npg_srgb_to_linear(colour[c]) : colour[c] / 255.0;
             npg_put_little(row + 2 * c, (uint64_t)lround(65535 * value), 2);
         }
-        npg_file_write(s->file, row, sizeof row);
+        npg_file_write(s->writer.file, row, sizeof row);
     }
 }
 
 /* Normals in a file must have unit length; one that has none looks along z. */
 static void set_base(glb_state *s, const npg_pose *pose)
 {
-    size_t v = s->facts->vert_count;
+    size_t v = s->writer.facts->vert_count;
     memcpy(s->base, pose->pos, v * 3 * sizeof *s->base);
     for (size_t i = 0; i < v && pose->normals; i++) {
         const float *n = pose->normals + 3 * i;
@@ -121,15 +120,15 @@ static void set_base(glb_state *s, const npg_pose *pose)
 static void write_base(glb_state *s, const npg_pose *pose)
 {
     unsigned char word[4];
-    for (size_t i = 0; i < 3 * s->facts->face_count; i++)
-        npg_file_write(s->file, word, npg_put_little(word, s->split.indices[i], 4));
+    for (size_t i = 0; i < 3 * s->writer.facts->face_count; i++)
+        npg_file_write(s->writer.file, word, npg_put_little(word, s->split.indices[i], 4));
     set_base(s, pose);
     write_rows(s, &s->layout.base, s->base, NULL);
-    if (s->facts->has_normals) write_rows(s, NULL, s->base_normals, NULL);
-    if (s->facts->colours) write_colours(s);
+    if (s->writer.facts->has_normals) write_rows(s, NULL, s->base_normals, NULL);
+    if (s->writer.facts->colours) write_colours(s);
     for (size_t i = 0; i < s->split.count && s->split.uvs; i++) {
         const float uv[2] = {s->split.uvs[2 * i], 1 - s->split.uvs[2 * i + 1]};
-        write_floats(s->file, uv, 2);
+        write_floats(s->writer.file, uv, 2);
     }
 }
 
@@ -140,7 +139,7 @@ static void write_weights(glb_state *s)
     for (size_t row = 0; row < t; row++)
         for (size_t k = 1; k < t; k++) {
             const float weight = row == k;
-            write_floats(s->file, &weight, 1);
+            write_floats(s->writer.file, &weight, 1);
         }
 }
 
@@ -158,7 +157,7 @@ static void put_heads(glb_state *s, unsigned char heads[20])
 
 static npg_status begin_file(glb_state *s, const npg_pose *pose)
 {
-    const npg_export_facts *facts = s->facts;
+    const npg_export_facts *facts = s->writer.facts;
     unsigned char heads[20], binary_head[8] = "....BIN"; /* its length comes first */
     int64_t left = facts->pose_count - s->done;
     char *text;
@@ -173,15 +172,15 @@ static npg_status begin_file(glb_state *s, const npg_pose *pose)
         strcpy(s->name, "motion.glb");
     else
         snprintf(s->name, sizeof s->name, "motion_%03lld.glb", (long long)s->layout.segment);
-    NPG_TRY(npg_export_open(&s->file, facts->output, s->name));
+    NPG_TRY(npg_export_open(&s->writer.file, facts->output, s->name));
     s->text_length = 0;
     NPG_TRY(npg_glb_text(&text, &s->text_length, &s->layout));
     put_heads(s, heads);
-    npg_file_write(s->file, heads, sizeof heads);
-    npg_file_write(s->file, text, s->text_length);
+    npg_file_write(s->writer.file, heads, sizeof heads);
+    npg_file_write(s->writer.file, text, s->text_length);
     npg_release(&text);
     npg_put_little(binary_head, npg_glb_places_of(&s->layout).end, 4);
-    npg_file_write(s->file, binary_head, sizeof binary_head);
+    npg_file_write(s->writer.file, binary_head, sizeof binary_head);
     write_base(s, pose);
     return NPG_OK;
 }
@@ -190,24 +189,24 @@ static npg_status begin_file(glb_state *s, const npg_pose *pose)
 static npg_status end_file(glb_state *s)
 {
     char *text;
-    if (s->layout.pose_count > 1) write_floats(s->file, s->layout.times, s->layout.pose_count);
+    if (s->layout.pose_count > 1) write_floats(s->writer.file, s->layout.times, s->layout.pose_count);
     write_weights(s);
     NPG_TRY(npg_glb_text(&text, &s->text_length, &s->layout));
-    npg_status status = npg_file_patch(s->file, 20, text, s->text_length);
+    npg_status status = npg_file_patch(s->writer.file, 20, text, s->text_length);
     npg_release(&text);
     NPG_TRY(status);
-    NPG_TRY(npg_file_commit(&s->file));
+    NPG_TRY(npg_file_commit(&s->writer.file));
     s->at = 0;
-    return npg_export_made(s->facts->log, "glb", s->name, s->layout.first_index,
+    return npg_export_made(s->writer.facts->log, "glb", s->name, s->layout.first_index,
                            (int64_t)s->layout.pose_count);
 }
 
 /* ---- the exporter ---- */
 
-static npg_status open_glb(void *state, const npg_export_facts *facts)
+static npg_status open_glb(void *state)
 {
     glb_state *s = state;
-    s->facts = facts;
+    const npg_export_facts *facts = s->writer.facts;
     NPG_TRY(npg_corner_split_make(&s->split, facts->vert_count, facts->faces, facts->face_count, facts->uvs,
                                   facts->corner_uvs));
     s->poses_most = poses_for(facts, s->split.count);
@@ -224,9 +223,9 @@ static npg_status write_pose(void *state, const npg_pose *pose)
         NPG_TRY(begin_file(s, pose));
     } else {
         write_rows(s, &s->layout.delta[s->at], pose->pos, s->base);
-        if (s->facts->has_normals) write_rows(s, NULL, pose->normals, s->base_normals);
+        if (s->writer.facts->has_normals) write_rows(s, NULL, pose->normals, s->base_normals);
     }
-    s->layout.times[s->at++] = (float)((double)(pose->index - s->layout.first_index) / s->facts->fps);
+    s->layout.times[s->at++] = (float)((double)(pose->index - s->layout.first_index) / s->writer.facts->fps);
     s->done++;
     return s->at == s->layout.pose_count ? end_file(s) : NPG_OK;
 }
@@ -241,7 +240,6 @@ static npg_status finish_glb(void *state)
 static void close_glb(void *state)
 {
     glb_state *s = state;
-    npg_file_discard(&s->file);
     npg_corner_split_clear(&s->split);
     npg_release(&s->base);
     npg_release(&s->base_normals);

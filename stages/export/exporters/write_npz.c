@@ -42,7 +42,7 @@ enum {
 enum { HEADER = 128 }; /* of an array, with its name and shape */
 
 typedef struct npz_state {
-    const npg_export_facts *facts;
+    npg_writer writer;
     npg_zip zip;
     npg_zip_member members[ARRAYS];
     int at[ARRAYS]; /* place among the members, -1: not there */
@@ -110,7 +110,7 @@ static uint64_t bytes(const npg_export_facts *facts)
 /* The magic, version 1.0, and a dictionary padded with blanks to 128 bytes in all. */
 static npg_status put_header(npz_state *s, int which)
 {
-    array a = describe(which, s->facts);
+    array a = describe(which, s->writer.facts);
     char shape[96] = "", text[HEADER + 1];
     for (int i = 0; i < a.rank; i++) {
         size_t used = strlen(shape);
@@ -154,7 +154,7 @@ static npg_status put(npz_state *s, int which, const void *words, size_t word_si
 
 static npg_status put_fixed(npz_state *s)
 {
-    const npg_export_facts *facts = s->facts;
+    const npg_export_facts *facts = s->writer.facts;
     const uint32_t up = facts->is_z_up ? 'z' : 'y';
     NPG_TRY(put(s, FACES, facts->faces, 4, 3 * facts->face_count));
     NPG_TRY(put(s, REFERENCE, facts->rest, 4, 3 * facts->vert_count));
@@ -169,19 +169,10 @@ static npg_status put_fixed(npz_state *s)
 
 /* ---- the exporter ---- */
 
-static npg_status check_npz(const npg_export_facts *facts)
-{
-    if (facts->vert_count <= INT32_MAX) return NPG_OK;
-    return npg_error(NPG_USAGE,
-                     "npz can't hold the capture: faces name vertices in 31 bits, and there are %zu",
-                     facts->vert_count);
-}
-
-static npg_status open_npz(void *state, const npg_export_facts *facts)
+static npg_status open_npz(void *state)
 {
     npz_state *s = state;
-    char path[NPG_PATH_SIZE];
-    s->facts = facts;
+    const npg_export_facts *facts = s->writer.facts;
     for (int i = 0; i < ARRAYS; i++) {
         array a = describe(i, facts);
         s->at[i] = is_there(i, facts) ? (int)s->member_count : -1;
@@ -190,17 +181,16 @@ static npg_status open_npz(void *state, const npg_export_facts *facts)
         snprintf(member->name, sizeof member->name, "%s.npy", a.name);
         member->size = HEADER + data_bytes(&a);
     }
-    NPG_TRY(npg_path_of(path, facts->output, "motion.npz"));
-    npg_status status = npg_zip_open(&s->zip, path, s->members, s->member_count, NPG_ZIP_LARGE);
-    for (int i = 0; i < ARRAYS && !status; i++)
-        if (s->at[i] >= 0) status = put_header(s, i);
-    return status ? status : put_fixed(s);
+    NPG_TRY(npg_zip_open(&s->zip, s->writer.file, s->members, s->member_count, NPG_ZIP_LARGE));
+    for (int i = 0; i < ARRAYS; i++)
+        if (s->at[i] >= 0) NPG_TRY(put_header(s, i));
+    return put_fixed(s);
 }
 
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
     npz_state *s = state;
-    const npg_export_facts *facts = s->facts;
+    const npg_export_facts *facts = s->writer.facts;
     double rotation[3][3], translation[3], time = (double)pose->index / facts->fps;
     npg_rigid_fit(rotation, translation, facts->rest, pose->pos, facts->vert_count);
     NPG_TRY(put(s, ROTATION, rotation, 8, 9));
@@ -214,24 +204,16 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 
 static npg_status finish_npz(void *state)
 {
-    npz_state *s = state;
-    NPG_TRY(npg_zip_commit(&s->zip));
-    return npg_export_made(s->facts->log, "npz", "motion.npz", s->facts->first_index, s->facts->pose_count);
-}
-
-static void close_npz(void *state)
-{
-    npz_state *s = state;
-    npg_zip_discard(&s->zip);
+    return npg_zip_finish(&((npz_state *)state)->zip);
 }
 
 const npg_exporter npg_exporter_npz = {.name = "npz",
                                        .help = "NumPy arrays with each frame's rigid motion",
+                                       .file = "motion.npz",
                                        .is_float = true,
+                                       .is_indexed = true,
                                        .state_size = sizeof(npz_state),
-                                       .check = check_npz,
                                        .bytes = bytes,
                                        .open = open_npz,
                                        .pose = write_pose,
-                                       .finish = finish_npz,
-                                       .close = close_npz};
+                                       .finish = finish_npz};

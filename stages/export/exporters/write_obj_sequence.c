@@ -4,7 +4,7 @@
 #include "export/exporters/exporters_internal.h"
 
 typedef struct obj_state {
-    const npg_export_facts *facts;
+    npg_writer writer;
     npg_mesh_names names;
 } obj_state;
 
@@ -34,10 +34,10 @@ static uint64_t bytes(const npg_export_facts *facts)
     return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * facts->vert_count * per_vert;
 }
 
-static npg_status open_sequence(void *state, const npg_export_facts *facts)
+static npg_status open_sequence(void *state)
 {
     obj_state *s = state;
-    s->facts = facts;
+    const npg_export_facts *facts = s->writer.facts;
     s->names = (npg_mesh_names){facts->prefix, "obj", facts->width};
     return npg_export_folder(facts->output, "obj");
 }
@@ -47,9 +47,9 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     obj_state *s = state;
     char file[NPG_MESH_NAME_SIZE + 8] = "obj/", path[NPG_PATH_SIZE];
     npg_mesh_name(file + 4, &s->names, pose->number);
-    NPG_TRY(npg_path_of(path, s->facts->output, file));
-    npg_status status = npg_write_obj_pose(path, s->facts, pose->pos, pose->normals, pose->colours);
-    return status ? status : npg_export_made(s->facts->log, "obj", file, pose->index, 1);
+    NPG_TRY(npg_path_of(path, s->writer.facts->output, file));
+    npg_status status = npg_write_obj_pose(path, s->writer.facts, pose->pos, pose->normals, pose->colours);
+    return status ? status : npg_export_made(s->writer.facts->log, "obj", file, pose->index, 1);
 }
 
 const npg_exporter npg_exporter_obj = {.name = "obj",

@@ -24,8 +24,7 @@
 #define LEAD_SIZE   40  /* before and behind a frame's colours: indent, time, "[", and "]," */
 
 typedef struct usda_state {
-    const npg_export_facts *facts;
-    npg_file *file;
+    npg_writer writer;
     uint64_t extent_at; /* of the next sample              */
     uint64_t colour_at; /* the same, of the frames' colours */
     char *colour_text;  /* one sample of them, owned        */
@@ -111,10 +110,11 @@ static void print_extent(usda_state *s)
     char blanks[EXTENT_SIZE];
     memset(blanks, ' ', sizeof blanks);
     blanks[sizeof blanks - 1] = '\n';
-    npg_file_print(s->file, "        float3[] extent.timeSamples = {\n");
-    s->extent_at = npg_file_size(s->file);
-    for (int64_t i = 0; i < s->facts->pose_count; i++) npg_file_write(s->file, blanks, sizeof blanks);
-    npg_file_print(s->file, "        }\n");
+    npg_file_print(s->writer.file, "        float3[] extent.timeSamples = {\n");
+    s->extent_at = npg_file_size(s->writer.file);
+    for (int64_t i = 0; i < s->writer.facts->pose_count; i++)
+        npg_file_write(s->writer.file, blanks, sizeof blanks);
+    npg_file_print(s->writer.file, "        }\n");
 }
 
 /* Bytes of one frame's colours; 0 without any. */
@@ -126,15 +126,16 @@ static size_t colours_size(const npg_export_facts *facts)
 /* Room for the colours of all frames. */
 static npg_status print_colour_samples(usda_state *s)
 {
-    size_t size = colours_size(s->facts);
+    size_t size = colours_size(s->writer.facts);
     if (!size) return NPG_OK;
     NPG_TRY(npg_alloc(&s->colour_text, NPG_FOR_FILES, size + 1));
     memset(s->colour_text, ' ', size);
     s->colour_text[size - 1] = '\n';
-    npg_file_print(s->file, "        color3f[] primvars:displayColor.timeSamples = {\n");
-    s->colour_at = npg_file_size(s->file);
-    for (int64_t i = 0; i < s->facts->pose_count; i++) npg_file_write(s->file, s->colour_text, size);
-    return npg_file_print(s->file, "        }\n");
+    npg_file_print(s->writer.file, "        color3f[] primvars:displayColor.timeSamples = {\n");
+    s->colour_at = npg_file_size(s->writer.file);
+    for (int64_t i = 0; i < s->writer.facts->pose_count; i++)
+        npg_file_write(s->writer.file, s->colour_text, size);
+    return npg_file_print(s->writer.file, "        }\n");
 }
 
 /* ---- the exporter ---- */
@@ -146,37 +147,28 @@ static uint64_t bytes(const npg_export_facts *facts)
     return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * pose;
 }
 
-static npg_status check_usda(const npg_export_facts *facts)
-{
-    if (facts->vert_count <= INT32_MAX) return NPG_OK;
-    return npg_error(NPG_USAGE,
-                     "usda can't hold the capture: faces name vertices in 31 bits, and there are %zu",
-                     facts->vert_count);
-}
-
-static npg_status open_usda(void *state, const npg_export_facts *facts)
+static npg_status open_usda(void *state)
 {
     usda_state *s = state;
-    s->facts = facts;
-    NPG_TRY(npg_export_open(&s->file, facts->output, "motion.usda"));
-    print_stage(s->file, facts);
-    npg_file_print(s->file, "def Xform \"capture\" (\n    kind = \"component\"\n)\n{\n"
-                            "    def Mesh \"surface\"\n    {\n"
-                            "        uniform token subdivisionScheme = \"none\"\n"
-                            "        uniform token orientation = \"rightHanded\"\n");
-    print_faces(s->file, facts);
-    if (facts->colours) print_colours(s->file, facts);
-    if (facts->uvs) print_uvs(s->file, facts);
+    const npg_export_facts *facts = s->writer.facts;
+    print_stage(s->writer.file, facts);
+    npg_file_print(s->writer.file, "def Xform \"capture\" (\n    kind = \"component\"\n)\n{\n"
+                                   "    def Mesh \"surface\"\n    {\n"
+                                   "        uniform token subdivisionScheme = \"none\"\n"
+                                   "        uniform token orientation = \"rightHanded\"\n");
+    print_faces(s->writer.file, facts);
+    if (facts->colours) print_colours(s->writer.file, facts);
+    if (facts->uvs) print_uvs(s->writer.file, facts);
     print_extent(s);
     NPG_TRY(print_colour_samples(s));
-    return npg_file_print(s->file, "        point3f[] points.timeSamples = {\n");
+    return npg_file_print(s->writer.file, "        point3f[] points.timeSamples = {\n");
 }
 
 static npg_status write_extent(usda_state *s, const npg_pose *pose)
 {
     float box[6] = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
     char text[EXTENT_SIZE + 1], numbers[6][40];
-    for (size_t i = 0; i < 3 * s->facts->vert_count; i++) {
+    for (size_t i = 0; i < 3 * s->writer.facts->vert_count; i++) {
         box[i % 3] = fminf(box[i % 3], pose->pos[i]);
         box[3 + i % 3] = fmaxf(box[3 + i % 3], pose->pos[i]);
     }
@@ -184,7 +176,7 @@ static npg_status write_extent(usda_state *s, const npg_pose *pose)
     int length =
         snprintf(text, sizeof text, "            %lld: [(%s, %s, %s), (%s, %s, %s)],", (long long)pose->index,
                  numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]);
-    NPG_TRY(npg_file_patch(s->file, s->extent_at, text, (size_t)length));
+    NPG_TRY(npg_file_patch(s->writer.file, s->extent_at, text, (size_t)length));
     s->extent_at += EXTENT_SIZE;
     return NPG_OK;
 }
@@ -201,7 +193,7 @@ static char *put_share(char *at, float share)
 
 static npg_status write_colours(usda_state *s, const npg_pose *pose)
 {
-    size_t size = colours_size(s->facts), verts = s->facts->vert_count;
+    size_t size = colours_size(s->writer.facts), verts = s->writer.facts->vert_count;
     if (!size) return NPG_OK;
     char *at = s->colour_text;
     at += snprintf(at, LEAD_SIZE, "            %lld: [", (long long)pose->index);
@@ -214,7 +206,7 @@ static npg_status write_colours(usda_state *s, const npg_pose *pose)
         memcpy(at, end, 3);
         at += 3;
     }
-    NPG_TRY(npg_file_patch(s->file, s->colour_at, s->colour_text, (size_t)(at - s->colour_text)));
+    NPG_TRY(npg_file_patch(s->writer.file, s->colour_at, s->colour_text, (size_t)(at - s->colour_text)));
     s->colour_at += size;
     return NPG_OK;
 }
@@ -224,31 +216,27 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     usda_state *s = state;
     NPG_TRY(write_extent(s, pose));
     NPG_TRY(write_colours(s, pose));
-    npg_file_print(s->file, "            %lld: ", (long long)pose->index);
-    print_tuples(s->file, pose->pos, s->facts->vert_count, 3);
-    return npg_file_print(s->file, ",\n");
+    npg_file_print(s->writer.file, "            %lld: ", (long long)pose->index);
+    print_tuples(s->writer.file, pose->pos, s->writer.facts->vert_count, 3);
+    return npg_file_print(s->writer.file, ",\n");
 }
 
 static npg_status finish_usda(void *state)
 {
-    usda_state *s = state;
-    npg_file_print(s->file, "        }\n    }\n}\n");
-    NPG_TRY(npg_file_commit(&s->file));
-    return npg_export_made(s->facts->log, "usda", "motion.usda", s->facts->first_index, s->facts->pose_count);
+    return npg_file_print(((usda_state *)state)->writer.file, "        }\n    }\n}\n");
 }
 
 static void close_usda(void *state)
 {
-    usda_state *s = state;
-    npg_file_discard(&s->file);
-    npg_release(&s->colour_text);
+    npg_release(&((usda_state *)state)->colour_text);
 }
 
 const npg_exporter npg_exporter_usda = {.name = "usda",
                                         .help = "USD as text, points as time samples",
+                                        .file = "motion.usda",
                                         .is_float = true,
+                                        .is_indexed = true,
                                         .state_size = sizeof(usda_state),
-                                        .check = check_usda,
                                         .bytes = bytes,
                                         .open = open_usda,
                                         .pose = write_pose,

@@ -11,7 +11,7 @@
 #include "job/vdb_file.h"
 
 typedef struct vdb_state {
-    const npg_export_facts *facts;
+    npg_writer writer;
     npg_mesh_names names;
     uint32_t *faces; /* with the caps, owned */
     size_t face_count;
@@ -38,7 +38,7 @@ static npg_status check(const npg_export_facts *facts)
 
 static npg_status close_openings(vdb_state *s)
 {
-    const npg_export_facts *facts = s->facts;
+    const npg_export_facts *facts = s->writer.facts;
     uint32_t *caps;
     size_t cap_count, size = facts->face_count * 3 * sizeof *caps;
     NPG_TRY(npg_border_caps(&caps, &cap_count, facts->faces, facts->face_count));
@@ -50,10 +50,10 @@ static npg_status close_openings(vdb_state *s)
     return status;
 }
 
-static npg_status open_vdb(void *state, const npg_export_facts *facts)
+static npg_status open_vdb(void *state)
 {
     vdb_state *s = state;
-    s->facts = facts;
+    const npg_export_facts *facts = s->writer.facts;
     s->names = (npg_mesh_names){facts->prefix, "vdb", facts->width};
     NPG_TRY(npg_export_folder(facts->output, "volumes"));
     return close_openings(s);
@@ -67,7 +67,7 @@ static npg_status save(void *user, const char *path)
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
     vdb_state *s = state;
-    const npg_export_facts *facts = s->facts;
+    const npg_export_facts *facts = s->writer.facts;
     char file[NPG_MESH_NAME_SIZE + 8] = "volumes/", path[NPG_PATH_SIZE];
     npg_vdb_surface surface = {.points = pose->pos,
                                .vert_count = facts->vert_count,
@@ -87,7 +87,7 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 
 static npg_status finish_vdb(void *state)
 {
-    return npg_latents_write(((vdb_state *)state)->facts);
+    return npg_latents_write(((vdb_state *)state)->writer.facts);
 }
 
 static void close_vdb(void *state)

@@ -110,12 +110,11 @@ static void write_zeros(npg_file *file, uint64_t size)
         if (npg_file_write(file, zeros, size < sizeof zeros ? size : sizeof zeros)) return;
 }
 
-npg_status npg_zip_open(npg_zip *zip, const char *path, npg_zip_member *members, size_t count, uint64_t large)
+npg_status npg_zip_open(npg_zip *zip, npg_file *file, npg_zip_member *members, size_t count, uint64_t large)
 {
     unsigned char header[128];
-    *zip = (npg_zip){.members = members, .count = count, .large = large};
+    *zip = (npg_zip){.file = file, .members = members, .count = count, .large = large};
     NPG_REQUIRE(count && count < 0xffff);
-    NPG_TRY(npg_file_open(&zip->file, path));
     for (size_t i = 0; i < count; i++) {
         npg_zip_member *member = &members[i];
         member->filled = member->crc = 0;
@@ -138,7 +137,7 @@ npg_status npg_zip_put(npg_zip *zip, size_t at, const void *data, size_t size)
                                 : npg_file_patch(zip->file, place, data, size);
 }
 
-static npg_status write_directory(npg_zip *zip)
+npg_status npg_zip_finish(npg_zip *zip)
 {
     unsigned char record[160];
     for (size_t i = 0; i < zip->count; i++) {
@@ -151,17 +150,4 @@ static npg_status write_directory(npg_zip *zip)
         npg_file_write(zip->file, record, put_entry(zip, record, &zip->members[i]));
     write_end(zip, at, npg_file_size(zip->file) - at);
     return NPG_OK;
-}
-
-npg_status npg_zip_commit(npg_zip *zip)
-{
-    npg_status status = write_directory(zip);
-    if (!status) return npg_file_commit(&zip->file);
-    npg_zip_discard(zip);
-    return status;
-}
-
-void npg_zip_discard(npg_zip *zip)
-{
-    npg_file_discard(&zip->file);
 }
