@@ -168,13 +168,14 @@ def log_of(row, figure):
     return math.log(value) if value > 0 else None
 
 
-def spread_over_seeds(values):
-    """The deviation of single values around the mean of their capture, all captures of a kind of sensor together."""
-    squares, free = 0.0, 0
-    for group in values:
-        squares += sum((value - statistics.fmean(group)) ** 2 for value in group)
-        free += len(group) - 1
-    return math.sqrt(squares / free) if free > 0 else None
+def spread_of(groups):
+    """{capture: deviation of a single value} of {capture: values}: its own over the seeds, but no less than the median of the
+    captures together, since that of three values is often small by chance.  None where no capture has several."""
+    own = {name: statistics.stdev(values) for name, values in groups.items() if len(values) > 1}
+    if not own:
+        return None
+    usual = statistics.median(own.values())
+    return {name: max(own.get(name, usual), usual, LEAST) for name in groups}
 
 
 def differences(before, after, figure):
@@ -188,10 +189,10 @@ def differences(before, after, figure):
 
 
 def noise_of(before, after, figure, sensor, groups):
-    """The deviation of one difference that chance alone makes: of the seeds' differences where there are several seeds on both
-    sides, else what the seeds of one side differ by, which is more.  With one seed everywhere it is not known, and 0."""
-    paired = spread_over_seeds(list(groups.values()))
-    if paired is not None:
+    """{capture: deviation of one difference that chance alone makes}: of the seeds' differences where there are several seeds on
+    both sides, else what the seeds of one side differ by, which is more.  With one seed everywhere it is not known, and LEAST."""
+    paired = spread_of(groups)
+    if paired:
         return paired
     for side in (before, after):
         values = {}
@@ -199,10 +200,10 @@ def noise_of(before, after, figure, sensor, groups):
             value = log_of(row, figure)
             if name.split(".")[1] == sensor and value is not None:
                 values.setdefault(name, []).append(value)
-        spread = spread_over_seeds(list(values.values()))
-        if spread is not None:
+        spread = spread_of(values)
+        if spread:
             return spread
-    return 0.0
+    return dict.fromkeys(groups, LEAST)
 
 
 def moved_figures(before, after):
@@ -211,7 +212,7 @@ def moved_figures(before, after):
         everything = []
         for sensor, groups in differences(before, after, figure).items():
             noise = noise_of(before, after, figure, sensor, groups)
-            means = [(statistics.fmean(values), max(noise, LEAST) / math.sqrt(len(values))) for values in groups.values()]
+            means = [(statistics.fmean(values), noise[name] / math.sqrt(len(values))) for name, values in groups.items()]
             for name, (mean, error) in zip(groups, means):
                 yield name, figure, mean, error, abs(mean) > MOVED * error
             everything += means
@@ -221,9 +222,9 @@ def moved_figures(before, after):
 
 
 def together(means):
-    """The mean of several captures.  Its error: what the noise of each makes of it."""
-    mean = statistics.fmean(mean for mean, _ in means)
-    error = math.sqrt(sum(error ** 2 for _, error in means)) / len(means)
+    """The mean of several captures, each by what its noise leaves it to say, and the error of that."""
+    weight = sum(error ** -2 for _, error in means)
+    mean, error = sum(mean * error ** -2 for mean, error in means) / weight, weight ** -0.5
     return mean, error, abs(mean) > MOVED * error
 
 
