@@ -11,13 +11,13 @@
 #include "pipeline/stage.h"
 
 /* Set by trial, on captures whose topology changes and on ones whose fit fails. */
-#define HISTORY  64    /* explained frames that the usual level is taken from        */
-#define SPREADS  6.0   /* of normal noise, above the usual level: the bound          */
-#define SUSPECT  0.5   /* of the bound                                               */
-#define LOST     3.0   /* times the points' distance in the keyframe: off everywhere */
-#define LOST_FIT 0.004 /* of the frame's diagonal: nearer than that it isn't         */
-#define CLEARLY  2.0   /* times the misfit on the other side                         */
-#define RUN_MAX  (NPG_ALARM_BACK + 2 * NPG_ALARM_FRAMES) /* twice as many where each weighs half */
+#define HISTORY  64                     /* explained frames that the usual level is taken from        */
+#define SPREADS  6.0                    /* of normal noise, above the usual level: the bound          */
+#define SUSPECT  0.5                    /* of the bound                                               */
+#define LOST     3.0                    /* times the points' distance in the keyframe: off everywhere */
+#define LOST_FIT 0.004                  /* of the frame's diagonal: nearer than that it isn't         */
+#define CLEARLY  2.0                    /* times the misfit on the other side                         */
+#define RUN_MAX  (3 * NPG_ALARM_FRAMES) /* twice as many where each weighs half */
 
 /* clang-format off */
 static const struct {
@@ -177,7 +177,7 @@ static double times_bound(const npg_alarm_cause *cause)
 static void raise_alarm(side *s, size_t row)
 {
     size_t first_unexplained = s->run_count - row, best = first_unexplained;
-    size_t first = first_unexplained > NPG_ALARM_BACK ? first_unexplained - NPG_ALARM_BACK : 0;
+    size_t first = first_unexplained > NPG_ALARM_FRAMES ? first_unexplained - NPG_ALARM_FRAMES : 0;
     for (size_t i = first_unexplained; i < s->run_count; i++)
         if (is_clearer(s->causes[i].misfit, times_bound(&s->causes[i]), s->causes[best].misfit,
                        times_bound(&s->causes[best])))
@@ -228,7 +228,7 @@ static void process_frame(side *s, const record *r)
         row++;
         weight += kinds[s->causes[s->run_count - row].misfit].weight;
     }
-    if (weight >= NPG_ALARM_FRAMES && s->run_length - row <= NPG_ALARM_RISE) raise_alarm(s, row);
+    if (weight >= NPG_ALARM_FRAMES && s->run_length - row <= 2 * NPG_ALARM_FRAMES) raise_alarm(s, row);
 }
 
 /* ---- order ---- */

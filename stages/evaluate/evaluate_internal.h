@@ -118,9 +118,9 @@ size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_cou
  *
  * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm (twice as
  * many where each is merely stretched: an alignment that slips does that, too, until it is found again),
- * if no more than NPG_ALARM_RISE suspect ones lead up to them: a topology changes at once, a fit that creeps
+ * if no more than twice as many suspect ones lead up to them: a topology changes at once, a fit that creeps
  * away is another fault (the quality bar's).  It dates from the first of the suspect ones before them, by
- * NPG_ALARM_BACK frames at most.  A frame or two alone (an outlier, a fast motion that the next frame has
+ * as many frames at most.  A frame or two alone (an outlier, a fast motion that the next frame has
  * caught up with) raise none, and no level that is spread all over the surface or usual in the capture
  * (noise, holes, what cameras don't see) does.
  *
@@ -137,8 +137,6 @@ size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_cou
 
 /* Set by trial; what each does stands above. */
 #define NPG_ALARM_FRAMES 3
-#define NPG_ALARM_BACK   3
-#define NPG_ALARM_RISE   6
 
 enum { NPG_FORWARD, NPG_BACKWARD, NPG_DIRECTIONS };
 

@@ -253,6 +253,7 @@ static npg_status write_line(npg_file *file, char *line, size_t size, bool is_un
     static const char good[] = "\"good\":true,";
     char words[2][64] = {",\"unexplained\":true", ""};
     char *is_good = fault ? memmem(line, size, good, sizeof good - 1) : NULL;
+    if (size < 2) return npg_file_write(file, line, size);
     if (is_good) {
         snprintf(words[1], sizeof words[1], ",\"fault\":\"%s\"", fault_names[fault]);
         size_t at = (size_t)(is_good - line) + strlen("\"good\":");

@@ -13,10 +13,9 @@
 #define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half    */
 #define DISTANCE       1.5 /* of a sensor that is looked for, in sizes of the cloud */
 /* First few points from few places: a cloud of many views has from all of them more that is hidden (bodies
- * 0.15, with noise and holes 0.08; one view at most 0.05) ... */
+ * 0.15; one view at most 0.05) ... */
 #define FEW_POINTS 2000
 #define FEW_PLACES 100
-#define FEW_HIDDEN 0.12
 /* ... then more of both (bodies 0.2, with noise and holes 0.09; one view 0.05), near the best so far. */
 #define MANY_POINTS   5000
 #define MANY_PLACES   400
@@ -237,7 +236,7 @@ static bool choose_side(search *s)
 static bool find_place(search *few, search *many)
 {
     double shares[MANY_PLACES];
-    if (!(try_places(few, shares, FEW_PLACES, NULL) < FEW_HIDDEN)) return false;
+    if (!(try_places(few, shares, FEW_PLACES, NULL) < HIDDEN_MAX)) return false;
     double least = try_places(many, shares, MANY_PLACES, few->best);
     if (!(least < MANY_HIDDEN)) return false;
     take_mean(many, shares, MANY_PLACES, least);

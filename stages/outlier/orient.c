@@ -18,13 +18,11 @@
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-#define NEIGHBOURS NPG_SIDE_NEIGHBOURS
+#define NEIGHBOURS NPG_NEIGHBOURS
 /* All set by trial. */
-#define TRIALS         4    /* numbers of neighbours                                               */
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
 #define FOLLOWED       5    /* core points that each other point asks for its side                 */
 #define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
-#define MEND_ROUNDS    6    /* of those, each followed by the winding number of what it gave       */
 #define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
 #define MISFIT_WEIGHT  4.0  /* of the winding number's misfit beside the neighbours' agreement     */
 #define WINDING_WEIGHT 0.6  /* of the winding number beside the neighbours' vote, of single points */
@@ -152,7 +150,7 @@ static npg_status settle_points(npg_sided_cloud *c)
     uint32_t *list = npg_arena_take(&c->arena, c->count, sizeof *list);
     NPG_TRY(npg_arena_status(&c->arena));
     NPG_TRY(npg_sided_winding(c));
-    for (int round = 0; round < MEND_ROUNDS && count; round++) {
+    for (int round = 0; round < NPG_SIDE_ROUNDS && count; round++) {
         turn_points(c, was_turned);
         count = list_turned(list, was_turned, c->count);
         if (count) NPG_TRY(npg_sided_rewind(c, list, count));
@@ -305,7 +303,8 @@ npg_status npg_normals_orient(float *normals, double *score, const float *points
 
 /* ---- several numbers of neighbours ---- */
 
-static const int trial_neighbours[TRIALS] = {10, 12, 16, 24}; /* see normals.h for what they trade */
+static const int trial_neighbours[] = {10, 12, 16, 24}; /* see normals.h for what they trade */
+enum { TRIALS = sizeof trial_neighbours / sizeof *trial_neighbours };
 
 typedef struct trials {     /* of the same points with several numbers of neighbours */
     float *normals[TRIALS]; /* count x 3 each */

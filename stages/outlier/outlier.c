@@ -17,8 +17,7 @@
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
 
-#define ISOLATED_NEIGHBOURS 12 /* whose mean distance tells whether a point is isolated */
-#define NORMAL_NEIGHBOURS   16 /* of normals that a sensor turns; npg_normals_make() tries it, too */
+#define NORMAL_NEIGHBOURS 16 /* of normals that a sensor turns; npg_normals_make() tries it, too */
 
 enum { NORMALS_AUTO, NORMALS_ESTIMATE, NORMALS_GIVEN };
 enum { FOR_KEY, FOR_ALL };
@@ -368,8 +367,7 @@ static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
     for (size_t i = 0; i < frame_count; i++)
         if (!is_done(npg_chunk_frame(chunk, i))) frames[count++] = npg_chunk_frame(chunk, i);
-    npg_status status =
-        npg_isolated_drop(npg_worker_kept(worker), frames, count, ISOLATED_NEIGHBOURS, s->ratio);
+    npg_status status = npg_isolated_drop(npg_worker_kept(worker), frames, count, NPG_NEIGHBOURS, s->ratio);
     npg_release(&frames);
     return status;
 }

@@ -120,7 +120,8 @@ npg_status npg_sensors_set(const npg_sensors *sensors, npg_frame *frame, const n
 /* Sides: what orient.c (the order of the steps) and sides.c (tree, patches, winding number) share: a
  * npg_sided_cloud whose normals have a direction each, and are to be turned to the side that is out. */
 
-#define NPG_SIDE_NEIGHBOURS 12 /* of a point, itself among them; set by trial */
+#define NPG_NEIGHBOURS  12 /* of a point, itself among them: of its side, and whether it is isolated */
+#define NPG_SIDE_ROUNDS 4  /* of turning points or patches: what turns changes what is best for others */
 
 typedef struct npg_link { /* two neighbours and how well their sides agree, -1..1 */
     uint32_t a, b;
@@ -132,7 +133,7 @@ typedef struct npg_sided_cloud { /* the points that are oriented together */
     size_t count;
     const float *points;
     float *normals;
-    uint32_t *index;       /* count x NPG_SIDE_NEIGHBOURS, itself among them; its own */
+    uint32_t *index;       /* count x NPG_NEIGHBOURS, itself among them; its own */
     float *area, *winding; /* count; its own */
     bool is_wound;         /* winding is that of the normals as they are */
     float soft_sq;         /* squared length below which the winding number is softened */

@@ -6,8 +6,7 @@
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-#define NEIGHBOURS    NPG_SIDE_NEIGHBOURS
-#define PATCH_ROUNDS  4           /* turning one patch changes what is best for the others; set by trial */
+#define NEIGHBOURS    NPG_NEIGHBOURS
 #define BORDER_WEIGHT 0.1         /* of a patch's border beside its winding number; set by trial         */
 #define FULL_ANGLE    12.5663706f /* 4 pi: the winding number is a solid angle in units of it            */
 
@@ -239,7 +238,7 @@ npg_status npg_sided_turn_patches(npg_sided_cloud *c, const uint32_t *patch_of, 
     npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
     npg_status status = open_patches(&p, &scratch, patch_of, c->count);
     if (!status) status = npg_sided_winding(c);
-    for (int round = 0; round < PATCH_ROUNDS && turned && !status; round++) {
+    for (int round = 0; round < NPG_SIDE_ROUNDS && turned && !status; round++) {
         turned = 0;
         for (size_t k = 0; k < p.count; k++) {
             /* More than half of the points: that is the sign of the whole, which face_out() decides. */
