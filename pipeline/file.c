@@ -17,11 +17,12 @@
 #define BUFFER_SIZE (256 << 10) /* bytes gathered before a write: few system calls for many small pieces */
 
 struct npg_file {
+    npg_arena arena; /* of paths and buffer */
     int fd;
     npg_status status; /* of the first failure, with its text in `cause` */
     char cause[512];
-    char *path, *hidden_path, *folder; /* owned */
-    unsigned char *buffer;             /* BUFFER_SIZE, owned */
+    char *path, *hidden_path, *folder;
+    unsigned char *buffer; /* BUFFER_SIZE */
     size_t used;
     uint64_t flushed; /* bytes that left the buffer */
 };
@@ -31,18 +32,17 @@ static size_t path_size(const char *folder, const char *name)
     return strlen(folder) + strlen(name) + 2;
 }
 
-static void print_path(char *path, const char *folder, const char *name)
+static bool print_path(char *path, size_t size, const char *folder, const char *name)
 {
     size_t length = strlen(folder);
     const char *slash = length && folder[length - 1] == '/' ? "" : "/";
-    snprintf(path, path_size(folder, name), "%s%s%s", folder, slash, name);
+    int printed = snprintf(path, size, "%s%s%s", folder, slash, name);
+    return printed >= 0 && (size_t)printed < size;
 }
 
 npg_status npg_path_of(char path[NPG_PATH_SIZE], const char *folder, const char *name)
 {
-    size_t length = strlen(folder);
-    const char *slash = length && folder[length - 1] == '/' ? "" : "/";
-    if (snprintf(path, NPG_PATH_SIZE, "%s%s%s", folder, slash, name) < NPG_PATH_SIZE) return NPG_OK;
+    if (print_path(path, NPG_PATH_SIZE, folder, name)) return NPG_OK;
     return npg_error(NPG_USAGE, "%s: the name is too long", folder);
 }
 
@@ -73,14 +73,14 @@ npg_status npg_file_lock(int *fd, const char *folder, const char *name, bool wai
 npg_status npg_join_path(char **out, const char *folder, const char *name)
 {
     NPG_TRY(npg_alloc(out, NPG_FOR_FILES, path_size(folder, name)));
-    print_path(*out, folder, name);
+    print_path(*out, path_size(folder, name), folder, name);
     return NPG_OK;
 }
 
 char *npg_arena_path(npg_arena *arena, const char *folder, const char *name)
 {
     char *path = npg_arena_take(arena, path_size(folder, name), 1);
-    if (path) print_path(path, folder, name);
+    if (path) print_path(path, path_size(folder, name), folder, name);
     return path;
 }
 
@@ -121,52 +121,28 @@ bool npg_is_in_folder(const char *folder, const char *name)
     return !npg_path_of(path, folder, name) && npg_is_there(path);
 }
 
-/* The folder part of a path, "." where there is none. */
-static npg_status folder_of(char **out, const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    NPG_TRY(npg_copy_text(out, slash ? path : "."));
-    if (slash) (*out)[slash == path ? 1 : slash - path] = 0;
-    return NPG_OK;
-}
-
-/* "<folder>/.<name>.part", where the file is written until it is whole. */
-static npg_status make_hidden_path(char **out, const char *path)
-{
-    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-    size_t folder = (size_t)(name - path), size = strlen(path) + 8;
-    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, size));
-    snprintf(*out, size, "%.*s.%s.part", (int)folder, path, name);
-    return NPG_OK;
-}
-
-static void free_file(npg_file **slot)
-{
-    npg_release(&(*slot)->path);
-    npg_release(&(*slot)->hidden_path);
-    npg_release(&(*slot)->folder);
-    npg_release(&(*slot)->buffer);
-    npg_release(slot);
-}
-
 static npg_status fill_file(npg_file *file, const char *path)
 {
-    NPG_TRY(npg_copy_text(&file->path, path));
-    NPG_TRY(make_hidden_path(&file->hidden_path, path));
-    NPG_TRY(folder_of(&file->folder, path));
-    NPG_TRY(npg_alloc(&file->buffer, NPG_FOR_FILES, BUFFER_SIZE));
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    size_t size = strlen(path) + 8;
+    file->fd = -1;
+    file->path = npg_arena_text(&file->arena, path);
+    file->hidden_path = npg_arena_take(&file->arena, size, 1);
+    file->folder = npg_arena_text(&file->arena, slash ? path : ".");
+    file->buffer = npg_arena_take(&file->arena, BUFFER_SIZE, 1);
+    NPG_TRY(npg_arena_status(&file->arena));
+    /* where the file is written until it is whole */
+    snprintf(file->hidden_path, size, "%.*s.%s.part", (int)(name - path), path, name);
+    if (slash) file->folder[slash == path ? 1 : slash - path] = 0;
     file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
     return file->fd < 0 ? npg_error_errno(NPG_DISK, "can't write %s", path) : NPG_OK;
 }
 
 npg_status npg_file_open(npg_file **out, const char *path)
 {
-    npg_file *file;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&file, NPG_FOR_FILES, sizeof *file));
-    npg_status status = fill_file(file, path);
-    if (status) free_file(&file);
-    *out = file;
+    NPG_TRY(npg_object_open(out, NPG_FOR_FILES, sizeof **out));
+    npg_status status = fill_file(*out, path);
+    if (status) npg_object_close(out);
     return status;
 }
 
@@ -180,16 +156,9 @@ static npg_status keep_failure(npg_file *file, const char *verb)
 
 static npg_status write_through(npg_file *file, const unsigned char *data, size_t size)
 {
+    int64_t at = (int64_t)file->flushed;
     file->flushed += size;
-    while (size) {
-        ssize_t written = write(file->fd, data, size);
-        if (written < 0 && errno == EINTR) continue;
-        if (written == 0) errno = ENOSPC; /* nothing was written, and no cause was given */
-        if (written <= 0) return keep_failure(file, "write");
-        data += written;
-        size -= (size_t)written;
-    }
-    return NPG_OK;
+    return npg_write_at(file->fd, data, size, at) ? NPG_OK : keep_failure(file, "write");
 }
 
 static npg_status flush_buffer(npg_file *file)
@@ -216,18 +185,10 @@ uint64_t npg_file_size(const npg_file *file)
 
 npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size)
 {
-    const unsigned char *at = data;
     NPG_REQUIRE(offset <= npg_file_size(file) && size <= npg_file_size(file) - offset);
     if (!file->status && offset + size > file->flushed) NPG_TRY(flush_buffer(file));
-    while (size && !file->status) {
-        ssize_t written = pwrite(file->fd, at, size, (off_t)offset);
-        if (written < 0 && errno == EINTR) continue;
-        if (written == 0) errno = ENOSPC;
-        if (written <= 0) return keep_failure(file, "write");
-        at += written;
-        offset += (uint64_t)written;
-        size -= (size_t)written;
-    }
+    if (!file->status && !npg_write_at(file->fd, data, size, (int64_t)offset))
+        return keep_failure(file, "write");
     return file->status;
 }
 
@@ -267,7 +228,7 @@ npg_status npg_file_commit(npg_file **slot)
      * the same. */
     npg_status status = file->status ? npg_error_restore(file->status, file->cause) : sync_folder(file);
     if (file->status) unlink(file->hidden_path);
-    free_file(slot);
+    npg_object_close(slot);
     return status;
 }
 
@@ -277,7 +238,7 @@ void npg_file_discard(npg_file **slot)
     if (!file) return;
     if (file->fd >= 0) close(file->fd);
     unlink(file->hidden_path);
-    free_file(slot);
+    npg_object_close(slot);
 }
 
 /* ---- reading ---- */

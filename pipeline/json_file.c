@@ -135,11 +135,9 @@ npg_status npg_json_save(const char *path, const json_t *value)
 
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, folder, name));
-    npg_status status = npg_json_save(path, value);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, folder, name));
+    return npg_json_save(path, value);
 }
 
 /* ---- lines ---- */
@@ -182,14 +180,12 @@ npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_vi
 
 npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
 {
-    char *path, text[17];
+    char path[NPG_PATH_SIZE], text[17];
     uint64_t hash;
     struct stat info;
-    NPG_TRY(npg_join_path(&path, output, file));
-    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
-    if (!status && stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-    npg_release(&path);
-    NPG_TRY(status);
+    NPG_TRY(npg_path_of(path, output, file));
+    NPG_TRY(npg_hash_file(&hash, path, UINT64_MAX));
+    if (stat(path, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", path);
     snprintf(text, sizeof text, "%016llx", (unsigned long long)hash);
     json_object_set_new(entry, "bytes", json_integer((json_int_t)info.st_size));
     json_object_set_new(entry, "xxh3", json_string(text));

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "evaluate/evaluate_internal.h"
-#include "job/frame_log.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"

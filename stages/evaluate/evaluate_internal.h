@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "job/frame_log.h"
+#include "job/job.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/mesh.h"

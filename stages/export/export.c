@@ -7,7 +7,6 @@
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
-#include "job/frame_log.h"
 #include "job/job.h"
 #include "optimize/solver.h"
 #include "pipeline/json_file.h"
@@ -474,7 +473,10 @@ static npg_status conclude(npg_worker *worker)
     json_object_set(head, "meshes", json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
     json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
-    if (!status) return npg_done_write(output_of(worker), head, npg_exporters_any(&state->choice));
+    if (!status) {
+        NPG_TRY(npg_done_write(output_of(worker), head, npg_exporters_any(&state->choice)));
+        return npg_job_end(npg_job_of(worker));
+    }
     json_decref(head);
     return status;
 }

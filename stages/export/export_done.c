@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "job/frame_log.h"
+#include "job/job.h"
 #include "pipeline/json_file.h"
 
 static npg_status write_entry(npg_file *file, const json_t *entry, bool *is_first)

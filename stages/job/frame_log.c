@@ -1,5 +1,5 @@
 /* Frame log: one line for every frame whose results are on disk. */
-#include "job/frame_log.h"
+#include "job/job_internal.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include "pipeline/file.h"
-#include "pipeline/json_file.h"
 
 typedef struct line_place { /* a frame's line in the partial list */
     int64_t index;
@@ -18,10 +17,11 @@ typedef struct line_place { /* a frame's line in the partial list */
 } line_place;
 
 struct npg_frame_log {
-    char *output, *partial_path; /* owned */
+    npg_arena arena; /* of what follows */
+    char *output, *partial_path;
     int fd;
     off_t size;
-    line_place *lines; /* owned */
+    line_place *lines;
     size_t line_count, line_capacity;
 };
 
@@ -137,15 +137,14 @@ static json_t *json_of_frame(const npg_frame *frame, const char *file)
 
 static npg_status open_list(npg_frame_log **out, const char *output, int flags)
 {
-    npg_frame_log *list;
-    NPG_TRY(npg_alloc(&list, NPG_FOR_FILES, sizeof *list));
-    list->fd = -1;
-    npg_status status = npg_copy_text(&list->output, output);
-    if (!status) status = npg_join_path(&list->partial_path, output, NPG_FRAME_LOG_NAME);
-    if (!status) list->fd = open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
+    NPG_TRY(npg_object_open(out, NPG_FOR_FILES, sizeof **out));
+    npg_frame_log *list = *out;
+    list->output = npg_arena_text(&list->arena, output);
+    list->partial_path = npg_arena_path(&list->arena, output, NPG_FRAME_LOG_NAME);
+    npg_status status = npg_arena_status(&list->arena);
+    list->fd = status ? -1 : open(list->partial_path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
     if (!status && list->fd < 0) status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
-    if (status) npg_frame_log_close(&list);
-    *out = list;
+    if (status) npg_frame_log_close(out);
     return status;
 }
 
@@ -154,21 +153,16 @@ npg_status npg_frame_log_open(npg_frame_log **out, const char *output)
     return open_list(out, output, O_CREAT | O_TRUNC);
 }
 
-void npg_frame_log_close(npg_frame_log **slot)
+void npg_frame_log_close(npg_frame_log **list)
 {
-    npg_frame_log *list = *slot;
-    if (!list) return;
-    if (list->fd >= 0) close(list->fd);
-    npg_release(&list->output);
-    npg_release(&list->partial_path);
-    npg_release(&list->lines);
-    npg_release(slot);
+    if (*list && (*list)->fd >= 0) close((*list)->fd);
+    npg_object_close(list);
 }
 
 static npg_status add_place(npg_frame_log *list, int64_t index, size_t size)
 {
-    NPG_TRY(npg_grow(&list->lines, &list->line_capacity, list->line_count + 1, sizeof *list->lines,
-                     NPG_FOR_FILES));
+    NPG_TRY(npg_arena_grow(&list->arena, &list->lines, &list->line_capacity, list->line_count + 1,
+                           sizeof *list->lines));
     list->lines[list->line_count++] = (line_place){index, list->size, size};
     list->size += (off_t)size;
     return NPG_OK;
@@ -300,13 +294,11 @@ const npg_fact_kind npg_fact_late_faults = {"late_faults", "evaluate", release_l
 npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts, const npg_late_faults *late)
 {
     npg_file *file;
-    char *path;
+    char path[NPG_PATH_SIZE];
     if (list->line_count) qsort(list->lines, list->line_count, sizeof *list->lines, by_index);
-    NPG_TRY(npg_join_path(&path, list->output, "frames.jsonl"));
-    npg_status status = npg_file_open(&file, path);
-    npg_release(&path);
-    NPG_TRY(status);
-    status = copy_lines(list, file, facts, late);
+    NPG_TRY(npg_path_of(path, list->output, "frames.jsonl"));
+    NPG_TRY(npg_file_open(&file, path));
+    npg_status status = copy_lines(list, file, facts, late);
     if (status)
         npg_file_discard(&file);
     else

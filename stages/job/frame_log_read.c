@@ -1,5 +1,5 @@
 /* Frame log: the lines of an earlier run. */
-#include "job/frame_log.h"
+#include "job/job_internal.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,38 +10,31 @@
 
 npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
-    npg_status status = npg_json_lines_each(path, bytes, visit, user);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
+    return npg_json_lines_each(path, bytes, visit, user);
 }
 
 /* ---- the log that goes with a state ---- */
 
 npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
     int fd = open(path, O_RDWR | O_CLOEXEC);
     npg_status status = NPG_OK;
     if (fd < 0 || fdatasync(fd)) status = npg_error_errno(NPG_DISK, "can't sync %s", path);
     if (fd >= 0) close(fd);
-    if (!status) status = npg_hash_file(hash, path, (uint64_t)bytes);
-    npg_release(&path);
-    return status;
+    return status ? status : npg_hash_file(hash, path, (uint64_t)bytes);
 }
 
 npg_status npg_frame_log_check(const char *output, int64_t bytes, uint64_t hash)
 {
     uint64_t now;
-    char *path;
-    NPG_TRY(npg_join_path(&path, output, NPG_FRAME_LOG_NAME));
-    npg_status status = npg_hash_file(&now, path, (uint64_t)bytes);
-    if (!status && now != hash)
-        status = npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
+    NPG_TRY(npg_hash_file(&now, path, (uint64_t)bytes));
+    return now == hash ? NPG_OK : npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
 }
 
 /* ---- appended frames ---- */
@@ -78,13 +71,9 @@ static npg_status shorten(const char *from, const char *to, int64_t below, int64
 
 npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lines, int64_t *bytes)
 {
-    char *whole, *partial = NULL;
-    NPG_TRY(npg_join_path(&whole, output, "frames.jsonl"));
-    npg_status status = npg_join_path(&partial, output, NPG_FRAME_LOG_NAME);
-    bool is_whole = !status && npg_is_there(whole);
-    if (!status) status = shorten(is_whole ? whole : partial, partial, below, lines, bytes);
-    if (!status && is_whole && unlink(whole)) status = npg_error_errno(NPG_DISK, "can't remove %s", whole);
-    npg_release(&whole);
-    npg_release(&partial);
-    return status;
+    char whole[NPG_PATH_SIZE], partial[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(whole, output, "frames.jsonl"));
+    NPG_TRY(npg_path_of(partial, output, NPG_FRAME_LOG_NAME));
+    NPG_TRY(shorten(npg_is_there(whole) ? whole : partial, partial, below, lines, bytes));
+    return npg_file_remove(output, "frames.jsonl");
 }

@@ -1,16 +1,11 @@
 /* job: the service that, before anything else, finds out whether an earlier run of the same
  * job can be resumed. */
-#include "job/job.h"
+#include "job/job_internal.h"
 
-#include <errno.h>
 #include <stdio.h>
-#include <string.h>
-#include <unistd.h>
 
 #include "ingest/ingest.h"
-#include "job/frame_log.h"
 #include "pipeline/file.h"
-#include "pipeline/options.h"
 
 typedef struct job_state {
     bool restart, append;
@@ -34,8 +29,7 @@ npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key)
     const npg_job *job = npg_job_of(worker);
     uint64_t frames = 0;
     NPG_TRY(npg_job_key(job, key));
-    if (npg_job_frames(job))
-        NPG_TRY(npg_spool_key(npg_job_frames(job), npg_worker_facts(worker)->planned_count, &frames));
+    if (job->frames) NPG_TRY(npg_spool_key(job->frames, npg_worker_facts(worker)->planned_count, &frames));
     *key ^= frames;
     return NPG_OK;
 }
@@ -77,21 +71,11 @@ static void widen_plan(npg_plan *plan, int64_t window_asked, int64_t overlap_ask
     if (plan->overlap >= plan->window) plan->overlap = plan->window - 1;
 }
 
-static npg_status remove_done(npg_worker *worker)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, npg_worker_settings(worker)->output, "done.json"));
-    npg_status status = NPG_OK;
-    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    npg_release(&path);
-    return status;
-}
-
 /* Each step can be broken off and done again: job.json first says that there are more frames. */
 static npg_status begin_append(npg_worker *worker, npg_job *job)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    int64_t lines, bytes, frame_count = npg_job_frame_count(job);
+    int64_t lines, bytes, frame_count = job->frame_count;
     NPG_TRY(npg_job_open_forward(job));
     NPG_TRY(npg_job_restore_facts(worker, job));
     npg_plan plan = facts->plan;
@@ -100,7 +84,7 @@ static npg_status begin_append(npg_worker *worker, npg_job *job)
     *npg_own(worker, frame_count) = frame_count;
     *npg_own(worker, resumed_read) = 0;
     NPG_TRY(npg_job_extend(job));
-    NPG_TRY(remove_done(worker));
+    NPG_TRY(npg_file_remove(npg_worker_settings(worker)->output, "done.json"));
     NPG_TRY(npg_frame_log_shorten(npg_worker_settings(worker)->output,
                                   npg_plan_window(&facts->plan, 0, -1).first, &lines, &bytes));
     npg_job_set_exported(job, lines, bytes);
@@ -129,17 +113,17 @@ static npg_status begin(npg_worker *worker)
         return npg_error(NPG_USAGE, "frames can be appended to a job of files, not to one of a live source");
     NPG_TRY(npg_job_open(&job, &start, worker, state->restart, state->append));
     NPG_TRY(npg_worker_publish(worker, &job_fact, job));
-    if (is_live) NPG_TRY(npg_worker_publish(worker, &npg_fact_spool, npg_job_frames(job)));
+    if (is_live) NPG_TRY(npg_worker_publish(worker, &npg_fact_spool, job->frames));
     switch (start) {
     case NPG_JOB_FRESH: return NPG_OK;
     case NPG_JOB_DONE:
-        if (is_live) NPG_TRY(npg_live_check_done(worker, npg_job_frames(job)));
+        if (is_live) NPG_TRY(npg_live_check_done(worker, job->frames));
         npg_worker_log(worker, NPG_LOG_INFO, -1, "%s is done already: nothing is left to do",
                        settings->output);
         return NPG_END;
     case NPG_JOB_RESUME:
         NPG_TRY(npg_job_restore_facts(worker, job));
-        if (npg_job_source_of(settings) == NPG_JOB_PUSH) NPG_TRY(want_next(worker, npg_job_frames(job)));
+        if (npg_job_source_of(settings) == NPG_JOB_PUSH) NPG_TRY(want_next(worker, job->frames));
         break;
     case NPG_JOB_APPEND: NPG_TRY(begin_append(worker, job)); break;
     }

@@ -5,7 +5,8 @@
  *                                  process
  *     OUT/job/job.json             what the results are made of: version, options, and the inputs with their
  *                                  sizes, times and checksums
- *     OUT/job/frames.npg           what came from a live source, frame by frame (ingest/spool.c)
+ *     OUT/job/frames.npg           what came from a live source, frame by frame (ingest/spool.c); that of a pipe, or
+ *                                  of pushed frames, goes when the run is done
  *     OUT/job/store.npg            one file of records with checksums, each whole or not there (store.h): after
  *                                  each solved window a state, with the facts of the capture, the reference
  *                                  mesh in unit coordinates, what stages need to be resumed, the optimiser,
@@ -26,6 +27,7 @@
 #ifndef NPG_JOB_H
 #define NPG_JOB_H
 
+#include "pipeline/json_file.h"
 #include "pipeline/stage.h"
 #include "pipeline/store.h"
 
@@ -35,42 +37,18 @@ typedef struct npg_job npg_job;
  * Written by the service job before the first pass. */
 npg_job *npg_job_of(const npg_worker *worker);
 
-/* ---- the job as a whole (job_folder.c) ---- */
-
-/* What a run finds of an earlier one. */
-typedef enum npg_job_start {
-    NPG_JOB_FRESH,  /* nothing that it could be resumed from      */
-    NPG_JOB_RESUME, /* it continues where the earlier one was     */
-    NPG_JOB_APPEND, /* the earlier one is done, frames came since */
-    NPG_JOB_DONE    /* nothing is left to do                      */
-} npg_job_start;
-
-/* Open OUT/job, lock it and compare.  NPG_USAGE: another run is at work there, or the inputs,
- * options or the version are others than those that what is there was made of; the text says which. */
-npg_status npg_job_open(npg_job **job, npg_job_start *start, npg_worker *worker, bool restart, bool append);
-void npg_job_close(npg_job **job);
-
 /* Whether this run discards what is there (option restart). */
 bool npg_job_is_restart(const npg_job *job);
 
-/* Frames of the input, gaps included. */
-int64_t npg_job_frame_count(const npg_job *job);
-
-/* The newest state that is whole, NULL when there is none (NPG_JOB_FRESH); a loan. */
+/* The newest state that is whole, NULL when there is none; a loan. */
 const npg_record *npg_job_state(const npg_job *job);
 
 /* From now on the job is of this run: forget older states and write job.json.  keeps_grids:
  * those of all windows stay.  Any thread. */
 npg_status npg_job_write(npg_job *job, bool keeps_grids);
 
-/* The job is extended by frames that came since: write job.json with them. */
-npg_status npg_job_extend(npg_job *job);
-
-/* <folder>/<name>, which the program wrote; NULL where there is none.  NPG_USAGE: it is damaged. */
-npg_status npg_job_read_json(json_t **value, const char *folder, const char *name);
-
-/* Open the state that later frames start from in place of the newest one. */
-npg_status npg_job_open_forward(npg_job *job);
+/* The run is done: what came from a pipe or was pushed is not needed any more.  NULL is fine. */
+npg_status npg_job_end(npg_job *job);
 
 /* ---- frames on disk ---- */
 
@@ -79,10 +57,6 @@ void npg_job_set_exported(npg_job *job, int64_t count, int64_t log_bytes);
 
 /* What was set last.  Any thread. */
 void npg_job_exported(npg_job *job, int64_t *count, int64_t *log_bytes);
-
-/* Wait until job.json is written and `count` frames are on disk; *log_bytes gets the frame log's size then.
- * NPG_ABORTED when the run stops before.  Any thread. */
-npg_status npg_job_wait_exported(npg_job *job, int64_t count, int64_t *log_bytes);
 
 /* ---- states (job_state.c) ---- */
 
@@ -104,53 +78,82 @@ typedef npg_status npg_job_write_state(void *user, npg_store *out, const char *g
 npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, npg_job_write_state *write,
                               void *user);
 
-/* Facts, reference, reports and warnings from the open state; before the first pass.  NPG_BAD_INPUT. */
-npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job);
-
 /* Where stage align keeps what it finds in fusing passes; a loan. */
 npg_store *npg_job_store(const npg_job *job);
 
 /* The solving pass starts from the poses in the store that are `of` this: they stay with its states. */
 void npg_job_keep_poses(npg_job *job, uint64_t of);
 
-/* Hash of options and input, to be asked before the job is written: what of an earlier run has the same is of
- * the same job. */
-npg_status npg_job_key(const npg_job *job, uint64_t *key);
-
-/* The same in a fusing pass: of a live source the input is the look-ahead that has come. */
+/* Hash of options and input: what of an earlier run has the same is of the same job.  Of a live source the input is
+ * the look-ahead that has come, and so this is asked in fusing passes alone. */
 npg_status npg_job_fusing_key(const npg_worker *worker, uint64_t *key);
 
-/* What job_state.c needs of the folder: block "log" of a state, the path of the next one's grids, what is kept. */
-typedef struct npg_job_log {
-    int64_t bytes, count; /* of the frame log that goes with the state */
-    uint64_t hash;        /* XXH3 of these bytes                       */
-} npg_job_log;
-npg_status npg_job_next_grids(const npg_job *job, char **path);
-npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment);
-int64_t npg_job_serial(const npg_job *job);         /* of the newest window's state, -1 while there is none */
-int64_t npg_job_forward_serial(const npg_job *job); /* -1 while there is none */
+/* Frame log: one line (JSON) for every frame whose results are on disk, in the order of solving.
+ *
+ *     OUT/frames.partial.jsonl     while the run is at work; a resumed run reads what came before from it
+ *     OUT/frames.jsonl             the same lines in the order of time, once all frames are there
+ *
+ * Stage export writes it; stage evaluate reads the figures of the frames before a resumed run's.
+ *
+ * Threads: one at a time, but for reading the lines that were there before. */
 
-/* ---- the frames of a live run (ingest/spool.c) ---- */
+#define NPG_FRAME_LOG_NAME "frames.partial.jsonl"
 
-#define NPG_BLOCK_FRAMES "frames" /* of a state: how many had come */
+typedef struct npg_frame_log npg_frame_log;
 
-/* A loan; NULL where the job is one of files.  Its file has another name until the job is written. */
-npg_store *npg_job_frames(const npg_job *job);
+/* Begin OUT/frames.partial.jsonl. */
+npg_status npg_frame_log_open(npg_frame_log **log, const char *output);
 
-/* The job is not the one that lies there: npg_error_text() with what to do about it.  NPG_USAGE. */
-npg_status npg_job_differs(const npg_job *job);
+/* Continue OUT/frames.partial.jsonl where it has `bytes` bytes; what comes after them goes.  Every mesh that
+ * the lines name must be as it was written: NPG_BAD_INPUT.  *mesh_count and *skipped_count: of the lines. */
+npg_status npg_frame_log_resume(npg_frame_log **log, const char *output, int64_t bytes, int64_t *mesh_count,
+                                int64_t *skipped_count);
 
-/* ---- what the results are made of (job_inputs.c) ---- */
+/* The partial file stays when finish has not been called.  NULL is fine. */
+void npg_frame_log_close(npg_frame_log **log);
 
-/* Where frames come from.  Words of job.json. */
-typedef enum npg_job_source { NPG_JOB_FILES, NPG_JOB_FOLLOW, NPG_JOB_STREAM, NPG_JOB_PUSH } npg_job_source;
-npg_job_source npg_job_source_of(const npg_settings *settings);
+/* Append one line for a frame.  file: its mesh relative to OUT, NULL if it has none. */
+npg_status npg_frame_log_add(npg_frame_log *log, const npg_frame *frame, const char *output,
+                             const char *file);
 
-/* A new JSON object.  */
-npg_status npg_job_describe(json_t **description, const npg_options *options);
+/* Lines so far and their bytes. */
+void npg_frame_log_size(const npg_frame_log *log, int64_t *lines, int64_t *bytes);
 
-/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.
- * NPG_USAGE says what differs first. */
-npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now);
+/* Faults that only showed when all frames were there, in the order of the indices. */
+typedef struct npg_late_faults {
+    struct npg_late_fault {
+        int64_t index, number;
+        int fault;           /* NPG_FAULT_*                                        */
+        double value, bound; /* in per cent of what the fault's text says, see evaluate.c */
+    } * faults;              /* owned */
+    size_t count;
+} npg_late_faults;
+
+/* Published by stage evaluate before the last frame's line is asked for. */
+extern const npg_fact_kind npg_fact_late_faults;
+
+/* Write OUT/frames.jsonl in the order of the indices; the partial one stays until the run is done.  Frames
+ * that the reference does not explain (facts->changed_at), and those with late faults (NULL: none), are
+ * marked. */
+npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts, const npg_late_faults *late);
+
+/* ---- the log of an earlier run ---- */
+
+/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where
+ * they are no such lines. */
+npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user);
+
+/* Misfits and marks of a line, exactly as they were; NaN where it has none. */
+void npg_frame_line_read(npg_figures *figures, const json_t *line);
+
+/* Their bytes on disk for good, and their checksum.  NPG_DISK. */
+npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash);
+
+/* NPG_BAD_INPUT where the first `bytes` bytes have another checksum. */
+npg_status npg_frame_log_check(const char *output, int64_t bytes, uint64_t hash);
+
+/* Make OUT/frames.partial.jsonl of the frames before index `below` from the whole list of a run that is done
+ * (or from the partial one, where this was broken off), which goes. */
+npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lines, int64_t *bytes);
 
 #endif

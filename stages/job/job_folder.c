@@ -1,5 +1,5 @@
 /* Job: the folder OUT/job, its lock and its states. */
-#include "job/job.h"
+#include "job/job_internal.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -14,55 +14,14 @@
 #include <xxhash.h>
 
 #include "ingest/ingest.h"
-#include "job/frame_log.h"
 #include "pipeline/file.h"
 
-#define GRIDS_NAME  "window_%06lld.vdb"
 #define STORE_NAME  "store.npg"
 #define STORE_NEW   "store.new"
 #define FRAMES_NAME "frames.npg"
 #define FRAMES_NEW  "frames.new"
 
-struct npg_job {
-    char *output, *folder; /* owned */
-    int lock_fd;
-    json_t *then, *now;  /* owned; what an earlier run was made of, and this one; NULL once written */
-    int64_t frame_count; /* of the input, gaps included */
-    npg_store *store;    /* owned */
-    npg_store *frames;   /* of a live source (ingest/spool.c); owned, or NULL */
-    npg_record *state;   /* that the run is resumed from; owned */
-    int64_t serial;      /* of the newest state in place, -1: none */
-    int64_t forward_serial;
-    uint64_t poses_of; /* what the poses that states go with were found from */
-    bool keeps_grids;  /* of all windows, for the form vdb */
-    bool forgets;      /* older states go when the job is written */
-    bool is_restart;
-    npg_job_source source;
-
-    npg_latch *exported;  /* the run's: frames on disk, -1 until job.json is written */
-    pthread_mutex_t lock; /* guards what follows */
-    bool is_written;
-    int64_t exported_count, log_bytes;
-};
-
 /* ---- files ---- */
-
-static npg_status make_grids_path(char **path, const npg_job *job, int64_t serial)
-{
-    char name[64];
-    snprintf(name, sizeof name, GRIDS_NAME, (long long)serial);
-    return npg_join_path(path, job->folder, name);
-}
-
-static npg_status remove_file(const npg_job *job, const char *name)
-{
-    char *path;
-    NPG_TRY(npg_join_path(&path, job->folder, name));
-    npg_status status = NPG_OK;
-    if (unlink(path) && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    npg_release(&path);
-    return status;
-}
 
 /* The two newest states stay, and the one that later frames start from. */
 static bool is_kept(const npg_job *job, int64_t serial)
@@ -91,7 +50,7 @@ static npg_status remove_stale(const npg_job *job)
     DIR *listing = opendir(job->folder);
     if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
     for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (is_stale(job, entry->d_name)) status = remove_file(job, entry->d_name);
+        if (is_stale(job, entry->d_name)) status = npg_file_remove(job->folder, entry->d_name);
     closedir(listing);
     return status;
 }
@@ -100,44 +59,35 @@ static npg_status remove_stale(const npg_job *job)
 
 static npg_status take_lock(npg_job *job)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, job->folder, "lock"));
-    npg_status status = NPG_OK;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, job->folder, "lock"));
     job->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (job->lock_fd < 0)
-        status = npg_error_errno(NPG_DISK, "can't open %s", path);
-    else if (flock(job->lock_fd, LOCK_EX | LOCK_NB))
-        status = errno == EWOULDBLOCK ? npg_error(NPG_USAGE,
-                                                  "another run is at work on %s: "
-                                                  "wait for its end, or choose another output folder",
-                                                  job->output)
-                                      : npg_error_errno(NPG_DISK, "can't lock %s", path);
-    npg_release(&path);
-    return status;
+    if (job->lock_fd < 0) return npg_error_errno(NPG_DISK, "can't open %s", path);
+    if (!flock(job->lock_fd, LOCK_EX | LOCK_NB)) return NPG_OK;
+    return errno == EWOULDBLOCK ? npg_error(NPG_USAGE,
+                                            "another run is at work on %s: "
+                                            "wait for its end, or choose another output folder",
+                                            job->output)
+                                : npg_error_errno(NPG_DISK, "can't lock %s", path);
 }
 
 /* ---- what is there ---- */
 
 npg_status npg_job_read_json(json_t **value, const char *folder, const char *name)
 {
-    char *path;
+    char path[NPG_PATH_SIZE];
     json_error_t error;
-    int fd = -1;
+    int fd;
     *value = NULL;
-    NPG_TRY(npg_join_path(&path, folder, name));
-    bool is_missing = access(path, F_OK) && errno == ENOENT;
-    npg_status status = is_missing ? NPG_OK : npg_file_open_plain(&fd, path, NPG_USAGE);
-    if (fd >= 0) {
-        *value = json_loadfd(fd, 0, &error);
-        close(fd);
-        if (!json_is_object(*value)) {
-            json_decref(*value);
-            *value = NULL;
-            status = npg_error(NPG_USAGE, "%s is damaged (line %d: %s)", path, error.line, error.text);
-        }
-    }
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_path_of(path, folder, name));
+    if (access(path, F_OK) && errno == ENOENT) return NPG_OK;
+    NPG_TRY(npg_file_open_plain(&fd, path, NPG_USAGE));
+    *value = json_loadfd(fd, 0, &error);
+    close(fd);
+    if (json_is_object(*value)) return NPG_OK;
+    json_decref(*value);
+    *value = NULL;
+    return npg_error(NPG_USAGE, "%s is damaged (line %d: %s)", path, error.line, error.text);
 }
 
 static npg_status check_listed(const npg_job *job, const json_t *files)
@@ -146,11 +96,10 @@ static npg_status check_listed(const npg_job *job, const json_t *files)
         const json_t *entry = json_array_get(files, i);
         const char *name = json_string_value(json_object_get(entry, "path"));
         struct stat info;
-        char *path;
-        NPG_TRY(npg_join_path(&path, job->output, name ? name : ""));
+        char path[NPG_PATH_SIZE];
+        NPG_TRY(npg_path_of(path, job->output, name ? name : ""));
         bool is_there = name && npg_path_stays(name) && !stat(path, &info) &&
                         info.st_size == (off_t)json_integer_value(json_object_get(entry, "bytes"));
-        npg_release(&path);
         if (!is_there)
             return npg_error(NPG_USAGE, "%s/%s is missing or has another size than when it was done",
                              job->output, name ? name : "?");
@@ -177,21 +126,17 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
 
 static npg_status open_store(npg_store **store, const npg_job *job, const char *name)
 {
-    char *path;
+    char path[NPG_PATH_SIZE];
     npg_store_close(store);
-    NPG_TRY(npg_join_path(&path, job->folder, name));
-    npg_status status = npg_store_open(store, path);
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_path_of(path, job->folder, name));
+    return npg_store_open(store, path);
 }
 
 static npg_status rename_store(npg_store *store, const npg_job *job, const char *name)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, job->folder, name));
-    npg_status status = npg_store_rename(store, path);
-    npg_release(&path);
-    return status;
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, job->folder, name));
+    return npg_store_rename(store, path);
 }
 
 npg_store *npg_job_store(const npg_job *job)
@@ -237,12 +182,15 @@ static npg_status check_frames(const npg_job *job, const npg_record *record)
 }
 
 /* A state of aligned frames has none. */
-static npg_status check_grids(const npg_record *record, const char *path)
+static npg_status check_grids(const npg_job *job, const npg_record *record, int64_t serial)
 {
+    char name[64], path[NPG_PATH_SIZE];
     size_t size;
-    if (!npg_record_find(record, "grids.hash", &size)) return NPG_OK;
     uint64_t wanted, hash;
+    if (!npg_record_find(record, "grids.hash", &size)) return NPG_OK;
     NPG_TRY(npg_record_get(record, "grids.hash", &wanted, sizeof wanted));
+    snprintf(name, sizeof name, NPG_GRIDS_NAME, (long long)serial);
+    NPG_TRY(npg_path_of(path, job->folder, name));
     NPG_TRY(npg_hash_file(&hash, path, UINT64_MAX));
     return hash == wanted ? NPG_OK
                           : npg_error(NPG_BAD_INPUT, "%s is damaged: its checksum does not match", path);
@@ -253,15 +201,11 @@ static npg_status open_state(npg_job *job, const char *kind, int64_t serial, boo
 {
     npg_record *state = NULL;
     int64_t forward;
-    char *grids = NULL;
-    bool is_solved = !strcmp(kind, NPG_RECORD_STATE);
     npg_status status = npg_store_read(job->store, &state, kind, serial, 0);
-    if (!status && is_solved) status = make_grids_path(&grids, job, serial);
-    if (!status && is_solved) status = check_grids(state, grids);
+    if (!status && !strcmp(kind, NPG_RECORD_STATE)) status = check_grids(job, state, serial);
     if (!status && with_log) status = check_log(job, state);
     if (!status && with_log) status = check_frames(job, state);
     if (!status) status = npg_record_get(state, "forward", &forward, sizeof forward);
-    npg_release(&grids);
     if (status) {
         npg_record_close(&state);
         return status;
@@ -309,24 +253,9 @@ npg_status npg_job_key(const npg_job *job, uint64_t *key)
     return NPG_OK;
 }
 
-npg_store *npg_job_frames(const npg_job *job)
-{
-    return job->frames;
-}
-
-int64_t npg_job_serial(const npg_job *job)
-{
-    return job->serial;
-}
-
 bool npg_job_is_restart(const npg_job *job)
 {
     return job->is_restart;
-}
-
-int64_t npg_job_frame_count(const npg_job *job)
-{
-    return job->frame_count;
 }
 
 const npg_record *npg_job_state(const npg_job *job)
@@ -413,8 +342,9 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     job->source = npg_job_source_of(npg_worker_settings(worker));
     pthread_mutex_init(&job->lock, NULL);
     NPG_TRY(npg_worker_open_latch(worker, &job->exported, -1));
-    NPG_TRY(npg_copy_text(&job->output, npg_worker_settings(worker)->output));
-    NPG_TRY(npg_join_path(&job->folder, job->output, "job"));
+    job->output = npg_arena_text(&job->arena, npg_worker_settings(worker)->output);
+    job->folder = npg_arena_path(&job->arena, npg_worker_settings(worker)->output, "job");
+    NPG_TRY(npg_arena_status(&job->arena));
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
     job->frame_count = (int64_t)json_array_size(json_object_get(job->now, "frames"));
     if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
@@ -423,21 +353,18 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     *start = NPG_JOB_FRESH;
     if (!restart) NPG_TRY(look_around(job, start, worker, append));
     job->forgets = *start == NPG_JOB_FRESH;
-    if (restart || !job->forgets) NPG_TRY(remove_file(job, STORE_NEW));
+    if (restart || !job->forgets) NPG_TRY(npg_file_remove(job->folder, STORE_NEW));
     if (!job->store) NPG_TRY(open_store(&job->store, job, STORE_NEW));
     if (!job->source || !job->forgets) return NPG_OK;
-    NPG_TRY(remove_file(job, FRAMES_NEW));
+    NPG_TRY(npg_file_remove(job->folder, FRAMES_NEW));
     return open_store(&job->frames, job, FRAMES_NEW);
 }
 
 npg_status npg_job_open(npg_job **out, npg_job_start *start, npg_worker *worker, bool restart, bool append)
 {
-    npg_job *job;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&job, NPG_FOR_RUN, sizeof *job));
-    npg_status status = fill(job, start, worker, restart, append);
-    if (status) npg_job_close(&job);
-    *out = job;
+    NPG_TRY(npg_object_open(out, NPG_FOR_RUN, sizeof **out));
+    npg_status status = fill(*out, start, worker, restart, append);
+    if (status) npg_job_close(out);
     return status;
 }
 
@@ -450,12 +377,10 @@ void npg_job_close(npg_job **slot)
     npg_store_close(&job->frames);
     json_decref(job->then);
     json_decref(job->now);
-    if (job->source && job->folder && !job->is_written) remove_file(job, FRAMES_NEW);
+    if (job->source && job->folder && !job->is_written) npg_file_remove(job->folder, FRAMES_NEW);
     if (job->lock_fd >= 0) close(job->lock_fd);
-    npg_release(&job->folder);
-    npg_release(&job->output);
     pthread_mutex_destroy(&job->lock);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 /* ---- writing ---- */
@@ -471,10 +396,11 @@ static void forget_descriptions(npg_job *job)
 npg_status npg_job_write(npg_job *job, bool keeps_grids)
 {
     if (job->forgets) {
-        NPG_TRY(remove_file(job, "job.json"));
+        NPG_TRY(npg_file_remove(job->folder, "job.json"));
         NPG_TRY(rename_store(job->store, job, STORE_NAME));
         NPG_TRY(remove_stale(job));
-        NPG_TRY(job->frames ? rename_store(job->frames, job, FRAMES_NAME) : remove_file(job, FRAMES_NAME));
+        NPG_TRY(job->frames ? rename_store(job->frames, job, FRAMES_NAME)
+                            : npg_file_remove(job->folder, FRAMES_NAME));
         NPG_TRY(npg_json_write(job->folder, "job.json", job->now));
     }
     job->keeps_grids = keeps_grids;
@@ -491,9 +417,9 @@ npg_status npg_job_extend(npg_job *job)
     return npg_json_write(job->folder, "job.json", job->now);
 }
 
-npg_status npg_job_next_grids(const npg_job *job, char **path)
+npg_status npg_job_end(npg_job *job)
 {
-    return make_grids_path(path, job, job->serial + 1);
+    return job && job->source > NPG_JOB_FOLLOW ? npg_file_remove(job->folder, FRAMES_NAME) : NPG_OK;
 }
 
 npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment)
@@ -502,11 +428,6 @@ npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment)
     if (moment->is_forward_end) job->forward_serial = job->serial;
     NPG_TRY(npg_store_forget(job->store, is_needed, job));
     return remove_stale(job);
-}
-
-int64_t npg_job_forward_serial(const npg_job *job)
-{
-    return job->forward_serial;
 }
 
 /* ---- frames on disk ---- */

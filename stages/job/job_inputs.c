@@ -8,16 +8,16 @@
 #include <unistd.h>
 
 #include "ingest/ingest.h"
-#include "job/job.h"
+#include "job/job_internal.h"
 #include "pipeline/file.h"
 
 /* Of the files in the job folder; another one is not read. */
 #define LAYOUT 2
 
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
-static const char *const free_options[] = {
-    "input",   "output",  "ring",   "chunk", "max-memory",  "pull",        "cache",  "overwrite",
-    "confine", "restart", "append", "alarm", "segment-min", "follow", NULL};
+static const char *const free_options[] = {"input",  "output", "ring",        "chunk",   "max-memory",
+                                           "pull",   "cache",  "overwrite",   "confine", "restart",
+                                           "append", "alarm",  "segment-min", "follow",  NULL};
 /* Of a live source: what ends it.  Kept for npg_options_load_job(), not compared. */
 static const char *const end_options[] = {"follow-end.name", "follow-end.idle", NULL};
 

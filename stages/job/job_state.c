@@ -1,11 +1,10 @@
 /* Job: a state to the job's folder, and the facts of the run back. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "ingest/ingest.h"
-#include "job/frame_log.h"
-#include "job/job.h"
-#include "job/state_mesh.h"
+#include "job/job_internal.h"
 #include "pipeline/file.h"
 
 /* ---- saving ---- */
@@ -53,7 +52,7 @@ static npg_status put_log(npg_store *out, const npg_worker *worker, int64_t emit
 /* So do the frames of a live source. */
 static npg_status put_frames(npg_store *out, const npg_worker *worker)
 {
-    npg_store *frames = npg_job_frames(npg_job_of(worker));
+    npg_store *frames = npg_job_of(worker)->frames;
     if (!frames) return NPG_OK;
     const int64_t count = npg_spool_count(frames);
     NPG_TRY(npg_store_sync(frames));
@@ -63,8 +62,7 @@ static npg_status put_frames(npg_store *out, const npg_worker *worker)
 static npg_status put_all(npg_store *out, npg_worker *worker, const npg_job_moment *moment)
 {
     const npg_job *job = npg_job_of(worker);
-    int64_t serial = npg_job_serial(job);
-    int64_t forward = moment->is_forward_end ? serial + 1 : npg_job_forward_serial(job);
+    int64_t forward = moment->is_forward_end ? job->serial + 1 : job->forward_serial;
     NPG_TRY(put_log(out, worker, moment->emitted));
     NPG_TRY(put_frames(out, worker));
     NPG_TRY(npg_store_put(out, "forward", &forward, sizeof forward));
@@ -79,18 +77,15 @@ npg_status npg_job_save_state(npg_worker *worker, const npg_job_moment *moment, 
                               void *user)
 {
     npg_job *job = npg_job_of(worker);
-    npg_store *out = npg_job_store(job);
-    int64_t serial = npg_job_serial(job);
-    char *grids_path = NULL;
-    npg_status status = moment->is_inside ? NPG_OK : npg_job_next_grids(job, &grids_path);
-    NPG_TRY(status);
-    npg_store_begin(out, moment->is_inside ? NPG_RECORD_INSIDE : NPG_RECORD_STATE,
-                    moment->is_inside ? serial : serial + 1, 0);
-    status = put_all(out, worker, moment);
-    if (!status) status = write(user, out, grids_path);
-    status = npg_store_end(out, status, true);
-    npg_release(&grids_path);
-    return status ? status : npg_job_commit(job, moment);
+    char name[64], grids[NPG_PATH_SIZE];
+    snprintf(name, sizeof name, NPG_GRIDS_NAME, (long long)job->serial + 1);
+    NPG_TRY(npg_path_of(grids, job->folder, name));
+    npg_store_begin(job->store, moment->is_inside ? NPG_RECORD_INSIDE : NPG_RECORD_STATE,
+                    job->serial + !moment->is_inside, 0);
+    npg_status status = put_all(job->store, worker, moment);
+    if (!status) status = write(user, job->store, moment->is_inside ? NULL : grids);
+    NPG_TRY(npg_store_end(job->store, status, true));
+    return npg_job_commit(job, moment);
 }
 
 /* ---- restoring ---- */
@@ -109,7 +104,7 @@ static npg_status get_reports(npg_worker *worker, const npg_record *in)
 npg_status npg_job_restore_facts(npg_worker *worker, npg_job *job)
 {
     npg_facts restored;
-    const npg_record *in = npg_job_state(job);
+    const npg_record *in = job->state;
     int64_t read;
     npg_job_log log;
     NPG_TRY(npg_record_get(in, "facts", &restored, sizeof restored));

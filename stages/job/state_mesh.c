@@ -1,5 +1,5 @@
 /* State mesh: the reference mesh as blocks of a state on disk. */
-#include "job/state_mesh.h"
+#include "job/job_internal.h"
 
 #include <stddef.h>
 

@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #include "geometry/geometry.h"
-#include "job/state_mesh.h"
+#include "job/job_internal.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/group_folder.h"
 

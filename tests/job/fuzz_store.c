@@ -4,7 +4,7 @@
 #include <string.h>
 #include <xxhash.h>
 
-#include "job/state_mesh.h"
+#include "job/job_internal.h"
 #include "pipeline/store.h"
 #include "tests/support/fuzz_target.h"
 

@@ -34,6 +34,17 @@ await() {
     grep -q '"open": true' piped/report.json
 }
 
+@test "what was piped is gone once the run is done; the result can be judged, looked at and applied" {
+    [ -f piped/job/store.npg ]
+    [ ! -e piped/job/frames.npg ]
+    [ ! -e piped/job/frames.new ]
+    "$NEUPIG" eval --points-only piped capture/points >eval.txt
+    "$NEUPIG" view piped -o page.html
+    [ -s page.html ]
+    "$NEUPIG" apply piped --mesh piped/reference.ply -o applied
+    [ "$(ls applied | grep -c '^frame_.*ply$')" -eq 16 ]
+}
+
 @test "a folder that grows gives the same meshes, until its end file is there" {
     mkdir -p grows
     "$NEUPIG" run --follow grows -o followed --follow-end 0 "${small[@]}" >followed.log &

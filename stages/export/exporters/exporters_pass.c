@@ -11,7 +11,7 @@
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
-#include "job/frame_log.h"
+#include "job/job.h"
 #include "pipeline/json_file.h"
 
 struct npg_export_log {
