@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -172,20 +173,28 @@ static npg_status read_places(npg_store *s)
 static npg_status open_file(npg_store *s, const char *path)
 {
     struct stat info;
-    if (!path) {
-        FILE *file = tmpfile();
-        if (!file) return npg_error_errno(NPG_DISK, "can't make a temporary file");
-        s->fd = dup(fileno(file));
-        fclose(file);
-        return s->fd < 0 ? npg_error_errno(NPG_DISK, "can't keep a temporary file open") : NPG_OK;
-    }
     NPG_TRY(npg_copy_text(&s->path, path));
     s->fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
     if (s->fd < 0 || fstat(s->fd, &info)) return fail(s, "open");
     return S_ISREG(info.st_mode) ? NPG_OK : npg_error(NPG_DISK, "%s is not a plain file", path);
 }
 
-npg_status npg_store_open(npg_store **out, const char *path)
+/* Nobody sees it, and it goes with the process that has it open. */
+static npg_status open_nameless(npg_store *s, const char *folder)
+{
+    char path[NPG_PATH_SIZE];
+    if (!folder) folder = P_tmpdir;
+    s->fd = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (s->fd >= 0) return NPG_OK;
+    NPG_TRY(npg_path_of(path, folder, "frames.XXXXXX"));
+    s->fd = mkostemp(path, O_CLOEXEC); /* file systems that can't */
+    if (s->fd < 0) return npg_error_errno(NPG_DISK, "can't make a temporary file in %s", folder);
+    unlink(path);
+    return NPG_OK;
+}
+
+static npg_status open_store(npg_store **out, const char *where,
+                             npg_status (*open_as)(npg_store *s, const char *where))
 {
     npg_store *s;
     *out = NULL;
@@ -195,11 +204,21 @@ npg_status npg_store_open(npg_store **out, const char *path)
     s->fd = -1;
     s->hash = XXH3_createState();
     npg_status status = s->hash ? NPG_OK : npg_error(NPG_MEMORY, "no memory for a checksum");
-    if (!status) status = open_file(s, path);
+    if (!status) status = open_as(s, where);
     if (!status) status = read_places(s);
     if (status) npg_store_close(&s);
     *out = s;
     return status;
+}
+
+npg_status npg_store_open(npg_store **out, const char *path)
+{
+    return open_store(out, path, open_file);
+}
+
+npg_status npg_store_open_nameless(npg_store **out, const char *folder)
+{
+    return open_store(out, folder, open_nameless);
 }
 
 void npg_store_close(npg_store **slot)

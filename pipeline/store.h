@@ -36,8 +36,9 @@ typedef struct npg_store npg_store;
 typedef struct npg_record npg_record;
 
 /* The file at `path` (kept as a copy), made where there is none; what follows the last whole record is cut off.
- * path NULL: a file without a name, which ends with the process.  NPG_DISK, NPG_MEMORY. */
+ * Nameless: one in the folder (NULL: that of temporary files) that has no name, and ends with the process.  NPG_DISK, NPG_MEMORY. */
 npg_status npg_store_open(npg_store **store, const char *path);
+npg_status npg_store_open_nameless(npg_store **store, const char *folder);
 void npg_store_close(npg_store **store);
 
 /* Where the file is damaged, to be said to the user; "" where it is not.  A run that was killed while it wrote

@@ -105,7 +105,7 @@ static npg_status open_found(npg_pose_cache *c, npg_worker *worker, const npg_tr
                              size_t group_bytes)
 {
     if (c->owns)
-        NPG_TRY(npg_store_open(&c->found, NULL));
+        NPG_TRY(npg_store_open_nameless(&c->found, NULL));
     else
         c->found = npg_job_store(npg_job_of(worker));
     NPG_TRY(make_of(&c->found_of, worker, tracker, group_bytes));

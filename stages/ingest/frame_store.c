@@ -1,36 +1,28 @@
-/* Frame store: entries in memory or on disk. */
-#include "ingest/ingest_internal.h"
-
-#include <fcntl.h>
+/* Frame store: entries in memory, or records of a store that has no name. */
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
 
-#include "pipeline/file.h"
+#include "ingest/ingest_internal.h"
 
 #define ROW         (3 * sizeof(float))
-#define COLOUR      4 /* bytes of a point's colour; of its sensor's index it is one */
-#define FREE_SHARE  4 /* of the disk's free space, one such part may be taken: results need room, too */
-#define NOT_ON_DISK (-1)
+#define FREE_SHARE  4      /* of the disk's free space, one such part may be taken: results need room, too */
+#define RECORD_MADE "made" /* normals that were made or mended, of a frame */
 
 typedef struct entry {
     npg_frame *frame; /* its arrays are NULL where they are on disk; NULL: nothing is kept; owned */
-    float *made;      /* normals made or mended, N x 3; owned                                     */
+    float *made;      /* normals made or mended, N x 3, where they are not on disk; owned         */
     npg_cleaning made_cleaning;
-    off_t points_at, normals_at, colours_at, sensors_at, made_at; /* places in the file, or NOT_ON_DISK */
-    bool has_made;
+    bool is_on_disk, has_made;
 } entry;
 
 struct npg_frame_store {
     pthread_mutex_t lock;
     entry *entries; /* owned */
     size_t count, capacity, bytes, byte_max;
-    char *folder; /* owned; NULL: nothing goes to disk (any more) */
-    int file;     /* -1: not made yet */
-    off_t file_bytes, file_max;
+    char *folder;    /* owned; NULL: nothing goes to disk (any more) */
+    npg_store *disk; /* owned; NULL: not made yet */
+    size_t disk_bytes, disk_max;
 };
 
 static void release_nothing(void *value)
@@ -42,22 +34,28 @@ const npg_fact_kind npg_fact_frame_store = {"frame_store", "ingest", release_not
 
 npg_status npg_frame_store_open(npg_frame_store **out, size_t byte_max, const char *spill_folder)
 {
-    npg_frame_store *s;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&s, NPG_FOR_FILES, sizeof *s));
-    s->byte_max = byte_max;
-    s->file = -1;
-    pthread_mutex_init(&s->lock, NULL);
-    npg_status status = spill_folder ? npg_copy_text(&s->folder, spill_folder) : NPG_OK;
-    if (status) npg_frame_store_close(&s);
-    *out = s;
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, sizeof **out));
+    (*out)->byte_max = byte_max;
+    pthread_mutex_init(&(*out)->lock, NULL);
+    npg_status status = spill_folder ? npg_copy_text(&(*out)->folder, spill_folder) : NPG_OK;
+    if (status) npg_frame_store_close(out);
     return status;
+}
+
+void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], size_t point_count)
+{
+    const npg_store_array arrays[NPG_FRAME_ARRAYS] = {
+        {"points", offsetof(npg_frame, pos_local), point_count, ROW},
+        {"normals", offsetof(npg_frame, normals), point_count, ROW},
+        {"colours", offsetof(npg_frame, colours), point_count, 4},
+        {"sensors", offsetof(npg_frame, sensors), point_count, 1}};
+    memcpy(list, arrays, sizeof arrays);
 }
 
 /* Of a point, in the arrays that the frame has. */
 static size_t point_bytes(const npg_frame *frame)
 {
-    return (frame->pos_local ? ROW : 0) + (frame->normals ? ROW : 0) + (frame->colours ? COLOUR : 0) +
+    return (frame->pos_local ? ROW : 0) + (frame->normals ? ROW : 0) + (frame->colours ? 4 : 0) +
            (frame->sensors ? 1 : 0);
 }
 
@@ -73,19 +71,15 @@ static void drop(npg_frame_store *s, entry *e)
     if (e->frame) npg_frame_clear(e->frame);
     npg_release(&e->frame);
     npg_release(&e->made);
-    *e = (entry){.points_at = NOT_ON_DISK,
-                 .normals_at = NOT_ON_DISK,
-                 .colours_at = NOT_ON_DISK,
-                 .sensors_at = NOT_ON_DISK,
-                 .made_at = NOT_ON_DISK};
+    *e = (entry){0};
 }
 
 void npg_frame_store_close(npg_frame_store **slot)
 {
-    npg_frame_store *s = slot ? *slot : NULL;
+    npg_frame_store *s = *slot;
     if (!s) return;
-    for (size_t i = 0; s->entries && i < s->count; i++) drop(s, &s->entries[i]);
-    if (s->file >= 0) close(s->file);
+    for (size_t i = 0; i < s->count; i++) drop(s, &s->entries[i]);
+    npg_store_close(&s->disk);
     npg_release(&s->entries);
     npg_release(&s->folder);
     pthread_mutex_destroy(&s->lock);
@@ -95,7 +89,7 @@ void npg_frame_store_close(npg_frame_store **slot)
 npg_frame_store_use npg_frame_store_used(npg_frame_store *s)
 {
     pthread_mutex_lock(&s->lock);
-    npg_frame_store_use use = {s->bytes, (size_t)s->file_bytes};
+    npg_frame_store_use use = {s->bytes, s->disk_bytes};
     pthread_mutex_unlock(&s->lock);
     return use;
 }
@@ -107,134 +101,73 @@ static entry *find(npg_frame_store *s, int64_t index)
 
 /* ---- disk ---- */
 
-/* A file that has no name: nobody sees it, and it goes with the process that has it open. */
-static int open_nameless(const char *folder)
-{
-    char path[4096];
-    int file = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    if (file >= 0) return file;
-    if (snprintf(path, sizeof path, "%s/frames.XXXXXX", folder) >= (int)sizeof path) return -1;
-    file = mkostemp(path, O_CLOEXEC); /* file systems that can't */
-    if (file >= 0) unlink(path);
-    return file;
-}
-
-static bool may_write(npg_frame_store *s, off_t size)
+static bool may_write(npg_frame_store *s, size_t size)
 {
     struct statvfs disk;
     if (!s->folder) return false;
-    if (s->file < 0) {
-        s->file = open_nameless(s->folder);
-        if (s->file >= 0 && !fstatvfs(s->file, &disk))
-            s->file_max = (off_t)(disk.f_bavail / FREE_SHARE) * (off_t)disk.f_frsize;
-        if (s->file < 0) npg_release(&s->folder);
-    }
-    return s->file >= 0 && size <= s->file_max - s->file_bytes;
+    if (!s->disk && !npg_store_open_nameless(&s->disk, s->folder) && !statvfs(s->folder, &disk))
+        s->disk_max = (size_t)(disk.f_bavail / FREE_SHARE) * (size_t)disk.f_frsize;
+    if (!s->disk) npg_release(&s->folder);
+    return s->disk && size <= s->disk_max - s->disk_bytes;
 }
 
-/* Where the bytes lie in the file, or NOT_ON_DISK; after a failure nothing more goes there. */
-static off_t write_bytes(npg_frame_store *s, const void *data, size_t size)
+/* False: it found no place; after a failure nothing more goes to disk. */
+static bool write_arrays(npg_frame_store *s, const char *kind, const npg_frame *frame, size_t bytes,
+                         const npg_store_array *arrays, size_t count)
 {
-    off_t at = s->file_bytes;
-    if (!may_write(s, (off_t)size)) return NOT_ON_DISK;
-    if (!npg_write_at(s->file, data, size, at)) {
+    if (!may_write(s, bytes)) return false;
+    npg_store_begin(s->disk, kind, frame->index, 0);
+    npg_status status = npg_store_put_arrays(s->disk, frame, arrays, count);
+    if (npg_store_end(s->disk, status, false)) {
         npg_release(&s->folder);
-        return NOT_ON_DISK;
+        return false;
     }
-    s->file_bytes += (off_t)size;
-    return at;
-}
-
-/* An array of `size` bytes from the file into *array, which stays NULL where it is not there. */
-static npg_status read_bytes(const npg_frame_store *s, void *array, off_t at, size_t size)
-{
-    char *data;
-    if (at == NOT_ON_DISK) return NPG_OK;
-    NPG_TRY(npg_alloc(&data, NPG_FOR_FRAMES, size));
-    size_t got = size;
-    if (!npg_read_at(s->file, data, &got, at) || got < size) {
-        npg_release(&data);
-        return npg_error(NPG_DISK, "what was kept of a frame on disk can't be read back");
-    }
-    *(void **)array = data;
-    return NPG_OK;
-}
-
-/* An array of the frame into the file, where it has one; false: it found no place there. */
-static bool put_array(npg_frame_store *s, off_t *at, const void *array, size_t size)
-{
-    if (array) *at = write_bytes(s, array, size);
-    return !array || *at != NOT_ON_DISK;
-}
-
-/* A few numbers, which stay in memory. */
-static bool put_sensors(npg_frame *to, const npg_frame *frame)
-{
-    size_t bytes = frame->sensor_count * ROW;
-    if (!frame->sensor_local) return true;
-    if (npg_alloc(&to->sensor_local, NPG_FOR_FRAMES, bytes)) return false;
-    memcpy(to->sensor_local, frame->sensor_local, bytes);
+    s->disk_bytes += bytes;
     return true;
 }
 
-/* The frame without its arrays, which go to disk. */
-static bool put_on_disk(npg_frame_store *s, entry *e, const npg_frame *frame)
+static npg_status read_arrays(const npg_frame_store *s, const char *kind, int64_t index, npg_frame *frame,
+                              const npg_store_array *arrays, size_t count)
 {
-    size_t count = frame->point_count;
-    if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return false;
-    *e->frame = npg_frame_bare(frame);
-    bool is_put = !frame->path || !npg_copy_text(&e->frame->path, frame->path);
-    is_put = is_put && put_sensors(e->frame, frame) &&
-             put_array(s, &e->points_at, frame->pos_local, count * ROW) &&
-             put_array(s, &e->normals_at, frame->normals, count * ROW) &&
-             put_array(s, &e->colours_at, frame->colours, count * COLOUR) &&
-             put_array(s, &e->sensors_at, frame->sensors, count);
-    if (is_put) s->bytes += bytes_of(e);
-    if (!is_put) {
-        npg_frame_clear(e->frame);
-        npg_release(&e->frame);
-        drop(s, e);
-    }
-    return is_put;
+    npg_record *record;
+    NPG_TRY(npg_store_read(s->disk, &record, kind, index, 0));
+    npg_status status = npg_record_get_arrays(record, frame, arrays, count, NPG_FOR_FRAMES);
+    npg_record_close(&record);
+    return status;
 }
 
 /* ---- frames ---- */
 
-static bool fits(const npg_frame_store *s, const npg_frame *frame)
+static bool fits(const npg_frame_store *s, size_t bytes)
 {
-    size_t bytes = sizeof *frame + frame->point_count * point_bytes(frame);
     return s->bytes <= s->byte_max && bytes <= s->byte_max - s->bytes;
-}
-
-static npg_status put_in_memory(npg_frame_store *s, entry *e, const npg_frame *frame)
-{
-    NPG_TRY(npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame));
-    npg_status status = npg_frame_copy(e->frame, frame);
-    if (status) npg_release(&e->frame);
-    s->bytes += bytes_of(e);
-    return status;
 }
 
 static void put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool is_final)
 {
-    if (fits(s, frame) && !put_in_memory(s, e, frame)) return;
-    if (is_final) put_on_disk(s, e, frame);
-}
-
-/* Under the lock: an entry for this index, too. */
-static npg_status grow(npg_frame_store *s, int64_t index)
-{
-    if (index < (int64_t)s->count) return NPG_OK;
-    NPG_TRY(npg_grow(&s->entries, &s->capacity, (size_t)index + 1, sizeof *s->entries, NPG_FOR_FILES));
-    while ((int64_t)s->count <= index) s->entries[s->count++] = (entry){0};
-    return NPG_OK;
+    npg_store_array arrays[NPG_FRAME_ARRAYS];
+    npg_frame kept = *frame;
+    size_t bytes = frame->point_count * point_bytes(frame);
+    npg_frame_arrays(arrays, frame->point_count);
+    e->is_on_disk = !fits(s, sizeof *frame + bytes);
+    if (e->is_on_disk) {
+        if (!is_final || !write_arrays(s, NPG_RECORD_FRAME, frame, bytes, arrays, NPG_FRAME_ARRAYS)) return;
+        kept = npg_frame_bare(frame);
+        kept.path = frame->path; /* these stay in memory */
+        kept.sensor_local = frame->sensor_local;
+    }
+    if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return;
+    if (npg_frame_copy(e->frame, &kept)) npg_release(&e->frame);
+    s->bytes += bytes_of(e);
 }
 
 npg_status npg_frame_store_put(npg_frame_store *s, const npg_frame *frame, bool is_final)
 {
     if (!frame->point_count || frame->is_held) return NPG_OK;
     pthread_mutex_lock(&s->lock);
-    npg_status status = grow(s, frame->index);
+    size_t need = (size_t)frame->index + 1;
+    npg_status status = npg_grow(&s->entries, &s->capacity, need, sizeof *s->entries, NPG_FOR_FILES);
+    if (!status && s->count < need) s->count = need;
     entry *e = status ? NULL : find(s, frame->index);
     if (e) drop(s, e);
     if (e) put_frame(s, e, frame, is_final);
@@ -244,12 +177,10 @@ npg_status npg_frame_store_put(npg_frame_store *s, const npg_frame *frame, bool 
 
 static npg_status get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
 {
-    size_t count = e->frame->point_count;
-    npg_status status = npg_frame_copy(frame, e->frame);
-    if (!status) status = read_bytes(s, &frame->pos_local, e->points_at, count * ROW);
-    if (!status) status = read_bytes(s, &frame->normals, e->normals_at, count * ROW);
-    if (!status) status = read_bytes(s, &frame->colours, e->colours_at, count * COLOUR);
-    if (!status) status = read_bytes(s, &frame->sensors, e->sensors_at, count);
+    npg_store_array arrays[NPG_FRAME_ARRAYS];
+    npg_frame_arrays(arrays, e->frame->point_count);
+    NPG_TRY(npg_frame_copy(frame, e->frame));
+    npg_status status = read_arrays(s, NPG_RECORD_FRAME, e->frame->index, frame, arrays, NPG_FRAME_ARRAYS);
     if (status) npg_frame_clear(frame);
     return status;
 }
@@ -262,19 +193,14 @@ static void give_frame_away(npg_frame_store *s, npg_frame *frame, entry *e)
     s->bytes -= before - bytes_of(e);
 }
 
-static bool was_given_away(const entry *e)
-{
-    return e->frame->point_count && !e->frame->pos_local && e->points_at == NOT_ON_DISK;
-}
-
 npg_status npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t index, bool give_away)
 {
     npg_status status = NPG_OK;
     pthread_mutex_lock(&s->lock);
     entry *e = find(s, index);
-    if (!e || !e->frame || was_given_away(e))
+    if (!e || !e->frame || (!e->is_on_disk && !e->frame->pos_local)) /* or was given away */
         status = NPG_END;
-    else if (e->points_at != NOT_ON_DISK)
+    else if (e->is_on_disk)
         status = get_from_disk(s, frame, e);
     else if (give_away)
         give_frame_away(s, frame, e);
@@ -286,21 +212,24 @@ npg_status npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t ind
 
 /* ---- normals ---- */
 
+static npg_store_array made_array(size_t point_count)
+{
+    return (npg_store_array){"normals", offsetof(npg_frame, normals), point_count, ROW};
+}
+
 void npg_frame_store_put_normals(npg_frame_store *s, const npg_frame *frame)
 {
     size_t size = frame->point_count * ROW;
+    const npg_store_array array = made_array(frame->point_count);
     pthread_mutex_lock(&s->lock);
     entry *e = find(s, frame->index);
     if (e && e->frame && e->frame->point_count == frame->point_count && !e->has_made) {
-        bool has_room = s->bytes <= s->byte_max && size <= s->byte_max - s->bytes;
-        if (has_room && !npg_alloc(&e->made, NPG_FOR_FRAMES, size)) {
+        if (fits(s, size) && !npg_alloc(&e->made, NPG_FOR_FRAMES, size)) {
             memcpy(e->made, frame->normals, size);
             s->bytes += size;
-        } else {
-            e->made_at = write_bytes(s, frame->normals, size);
         }
         e->made_cleaning = frame->cleaning;
-        e->has_made = e->made || e->made_at != NOT_ON_DISK;
+        e->has_made = e->made || write_arrays(s, RECORD_MADE, frame, size, &array, 1);
     }
     pthread_mutex_unlock(&s->lock);
 }
@@ -308,16 +237,21 @@ void npg_frame_store_put_normals(npg_frame_store *s, const npg_frame *frame)
 bool npg_frame_store_get_normals(npg_frame_store *s, npg_frame *frame)
 {
     size_t size = frame->point_count * ROW;
-    float *normals = NULL;
+    const npg_store_array array = made_array(frame->point_count);
+    npg_frame made = {0};
     pthread_mutex_lock(&s->lock);
     const entry *e = find(s, frame->index);
     bool is_there = e && e->has_made && e->frame->point_count == frame->point_count;
-    if (is_there && !e->made && read_bytes(s, &normals, e->made_at, size)) normals = NULL;
-    if (is_there && e->made && !npg_alloc(&normals, NPG_FOR_FRAMES, size)) memcpy(normals, e->made, size);
-    if (normals) frame->cleaning = e->made_cleaning;
+    if (is_there && !e->made) is_there = !read_arrays(s, RECORD_MADE, frame->index, &made, &array, 1);
+    if (is_there && e->made && !npg_alloc(&made.normals, NPG_FOR_FRAMES, size))
+        memcpy(made.normals, e->made, size);
+    if (made.normals && is_there) frame->cleaning = e->made_cleaning;
     pthread_mutex_unlock(&s->lock);
-    if (!normals) return false;
+    if (!made.normals || !is_there) {
+        npg_release(&made.normals);
+        return false;
+    }
     npg_release(&frame->normals);
-    frame->normals = normals;
+    frame->normals = made.normals;
     return true;
 }

@@ -600,7 +600,7 @@ npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const
     live->spool = npg_worker_fact(worker, &npg_fact_spool);
     npg_status status = NPG_OK;
     if (!live->spool) {
-        status = npg_store_open(&live->own, NULL);
+        status = npg_store_open_nameless(&live->own, NULL);
         live->spool = live->own;
     }
     if (!status) status = npg_frame_store_open(&live->cache, cache_bytes, spill_folder);

@@ -31,18 +31,14 @@ npg_status npg_spool_add(npg_store *spool, npg_spooled *entry, const npg_frame *
                          const char *cause)
 {
     const int64_t at = npg_spool_count(spool);
-    const size_t count = frame->point_count;
+    npg_store_array arrays[NPG_FRAME_ARRAYS];
     entry->key = XXH3_64bits(entry, sizeof *entry);
     npg_store_begin(spool, NPG_RECORD_FRAME, at, 0);
     npg_status status = npg_store_put(spool, "entry", entry, sizeof *entry);
     if (!status && frame->path) status = npg_store_put(spool, "path", frame->path, strlen(frame->path) + 1);
     if (!status && cause) status = npg_store_put(spool, "cause", cause, strlen(cause) + 1);
-    if (!status && with_points && frame->pos_local)
-        status = npg_store_put(spool, "points", frame->pos_local, count * ROW);
-    if (!status && with_points && frame->normals)
-        status = npg_store_put(spool, "normals", frame->normals, count * ROW);
-    if (!status && with_points && frame->colours)
-        status = npg_store_put(spool, "colours", frame->colours, count * 4);
+    npg_frame_arrays(arrays, frame->point_count);
+    if (!status && with_points) status = npg_store_put_arrays(spool, frame, arrays, NPG_FRAME_ARRAYS);
     return npg_store_end(spool, status, false);
 }
 
@@ -66,39 +62,26 @@ const char *npg_spool_path(const npg_record *record)
     return path && size && !path[size - 1] ? path : NULL;
 }
 
-static npg_status get_array(void *array, size_t *count, const npg_record *record, const char *name,
-                            size_t row)
-{
-    size_t size;
-    char *copy;
-    const void *bytes = npg_record_find(record, name, &size);
-    if (!bytes || !size) return NPG_OK;
-    NPG_TRY(npg_alloc(&copy, NPG_FOR_FRAMES, size));
-    memcpy(copy, bytes, size);
-    *(void **)array = copy;
-    *count = size / row;
-    return NPG_OK;
-}
-
 npg_status npg_spool_frame(const npg_spooled *entry, const npg_record *record, npg_frame *frame)
 {
     const char *path = npg_spool_path(record);
-    size_t normals = 0, colours = 0;
+    npg_store_array arrays[NPG_FRAME_ARRAYS];
+    size_t size = 0;
+    if (npg_record_find(record, "points", &size)) frame->point_count = size / ROW;
+    npg_frame_arrays(arrays, frame->point_count);
     npg_status status = path ? npg_copy_text(&frame->path, path) : NPG_OK;
-    if (!status) status = get_array(&frame->pos_local, &frame->point_count, record, "points", ROW);
-    if (!status) status = get_array(&frame->normals, &normals, record, "normals", ROW);
-    if (!status) status = get_array(&frame->colours, &colours, record, "colours", 4);
-    if (!status && ((frame->normals && normals != frame->point_count) ||
-                    (frame->colours && colours != frame->point_count)))
-        status = npg_error(NPG_BAD_INPUT, "frame %lld was not kept whole", (long long)entry->number);
+    if (!status) status = npg_record_get_arrays(record, frame, arrays, NPG_FRAME_ARRAYS, NPG_FOR_FRAMES);
+    if (status == NPG_BAD_INPUT)
+        npg_error_prefix(status, "frame %lld was not kept whole", (long long)entry->number);
     if (status) npg_frame_clear(frame);
+    NPG_TRY(status);
     frame->number = entry->number;
     frame->index = entry->index;
     frame->fields = NPG_FIELD_POINTS;
     frame->is_held = entry->is_held;
     frame->is_skipped = entry->is_skipped;
     frame->cleaning.read = frame->point_count;
-    return status;
+    return NPG_OK;
 }
 
 npg_status npg_spool_key(npg_store *spool, int64_t count, uint64_t *key)

@@ -110,7 +110,7 @@ static npg_mesh *through_a_state(const npg_mesh *mesh)
     npg_store *store;
     npg_record *record;
     npg_mesh *out;
-    assert_int_equal(npg_store_open(&store, NULL), NPG_OK);
+    assert_int_equal(npg_store_open_nameless(&store, NULL), NPG_OK);
     npg_store_begin(store, NPG_RECORD_STATE, 0, 0);
     assert_int_equal(npg_store_end(store, npg_state_put_mesh(store, mesh), false), NPG_OK);
     assert_int_equal(npg_store_read(store, &record, NPG_RECORD_STATE, 0, 0), NPG_OK);
