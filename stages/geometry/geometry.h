@@ -225,6 +225,26 @@ void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_
 /* Give a mesh new vertex normals, of these.  NPG_MEMORY. */
 npg_status npg_mesh_make_normals(npg_mesh *mesh);
 
+static inline uint32_t npg_next_corner(uint32_t corner)
+{
+    return corner - corner % 3 + (corner + 1) % 3;
+}
+
+/* A directed edge of a face, from corner 3 f + k to the next one. */
+typedef struct npg_half_edge {
+    uint32_t lo, hi, corner;
+    bool is_back; /* it goes from hi to lo */
+} npg_half_edge;
+
+static inline bool npg_same_edge(const npg_half_edge *a, const npg_half_edge *b)
+{
+    return a->lo == b->lo && a->hi == b->hi;
+}
+
+/* The 3 F of a mesh by edges; of one edge first those from lo to hi, then by corner.  To be given to npg_release();
+ * NPG_MEMORY. */
+npg_status npg_mesh_half_edges(npg_half_edge **halves, const uint32_t *faces, size_t face_count);
+
 /* The E distinct undirected edges as vertex pairs (lower index first), sorted; *edges
  * is owned by the caller. */
 npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces,

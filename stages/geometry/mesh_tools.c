@@ -33,43 +33,39 @@ npg_status npg_mesh_make_normals(npg_mesh *mesh)
     return NPG_OK;
 }
 
-/* A directed edge of a face, ordered by its undirected key. */
-typedef struct half_edge {
-    uint32_t lo, hi, at; /* at: the number of its corner, 3 f + k */
-    int forward;
-} half_edge;
-
-static int by_key(const void *left, const void *right)
+static int by_edge(const void *left, const void *right)
 {
-    const half_edge *a = left, *b = right;
+    const npg_half_edge *a = left, *b = right;
     if (a->lo != b->lo) return a->lo < b->lo ? -1 : 1;
-    return a->hi < b->hi ? -1 : a->hi > b->hi;
+    if (a->hi != b->hi) return a->hi < b->hi ? -1 : 1;
+    if (a->is_back != b->is_back) return a->is_back ? 1 : -1;
+    return a->corner < b->corner ? -1 : a->corner > b->corner;
 }
 
-static npg_status sorted_half_edges(half_edge **out, const uint32_t *faces, size_t face_count)
+npg_status npg_mesh_half_edges(npg_half_edge **out, const uint32_t *faces, size_t face_count)
 {
-    half_edge *halves;
+    npg_half_edge *halves;
     NPG_TRY(npg_alloc_array(&halves, NPG_FOR_MESH, face_count, 3 * sizeof *halves));
-    for (size_t i = 0; i < 3 * face_count; i++) {
-        uint32_t a = faces[i], b = faces[i - i % 3 + (i + 1) % 3];
-        halves[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i, a < b};
+    for (uint32_t c = 0; c < 3 * face_count; c++) {
+        uint32_t a = faces[c], b = faces[npg_next_corner(c)];
+        halves[c] = (npg_half_edge){a < b ? a : b, a < b ? b : a, c, a >= b};
     }
-    if (face_count) qsort(halves, 3 * face_count, sizeof *halves, by_key);
+    if (face_count) qsort(halves, 3 * face_count, sizeof *halves, by_edge);
     *out = halves;
     return NPG_OK;
 }
 
 npg_status npg_mesh_edges(uint32_t (**edges)[2], size_t *edge_count, const uint32_t *faces, size_t face_count)
 {
-    half_edge *halves;
+    npg_half_edge *halves;
     size_t count = 0;
     *edges = NULL;
     *edge_count = 0;
-    NPG_TRY(sorted_half_edges(&halves, faces, face_count));
-    for (size_t i = 0; i < 3 * face_count; i++) count += i == 0 || by_key(&halves[i - 1], &halves[i]) != 0;
+    NPG_TRY(npg_mesh_half_edges(&halves, faces, face_count));
+    for (size_t i = 0; i < 3 * face_count; i++) count += i == 0 || !npg_same_edge(&halves[i - 1], &halves[i]);
     npg_status status = npg_alloc_array(edges, NPG_FOR_MESH, count, sizeof **edges);
     for (size_t i = 0; i < 3 * face_count && !status; i++) {
-        if (i && !by_key(&halves[i - 1], &halves[i])) continue;
+        if (i && npg_same_edge(&halves[i - 1], &halves[i])) continue;
         (*edges)[*edge_count][0] = halves[i].lo;
         (*edges)[(*edge_count)++][1] = halves[i].hi;
     }
@@ -103,14 +99,14 @@ void npg_mesh_neighbours_close(npg_mesh_neighbours *neighbours)
 
 npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_count)
 {
-    half_edge *halves;
+    npg_half_edge *halves;
     size_t count = 3 * face_count;
-    NPG_TRY(sorted_half_edges(&halves, faces, face_count));
+    NPG_TRY(npg_mesh_half_edges(&halves, faces, face_count));
     for (size_t i = 0, next; i < count; i = next) {
-        for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
-        bool is_pair = next - i == 2 && halves[i].forward != halves[i + 1].forward;
+        for (next = i + 1; next < count && npg_same_edge(&halves[i], &halves[next]);) next++;
+        bool is_pair = next - i == 2 && halves[i].is_back != halves[i + 1].is_back;
         for (size_t k = i; k < next; k++)
-            twin[halves[k].at] = is_pair ? halves[2 * i + 1 - k].at : UINT32_MAX;
+            twin[halves[k].corner] = is_pair ? halves[2 * i + 1 - k].corner : UINT32_MAX;
     }
     npg_release(&halves);
     return NPG_OK;
@@ -175,24 +171,24 @@ double npg_vertex_areas(double *areas, const float *vert_pos, size_t vert_count,
     return sum;
 }
 
-static void count_edge(npg_manifold *out, const half_edge *run, size_t uses)
+static void count_edge(npg_manifold *out, const npg_half_edge *run, size_t uses)
 {
     out->edge_count++;
     out->border_edges += uses == 1;
     out->crowded_edges += uses > 2;
-    out->misoriented_edges += uses == 2 && run[0].forward == run[1].forward;
+    out->misoriented_edges += uses == 2 && run[0].is_back == run[1].is_back;
 }
 
 npg_status npg_mesh_manifold(npg_manifold *out, const npg_mesh *mesh)
 {
-    half_edge *halves;
+    npg_half_edge *halves;
     uint8_t *is_used;
     size_t count = 3 * mesh->face_count;
     *out = (npg_manifold){0};
     NPG_TRY(npg_alloc(&is_used, NPG_FOR_MESH, mesh->vert_count));
-    npg_status status = sorted_half_edges(&halves, mesh->faces, mesh->face_count);
+    npg_status status = npg_mesh_half_edges(&halves, mesh->faces, mesh->face_count);
     for (size_t i = 0, next; i < count && !status; i = next) {
-        for (next = i + 1; next < count && !by_key(&halves[i], &halves[next]);) next++;
+        for (next = i + 1; next < count && npg_same_edge(&halves[i], &halves[next]);) next++;
         count_edge(out, halves + i, next - i);
     }
     for (size_t f = 0; f < mesh->face_count; f++) {

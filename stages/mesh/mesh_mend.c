@@ -90,73 +90,24 @@ static npg_status drop_faces(npg_mesh **mesh, npg_mending *done)
 
 /* ---- one fan per vertex ---- */
 
-typedef struct side { /* a directed edge with the corner it starts at */
-    uint32_t from, to, corner;
-} side;
-
-static int same_ends(const side *a, const side *b)
-{
-    return a->from == b->from && a->to == b->to;
-}
-
-static int by_ends(const void *left, const void *right)
-{
-    const side *a = left, *b = right;
-    if (a->from != b->from) return a->from < b->from ? -1 : 1;
-    if (a->to != b->to) return a->to < b->to ? -1 : 1;
-    return a->corner < b->corner ? -1 : a->corner > b->corner;
-}
-
-static uint32_t next_corner(uint32_t corner)
-{
-    return corner - corner % 3 + (corner + 1) % 3;
-}
-
-static npg_status sorted_sides(side **out, const npg_mesh *mesh)
-{
-    size_t count = 3 * mesh->face_count;
-    side *sides;
-    NPG_TRY(npg_alloc_array(&sides, NPG_FOR_MESH, count, sizeof *sides));
-    for (uint32_t c = 0; c < count; c++) sides[c] = (side){mesh->faces[c], mesh->faces[next_corner(c)], c};
-    if (count) qsort(sides, count, sizeof *sides, by_ends);
-    *out = sides;
-    return NPG_OK;
-}
-
-/* The first side with these ends, or where it would be. */
-static size_t find_side(const side *sides, size_t count, uint32_t from, uint32_t to)
-{
-    size_t lo = 0, hi = count;
-    while (lo < hi) {
-        size_t middle = lo + (hi - lo) / 2;
-        const side *s = &sides[middle];
-        if (s->from < from || (s->from == from && s->to < to))
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
-    return lo;
-}
-
 /* Join the corners that two faces share along an edge both use in opposite directions.  Where more than two
  * faces meet, they are taken in pairs in their order and the pairs come apart. */
 static npg_status join_corners(uint32_t *parent, const npg_mesh *mesh)
 {
-    side *sides;
+    npg_half_edge *halves;
     size_t count = 3 * mesh->face_count;
-    NPG_TRY(sorted_sides(&sides, mesh));
+    NPG_TRY(npg_mesh_half_edges(&halves, mesh->faces, mesh->face_count));
     for (uint32_t c = 0; c < count; c++) parent[c] = c;
-    for (size_t i = 0, next; i < count; i = next) {
-        for (next = i + 1; next < count && same_ends(&sides[i], &sides[next]);) next++;
-        if (sides[i].to < sides[i].from) continue;
-        size_t back = find_side(sides, count, sides[i].to, sides[i].from);
-        for (size_t k = i; k < next && back < count; k++, back++) {
-            if (sides[back].from != sides[i].to || sides[back].to != sides[i].from) break;
-            npg_set_join(parent, sides[k].corner, next_corner(sides[back].corner));
-            npg_set_join(parent, next_corner(sides[k].corner), sides[back].corner);
+    for (size_t i = 0, back, next; i < count; i = next) {
+        for (next = i + 1; next < count && npg_same_edge(&halves[i], &halves[next]);) next++;
+        for (back = i; back < next && !halves[back].is_back;) back++;
+        for (size_t k = i, first_back = back; k < first_back && back < next; k++, back++) {
+            uint32_t a = halves[k].corner, b = halves[back].corner;
+            npg_set_join(parent, a, npg_next_corner(b));
+            npg_set_join(parent, npg_next_corner(a), b);
         }
     }
-    npg_release(&sides);
+    npg_release(&halves);
     return NPG_OK;
 }
 
@@ -212,16 +163,17 @@ static npg_status split(npg_mesh **slot, npg_mending *done)
 /* The border's successor of a vertex: a face uses next -> vertex and none uses vertex -> next. */
 static npg_status find_border(uint32_t *next, const npg_mesh *mesh)
 {
-    side *sides;
+    npg_half_edge *halves;
     size_t count = 3 * mesh->face_count;
     memset(next, 0xff, mesh->vert_count * sizeof *next);
-    NPG_TRY(sorted_sides(&sides, mesh));
-    for (size_t i = 0; i < count; i++) {
-        size_t back = find_side(sides, count, sides[i].to, sides[i].from);
-        bool is_border = back == count || sides[back].from != sides[i].to || sides[back].to != sides[i].from;
-        if (is_border) next[sides[i].to] = sides[i].from;
+    NPG_TRY(npg_mesh_half_edges(&halves, mesh->faces, mesh->face_count));
+    for (size_t i = 0, end; i < count; i = end) {
+        const npg_half_edge *first = &halves[i];
+        for (end = i + 1; end < count && npg_same_edge(first, &halves[end]);) end++;
+        if (first->is_back != halves[end - 1].is_back) continue;
+        next[first->is_back ? first->lo : first->hi] = first->is_back ? first->hi : first->lo;
     }
-    npg_release(&sides);
+    npg_release(&halves);
     return NPG_OK;
 }
 
@@ -351,7 +303,7 @@ static void smooth_round(npg_mesh *mesh, const uint8_t *is_flipped, double *sum,
     memset(sum, 0, mesh->vert_count * 3 * sizeof *sum);
     memset(weight, 0, mesh->vert_count * sizeof *weight);
     for (size_t c = 0; c < 3 * mesh->face_count; c++) {
-        uint32_t v = mesh->faces[c], to = mesh->faces[next_corner((uint32_t)c)];
+        uint32_t v = mesh->faces[c], to = mesh->faces[npg_next_corner((uint32_t)c)];
         for (size_t a = 0; a < 3; a++) {
             sum[3 * (size_t)v + a] += (double)mesh->vert_pos[3 * (size_t)to + a];
             sum[3 * (size_t)to + a] += (double)mesh->vert_pos[3 * (size_t)v + a];
@@ -415,25 +367,31 @@ static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
 
 /* ---- edges of more than two faces that splitting could not part ---- */
 
+/* Whether the next one goes the same way along the same edge. */
+static bool is_used_twice(const npg_half_edge *half)
+{
+    return npg_same_edge(half, half + 1) && half->is_back == half[1].is_back;
+}
+
 /* Of the faces that use an edge in one direction only the first is kept. */
 static npg_status drop_crowded(npg_mesh **mesh, npg_mending *done, size_t *dropped)
 {
-    side *sides;
+    npg_half_edge *halves;
     uint8_t *keep_face = NULL;
     size_t face_count = (*mesh)->face_count;
     *dropped = 0;
-    NPG_TRY(sorted_sides(&sides, *mesh));
+    NPG_TRY(npg_mesh_half_edges(&halves, (*mesh)->faces, face_count));
     npg_status status = npg_alloc(&keep_face, NPG_FOR_MESH, face_count);
     if (!status) memset(keep_face, 1, face_count);
     for (size_t i = 1; i < 3 * face_count && !status; i++) {
-        uint32_t face = sides[i].corner / 3;
-        if (!same_ends(&sides[i - 1], &sides[i]) || !keep_face[face]) continue;
+        uint32_t face = halves[i].corner / 3;
+        if (!is_used_twice(&halves[i - 1]) || !keep_face[face]) continue;
         keep_face[face] = 0;
         ++*dropped;
     }
     done->duplicate += *dropped;
     if (!status && *dropped) status = npg_mesh_keep_faces(mesh, keep_face);
-    npg_release(&sides);
+    npg_release(&halves);
     npg_release(&keep_face);
     return status;
 }
@@ -459,22 +417,23 @@ npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done)
 
 npg_status npg_mesh_require_manifold(const npg_mesh *mesh, const char *name)
 {
-    side *sides;
+    npg_half_edge *halves;
     size_t count = 3 * mesh->face_count;
     npg_status status = NPG_OK;
-    NPG_TRY(sorted_sides(&sides, mesh));
+    NPG_TRY(npg_mesh_half_edges(&halves, mesh->faces, mesh->face_count));
     for (size_t i = 0; i < count && !status; i++) {
-        uint32_t face = sides[i].corner / 3;
-        if (sides[i].from == sides[i].to)
-            status = npg_error(NPG_BAD_INPUT, "%s: face %u uses vertex %u twice", name, face, sides[i].from);
+        uint32_t face = halves[i].corner / 3;
+        if (halves[i].lo == halves[i].hi)
+            status = npg_error(NPG_BAD_INPUT, "%s: face %u uses vertex %u twice", name, face, halves[i].lo);
         /* A directed edge used once at most means: two faces at most, and they agree on the outside. */
-        else if (i && same_ends(&sides[i - 1], &sides[i]))
+        else if (i && is_used_twice(&halves[i - 1]))
             status = npg_error(NPG_BAD_INPUT,
                                "%s is not a manifold: "
                                "faces %u and %u both use the edge from vertex %u to vertex %u "
                                "in this direction",
-                               name, sides[i - 1].corner / 3, face, sides[i].from, sides[i].to);
+                               name, halves[i - 1].corner / 3, face, mesh->faces[halves[i].corner],
+                               mesh->faces[npg_next_corner(halves[i].corner)]);
     }
-    npg_release(&sides);
+    npg_release(&halves);
     return status;
 }
