@@ -108,19 +108,21 @@ static npg_status check_widths(const npg_grid_settings *s)
     return NPG_OK;
 }
 
-/* A key of a solver that this run does not use: whoever sets one expects an effect. */
+/* Members of the settings lie in the order: epochs, of both solvers of poses, of both of grids, of paper's. */
+static bool is_used(size_t offset, const npg_solver *row)
+{
+    if (offset == offsetof(state, named)) return row->needs_poses;
+    if (offset < SETTING(energy)) return true;
+    if (offset < SETTING(grid)) return row->needs_poses;
+    return offset < SETTING(paper) ? row->needs_device : !row->needs_poses;
+}
+
+/* Whoever sets a key expects an effect. */
 static npg_status refuse_unused(npg_worker *worker, const npg_solver *row)
 {
     for (const npg_option *option = options; option->name; option++) {
-        bool is_of_energy = option->offset >= SETTING(energy) && option->offset < SETTING(grid);
-        bool is_of_grids = option->offset >= SETTING(grid) && option->offset < SETTING(paper);
-        bool is_of_paper = option->offset >= SETTING(paper) && option->offset < offsetof(state, named);
-        bool is_used = is_of_energy || option->offset == offsetof(state, named) ? row->needs_poses
-                       : is_of_grids                                            ? row->needs_device
-                       : is_of_paper                                            ? !row->needs_poses
-                                                                                : true;
-        if (!is_used &&
-            strcmp(npg_options_get(npg_worker_options(worker), option->name), option->default_text) != 0)
+        const char *value = npg_options_get(npg_worker_options(worker), option->name);
+        if (!is_used(option->offset, row) && strcmp(value, option->default_text) != 0)
             return npg_error(
                 NPG_USAGE,
                 "key %s of the method has no effect: this run's solver is %s (keys solver and align)",

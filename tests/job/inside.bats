@@ -76,6 +76,12 @@ check_killed() {
     grep -q '"solver": "grids"' grids/report.json
     cmp grids-whole/frames.jsonl grids/frames.jsonl
     diff -r grids-whole/meshes grids/meshes
+    # another mesh goes with it, also between frames
+    "$NEUPIG" apply grids --mesh grids/reference.ply -o carried --fps-scale 2
+    [ "$(ls carried/*.ply | wc -l)" -eq 15 ]
+    "$NEUPIG" apply grids --mesh grids/reference.ply -o same
+    run "$NEUPIG" eval same grids/meshes --samples 1000
+    [[ "$output" == *"Corr 0.00000"* ]]
 }
 
 @test "SIGTERM inside a window keeps what was done" {
