@@ -23,26 +23,17 @@ const npg_service *const npg_services[] = {
     NULL};
 
 /* clang-format off */
-static const npg_preset_value paper[] = {
-    {"align",           "no"},         /* from the reference */
-    {"keyframe-choice", "paper"},      /* by score alone */
-    {"hold-apart",      "no"},         /* the keyframe's points as they are */
-    {"smooth",          "no"},
-    {"unseen",          "keep"},       /* as Poisson closed it */
-    {"welds",           "keep"},       /* nothing is cut */
-    {"window",          "-1"},         /* all frames at once, up to 60 */
-    {"epochs",          "250"},        /* of every vertex */
-    {NULL, NULL}};
-static const npg_preset_value paper_1000[] = {
-    {"align",           "no"},
-    {"keyframe-choice", "paper"},
-    {"hold-apart",      "no"},
-    {"smooth",          "no"},
-    {"unseen",          "keep"},
-    {"welds",           "keep"},
-    {"window",          "-1"},
-    {"epochs",          "1000"},       /* the paper's slower setting; the rest as above */
-    {NULL, NULL}};
+/* Parts that nearly touch are held apart in the keyframe, as by default: legs that Poisson joins are drawn to each
+ * other's points, early and for good. */
+#define PAPER                                                                                                \
+    {"align", "no"},                   /* from the reference */                                              \
+        {"keyframe-choice", "paper"},  /* by score alone */                                                  \
+        {"smooth", "no"},              /* the keyframe's points as they are */                               \
+        {"unseen", "keep"},            /* as Poisson closed it */                                            \
+        {"welds", "keep"},             /* nothing is cut */                                                  \
+        {"window", "-1"}               /* all frames at once, up to 60 */
+static const npg_preset_value paper[] = {PAPER, {"epochs", "250"}, {NULL, NULL}};
+static const npg_preset_value paper_1000[] = {PAPER, {"epochs", "1000"}, {NULL, NULL}}; /* the slower setting */
 static const npg_preset_value grids[] = {
     {"solver",    "grids"}, /* over aligned poses */
     {"width-1",   "64"},    /* ways from the smoothed poses are small and smooth: */
