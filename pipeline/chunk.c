@@ -2,43 +2,29 @@
 #include "pipeline/chunk.h"
 
 #include <assert.h>
-#include <stdatomic.h>
 #include <string.h>
 
 struct npg_chunk {
-    atomic_int references;
+    npg_arena arena; /* of the frames */
     size_t count, capacity;
-    npg_frame *frames; /* capacity of them, owned */
+    npg_frame *frames; /* capacity of them */
 };
 
-npg_status npg_chunk_open(npg_chunk **out, size_t capacity)
+npg_status npg_chunk_open(npg_chunk **chunk, size_t capacity)
 {
-    npg_chunk *chunk;
     NPG_REQUIRE(capacity >= 1);
-    NPG_TRY(npg_alloc(&chunk, NPG_FOR_RUN, sizeof *chunk));
-    chunk->capacity = capacity;
-    atomic_init(&chunk->references, 1);
-    npg_status status = npg_alloc_array(&chunk->frames, NPG_FOR_RUN, capacity, sizeof *chunk->frames);
-    if (status) npg_chunk_unref(&chunk);
-    *out = chunk;
+    NPG_TRY(npg_object_open(chunk, NPG_FOR_RUN, sizeof **chunk));
+    (*chunk)->capacity = capacity;
+    (*chunk)->frames = npg_arena_take(&(*chunk)->arena, capacity, sizeof *(*chunk)->frames);
+    npg_status status = npg_arena_status(&(*chunk)->arena);
+    if (status) npg_chunk_close(chunk);
     return status;
 }
 
-npg_chunk *npg_chunk_ref(npg_chunk *chunk)
+void npg_chunk_close(npg_chunk **slot)
 {
-    /* Relaxed: who makes a reference holds one already.  The last to go must see what all others wrote. */
-    atomic_fetch_add_explicit(&chunk->references, 1, memory_order_relaxed);
-    return chunk;
-}
-
-void npg_chunk_unref(npg_chunk **slot)
-{
-    npg_chunk *chunk = *slot;
-    *slot = NULL;
-    if (!chunk || atomic_fetch_sub_explicit(&chunk->references, 1, memory_order_acq_rel) > 1) return;
-    for (size_t i = 0; i < chunk->count; i++) npg_frame_clear(&chunk->frames[i]);
-    npg_release(&chunk->frames);
-    npg_release(&chunk);
+    for (size_t i = 0; *slot && i < (*slot)->count; i++) npg_frame_clear(&(*slot)->frames[i]);
+    npg_object_close(slot);
 }
 
 size_t npg_chunk_count(const npg_chunk *chunk)

@@ -98,10 +98,9 @@ typedef struct npg_frame {
 
 typedef struct npg_chunk npg_chunk;
 
-/* An empty chunk with room for capacity frames and one reference. */
+/* An empty chunk with room for capacity frames. */
 npg_status npg_chunk_open(npg_chunk **chunk, size_t capacity);
-npg_chunk *npg_chunk_ref(npg_chunk *chunk);
-void npg_chunk_unref(npg_chunk **chunk);
+void npg_chunk_close(npg_chunk **chunk);
 
 size_t npg_chunk_count(const npg_chunk *chunk);
 size_t npg_chunk_capacity(const npg_chunk *chunk);

@@ -291,7 +291,7 @@ bool npg_path_stays(const char *name)
     return true;
 }
 
-bool npg_path_is_inside(const char *path, const char *folder)
+static bool is_inside(const char *path, const char *folder)
 {
     char *real_path = realpath(path, NULL), *real_folder = realpath(folder, NULL);
     size_t size = real_folder ? strlen(real_folder) : 0;
@@ -305,7 +305,7 @@ bool npg_path_is_inside(const char *path, const char *folder)
 
 npg_status npg_path_confine(const char *path, const char *folder)
 {
-    if (npg_path_is_inside(path, folder)) return NPG_OK;
+    if (is_inside(path, folder)) return NPG_OK;
     return npg_error(NPG_BAD_INPUT,
                      "%s: leads out of %s, and option confine is set "
                      "(as always in a batch, unless it says otherwise); --no-confine follows it",

@@ -41,10 +41,8 @@ npg_status npg_file_open_plain(int *fd, const char *path, npg_status failure);
 /* Whether a name from a file can be added to a folder without leading out of it: not absolute, no "..". */
 bool npg_path_stays(const char *name);
 
-/* Whether the file is in the folder after all links are followed, at any depth. */
-bool npg_path_is_inside(const char *path, const char *folder);
-
-/* NPG_BAD_INPUT, by name, for one that is not inside: what option confine is for. */
+/* NPG_BAD_INPUT, by name, for a file that is not in the folder, at any depth, after all links are followed: what
+ * option confine is for. */
 npg_status npg_path_confine(const char *path, const char *folder);
 
 /* NPG_USAGE where a symbolic link stands in the place of a folder (option confine). */

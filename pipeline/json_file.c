@@ -118,7 +118,7 @@ json_t *npg_json_real(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
-npg_status npg_json_save(const char *path, const json_t *value)
+static npg_status save(const char *path, const json_t *value)
 {
     char *text = json_dumps(value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     npg_file *file = NULL;
@@ -137,7 +137,7 @@ npg_status npg_json_write(const char *folder, const char *name, const json_t *va
 {
     char path[NPG_PATH_SIZE];
     NPG_TRY(npg_path_of(path, folder, name));
-    return npg_json_save(path, value);
+    return save(path, value);
 }
 
 /* ---- lines ---- */

@@ -30,9 +30,8 @@ json_t *npg_json_at(const json_t *object, const char *names);
 /* A JSON number, or null for one that is not finite. */
 json_t *npg_json_real(double value);
 
-/* Write a file that appears whole: <folder>/<name>, or the one of this path.  NPG_DISK, NPG_MEMORY. */
+/* Write <folder>/<name>, a file that appears whole.  NPG_DISK, NPG_MEMORY. */
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value);
-npg_status npg_json_save(const char *path, const json_t *value);
 
 /* ---- JSON lines: one object a line, read so that memory does not grow with the file ---- */
 

@@ -20,7 +20,8 @@ npg_status npg_mesh_open(npg_mesh **out, size_t vert_count, size_t face_count)
 
 npg_mesh *npg_mesh_ref(npg_mesh *mesh)
 {
-    /* Builtins, not <stdatomic.h>: C++ reads the struct, too.  The orders are those of npg_chunk_ref(). */
+    /* Builtins, not <stdatomic.h>: C++ reads the struct, too.  Relaxed: who makes a reference holds one
+     * already.  The last to go must see what all others wrote. */
     __atomic_fetch_add(&mesh->references, 1, __ATOMIC_RELAXED);
     return mesh;
 }

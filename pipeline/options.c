@@ -16,10 +16,11 @@
 #include "pipeline/struct_size.h"
 
 struct npg_options {
+    npg_arena arena;               /* of all that follows but what is said to be owned */
     const npg_stage *const *chain; /* whose tables count */
     size_t count;
-    char **texts;                                   /* count of them: what the user set, or NULL; owned */
-    npg_custom_stage custom[NPG_CUSTOM_STAGES_MAX]; /* custom_count of them, their texts owned */
+    char **texts; /* count of them: what the user set, or NULL; each owned */
+    npg_custom_stage custom[NPG_CUSTOM_STAGES_MAX]; /* custom_count of them */
     size_t custom_count;
     char *ignored; /* owned, or NULL */
 };
@@ -152,40 +153,28 @@ npg_status npg_options_open(npg_options **out)
 
 npg_status npg_options_open_chain(npg_options **out, const npg_stage *const *chain)
 {
-    npg_options *options;
     NPG_REQUIRE(out);
     *out = NULL;
-    NPG_TRY(npg_alloc(&options, NPG_FOR_RUN, sizeof *options));
+    NPG_TRY(npg_object_open(out, NPG_FOR_RUN, sizeof **out));
+    npg_options *options = *out;
     options->chain = chain;
     while (option_at(chain, options->count, NULL)) options->count++;
-    npg_status status = npg_alloc_array(&options->texts, NPG_FOR_RUN, options->count, sizeof *options->texts);
-    if (status) npg_release(&options);
-    *out = options;
+    options->texts = npg_arena_take(&options->arena, options->count, sizeof *options->texts);
+    npg_status status = npg_arena_status(&options->arena);
+    if (status) npg_options_close(out);
     return status;
 }
 
 /* ---- custom stages ---- */
 
-/* The texts of a copied stage are ours, whatever the public struct says. */
-static void release_custom(npg_custom_stage *custom)
-{
-    npg_release(&custom->name);
-    npg_release(&custom->after);
-}
-
 static npg_status copy_custom(npg_options *options, const npg_custom_stage *given)
 {
-    char *name, *after;
-    NPG_TRY(npg_copy_text(&name, given->name));
-    npg_status status = npg_copy_text(&after, given->after);
-    if (status) {
-        npg_release(&name);
-        return status;
-    }
-    npg_custom_stage *custom = &options->custom[options->custom_count++];
+    npg_custom_stage *custom = &options->custom[options->custom_count];
     *custom = *given;
-    custom->name = name;
-    custom->after = after;
+    custom->name = npg_arena_text(&options->arena, given->name);
+    custom->after = npg_arena_text(&options->arena, given->after);
+    NPG_TRY(npg_arena_status(&options->arena));
+    options->custom_count++;
     return NPG_OK;
 }
 
@@ -213,11 +202,9 @@ const npg_custom_stage *npg_options_custom_stage(const npg_options *options, siz
 void npg_options_close(npg_options **slot)
 {
     if (!slot || !*slot) return;
-    for (size_t i = 0; i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
-    npg_release(&(*slot)->texts);
-    for (size_t i = 0; i < (*slot)->custom_count; i++) release_custom(&(*slot)->custom[i]);
+    for (size_t i = 0; (*slot)->texts && i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
     npg_release(&(*slot)->ignored);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 npg_status npg_options_copy(npg_options **out, const npg_options *options)

@@ -28,41 +28,25 @@ typedef struct npg_option {
  *     NPG_ROW_INT ("epochs", AT(epochs),  "10",    0,     1e6,  "N",
  *         "help"),
  */
-#define NPG_ROW_FLAG(...)                                                                                    \
+#define NPG_ROW(type, ...)                                                                                   \
     {                                                                                                        \
-        NPG_FLAG_FIELDS(__VA_ARGS__)                                                                         \
+        NPG_##type##_FIELDS(__VA_ARGS__)                                                                     \
     }
-#define NPG_ROW_INT(...)                                                                                     \
-    {                                                                                                        \
-        NPG_INT_FIELDS(__VA_ARGS__)                                                                          \
-    }
-#define NPG_ROW_REAL(...)                                                                                    \
-    {                                                                                                        \
-        NPG_REAL_FIELDS(__VA_ARGS__)                                                                         \
-    }
-#define NPG_ROW_CHOICE(...)                                                                                  \
-    {                                                                                                        \
-        NPG_CHOICE_FIELDS(__VA_ARGS__)                                                                       \
-    }
-#define NPG_ROW_TEXT(...)                                                                                    \
-    {                                                                                                        \
-        NPG_TEXT_FIELDS(__VA_ARGS__)                                                                         \
-    }
+#define NPG_ROW_FLAG(...)   NPG_ROW(FLAG, __VA_ARGS__)
+#define NPG_ROW_INT(...)    NPG_ROW(INT, __VA_ARGS__)
+#define NPG_ROW_REAL(...)   NPG_ROW(REAL, __VA_ARGS__)
+#define NPG_ROW_CHOICE(...) NPG_ROW(CHOICE, __VA_ARGS__)
+#define NPG_ROW_TEXT(...)   NPG_ROW(TEXT, __VA_ARGS__)
 
 /* The same for keys of the method, for parts of a list, and for what programs alone set:
  * NPG_KEY(INT, "epochs", ...), NPG_PART(REAL, "bars.residual", ...). */
-#define NPG_KEY(type, ...)                                                                                   \
+#define NPG_ROW_FOR(purpose, type, ...)                                                                      \
     {                                                                                                        \
-        NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_METHOD                                              \
+        NPG_##type##_FIELDS(__VA_ARGS__), .use = (purpose)                                                   \
     }
-#define NPG_PART(type, ...)                                                                                  \
-    {                                                                                                        \
-        NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_PART                                                \
-    }
-#define NPG_PROGRAM_ROW(type, ...)                                                                           \
-    {                                                                                                        \
-        NPG_##type##_FIELDS(__VA_ARGS__), .use = NPG_USE_PROGRAM                                             \
-    }
+#define NPG_KEY(...)         NPG_ROW_FOR(NPG_USE_METHOD, __VA_ARGS__)
+#define NPG_PART(...)        NPG_ROW_FOR(NPG_USE_PART, __VA_ARGS__)
+#define NPG_PROGRAM_ROW(...) NPG_ROW_FOR(NPG_USE_PROGRAM, __VA_ARGS__)
 
 #define NPG_FLAG_FIELDS(word, place, initial, text)                                                          \
     .name = (word), .help = (text), .type = NPG_OPTION_FLAG, .offset = (place), .default_text = (initial)

@@ -11,13 +11,6 @@ static inline int npg_order_int64(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Ascending uint64_t. */
-static inline int npg_order_uint64(const void *left, const void *right)
-{
-    uint64_t a = *(const uint64_t *)left, b = *(const uint64_t *)right;
-    return (a > b) - (a < b);
-}
-
 /* Pairs of uint32_t, ascending by the first, then by the second. */
 static inline int npg_order_pair(const void *left, const void *right)
 {

@@ -64,7 +64,7 @@ npg_status npg_run_push(npg_run *run, const npg_cloud *given)
     }
     if (!status) run->pushed_number = cloud.number;
     npg_frame_clear(&frame);
-    npg_chunk_unref(&chunk);
+    npg_chunk_close(&chunk);
     return status == NPG_ABORTED ? why_closed(run) : status;
 }
 
@@ -88,37 +88,30 @@ npg_status npg_run_finish(npg_run *run)
 
 /* ---- pull ---- */
 
+typedef struct own_result {
+    npg_arena arena; /* of what the result points to */
+    npg_result given;
+} own_result;
+
 static npg_status open_result(npg_result **out, const npg_run *run, const npg_frame *frame)
 {
     const npg_mesh *reference = run->facts.reference;
-    npg_result *result;
-    double *vertices;
-    NPG_TRY(npg_alloc(&result, NPG_FOR_FRAMES, sizeof *result));
-    npg_status status = npg_alloc_array(&vertices, NPG_FOR_FRAMES, frame->vert_count, 3 * sizeof(double));
-    uint32_t *faces = NULL;
-    if (!status)
-        status = npg_alloc_array(&faces, NPG_FOR_FRAMES, reference->face_count, 3 * sizeof(uint32_t));
-    if (status) {
-        npg_release(&vertices);
-        npg_release(&result);
-        return status;
-    }
     const uint8_t *seen = frame->vert_colours ? frame->vert_colours : reference->vert_colours;
-    uint8_t *colours = NULL;
-    if (seen && npg_alloc_array(&colours, NPG_FOR_FRAMES, frame->vert_count, 4)) {
-        npg_release(&faces);
-        npg_release(&vertices);
-        npg_release(&result);
-        return NPG_MEMORY;
-    }
-    if (seen) memcpy(colours, seen, 4 * frame->vert_count);
+    own_result *result;
+    NPG_TRY(npg_object_open(&result, NPG_FOR_FRAMES, sizeof *result));
+    npg_arena *arena = &result->arena;
+    double *vertices = npg_arena_take(arena, frame->vert_count, 3 * sizeof(double));
+    uint32_t *faces = npg_arena_copy(arena, reference->faces, reference->face_count, 3 * sizeof(uint32_t));
+    uint8_t *colours = seen ? npg_arena_copy(arena, seen, frame->vert_count, 4) : NULL;
+    npg_status status = npg_arena_status(arena);
+    if (status) npg_object_close(&result);
+    NPG_TRY(status);
     npg_box_unit_to_world(&run->facts.box, vertices, frame->vert_unit, frame->vert_count);
-    memcpy(faces, reference->faces, reference->face_count * 3 * sizeof(uint32_t));
-    *result =
-        (npg_result){sizeof *result,          frame->index, frame->number, frame->vert_count,
+    result->given =
+        (npg_result){sizeof result->given,    frame->index, frame->number, frame->vert_count,
                      reference->face_count,   vertices,     faces,         frame->figures.point_dist_median,
                      frame->figures.coverage, colours};
-    *out = result;
+    *out = &result->given;
     return NPG_OK;
 }
 
@@ -132,7 +125,7 @@ npg_status npg_run_pull(npg_run *run, npg_result **result)
             npg_frame *frame = npg_chunk_frame(run->pulled, run->pulled_at++);
             if (frame->fields & NPG_FIELD_VERTICES) return open_result(result, run, frame);
         }
-        npg_chunk_unref(&run->pulled);
+        npg_chunk_close(&run->pulled);
         run->pulled_at = 0;
         npg_status status = npg_ring_pop(run->results, &run->pulled);
         if (status == NPG_ABORTED) return why_closed(run);
@@ -143,8 +136,7 @@ npg_status npg_run_pull(npg_run *run, npg_result **result)
 void npg_result_close(npg_result **slot)
 {
     if (!slot || !*slot) return;
-    npg_release(&(*slot)->vertices);
-    npg_release(&(*slot)->faces);
-    npg_release(&(*slot)->vertex_colours);
-    npg_release(slot);
+    void *result = (char *)*slot - offsetof(own_result, given);
+    *slot = NULL;
+    npg_object_close(&result);
 }

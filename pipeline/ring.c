@@ -10,25 +10,27 @@
 typedef enum ring_state { RING_OPEN, RING_ENDED, RING_ABORTED } ring_state;
 
 struct npg_ring {
+    npg_arena arena; /* of the slots */
     pthread_mutex_t lock;
     pthread_cond_t changed_full;  /* the producer waits for room   */
     pthread_cond_t changed_empty; /* the consumer waits for chunks */
     ring_state state;
     size_t capacity, count, first;
     double push_wait_s, pop_wait_s;
-    npg_chunk **slots; /* capacity of them, owned */
+    npg_chunk **slots; /* capacity of them, with the chunks in them */
 };
 
 npg_status npg_ring_open(npg_ring **out, size_t capacity)
 {
     npg_ring *ring;
     NPG_REQUIRE(capacity >= 1);
-    NPG_TRY(npg_alloc(&ring, NPG_FOR_RUN, sizeof *ring));
+    NPG_TRY(npg_object_open(&ring, NPG_FOR_RUN, sizeof *ring));
     ring->capacity = capacity;
     pthread_mutex_init(&ring->lock, NULL);
     pthread_cond_init(&ring->changed_full, NULL);
     pthread_cond_init(&ring->changed_empty, NULL);
-    npg_status status = npg_alloc_array(&ring->slots, NPG_FOR_RUN, capacity, sizeof *ring->slots);
+    ring->slots = npg_arena_take(&ring->arena, capacity, sizeof *ring->slots);
+    npg_status status = npg_arena_status(&ring->arena);
     if (status) npg_ring_close(&ring);
     *out = ring;
     return status;
@@ -37,7 +39,7 @@ npg_status npg_ring_open(npg_ring **out, size_t capacity)
 static void drop_all(npg_ring *ring)
 {
     for (; ring->count; ring->count--) {
-        npg_chunk_unref(&ring->slots[ring->first]);
+        npg_chunk_close(&ring->slots[ring->first]);
         ring->first = (ring->first + 1) % ring->capacity;
     }
 }
@@ -50,8 +52,7 @@ void npg_ring_close(npg_ring **slot)
     pthread_cond_destroy(&ring->changed_full);
     pthread_cond_destroy(&ring->changed_empty);
     pthread_mutex_destroy(&ring->lock);
-    npg_release(&ring->slots);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 npg_status npg_ring_push(npg_ring *ring, npg_chunk **chunk)

@@ -564,7 +564,7 @@ void npg_run_close(npg_run **slot)
     for (size_t i = 0; i < run->worker_count; i++)
         if (run->workers[i].kept) run->workers[i].release_kept(run->workers[i].kept);
     for (size_t i = 0; i < run->latch_count; i++) npg_latch_close(&run->latches[i]);
-    npg_chunk_unref(&run->pulled);
+    npg_chunk_close(&run->pulled);
     npg_ring_close(&run->feed);
     npg_ring_close(&run->results);
     npg_mesh_unref(&run->facts.reference);

@@ -24,25 +24,24 @@ static npg_status refuse_unreadable(const char *name, int cause)
 
 npg_status npg_source_open_fd(npg_source **out, int fd, const char *name)
 {
-    npg_source *source;
     struct stat info;
     *out = NULL;
     if (fstat(fd, &info)) return refuse_unreadable(name, errno);
     if (S_ISDIR(info.st_mode)) return refuse_unreadable(name, EISDIR);
-    NPG_TRY(npg_alloc(&source, NPG_FOR_FILES, sizeof *source));
-    npg_status status = npg_copy_text(&source->name, name);
+    NPG_TRY(npg_object_open(out, NPG_FOR_FILES, sizeof **out));
+    npg_source *source = *out;
     /* A file that was opened elsewhere may stand behind its beginning: its size then says nothing. */
     bool is_file = S_ISREG(info.st_mode) && lseek(fd, 0, SEEK_CUR) == 0;
     /* A small file needs no more than its own size, so that many small frames stay cheap. */
     size_t window = WINDOW_SIZE;
     if (is_file && info.st_size < (off_t)WINDOW_SIZE) window = (size_t)info.st_size + 1;
-    if (!status) status = npg_grow(&source->window, &source->capacity, window, 1, NPG_FOR_FILES);
     source->fd = fd;
     source->is_seekable = is_file;
     source->size = is_file ? (uint64_t)info.st_size : UINT64_MAX;
     source->line_end = '\n';
-    if (status) npg_source_close(&source);
-    *out = source;
+    source->name = npg_arena_text(&source->arena, name);
+    npg_status status = npg_arena_grow(&source->arena, &source->window, &source->capacity, window, 1);
+    if (status) npg_source_close(out);
     return status;
 }
 
@@ -59,15 +58,10 @@ npg_status npg_source_open_file(npg_source **out, const char *path)
     return status;
 }
 
-void npg_source_close(npg_source **slot)
+void npg_source_close(npg_source **source)
 {
-    npg_source *source = *slot;
-    *slot = NULL;
-    if (!source) return;
-    if (source->owns_fd) close(source->fd);
-    npg_release(&source->name);
-    npg_release(&source->window);
-    npg_release(&source);
+    if (*source && (*source)->owns_fd) close((*source)->fd);
+    npg_object_close(source);
 }
 
 npg_status npg_source_rewind(npg_source *source)
@@ -114,7 +108,8 @@ npg_status npg_source_fill(npg_source *source, size_t need, size_t *available)
             source->begin = 0;
         }
         if (source->end == source->capacity)
-            NPG_TRY(npg_grow(&source->window, &source->capacity, source->capacity + 1, 1, NPG_FOR_FILES));
+            NPG_TRY(
+                npg_arena_grow(&source->arena, &source->window, &source->capacity, source->capacity + 1, 1));
         NPG_TRY(read_some(source));
     }
     *available = source->end - source->begin;
@@ -139,30 +134,6 @@ uint64_t npg_source_left(const npg_source *source)
 {
     if (source->size == UINT64_MAX) return UINT64_MAX;
     return source->size > source->byte ? source->size - source->byte : 0;
-}
-
-npg_status npg_source_read(npg_source *source, unsigned char **out, size_t size, size_t *got)
-{
-    /* Where the size of the source is known all is allocated at once, else as the bytes come in. */
-    size_t capacity = 0, first = npg_source_left(source) == UINT64_MAX ? WINDOW_SIZE : size;
-    npg_status status = NPG_OK;
-    *out = NULL;
-    *got = 0;
-    if (npg_source_left(source) < first) first = (size_t)npg_source_left(source);
-    while (*got < size && !status) {
-        size_t available, want = size - *got < WINDOW_SIZE ? size - *got : WINDOW_SIZE;
-        status = npg_source_fill(source, 1, &available);
-        if (status || !available) break;
-        if (available > want) available = want;
-        size_t need = *got + available > first ? *got + available : first < size ? first : size;
-        if (need > capacity) status = npg_grow(out, &capacity, need, 1, NPG_FOR_FILES);
-        if (status) break;
-        memcpy(*out + *got, npg_source_data(source), available);
-        npg_source_take(source, available);
-        *got += available;
-    }
-    if (status) npg_release(out);
-    return status;
 }
 
 npg_status npg_source_line(npg_source *source, const char **text, size_t *length)
@@ -250,28 +221,12 @@ npg_status npg_source_find_line_end(npg_source *source)
     return NPG_OK;
 }
 
-static npg_status refuse_at(const npg_source *source, const char *unit, uint64_t place, const char *format,
-                            va_list arguments)
+npg_status npg_source_bad(const npg_source *source, const char *unit, uint64_t place, const char *format, ...)
 {
     char text[512];
+    va_list arguments;
+    va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
     return npg_error(NPG_BAD_INPUT, "%s: %s %llu: %s", source->name, unit, (unsigned long long)place, text);
-}
-
-npg_status npg_source_bad_line(const npg_source *source, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    npg_status status = refuse_at(source, "line", source->line, format, arguments);
-    va_end(arguments);
-    return status;
-}
-
-npg_status npg_source_bad_byte(const npg_source *source, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    npg_status status = refuse_at(source, "byte", source->byte, format, arguments);
-    va_end(arguments);
-    return status;
 }

@@ -6,7 +6,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "pipeline/status.h"
+#include "pipeline/memory.h"
 
 /* Number: decimal numbers from text, fast and the same under every locale. */
 
@@ -67,14 +67,15 @@ static inline uint64_t npg_double_bits(double value)
 #define NPG_LINE_MAX ((size_t)1 << 20) /* longer lines are refused */
 
 typedef struct npg_source {
-    char *name; /* for messages; owned */
+    npg_arena arena; /* of name and window */
+    char *name;      /* for messages */
     int fd;
     bool owns_fd, is_seekable, at_end;
-    char line_end;         /* '\n', or '\r' for files that know no '\n' */
-    uint64_t size;         /* of the whole file; UINT64_MAX where it can't be known */
-    uint64_t byte;         /* offset of data[0] in the file */
-    uint64_t line;         /* number of the line npg_source_line() gave last, 1 for the first */
-    unsigned char *window; /* owned */
+    char line_end; /* '\n', or '\r' for files that know no '\n' */
+    uint64_t size; /* of the whole file; UINT64_MAX where it can't be known */
+    uint64_t byte; /* offset of data[0] in the file */
+    uint64_t line; /* number of the line npg_source_line() gave last, 1 for the first */
+    unsigned char *window;
     size_t capacity, begin, end;
     /* asked about four times a second while a stream has nothing; may be NULL */
     bool (*stopping)(void *user);
@@ -112,10 +113,6 @@ npg_status npg_source_skip(npg_source *source, uint64_t size, uint64_t *skipped)
 /* Bytes from here to the end; UINT64_MAX where that can't be known. */
 uint64_t npg_source_left(const npg_source *source);
 
-/* size bytes into *out (npg_alloc, owned by the caller); takes memory only as the bytes come in where the
- * size of the source is not known.  *got < size only at the end. */
-npg_status npg_source_read(npg_source *source, unsigned char **out, size_t size, size_t *got);
-
 /* The next line without its end, not terminated by 0; valid until the next call.  NPG_END. */
 npg_status npg_source_line(npg_source *source, const char **text, size_t *length);
 
@@ -142,8 +139,10 @@ npg_status npg_source_count(const npg_source *source, uint64_t *count, const cha
 /* Look whether lines end with '\r' alone, from the first 64 KiB. */
 npg_status npg_source_find_line_end(npg_source *source);
 
-/* NPG_BAD_INPUT with "<name>: line <n>: ..." or "<name>: byte <n>: ...". */
-npg_status npg_source_bad_line(const npg_source *source, const char *format, ...) NPG_PRINTF(2, 3);
-npg_status npg_source_bad_byte(const npg_source *source, const char *format, ...) NPG_PRINTF(2, 3);
+/* NPG_BAD_INPUT with "<name>: line <n>: ..." or "<name>: byte <n>: ...": of the place where the source is. */
+npg_status npg_source_bad(const npg_source *source, const char *unit, uint64_t place, const char *format, ...)
+    NPG_PRINTF(4, 5);
+#define npg_source_bad_line(source, ...) npg_source_bad(source, "line", (source)->line, __VA_ARGS__)
+#define npg_source_bad_byte(source, ...) npg_source_bad(source, "byte", (source)->byte, __VA_ARGS__)
 
 #endif

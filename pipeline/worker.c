@@ -170,7 +170,7 @@ void *npg_worker_kept(const npg_worker *worker)
 npg_status npg_worker_push(npg_worker *worker, npg_chunk **chunk)
 {
     if (worker->out) return npg_ring_push(worker->out, chunk);
-    npg_chunk_unref(chunk);
+    npg_chunk_close(chunk);
     return NPG_OK;
 }
 
@@ -302,7 +302,7 @@ static npg_status work_as_source(npg_worker *worker)
         npg_status status =
             npg_worker_stopping(worker) ? NPG_STOPPED : worker->stage->process(worker, &chunk);
         if (status == NPG_OK && chunk) status = npg_worker_push(worker, &chunk);
-        npg_chunk_unref(&chunk);
+        npg_chunk_close(&chunk);
         if (status) return status == NPG_END ? NPG_OK : status;
     }
 }
@@ -316,7 +316,7 @@ static npg_status work_on_chunks(npg_worker *worker)
         if (status == NPG_OK && npg_worker_stopping(worker)) status = NPG_STOPPED;
         if (status == NPG_OK) status = worker->stage->process(worker, &chunk);
         if (status == NPG_OK && chunk) status = npg_worker_push(worker, &chunk);
-        npg_chunk_unref(&chunk);
+        npg_chunk_close(&chunk);
         if (status) return status;
     }
 }

@@ -368,7 +368,7 @@ static npg_status pass_on(npg_worker *worker, npg_waiting *w)
     NPG_TRY(npg_chunk_open(&chunk, 1));
     npg_chunk_add(chunk, frame);
     npg_status status = npg_worker_push(worker, &chunk);
-    npg_chunk_unref(&chunk);
+    npg_chunk_close(&chunk);
     return status;
 }
 
@@ -451,7 +451,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         if (is_done || s->group.count == GROUP_MOST) NPG_TRY(close_group(worker, with_state));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
-    npg_chunk_unref(chunk);
+    npg_chunk_close(chunk);
     return NPG_OK;
 }
 

@@ -12,9 +12,8 @@ static npg_status refuse_gaps(const npg_capture *capture, const char *input)
                      input, list->gap_count, list->count, numbers);
 }
 
-npg_status npg_capture_open_list(npg_capture **out, npg_frame_files **list, const char *input,
-                                 npg_missing missing, bool keep_going, size_t cache_limit,
-                                 const char *spill_folder)
+npg_status npg_capture_open(npg_capture **out, npg_frame_files **list, const char *input, npg_missing missing,
+                            bool keep_going, size_t cache_limit, const char *spill_folder)
 {
     npg_capture *c;
     *out = NULL;
@@ -33,15 +32,6 @@ npg_status npg_capture_open_list(npg_capture **out, npg_frame_files **list, cons
     if (status) npg_capture_close(&c);
     *out = c;
     return status;
-}
-
-npg_status npg_capture_open(npg_capture **out, const char *input, const char *selection, npg_missing missing,
-                            bool keep_going, size_t cache_limit, const char *spill_folder)
-{
-    npg_frame_files *list;
-    *out = NULL;
-    NPG_TRY(npg_frame_files_open(&list, input, selection, missing != NPG_MISSING_IGNORE));
-    return npg_capture_open_list(out, &list, input, missing, keep_going, cache_limit, spill_folder);
 }
 
 void npg_capture_close(npg_capture **slot)

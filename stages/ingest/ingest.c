@@ -190,8 +190,8 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(spill_folder(&folder, worker));
     npg_status status = list_frames(&list, s, settings, s->frames);
     if (!status)
-        status = npg_capture_open_list(&capture, &list, settings->input, (npg_missing)s->missing,
-                                       settings->keep_going, cache_limit(worker), folder);
+        status = npg_capture_open(&capture, &list, settings->input, (npg_missing)s->missing,
+                                  settings->keep_going, cache_limit(worker), folder);
     npg_release(&folder);
     NPG_TRY(status);
     npg_worker_keep(worker, capture, release_capture);
@@ -351,7 +351,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     size_t frames = is_live ? 1 : (size_t)npg_worker_settings(worker)->chunk_frames;
     NPG_TRY(npg_chunk_open(chunk, frames));
     npg_status status = is_live ? next_from_source(worker, *chunk) : next_from_files(worker, *chunk);
-    if (status) npg_chunk_unref(chunk);
+    if (status) npg_chunk_close(chunk);
     return status;
 }
 

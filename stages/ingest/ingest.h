@@ -144,9 +144,6 @@ bool npg_rig_is(const char *path);
 npg_status npg_rig_open(npg_rig **rig, const char *path, const npg_rig_settings *settings);
 void npg_rig_close(npg_rig **rig);
 
-/* The settings without any option. */
-npg_rig_settings npg_rig_defaults(void);
-
 /* Place of a frame number; SIZE_MAX for one that is not there. */
 size_t npg_rig_find(const npg_rig *rig, int64_t number);
 

@@ -177,14 +177,10 @@ typedef struct npg_capture {
 /* Over a list that is at hand; takes it.  NPG_BAD_INPUT with the numbers of the gaps under
  * NPG_MISSING_ERROR; input is for messages.  What was read is kept in cache_limit bytes, and beyond that in
  * spill_folder. */
-npg_status npg_capture_open_list(npg_capture **capture, npg_frame_files **list, const char *input,
-                                 npg_missing missing, bool keep_going, size_t cache_limit,
-                                 const char *spill_folder);
-
-/* Over the list of an input that is no rig. */
-npg_status npg_capture_open(npg_capture **capture, const char *input, const char *selection,
+npg_status npg_capture_open(npg_capture **capture, npg_frame_files **list, const char *input,
                             npg_missing missing, bool keep_going, size_t cache_limit,
                             const char *spill_folder);
+
 void npg_capture_close(npg_capture **capture);
 
 /* Frame `index` (0 <= index < list->count) into the empty *frame.  NPG_PARTIAL: with keep_going, a file that

@@ -95,7 +95,7 @@ static const char *name_of(const npg_live_source *live)
 static npg_status next_of_feed(npg_live_source *live, npg_frame *frame)
 {
     while (!live->pushed || live->pushed_at == npg_chunk_count(live->pushed)) {
-        npg_chunk_unref(&live->pushed);
+        npg_chunk_close(&live->pushed);
         live->pushed_at = 0;
         NPG_TRY(npg_worker_feed(live->worker, &live->pushed));
     }
@@ -618,7 +618,7 @@ void npg_live_source_close(npg_live_source **slot)
     npg_selection_clear(&live->selection);
     npg_stream_close(&live->stream);
     npg_follow_close(&live->follow);
-    npg_chunk_unref(&live->pushed);
+    npg_chunk_close(&live->pushed);
     npg_frame_clear(&live->waiting);
     npg_frame_clear(&live->previous);
     npg_frame_clear(&live->last);

@@ -3,12 +3,10 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
@@ -59,16 +57,12 @@ static npg_status remove_stale(const npg_job *job)
 
 static npg_status take_lock(npg_job *job)
 {
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, job->folder, "lock"));
-    job->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (job->lock_fd < 0) return npg_error_errno(NPG_DISK, "can't open %s", path);
-    if (!flock(job->lock_fd, LOCK_EX | LOCK_NB)) return NPG_OK;
-    return errno == EWOULDBLOCK ? npg_error(NPG_USAGE,
-                                            "another run is at work on %s: "
-                                            "wait for its end, or choose another output folder",
-                                            job->output)
-                                : npg_error_errno(NPG_DISK, "can't lock %s", path);
+    npg_status status = npg_file_lock(&job->lock_fd, job->folder, "lock", false);
+    if (status != NPG_USAGE) return status;
+    return npg_error(NPG_USAGE,
+                     "another run is at work on %s: "
+                     "wait for its end, or choose another output folder",
+                     job->output);
 }
 
 /* ---- what is there ---- */
@@ -348,7 +342,6 @@ static npg_status fill(npg_job *job, npg_job_start *start, npg_worker *worker, b
     NPG_TRY(npg_job_describe(&job->now, npg_worker_options(worker)));
     job->frame_count = (int64_t)json_array_size(json_object_get(job->now, "frames"));
     if (npg_worker_settings(worker)->confine) NPG_TRY(npg_folder_is_own(job->folder));
-    NPG_TRY(npg_make_folder(job->folder));
     NPG_TRY(take_lock(job));
     *start = NPG_JOB_FRESH;
     if (!restart) NPG_TRY(look_around(job, start, worker, append));

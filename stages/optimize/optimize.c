@@ -293,7 +293,7 @@ static npg_status emit(npg_worker *worker, npg_held *held)
     npg_chunk_add(chunk, &held->frame);
     s->emitted++;
     npg_status status = npg_worker_push(worker, &chunk);
-    npg_chunk_unref(&chunk);
+    npg_chunk_close(&chunk);
     return status;
 }
 
@@ -401,7 +401,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         s->held[s->held_count++] = (npg_held){.frame = *frame};
         memset(frame, 0, sizeof *frame);
     }
-    npg_chunk_unref(chunk);
+    npg_chunk_close(chunk);
     return solve_complete_windows(worker);
 }
 

@@ -13,6 +13,12 @@
 
 enum { WIDE = 40, HIGH = 30 };
 
+/* The settings without any option. */
+static npg_rig_settings usual_settings(void)
+{
+    return (npg_rig_settings){.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
+}
+
 static temp_folder folder;
 
 static inline int open_rig_tests(void **state)
@@ -102,7 +108,7 @@ static inline void write_text(const char *name, const char *text)
 static inline npg_status read_rig_frame(npg_frame *frame, const char *name, size_t at,
                                         const npg_rig_settings *settings)
 {
-    npg_rig_settings usual = npg_rig_defaults();
+    npg_rig_settings usual = usual_settings();
     npg_origin origin = {.known = true};
     npg_rig *rig;
     *frame = (npg_frame){0};

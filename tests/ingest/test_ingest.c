@@ -15,6 +15,15 @@ extern const npg_stage npg_stage_ingest;
 
 /* ---- a stage that writes down what it sees, and plans ---- */
 
+static npg_status open_capture(npg_capture **capture, const char *path, npg_missing missing, bool keep_going,
+                               size_t limit, const char *spill)
+{
+    npg_frame_files *list;
+    *capture = NULL;
+    npg_status status = npg_frame_files_open(&list, path, "", missing != NPG_MISSING_IGNORE);
+    return status ? status : npg_capture_open(capture, &list, path, missing, keep_going, limit, spill);
+}
+
 static char seen[3][2048]; /* per pass: "index/number(flags)points@first-x" */
 static npg_facts facts_at_end;
 static npg_plan wanted_plan;
@@ -192,7 +201,7 @@ static void few_files_are_parsed_twice(void **state)
     for (int limited = 0; limited < 2; limited++) {
         /* Room for the first two frames: 1 + 2 points. */
         size_t limit = limited ? 2 * sizeof(npg_frame) + 3 * 3 * sizeof(float) : 1 << 20;
-        assert_int_equal(npg_capture_open(&capture, path, "", NPG_MISSING_ERROR, false, limit, NULL), NPG_OK);
+        assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, false, limit, NULL), NPG_OK);
         for (int pass = 0; pass < 3; pass++)
             for (int64_t i = 0; i < 4; i++) {
                 npg_frame frame;
@@ -300,7 +309,7 @@ static void no_memory_at_any_point(void **state)
         npg_capture *capture;
         npg_origin origin = {0};
         npg_memory_fail_at(n + 1, false);
-        status = npg_capture_open(&capture, path, "", NPG_MISSING_HOLD, false, 1 << 20, NULL);
+        status = open_capture(&capture, path, NPG_MISSING_HOLD, false, 1 << 20, NULL);
         for (int64_t i = 0; !status && i < 4; i++) {
             npg_frame frame;
             status = npg_capture_read(capture, &frame, i, &origin, false);

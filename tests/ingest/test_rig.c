@@ -92,7 +92,7 @@ static void own_layout(void **state)
     assert_int_equal(read_rig_frame(&frame, "own", 1, NULL), NPG_OK);
     check_plane(&frame, (const double[3]){5, 6, 7}, 0);
     npg_frame_clear(&frame);
-    npg_rig_settings none = npg_rig_defaults(), inverse = none;
+    npg_rig_settings none = usual_settings(), inverse = none;
     none.poses = NPG_POSES_NONE;
     inverse.poses = NPG_POSES_INVERSE;
     assert_int_equal(read_rig_frame(&frame, "own/rig.json", 0, &none), NPG_OK);
@@ -161,12 +161,12 @@ static void edges_and_flying_pixels_are_dropped(void **state)
     for (size_t i = 0; i < frame.point_count; i++)
         assert_true(frame.pos_local[3 * i + 2] == 1.0f || frame.pos_local[3 * i + 2] == 2.0f);
     npg_frame_clear(&frame);
-    npg_rig_settings loose = npg_rig_defaults();
+    npg_rig_settings loose = usual_settings();
     loose.margin = 3;
     assert_int_equal(read_rig_frame(&frame, "edge", 0, &loose), NPG_OK);
     assert_true(frame.point_count < (WIDE - 6) * (HIGH - 4) - 18);
     npg_frame_clear(&frame);
-    loose = npg_rig_defaults();
+    loose = usual_settings();
     loose.far_m = 1.2;
     assert_int_equal(read_rig_frame(&frame, "edge", 0, &loose), NPG_OK);
     for (size_t i = 0; i < frame.point_count; i++) assert_true(frame.pos_local[3 * i + 2] == 1.0f);
@@ -180,7 +180,7 @@ static void a_missing_image_is_a_gap_of_its_sensor(void **state)
     (void)state;
     npg_frame frame;
     npg_rig *rig;
-    npg_rig_settings usual = npg_rig_defaults();
+    npg_rig_settings usual = usual_settings();
     make_folder("two");
     write_depth("two/a_0000.png", 0);
     write_depth("two/a_0001.png", 0);
@@ -213,7 +213,7 @@ static void tum_layout(void **state)
     (void)state;
     npg_frame frame;
     npg_rig *rig;
-    npg_rig_settings usual = npg_rig_defaults();
+    npg_rig_settings usual = usual_settings();
     make_folder("tum");
     make_folder("tum/depth");
     write_depth("tum/depth/1.png", 0);
@@ -423,7 +423,7 @@ static void confine_refuses_what_leads_out(void **state)
 {
     (void)state;
     npg_frame frame;
-    npg_rig_settings confined = npg_rig_defaults();
+    npg_rig_settings confined = usual_settings();
     confined.confine = true;
     make_folder("in");
     write_text("outside.log", "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");

@@ -115,7 +115,7 @@ static void write_views(const char *rig, int cameras, const ball *balls, size_t 
 static npg_rig *compare(const char *name, npg_rig_view *views)
 {
     static const size_t frames[FRAMES] = {0, 1, 2, 3};
-    npg_rig_settings usual = npg_rig_defaults();
+    npg_rig_settings usual = usual_settings();
     npg_rig *rig;
     assert_int_equal(npg_rig_open(&rig, in_folder(&folder, name), &usual), NPG_OK);
     assert_int_equal(npg_rig_compare(rig, views, frames, FRAMES), NPG_OK);
@@ -229,7 +229,7 @@ static void lengths_have_the_unit_of_the_rig(void **state)
                                                                                     "12.5 mm", "1.25 foot"};
     for (int u = 0; u < 4; u++) {
         char text[64];
-        npg_rig_settings usual = npg_rig_defaults();
+        npg_rig_settings usual = usual_settings();
         npg_rig *rig;
         write_rig("ring", 4, -1, nothing, units[u]);
         assert_int_equal(npg_rig_open(&rig, in_folder(&folder, "ring"), &usual), NPG_OK);
@@ -257,7 +257,7 @@ static void memory_runs_out(void **state)
 {
     (void)state;
     static const size_t frames[FRAMES] = {0, 1, 2, 3};
-    npg_rig_settings usual = npg_rig_defaults();
+    npg_rig_settings usual = usual_settings();
     for (uint64_t n = 1; n < 1000; n += 1 + n / 2) {
         npg_rig_view views[4];
         npg_rig *rig;

@@ -38,7 +38,7 @@ static void keeps_order_and_delivers_after_the_end(void **state)
             npg_chunk *chunk = NULL;
             assert_int_equal(npg_ring_pop(ring, &chunk), NPG_OK);
             assert_int_equal(npg_chunk_frame(chunk, 0)->index, 3 * round + i);
-            npg_chunk_unref(&chunk);
+            npg_chunk_close(&chunk);
         }
     }
     npg_chunk *chunk = NULL;
@@ -47,7 +47,7 @@ static void keeps_order_and_delivers_after_the_end(void **state)
     chunk = chunk_of(0);
     assert_int_equal(npg_ring_push(ring, &chunk), NPG_USAGE);
     assert_non_null(chunk);
-    npg_chunk_unref(&chunk);
+    npg_chunk_close(&chunk);
     npg_ring_close(&ring);
     assert_null(ring);
     npg_ring_close(&ring);
@@ -68,7 +68,7 @@ static void abort_frees_and_stays(void **state)
     chunk = chunk_of(2);
     assert_int_equal(npg_ring_push(ring, &chunk), NPG_ABORTED);
     assert_non_null(chunk);
-    npg_chunk_unref(&chunk);
+    npg_chunk_close(&chunk);
     npg_ring_close(&ring);
     assert_int_equal(npg_memory_used(), before);
 }
@@ -105,7 +105,7 @@ static void *produce(void *argument)
         if (npg_chunk_open(&chunk, 1)) break;
         npg_chunk_add(chunk, &frame);
         d->end = npg_ring_push(d->ring, &chunk);
-        npg_chunk_unref(&chunk);
+        npg_chunk_close(&chunk);
         if (d->end) return NULL;
         long long inside = atomic_fetch_add(&d->pushed, 1) + 1 - atomic_load(&d->popped);
         if (inside > atomic_load(&d->most_inside)) atomic_store(&d->most_inside, inside);
@@ -123,7 +123,7 @@ static void *consume(void *argument)
         if (d->end) return NULL;
         if (npg_chunk_frame(chunk, 0)->index != i) d->count = -1;
         atomic_fetch_add(&d->popped, 1);
-        npg_chunk_unref(&chunk);
+        npg_chunk_close(&chunk);
     }
 }
 
@@ -142,7 +142,7 @@ static int64_t consume_with_stalls(duet *d, npg_status *end)
         *end = npg_ring_pop(d->ring, &chunk);
         if (*end) return next;
         assert_int_equal(npg_chunk_frame(chunk, 0)->index, next);
-        npg_chunk_unref(&chunk);
+        npg_chunk_close(&chunk);
         atomic_fetch_add(&d->popped, 1);
     }
 }

@@ -76,7 +76,7 @@ static npg_status pass_on(npg_worker *worker, int64_t solved_window)
         memmove(frame, frame + 1, (--s->count - i) * sizeof *frame);
         memset(&s->held[s->count], 0, sizeof *frame);
         npg_status status = npg_worker_push(worker, &chunk);
-        npg_chunk_unref(&chunk);
+        npg_chunk_close(&chunk);
         NPG_TRY(status);
     }
     return NPG_OK;
@@ -109,7 +109,7 @@ static npg_status windower_process(npg_worker *worker, npg_chunk **chunk)
         *npg_chunk_frame(*chunk, i) = (npg_frame){0};
     }
     if (s->count > atomic_load(&held_max)) atomic_store(&held_max, s->count);
-    npg_chunk_unref(chunk);
+    npg_chunk_close(chunk);
     return solve_complete(worker);
 }
 

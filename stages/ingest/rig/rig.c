@@ -71,11 +71,6 @@ bool npg_rig_is(const char *path)
 
 /* ---- open and close ---- */
 
-npg_rig_settings npg_rig_defaults(void)
-{
-    return (npg_rig_settings){.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
-}
-
 /* The folder that names start from: the path itself, or the one its file lies in. */
 static char *find_folder(npg_rig *rig)
 {
