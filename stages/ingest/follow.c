@@ -12,13 +12,12 @@
 #include <unistd.h>
 
 #include "pipeline/clock.h"
-#include "pipeline/file.h"
 
 /* Between two scans of the folder: a file that is the same in both is complete, on every file system. */
 #define SCAN_MS 250
 
 typedef struct file {
-    char *name; /* owned */
+    char *name; /* first: npg_natural_order() asks for it; owned */
     off_t size, refused_size;
     struct timespec changed; /* as the file system tells; only compared for being equal */
     double since_s;          /* when it was first seen as it is                         */
@@ -113,16 +112,11 @@ npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place)
     return NPG_OK;
 }
 
-npg_status npg_follow_path(const npg_follow *follow, char **path, const char *name)
+npg_status npg_follow_path(const npg_follow *follow, char path[NPG_PATH_SIZE], const char *name)
 {
-    NPG_TRY(npg_join_path(path, follow->folder, name));
-    npg_status status = NPG_OK;
-    if (strchr(name, '/'))
-        status = npg_error(NPG_BAD_INPUT, "%s: not a file of this folder", *path);
-    else if (follow->settings.confine && npg_is_there(*path))
-        status = npg_path_confine(*path, follow->folder);
-    if (status) npg_release(path);
-    return status;
+    NPG_TRY(npg_path_of(path, follow->folder, name));
+    if (strchr(name, '/')) return npg_error(NPG_BAD_INPUT, "%s: not a file of this folder", path);
+    return follow->settings.confine && npg_is_there(path) ? npg_path_confine(path, follow->folder) : NPG_OK;
 }
 
 /* ---- scanning the folder ---- */
@@ -135,17 +129,10 @@ static bool is_frame_name(const npg_follow *follow, const char *name)
     return !follow->ending[0] || !strcasecmp(strrchr(name, '.'), follow->ending);
 }
 
-static int by_name(const void *left, const void *right)
-{
-    const char *a = ((const file *)left)->name, *b = ((const file *)right)->name;
-    int order = npg_natural_compare(a, b);
-    return order ? order : strcmp(a, b);
-}
-
 static file *find_file(npg_follow *follow, const char *name)
 {
     const file key = {.name = (char *)name};
-    return follow->count ? bsearch(&key, follow->files, follow->count, sizeof key, by_name) : NULL;
+    return follow->count ? bsearch(&key, follow->files, follow->count, sizeof key, npg_natural_order) : NULL;
 }
 
 /* Size and time of the file now, against those of the scan before. */
@@ -193,13 +180,10 @@ static npg_status stat_files(npg_follow *follow)
     for (size_t i = 0; i < follow->count; i++) {
         file f = follow->files[i];
         struct stat info;
-        char *path;
-        NPG_TRY(npg_join_path(&path, follow->folder, f.name));
+        char path[NPG_PATH_SIZE];
+        NPG_TRY(npg_path_of(path, follow->folder, f.name));
         bool is_there = !stat(path, &info) && !S_ISDIR(info.st_mode);
-        npg_status status =
-            is_there && follow->settings.confine ? npg_path_confine(path, follow->folder) : NPG_OK;
-        npg_release(&path);
-        NPG_TRY(status);
+        if (is_there && follow->settings.confine) NPG_TRY(npg_path_confine(path, follow->folder));
         if (!is_there) { /* taken away again, or a folder */
             npg_release(&follow->files[i].name);
             continue;
@@ -210,17 +194,6 @@ static npg_status stat_files(npg_follow *follow)
     }
     follow->count = kept;
     return NPG_OK;
-}
-
-static bool end_file_is_there(const npg_follow *follow, npg_status *status)
-{
-    char *path;
-    if (!follow->settings.end_name[0]) return false;
-    *status = npg_join_path(&path, follow->folder, follow->settings.end_name);
-    if (*status) return false;
-    bool is_there = npg_is_there(path);
-    npg_release(&path);
-    return is_there;
 }
 
 static size_t waiting_count(const npg_follow *follow)
@@ -242,8 +215,8 @@ static npg_status scan_folder(npg_follow *follow)
     size_t known = follow->count, passed = 0;
     npg_status status = NPG_OK;
     /* Asked before the names are listed: who writes the end file last has written all frames by then. */
-    bool is_end = end_file_is_there(follow, &status);
-    NPG_TRY(status);
+    const char *end_name = follow->settings.end_name;
+    bool is_end = end_name[0] && npg_is_in_folder(follow->folder, end_name);
     DIR *directory = opendir(follow->folder);
     if (!directory)
         return npg_error(NPG_BAD_INPUT, "%s: can't be read any more: %s", follow->folder, strerror(errno));
@@ -252,7 +225,7 @@ static npg_status scan_folder(npg_follow *follow)
     closedir(directory);
     if (!status) status = stat_files(follow);
     if (status) return status;
-    if (follow->count) qsort(follow->files, follow->count, sizeof(file), by_name);
+    if (follow->count) qsort(follow->files, follow->count, sizeof(file), npg_natural_order);
     /* Of the names that were passed, all but the accepted ones turned up behind a later frame. */
     size_t late = passed > follow->taken_count ? passed - follow->taken_count : 0;
     if (late > follow->late_count) follow->late_count = late;
@@ -342,11 +315,10 @@ static bool waits_for_number(npg_follow *follow, const file *head)
 
 static npg_status read_file(npg_follow *follow, const file *head, npg_frame *frame, npg_origin *origin)
 {
-    char *path;
-    NPG_TRY(npg_join_path(&path, follow->folder, head->name));
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, follow->folder, head->name));
     npg_status status = npg_read_cloud(frame, path, origin);
-    if (status) frame->path = path; /* npg_read_cloud() sets it on success alone */
-    if (!status) npg_release(&path);
+    if (status) NPG_TRY(npg_copy_text(&frame->path, path)); /* npg_read_cloud() sets it on success alone */
     return status;
 }
 

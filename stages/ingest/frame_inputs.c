@@ -10,7 +10,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "pipeline/file.h"
 
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 
@@ -21,16 +20,9 @@ static npg_status add_path(npg_paths *list, char *path)
     return NPG_OK;
 }
 
-static int by_name(const void *left, const void *right)
-{
-    const char *a = *(char *const *)left, *b = *(char *const *)right;
-    int order = npg_natural_compare(a, b);
-    return order ? order : strcmp(a, b);
-}
-
 static void sort_paths(npg_paths *list)
 {
-    if (list->count) qsort(list->paths, list->count, sizeof *list->paths, by_name);
+    if (list->count) qsort(list->paths, list->count, sizeof *list->paths, npg_natural_order);
 }
 
 static bool is_folder(const char *path)

@@ -41,6 +41,13 @@ int npg_natural_compare(const char *a, const char *b)
     return *a ? 1 : *b ? -1 : 0;
 }
 
+int npg_natural_order(const void *left, const void *right)
+{
+    const char *a = *(char *const *)left, *b = *(char *const *)right;
+    int order = npg_natural_compare(a, b);
+    return order ? order : strcmp(a, b);
+}
+
 /* Where the ending begins, or the end of the text. */
 static const char *stem_end(const char *path)
 {

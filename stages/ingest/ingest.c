@@ -1,7 +1,6 @@
 /* Ingest: brings frames into the chain, from files (in time order, or in the order of the plan or choice),
  * from standard input, from a folder that grows, or from those that are pushed. */
 #include "ingest/ingest_internal.h"
-#include "pipeline/file.h"
 
 typedef struct state {
     const char *frames, *follow_end;
@@ -170,14 +169,15 @@ npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
     return npg_capture_select(list, options, NULL);
 }
 
-/* Where frames go that the cache does not hold; NULL: nowhere.  To npg_release(). */
-static npg_status spill_folder(char **folder, const npg_worker *worker)
+/* Where frames go that the cache does not hold; *folder is NULL, or the path. */
+static npg_status spill_folder(char path[NPG_PATH_SIZE], const char **folder, const npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     const npg_settings *settings = npg_worker_settings(worker);
     *folder = NULL;
     if (!settings->output[0] || !s->cache_mib) return NPG_OK;
-    return npg_join_path(folder, settings->output, "job");
+    *folder = path;
+    return npg_path_of(path, settings->output, "job");
 }
 
 static npg_status open_capture(npg_worker *worker)
@@ -186,14 +186,12 @@ static npg_status open_capture(npg_worker *worker)
     const npg_settings *settings = npg_worker_settings(worker);
     npg_capture *capture;
     npg_frame_files *list;
-    char *folder;
-    NPG_TRY(spill_folder(&folder, worker));
-    npg_status status = list_frames(&list, s, settings, s->frames);
-    if (!status)
-        status = npg_capture_open(&capture, &list, settings->input, (npg_missing)s->missing,
-                                  settings->keep_going, cache_limit(worker), folder);
-    npg_release(&folder);
-    NPG_TRY(status);
+    char path[NPG_PATH_SIZE];
+    const char *folder;
+    NPG_TRY(spill_folder(path, &folder, worker));
+    NPG_TRY(list_frames(&list, s, settings, s->frames));
+    NPG_TRY(npg_capture_open(&capture, &list, settings->input, (npg_missing)s->missing, settings->keep_going,
+                             cache_limit(worker), folder));
     npg_worker_keep(worker, capture, release_capture);
     NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
     /* A resumed run has restored it. */
@@ -297,11 +295,10 @@ static npg_status open_live(npg_worker *worker)
                                         .missing = (npg_missing)s->missing,
                                         .look_ahead = s->look_ahead};
     npg_live_source *live;
-    char *folder;
-    NPG_TRY(spill_folder(&folder, worker));
-    npg_status status = npg_live_source_open(&live, worker, &settings, cache_limit(worker), folder);
-    npg_release(&folder);
-    NPG_TRY(status);
+    char path[NPG_PATH_SIZE];
+    const char *folder;
+    NPG_TRY(spill_folder(path, &folder, worker));
+    NPG_TRY(npg_live_source_open(&live, worker, &settings, cache_limit(worker), folder));
     npg_worker_keep(worker, live, release_live);
     return npg_worker_publish(worker, &npg_fact_frame_store, npg_live_source_cache(live));
 }

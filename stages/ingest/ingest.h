@@ -297,6 +297,10 @@ void npg_frame_files_gaps(char *text, size_t size, const npg_frame_files *list);
  * leading zeros are equal. */
 int npg_natural_compare(const char *a, const char *b);
 
+/* The same of pointers to texts, or to structs that begin with one, as qsort() and bsearch() ask; equal names by their
+ * bytes. */
+int npg_natural_order(const void *left, const void *right);
+
 /* Input list: the frames that the options of a run name, those of files or of a rig (ingest.c). */
 
 /* The files that the options of a run (input, frames, missing, confine, those of rigs) name as its frames; of

@@ -12,13 +12,6 @@
 #include "pipeline/file.h"
 #include "pipeline/memory.h"
 
-static int compare_paths(const void *a, const void *b)
-{
-    const char *x = *(char *const *)a, *y = *(char *const *)b;
-    int order = npg_natural_compare(x, y);
-    return order ? order : strcmp(x, y);
-}
-
 static bool ends_in(const char *name, const char *endings)
 {
     const char *dot = strrchr(name, '.');
@@ -59,7 +52,7 @@ static npg_status add_folder(npg_listing *listing, const char *path, const char 
     if (!status && listing->count == before)
         return npg_error(NPG_BAD_INPUT, "%s: the folder has no file that ends in %s", path, endings);
     if (!status)
-        qsort(listing->paths + before, listing->count - before, sizeof *listing->paths, compare_paths);
+        qsort(listing->paths + before, listing->count - before, sizeof *listing->paths, npg_natural_order);
     return status;
 }
 

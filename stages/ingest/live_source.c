@@ -1,12 +1,12 @@
 /* Live source: frames that come one after the other. */
 #include "ingest/ingest_internal.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "pipeline/file.h"
 
 /* Frames of one gap.  Each becomes a frame of the run, so a number that is damaged or a time stamp must not
  * make millions; set far above what a capture loses. */
@@ -132,12 +132,24 @@ static npg_status next_streamed(npg_live_source *live, npg_frame *frame)
     return NPG_END;
 }
 
+/* What is there is not of this source. */
+static npg_status refuse_job(const npg_live_source *live, const char *format, ...) NPG_PRINTF(2, 3);
+static npg_status refuse_job(const npg_live_source *live, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    return npg_error(NPG_USAGE,
+                     "%s holds another job: %s; "
+                     "give --restart to discard what is there, or choose another output folder",
+                     npg_worker_settings(live->worker)->output, text);
+}
+
 static npg_status refuse(const npg_live_source *live, int64_t number, const char *what)
 {
-    return npg_error(NPG_USAGE,
-                     "%s holds another job: frame %lld of %s %s; "
-                     "give --restart to discard what is there, or choose another output folder",
-                     npg_worker_settings(live->worker)->output, (long long)number, name_of(live), what);
+    return refuse_job(live, "frame %lld of %s %s", (long long)number, name_of(live), what);
 }
 
 static npg_status check_content(const npg_live_source *live, const npg_spooled *entry, const npg_frame *frame)
@@ -322,11 +334,8 @@ static npg_status check_end(npg_live_source *live)
     }
     if (status && status != NPG_END) return status;
     if (live->next < live->total)
-        return npg_error(NPG_USAGE,
-                         "%s holds another job: %s had %lld frames and has %lld; "
-                         "give --restart to discard what is there, or choose another output folder",
-                         npg_worker_settings(live->worker)->output, name_of(live), (long long)live->total,
-                         (long long)live->next);
+        return refuse_job(live, "%s had %lld frames and has %lld", name_of(live), (long long)live->total,
+                          (long long)live->next);
     if (live->follow) NPG_TRY(npg_follow_count_new(live->follow, &fresh));
     if (fresh)
         npg_worker_warn(live->worker, false, -1,
@@ -391,27 +400,29 @@ static npg_status await(npg_live_source *live, int64_t index)
     return status;
 }
 
+/* The file that a frame of the folder had, where it is now. */
+static npg_status read_again(npg_live_source *live, npg_frame *frame, const npg_spooled *entry)
+{
+    char path[NPG_PATH_SIZE];
+    const char *slash = frame->path ? strrchr(frame->path, '/') : NULL;
+    npg_status status = npg_follow_path(live->follow, path, slash ? slash + 1 : "");
+    npg_release(&frame->path);
+    NPG_TRY(status);
+    if (entry->is_skipped) return npg_copy_text(&frame->path, path);
+    NPG_TRY(npg_read_cloud(frame, path, npg_own(live->worker, origin)));
+    frame->number = entry->number;
+    frame->index = entry->index;
+    return NPG_OK;
+}
+
 static npg_status from_spool(npg_live_source *live, npg_frame *frame, int64_t index)
 {
     npg_record *record;
     npg_spooled entry;
-    char *path;
     NPG_TRY(npg_spool_get(live->spool, live->entries[index], &entry, &record));
     npg_status status = npg_spool_frame(&entry, record, frame);
     npg_record_close(&record);
-    if (status || !entry.has_file) return status;
-    const char *slash = frame->path ? strrchr(frame->path, '/') : NULL;
-    status = npg_follow_path(live->follow, &path, slash ? slash + 1 : "");
-    npg_release(&frame->path);
-    if (!status && entry.is_skipped) {
-        frame->path = path;
-        return NPG_OK;
-    }
-    if (!status) status = npg_read_cloud(frame, path, npg_own(live->worker, origin));
-    npg_release(&path);
-    frame->number = entry.number;
-    frame->index = index;
-    return status;
+    return status || !entry.has_file ? status : read_again(live, frame, &entry);
 }
 
 npg_status npg_live_source_read(npg_live_source *live, npg_frame *frame, int64_t index, bool is_last_use)
@@ -460,24 +471,20 @@ static npg_status check_file(npg_live_source *live, const npg_spooled *entry, co
 {
     struct stat info;
     uint64_t hash = 0;
-    char *path;
+    char path[NPG_PATH_SIZE];
     const char *name = npg_spool_path(record), *slash = name ? strrchr(name, '/') : NULL;
     const char *what = NULL;
     if (!slash) return npg_error(NPG_BAD_INPUT, "frame %lld has no file", (long long)entry->number);
     if (entry->is_skipped || entry->bytes < 0) return NPG_OK;
-    NPG_TRY(npg_follow_path(live->follow, &path, slash + 1));
+    NPG_TRY(npg_follow_path(live->follow, path, slash + 1));
     bool is_there = !stat(path, &info);
-    npg_status status = NPG_OK;
-    if (is_there && info.st_size == entry->bytes) status = npg_hash_file(&hash, path, UINT64_MAX);
-    npg_release(&path);
+    if (is_there && info.st_size == entry->bytes) NPG_TRY(npg_hash_file(&hash, path, UINT64_MAX));
     *gone += !is_there;
     if (!is_there && is_needed) what = "missing";
     if (is_there && hash != entry->hash) what = "not the one it was";
-    if (status || !what) return status;
-    return npg_error(NPG_USAGE,
-                     "%s holds another job: the input %s is %s (frame %lld); "
-                     "give --restart to discard what is there, or choose another output folder",
-                     npg_worker_settings(live->worker)->output, slash + 1, what, (long long)entry->number);
+    return what ? refuse_job(live, "the input %s is %s (frame %lld)", slash + 1, what,
+                             (long long)entry->number)
+                : NPG_OK;
 }
 
 /* The state may be older than what was said of the frame. */
@@ -540,10 +547,9 @@ static npg_status stand_behind(npg_live_source *live, npg_follow_place *place)
         status = npg_follow_resume(live->follow, place);
     }
     if (!status && holds(live) && entry.has_file && !entry.is_skipped) {
-        char *now;
-        status = npg_follow_path(live->follow, &now, place->last);
+        char now[NPG_PATH_SIZE];
+        status = npg_follow_path(live->follow, now, place->last);
         if (!status) status = npg_read_cloud(previous, now, npg_own(live->worker, origin));
-        npg_release(&now);
     } else if (!status && holds(live) && !live->stream) {
         status = npg_spool_frame(&entry, record, previous);
     }
