@@ -207,6 +207,15 @@ npg_status npg_file_check(const json_t *entry, const char *output, const char *f
     return status == NPG_DISK ? NPG_BAD_INPUT : status;
 }
 
+npg_status npg_json_lines_in(const char *folder, const char *name, npg_json_line_visit *visit, void *user)
+{
+    char path[NPG_PATH_SIZE];
+    struct stat info;
+    NPG_TRY(npg_path_of(path, folder, name));
+    if (stat(path, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", path);
+    return npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
+}
+
 json_t *npg_json_in(const char *folder, const char *name)
 {
     char path[NPG_PATH_SIZE];

@@ -43,6 +43,9 @@ typedef npg_status npg_json_line_visit(void *user, const json_t *object, const c
  * these are no whole lines with an object each. */
 npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user);
 
+/* All of the file NAME of a folder; NPG_DISK, too, where it is not there. */
+npg_status npg_json_lines_in(const char *folder, const char *name, npg_json_line_visit *visit, void *user);
+
 /* ---- what the lists of a run say of a file ---- */
 
 /* {"bytes": n, "xxh3": "16 hex digits"} added to entry for the file OUT/<file>.  NPG_DISK. */

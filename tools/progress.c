@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -231,4 +232,17 @@ void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *out
         json_decref(line);
     if (reporter->log_fd >= 0) close(reporter->log_fd);
     reporter->log_fd = -1;
+}
+
+void npg_reporter_log(npg_reporter *reporter, npg_log_level level, double time_s, const char *stage,
+                      const char *format, ...)
+{
+    char text[900];
+    npg_hooks hooks = npg_reporter_hooks(reporter);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    npg_log_record record = {sizeof record, level, time_s, stage, -1, text};
+    hooks.log(hooks.user, &record);
 }

@@ -28,6 +28,10 @@ npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const
 /* Hooks for a run; the reporter is a loan until the run is closed. */
 npg_hooks npg_reporter_hooks(npg_reporter *reporter);
 
+/* A record of the verb's own. */
+void npg_reporter_log(npg_reporter *reporter, npg_log_level level, double time_s, const char *stage,
+                      const char *format, ...) NPG_PRINTF(5, 6);
+
 /* Remove the bar before something else is printed. */
 void npg_reporter_pause(npg_reporter *reporter);
 

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "export/files.h"
@@ -89,25 +88,11 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     return NPG_OK;
 }
 
-/* 0 where it can't be found out. */
-static int64_t file_size(const char *path)
-{
-    struct stat info;
-    return stat(path, &info) ? 0 : (int64_t)info.st_size;
-}
-
-static npg_status each_line(const applying *a, npg_json_line_visit *visit, void *user)
-{
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, a->s->job, "frames.jsonl"));
-    return npg_json_lines_each(path, file_size(path), visit, user);
-}
-
 static npg_status open_job(applying *a)
 {
     char path[NPG_PATH_SIZE];
     NPG_TRY(check_job(a));
-    NPG_TRY(each_line(a, count_line, a));
+    NPG_TRY(npg_json_lines_in(a->s->job, "frames.jsonl", count_line, a));
     if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->s->job);
     NPG_TRY(npg_path_of(path, a->s->job, "reference.ply"));
     return npg_read_mesh(&a->reference, path, &a->origin);
@@ -383,7 +368,7 @@ static npg_status apply(applying *a)
     NPG_TRY(open_job(a));
     NPG_TRY(open_carried(a));
     NPG_TRY(open_output(a));
-    NPG_TRY(each_line(a, visit_frame, a));
+    NPG_TRY(npg_json_lines_in(a->s->job, "frames.jsonl", visit_frame, a));
     return write_done(a);
 }
 

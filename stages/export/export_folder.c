@@ -45,19 +45,18 @@ npg_status npg_folder_probe(const char *output)
 
 /* ---- mesh files of any run ---- */
 
-/* Whether a name is <word>_<digits>.ply or .obj, or the hidden unfinished form of one; *number gets the
- * digits' value. */
-static bool is_mesh_name(const char *name, int64_t *number)
+bool npg_mesh_name_read(const char *name, const char *endings, int64_t *number)
 {
     size_t length = strlen(name);
     if (name[0] == '.' && length > 6 && !strcmp(name + length - 5, ".part")) length -= 5;
-    if (length < 7 ||
-        (strncmp(name + length - 4, ".ply", 4) != 0 && strncmp(name + length - 4, ".obj", 4) != 0))
-        return false;
+    char ending[8] = "";
+    if (length < 7) return false;
+    snprintf(ending, sizeof ending, "%.4s ", name + length - 4);
+    if (!strstr(endings, ending)) return false;
     size_t first = length - 4;
     while (first > 0 && isdigit((unsigned char)name[first - 1])) first--;
     if (length - 4 - first < 4 || length - 4 - first > 18) return false;
-    if (first > 1 && name[first - 1] == '-') first--;
+    if (first > 1 && name[first - 1] == '-') first--; /* numbers may be negative */
     *number = strtoll(name + first, NULL, 10);
     return first > 1 && name[first - 1] == '_';
 }
@@ -74,7 +73,8 @@ static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
     DIR *listing = opendir(folder);
     if (!listing && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't list %s", folder);
     for (struct dirent *entry; listing && !status && (entry = readdir(listing));)
-        if (is_mesh_name(entry->d_name, &number)) status = visit(user, folder, entry->d_name, number);
+        if (npg_mesh_name_read(entry->d_name, ".ply .obj ", &number))
+            status = visit(user, folder, entry->d_name, number);
     if (listing) closedir(listing);
     return status;
 }

@@ -74,6 +74,10 @@ enum { NPG_MESH_NAME_SIZE = 256 };
 /* "<prefix>_<number>.<ending>". */
 void npg_mesh_name(char name[NPG_MESH_NAME_SIZE], const npg_mesh_names *names, int64_t number);
 
+/* The number in such a name (four digits at least, whatever the prefix) of one of the endings ".ply .obj ", or in that of
+ * an unfinished file (pipeline/file.h). */
+bool npg_mesh_name_read(const char *name, const char *endings, int64_t *number);
+
 /* Digits that the largest number needs, 4 at least. */
 int npg_number_width(int64_t number_max);
 

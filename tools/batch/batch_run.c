@@ -4,7 +4,6 @@
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,17 +33,6 @@ typedef struct work {
 
 /* ---- reports ---- */
 
-static NPG_PRINTF(4, 5) void log_line(work *w, npg_log_level level, const char *name, const char *format, ...)
-{
-    char text[900];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    npg_log_record record = {sizeof record, level, npg_clock_s() - w->begun_s, name, -1, text};
-    w->hooks.log(w->hooks.user, &record);
-}
-
 static void print_record(work *w, json_t *record)
 {
     char *text =
@@ -57,10 +45,11 @@ static void print_record(work *w, json_t *record)
 
 static void report_start(work *w, const npg_capture *capture)
 {
-    log_line(w, NPG_LOG_INFO, capture->name, "started (%zu of %zu)", w->ended + w->running + 1, w->mine);
+    npg_reporter_log(w->reporter, NPG_LOG_INFO, npg_clock_s() - w->begun_s, capture->name,
+                     "started (%zu of %zu)", w->ended + w->running + 1, w->mine);
     if (capture->of_mesh_vertices)
-        log_line(w, NPG_LOG_WARNING, capture->name,
-                 "%s holds meshes and no clouds: their vertices are the points", capture->input);
+        npg_reporter_log(w->reporter, NPG_LOG_WARNING, npg_clock_s() - w->begun_s, capture->name,
+                         "%s holds meshes and no clouds: their vertices are the points", capture->input);
     print_record(w, json_pack("{s:s,s:o}", "event", "start", "name", npg_json_text(capture->name)));
 }
 
@@ -71,10 +60,11 @@ static void report_end(work *w, const npg_capture *capture)
                           : v->exit_code == 7 ? NPG_LOG_WARNING
                                               : NPG_LOG_ERROR;
     if (v->was_done)
-        log_line(w, level, capture->name, "was done already%s%s", *v->message ? ": " : "", v->message);
+        npg_reporter_log(w->reporter, level, npg_clock_s() - w->begun_s, capture->name,
+                         "was done already%s%s", *v->message ? ": " : "", v->message);
     else
-        log_line(w, level, capture->name, "%s after %.0f s%s%s", v->word, v->seconds, *v->message ? ": " : "",
-                 v->message);
+        npg_reporter_log(w->reporter, level, npg_clock_s() - w->begun_s, capture->name, "%s after %.0f s%s%s",
+                         v->word, v->seconds, *v->message ? ": " : "", v->message);
     json_t *record = npg_verdict_json(capture);
     json_object_set_new(record, "event", json_string("verdict"));
     json_object_set_new(record, "was_done", json_boolean(v->was_done));
@@ -150,7 +140,8 @@ static void read_signals(work *w)
         double now_s = npg_clock_s();
         if (w->stopped && now_s < w->stopped_s + AGAIN_SECONDS) continue;
         if (!w->stopped)
-            log_line(w, NPG_LOG_WARNING, "batch", "stopping on request: the runs write their states");
+            npg_reporter_log(w->reporter, NPG_LOG_WARNING, npg_clock_s() - w->begun_s, "batch",
+                             "stopping on request: the runs write their states");
         w->stopped = true;
         w->stopped_s = now_s;
         stop_all(w);

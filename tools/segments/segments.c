@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,19 +12,6 @@
 #include "pipeline/file.h"
 #include "pipeline/options.h"
 #include "pipeline/stage.h"
-
-static void log_info(npg_reporter *reporter, const char *format, ...) NPG_PRINTF(2, 3);
-static void log_info(npg_reporter *reporter, const char *format, ...)
-{
-    char text[512];
-    npg_hooks hooks = npg_reporter_hooks(reporter);
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    npg_log_record record = {sizeof record, NPG_LOG_INFO, 0, "segments", -1, text};
-    hooks.log(hooks.user, &record);
-}
 
 static int64_t option_number(const npg_options *options, const char *name)
 {
@@ -126,9 +112,9 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
     NPG_TRY(npg_options_copy(&own, options));
     npg_status status = set_segment_options(own, s, segment);
     if (!status && strcmp(segment->folder, ".") != 0)
-        log_info(reporter, "%s: frames %lld to %lld", segment->folder,
-                 (long long)npg_segment_number(s, segment->first),
-                 (long long)npg_segment_number(s, segment->last));
+        npg_reporter_log(reporter, NPG_LOG_INFO, 0, "segments", "%s: frames %lld to %lld", segment->folder,
+                         (long long)npg_segment_number(s, segment->first),
+                         (long long)npg_segment_number(s, segment->last));
     if (!status) status = npg_run_once(own, reporter, &is_open);
     npg_options_close(&own);
     return status;
@@ -187,8 +173,9 @@ static npg_status split_segment(npg_segments *s, size_t at, const npg_options *o
     npg_segment_name(segment, s);
     npg_segment_name(&rest, s);
     json_decref(topology);
-    log_info(reporter, "a new reference for frames %lld to %lld",
-             (long long)npg_segment_number(s, rest.first), (long long)npg_segment_number(s, rest.last));
+    npg_reporter_log(reporter, NPG_LOG_INFO, 0, "segments", "a new reference for frames %lld to %lld",
+                     (long long)npg_segment_number(s, rest.first),
+                     (long long)npg_segment_number(s, rest.last));
     npg_status status = npg_segments_insert(s, rest.first > segment->first ? at + 1 : at, &rest);
     if (status) json_decref(rest.alarm);
     return status ? status : npg_segments_save(s);
@@ -199,9 +186,9 @@ static npg_status split_segment(npg_segments *s, size_t at, const npg_options *o
 /* Done before without segments, and there was an alarm: what it left makes way for the segments. */
 static npg_status solve_again(const npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
-    log_info(reporter,
-             "%s was done with one reference, which does not explain all frames: it is solved again",
-             s->output);
+    npg_reporter_log(reporter, NPG_LOG_INFO, 0, "segments",
+                     "%s was done with one reference, which does not explain all frames: it is solved again",
+                     s->output);
     NPG_TRY(npg_segment_remove(s, &s->list[0]));
     return run_segment(s, &s->list[0], options, reporter);
 }

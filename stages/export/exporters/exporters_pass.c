@@ -1,11 +1,9 @@
 /* Exporters: the pass over a run's meshes in the order of time that writes all of them at once. */
-#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "export/exporters/exporters_internal.h"
@@ -50,16 +48,10 @@ static bool is_single(const char *name)
     return rest == strrchr(name, '.');
 }
 
-/* "<word>_<four digits or more>.<ending>". */
 static bool is_numbered(const char *name)
 {
-    static const char *const endings[] = {".obj", ".vdb", NULL};
-    if (!has_ending(name, endings)) return false;
-    const char *dot = strrchr(name, '.'), *digits = dot;
-    while (digits > name && isdigit((unsigned char)digits[-1])) digits--;
-    if (dot - digits < 4) return false;
-    if (digits - name > 1 && digits[-1] == '-') digits--; /* numbers may be negative */
-    return digits - name > 1 && digits[-1] == '_';
+    int64_t number;
+    return npg_mesh_name_read(name, ".obj .vdb ", &number);
 }
 
 static npg_status clear_folder(const char *folder, bool (*is_ours)(const char *name))
@@ -132,17 +124,6 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     facts->last_index = json_integer_value(json_object_get(frame, "index"));
     if (!facts->pose_count++) facts->first_index = facts->last_index;
     return NPG_OK;
-}
-
-static npg_status each_line(const npg_export_facts *facts, npg_json_line_visit *visit, void *user)
-{
-    struct stat info;
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, facts->output, "frames.jsonl"));
-    npg_status status = NPG_OK;
-    if (stat(path, &info)) status = npg_error_errno(NPG_DISK, "can't read back %s", path);
-    if (!status) status = npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
-    return status;
 }
 
 static npg_status pass_pose(exporters_pass *p, int64_t index, int64_t number, bool fixed_rate_only)
@@ -265,12 +246,12 @@ static npg_status write_exports(exporters_pass *p)
     facts->pose_count = 0;
     p->watch->repeated = 0;
     NPG_TRY(npg_exporters_clear(facts->output));
-    NPG_TRY(each_line(facts, count_line, facts));
+    NPG_TRY(npg_json_lines_in(facts->output, "frames.jsonl", count_line, facts));
     if (!facts->pose_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", facts->output);
     NPG_TRY(npg_exporters_check(p->choice, facts));
     NPG_TRY(open_log(p));
     NPG_TRY(open_writers(p));
-    NPG_TRY(each_line(facts, write_line_poses, p));
+    NPG_TRY(npg_json_lines_in(facts->output, "frames.jsonl", write_line_poses, p));
     return finish_writers(p);
 }
 
