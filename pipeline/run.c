@@ -202,16 +202,28 @@ static void wait_for_workers(npg_run *run)
     }
 }
 
-static void close_pass(npg_run *run)
+static void join_workers(npg_run *run)
 {
     wait_for_workers(run);
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
-        if (worker->started) {
-            pthread_join(worker->thread, NULL);
-            note_waits(worker);
-        }
+        if (!worker->started) continue;
+        pthread_join(worker->thread, NULL);
+        note_waits(worker);
     }
+}
+
+static npg_status settle_pass(npg_run *run)
+{
+    for (size_t i = 0; i < run->worker_count; i++) {
+        npg_worker *worker = &run->workers[i];
+        if (worker->started && worker->stage->settle) NPG_TRY(worker->stage->settle(worker));
+    }
+    return NPG_OK;
+}
+
+static void close_pass(npg_run *run)
+{
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
         if (worker->started && worker->stage->uninit) worker->stage->uninit(worker);
@@ -269,6 +281,8 @@ static npg_status do_pass(npg_run *run, npg_pass pass)
     if (!status) status = open_rings(run);
     if (!status) status = start_threads(run);
     if (status) npg_run_fail(run, "run", status);
+    join_workers(run);
+    if (!run->first_failure && (status = settle_pass(run))) npg_run_fail(run, "run", status);
     close_pass(run);
     report_pass(run, &begun);
     return run->first_failure;
@@ -338,7 +352,7 @@ static npg_status do_passes(npg_run *run)
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
         if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
-        for (; run->facts.fuse_left; run->fuse_done++) NPG_TRY(do_pass(run, NPG_PASS_FUSE));
+        for (; run->facts.brief.rounds_left; run->fuse_done++) NPG_TRY(do_pass(run, NPG_PASS_FUSE));
     }
     run->closed_reports = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));

@@ -39,18 +39,32 @@ typedef enum npg_pass {
     NPG_PASS_SCORE = 2,   /* score every frame, choose the keyframe   */
     NPG_PASS_SOLVE = 4,   /* the work itself                          */
     NPG_PASS_CHOOSE = 8,  /* after SCORE: look closer at a few frames */
-    NPG_PASS_FUSE = 16    /* facts.fuse_left times: all frames' points */
+    NPG_PASS_FUSE = 16    /* while facts.brief.rounds_left: all frames' points */
 } npg_pass;
 
 /* The frames that the choosing pass reads, in time order. */
-#define NPG_CHOICE_FRAMES 25
-#define NPG_CHOICE_MAX    4 /* candidates among them */
+#define NPG_CHOICE_FRAMES 48
+#define NPG_CHOICE_MAX    6 /* candidates among them */
 typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them        */
     bool cut_welds;                       /* cut from the reference what the other frames contradict */
 } npg_choice;
+
+/* How the next pass over all frames is walked: what the reference's owner decides between passes
+ * (reference/loop.h). */
+typedef struct npg_brief {
+    int64_t
+        rounds_left; /* fusing passes that are still to be walked: each follows the reference so far through
+                               all frames and gathers their points for the next one */
+    bool takes_gathered; /* the next reference is made from what was gathered, and the poses found are good to
+                               start from; false: from the keyframe alone, and frames are followed anew */
+    int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */
+    bool is_growing;        /* ... and goes on to: the next one is not closed                               */
+    double explained_least; /* share of a frame's points that a growing reference that bends must have places
+                               for: it is followed to the last frame before one of which it has fewer      */
+} npg_brief;
 
 /* What the stages find out about the capture as a whole.  A fact is written by its owner, the stage named,
  * and by nobody else (npg_own), before it passes on the first chunk (or ends the pass) that depends on it; the
@@ -76,13 +90,8 @@ typedef struct npg_facts {
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
     /* fuse */
-    int64_t fuse_left; /* fusing passes that are still to be walked: each follows the reference so far through
-                          all frames and gathers their points for the next one */
+    npg_brief brief;         /* between passes */
     size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
-    int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */
-    bool is_growing;        /* ... and goes on to: the next one is not closed                               */
-    double explained_least; /* share of a frame's points that a growing reference that bends must have places
-                               for: it is followed to the last frame before one of which it has fewer      */
     /* align, at the end of a fusing pass */
     int64_t
         unreached_count; /* frames that see too much that the reference does not have, and those beyond them */
@@ -133,6 +142,9 @@ typedef struct npg_stage {
     npg_status (*process)(npg_worker *worker, npg_chunk **chunk);
     /* The stream ended: push on what was held back.  May be NULL. */
     npg_status (*flush)(npg_worker *worker);
+    /* All stages have ended the pass well, and none is closed yet; on the run's own thread: what the pass
+     * came to, and what follows from it for the next.  May be NULL. */
+    npg_status (*settle)(npg_worker *worker);
     /* Free everything, after success and failure alike.  May be NULL. */
     void (*uninit)(npg_worker *worker);
     /* Bytes the stage holds at most in the solving pass, and how many chunks of them it may hold back; facts

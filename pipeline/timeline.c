@@ -38,7 +38,7 @@ void npg_timeline_begin_pass(npg_run *run)
 {
     const npg_facts *facts = &run->facts;
     bool is_known = facts->frame_count >= 0 && !facts->is_resumed && facts->point_count_max;
-    run->fuse_walks = run->fuse_done + facts->fuse_left;
+    run->fuse_walks = run->fuse_done + facts->brief.rounds_left;
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
         bool expects = is_known && worker->stage->expects && npg_worker_takes_part(worker);

@@ -247,7 +247,7 @@ static npg_status reaches(bool *is_reached, const npg_worker *worker, const npg_
     double bend, size = npg_points_diagonal(reference->vert_pos, reference->vert_count);
     NPG_TRY(npg_pose_bend(&bend, npg_tracker_graph(s->tracker), w->pose));
     *is_reached = w->tracked.explained >=
-                  (bend > BENT * size ? npg_worker_facts(worker)->explained_least : EXPLAINED_STIFF);
+                  (bend > BENT * size ? npg_worker_facts(worker)->brief.explained_least : EXPLAINED_STIFF);
     return NPG_OK;
 }
 
@@ -328,7 +328,7 @@ static npg_status finish_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool is_of_one_side = facts->growing_passes || is_growing(worker, facts->sensor_count_max);
+    bool is_of_one_side = facts->brief.growing_passes || is_growing(worker, facts->sensor_count_max);
     npg_recover_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group.count + NPG_GROUP_FIXED, sizeof *frames));
     size_t count = npg_group_list(&s->group, frames);

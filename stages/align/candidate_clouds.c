@@ -3,13 +3,45 @@
 
 #include <math.h>
 #include <string.h>
+#include <xxhash.h>
 
 #include "geometry/geometry.h"
 
 #define FLIPPED_MOST                                                                                         \
     0.1 /* share of given normals on the wrong side, beyond which those of other frames are not used */
 
+#define HELD_OUT 5 /* one point of so many */
+
 /* ---- the list ---- */
+
+/* Whether a point takes no part in what is fitted, so that it can tell how good the fit is. */
+static bool is_held_out(const float point[3])
+{
+    return XXH3_64bits(point, 3 * sizeof *point) % HELD_OUT == 0;
+}
+
+static void swap_rows(float *rows, size_t a, size_t b)
+{
+    for (size_t c = 0; c < 3; c++) {
+        float kept = rows[3 * a + c];
+        rows[3 * a + c] = rows[3 * b + c];
+        rows[3 * b + c] = kept;
+    }
+}
+
+static void hold_out(npg_candidate_cloud *cloud)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < cloud->point_count; i++) {
+        if (is_held_out(cloud->points + 3 * i)) continue;
+        swap_rows(cloud->points, i, used);
+        if (cloud->normals) swap_rows(cloud->normals, i, used);
+        used++;
+    }
+    cloud->held = cloud->points + 3 * used;
+    cloud->held_count = cloud->point_count - used;
+    cloud->point_count = used;
+}
 
 static npg_status copy_points(npg_candidate_cloud *cloud, npg_arena *arena, const npg_frame *frame,
                               const npg_frame_box *box)
@@ -17,11 +49,16 @@ static npg_status copy_points(npg_candidate_cloud *cloud, npg_arena *arena, cons
     size_t count = frame->point_count < NPG_CANDIDATE_POINTS ? frame->point_count : NPG_CANDIDATE_POINTS;
     cloud->points = npg_arena_take(arena, count, 3 * sizeof(float));
     if (frame->normals) cloud->normals = npg_arena_take(arena, count, 3 * sizeof(float));
+    if (frame->sensor_count) cloud->sensors = npg_arena_take(arena, frame->sensor_count, 3 * sizeof(float));
     NPG_TRY(npg_arena_status(arena));
     npg_points_spread(cloud->points, cloud->normals, count, frame->pos_local, frame->normals,
                       frame->point_count);
     npg_box_local_to_unit(box, cloud->points, cloud->points, count);
     cloud->point_count = count;
+    cloud->sensor_count = frame->sensor_count;
+    if (frame->sensor_count)
+        npg_box_local_to_unit(box, cloud->sensors, frame->sensor_local, frame->sensor_count);
+    hold_out(cloud);
     return NPG_OK;
 }
 
@@ -108,7 +145,9 @@ static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
     f->next = oldest;
     const npg_tracker_cloud cloud = {.points = next->points,
                                      .normals = f->with_normals ? next->normals : NULL,
-                                     .count = next->point_count};
+                                     .count = next->point_count,
+                                     .sensors = next->sensors,
+                                     .sensor_count = next->sensor_count};
     NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL, NULL));
     npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
     return f->seen(f->user, next, f->vert_unit, &tracked);

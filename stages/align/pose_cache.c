@@ -59,19 +59,12 @@ static npg_status restore_known(npg_pose_cache *c, const npg_worker *worker)
     return NPG_OK;
 }
 
-/* Of a capture that the reference does not explain to its ends: poses were stretched to what is new. */
-static void drop_if_changed(const npg_worker *worker, between *b)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    if (!facts->growing_passes && npg_facts_has_changed(facts)) drop(b);
-}
-
 /* The poses of the pass before, or of the run that is resumed. */
 static npg_status open_known(npg_pose_cache *c, npg_worker *worker, const npg_tracker *tracker)
 {
     between *b = npg_worker_kept(worker);
     npg_job *job = npg_job_of(worker);
-    if (b) drop_if_changed(worker, b);
+    if (b && !npg_worker_facts(worker)->brief.takes_gathered) drop(b); /* stretched to what is new */
     if (b && b->store) {
         NPG_TRY(npg_pose_map_open(&c->map, b->tracker, tracker));
         c->known = b->store;

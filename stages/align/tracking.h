@@ -263,6 +263,10 @@ typedef struct npg_candidate_cloud {
     bool is_candidate;
     size_t point_count;
     float *points, *normals; /* N x 3 each, unit; normals may be NULL; the list's */
+    float *held;             /* H x 3, right behind the points: every fifth or so, which nobody may fit to */
+    size_t held_count;
+    float *sensors; /* S x 3, unit: where it was seen from; the list's */
+    size_t sensor_count;
 } npg_candidate_cloud;
 
 typedef struct npg_candidate_clouds {
@@ -272,7 +276,8 @@ typedef struct npg_candidate_clouds {
     size_t given, flipped;     /* normals of candidates: given, and on the wrong side */
 } npg_candidate_clouds;
 
-/* Copy a cleaned frame's points, evenly thinned.  Skipped frames are left out.  NPG_MEMORY. */
+/* Copy a cleaned frame's points, evenly thinned, and hold some of them out, by a hash of their place.  Skipped
+ * frames are left out.  NPG_MEMORY. */
 npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_frame *frame,
                                     const npg_frame_box *box, bool is_candidate);
 /* What stage keyframe saw in the choosing pass, for the stage that cuts welds;

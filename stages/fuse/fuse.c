@@ -22,6 +22,7 @@
 #include "pipeline/cost.h"
 #include "pipeline/options.h"
 #include "pipeline/order.h"
+#include "reference/loop.h"
 
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
 #define POINTS_A_CELL   1    /* that a cell should average, from all frames ...                        */
@@ -53,10 +54,6 @@
 /* While a reference that is one side of the body grows. */
 #define GROW_SIZE        0.1  /* of its diagonal: so far past its border points are taken to be of the body */
 #define GROW_WEIGHT      0.25 /* of such a point, one on the surface being 1                              */
-#define GROW_PASSES      40   /* at most                                                                  */
-#define EXPLAINED_FIRST  0.8  /* of a frame's points must have a place: a frame that sees much more is ... */
-#define EXPLAINED_LAST   0.5  /* ... wrongly followed, and adds limbs where they are not; in the end half */
-#define EXPLAINED_STEP   0.1  /* less, after a pass that reached no more frames                           */
 #define DENSE_SPACINGS   1.5  /* of the keyframe's points, or ...                                         */
 #define DENSE_CELLS      4    /* ... sides of a cell, within which a place must have ...                  */
 #define DENSE_NEIGHBOURS 16   /* ... so many others, itself counted: single ones are of other parts       */
@@ -272,7 +269,7 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
     size_t most = npg_cells_count(s->cells);
     double least = fmax(FRAMES_AT_LEAST, FRAMES_SHARE * (double)s->frames);
     /* What is new may be seen by the last frame that is reached alone. */
-    bool is_one_enough = s->frames < 2 * FRAMES_AT_LEAST || npg_worker_facts(worker)->is_growing;
+    bool is_one_enough = s->frames < 2 * FRAMES_AT_LEAST || npg_worker_facts(worker)->brief.is_growing;
     int64_t frames_least = is_one_enough ? 1 : (int64_t)least;
     NPG_TRY(npg_alloc_array(&fused->points, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
@@ -323,7 +320,7 @@ static npg_status publish(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "frames", json_integer(s->frames));
     json_object_set_new(report, "frames_misaligned", json_integer(s->misaligned));
-    json_object_set_new(report, "passes_grown", json_integer(npg_worker_facts(worker)->growing_passes));
+    json_object_set_new(report, "passes_grown", json_integer(npg_worker_facts(worker)->brief.growing_passes));
     json_object_set_new(report, "points", json_integer(s->points));
     json_object_set_new(report, "points_stray", json_integer(s->strays));
     json_object_set_new(report, "points_fused", json_integer((json_int_t)fused->count));
@@ -355,66 +352,35 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     return NPG_OK;
 }
 
-/* What growth knows from pass to pass. */
-typedef struct growth {
-    int64_t unreached_before; /* frames that the reference did not reach in the pass before ...  */
-    int64_t in_vain;          /* ... and passes in a row that have reached no more since         */
-} growth;
-
-static void release_growth(void *thing)
+static void release_loop(void *thing)
 {
-    growth *g = thing;
-    npg_release(&g);
+    npg_reference_loop *loop = thing;
+    npg_release(&loop);
 }
 
-static npg_status growth_of(npg_worker *worker, growth **g)
-{
-    *g = npg_worker_kept(worker);
-    if (*g) return NPG_OK;
-    NPG_TRY(npg_alloc(g, NPG_FOR_MESH, sizeof **g));
-    npg_worker_keep(worker, *g, release_growth);
-    return NPG_OK;
-}
-
-/* A side of the body grows until all frames are reached, or two passes in a row that ask for the least have
- * reached no more.  What has grown is gathered once more: the last frames that were reached had nothing around
- * them yet.  *counts: whether the pass is one of those that the options ask for. */
-static npg_status decide_growth(npg_worker *worker, bool *counts)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    growth *g;
-    NPG_TRY(growth_of(worker, &g));
-    bool has_gained = !facts->growing_passes || facts->unreached_count < g->unreached_before;
-    bool is_whole_now = g->unreached_before && !facts->unreached_count;
-    bool asks_less = !has_gained && facts->explained_least > EXPLAINED_LAST + EXPLAINED_STEP / 2;
-    if (asks_less)
-        *npg_own(worker, explained_least) = fmax(facts->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
-    g->in_vain = has_gained || asks_less ? 0 : g->in_vain + 1;
-    *npg_own(worker, is_growing) =
-        facts->unreached_count && g->in_vain < 2 && facts->growing_passes < GROW_PASSES;
-    *npg_own(worker, growing_passes) += facts->unreached_count > 0;
-    g->unreached_before = facts->unreached_count;
-    if (facts->unreached_count)
-        npg_worker_log(worker, NPG_LOG_INFO, -1,
-                       "%lld frames see too much that the reference does not have yet%s",
-                       (long long)facts->unreached_count,
-                       facts->is_growing ? ": it grows, and they are followed again" : "");
-    *counts = !facts->is_growing && !is_whole_now;
-    return NPG_OK;
-}
-
-static npg_status flush(npg_worker *worker)
+static npg_status begin(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
-        *npg_own(worker, fuse_left) = s->usable > 1 ? s->rounds : 0;
-        *npg_own(worker, sensor_count_max) = s->sensors;
-        *npg_own(worker, explained_least) = EXPLAINED_FIRST;
-        return NPG_OK;
-    }
-    bool counts;
-    NPG_TRY(decide_growth(worker, &counts));
-    *npg_own(worker, fuse_left) -= counts;
+    npg_reference_loop *loop;
+    NPG_TRY(npg_alloc(&loop, NPG_FOR_MESH, sizeof *loop));
+    npg_worker_keep(worker, loop, release_loop);
+    *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0);
+    *npg_own(worker, sensor_count_max) = s->sensors;
+    return NPG_OK;
+}
+
+/* The pass's points are gathered as what comes next needs them. */
+static npg_status settle(npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
+    const npg_pass_result result = {facts->unreached_count, npg_facts_has_changed(facts)};
+    *npg_own(worker, brief) = npg_reference_next(npg_worker_kept(worker), &result);
+    if (result.unreached_count)
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "%lld frames see too much that the reference does not have yet%s",
+                       (long long)result.unreached_count,
+                       facts->brief.is_growing ? ": it grows, and they are followed again" : "");
     return publish(worker);
 }
 
@@ -457,6 +423,6 @@ const npg_stage npg_stage_fuse = {.name = "fuse",
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
                                   .takes_part = takes_part,
                                   .process = process,
-                                  .flush = flush,
+                                  .settle = settle,
                                   .uninit = uninit,
                                   .memory = memory};

@@ -5,10 +5,8 @@
  * a 512^3 grid over [-1, 1]^3 that hold a point, times exp(-0.001 (t - T/2)^2): the frame that shows most
  * surface, near the middle in time.
  *
- * Not in the paper: such cells count points more than surface, which before several sensors differs from
- * frame to frame.  There the cells are larger (extent.c) and the middle weighs less.  And the frame that is
- * found is only the first of several candidates (shortlist.c), of which the choosing pass takes the one whose
- * surface fits best (choose.c).
+ * Not in the paper: the frame that is found is only the first of several candidates, of which the choosing
+ * pass takes the one whose surface does best in the others (candidates.c).
  * A mesh of the user's own has a pose already: its keyframe is the frame that it is nearest to
  * (likeness.c). */
 #include <math.h>
@@ -25,7 +23,7 @@
 #define SHOWN_SCORES 5
 #define NO_NUMBER    (-1)
 
-enum { CHOICE_PAPER, CHOICE_APART };
+enum { CHOICE_PAPER, CHOICE_JUDGED };
 enum { WELDS_KEEP, WELDS_CUT };
 
 typedef struct candidate {
@@ -37,10 +35,9 @@ typedef struct candidate {
 typedef struct keyframe_state {
     int64_t number, window, overlap; /* options */
     int choice, welds;               /* options */
-    npg_shortlist shortlist;
-    double box_margin;            /* option */
-    npg_extent *extent;           /* from the first usable frame on; owned */
-    candidate best[SHOWN_SCORES]; /* best first */
+    double box_margin;               /* option */
+    npg_extent *extent;              /* from the first usable frame on; owned */
+    candidate best[SHOWN_SCORES];    /* best first */
     size_t best_count;
     npg_likeness *likeness; /* of the user's own mesh; owned */
     npg_choose_pass choosing;
@@ -178,7 +175,7 @@ static const char *own_mesh(const npg_worker *worker)
 static bool has_candidates(const npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
-    return state->choice == CHOICE_APART && state->number == NO_NUMBER && !*own_mesh(worker);
+    return state->choice == CHOICE_JUDGED && state->number == NO_NUMBER && !*own_mesh(worker);
 }
 
 /* The user's own mesh has the pose of a frame: the nearest one is the keyframe. */
@@ -202,39 +199,20 @@ static double score_of(size_t cell_count, double from_middle)
     return (double)cell_count * exp(-0.001 * from_middle * from_middle);
 }
 
-/* Areas differ by a few per cent only, so the middle weighs less among the frames that are remembered
- * (shortlist.c). */
-static double area_score_of(size_t cell_count, double from_middle, int64_t frame_count)
-{
-    double share = from_middle / (double)frame_count;
-    double beyond = fmax(0, fabs(from_middle) - NPG_SHORTLIST_REACH);
-    return (double)cell_count / (1 + share * share) * exp(-0.001 * beyond * beyond);
-}
-
-/* What the frame shows: to several sensors bodies hide parts of themselves, the more the narrower they
- * stand. */
 static npg_status measure_extent(npg_worker *worker, candidate *scored, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    double from_middle = (double)frame->index - (double)facts->planned_count / 2;
-    if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box, frame));
-    *scored = (candidate){.index = frame->index, .number = frame->number};
-    if (has_candidates(worker) && facts->sensor_count_max > 1) {
-        scored->cell_count = npg_extent_area(state->extent, frame);
-        scored->score = area_score_of(scored->cell_count, from_middle, facts->planned_count);
-    } else {
-        scored->cell_count = npg_extent_papers(state->extent, frame);
-        scored->score = score_of(scored->cell_count, from_middle);
-    }
+    if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box));
+    *scored = (candidate){
+        .index = frame->index, .number = frame->number, .cell_count = npg_extent_cells(state->extent, frame)};
+    scored->score = score_of(scored->cell_count, (double)frame->index - (double)facts->planned_count / 2);
     return NPG_OK;
 }
 
 static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    const int64_t frame_count = facts->planned_count;
     bool is_named = frame->number == state->number && state->number != NO_NUMBER;
     if (is_named && frame->is_skipped) state->is_chosen_skipped = true;
     if (frame->is_skipped) return NPG_OK;
@@ -246,8 +224,7 @@ static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
         state->chosen = scored;
         state->is_chosen = true;
     }
-    if (!has_candidates(worker) || !npg_shortlist_wants(frame->index, frame_count)) return NPG_OK;
-    return npg_shortlist_add(&state->shortlist, frame, scored.cell_count);
+    return NPG_OK;
 }
 
 static json_t *json_of(const candidate *c, bool is_by_mesh)
@@ -297,8 +274,7 @@ static void set_choice(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker), chooses = has_candidates(worker);
     if (facts->planned_count < 2 || (!chooses && !cuts_welds)) return;
-    npg_shortlist_choose(npg_own(worker, choice), &state->shortlist, facts->plan.key, facts->planned_count,
-                         !chooses);
+    npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, !chooses);
     npg_own(worker, choice)->cut_welds = cuts_welds;
 }
 
@@ -345,14 +321,14 @@ static npg_status close_choosing(npg_worker *worker)
     keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     json_t *report = npg_worker_report(worker), *by_score = json_object_get(report, "key");
-    npg_draft_result result;
-    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &result));
-    if (result.index < 0 || result.index == facts->plan.key) return NPG_OK;
+    npg_candidate chosen;
+    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &chosen));
+    if (chosen.index < 0 || chosen.index == facts->plan.key) return NPG_OK;
     json_object_set(report, "key_by_score", by_score);
-    npg_own(worker, plan)->key = result.index;
+    npg_own(worker, plan)->key = chosen.index;
     json_object_set_new(report, "key",
-                        json_pack("{sI sI sf}", "index", (json_int_t)result.index, "number",
-                                  (json_int_t)result.number, "cost", result.cost));
+                        json_pack("{sI sI sf}", "index", (json_int_t)chosen.index, "number",
+                                  (json_int_t)chosen.number, "judged", chosen.judgement.mean));
     report_windows(worker); /* they lie around the keyframe */
     return NPG_OK;
 }
@@ -478,10 +454,9 @@ static const npg_option options[] = {
     NPG_ROW_INT(    "keyframe",        AT(number),     "-1",    -1, 1e15, NULL,
         "Number of the frame that the reference is made around. As in the file names; -1: chosen, or, with "
         "--reference, the frame that it is nearest to"),
-    NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "apart", "paper|apart",
+    NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "judged", "paper|judged",
         "Take the frame with the paper's score (paper), "
-        "or the one of several that show most surface whose own fares best in the others, "
-        "so that limbs which touch in one frame are not joined for the whole capture (apart)"),
+        "or the one of several whose surface fares best in the others (judged)"),
     NPG_KEY(CHOICE, "welds",           AT(welds),      "cut",   "keep|cut",
         "Surface of the reference that other frames stretch far from all points: "
         "cut it and close the holes, or keep it"),

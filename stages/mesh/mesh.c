@@ -9,6 +9,7 @@
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
 #include "pipeline/stage.h"
+#include "reference/reference.h"
 
 /* Limits of the reconstruction's process: one that hangs, or that strange points have blown up, ends. */
 #define POISSON_TIME_S     600
@@ -138,20 +139,17 @@ static void report_false_bridges(making *m, const npg_bridge_cut *cut)
 /* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
 static npg_status cut_false_bridges(making *m)
 {
-    bool is_last = npg_worker_pass(m->worker) == NPG_PASS_SOLVE;
-    npg_candidate_clouds *clouds = is_last ? npg_worker_take_fact(m->worker, &npg_fact_candidate_clouds)
-                                           : npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
+    const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
     npg_bridge_settings settings = {
         .spacing_unit = m->set.spacing, .should_stop = npg_worker_should_stop, .user = m->worker};
     npg_bridge_cut done;
-    if (!clouds) return NPG_OK;
+    if (!clouds || !npg_worker_facts(m->worker)->choice.cut_welds) return NPG_OK;
     size_t at = npg_candidate_clouds_find(clouds, m->key->index);
     double since = npg_clock_s();
     npg_status status =
         at < clouds->count ? npg_bridge_cut_all(&m->mesh, &done, clouds, at, &settings) : NPG_OK;
     if (!status && at < clouds->count) report_false_bridges(m, &done);
     npg_mesh_note(m->worker, "welds_s", npg_clock_s() - since);
-    if (is_last) npg_candidate_clouds_close(&clouds); /* a few MB that no later frame needs */
     return status == NPG_DIVERGED ? NPG_OK : status;
 }
 
@@ -278,6 +276,45 @@ static npg_status colour_reference(making *m)
     return npg_colour_fill(mesh->vert_colours, mesh);
 }
 
+/* ---- keep it, or take it back ---- */
+
+/* Judge the new reference and the one before it by what held-out points of the sampled frames say. */
+static npg_status compare(bool *is_worse, making *m, const npg_candidate_clouds *clouds, npg_mesh *before)
+{
+    npg_judgement now, then;
+    npg_judge_settings settings = {.should_stop = npg_worker_should_stop, .user = m->worker};
+    size_t at = npg_candidate_clouds_find(clouds, m->key->index);
+    *is_worse = false;
+    if (at == clouds->count) return NPG_OK;
+    NPG_TRY(npg_cloud_spacing(&settings.spacing_unit, clouds->list[at].points, clouds->list[at].point_count));
+    NPG_TRY(npg_judge(&then, clouds, at, before, &settings));
+    NPG_TRY(npg_judge(&now, clouds, at, m->mesh, &settings));
+    npg_mesh_note(m->worker, "judged", now.mean);
+    npg_mesh_note(m->worker, "judged_before", then.mean);
+    *is_worse = npg_judged_better(&then, &now);
+    return NPG_OK;
+}
+
+/* What all frames saw mostly makes the better reference; where points that took no part say otherwise, the
+ * one before stays.  A side of the body that grows is no rival: it lacks what the next one has. */
+static npg_status take_back_if_worse(making *m)
+{
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
+    npg_mesh *before = facts->reference;
+    bool is_worse = false;
+    if (!m->fused || !before || !clouds || facts->brief.growing_passes) return NPG_OK;
+    npg_status status = compare(&is_worse, m, clouds, before);
+    if (status != NPG_DIVERGED) NPG_TRY(status);
+    json_object_set_new(npg_worker_report(m->worker), "taken_back", json_boolean(is_worse));
+    if (!is_worse) return NPG_OK;
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
+                   "the surface of all frames' points does worse than the keyframe's own, which stays");
+    npg_mesh_unref(&m->mesh);
+    m->mesh = npg_mesh_ref(before);
+    return NPG_OK;
+}
+
 /* ---- one reference ---- */
 
 /* The points and normals of fused (or NULL) are taken from it. */
@@ -290,6 +327,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     if (!status) status = is_given ? read_reference(&m) : make(&m);
     if (!status && !is_given) status = cut_false_bridges(&m);
     if (!status) status = measure_reference(&m);
+    if (!status) status = take_back_if_worse(&m);
     if (!status) status = judge_invented(&m);
     if (!status) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);
@@ -304,24 +342,17 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
 
 /* ---- the stage ---- */
 
-/* What all frames saw is one body only where the reference so far explains the capture to its ends: parts
- * that come, go or open belong to no common surface, and hiding them in one would silence the alarm.  A side
- * of the body that is growing explains what it has reached, and no more is gathered. */
-static void drop_if_changed(npg_worker *worker, npg_fused **fused)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    if (!*fused || facts->growing_passes || !npg_facts_has_changed(facts)) return;
-    npg_worker_log(worker, NPG_LOG_INFO, -1,
-                   "the keyframe's surface does not explain all frames: the reference is made from it alone");
-    npg_fused_close(fused);
-}
-
 /* The first one from the keyframe's points, those of later passes from all frames'. */
 static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
 {
     mesh_state *s = npg_worker_state(worker);
     npg_fused *fused = npg_worker_take_fact(worker, &npg_fact_fused);
-    drop_if_changed(worker, &fused);
+    if (fused && !npg_worker_facts(worker)->brief.takes_gathered) {
+        npg_worker_log(
+            worker, NPG_LOG_INFO, -1,
+            "the keyframe's surface does not explain all frames: the reference is made from it alone");
+        npg_fused_close(&fused);
+    }
     if (key->is_skipped || !key->point_count)
         return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)key->number);
     npg_status status = make_reference(worker, key, fused);
@@ -376,7 +407,8 @@ static double mesh_expects(const npg_worker *worker, npg_pass pass)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     double points = (double)facts->point_count_max;
-    bool from_all = pass == NPG_PASS_SOLVE && (facts->fuse_left || npg_worker_fact(worker, &npg_fact_fused));
+    bool from_all =
+        pass == NPG_PASS_SOLVE && (facts->brief.rounds_left || npg_worker_fact(worker, &npg_fact_fused));
     if (pass == NPG_PASS_CHOOSE || facts->own_verts) return 0;
     return npg_cost_surface_s(from_all ? fmin(points * (double)facts->frame_count, NPG_COST_FUSED_POINTS)
                                        : fmin(points, NPG_START_POINTS_MOST));

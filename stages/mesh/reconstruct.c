@@ -77,7 +77,7 @@ static npg_status draw_surface(reconstruction *r)
 {
     npg_point_set *p = r->set;
     npg_poisson_settings settings = r->settings->poisson;
-    if (npg_worker_facts(r->worker)->is_growing && settings.depth > GROWING_DEPTH)
+    if (npg_worker_facts(r->worker)->brief.is_growing && settings.depth > GROWING_DEPTH)
         settings.depth = GROWING_DEPTH;
     if (p->is_fused) settings.rounds_max = 1; /* the surface that carried them has told their sides */
     if (!p->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
@@ -119,9 +119,9 @@ static npg_status judge_unseen(reconstruction *r, bool *trim_unseen)
     const npg_facts *facts = npg_worker_facts(r->worker);
     const npg_point_set *p = r->set;
     int way = r->settings->unseen;
-    double share, side = facts->growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
+    double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
-    *trim_unseen = way == NPG_UNSEEN_TRIM || facts->is_growing || (way == NPG_UNSEEN_AUTO && share > side);
+    *trim_unseen = way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way == NPG_UNSEEN_AUTO && share > side);
     npg_mesh_note(r->worker, "unseen_share", share);
     json_object_set_new(npg_worker_report(r->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));
@@ -141,7 +141,7 @@ static npg_status drop_shreds(reconstruction *r)
 {
     const npg_facts *facts = npg_worker_facts(r->worker);
     double share;
-    if (!facts->growing_passes || facts->is_growing) return NPG_OK;
+    if (!facts->brief.growing_passes || facts->brief.is_growing) return NPG_OK;
     NPG_TRY(npg_mesh_trim_shreds(&r->mesh, &share, r->set->seen_dist));
     npg_mesh_note(r->worker, "fringe_share", share);
     return NPG_OK;

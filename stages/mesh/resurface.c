@@ -70,7 +70,8 @@ npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *no
         NPG_TRY(draft(mesh, &now, normals, points, point_count, settings));
         *turned += now;
     }
-    if (is_draft && (double)now <= settled) return NPG_OK; /* the last draft is as good */
+    /* the last draft is as good, or good enough for who asked for so many */
+    if (is_draft && ((double)now <= settled || settings->rounds_max)) return NPG_OK;
     npg_mesh_unref(mesh);
     ++*rounds;
     return npg_poisson(mesh, points, normals, point_count, settings);

@@ -1,0 +1,217 @@
+/* Candidates: which frames the choosing pass reads, and whose surface carries the capture best. */
+#include "keyframe/keyframe_internal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "geometry/mesh_tools.h"
+#include "mesh/surface.h"
+#include "pipeline/clock.h"
+#include "pipeline/parallel.h"
+#include "reference/reference.h"
+
+#define SAMPLE_LEAST 24 /* frames: with fewer none is left out */
+#define STRIDE_MOST  3  /* frames: the tracker must find from one to the next */
+
+#define DRAFT_DEPTH     7
+#define DRAFT_ROUNDS    1
+#define DRAFT_FACES     4000
+#define PIECE_SHARE     0.01 /* of the area, and units from the main piece: what belongs to the body */
+#define PIECE_DIST_UNIT 0.1
+
+/* ---- which frames ---- */
+
+void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, bool key_alone)
+{
+    int64_t stride = (frame_count + SAMPLE_LEAST - 1) / SAMPLE_LEAST;
+    if (stride > STRIDE_MOST) stride = STRIDE_MOST;
+    int64_t side = NPG_CHOICE_FRAMES / 2 * stride, first = key % stride;
+    if (key - side > first) first = key - side;
+    *choice = (npg_choice){0};
+    for (int64_t i = first; i < frame_count && choice->count < NPG_CHOICE_FRAMES; i += stride) {
+        choice->is_candidate[choice->count] = i == key;
+        choice->frames[choice->count++] = i;
+    }
+    choice->candidate_count = 1;
+    for (size_t i = 1; i < NPG_CHOICE_MAX && !key_alone; i++) {
+        size_t at = (i * (choice->count - 1) + NPG_CHOICE_MAX / 2) / NPG_CHOICE_MAX;
+        choice->candidate_count += !choice->is_candidate[at];
+        choice->is_candidate[at] = true;
+    }
+}
+
+/* ---- the draft of a candidate ---- */
+
+static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, float *normals,
+                             double spacing, const npg_poisson_settings *settings)
+{
+    size_t moved, turned;
+    npg_pieces pieces;
+    int rounds;
+    npg_mending mending;
+    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, &rounds, normals, cloud->points, cloud->point_count,
+                                  spacing, settings));
+    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
+    NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
+    NPG_TRY(npg_mesh_mend(mesh, &mending));
+    return npg_mesh_make_normals(*mesh);
+}
+
+static npg_status make_draft(npg_mesh **mesh, const npg_candidate_cloud *cloud, double spacing,
+                             const npg_poisson_settings *settings)
+{
+    npg_poisson_settings quick = *settings;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    quick.rounds_max = DRAFT_ROUNDS;
+    *mesh = NULL;
+    float *normals = npg_arena_copy(&scratch, cloud->normals, cloud->point_count, 3 * sizeof(float));
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = draft_from(mesh, cloud, normals, spacing, &quick);
+    npg_arena_release(&scratch);
+    if (status) npg_mesh_unref(mesh);
+    return status;
+}
+
+/* ---- the choice ---- */
+
+typedef struct choosing {
+    const npg_candidate_clouds *clouds;
+    const npg_poisson_settings *settings;
+    npg_judge_settings judging;
+    npg_candidate *list;
+    size_t count;
+} choosing;
+
+/* A frame of which no surface can be made is no keyframe; that is no failure of the run. */
+static bool is_fatal(npg_status status)
+{
+    return status && status != NPG_BAD_INPUT && status != NPG_FAILED && status != NPG_DIVERGED;
+}
+
+static npg_status try_one(const choosing *c, npg_candidate *one)
+{
+    npg_mesh *draft;
+    NPG_TRY(make_draft(&draft, &c->clouds->list[one->at], c->judging.spacing_unit, c->settings));
+    npg_status status = npg_judge(&one->judgement, c->clouds, one->at, draft, &c->judging);
+    one->is_followed = !status;
+    npg_mesh_unref(&draft);
+    return status;
+}
+
+static npg_status try_part(void *user, size_t part)
+{
+    const choosing *c = user;
+    npg_candidate *one = &c->list[part];
+    npg_status status = try_one(c, one);
+    return is_fatal(status) ? npg_error_prefix(status, "frame %lld as a keyframe", (long long)one->number)
+                            : NPG_OK;
+}
+
+static void list_candidates(choosing *c)
+{
+    for (size_t i = 0; i < c->clouds->count && c->count < NPG_CHOICE_MAX; i++) {
+        const npg_candidate_cloud *cloud = &c->clouds->list[i];
+        if (cloud->is_candidate && cloud->normals)
+            c->list[c->count++] = (npg_candidate){.at = i, .index = cloud->index, .number = cloud->number};
+    }
+}
+
+/* The least of those that are better than the one by score, beyond chance. */
+static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
+{
+    size_t best = scored;
+    for (size_t i = 0; i < count; i++) {
+        if (!list[i].is_followed || i == scored) continue;
+        bool is_better = scored == count || !list[scored].is_followed ||
+                         npg_judged_better(&list[i].judgement, &list[scored].judgement);
+        bool is_least =
+            best == count || !list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean;
+        if (is_better && is_least) best = i;
+    }
+    return best < count ? best : 0;
+}
+
+npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count, size_t *best,
+                              const npg_candidate_clouds *clouds, int64_t scored,
+                              const npg_poisson_settings *settings)
+{
+    choosing c = {.clouds = clouds,
+                  .settings = settings,
+                  .judging = {.should_stop = settings->should_stop, .user = settings->user},
+                  .list = list};
+    const npg_candidate_cloud *middle = &clouds->list[clouds->count / 2];
+    NPG_TRY(npg_cloud_spacing(&c.judging.spacing_unit, middle->points, middle->point_count));
+    list_candidates(&c);
+    npg_status status = npg_parallel(try_part, &c, c.count);
+    size_t at = 0;
+    while (at < c.count && list[at].index != scored) at++;
+    *count = c.count;
+    *best = best_of(list, c.count, at);
+    return status;
+}
+
+/* ---- the pass ---- */
+
+static bool is_candidate(const npg_choice *choice, int64_t index)
+{
+    for (size_t i = 0; i < choice->count; i++)
+        if (choice->frames[i] == index) return choice->is_candidate[i];
+    return false;
+}
+
+npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk)
+{
+    if (!pass->clouds) NPG_TRY(npg_candidate_clouds_open(&pass->clouds));
+    for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
+        const npg_frame *frame = npg_chunk_frame(chunk, i);
+        NPG_TRY(npg_candidate_clouds_add(pass->clouds, frame, &facts->box,
+                                         is_candidate(&facts->choice, frame->index)));
+    }
+    return NPG_OK;
+}
+
+static void report_candidates(npg_worker *worker, const npg_candidate *list, size_t count, double seconds)
+{
+    json_t *of = json_array();
+    for (size_t i = 0; i < count; i++)
+        json_array_append_new(of, json_pack("{sI sb sf sI}", "number", (json_int_t)list[i].number, "followed",
+                                            list[i].is_followed, "judged", list[i].judgement.mean, "frames",
+                                            (json_int_t)list[i].judgement.count));
+    json_object_set_new(npg_worker_report(worker), "candidates", of);
+    json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
+}
+
+static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_candidate_clouds *clouds)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_poisson_settings settings = npg_poisson_settings_of(npg_worker_options(worker));
+    npg_candidate list[NPG_CHOICE_MAX];
+    size_t count, best;
+    double since = npg_clock_s();
+    settings.should_stop = npg_worker_should_stop;
+    settings.user = worker;
+    NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
+    if (!count) return NPG_OK;
+    *chosen = list[best];
+    report_candidates(worker, list, count, npg_clock_s() - since);
+    npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
+                   count, chosen->judgement.mean);
+    return NPG_OK;
+}
+
+npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_candidate *chosen)
+{
+    const npg_choice *choice = &npg_worker_facts(worker)->choice;
+    npg_candidate_clouds *clouds = pass->clouds;
+    *chosen = (npg_candidate){.index = -1};
+    if (!clouds || !clouds->count) return NPG_OK;
+    if (choice->candidate_count > 1) NPG_TRY(compare(worker, chosen, clouds));
+    pass->clouds = NULL; /* the run's, from here on */
+    return npg_worker_publish(worker, &npg_fact_candidate_clouds, clouds);
+}
+
+void npg_choose_pass_clear(npg_choose_pass *pass)
+{
+    npg_candidate_clouds_close(&pass->clouds);
+}

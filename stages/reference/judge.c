@@ -1,0 +1,145 @@
+/* Judge: a surface followed through the sampled frames, and what held-out points say of it. */
+#include "reference/reference.h"
+
+#include <math.h>
+
+#include "geometry/kdtree.h"
+#include "geometry/mesh_tools.h"
+#include "geometry/query.h"
+
+#define TAU         1.0 /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
+#define SEEN_OFFSET 0.004 /* surface nearer than this hides nothing from a sensor */
+
+/* Coarse: what a finer one forgives shows. */
+static const npg_tracker_settings judge_tracking = {
+    .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
+
+typedef struct judging {
+    const npg_judge_settings *settings;
+    const npg_candidate_clouds *clouds;
+    const npg_mesh *mesh;
+    npg_judgement *judgement;
+    npg_arena arena;
+    double tau_sq;
+    npg_surface *surface;
+    float *normals;   /* V x 3: of the posed surface                    */
+    double *areas;    /* V: a third of those of the faces around        */
+    float *dist_sq;   /* V: to the nearest point                        */
+    uint32_t *near;   /* V */
+    uint8_t *is_seen; /* V */
+    npg_visible visible;
+} judging;
+
+static double rho(const judging *j, double dist_sq)
+{
+    return fmin(dist_sq, j->tau_sq) / j->tau_sq;
+}
+
+/* ---- both directions ---- */
+
+static npg_status points_off(double *mean, const judging *j, const npg_candidate_cloud *cloud)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    npg_surface_hit *hits = npg_arena_take(&scratch, cloud->held_count, sizeof *hits);
+    npg_status status = npg_arena_status(&scratch);
+    double sum = 0;
+    if (!status)
+        status = npg_surface_closest_near(j->surface, hits, cloud->held, cloud->held_count, NULL, NULL, 1);
+    for (size_t i = 0; i < cloud->held_count && !status; i++) sum += rho(j, (double)hits[i].dist_sq);
+    *mean = cloud->held_count ? sum / (double)cloud->held_count : 0;
+    npg_arena_release(&scratch);
+    return status;
+}
+
+static void spread_areas(const judging *j, const float *vert_unit)
+{
+    for (size_t v = 0; v < j->mesh->vert_count; v++) j->areas[v] = 0;
+    for (size_t f = 0; f < j->mesh->face_count; f++) {
+        const uint32_t *face = j->mesh->faces + 3 * f;
+        double third = npg_face_area(vert_unit, face) / 3;
+        for (int k = 0; k < 3; k++) j->areas[face[k]] += third;
+    }
+}
+
+/* The points that were held out and those that were not: a cloud's lie one after the other. */
+static npg_status surface_off(double *mean, judging *j, const npg_candidate_cloud *cloud,
+                              const float *vert_unit)
+{
+    size_t v = j->mesh->vert_count;
+    double sum = 0, area = 0;
+    spread_areas(j, vert_unit);
+    npg_mesh_vertex_normals(j->normals, vert_unit, v, j->mesh->faces, j->mesh->face_count);
+    NPG_TRY(npg_visible_find(&j->visible, j->is_seen, j->surface, cloud->sensors, cloud->sensor_count,
+                             vert_unit, NULL, j->normals, v, SEEN_OFFSET));
+    NPG_TRY(npg_points_nearest(j->near, j->dist_sq, cloud->points, cloud->point_count + cloud->held_count,
+                               vert_unit, v, 1));
+    for (size_t i = 0; i < v; i++) {
+        if (!j->is_seen[i]) continue;
+        sum += j->areas[i] * rho(j, (double)j->dist_sq[i]);
+        area += j->areas[i];
+    }
+    *mean = area > 0 ? sum / area : 1;
+    return NPG_OK;
+}
+
+static npg_status judge_frame(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
+                              const npg_tracked *tracked)
+{
+    judging *j = user;
+    npg_judgement *out = j->judgement;
+    double points, surface;
+    (void)tracked;
+    if (j->settings->should_stop && j->settings->should_stop(j->settings->user))
+        return npg_error(NPG_STOPPED, "stopped while a reference was judged");
+    NPG_TRY(npg_surface_move(j->surface, vert_unit));
+    NPG_TRY(points_off(&points, j, cloud));
+    NPG_TRY(surface_off(&surface, j, cloud, vert_unit));
+    out->of_frame[cloud - j->clouds->list] = points + surface;
+    out->mean += (points + surface - out->mean) / (double)++out->count;
+    return NPG_OK;
+}
+
+/* ---- the whole ---- */
+
+static npg_status open_judging(judging *j)
+{
+    size_t v = j->mesh->vert_count;
+    j->tau_sq = TAU * TAU * j->settings->spacing_unit * j->settings->spacing_unit;
+    j->arena.purpose = NPG_FOR_FIT;
+    j->normals = npg_arena_take(&j->arena, v, 3 * sizeof *j->normals);
+    j->areas = npg_arena_take(&j->arena, v, sizeof *j->areas);
+    j->dist_sq = npg_arena_take(&j->arena, v, sizeof *j->dist_sq);
+    j->near = npg_arena_take(&j->arena, v, sizeof *j->near);
+    j->is_seen = npg_arena_take(&j->arena, v, 1);
+    npg_visible_open(&j->visible, &j->arena, v);
+    NPG_TRY(npg_arena_status(&j->arena));
+    return npg_surface_open(&j->surface, j->mesh->vert_pos, v, j->mesh->faces, j->mesh->face_count);
+}
+
+npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at, npg_mesh *mesh,
+                     const npg_judge_settings *settings)
+{
+    judging j = {.settings = settings, .clouds = clouds, .mesh = mesh, .judgement = judgement};
+    *judgement = (npg_judgement){0};
+    for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) judgement->of_frame[i] = (double)NAN;
+    npg_status status = open_judging(&j);
+    if (!status) status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, judge_frame, &j);
+    npg_surface_close(&j.surface);
+    npg_arena_release(&j.arena);
+    return status;
+}
+
+double npg_judged_against(const npg_judgement *one, const npg_judgement *other)
+{
+    double mean = 0, squares = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) {
+        double more = one->of_frame[i] - other->of_frame[i], before = mean;
+        if (isnan(more)) continue;
+        mean += (more - mean) / (double)++count; /* Welford */
+        squares += (more - before) * (more - mean);
+    }
+    if (count < 3) return 0;
+    double error = sqrt(squares / (double)(count - 1) / (double)count);
+    return error > 0 ? mean / error : 0;
+}

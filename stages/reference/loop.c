@@ -1,0 +1,42 @@
+/* Loop: rounds and growth. */
+#include "reference/loop.h"
+
+#include <math.h>
+
+#define GROW_PASSES 40 /* at most */
+#define EXPLAINED_FIRST                                                                                      \
+    0.8                    /* of a frame's points must have a place: a frame that sees much more is ...     */
+#define EXPLAINED_LAST 0.5 /* ... wrongly followed, and adds limbs where they are not; in the end half ...  */
+#define EXPLAINED_STEP 0.1 /* ... in such steps, after passes that reached no more frames                   */
+
+npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
+{
+    *loop = (npg_reference_loop){
+        .brief = {.rounds_left = rounds, .takes_gathered = true, .explained_least = EXPLAINED_FIRST}};
+    return loop->brief;
+}
+
+/* How a reference that does not reach all frames goes on. */
+static void grow(npg_reference_loop *loop, int64_t unreached)
+{
+    npg_brief *brief = &loop->brief;
+    bool has_gained = !brief->growing_passes || unreached < loop->unreached_before;
+    bool asks_less = !has_gained && brief->explained_least > EXPLAINED_LAST + EXPLAINED_STEP / 2;
+    if (asks_less) brief->explained_least = fmax(brief->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
+    loop->in_vain = has_gained || asks_less ? 0 : loop->in_vain + 1;
+    brief->is_growing = unreached && loop->in_vain < 2 && brief->growing_passes < GROW_PASSES;
+    brief->growing_passes += unreached > 0;
+}
+
+npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result)
+{
+    npg_brief *brief = &loop->brief;
+    bool is_whole_now = loop->unreached_before && !result->unreached_count;
+    grow(loop, result->unreached_count);
+    loop->unreached_before = result->unreached_count;
+    brief->rounds_left -= !brief->is_growing && !is_whole_now;
+    /* Parts that come, go or open belong to no common surface, and hiding them in one would silence the
+     * alarm.  A side of the body that grows explains what it has reached, and no more is gathered. */
+    brief->takes_gathered = brief->growing_passes || !result->has_changed;
+    return *brief;
+}

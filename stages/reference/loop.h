@@ -1,0 +1,34 @@
+/* Loop: what is decided between two passes over all frames, of which each follows the reference so far and
+ * gathers the points for the next one.
+ *
+ * One owner decides it all: how many passes there are, whether a reference that is one side of the body grows,
+ * what is asked of frames that it is to reach, and whether what was gathered makes the next reference.  The
+ * stages read its brief and report what a pass came to.  No thread, no file, no run: it is a function of what
+ * it is told. */
+#ifndef NPG_REFERENCE_LOOP_H
+#define NPG_REFERENCE_LOOP_H
+
+#include "pipeline/stage.h"
+
+/* What a pass came to. */
+typedef struct npg_pass_result {
+    int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
+    bool has_changed;        /* it does not explain the capture to both its ends */
+} npg_pass_result;
+
+/* {0} before npg_reference_begin().  Nothing to close. */
+typedef struct npg_reference_loop {
+    npg_brief brief;          /* the last one given */
+    int64_t unreached_before; /* of the pass before ...                             */
+    int64_t in_vain;          /* ... and passes in a row that reached no more since */
+} npg_reference_loop;
+
+/* The brief of the first pass, of `rounds` that are to gather points. */
+npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
+
+/* The brief of the next one.  A side of the body grows until all frames are reached, or two passes in a row
+ * that ask for the least have reached no more.  What has grown is gathered once more: the last frames that
+ * were reached had nothing around them yet. */
+npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
+
+#endif

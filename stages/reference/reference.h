@@ -1,0 +1,47 @@
+/* Reference: which surface the capture is followed with, decided by what can be measured. */
+#ifndef NPG_REFERENCE_H
+#define NPG_REFERENCE_H
+
+#include "align/tracking.h"
+
+/* Judge: what a surface is worth as the reference, by points that had no part in it.
+ *
+ * The surface is followed through the sampled frames (npg_candidate_follow) by the coarse tracker.  In each
+ * frame t of them
+ *
+ *     D_t = mean_h rho(|h - S_t|) + mean_s rho(|s - P_t|)        rho(d) = min(d^2, tau^2) / tau^2
+ *
+ * h: points of the frame that the tracker was not given, |h - S_t| their distance from the surface as it is
+ * posed there; s: places of the posed surface, in proportion to its area, that a sensor could see (all where
+ * it is not known where sensors stood); P_t: all points of the frame; tau: three spacings of the sampled
+ * points.  0 is perfect, 2 is nowhere.  Surface that joins what parts, or that is not there in other frames,
+ * lies off the points; points of what the surface lacks lie off the surface. */
+
+typedef struct npg_judgement {
+    size_t count;                       /* frames judged */
+    double mean;                        /* of D_t, over these */
+    double of_frame[NPG_CHOICE_FRAMES]; /* D_t by place in the sample, NAN: it was not judged */
+} npg_judgement;
+
+typedef struct npg_judge_settings {
+    double spacing_unit;             /* of the sampled points; the same for all that are compared */
+    bool (*should_stop)(void *user); /* or NULL */
+    void *user;
+} npg_judge_settings;
+
+/* mesh (unit coordinates, with normals) is of the frame at list[at], which is not judged.
+ * NPG_MEMORY, NPG_STOPPED, NPG_DIVERGED. */
+npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at, npg_mesh *mesh,
+                     const npg_judge_settings *settings);
+
+/* The mean of D_t(one) - D_t(other) over the frames in which both were judged, in standard errors of that
+ * mean: negative, `one` is better.  0 where fewer than three are in common. */
+double npg_judged_against(const npg_judgement *one, const npg_judgement *other);
+
+/* Beyond chance: two standard errors. */
+static inline bool npg_judged_better(const npg_judgement *one, const npg_judgement *other)
+{
+    return npg_judged_against(one, other) < -2;
+}
+
+#endif

@@ -1,0 +1,101 @@
+/* Loop: rounds and growth, decided without a run. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "reference/loop.h"
+
+static npg_brief next(npg_reference_loop *loop, int64_t unreached, bool has_changed)
+{
+    const npg_pass_result result = {unreached, has_changed};
+    return npg_reference_next(loop, &result);
+}
+
+static void every_round_is_walked_once(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    for (int64_t rounds = 0; rounds < 4; rounds++) {
+        int64_t walked = 0;
+        npg_brief brief = npg_reference_begin(&loop, rounds);
+        for (; brief.rounds_left; walked++) {
+            assert_false(brief.is_growing || brief.growing_passes);
+            brief = next(&loop, 0, false);
+            assert_true(brief.takes_gathered);
+        }
+        assert_int_equal(walked, rounds);
+    }
+}
+
+static void what_a_reference_does_not_explain_is_not_gathered(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 2);
+    assert_false(next(&loop, 0, true).takes_gathered);
+    assert_true(next(&loop, 0, false).takes_gathered); /* what the next pass says counts */
+}
+
+static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_brief brief = npg_reference_begin(&loop, 1);
+    int64_t passes = 0;
+    for (int64_t unreached = 60; unreached > 0; unreached -= 20, passes++) {
+        brief = next(&loop, unreached, true);
+        assert_true(brief.is_growing && brief.takes_gathered);
+        assert_int_equal(brief.rounds_left, 1);
+        assert_int_equal(brief.growing_passes, passes + 1);
+    }
+    brief = next(&loop, 0, true); /* whole now, and its newest part has nothing around it */
+    assert_false(brief.is_growing);
+    assert_int_equal(brief.rounds_left, 1);
+    brief = next(&loop, 0, true);
+    assert_int_equal(brief.rounds_left, 0);
+    assert_int_equal(brief.growing_passes, passes);
+    assert_true(brief.takes_gathered);
+}
+
+static void growth_in_vain_asks_for_less_and_then_ends(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_brief brief = npg_reference_begin(&loop, 1);
+    double first = brief.explained_least, least = first;
+    int passes = 0;
+    for (; brief.rounds_left; passes++) {
+        brief = next(&loop, 30, false);
+        assert_true(brief.explained_least <= least);
+        least = brief.explained_least;
+        assert_true(passes < 20);
+    }
+    assert_true(least < first && least > 0);
+    assert_true(passes > 3); /* it does not give up at once */
+}
+
+static void growth_never_goes_on_for_ever(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_brief brief = npg_reference_begin(&loop, 1);
+    int64_t passes = 0;
+    for (int64_t unreached = 1000; brief.rounds_left; unreached--, passes++)
+        brief = next(&loop, unreached, false); /* one frame more each time */
+    assert_in_range(passes, 10, 100);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_round_is_walked_once),
+        cmocka_unit_test(what_a_reference_does_not_explain_is_not_gathered),
+        cmocka_unit_test(a_side_grows_until_all_is_reached_and_is_gathered_once_more),
+        cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
+        cmocka_unit_test(growth_never_goes_on_for_ever),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
