@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "geometry/mesh_tools.h"
+#include "geometry/geometry.h"
 #include "mesh/surface.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "geometry/vec3.h"
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 
 #define GRID       512 /* cells per axis */

@@ -3,9 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/kdtree.h"
-#include "geometry/mesh_tools.h"
-#include "geometry/query.h"
+#include "geometry/geometry.h"
 
 #define TAU         1.0 /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
 #define SEEN_OFFSET 0.004 /* surface nearer than this hides nothing from a sensor */
