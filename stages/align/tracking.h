@@ -280,8 +280,8 @@ typedef struct npg_candidate_clouds {
  * frames are left out.  NPG_MEMORY. */
 npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_frame *frame,
                                     const npg_frame_box *box, bool is_candidate);
-/* What stage keyframe saw in the choosing pass, for the stage that cuts welds;
- * not there where nothing is cut. */
+/* What stage keyframe saw in the choosing pass: the sample that references are judged by.  Not there where
+ * none was read. */
 extern const npg_fact_kind npg_fact_candidate_clouds;
 
 npg_status npg_candidate_clouds_open(npg_candidate_clouds **clouds);

@@ -8,7 +8,6 @@
 #include "geometry/geometry.h"
 
 #define NEIGHBOURS    48   /* in which a facing point is looked for */
-#define CONTACT_MOST  5000 /* points that contact is measured at                   */
 #define CONTACT_AMONG 24   /* of their neighbours, each                            */
 #define ACROSS        0.5f /* cosine of a normal and the way across the gap */
 #define SMOOTH_OVER   12   /* neighbours                            */
@@ -26,7 +25,8 @@ static const manner manners[] = {[NPG_GAPS_TIGHT] = {1.2, true, 2}, [NPG_GAPS_LO
 
 /* ---- contact ---- */
 
-bool npg_points_face(const float *p, const float *n, const float *q, const float *m)
+/* Whether two points with outward normals n and m face each other across a gap. */
+static bool points_face(const float *p, const float *n, const float *q, const float *m)
 {
     float d[3], along_n = 0, along_m = 0, cosine = 0, length = 0;
     for (int a = 0; a < 3; a++) {
@@ -40,39 +40,6 @@ bool npg_points_face(const float *p, const float *n, const float *q, const float
     return cosine < -NPG_SAME_SIDE && along_n > ACROSS * length && along_m < -ACROSS * length;
 }
 
-/* How many points face one of their neighbours. */
-static size_t count_facing(const float *p, const float *n, const uint32_t *near, size_t count)
-{
-    size_t facing = 0;
-    for (size_t i = 0; i < count; i++) {
-        size_t k = 0;
-        while (k < CONTACT_AMONG) {
-            size_t j = near[CONTACT_AMONG * i + k];
-            if (j < count && npg_points_face(p + 3 * i, n + 3 * i, p + 3 * j, n + 3 * j)) break;
-            k++;
-        }
-        facing += k < CONTACT_AMONG;
-    }
-    return facing;
-}
-
-npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count)
-{
-    npg_arena scratch = {.purpose = NPG_FOR_QUERY};
-    npg_neighbours near;
-    size_t count = point_count < CONTACT_MOST ? point_count : CONTACT_MOST;
-    *share = 0;
-    NPG_REQUIRE(count);
-    float *p = npg_arena_take(&scratch, count, 3 * sizeof *p);
-    float *n = npg_arena_take(&scratch, count, 3 * sizeof *n);
-    npg_status status = npg_arena_status(&scratch);
-    if (!status) npg_points_spread(p, n, count, points, normals, point_count);
-    if (!status) status = npg_neighbours_take(&near, &scratch, p, count, p, count, CONTACT_AMONG);
-    if (!status) *share = (double)count_facing(p, n, near.index, count) / (double)count;
-    npg_arena_release(&scratch);
-    return status;
-}
-
 /* ---- gaps ---- */
 
 static float push_of(size_t i, const uint32_t *near, const float *dist_sq, const float *points,
@@ -83,7 +50,7 @@ static float push_of(size_t i, const uint32_t *near, const float *dist_sq, const
         if (gap >= wide) break;
         if (near[k] == i) continue;
         size_t j = near[k];
-        if (npg_points_face(points + 3 * i, normals + 3 * i, points + 3 * j, normals + 3 * j))
+        if (points_face(points + 3 * i, normals + 3 * i, points + 3 * j, normals + 3 * j))
             return (float)((wide - gap) / 2);
     }
     return 0;

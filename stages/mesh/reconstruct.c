@@ -121,7 +121,8 @@ static npg_status judge_unseen(reconstruction *r, bool *trim_unseen)
     int way = r->settings->unseen;
     double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
-    *trim_unseen = way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way == NPG_UNSEEN_AUTO && share > side);
+    *trim_unseen =
+        way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way == NPG_UNSEEN_AUTO && share > side);
     npg_mesh_note(r->worker, "unseen_share", share);
     json_object_set_new(npg_worker_report(r->worker), "unseen",
                         json_string(*trim_unseen ? "trimmed" : "kept"));

@@ -106,16 +106,6 @@ npg_status npg_cloud_noise(double *sigma, const float *points, const float *norm
  * Quantities Using Polynomial Fitting of Osculating Jets, 2005. */
 npg_status npg_cloud_smooth(float *points, float *normals, size_t point_count, int neighbours);
 
-/* Contact: how much of a cloud lies close to another part of the body, told from the points alone. */
-
-/* Whether two points with outward normals n and m face each other across a gap. */
-bool npg_points_face(const float *p, const float *n, const float *q, const float *m);
-
-/* Share of points that have, among their 24 nearest, one that faces them across a gap: normals against each
- * other, the gap outside of both.  points and normals (outward): N x 3; of many points only 5000, evenly
- * chosen, are looked at.  NPG_MEMORY. */
-npg_status npg_cloud_contact(double *share, const float *points, const float *normals, size_t point_count);
-
 /* Mesh clean: from a raw reconstruction to a reference mesh one can deform: trimmed, in one piece, decimated,
  * manifold, without flipped, degenerate or duplicate faces.
  *
