@@ -44,7 +44,7 @@ typedef enum npg_pass {
 
 /* The frames that the choosing pass reads, in time order. */
 #define NPG_CHOICE_FRAMES 48
-#define NPG_CHOICE_MAX    6 /* candidates among them */
+#define NPG_CHOICE_MAX    5 /* candidates among them */
 typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];

@@ -15,7 +15,7 @@
 
 #define DRAFT_DEPTH     7
 #define DRAFT_ROUNDS    1
-#define DRAFT_FACES     4000
+#define DRAFT_FACES     3000
 #define PIECE_SHARE     0.01 /* of the area, and units from the main piece: what belongs to the body */
 #define PIECE_DIST_UNIT 0.1
 
@@ -175,9 +175,11 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
 {
     json_t *of = json_array();
     for (size_t i = 0; i < count; i++)
-        json_array_append_new(of, json_pack("{sI sb sf sI}", "number", (json_int_t)list[i].number, "followed",
-                                            list[i].is_followed, "judged", list[i].judgement.mean, "frames",
-                                            (json_int_t)list[i].judgement.count));
+        json_array_append_new(
+            of,
+            json_pack("{sI sb so sI}", "number", (json_int_t)list[i].number, "followed", list[i].is_followed,
+                      "judged", npg_json_real(list[i].is_followed ? list[i].judgement.mean : (double)NAN),
+                      "frames", (json_int_t)list[i].judgement.count));
     json_object_set_new(npg_worker_report(worker), "candidates", of);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }

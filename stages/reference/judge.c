@@ -10,7 +10,7 @@
 
 /* Coarse: what a finer one forgives shows. */
 static const npg_tracker_settings judge_tracking = {
-    .nodes = 200, .samples = 1200, .steps = 10, .stiffness = 0.01, .along = 0.1};
+    .nodes = 150, .samples = 800, .steps = 8, .stiffness = 0.01, .along = 0.1};
 
 typedef struct judging {
     const npg_judge_settings *settings;
@@ -49,6 +49,45 @@ static npg_status points_off(double *mean, const judging *j, const npg_candidate
     return status;
 }
 
+/* Towards the sensor from far enough before a held-out point that its own surface is behind. */
+static void aim_at(npg_ray *ray, const judging *j, const float sensor[3], const float point[3])
+{
+    double length = 0;
+    for (int a = 0; a < 3; a++) {
+        ray->origin[a] = point[a];
+        ray->direction[a] = sensor[a] - point[a];
+        length += (double)ray->direction[a] * (double)ray->direction[a];
+    }
+    ray->t_min = (float)fmin(1, sqrt(j->tau_sq / length));
+    ray->t_max = 1;
+}
+
+/* Some sensor saw each point: no surface stands between it and all of them. */
+static npg_status points_behind(double *share, const judging *j, const npg_candidate_cloud *cloud)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    size_t n = cloud->held_count, behind = 0;
+    bool is_asked = false;
+    *share = 0;
+    if (!cloud->sensor_count || !n) return NPG_OK;
+    npg_ray *rays = npg_arena_take(&scratch, n, sizeof *rays);
+    npg_ray_hit *hits = npg_arena_take(&scratch, n, sizeof *hits);
+    uint8_t *is_free = npg_arena_take(&scratch, n, 1);
+    npg_status status = npg_arena_status(&scratch);
+    for (size_t s = 0; s < cloud->sensor_count && !status; s++) {
+        const float *sensor = cloud->sensors + 3 * s;
+        if (!isfinite(sensor[0] + sensor[1] + sensor[2])) continue;
+        is_asked = true;
+        for (size_t i = 0; i < n; i++) aim_at(&rays[i], j, sensor, cloud->held + 3 * i);
+        status = npg_surface_rays(j->surface, hits, rays, n, 1);
+        for (size_t i = 0; i < n && !status; i++) is_free[i] |= hits[i].face == UINT32_MAX;
+    }
+    for (size_t i = 0; i < n && !status; i++) behind += !is_free[i];
+    if (is_asked) *share = (double)behind / (double)n;
+    npg_arena_release(&scratch);
+    return status;
+}
+
 static void spread_areas(const judging *j, const float *vert_unit)
 {
     for (size_t v = 0; v < j->mesh->vert_count; v++) j->areas[v] = 0;
@@ -57,6 +96,24 @@ static void spread_areas(const judging *j, const float *vert_unit)
         double third = npg_face_area(vert_unit, face) / 3;
         for (int k = 0; k < 3; k++) j->areas[face[k]] += third;
     }
+}
+
+/* Of the points that a sensor would have of a place, for its area: what it sees aslant it has few of. */
+static double expected(const judging *j, const npg_candidate_cloud *cloud, const float *vert_unit, size_t v)
+{
+    double most = 0;
+    if (!j->is_seen[v]) return 0;
+    if (!cloud->sensor_count) return 1;
+    for (size_t s = 0; s < cloud->sensor_count; s++) {
+        double along = 0, length = 0;
+        for (size_t a = 0; a < 3; a++) {
+            double way = (double)cloud->sensors[3 * s + a] - (double)vert_unit[3 * v + a];
+            along += way * (double)j->normals[3 * v + a];
+            length += way * way;
+        }
+        if (isfinite(length)) most = fmax(most, along / sqrt(length));
+    }
+    return most;
 }
 
 /* The points that were held out and those that were not: a cloud's lie one after the other. */
@@ -72,9 +129,9 @@ static npg_status surface_off(double *mean, judging *j, const npg_candidate_clou
     NPG_TRY(npg_points_nearest(j->near, j->dist_sq, cloud->points, cloud->point_count + cloud->held_count,
                                vert_unit, v, 1));
     for (size_t i = 0; i < v; i++) {
-        if (!j->is_seen[i]) continue;
-        sum += j->areas[i] * rho(j, (double)j->dist_sq[i]);
-        area += j->areas[i];
+        double weight = j->areas[i] * expected(j, cloud, vert_unit, i);
+        sum += weight * rho(j, (double)j->dist_sq[i]);
+        area += weight;
     }
     *mean = area > 0 ? sum / area : 1;
     return NPG_OK;
@@ -85,15 +142,17 @@ static npg_status judge_frame(void *user, const npg_candidate_cloud *cloud, cons
 {
     judging *j = user;
     npg_judgement *out = j->judgement;
-    double points, surface;
+    double points, surface, behind;
     (void)tracked;
     if (j->settings->should_stop && j->settings->should_stop(j->settings->user))
         return npg_error(NPG_STOPPED, "stopped while a reference was judged");
     NPG_TRY(npg_surface_move(j->surface, vert_unit));
     NPG_TRY(points_off(&points, j, cloud));
     NPG_TRY(surface_off(&surface, j, cloud, vert_unit));
-    out->of_frame[cloud - j->clouds->list] = points + surface;
-    out->mean += (points + surface - out->mean) / (double)++out->count;
+    NPG_TRY(points_behind(&behind, j, cloud));
+    double figure = points + surface + behind;
+    out->of_frame[cloud - j->clouds->list] = figure;
+    out->mean += (figure - out->mean) / (double)++out->count;
     return NPG_OK;
 }
 

@@ -9,13 +9,14 @@
  * The surface is followed through the sampled frames (npg_candidate_follow) by the coarse tracker.  In each
  * frame t of them
  *
- *     D_t = mean_h rho(|h - S_t|) + mean_s rho(|s - P_t|)        rho(d) = min(d^2, tau^2) / tau^2
+ *     D_t = mean_h rho(|h - S_t|) + mean_s rho(|s - P_t|) + mean_h b_h     rho(d) = min(d^2, tau^2) / tau^2
  *
  * h: points of the frame that the tracker was not given, |h - S_t| their distance from the surface as it is
- * posed there; s: places of the posed surface, in proportion to its area, that a sensor could see (all where
- * it is not known where sensors stood); P_t: all points of the frame; tau: three spacings of the sampled
- * points.  0 is perfect, 2 is nowhere.  Surface that joins what parts, or that is not there in other frames,
- * lies off the points; points of what the surface lacks lie off the surface. */
+ * posed there; s: places of the posed surface, in proportion to the area as the sensors see it (all of it
+ * where it is not known where they stood); P_t: all points of the frame; tau: three times as far as points lie
+ * apart; b_h: 1 where the posed surface stands between the point and every sensor (0 where none is known).
+ * 0 is perfect.  Surface that joins what parts, or that is not there in other frames, lies off the points, or
+ * in space that was seen to be empty; points of what the surface lacks lie off the surface. */
 
 typedef struct npg_judgement {
     size_t count;                       /* frames judged */
