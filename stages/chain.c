@@ -39,6 +39,7 @@ static const npg_preset_value grids[] = {
     {"width-2",   "64"},    /* 128 takes three times as long for hardly more      */
     {"grid-rate", "0.03"},
     {"mlp-rate",  "0.004"},
+    {"epochs",    "100"},
     {NULL, NULL}};
 static const npg_preset_value best[] = {
     {"reference-rounds", "2"}, /* a finer graph gains nothing: tests/bed/decisions.md */
