@@ -4,7 +4,7 @@
  * what the field knew after the one it borders on.  Its new frames are brought near their pose first, one by one
  * outward from those that are solved, with few vertices, and some of the known frames held in place, so that the
  * field forgets none of them.  Then all frames are fitted, those that are solved tied to where they are: such
- * frames need no gate, and a third of the epochs. */
+ * frames need no gate.  With more than one window rates fall. */
 #include <string.h>
 
 #include "geometry/geometry.h"
@@ -211,16 +211,18 @@ static npg_status take_best(paper *p)
 static npg_status solve(paper *p)
 {
     bool is_warm = p->problem->window->direction != 0;
-    int64_t epochs = p->settings.epochs;
-    p->steps = epochs = is_warm ? (epochs + 2) / 3 : epochs;
+    p->steps = p->settings.epochs;
     if (is_warm && !p->at.next) {
         if (p->problem->window->from == 0 && p->first.bytes) NPG_TRY(npg_fit_copy_give(&p->first, p->fit));
         NPG_TRY(open_new(p));
     }
-    if (is_warm) npg_fit_set_pace(p->fit, NPG_CONFIDENCE_CONSTANT, RATE_END);
+    if (!p->is_alone)
+        npg_fit_set_pace(p->fit,
+                         is_warm ? NPG_CONFIDENCE_CONSTANT : (npg_confidence)p->settings.paper.confidence,
+                         RATE_END);
     NPG_TRY(begin(p));
     p->is_opened = true;
-    NPG_TRY(npg_fit_run(p->fit, p->at.next, epochs, watch_epoch, p));
+    NPG_TRY(npg_fit_run(p->fit, p->at.next, p->settings.epochs, watch_epoch, p));
     return p->at.next ? NPG_OK : take_positions(p);
 }
 
