@@ -30,27 +30,10 @@ typedef struct grid {
     const npg_rig_sensor *sensor;
     npg_image depth, mask, colour;
     size_t width, height;
-    float *z;      /* H x W: depth, 0 where the pixel can't be used; owned */
-    uint8_t *keep; /* H x W: INNER or EDGE where the pixel is used; owned  */
+    npg_arena arena; /* of what follows */
+    float *z;        /* H x W: depth, 0 where the pixel can't be used */
+    uint8_t *keep;   /* H x W: INNER or EDGE where the pixel is used  */
 } grid;
-
-static void clear_grid(grid *g)
-{
-    npg_image_clear(&g->depth);
-    npg_image_clear(&g->mask);
-    npg_image_clear(&g->colour);
-    npg_release(&g->z);
-    npg_release(&g->keep);
-}
-
-void npg_depth_points_clear(npg_depth_points *points)
-{
-    npg_release(&points->pos);
-    npg_release(&points->normals);
-    npg_release(&points->colours);
-    npg_release(&points->pixels);
-    *points = (npg_depth_points){0};
-}
 
 /* ---- images ---- */
 
@@ -132,12 +115,12 @@ static npg_status mark_inner(grid *g)
     }
     find_inner(g, g->keep);
     if (g->rig->settings.margin == 1) return NPG_OK;
-    NPG_TRY(npg_alloc(&other, NPG_FOR_FRAMES, pixels));
+    other = npg_arena_take(&g->arena, pixels, 1);
+    NPG_TRY(npg_arena_status(&g->arena));
     for (int64_t ring = 1; ring < g->rig->settings.margin; ring++) {
         memcpy(other, g->keep, pixels);
         erode(g->keep, other, g->width, g->height);
     }
-    npg_release(&other);
     return NPG_OK;
 }
 
@@ -265,11 +248,12 @@ static npg_status reserve(npg_depth_points *points, const grid *g)
 {
     size_t kept = 0;
     for (size_t i = 0; i < g->width * g->height; i++) kept += g->keep[i] != 0;
-    NPG_TRY(npg_alloc_array(&points->pos, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&points->normals, NPG_FOR_FRAMES, kept, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&points->pixels, NPG_FOR_FRAMES, kept, sizeof *points->pixels));
     points->has_colours = g->colour.bytes != NULL;
-    return points->has_colours ? npg_alloc_array(&points->colours, NPG_FOR_FRAMES, kept, 4) : NPG_OK;
+    points->pos = npg_arena_take(&points->arena, kept, 3 * sizeof(float));
+    points->normals = npg_arena_take(&points->arena, kept, 3 * sizeof(float));
+    points->pixels = npg_arena_take(&points->arena, kept, sizeof *points->pixels);
+    if (points->has_colours) points->colours = npg_arena_take(&points->arena, kept, 4);
+    return npg_arena_status(&points->arena);
 }
 
 static void add_points(npg_depth_points *points, const grid *g)
@@ -307,8 +291,9 @@ static npg_status make_points(npg_depth_points *points, grid *g, const npg_rig_s
 {
     NPG_TRY(read_images(g, shot));
     size_t pixels = g->width * g->height;
-    NPG_TRY(npg_alloc_array(&g->z, NPG_FOR_FRAMES, pixels, sizeof *g->z));
-    NPG_TRY(npg_alloc(&g->keep, NPG_FOR_FRAMES, pixels));
+    g->z = npg_arena_take(&g->arena, pixels, sizeof *g->z);
+    g->keep = npg_arena_take(&g->arena, pixels, 1);
+    NPG_TRY(npg_arena_status(&g->arena));
     fill_depths(g);
     NPG_TRY(mark_inner(g));
     add_edges(g);
@@ -319,11 +304,13 @@ static npg_status make_points(npg_depth_points *points, grid *g, const npg_rig_s
 
 npg_status npg_depth_points_read(npg_depth_points *points, npg_rig *rig, size_t s, const npg_rig_shot *shot)
 {
-    grid g = {.rig = rig, .sensor = &rig->sensors[s]};
-    *points = (npg_depth_points){0};
+    grid g = {.arena.purpose = NPG_FOR_FRAMES, .rig = rig, .sensor = &rig->sensors[s]};
+    *points = (npg_depth_points){.arena.purpose = NPG_FOR_FRAMES};
     npg_status status = make_rays(&rig->sensors[s]);
     if (!status) status = make_points(points, &g, shot);
-    clear_grid(&g);
-    if (status) npg_depth_points_clear(points);
+    npg_image_clear(&g.depth);
+    npg_image_clear(&g.mask);
+    npg_image_clear(&g.colour);
+    npg_arena_release(&g.arena);
     return status;
 }

@@ -19,51 +19,40 @@
 
 /* What one frame adds. */
 typedef struct frame_sums {
-    double *square, *gradient; /* n x n, n; owned */
+    double *square, *gradient; /* n x n, n */
     npg_rig_bins bins;         /* of |off|        */
 } frame_sums;
 
 typedef struct solving {
+    npg_arena arena; /* of all its arrays */
     const npg_rig_sights *sights;
     npg_correction *corrections;
-    int *slot;                        /* per sensor: place of its six unknowns, -1: held; owned */
-    double (*poses)[12];              /* frame_count x sensor_count: corrected; owned           */
-    frame_sums *frames;               /* owned                                                  */
-    double *matrix, *gradient, *rows; /* n x n, n, 2 x n; owned                                 */
+    int *slot;                        /* per sensor: place of its six unknowns, -1: held */
+    double (*poses)[12];              /* frame_count x sensor_count: corrected;         */
+    frame_sums *frames;               /*                                                */
+    double *matrix, *gradient, *rows; /* n x n, n, 2 x n;                               */
     size_t unknowns, parts;
     double reach, sigma;
 } solving;
 
-static void close_solving(solving *s)
-{
-    for (size_t f = 0; s->frames && f < s->sights->frame_count; f++) {
-        npg_release(&s->frames[f].square);
-        npg_release(&s->frames[f].gradient);
-    }
-    npg_release(&s->frames);
-    npg_release(&s->slot);
-    npg_release(&s->poses);
-    npg_release(&s->matrix);
-    npg_release(&s->gradient);
-    npg_release(&s->rows);
-}
-
 static npg_status open_solving(solving *s, const bool *is_free)
 {
     size_t frames = s->sights->frame_count, sensors = s->sights->sensor_count;
-    NPG_TRY(npg_alloc_array(&s->slot, NPG_FOR_FILES, sensors, sizeof *s->slot));
+    npg_arena *arena = &s->arena;
+    s->slot = npg_arena_take(arena, sensors, sizeof *s->slot);
+    NPG_TRY(npg_arena_status(arena));
     for (size_t k = 0; k < sensors; k++) s->slot[k] = is_free[k] ? (int)(6 * s->unknowns++) : -1;
     size_t n = s->unknowns *= 6;
-    NPG_TRY(npg_alloc_array(&s->poses, NPG_FOR_FILES, frames * sensors, sizeof *s->poses));
-    NPG_TRY(npg_alloc_array(&s->frames, NPG_FOR_FILES, frames, sizeof *s->frames));
-    NPG_TRY(npg_alloc_array(&s->matrix, NPG_FOR_FILES, n * n + 1, sizeof *s->matrix));
-    NPG_TRY(npg_alloc_array(&s->rows, NPG_FOR_FILES, n + 1, 2 * sizeof *s->rows));
-    NPG_TRY(npg_alloc_array(&s->gradient, NPG_FOR_FILES, n + 1, sizeof *s->gradient));
-    for (size_t f = 0; f < frames; f++) {
-        NPG_TRY(npg_alloc_array(&s->frames[f].square, NPG_FOR_FILES, n * n + 1, sizeof(double)));
-        NPG_TRY(npg_alloc_array(&s->frames[f].gradient, NPG_FOR_FILES, n + 1, sizeof(double)));
+    s->poses = npg_arena_take(arena, frames * sensors, sizeof *s->poses);
+    s->frames = npg_arena_take(arena, frames, sizeof *s->frames);
+    s->matrix = npg_arena_take(arena, n * n + 1, sizeof *s->matrix);
+    s->rows = npg_arena_take(arena, n + 1, 2 * sizeof *s->rows);
+    s->gradient = npg_arena_take(arena, n + 1, sizeof *s->gradient);
+    for (size_t f = 0; f < frames && s->frames; f++) {
+        s->frames[f].square = npg_arena_take(arena, n * n + 1, sizeof(double));
+        s->frames[f].gradient = npg_arena_take(arena, n + 1, sizeof(double));
     }
-    return NPG_OK;
+    return npg_arena_status(arena);
 }
 
 /* ---- the sums of a frame ---- */
@@ -314,9 +303,9 @@ static npg_status iterate(solving *s)
 
 npg_status npg_rig_solve(npg_correction *corrections, const npg_rig_sights *sights, const bool *is_free)
 {
-    solving s = {.sights = sights, .corrections = corrections};
+    solving s = {.arena.purpose = NPG_FOR_FILES, .sights = sights, .corrections = corrections};
     npg_status status = open_solving(&s, is_free);
     if (!status && s.unknowns && sights->depth > 0) status = iterate(&s);
-    close_solving(&s);
+    npg_arena_release(&s.arena);
     return status;
 }

@@ -94,16 +94,16 @@ npg_status npg_opencv_matrix(const char *text, const char *path, const char *nam
 
 /* What one depth image gave, in the sensor's own axes. */
 typedef struct npg_depth_points {
-    size_t count, capacity;
-    float *pos, *normals; /* N x 3 each, owned                      */
-    uint8_t *colours;     /* N x 4, sRGB, alpha 0: not seen; owned  */
-    uint32_t *pixels;     /* N, y x width + x, growing; owned       */
+    npg_arena arena; /* of what follows; to be released, also after a failure */
+    size_t count;
+    float *pos, *normals; /* N x 3 each                             */
+    uint8_t *colours;     /* N x 4, sRGB, alpha 0: not seen         */
+    uint32_t *pixels;     /* N, y x width + x, growing              */
     bool has_colours;
 } npg_depth_points;
 
 npg_status npg_depth_points_read(npg_depth_points *points, npg_rig *rig, size_t sensor,
                                  const npg_rig_shot *shot);
-void npg_depth_points_clear(npg_depth_points *points);
 
 /* Image: depth, mask and colour images of a rig, decoded whole; libpng and libjpeg-turbo do the work.
  *
@@ -140,12 +140,13 @@ void npg_image_clear(npg_image *image);
 
 /* Points of one sensor in one frame, in its own axes. */
 typedef struct npg_rig_sight {
+    npg_arena arena;      /* of its arrays: sights are read side by side      */
     bool is_there;        /* there is an image that could be read             */
     size_t point_count;   /* in the image                                     */
     size_t count;         /* that are kept                                    */
-    float *pos, *normals; /* N x 3 each, owned                                */
-    uint16_t *columns;    /* N: column in the thinned grid; owned             */
-    uint32_t *rows;       /* (row_count + 1): first point of each row; owned  */
+    float *pos, *normals; /* N x 3 each                                       */
+    uint16_t *columns;    /* N: column in the thinned grid                    */
+    uint32_t *rows;       /* (row_count + 1): first point of each row         */
     size_t row_count;
     size_t step;     /* pixels of the image per cell of the thinned grid      */
     double pose[12]; /* sensor to world, as npg_rig_pose() has it             */

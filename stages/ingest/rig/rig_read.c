@@ -64,7 +64,7 @@ npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *o
     if (!status) status = reserve(frame, &r);
     for (size_t s = 0; s < rig->sensor_count && !status; s++)
         if (r.of[s].count) add_sensor(frame, &r, s, origin);
-    for (size_t s = 0; s < rig->sensor_count; s++) npg_depth_points_clear(&r.of[s]);
+    for (size_t s = 0; s < rig->sensor_count; s++) npg_arena_release(&r.of[s].arena);
     frame->has_sure_normals = true;
     if (status) npg_frame_clear(frame);
     return status;

@@ -46,10 +46,11 @@ static size_t step_for(size_t count)
 static npg_status reserve(npg_rig_sight *sight, size_t count, size_t height)
 {
     sight->row_count = (height + sight->step - 1) / sight->step;
-    NPG_TRY(npg_alloc_array(&sight->pos, NPG_FOR_FILES, count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&sight->normals, NPG_FOR_FILES, count, 3 * sizeof(float)));
-    NPG_TRY(npg_alloc_array(&sight->columns, NPG_FOR_FILES, count, sizeof *sight->columns));
-    return npg_alloc_array(&sight->rows, NPG_FOR_FILES, sight->row_count + 1, sizeof *sight->rows);
+    sight->pos = npg_arena_take(&sight->arena, count, 3 * sizeof(float));
+    sight->normals = npg_arena_take(&sight->arena, count, 3 * sizeof(float));
+    sight->columns = npg_arena_take(&sight->arena, count, sizeof *sight->columns);
+    sight->rows = npg_arena_take(&sight->arena, sight->row_count + 1, sizeof *sight->rows);
+    return npg_arena_status(&sight->arena);
 }
 
 /* Points come row by row. */
@@ -86,14 +87,15 @@ static npg_status read_sight(void *user, size_t s)
     npg_depth_points points;
     if (!shot) return NPG_OK;
     npg_status status = npg_depth_points_read(&points, r->rig, s, shot);
-    if (status == NPG_BAD_INPUT) return NPG_OK; /* who reads the frame itself reports it */
-    NPG_TRY(status);
-    npg_rig_pose(r->rig, sight->pose, s, shot);
-    sight->is_there = true;
-    sight->point_count = points.count;
-    status = fill_sight(sight, &points, &r->rig->sensors[s].camera);
-    npg_depth_points_clear(&points);
-    return status;
+    sight->arena.purpose = NPG_FOR_FILES;
+    if (!status) {
+        npg_rig_pose(r->rig, sight->pose, s, shot);
+        sight->is_there = true;
+        sight->point_count = points.count;
+        status = fill_sight(sight, &points, &r->rig->sensors[s].camera);
+    }
+    npg_arena_release(&points.arena);
+    return status == NPG_BAD_INPUT ? NPG_OK : status; /* who reads the frame itself reports it */
 }
 
 static void measure(npg_rig_sights *s)
@@ -130,12 +132,7 @@ npg_status npg_rig_sights_open(npg_rig_sights *sights, npg_rig *rig, const size_
 
 void npg_rig_sights_close(npg_rig_sights *s)
 {
-    for (size_t v = 0; s->of && v < s->frame_count * s->sensor_count; v++) {
-        npg_release(&s->of[v].pos);
-        npg_release(&s->of[v].normals);
-        npg_release(&s->of[v].columns);
-        npg_release(&s->of[v].rows);
-    }
+    for (size_t v = 0; s->of && v < s->frame_count * s->sensor_count; v++) npg_arena_release(&s->of[v].arena);
     npg_release(&s->of);
 }
 
