@@ -190,7 +190,9 @@ static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
     evaluate_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     fault found = fault_of(state, &frame->figures, facts->unseen_share);
-    const npg_verdict_bars bars = {(1 - state->coverage_min / 100) / 2, state->measured.cover_dist / 100};
+    const npg_verdict_bars bars = {(1 - state->coverage_min / 100) / 2,
+                                   fmax(state->measured.cover_dist, state->residual_max) / 100,
+                                   state->residual_max / 100};
     frame->figures.fault = frame->is_skipped ? 0 : found.kind;
     frame->figures.good = !found.kind && !frame->is_skipped;
     if (frame->is_shared) return NPG_OK;

@@ -195,6 +195,7 @@ typedef struct npg_verdict npg_verdict;
 typedef struct npg_verdict_bars {
     double uncovered;   /* share of the surface, the least that counts; 1: nothing does */
     double vertex_dist; /* the same in diagonals                                        */
+    double jump;        /* the same                                                     */
 } npg_verdict_bars;
 
 npg_status npg_verdict_open(npg_verdict **verdict, const npg_verdict_bars *bars, int64_t key);

@@ -8,8 +8,8 @@
 #include "pipeline/order.h"
 
 /* Times the motion of the frames around: motions of dancers and animals, at an eighth of their frames too,
- * reach 3.5; frames that are mirrored, cut, or of another body 6 to 28. */
-#define JUMP 4.0
+ * reach 2, a film's chicken 2.6 and 4 to 9 where it leaps; mirrored frames and other bodies 4 to 28. */
+#define JUMP 3.0
 
 enum { AROUND = NPG_ALARM_FRAMES }; /* motions on either side that tell what is usual, odd frames in a row */
 
@@ -104,16 +104,18 @@ static double motion_between(const record *a, const record *b)
     return sum / NPG_MARKS / (double)(b->index - a->index);
 }
 
-/* Of what the frames around move from one to the next, `at` and the one before it left out: the upper median,
- * so that a body that begins to move does not jump. */
+/* Of what the frames around move from one to the next, `at` and the one before it left out: the second largest,
+ * so that one more jump doesn't count, and a body that begins to move or swings does not jump.  As many at the
+ * capture's ends. */
 static double motion_around(const npg_verdict *v, size_t at)
 {
     double motions[2 * AROUND];
-    size_t count = 0;
-    for (size_t i = at > AROUND ? at - AROUND : 1; i <= at + AROUND && i < v->count; i++)
+    size_t count = 0, most = v->count - 1, first = at > AROUND + 1 ? at - AROUND : 1;
+    if (first + 2 * AROUND > most) first = most > 2 * AROUND ? most - 2 * AROUND : 1;
+    for (size_t i = first; i <= first + 2 * AROUND && i <= most; i++)
         if (i != at) motions[count++] = motion_between(&v->records[i - 1], &v->records[i]);
     qsort(motions, count, sizeof *motions, npg_order_double);
-    return count > 1 ? motions[count / 2] : (double)INFINITY;
+    return count > 2 ? motions[count - 2] : (double)INFINITY;
 }
 
 /* Whether the body has jumped on its way to a frame.  Less than points lie from the surface is no motion. */
@@ -125,11 +127,12 @@ static bool has_jumped(const npg_verdict *v, size_t at, double least, double *mo
     return *motion > *bound;
 }
 
-/* How many frames from `at` on are odd: after them the body is where it was before.  0: it stays away. */
-static size_t count_odd(const npg_verdict *v, size_t at, double bound)
+/* How many frames from `at` on are odd: after them the body is where it would have come to at its usual motion.
+ * 0: it stays away. */
+static size_t count_odd(const npg_verdict *v, size_t at, double usual)
 {
     for (size_t odd = 1; odd <= AROUND && at + odd < v->count; odd++)
-        if (motion_between(&v->records[at - 1], &v->records[at + odd]) <= bound) return odd;
+        if (motion_between(&v->records[at - 1], &v->records[at + odd]) <= usual) return odd;
     return 0;
 }
 
@@ -140,7 +143,7 @@ static void judge_jumps(npg_verdict *v, double least)
     double motion, bound;
     for (size_t i = 1; i < v->count; i++) {
         if (!has_jumped(v, i, least, &motion, &bound)) continue;
-        size_t odd = count_odd(v, i, bound);
+        size_t odd = count_odd(v, i, bound / JUMP);
         size_t first = !odd && v->records[i].index <= v->key ? i - 1 : i;
         for (size_t k = first; k < first + (odd ? odd : 1); k++)
             find_fault(&v->records[k], NPG_FAULT_JUMP, motion, bound);
@@ -175,6 +178,6 @@ npg_status npg_verdict_finish(npg_verdict *v, npg_late_faults *late)
     if (v->count <= NPG_ALARM_FRAMES) return NPG_OK; /* too few to say what is usual */
     qsort(v->records, v->count, sizeof *v->records, by_index);
     NPG_TRY(judge_levels(v, &dist));
-    judge_jumps(v, dist.usual);
+    judge_jumps(v, fmax(dist.usual, v->bars.jump));
     return list_faults(v, late);
 }

@@ -41,7 +41,7 @@ static void move(int from, int to, float by)
 /* The faults of the first `count` frames: their kinds, by index; 0 where there is none. */
 static void judge(int faults[FRAMES], int count)
 {
-    const npg_verdict_bars bars = {0.25, 0.01};
+    const npg_verdict_bars bars = {0.25, 0.01, 0.005};
     npg_verdict *verdict;
     npg_late_faults late;
     memset(faults, 0, FRAMES * sizeof *faults);
@@ -131,6 +131,16 @@ static void a_body_that_begins_to_move_or_stops_does_not_jump(void **state)
     expect(0, 0, 0);
 }
 
+static void a_body_that_swings_does_not_jump(void **state)
+{
+    (void)state;
+    for (int period = 8; period <= 24; period++) {
+        make_capture(NULL);
+        for (int t = 0; t < FRAMES; t++) move(t, t, 0.5f * (float)sin(6.2831853 * t / period));
+        expect(0, 0, 0);
+    }
+}
+
 static void frames_that_are_missing_take_their_time(void **state)
 {
     int faults[FRAMES];
@@ -174,6 +184,7 @@ int main(void)
         cmocka_unit_test_setup(a_jump_there_and_back, make_capture),
         cmocka_unit_test_setup(a_jump_for_good_is_the_fault_of_the_frame_behind_it, make_capture),
         cmocka_unit_test_setup(a_body_that_begins_to_move_or_stops_does_not_jump, make_capture),
+        cmocka_unit_test_setup(a_body_that_swings_does_not_jump, make_capture),
         cmocka_unit_test_setup(frames_that_are_missing_take_their_time, make_capture),
         cmocka_unit_test_setup(less_than_the_points_tell_is_no_motion, make_capture),
         cmocka_unit_test_setup(three_frames_say_nothing, make_capture),
