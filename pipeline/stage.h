@@ -49,6 +49,7 @@ typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them        */
+    bool cut_welds;                       /* cut from the reference what the other frames contradict */
 } npg_choice;
 
 /* How the next pass over all frames is walked: what the reference's owner decides between passes

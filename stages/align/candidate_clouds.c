@@ -20,27 +20,30 @@ static bool is_held_out(const float point[3])
     return XXH3_64bits(point, 3 * sizeof *point) % HELD_OUT == 0;
 }
 
-static void swap_rows(float *rows, size_t a, size_t b)
+static void copy_row(float *to, size_t *count, const float *from, size_t i)
 {
-    for (size_t c = 0; c < 3; c++) {
-        float kept = rows[3 * a + c];
-        rows[3 * a + c] = rows[3 * b + c];
-        rows[3 * b + c] = kept;
-    }
+    memcpy(to + 3 * (*count)++, from + 3 * i, 3 * sizeof *to);
 }
 
-static void hold_out(npg_candidate_cloud *cloud)
+static npg_status hold_out(npg_candidate_cloud *cloud, npg_arena *arena)
 {
-    size_t used = 0;
+    size_t normals = 0;
+    for (size_t i = 0; i < cloud->point_count; i++) cloud->held_count += is_held_out(cloud->points + 3 * i);
+    size_t held = cloud->held_count, fit = cloud->point_count - held;
+    cloud->fit = npg_arena_take(arena, fit, 3 * sizeof(float));
+    cloud->held = npg_arena_take(arena, held, 3 * sizeof(float));
+    if (cloud->normals) cloud->fit_normals = npg_arena_take(arena, fit, 3 * sizeof(float));
+    NPG_TRY(npg_arena_status(arena));
+    cloud->held_count = 0;
     for (size_t i = 0; i < cloud->point_count; i++) {
-        if (is_held_out(cloud->points + 3 * i)) continue;
-        swap_rows(cloud->points, i, used);
-        if (cloud->normals) swap_rows(cloud->normals, i, used);
-        used++;
+        if (is_held_out(cloud->points + 3 * i)) {
+            copy_row(cloud->held, &cloud->held_count, cloud->points, i);
+            continue;
+        }
+        copy_row(cloud->fit, &cloud->fit_count, cloud->points, i);
+        if (cloud->normals) copy_row(cloud->fit_normals, &normals, cloud->normals, i);
     }
-    cloud->held = cloud->points + 3 * used;
-    cloud->held_count = cloud->point_count - used;
-    cloud->point_count = used;
+    return NPG_OK;
 }
 
 static npg_status copy_points(npg_candidate_cloud *cloud, npg_arena *arena, const npg_frame *frame,
@@ -58,8 +61,7 @@ static npg_status copy_points(npg_candidate_cloud *cloud, npg_arena *arena, cons
     cloud->sensor_count = frame->sensor_count;
     if (frame->sensor_count)
         npg_box_local_to_unit(box, cloud->sensors, frame->sensor_local, frame->sensor_count);
-    hold_out(cloud);
-    return NPG_OK;
+    return hold_out(cloud, arena);
 }
 
 npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_frame *frame,
@@ -117,7 +119,7 @@ typedef struct follower {
     size_t node_count;
     double *pose, *before, *next; /* K x 12 each */
     float *vert_unit;             /* V x 3       */
-    bool with_normals;
+    bool with_normals, is_judged;
     npg_candidate_seen seen;
     void *user;
 } follower;
@@ -143,21 +145,25 @@ static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
     f->before = f->pose;
     f->pose = f->next;
     f->next = oldest;
-    const npg_tracker_cloud cloud = {.points = next->points,
-                                     .normals = f->with_normals ? next->normals : NULL,
-                                     .count = next->point_count,
-                                     .sensors = next->sensors,
-                                     .sensor_count = next->sensor_count};
-    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL, NULL));
+    const npg_tracker_cloud all = {.points = next->points,
+                                   .normals = f->with_normals ? next->normals : NULL,
+                                   .count = next->point_count};
+    const npg_tracker_cloud some = {.points = next->fit,
+                                    .normals = f->with_normals ? next->fit_normals : NULL,
+                                    .count = next->fit_count,
+                                    .sensors = next->sensors,
+                                    .sensor_count = next->sensor_count};
+    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, f->is_judged ? &some : &all, NULL, NULL));
     npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
     return f->seen(f->user, next, f->vert_unit, &tracked);
 }
 
 npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
-                                const npg_tracker_settings *settings, npg_candidate_seen seen, void *user)
+                                const npg_tracker_settings *settings, bool is_judged, npg_candidate_seen seen,
+                                void *user)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
-    follower f = {.clouds = clouds, .seen = seen, .user = user};
+    follower f = {.clouds = clouds, .is_judged = is_judged, .seen = seen, .user = user};
     f.with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
     npg_status status = open_follower(&f, &scratch, mesh, settings);
     for (int step = -1; step <= 1 && !status; step += 2) {

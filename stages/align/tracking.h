@@ -263,7 +263,10 @@ typedef struct npg_candidate_cloud {
     bool is_candidate;
     size_t point_count;
     float *points, *normals; /* N x 3 each, unit; normals may be NULL; the list's */
-    float *held;             /* H x 3, right behind the points: every fifth or so, which nobody may fit to */
+    float *fit,
+        *fit_normals; /* F x 3 each: those of them that a surface which is to be judged may be fitted to */
+    size_t fit_count;
+    float *held; /* H x 3: the others, every fifth or so */
     size_t held_count;
     float *sensors; /* S x 3, unit: where it was seen from; the list's */
     size_t sensor_count;
@@ -276,8 +279,8 @@ typedef struct npg_candidate_clouds {
     size_t given, flipped;     /* normals of candidates: given, and on the wrong side */
 } npg_candidate_clouds;
 
-/* Copy a cleaned frame's points, evenly thinned, and hold some of them out, by a hash of their place.  Skipped
- * frames are left out.  NPG_MEMORY. */
+/* Copy a cleaned frame's points, evenly thinned, and again what is to be held out of them, by a hash of their
+ * place, and what is not.  Skipped frames are left out.  NPG_MEMORY. */
 npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_frame *frame,
                                     const npg_frame_box *box, bool is_candidate);
 /* What stage keyframe saw in the choosing pass: the sample that references are judged by.  Not there where
@@ -295,8 +298,10 @@ typedef npg_status (*npg_candidate_seen)(void *user, const npg_candidate_cloud *
                                          const npg_tracked *tracked);
 
 /* Follow the surface (unit coordinates, with normals) of list[from] through all others; seen is called once
- * for each of them.  NPG_MEMORY, NPG_DIVERGED, or what seen returns. */
+ * for each of them.  is_judged: by what was not held out alone, as far as the sensors could see it; else by all
+ * points, wherever they were seen from.  NPG_MEMORY, NPG_DIVERGED, or what seen returns. */
 npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
-                                const npg_tracker_settings *settings, npg_candidate_seen seen, void *user);
+                                const npg_tracker_settings *settings, bool is_judged, npg_candidate_seen seen,
+                                void *user);
 
 #endif

@@ -49,7 +49,7 @@ static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
     npg_pieces pieces;
     int rounds;
     npg_mending mending;
-    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, &rounds, normals, cloud->points, cloud->point_count,
+    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, &rounds, normals, cloud->fit, cloud->fit_count,
                                   spacing, settings));
     NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
@@ -65,7 +65,7 @@ static npg_status make_draft(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
     if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
     quick.rounds_max = DRAFT_ROUNDS;
     *mesh = NULL;
-    float *normals = npg_arena_copy(&scratch, cloud->normals, cloud->point_count, 3 * sizeof(float));
+    float *normals = npg_arena_copy(&scratch, cloud->fit_normals, cloud->fit_count, 3 * sizeof(float));
     npg_status status = npg_arena_status(&scratch);
     if (!status) status = draft_from(mesh, cloud, normals, spacing, &quick);
     npg_arena_release(&scratch);

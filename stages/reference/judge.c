@@ -6,6 +6,7 @@
 #include "geometry/geometry.h"
 
 #define TAU         1.0 /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
+#define CLEARLY     0.85  /* times the other's figure: tests/bed/decisions.md, "The judge" */
 #define SEEN_OFFSET 0.004 /* surface nearer than this hides nothing from a sensor */
 
 /* Coarse: what a finer one forgives shows. */
@@ -126,8 +127,7 @@ static npg_status surface_off(double *mean, judging *j, const npg_candidate_clou
     npg_mesh_vertex_normals(j->normals, vert_unit, v, j->mesh->faces, j->mesh->face_count);
     NPG_TRY(npg_visible_find(&j->visible, j->is_seen, j->surface, cloud->sensors, cloud->sensor_count,
                              vert_unit, NULL, j->normals, v, SEEN_OFFSET));
-    NPG_TRY(npg_points_nearest(j->near, j->dist_sq, cloud->points, cloud->point_count + cloud->held_count,
-                               vert_unit, v, 1));
+    NPG_TRY(npg_points_nearest(j->near, j->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
     for (size_t i = 0; i < v; i++) {
         double weight = j->areas[i] * expected(j, cloud, vert_unit, i);
         sum += weight * rho(j, (double)j->dist_sq[i]);
@@ -180,7 +180,7 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
     *judgement = (npg_judgement){0};
     for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) judgement->of_frame[i] = (double)NAN;
     npg_status status = open_judging(&j);
-    if (!status) status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, judge_frame, &j);
+    if (!status) status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, true, judge_frame, &j);
     npg_surface_close(&j.surface);
     npg_arena_release(&j.arena);
     return status;
@@ -199,4 +199,9 @@ double npg_judged_against(const npg_judgement *one, const npg_judgement *other)
     if (count < 3) return 0;
     double error = sqrt(squares / (double)(count - 1) / (double)count);
     return error > 0 ? mean / error : 0;
+}
+
+bool npg_judged_better(const npg_judgement *one, const npg_judgement *other)
+{
+    return npg_judged_against(one, other) < -2 && one->mean < CLEARLY * other->mean;
 }

@@ -39,10 +39,8 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
  * mean: negative, `one` is better.  0 where fewer than three are in common. */
 double npg_judged_against(const npg_judgement *one, const npg_judgement *other);
 
-/* Beyond chance: two standard errors. */
-static inline bool npg_judged_better(const npg_judgement *one, const npg_judgement *other)
-{
-    return npg_judged_against(one, other) < -2;
-}
+/* Whether `one` is better beyond chance, by two standard errors, and by so much that it is no matter of how
+ * coarsely a surface is followed: judge.c. */
+bool npg_judged_better(const npg_judgement *one, const npg_judgement *other);
 
 #endif

@@ -79,11 +79,12 @@ static void held_out_points_are_no_others(void **state)
     npg_candidate_clouds *clouds = sample(false);
     for (size_t f = 0; f < clouds->count; f++) {
         const npg_candidate_cloud *c = &clouds->list[f];
-        assert_int_equal(c->point_count + c->held_count, POINTS);
+        assert_int_equal(c->fit_count + c->held_count, c->point_count);
+        assert_int_equal(c->point_count, POINTS);
         assert_in_range(c->held_count, POINTS / 7, POINTS / 4);
         for (size_t h = 0; h < c->held_count; h++)
-            for (size_t i = 0; i < c->point_count; i++)
-                assert_memory_not_equal(c->held + 3 * h, c->points + 3 * i, 3 * sizeof(float));
+            for (size_t i = 0; i < c->fit_count; i++)
+                assert_memory_not_equal(c->held + 3 * h, c->fit + 3 * i, 3 * sizeof(float));
     }
     npg_candidate_clouds_close(&clouds);
 }
