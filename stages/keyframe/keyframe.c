@@ -22,6 +22,7 @@
 
 #define SHOWN_SCORES 5
 #define NO_NUMBER    (-1)
+#define MIDDLE_REACH 24 /* frames from the middle, within which it hardly weighs against area */
 
 enum { CHOICE_PAPER, CHOICE_JUDGED };
 enum { WELDS_KEEP, WELDS_CUT };
@@ -199,14 +200,35 @@ static double score_of(size_t cell_count, double from_middle)
     return (double)cell_count * exp(-0.001 * from_middle * from_middle);
 }
 
+/* Whether the keyframe is the one that shows most surface: before several sensors bodies hide parts of
+ * themselves, the more the narrower they stand, and the draft of one frame says little of what all show. */
+static bool goes_by_area(const npg_worker *worker)
+{
+    return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max > 1;
+}
+
+/* Areas differ by a few per cent only, so the middle weighs less. */
+static double area_score_of(size_t cell_count, double from_middle, int64_t frame_count)
+{
+    double share = from_middle / (double)frame_count;
+    double beyond = fmax(0, fabs(from_middle) - MIDDLE_REACH);
+    return (double)cell_count / (1 + share * share) * exp(-0.001 * beyond * beyond);
+}
+
 static npg_status measure_extent(npg_worker *worker, candidate *scored, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box));
-    *scored = (candidate){
-        .index = frame->index, .number = frame->number, .cell_count = npg_extent_cells(state->extent, frame)};
-    scored->score = score_of(scored->cell_count, (double)frame->index - (double)facts->planned_count / 2);
+    double from_middle = (double)frame->index - (double)facts->planned_count / 2;
+    if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box, frame));
+    *scored = (candidate){.index = frame->index, .number = frame->number};
+    if (goes_by_area(worker)) {
+        scored->cell_count = npg_extent_area(state->extent, frame);
+        scored->score = area_score_of(scored->cell_count, from_middle, facts->planned_count);
+    } else {
+        scored->cell_count = npg_extent_papers(state->extent, frame);
+        scored->score = score_of(scored->cell_count, from_middle);
+    }
     return NPG_OK;
 }
 
@@ -272,7 +294,8 @@ static void set_choice(npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker), chooses = has_candidates(worker);
+    bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker),
+         chooses = has_candidates(worker) && !goes_by_area(worker);
     if (facts->planned_count < 2 || (!chooses && !cuts_welds)) return;
     npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, !chooses);
     npg_own(worker, choice)->cut_welds = cuts_welds;

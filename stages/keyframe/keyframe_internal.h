@@ -31,17 +31,25 @@ void npg_likeness_close(npg_likeness **likeness);
 npg_status npg_likeness_dist(double *dist_unit, const npg_likeness *likeness, const npg_frame *frame,
                              const npg_frame_box *box);
 
-/* Extent: how much a frame shows, as the number of cells of the paper's grid, a 512th of the unit box each,
- * that hold a point. */
+/* Extent: how much surface a frame shows, as the number of cells of a grid that hold a point.
+ *
+ * Where cells are much smaller than the points are apart, that is the number of points and says nothing of
+ * the surface: so it is with the paper's cells, a 512th of the box, and 5000 points.  With cells of
+ *
+ *     side = max(2 x spacing of the first frame's points, 1.5 % of the figure's diagonal)
+ *
+ * it goes with the area: a frame whose parts touch, or hide each other from the sensors, has fewer.  Their
+ * number is then the sum over eight places of the grid; it scatters by half a per cent. */
 
 typedef struct npg_extent npg_extent;
 
-/* box is a loan until it is closed.  NPG_MEMORY. */
-npg_status npg_extent_open(npg_extent **extent, const npg_frame_box *box);
+/* The cells of a capture of which this is a frame.  NPG_MEMORY. */
+npg_status npg_extent_open(npg_extent **extent, const npg_frame_box *box, const npg_frame *first);
 void npg_extent_close(npg_extent **extent);
 
-/* Cells that hold a finite point of the frame. */
-size_t npg_extent_cells(npg_extent *extent, const npg_frame *frame);
+/* Cells that hold a finite point of the frame: the paper's, and those that go with the area. */
+size_t npg_extent_papers(npg_extent *extent, const npg_frame *frame);
+size_t npg_extent_area(npg_extent *extent, const npg_frame *frame);
 
 /* Outside: a watch on the frames of a live source that leave the box of the look-ahead. */
 
