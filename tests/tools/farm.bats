@@ -8,7 +8,7 @@ samples=$BATS_TEST_DIRNAME/../../samples
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG-bodies" --body bar --frames 3 --points 300 -o short >synth.log
-    "$NEUPIG-bodies" --body bar --frames 41 --points 400 -o long >synth.log
+    "$NEUPIG-bodies" --body bar --frames 91 --points 400 -o long >synth.log
     cp -r short/points broken
     truncate -s 3000 broken/frame_0001.ply
 }
