@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-
 /* ---- layout ---- */
 
 void npg_pack16(float *out, const float *points, size_t count, size_t padded)

@@ -42,8 +42,8 @@ static npg_status note_height(void *user, npg_frame_view *frame)
 /* A small reference and a small network: quick rather than good. */
 static npg_status open_options(npg_options **options, const char *input, const char *output)
 {
-    const char *const settings[][2] = {{"input", input}, {"output", output}, {"epochs", "10"},
-                                       {"faces", "800"}};
+    const char *const settings[][2] = {
+        {"input", input}, {"output", output}, {"epochs", "10"}, {"faces", "800"}};
     npg_status status = npg_options_open(options);
     for (size_t i = 0; i < sizeof settings / sizeof *settings && !status; i++)
         status = npg_options_set(*options, settings[i][0], settings[i][1]);

@@ -77,7 +77,9 @@ int main(int argc, char **argv)
 {
     static const char *const settings[][2] = {
         {"pull", "yes"}, /* input and output stay empty: frames are pushed, meshes only pulled */
-        {"epochs", "20"}, {"faces", "800"}, {"poisson-depth", "6"}};
+        {"epochs", "20"},
+        {"faces", "800"},
+        {"poisson-depth", "6"}};
     npg_options *options = NULL;
     npg_run *run = NULL;
     pthread_t thread;

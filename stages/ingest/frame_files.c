@@ -5,7 +5,6 @@
 #include <string.h>
 #include <sys/stat.h>
 
-
 /* Slots are made for gaps as well.  Names that hold dates or identities instead of frame numbers would ask
  * for billions of them; the limit itself is a round number far above any capture. */
 #define SLOTS_MAX ((int64_t)10000000)

@@ -10,7 +10,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 
 static npg_status add_path(npg_paths *list, char *path)

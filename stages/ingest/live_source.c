@@ -7,7 +7,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-
 /* Frames of one gap.  Each becomes a frame of the run, so a number that is damaged or a time stamp must not
  * make millions; set far above what a capture loses. */
 #define GAP_MAX 100000

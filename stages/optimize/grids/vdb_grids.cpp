@@ -125,8 +125,7 @@ npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const
         about.insertMeta("npg_world_centre", openvdb::Vec3DMetadata(openvdb::Vec3d(place->world_centre)));
         about.insertMeta("npg_unit_per_world", openvdb::DoubleMetadata(place->unit_per_world));
         npg::vdb_writer file(path, about, grid_count(levels));
-        for (int at = 0; at < levels->count; at++)
-            add_level(file, levels->level[at], at, rows, *place);
+        for (int at = 0; at < levels->count; at++) add_level(file, levels->level[at], at, rows, *place);
         file.close();
         return NPG_OK;
     });
