@@ -43,7 +43,7 @@ static bool print_path(char *path, size_t size, const char *folder, const char *
 npg_status npg_path_of(char path[NPG_PATH_SIZE], const char *folder, const char *name)
 {
     if (print_path(path, NPG_PATH_SIZE, folder, name)) return NPG_OK;
-    return npg_error(NPG_USAGE, "%s: the name is too long", folder);
+    return npg_error(NPG_DISK, "%s: the name is too long", folder);
 }
 
 npg_status npg_file_remove(const char *folder, const char *name)

@@ -51,7 +51,7 @@ npg_status npg_folder_is_own(const char *folder);
 /* Make a folder and its parents. */
 npg_status npg_make_folder(const char *path);
 
-/* "<folder>/<name>".  NPG_USAGE where it is longer than the system takes. */
+/* "<folder>/<name>".  NPG_DISK where it is longer than the system takes. */
 #define NPG_PATH_SIZE 4096
 npg_status npg_path_of(char path[NPG_PATH_SIZE], const char *folder, const char *name);
 
