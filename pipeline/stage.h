@@ -52,6 +52,14 @@ typedef struct npg_choice {
     bool cut_welds;                       /* cut from the reference what the other frames contradict */
 } npg_choice;
 
+/* Whether the frame with this index is one of the candidates. */
+static inline bool npg_choice_is_candidate(const npg_choice *choice, int64_t index)
+{
+    for (size_t i = 0; i < choice->count; i++)
+        if (choice->frames[i] == index) return choice->is_candidate[i];
+    return false;
+}
+
 /* How the next pass over all frames is walked: what the reference's owner decides between passes
  * (reference/loop.h). */
 typedef struct npg_brief {

@@ -19,12 +19,11 @@
 #define MOVE_MAX    0.15  /* units                                                            */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Set by trial, like those above. */
-#define SCHEDULE    1.5   /* stiffness and width are final after 2/3 of the steps; the last third settles */
-#define NOISE_WIDTH 2.5   /* mean distances of points that the robust weight is wide at least */
-#define SETTLED     0.01  /* of the graph's radius: a step that moves no node farther ends the fit */
-#define PAIR_WIDTHS 3.0   /* samples farther than so many widths from every point have no pair: a hole */
-#define ONE_SIDE    20    /* times the stiffness where one sensor leaves half of the body to the edges */
-#define SEEN_OFFSET 0.004 /* surface nearer than this hides nothing from a sensor */
+#define SCHEDULE    1.5  /* stiffness and width are final after 2/3 of the steps; the last third settles */
+#define NOISE_WIDTH 2.5  /* mean distances of points that the robust weight is wide at least */
+#define SETTLED     0.01 /* of the graph's radius: a step that moves no node farther ends the fit */
+#define PAIR_WIDTHS 3.0  /* samples farther than so many widths from every point have no pair: a hole */
+#define ONE_SIDE    20   /* times the stiffness where one sensor leaves half of the body to the edges */
 /* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
 #define LENT_PAIRS 0.35
 #define LENT_TERMS 0.18
@@ -455,7 +454,7 @@ static npg_status find_pairs(void *user, size_t part)
     NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
     NPG_TRY(npg_visible_find(&t->visible, t->is_seen, t->surface, s->cloud->sensors, s->cloud->sensor_count,
                              t->sample_pos, t->samples, t->vert_normals, t->sample_count,
-                             SEEN_OFFSET * t->size));
+                             NPG_SEEN_OFFSET * t->size));
     return find_on_surface(s, 0, lent);
 }
 

@@ -100,6 +100,8 @@ npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pos
  * A sensor sees a place that faces it and has none of the surface before it.  What no sensor sees must not be
  * drawn to the points: they are of another side of the body. */
 
+#define NPG_SEEN_OFFSET 0.004 /* units: surface nearer than this hides nothing from a sensor */
+
 /* Room for a number of places; the arena's, which knows whether there was enough. */
 typedef struct npg_visible {
     npg_ray *rays;

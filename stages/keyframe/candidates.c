@@ -2,7 +2,6 @@
 #include "keyframe/keyframe_internal.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "geometry/geometry.h"
 #include "mesh/surface.h"
@@ -153,20 +152,13 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
 
 /* ---- the pass ---- */
 
-static bool is_candidate(const npg_choice *choice, int64_t index)
-{
-    for (size_t i = 0; i < choice->count; i++)
-        if (choice->frames[i] == index) return choice->is_candidate[i];
-    return false;
-}
-
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk)
 {
     if (!pass->clouds) NPG_TRY(npg_candidate_clouds_open(&pass->clouds));
     for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
         const npg_frame *frame = npg_chunk_frame(chunk, i);
         NPG_TRY(npg_candidate_clouds_add(pass->clouds, frame, &facts->box,
-                                         is_candidate(&facts->choice, frame->index)));
+                                         npg_choice_is_candidate(&facts->choice, frame->index)));
     }
     return NPG_OK;
 }

@@ -213,12 +213,8 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    const npg_choice *choice = &facts->choice;
-    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) {
-        for (size_t i = 0; i < choice->count; i++)
-            if (choice->frames[i] == frame->index) return choice->is_candidate[i];
-        return false;
-    }
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE)
+        return npg_choice_is_candidate(&facts->choice, frame->index);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
     if (frame->sensor_count == 1 && !frame->sensors) return true; /* they face it: sure, and needed to grow */
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;

@@ -5,9 +5,8 @@
 
 #include "geometry/geometry.h"
 
-#define TAU         1.0 /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
-#define CLEARLY     0.85  /* times the other's figure: tests/bed/decisions.md, "The judge" */
-#define SEEN_OFFSET 0.004 /* surface nearer than this hides nothing from a sensor */
+#define TAU     1.0  /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
+#define CLEARLY 0.85 /* times the other's figure: tests/bed/decisions.md, "The judge" */
 
 /* Coarse: what a finer one forgives shows. */
 static const npg_tracker_settings judge_tracking = {
@@ -117,7 +116,7 @@ static double expected(const judging *j, const npg_candidate_cloud *cloud, const
     return most;
 }
 
-/* The points that were held out and those that were not: a cloud's lie one after the other. */
+/* To all points, those that were held out among them: fewer would leave gaps. */
 static npg_status surface_off(double *mean, judging *j, const npg_candidate_cloud *cloud,
                               const float *vert_unit)
 {
@@ -126,7 +125,7 @@ static npg_status surface_off(double *mean, judging *j, const npg_candidate_clou
     spread_areas(j, vert_unit);
     npg_mesh_vertex_normals(j->normals, vert_unit, v, j->mesh->faces, j->mesh->face_count);
     NPG_TRY(npg_visible_find(&j->visible, j->is_seen, j->surface, cloud->sensors, cloud->sensor_count,
-                             vert_unit, NULL, j->normals, v, SEEN_OFFSET));
+                             vert_unit, NULL, j->normals, v, NPG_SEEN_OFFSET));
     NPG_TRY(npg_points_nearest(j->near, j->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
     for (size_t i = 0; i < v; i++) {
         double weight = j->areas[i] * expected(j, cloud, vert_unit, i);

@@ -4,10 +4,12 @@
 #include <math.h>
 
 #define GROW_PASSES 40 /* at most */
-#define EXPLAINED_FIRST                                                                                      \
-    0.8                    /* of a frame's points must have a place: a frame that sees much more is ...     */
-#define EXPLAINED_LAST 0.5 /* ... wrongly followed, and adds limbs where they are not; in the end half ...  */
-#define EXPLAINED_STEP 0.1 /* ... in such steps, after passes that reached no more frames                   */
+/* Share of a frame's points that must have a place on a surface that grows: a frame that sees much more is
+ * wrongly followed, and adds limbs where they are not.  In the end half, in steps, after passes that reached no
+ * more frames. */
+#define EXPLAINED_FIRST 0.8
+#define EXPLAINED_LAST  0.5
+#define EXPLAINED_STEP  0.1
 
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
 {
