@@ -8,15 +8,14 @@
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 
-/* Both matrices of the smoothing, by turns. */
 static void make_levels(npg_levels *levels, int size)
 {
     *levels = (npg_levels){0};
     int count = size < 4 ? 3 : 8;
     for (int l = 0; l < count; l++)
         npg_levels_add(levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 1.0 / count,
-                                           0.4 * pow(1.5, l), l % 2 ? 1 : 3.4, l % 2 ? 2 : 1, 1});
-    npg_levels_add(levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, 3.4, 1, 1});
+                                           0.4 * pow(1.5, l), 1});
+    npg_levels_add(levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, 1});
 }
 
 /* ---- latent ---- */

@@ -16,16 +16,15 @@ typedef enum npg_level_kind {
     NPG_LEVEL_NORMAL    /* dense grid over [-1, 1]^3, sampled at normals   */
 } npg_level_kind;
 
+/* D counts a node's neighbours inside the grid, A joins them. */
 typedef struct npg_level {
     npg_level_kind kind;
     int nodes;                      /* n per axis                                           */
     size_t first_row, row_count;    /* in the table; row_count = n^3                        */
     int channel_first, channel_end; /* the channels it fills                                */
     double share;                   /* weight of its value: 1 / L where levels are averaged */
-    double lambda;                  /* strength of the smoothing, 0: none                   */
-    /* ... by screen I + lambda (degree D - A): D counts a node's neighbours inside the grid, A joins them */
-    double screen, degree;
-    double rate; /* learning rate */
+    double lambda; /* of the smoothing, I + lambda (2 D - A) as in the published code; 0: none */
+    double rate;   /* learning rate                                        */
 } npg_level;
 
 typedef struct npg_levels {

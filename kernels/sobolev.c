@@ -6,7 +6,7 @@
 typedef struct tables {
     int32_t level[NPG_LEVELS_MAX][NPG_GRID];
     int32_t eigen_first[NPG_LEVELS_MAX];
-    float lambda[NPG_LEVELS_MAX], diagonal[NPG_LEVELS_MAX];
+    float lambda[NPG_LEVELS_MAX];
     size_t matrix_size, eigen_size, lines;
 } tables;
 
@@ -26,27 +26,25 @@ static void fill_tables(tables *t, const npg_levels *levels)
         t->level[l][NPG_GRID_MATRIX] = (int32_t)t->matrix_size;
         t->eigen_first[l] = (int32_t)t->eigen_size;
         t->lambda[l] = (float)level->lambda;
-        t->diagonal[l] = (float)level->screen;
         t->matrix_size += n * n;
         t->eigen_size += n;
         t->lines += n ? n * n : level->row_count;
     }
 }
 
-static npg_status fill_transform(float *matrix, float *eigen, const npg_level *level, size_t n)
+static npg_status fill_transform(float *matrix, float *eigen, size_t n)
 {
     double *basis;
     NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FIT, n + 1, n * sizeof *basis));
     double *values = basis + n * n;
-    npg_status status = npg_path_spectrum(basis, values, (int)n, level->degree);
+    npg_status status = npg_path_spectrum(basis, values, (int)n);
     for (size_t i = 0; i < n * n && !status; i++) matrix[i] = (float)basis[i];
     for (size_t i = 0; i < n && !status; i++) eigen[i] = (float)values[i];
     npg_release(&basis);
     return status;
 }
 
-static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels,
-                                    const tables *t)
+static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, const tables *t)
 {
     float *matrices = NULL, *eigen = NULL;
     npg_status status = npg_alloc_array(&matrices, NPG_FOR_FIT, t->matrix_size + 1, sizeof(float));
@@ -54,7 +52,7 @@ static npg_status upload_transforms(npg_sobolev *sobolev, npg_device *device, co
     for (int l = 0; !status && l < sobolev->level_count; l++)
         if (t->level[l][NPG_GRID_NODES])
             status = fill_transform(matrices + t->level[l][NPG_GRID_MATRIX], eigen + t->eigen_first[l],
-                                    &levels->level[l], (size_t)t->level[l][NPG_GRID_NODES]);
+                                    (size_t)t->level[l][NPG_GRID_NODES]);
     if (!status)
         status = npg_buffer_from(&sobolev->matrices, device, matrices, (t->matrix_size + 1) * sizeof(float));
     if (!status)
@@ -74,8 +72,7 @@ npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_
     if (!status) status = npg_buffer_from(&sobolev->levels, device, t.level, sizeof t.level);
     if (!status) status = npg_buffer_from(&sobolev->eigen_first, device, t.eigen_first, sizeof t.eigen_first);
     if (!status) status = npg_buffer_from(&sobolev->lambda, device, t.lambda, sizeof t.lambda);
-    if (!status) status = npg_buffer_from(&sobolev->diagonal, device, t.diagonal, sizeof t.diagonal);
-    if (!status) status = upload_transforms(sobolev, device, levels, &t);
+    if (!status) status = upload_transforms(sobolev, device, &t);
     if (!status) status = npg_buffer_open(&sobolev->a, device, bytes);
     if (!status) status = npg_buffer_open(&sobolev->b, device, bytes);
     if (status) npg_sobolev_close(sobolev);
@@ -90,7 +87,6 @@ void npg_sobolev_close(npg_sobolev *sobolev)
     npg_buffer_close(&sobolev->eigen);
     npg_buffer_close(&sobolev->eigen_first);
     npg_buffer_close(&sobolev->lambda);
-    npg_buffer_close(&sobolev->diagonal);
     npg_buffer_close(&sobolev->a);
     npg_buffer_close(&sobolev->b);
 }
@@ -100,9 +96,8 @@ static npg_status pass(npg_sobolev *s, const npg_buffer *out, const npg_buffer *
 {
     return NPG_LAUNCH(s->program, "sobolev_pass", s->line_count, 1, NPG_BUF(out), NPG_BUF(in),
                       NPG_BUF(&s->levels), NPG_BUF(&s->matrices), NPG_BUF(&s->eigen),
-                      NPG_BUF(&s->eigen_first), NPG_BUF(&s->lambda), NPG_BUF(&s->diagonal),
-                      NPG_INT(s->level_count), NPG_INT(s->line_count), NPG_INT(axis), NPG_INT(back),
-                      NPG_INT(scale));
+                      NPG_BUF(&s->eigen_first), NPG_BUF(&s->lambda), NPG_INT(s->level_count),
+                      NPG_INT(s->line_count), NPG_INT(axis), NPG_INT(back), NPG_INT(scale));
 }
 
 npg_status npg_sobolev_solve(npg_sobolev *s, const npg_buffer *x, const npg_buffer *y)

@@ -1,8 +1,7 @@
-/* sobolev: x = (a I + lambda L)^-1 y on every grid level, exactly.
+/* sobolev: x = (I + lambda L)^-1 y on every grid level, exactly.
  *
  * L of an n^3 grid is the Kronecker sum of three matrices of paths, which an orthonormal matrix C (n x n)
- * diagonalises (path_spectrum.h; for the graph's Laplacian the DCT-II with 2 - 2 cos(pi k / n)).  So the solve
- * is C on each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper:
+ * diagonalises (path_spectrum.h).  So the solve is C on each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper:
  * section on the objectives, "Preconditioning"; the published code iterates conjugate gradients instead.
  *
  * levels: [L][NPG_GRID] (layout.h); the node (i, j, k) of a level is row
@@ -27,11 +26,11 @@ inline line_of find_line(global const int *levels, int L, int line, int axis)
 }
 
 /* One pass.  matrices: C of each level, row-major; back = 1 multiplies by C^T.  scale = 1 divides the result by
- * diagonal[l] + lambda[l] (e_i + e_a + e_b), e the eigenvalues eigen[eigen_first[l] + k].  Only the pass over
+ * 1 + lambda[l] (e_i + e_a + e_b), e the eigenvalues eigen[eigen_first[l] + k].  Only the pass over
  * axis 2 may scale.  Global size: (lines). */
 kernel void sobolev_pass(global float *out, global const float *in, global const int *levels,
                          global const float *matrices, global const float *eigen, global const int *eigen_first,
-                         global const float *lambda, global const float *diagonal, int L, int lines, int axis, int back,
+                         global const float *lambda, int L, int lines, int axis, int back,
                          int scale)
 {
     if (get_global_id(0) >= (size_t)lines) return;
@@ -52,7 +51,7 @@ kernel void sobolev_pass(global float *out, global const float *in, global const
             a = fma(c, vload16(2 * row, in), a);
             b = fma(c, vload16(2 * row + 1, in), b);
         }
-        float s = scale ? 1.0f / (diagonal[at.level] + lambda[at.level] * (e_line + e[i])) : 1.0f;
+        float s = scale ? 1.0f / (1.0f + lambda[at.level] * (e_line + e[i])) : 1.0f;
         size_t row = at.first + i * at.stride;
         vstore16(s * a, 2 * row, out);
         vstore16(s * b, 2 * row + 1, out);

@@ -1,4 +1,4 @@
-/* sobolev: the exact solve (I + lambda L) x = y on every grid level; kernels in sobolev.cl, twin in
+/* sobolev: the exact solve (I + lambda L) x = y, L = 2 D - A (levels.h), on every grid level; kernels in sobolev.cl, twin in
  * sobolev_ref.c. */
 #ifndef NPG_SOBOLEV_H
 #define NPG_SOBOLEV_H
@@ -8,7 +8,7 @@
 
 typedef struct npg_sobolev {
     npg_program *program;
-    npg_buffer levels, matrices, eigen, eigen_first, lambda, diagonal;
+    npg_buffer levels, matrices, eigen, eigen_first, lambda;
     npg_buffer a, b; /* scratch, [nodes][32] each */
     int level_count;
     size_t line_count;
@@ -17,11 +17,11 @@ typedef struct npg_sobolev {
 npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_levels *levels);
 void npg_sobolev_close(npg_sobolev *sobolev);
 
-/* x = (a I + lambda L)^-1 y, [nodes][32]; x may be y.  Levels with lambda = 0 and hashed levels are copied.
+/* x = (I + lambda L)^-1 y, [nodes][32]; x may be y.  Levels with lambda = 0 are copied.
  * The matrix is symmetric: the same call passes gradients back. */
 npg_status npg_sobolev_solve(npg_sobolev *sobolev, const npg_buffer *x, const npg_buffer *y);
 
-/* y = (a I + lambda L) x, the matrix itself, in double: what the solve must invert. */
+/* y = (I + lambda L) x, the matrix itself, in double: what the solve must invert. */
 void npg_sobolev_apply_ref(double *y, const double *x, const npg_levels *levels);
 
 #endif

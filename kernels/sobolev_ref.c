@@ -1,21 +1,19 @@
 /* sobolev: the matrix that the kernels invert, written out node by node, in double. */
 #include "kernels/sobolev.h"
 
-/* Row (i, j, k) of screen I + lambda (degree D - A): D counts the neighbours inside the grid, A sums them. */
+/* Row (i, j, k) of I + lambda (2 D - A): D counts the neighbours inside the grid, A sums them. */
 static double apply_at(const double *x, const npg_level *level, int i, int j, int k, size_t channel)
 {
     int n = level->nodes, at[3] = {i, j, k};
     const size_t step[3] = {(size_t)n * (size_t)n, (size_t)n, 1};
     size_t row = level->first_row + ((size_t)i * (size_t)n + (size_t)j) * (size_t)n + (size_t)k;
     double mine = x[row * NPG_LATENT_CHANNELS + channel];
-    double sum = level->screen * mine;
+    double sum = mine;
     for (int axis = 0; axis < 3; axis++) {
         if (at[axis] > 0)
-            sum += level->lambda *
-                   (level->degree * mine - x[(row - step[axis]) * NPG_LATENT_CHANNELS + channel]);
+            sum += level->lambda * (2 * mine - x[(row - step[axis]) * NPG_LATENT_CHANNELS + channel]);
         if (at[axis] < n - 1)
-            sum += level->lambda *
-                   (level->degree * mine - x[(row + step[axis]) * NPG_LATENT_CHANNELS + channel]);
+            sum += level->lambda * (2 * mine - x[(row + step[axis]) * NPG_LATENT_CHANNELS + channel]);
     }
     return sum;
 }

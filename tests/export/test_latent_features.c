@@ -15,28 +15,19 @@
 static void features_invert_the_grid_matrix(void **state)
 {
     (void)state;
-    static const double matrices[3][2] = {{1, 1}, {19, 1}, {1, 2}}; /* screen, degree */
-    for (int m = 0; m < 3; m++) {
-        double screen = matrices[m][0], degree = matrices[m][1];
-        npg_levels levels = {0};
-        npg_level level = {.kind = NPG_LEVEL_POSITION,
-                           .nodes = 5,
-                           .channel_end = 32,
-                           .lambda = 3,
-                           .screen = screen,
-                           .degree = degree};
-        npg_levels_add(&levels, level);
-        size_t count = levels.row_count * NPG_LATENT_CHANNELS;
-        double *unknowns = calloc(count, sizeof *unknowns), *x = calloc(count, sizeof *x),
-               *again = calloc(count, sizeof *again);
-        for (size_t i = 0; i < count; i++) x[i] = unknowns[i] = sin(1.7 * (double)i) + (double)(i % 7);
-        assert_int_equal(npg_features_solve(x, 5, NPG_LATENT_CHANNELS, screen, degree, 3), NPG_OK);
-        npg_sobolev_apply_ref(again, x, &levels);
-        for (size_t i = 0; i < count; i++) assert_true(fabs(again[i] - unknowns[i]) < 1e-10);
-        free(unknowns);
-        free(x);
-        free(again);
-    }
+    npg_levels levels = {0};
+    npg_levels_add(&levels,
+                   (npg_level){.kind = NPG_LEVEL_POSITION, .nodes = 5, .channel_end = 32, .lambda = 3});
+    size_t count = levels.row_count * NPG_LATENT_CHANNELS;
+    double *unknowns = calloc(count, sizeof *unknowns), *x = calloc(count, sizeof *x),
+           *again = calloc(count, sizeof *again);
+    for (size_t i = 0; i < count; i++) x[i] = unknowns[i] = sin(1.7 * (double)i) + (double)(i % 7);
+    assert_int_equal(npg_features_solve(x, 5, NPG_LATENT_CHANNELS, 3), NPG_OK);
+    npg_sobolev_apply_ref(again, x, &levels);
+    for (size_t i = 0; i < count; i++) assert_true(fabs(again[i] - unknowns[i]) < 1e-10);
+    free(unknowns);
+    free(x);
+    free(again);
 }
 
 static void the_first_component_is_the_widest(void **state)

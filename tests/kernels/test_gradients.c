@@ -97,9 +97,8 @@ static void latent(void **state)
     double error = 0;
     (void)state;
     for (int l = 0; l < 3; l++)
-        npg_levels_add(&levels,
-                       (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 1.0 / 3, 0.4, 1, 1, 1});
-    npg_levels_add(&levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, 1, 1, 1});
+        npg_levels_add(&levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 1.0 / 3, 0.4, 1});
+    npg_levels_add(&levels, (npg_level){NPG_LEVEL_NORMAL, 4, 0, 0, 30, 32, 1, 0.4, 1});
     const float *positions = narrow(drawn(f.real * 3, 1.05), f.real * 3); /* some outside the cube */
     const float *normals = narrow(drawn(f.real * 3, 1), f.real * 3);
     assert_int_equal(npg_samples_open(&f.samples, &levels, positions, normals, f.real, rows), 0);

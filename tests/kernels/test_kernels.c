@@ -62,8 +62,7 @@ static void sampling_gives_equal_bytes(void **state)
     float *points, *nodes, *dz, *first = NULL;
     (void)state;
     for (int l = 0; l < 8; l++)
-        npg_levels_add(&levels,
-                       (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, 3.4, 1, 1});
+        npg_levels_add(&levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, 1});
     size_t size = levels.row_count * NPG_LATENT_CHANNELS;
     npg_check_values(&arena, &points, NULL, POINTS * 3, 1, &random);
     npg_check_values(&arena, &nodes, NULL, size, 1, &random);

@@ -28,15 +28,14 @@ static void turn_axis(double *values, double *line, const double *basis, int n, 
     }
 }
 
-npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double degree,
-                              double lambda)
+npg_status npg_features_solve(double *values, int nodes, int channels, double lambda)
 {
     double *basis;
     size_t n = (size_t)nodes, c = (size_t)channels;
-    NPG_REQUIRE(nodes > 0 && channels > 0 && screen > 0 && degree >= 1 && lambda >= 0);
+    NPG_REQUIRE(nodes > 0 && channels > 0 && lambda >= 0);
     NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FILES, n + 2, n * sizeof *basis));
     double *line = basis + n * n, *eigen = line + n;
-    npg_status status = npg_path_spectrum(basis, eigen, nodes, degree);
+    npg_status status = npg_path_spectrum(basis, eigen, nodes);
     /* Into the basis that makes the matrix diagonal, a division, and back, as in kernels/sobolev.cl. */
     for (int back = 0; back < 2 && !status; back++) {
         for (size_t axis = 0, step = c; axis < 3; axis++, step *= n)
@@ -45,7 +44,7 @@ npg_status npg_features_solve(double *values, int nodes, int channels, double sc
             size_t node = i / c;
             double sum = 0;
             for (int axis = 0; axis < 3; axis++, node /= n) sum += eigen[node % n];
-            values[i] /= screen + lambda * sum;
+            values[i] /= 1 + lambda * sum;
         }
     }
     npg_release(&basis);

@@ -28,11 +28,10 @@ npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *surface
 
 /* ---- what the unknowns of a latent grid stand for, and the direction in which they differ most ---- */
 
-/* x = (screen I + lambda (degree D - A))^-1 y of a dense grid (kernels/levels.h): n^3 nodes with C channels
+/* x = (I + lambda (2 D - A))^-1 y of a dense grid (kernels/levels.h): n^3 nodes with C channels
  * each ([n][n][n][C]), in place, in double on the host.  What makes the matrix of a path diagonal
  * (kernels/path_spectrum.h) along each axis does so with the grid's.  O(C n^4).  NPG_MEMORY. */
-npg_status npg_features_solve(double *values, int nodes, int channels, double screen, double degree,
-                              double lambda);
+npg_status npg_features_solve(double *values, int nodes, int channels, double lambda);
 
 /* The first principal component of `count` rows of C values: out[i] = direction . (row_i - mean),
  * where direction (C, unit length, its largest entry positive) is the eigenvector of the covariance's

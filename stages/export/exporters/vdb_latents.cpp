@@ -24,7 +24,7 @@ using openvdb::Vec3SGrid;
 struct level {
     std::map<int, openvdb::GridBase::Ptr> grids;
     int nodes, channels;
-    double screen, degree, lambda;
+    double lambda;
     std::vector<double> values; // [n][n][n][C]
 };
 
@@ -100,8 +100,6 @@ npg_status sort_into_levels(std::map<int, level> &levels, const openvdb::GridPtr
         level &l = levels[grid->metaValue<int32_t>("npg_level")];
         l.nodes = grid->metaValue<int32_t>("npg_nodes");
         l.lambda = grid->metaValue<double>("npg_lambda");
-        l.screen = grid->metaValue<double>("npg_screen");
-        l.degree = grid->metaValue<double>("npg_degree");
         if (l.nodes < 1 || l.nodes > 4096) // damage: the fit's grids have at most some hundred nodes per axis
             return npg_error(NPG_BAD_INPUT, "%s: the grid %s has %d nodes", path, grid->getName().c_str(),
                              l.nodes);
@@ -184,7 +182,7 @@ npg_status make_features(npg::vdb_writer &file, level &l, const npg_placement *p
     each_grid(
         l, [&](Vec3SGrid &grid, size_t channel) { read_values(l, grid, channel); },
         [&](FloatGrid &grid, size_t channel) { read_values(l, grid, channel); });
-    NPG_TRY(npg_features_solve(l.values.data(), l.nodes, l.channels, l.screen, l.degree, l.lambda));
+    NPG_TRY(npg_features_solve(l.values.data(), l.nodes, l.channels, l.lambda));
     each_grid(
         l, [&](Vec3SGrid &grid, size_t channel) { write_values(l, grid, channel); },
         [&](FloatGrid &grid, size_t channel) { write_values(l, grid, channel); });

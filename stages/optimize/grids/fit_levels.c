@@ -4,7 +4,6 @@
 #include "optimize/grids/fit.h"
 
 #define NORMAL_NODES 4 /* per axis of the grid over directions (published code) */
-#define DEGREE       2 /* the smoothing's matrix is I + lambda (2 D - A), as in the published code */
 
 void npg_fit_levels(npg_levels *levels, const npg_grid_settings *s)
 {
@@ -14,8 +13,6 @@ void npg_fit_levels(npg_levels *levels, const npg_grid_settings *s)
                                            .channel_end = (int)s->position_channels,
                                            .share = 1.0 / (double)s->grid_levels,
                                            .lambda = s->lambda * pow(s->lambda_growth, (double)l),
-                                           .screen = 1,
-                                           .degree = DEGREE,
                                            .rate = s->grid_rate * pow(s->grid_rate_growth, (double)l)});
     if (!s->normal_channels) return;
     npg_levels_add(levels, (npg_level){.kind = NPG_LEVEL_NORMAL,
@@ -24,7 +21,5 @@ void npg_fit_levels(npg_levels *levels, const npg_grid_settings *s)
                                        .channel_end = (int)(s->position_channels + s->normal_channels),
                                        .share = 1,
                                        .lambda = s->lambda,
-                                       .screen = 1,
-                                       .degree = DEGREE,
                                        .rate = s->grid_rate});
 }

@@ -66,8 +66,6 @@ void describe(openvdb::GridBase &grid, const npg_level &level, int at, int chann
     grid.insertMeta("npg_level", openvdb::Int32Metadata(at));
     grid.insertMeta("npg_nodes", openvdb::Int32Metadata(level.nodes));
     grid.insertMeta("npg_lambda", openvdb::DoubleMetadata(level.lambda));
-    grid.insertMeta("npg_screen", openvdb::DoubleMetadata(level.screen));
-    grid.insertMeta("npg_degree", openvdb::DoubleMetadata(level.degree));
     grid.insertMeta("npg_channel_first", openvdb::Int32Metadata(channel));
     grid.insertMeta("npg_frame_first", openvdb::Int64Metadata(place.frame_first));
     grid.insertMeta("npg_frame_last", openvdb::Int64Metadata(place.frame_last));

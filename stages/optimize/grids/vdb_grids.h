@@ -21,8 +21,8 @@ typedef struct npg_vdb_place {
  * The voxel (i, j, k) is node (i, j, k) of the level; the transform takes it to world coordinates
  * (grids over normal directions: to the cube [-1, 1]^3; so do the others where the capture is so small that
  * OpenVDB can't hold their voxels, and then they have the metadata npg_space = "unit").  Every grid has the
- * metadata npg_level, npg_nodes, npg_lambda, npg_screen and npg_degree (a and b of a I + lambda (b D - A)),
- * npg_channel_first, npg_frame_first, npg_frame_last; the file has npg_window, npg_levels, npg_world_centre,
+ * metadata npg_level, npg_nodes, npg_lambda (of I + lambda (2 D - A), kernels/levels.h), npg_channel_first,
+ * npg_frame_first, npg_frame_last; the file has npg_window, npg_levels, npg_world_centre,
  * npg_unit_per_world.  Values are the unknowns of the fit, differential coordinates: the features are that
  * matrix, inverted, times them.  Single precision, exact.. */
 npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const float *rows,
