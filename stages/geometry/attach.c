@@ -47,17 +47,11 @@ static void face_corners(local_frame *frame, const float *vert_pos, const uint32
 static void set_frame(local_frame *frame, const float *vert_pos, const float *vert_normals,
                       const uint32_t *face, const float weights[3])
 {
-    double *normal = frame->axes[2], side[3] = {0};
+    double *normal = frame->axes[2];
     interpolate(normal, vert_normals, face, weights);
     if (!npg_vec3_make_unit(normal))
         for (size_t a = 0; a < 3; a++) normal[a] = (double)vert_normals[3 * face[0] + a];
-    int least = 0; /* the axis that the normal is farthest from: their cross product is not short */
-    for (int a = 1; a < 3; a++)
-        if (fabs(normal[a]) < fabs(normal[least])) least = a;
-    side[least] = 1;
-    npg_vec3_cross(frame->axes[0], side, normal);
-    npg_vec3_make_unit(frame->axes[0]);
-    npg_vec3_cross(frame->axes[1], normal, frame->axes[0]);
+    npg_vec3_span_plane(frame->axes[0], frame->axes[1], normal);
     face_corners(frame, vert_pos, face);
 }
 

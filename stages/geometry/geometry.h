@@ -76,6 +76,16 @@ static inline bool npg_vec3_make_unit(double v[3])
     return length > 0;
 }
 
+/* Two unit vectors that span the plane across n, which is one, too: right-handed, x first. */
+static inline void npg_vec3_span_plane(double x[3], double y[3], const double n[3])
+{
+    int least = fabs(n[0]) < fabs(n[1]) ? 0 : 1;
+    if (fabs(n[2]) < fabs(n[least])) least = 2;
+    npg_vec3_cross(x, (const double[3]){least == 0, least == 1, least == 2}, n);
+    npg_vec3_make_unit(x);
+    npg_vec3_cross(y, n, x);
+}
+
 static inline bool npg_vec3_make_unitf(float v[3])
 {
     float length = npg_vec3_lengthf(v);

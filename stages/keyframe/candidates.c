@@ -12,11 +12,7 @@
 #define SAMPLE_LEAST 24 /* frames: with fewer none is left out */
 #define STRIDE_MOST  3  /* frames: the tracker must find from one to the next */
 
-#define DRAFT_DEPTH     7
-#define DRAFT_ROUNDS    1
-#define DRAFT_FACES     3000
-#define PIECE_SHARE     0.01 /* of the area, and units from the main piece: what belongs to the body */
-#define PIECE_DIST_UNIT 0.1
+#define DRAFT_FACES 3000
 
 /* ---- which frames ---- */
 
@@ -46,11 +42,10 @@ static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
 {
     size_t moved, turned;
     npg_pieces pieces;
-    int rounds;
     npg_mending mending;
-    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, &rounds, normals, cloud->fit, cloud->fit_count,
-                                  spacing, settings));
-    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, PIECE_SHARE, PIECE_DIST_UNIT));
+    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, normals, cloud->fit, cloud->fit_count, spacing,
+                                  settings));
+    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, 1));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
     NPG_TRY(npg_mesh_mend(mesh, &mending));
     return npg_mesh_make_normals(*mesh);
@@ -61,8 +56,7 @@ static npg_status make_draft(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
 {
     npg_poisson_settings quick = *settings;
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
-    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
-    quick.rounds_max = DRAFT_ROUNDS;
+    if (quick.depth > NPG_DRAFT_DEPTH) quick.depth = NPG_DRAFT_DEPTH;
     *mesh = NULL;
     float *normals = npg_arena_copy(&scratch, cloud->fit_normals, cloud->fit_count, 3 * sizeof(float));
     npg_status status = npg_arena_status(&scratch);

@@ -99,50 +99,14 @@ npg_status npg_cloud_noise(double *sigma, const float *points, const float *norm
 
 /* ---- smooth ---- */
 
-/* Solve the symmetric system in place by Cholesky; false when it is singular. */
-static bool solve(double m[TERMS][TERMS], double b[TERMS])
-{
-    for (int i = 0; i < TERMS; i++) {
-        double scale = m[i][i];
-        for (int k = 0; k < i; k++) m[i][i] -= m[i][k] * m[i][k];
-        if (!(m[i][i] > 1e-9 * scale)) return false;
-        m[i][i] = sqrt(m[i][i]);
-        for (int j = i + 1; j < TERMS; j++) {
-            for (int k = 0; k < i; k++) m[j][i] -= m[i][k] * m[j][k];
-            m[j][i] /= m[i][i];
-        }
-    }
-    for (int i = 0; i < TERMS; i++) {
-        for (int k = 0; k < i; k++) b[i] -= m[i][k] * b[k];
-        b[i] /= m[i][i];
-    }
-    for (int i = TERMS - 1; i >= 0; i--) {
-        for (int k = i + 1; k < TERMS; k++) b[i] -= m[k][i] * b[k];
-        b[i] /= m[i][i];
-    }
-    return true;
-}
-
-/* Two unit vectors that span the plane across n. */
-static void span_plane(double x[3], double y[3], const float n[3])
-{
-    int least = fabsf(n[0]) < fabsf(n[1]) ? 0 : 1;
-    if (fabsf(n[2]) < fabsf(n[least])) least = 2;
-    const double axis[3] = {least == 0, least == 1, least == 2};
-    const double across[3] = {(double)n[0], (double)n[1], (double)n[2]};
-    npg_vec3_cross(x, axis, across);
-    npg_vec3_make_unit(x);
-    npg_vec3_cross(y, across, x);
-}
-
 /* The quadric's height and slope at the point itself, from the neighbours of its side. */
 static void fit(float *out_point, float *out_normal, size_t i, const float *points, const float *normals,
                 const uint32_t *index, const float *dist_sq, size_t k)
 {
     const float *p = points + 3 * i, *n = normals + 3 * i;
-    double x[3], y[3], m[TERMS][TERMS] = {{0}}, b[TERMS] = {0}, r = sqrt((double)dist_sq[k - 1]);
+    double x[3], y[3], m[TERMS * TERMS] = {0}, b[TERMS] = {0}, r = sqrt((double)dist_sq[k - 1]);
     size_t support = 0;
-    span_plane(x, y, n);
+    npg_vec3_span_plane(x, y, (const double[3]){(double)n[0], (double)n[1], (double)n[2]});
     for (size_t j = 0; j < k && r > 0; j++) {
         const float *q = points + 3 * (size_t)index[j], *o = normals + 3 * (size_t)index[j];
         if (npg_vec3_dotf(n, o) < NPG_SAME_SIDE) continue;
@@ -156,13 +120,16 @@ static void fit(float *out_point, float *out_normal, size_t i, const float *poin
         const double terms[TERMS] = {1, u, v, u * u, u * v, v * v};
         for (int s = 0; s < TERMS; s++) {
             b[s] += weight * terms[s] * h;
-            for (int t = 0; t < TERMS; t++) m[s][t] += weight * terms[s] * terms[t];
+            for (int t = 0; t < TERMS; t++) m[TERMS * s + t] += weight * terms[s] * terms[t];
         }
         support++;
     }
     memcpy(out_point, p, 3 * sizeof *p);
     memcpy(out_normal, n, 3 * sizeof *n);
-    if (support < SUPPORT_MIN || !solve(m, b) || !(fabs(b[0]) < 0.5)) return;
+    if (support < SUPPORT_MIN) return;
+    npg_cholesky_factor(m, TERMS, 0);
+    npg_cholesky_solve(m, TERMS, b);
+    if (!(fabs(b[0]) < 0.5)) return; /* or the neighbours leave the quadric open: no number */
     double length = sqrt(1 + b[1] * b[1] + b[2] * b[2]);
     for (int a = 0; a < 3; a++) {
         out_point[a] = (float)((double)p[a] + r * b[0] * (double)n[a]);

@@ -16,7 +16,6 @@
 #define BORDER_NEAR     0.85 /* times the faces' distance from the points, for the border around them */
 #define SAVED_LEAST     0.7  /* the new faces' area, at most, of the patch in its worst pose          */
 #define LOOPS_LEAST     2    /* of its border: a tube between two parts; a cap or a crease is left    */
-#define TIDY_ROUNDS     10
 #define ISLAND_MOST     0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
 #define PATCH_MOST      0.2  /* of the faces: more is no false bridge but a surface that fits nowhere */
 
@@ -38,16 +37,10 @@ typedef struct ballot {
 
 /* ---- what a frame says ---- */
 
-static double edge_growth(const float *rest, const float *now, uint32_t a, uint32_t b)
+static double edge_growth(const float *rest, const float *now, size_t a, size_t b)
 {
-    double before = 0, after = 0;
-    for (size_t i = 0; i < 3; i++) {
-        double x = (double)rest[3 * (size_t)a + i] - (double)rest[3 * (size_t)b + i];
-        double y = (double)now[3 * (size_t)a + i] - (double)now[3 * (size_t)b + i];
-        before += x * x;
-        after += y * y;
-    }
-    return before > 0 ? sqrt(after / before) : 0;
+    double before = npg_vec3_distance(rest + 3 * a, rest + 3 * b);
+    return before > 0 ? npg_vec3_distance(now + 3 * a, now + 3 * b) / before : 0;
 }
 
 /* Count what a frame says of a face: `against`, and with half the distance and less growth, `nearly`. */
@@ -202,10 +195,9 @@ static npg_status tidy(patches *p, const npg_mesh *mesh)
     uint32_t *twin;
     NPG_TRY(npg_alloc_array(&twin, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *twin));
     npg_status status = npg_mesh_twins(twin, mesh->faces, mesh->face_count);
-    for (int round = 0; round < TIDY_ROUNDS && !status; round++) {
-        status = take_islands(p, mesh);
-        if (!status && !take_pinches(p, mesh, twin)) break;
-    }
+    do { /* ends: each pinch takes faces in */
+        if (!status) status = take_islands(p, mesh);
+    } while (!status && take_pinches(p, mesh, twin));
     npg_release(&twin);
     return status;
 }

@@ -6,14 +6,12 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "outlier/normals.h"
 
 #define NEIGHBOURS    48   /* in which a facing point is looked for */
-#define CONTACT_AMONG 24   /* of their neighbours, each                            */
 #define ACROSS        0.5f /* cosine of a normal and the way across the gap */
-#define SMOOTH_OVER   12   /* neighbours                            */
 #define SMOOTH_ROUNDS 3
-#define BACK_OVER     6  /* points around a vertex           */
-#define BACK_AMONG    16 /* nearest ones that they are among */
+#define BACK_OVER     6 /* points around a vertex */
 
 typedef struct manner {
     double wide;       /* a gap that survives, in spacings                         */
@@ -61,7 +59,7 @@ static void smooth(float *out, const float *push, const uint32_t *near, const fl
 {
     for (size_t i = 0; i < n; i++) {
         float sum = 0, weight = 0;
-        for (size_t k = 0; k < SMOOTH_OVER; k++) {
+        for (size_t k = 0; k < NPG_NEIGHBOURS; k++) {
             size_t j = near[NEIGHBOURS * i + k];
             if (j >= n) break;
             if (npg_vec3_dotf(normals + 3 * i, normals + 3 * j) < NPG_SAME_SIDE) continue;
@@ -141,7 +139,7 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
                           const npg_gap_widening *widening)
 {
     float scale = 0;
-    for (size_t k = 0; k < BACK_AMONG && near[k] < widening->count && to->count < BACK_OVER; k++) {
+    for (size_t k = 0; k < NPG_POINTS_ASKED && near[k] < widening->count && to->count < BACK_OVER; k++) {
         bool is_across = npg_vec3_dotf(vert_normal, widening->normals + 3 * (size_t)near[k]) <= 0;
         if (is_across && manners[widening->way].is_one_sided) continue;
         if (!to->count) scale = dist_sq[k] + 1e-12f;
@@ -158,11 +156,11 @@ static npg_status find_around(way_back *w)
     size_t v = m->vert_count;
     float *normals = npg_arena_take(&scratch, v, 3 * sizeof *normals);
     npg_status status = npg_neighbours_take(&near, &scratch, w->widening->shifted, w->widening->count,
-                                            m->vert_pos, v, BACK_AMONG);
+                                            m->vert_pos, v, NPG_POINTS_ASKED);
     if (!status) npg_mesh_vertex_normals(normals, m->vert_pos, v, m->faces, m->face_count);
     for (size_t i = 0; i < v && !status; i++)
-        choose_around(&w->of[i], normals + 3 * i, near.index + BACK_AMONG * i, near.dist_sq + BACK_AMONG * i,
-                      w->widening);
+        choose_around(&w->of[i], normals + 3 * i, near.index + NPG_POINTS_ASKED * i,
+                      near.dist_sq + NPG_POINTS_ASKED * i, w->widening);
     npg_arena_release(&scratch);
     return status;
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "geometry/geometry.h"
+#include "pipeline/order.h"
 
 typedef struct filling {
     npg_loop loop;
@@ -15,18 +16,11 @@ typedef struct filling {
     uint16_t *third; /* n x n: the corner of the triangle on i and j          */
 } filling;
 
-static int by_pair(const void *a, const void *b)
-{
-    const uint32_t *x = a, *y = b;
-    if (x[0] != y[0]) return x[0] < y[0] ? -1 : 1;
-    return x[1] < y[1] ? -1 : x[1] > y[1];
-}
-
 static bool is_edge(const filling *f, size_t i, size_t j)
 {
     uint32_t a = f->loop.verts[i], b = f->loop.verts[j];
     uint32_t pair[2] = {a < b ? a : b, a < b ? b : a};
-    return bsearch(pair, f->edges, f->edge_count, sizeof *f->edges, by_pair) != NULL;
+    return bsearch(pair, f->edges, f->edge_count, sizeof *f->edges, npg_order_pair) != NULL;
 }
 
 static void find_third(filling *f, size_t i, size_t j)

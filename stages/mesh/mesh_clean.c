@@ -11,6 +11,8 @@
 
 #define SPACING_NEIGHBOUR 8
 #define SPACING_ASKED     20000 /* points at most that are asked for their neighbours */
+#define PIECE_SHARE       0.01  /* of the area: a piece that may belong to the body ... */
+#define PIECE_DIST        0.1   /* ... of this size: so near the largest, does          */
 
 npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
                            size_t point_count)
@@ -116,7 +118,7 @@ static npg_status find_near(uint8_t *is_near, const npg_mesh *mesh, const uint32
 
 /* is_kept of each component: the largest, and what is near it. */
 static npg_status choose_pieces(uint8_t *is_kept, double *area, const npg_mesh *mesh, size_t count,
-                                const uint32_t *component_of, double share_min, double dist_max)
+                                const uint32_t *component_of, double size)
 {
     double total = 0;
     size_t largest = 0;
@@ -128,13 +130,14 @@ static npg_status choose_pieces(uint8_t *is_kept, double *area, const npg_mesh *
         total += area[i];
         if (area[i] > area[largest]) largest = i;
     }
-    if (dist_max > 0 && count > 1)
-        NPG_TRY(find_near(is_kept, mesh, component_of, area, largest, share_min * total, dist_max));
+    if (size > 0 && count > 1)
+        NPG_TRY(
+            find_near(is_kept, mesh, component_of, area, largest, PIECE_SHARE * total, PIECE_DIST * size));
     is_kept[largest] = 1;
     return NPG_OK;
 }
 
-npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max)
+npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double size)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     size_t v = (*mesh)->vert_count, face_count = (*mesh)->face_count;
@@ -147,8 +150,7 @@ npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_
     double *area = npg_arena_take(&scratch, pieces->found, sizeof *area);
     uint8_t *is_kept = npg_arena_take(&scratch, pieces->found, 1);
     if (!status) status = npg_arena_status(&scratch);
-    if (!status)
-        status = choose_pieces(is_kept, area, *mesh, pieces->found, component_of, share_min, dist_max);
+    if (!status) status = choose_pieces(is_kept, area, *mesh, pieces->found, component_of, size);
     for (size_t i = 0; i < pieces->found && !status; i++) pieces->kept += is_kept[i];
     for (size_t f = 0; f < face_count && !status; f++)
         keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];

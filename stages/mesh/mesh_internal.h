@@ -88,6 +88,8 @@ typedef struct npg_reconstruct_settings {
 npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *worker, npg_point_set *set,
                            const npg_reconstruct_settings *settings);
 
+#define NPG_POINTS_ASKED 16 /* nearest points that a vertex or a face asks; set by trial */
+
 /* Gap widening: keep parts of a body that nearly touch from being joined by the reconstruction.
  *
  * Poisson closes a gap that is narrower than the points are apart, and a false bridge once made stretches into

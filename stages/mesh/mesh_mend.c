@@ -6,9 +6,8 @@
 #include "geometry/geometry.h"
 #include "mesh/mesh_internal.h"
 
-#define SMOOTH_ROUNDS 12
-#define MEND_ROUNDS   12
-#define HOLE_MAX      32 /* edges of a hole that is filled */
+#define ROUNDS   12 /* of smoothing folds, and of all of it */
+#define HOLE_MAX 32 /* edges of a hole that is filled       */
 
 /* ---- duplicate and degenerate faces ---- */
 
@@ -356,7 +355,7 @@ static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
     npg_status status = npg_arena_status(&scratch);
     *left = status ? 0 : find_flipped(is_flipped, sum, mesh);
     done->flipped += *left;
-    for (int round = 0; round < SMOOTH_ROUNDS && *left; round++) {
+    for (int round = 0; round < ROUNDS && *left; round++) {
         smooth_round(mesh, is_flipped, sum, weight);
         *left = find_flipped(is_flipped, sum, mesh);
     }
@@ -399,7 +398,7 @@ static npg_status drop_crowded(npg_mesh **mesh, npg_mending *done, size_t *dropp
 npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done)
 {
     memset(done, 0, sizeof *done);
-    for (int round = 0; round < MEND_ROUNDS; round++) {
+    for (int round = 0; round < ROUNDS; round++) {
         size_t dropped, left;
         NPG_TRY(drop_faces(mesh, done));
         if (!(*mesh)->face_count) break;

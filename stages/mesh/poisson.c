@@ -6,10 +6,10 @@
 
 #include "geometry/geometry.h"
 #include "mesh/poisson_wire.h"
+#include "outlier/normals.h"
 #include "pipeline/child.h"
 #include "pipeline/frame_box.h"
 
-#define POINTS_MIN       16
 #define NEIGHBOURS       9   /* the point itself and 8 more */
 #define DISAGREEMENT_MAX 0.2 /* alternating normals have 0.5, a good cloud below 0.01 */
 #define BOX_GROWTH_MAX   2.5 /* the mesh's diagonal in diagonals of the points' box */
@@ -84,9 +84,9 @@ npg_status npg_normals_disagreement(double *share, const float *points, const fl
 npg_status npg_poisson_check(const float *points, const float *normals, size_t point_count)
 {
     double share;
-    if (point_count < POINTS_MIN)
+    if (point_count < NPG_SURFACE_POINTS)
         return npg_error(NPG_BAD_INPUT, "%zu points are too few for a surface, it takes %d", point_count,
-                         POINTS_MIN);
+                         NPG_SURFACE_POINTS);
     NPG_TRY(check_finite(points, normals, point_count));
     NPG_TRY(check_extent(points, point_count));
     NPG_TRY(check_spread(normals, point_count));

@@ -13,8 +13,6 @@
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define GROWING_DEPTH     8    /* of the octree while the reference grows: it is to carry frames, no more */
-#define PIECE_SHARE       0.01 /* of the area */
-#define PIECE_DIST        0.1  /* in diagonals */
 #define TRIM_DIST         0.15 /* in diagonals: surface farther from every point is none of the body's */
 #define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
 #define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
@@ -53,7 +51,7 @@ static npg_status smooth(reconstruction *r)
 }
 
 /* Poisson through the points and what lies between those of thin parts. */
-static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned, int *rounds,
+static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned,
                                const npg_poisson_settings *settings)
 {
     npg_point_set *p = r->set;
@@ -61,12 +59,12 @@ static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned,
     size_t count;
     /* noisy normals do not say what lies between, nor those that were estimated across both sides */
     if (r->is_rough || !p->has_given_normals)
-        return npg_resurface_widened(&r->mesh, moved, turned, rounds, p->normals, p->points, p->count,
-                                     p->spacing, settings);
+        return npg_resurface_widened(&r->mesh, moved, turned, p->normals, p->points, p->count, p->spacing,
+                                     settings);
     NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
     npg_mesh_note_count(r->worker, "points_between", count - p->count);
     npg_status status =
-        npg_resurface_widened(&r->mesh, moved, turned, rounds, normals, points, count, p->spacing, settings);
+        npg_resurface_widened(&r->mesh, moved, turned, normals, points, count, p->spacing, settings);
     if (!status) memcpy(p->normals, normals, 3 * p->count * sizeof *normals); /* their sides are mended */
     npg_release(&points);
     npg_release(&normals);
@@ -79,15 +77,12 @@ static npg_status draw_surface(reconstruction *r)
     npg_poisson_settings settings = r->settings->poisson;
     if (npg_worker_facts(r->worker)->brief.is_growing && settings.depth > GROWING_DEPTH)
         settings.depth = GROWING_DEPTH;
-    if (p->is_fused) settings.rounds_max = 1; /* the surface that carried them has told their sides */
     if (!p->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t turned, moved;
-    int rounds;
     NPG_TRY(smooth(r));
-    NPG_TRY(draw_through(r, &moved, &turned, &rounds, &settings));
+    NPG_TRY(draw_through(r, &moved, &turned, &settings));
     npg_mesh_note_count(r->worker, "points_held_apart", moved);
-    npg_mesh_note_count(r->worker, "poisson_rounds", (size_t)rounds);
     npg_mesh_note_count(r->worker, "normals_turned", turned);
     npg_mesh_note(r->worker, "poisson_s", npg_clock_s() - since);
     npg_mesh_note_count(r->worker, "faces_reconstructed", r->mesh->face_count);
@@ -99,7 +94,7 @@ static npg_status draw_surface(reconstruction *r)
 static npg_status keep_main(reconstruction *r, const char *when)
 {
     npg_pieces pieces;
-    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, PIECE_SHARE, PIECE_DIST * r->set->diagonal));
+    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, r->set->diagonal));
     npg_mesh_note_count(r->worker, "components", pieces.kept);
     if (pieces.kept > 1)
         npg_mesh_warn(r->worker, false, r->set->key_number,

@@ -1,4 +1,4 @@
-/* Resurface: Poisson again and again, until points and surface agree on which side is out. */
+/* Resurface: Poisson twice, with the sides that the first surface says. */
 #include "mesh/mesh_internal.h"
 
 #include <math.h>
@@ -6,12 +6,6 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-
-#define ROUNDS_MAX  4
-#define DRAFT_DEPTH 7      /* of the reconstructions that only serve the normals */
-#define SETTLED     0.0005 /* share of turned normals that ends it */
-#define ALMOST      0.002  /* the same where a draft is all that is wanted */
-#define RESTLESS    0.005  /* share that ends it when a round turns no fewer than the one before */
 
 /* The side of the surface at its point nearest to p, against n: smoothed normals, weighted by the hit. */
 static float side_at(const npg_mesh *mesh, const npg_surface_hit *hit, const float *n)
@@ -40,55 +34,31 @@ static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh
     return status;
 }
 
-/* A surface that only serves the normals. */
-static npg_status draft(npg_mesh **mesh, size_t *turned, float *normals, const float *points, size_t n,
-                        const npg_poisson_settings *settings)
+npg_status npg_resurface(npg_mesh **mesh, size_t *turned, float *normals, const float *points, size_t n,
+                         const npg_poisson_settings *settings)
 {
     npg_poisson_settings quick = *settings;
-    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    if (quick.depth > NPG_DRAFT_DEPTH) quick.depth = NPG_DRAFT_DEPTH;
     NPG_TRY(npg_poisson(mesh, points, normals, n, &quick));
     npg_status status = npg_mesh_make_normals(*mesh);
     if (!status) status = turn_to_surface(turned, normals, *mesh, points, n);
     npg_release(&(*mesh)->vert_normals);
-    if (status) npg_mesh_unref(mesh);
-    return status;
+    bool is_draft_alone = settings->depth <= NPG_DRAFT_DEPTH;
+    if (status || !is_draft_alone) npg_mesh_unref(mesh);
+    return status || is_draft_alone ? status : npg_poisson(mesh, points, normals, n, settings);
 }
 
-npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *normals, const float *points,
-                         size_t point_count, const npg_poisson_settings *settings)
-{
-    size_t now = point_count, before = SIZE_MAX;
-    bool is_draft = settings->depth <= DRAFT_DEPTH;
-    double settled = (is_draft ? ALMOST : SETTLED) * (double)point_count;
-    int rounds_max = settings->rounds_max ? settings->rounds_max : ROUNDS_MAX;
-    *mesh = NULL;
-    *turned = 0;
-    for (*rounds = 0; *rounds < rounds_max && (double)now > settled; ++*rounds) {
-        if (now >= before && (double)now < RESTLESS * (double)point_count) break;
-        before = now;
-        npg_mesh_unref(mesh);
-        NPG_TRY(draft(mesh, &now, normals, points, point_count, settings));
-        *turned += now;
-    }
-    /* the last draft is as good, or good enough for who asked for so many */
-    if (is_draft && ((double)now <= settled || settings->rounds_max)) return NPG_OK;
-    npg_mesh_unref(mesh);
-    ++*rounds;
-    return npg_poisson(mesh, points, normals, point_count, settings);
-}
-
-npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
+npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals,
                                  const float *points, size_t n, double spacing,
                                  const npg_poisson_settings *settings)
 {
     npg_gap_widening gaps;
     *mesh = NULL;
     *moved = 0;
-    if (settings->gaps == NPG_GAPS_KEPT)
-        return npg_resurface(mesh, turned, rounds, normals, points, n, settings);
+    if (settings->gaps == NPG_GAPS_KEPT) return npg_resurface(mesh, turned, normals, points, n, settings);
     NPG_TRY(npg_gaps_widen(&gaps, points, normals, n, spacing, settings->gaps));
     *moved = gaps.moved;
-    npg_status status = npg_resurface(mesh, turned, rounds, normals, gaps.shifted, n, settings);
+    npg_status status = npg_resurface(mesh, turned, normals, gaps.shifted, n, settings);
     if (!status) status = npg_gaps_bring_back(&gaps, *mesh);
     if (status) npg_mesh_unref(mesh);
     npg_gaps_close(&gaps);

@@ -46,8 +46,7 @@ typedef enum npg_gap_way { NPG_GAPS_TIGHT, NPG_GAPS_LOOSE, NPG_GAPS_KEPT } npg_g
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                     */
     double point_weight; /* of the screening term, 10             */
-    int rounds_max;      /* npg_resurface(): drafts at most; 0: 4 */
-    npg_gap_way gaps;    /* npg_resurface_widened(): how            */
+    npg_gap_way gaps;    /* npg_resurface_widened(): how          */
     double time_limit_s;
     size_t memory_limit; /* bytes of address space of the child; 0: none */
     const char *program; /* NULL: neupig-poisson                         */
@@ -74,21 +73,23 @@ npg_status npg_poisson_check(const float *points, const float *normals, size_t p
 npg_status npg_normals_disagreement(double *share, const float *points, const float *normals,
                                     size_t point_count);
 
-/* Resurface: Poisson again and again, until points and surface agree on which side is out.
+/* Resurface: Poisson twice, with the sides of normals that the first surface says.
  *
  * Where a patch of normals is on the wrong side, the surface that Poisson draws through it faces the other
  * way at many of its points: those take the surface's side and the next surface is better.  Based on: F. Hou
  * et al., Iterative Poisson Surface Reconstruction (iPSR) for Unoriented Points, 2022.  We turn normals only,
- * begin from oriented ones, and keep what fits the points best. */
+ * and begin from oriented ones: one coarse surface is enough. */
 
-/* As npg_poisson(), with normals (N x 3) mended in place; *turned counts the normals whose side changed,
- * *rounds the reconstructions done. */
-npg_status npg_resurface(npg_mesh **mesh, size_t *turned, int *rounds, float *normals, const float *points,
+#define NPG_DRAFT_DEPTH 7 /* of the octree of surfaces that are looked at, and not delivered */
+
+/* As npg_poisson(), with normals (N x 3) mended in place; *turned counts the normals whose side changed.  The
+ * first surface has NPG_DRAFT_DEPTH, and is the last where no more is asked for. */
+npg_status npg_resurface(npg_mesh **mesh, size_t *turned, float *normals, const float *points,
                          size_t point_count, const npg_poisson_settings *settings);
 
 /* The same, with parts that nearly touch kept from being joined (gap widening); *moved counts the points that
  * were moved for it.  spacing: npg_cloud_spacing(). */
-npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, int *rounds, float *normals,
+npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals,
                                  const float *points, size_t point_count, double spacing,
                                  const npg_poisson_settings *settings);
 
@@ -146,10 +147,10 @@ typedef struct npg_pieces {
     double lost_share;  /* share of the area that went */
 } npg_pieces;
 
-/* Keep the component of the largest area, and those with at least share_min of all area that come within
- * dist_max of it (a hand that a hole in the points cuts off belongs to the body; a ball beside it does not).
- * dist_max 0: the largest alone.  A mesh without faces stays as it is. */
-npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double share_min, double dist_max);
+/* Keep the component of the largest area, and those with a hundredth of all area that come within a tenth of
+ * `size` of it (a hand that a hole in the points cuts off belongs to the body; a ball beside it does not).
+ * size 0: the largest alone.  A mesh without faces stays as it is. */
+npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double size);
 
 /* At most face_max faces, by edge collapse (meshoptimizer). */
 npg_status npg_mesh_decimate(npg_mesh **mesh, size_t face_max);

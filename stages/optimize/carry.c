@@ -5,18 +5,15 @@
 
 npg_status npg_carriers_bind(npg_carrier *carriers, const npg_mesh *coarse, const float *points, size_t count)
 {
-    npg_surface *rest;
     npg_surface_hit *hits;
-    NPG_TRY(npg_surface_open(&rest, coarse->vert_pos, coarse->vert_count, coarse->faces, coarse->face_count));
-    npg_status status = npg_alloc_array(&hits, NPG_FOR_FIT, count, sizeof *hits);
-    if (!status) status = npg_surface_closest_near(rest, hits, points, count, NULL, NULL, 0);
+    NPG_TRY(npg_alloc_array(&hits, NPG_FOR_FIT, count, sizeof *hits));
+    npg_status status = npg_mesh_closest(hits, coarse, points, count);
     for (size_t i = 0; i < count && !status; i++)
         for (size_t c = 0; c < 3; c++) {
             carriers[i].vertex[c] = coarse->faces[3 * (size_t)hits[i].face + c];
             carriers[i].share[c] = hits[i].weights[c];
         }
     npg_release(&hits);
-    npg_surface_close(&rest);
     return status;
 }
 

@@ -18,20 +18,20 @@ static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t inde
     snprintf(name, NPG_BLOCK_NAME, "%s.%lld", what, (long long)index);
 }
 
-enum { ARRAYS = 5 };
+static const struct {
+    const char *name;
+    size_t offset, row;
+    bool is_of_points;
+} arrays[] = {{"points", offsetof(npg_held, frame.pos_local), 12, true},
+              {"normals", offsetof(npg_held, frame.normals), 12, true},
+              {"colours", offsetof(npg_held, frame.colours), 4, true},
+              {"aligned", offsetof(npg_held, frame.vert_unit), 12, false},
+              {"solved", offsetof(npg_held, solved), 12, false}};
+enum { ARRAYS = sizeof arrays / sizeof *arrays };
 
 static void list_arrays(npg_store_array list[ARRAYS], const npg_frame *frame, size_t vert_count)
 {
-    static const struct {
-        const char *name;
-        size_t offset, row;
-        bool is_of_points;
-    } arrays[ARRAYS] = {{"points", offsetof(npg_held, frame.pos_local), 12, true},
-                        {"normals", offsetof(npg_held, frame.normals), 12, true},
-                        {"colours", offsetof(npg_held, frame.colours), 4, true},
-                        {"aligned", offsetof(npg_held, frame.vert_unit), 12, false},
-                        {"solved", offsetof(npg_held, solved), 12, false}};
-    for (int i = 0; i < ARRAYS; i++) {
+    for (size_t i = 0; i < ARRAYS; i++) {
         block_name(list[i].name, arrays[i].name, frame->index);
         list[i].offset = arrays[i].offset;
         list[i].row = arrays[i].row;
@@ -44,14 +44,14 @@ static void list_arrays(npg_store_array list[ARRAYS], const npg_frame *frame, si
 static npg_status put_frame(npg_store *out, const npg_held *held, size_t vert_count)
 {
     const npg_frame *f = &held->frame;
-    npg_store_array arrays[ARRAYS];
+    npg_store_array list[ARRAYS];
     char name[NPG_BLOCK_NAME];
     npg_frame bare = npg_frame_bare(f);
     bare.sensor_count = 0;
     block_name(name, "frame", f->index);
     NPG_TRY(npg_store_put(out, name, &bare, sizeof bare));
-    list_arrays(arrays, f, vert_count);
-    NPG_TRY(npg_store_put_arrays(out, held, arrays, ARRAYS));
+    list_arrays(list, f, vert_count);
+    NPG_TRY(npg_store_put_arrays(out, held, list, ARRAYS));
     block_name(name, "path", f->index);
     return f->path ? npg_store_put(out, name, f->path, strlen(f->path) + 1) : NPG_OK;
 }
@@ -113,14 +113,14 @@ npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_win
 
 static npg_status get_frame(npg_held *held, const npg_record *in, int64_t index, size_t vert_count)
 {
-    npg_store_array arrays[ARRAYS];
+    npg_store_array list[ARRAYS];
     char name[NPG_BLOCK_NAME];
     size_t size;
     npg_frame *f = &held->frame;
     block_name(name, "frame", index);
     NPG_TRY(npg_record_get(in, name, f, sizeof *f));
-    list_arrays(arrays, f, vert_count);
-    NPG_TRY(npg_record_get_arrays(in, held, arrays, ARRAYS, NPG_FOR_FRAMES));
+    list_arrays(list, f, vert_count);
+    NPG_TRY(npg_record_get_arrays(in, held, list, ARRAYS, NPG_FOR_FRAMES));
     if (!held->solved) return npg_error(NPG_BAD_INPUT, "frame %lld is not solved", (long long)index);
     block_name(name, "path", index);
     const char *path = npg_record_find(in, name, &size);

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
@@ -24,8 +23,7 @@ struct npg_energy {
     npg_mesh *mesh; /* counted reference */
     uint32_t (*edges)[2];
     size_t edge_count;
-    npg_edge_ring ring;
-    npg_arena rings;
+    npg_mesh_neighbours ring;
     size_t threads;
     npg_point_matcher matchers[THREADS_MAX];
     npg_arena window; /* holds what follows, of the window at work */
@@ -48,7 +46,7 @@ void npg_energy_close(npg_energy **slot)
     npg_energy *e = *slot;
     for (size_t i = 0; i < THREADS_MAX; i++) npg_point_matcher_close(&e->matchers[i]);
     npg_arena_release(&e->window);
-    npg_arena_release(&e->rings);
+    npg_mesh_neighbours_close(&e->ring);
     npg_release(&e->edges);
     npg_mesh_unref(&e->mesh);
     npg_release(slot);
@@ -58,8 +56,7 @@ static npg_status open_parts(npg_energy *e)
 {
     const npg_mesh *mesh = e->mesh;
     NPG_TRY(npg_mesh_edges(&e->edges, &e->edge_count, mesh->faces, mesh->face_count));
-    NPG_TRY(npg_edge_ring_take(&e->ring, &e->rings, (const uint32_t(*)[2])e->edges, e->edge_count,
-                               mesh->vert_count));
+    NPG_TRY(npg_mesh_neighbours_open(&e->ring, mesh));
     e->threads = npg_parallel_parts(THREADS_MAX, 1, THREADS_MAX);
     for (size_t i = 0; i < e->threads; i++)
         NPG_TRY(npg_point_matcher_open(&e->matchers[i], mesh, (size_t)e->settings.points));
@@ -72,7 +69,7 @@ npg_status npg_energy_open(npg_energy **out, npg_mesh *surface, const npg_energy
     *out = NULL;
     NPG_TRY(npg_alloc(&e, NPG_FOR_FIT, sizeof *e));
     e->settings = *settings;
-    e->rings.purpose = e->window.purpose = NPG_FOR_FIT;
+    e->window.purpose = NPG_FOR_FIT;
     e->mesh = npg_mesh_ref(surface);
     npg_status status = open_parts(e);
     if (status) npg_energy_close(&e);

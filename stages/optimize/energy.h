@@ -3,7 +3,7 @@
 
 #include <stdbool.h>
 
-#include "pipeline/mesh.h"
+#include "geometry/geometry.h"
 
 /* Energy: what a window of aligned frames is moved by: the points of all of them at once.
  *
@@ -135,14 +135,9 @@ typedef struct npg_point_pull {
     float strength;
 } npg_point_pull;
 
-/* Neighbours of each vertex by its edges. */
-typedef struct npg_edge_ring {
-    uint32_t *start, *neighbour; /* W + 1, 2 E */
-} npg_edge_ring;
-
 typedef struct npg_energy_system {
     size_t frame_count, vert_count; /* T, W */
-    npg_edge_ring ring;             /* loan */
+    npg_mesh_neighbours ring;       /* loan */
     const float *lambda;            /* W: bend of the motion, times points per vertex; loan */
     double shape;                   /* weight of an edge                            */
     const npg_point_pull *pulls;    /* `most` per frame; loan */
@@ -158,10 +153,6 @@ void npg_energy_multiply(float *image, const npg_energy_system *system, const fl
 
 /* image_t += the part of the bend in time: sum_s B_ts lambda_v x_s, B = D^T D. */
 void npg_energy_bend(float *image, const npg_energy_system *system, const float *x, size_t t, float sign);
-
-/* Rings of a mesh's edges, from an arena. */
-npg_status npg_edge_ring_take(npg_edge_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
-                              size_t edge_count, size_t vert_count);
 
 /* Match: a frame's points and the places of the surface that they pull at. */
 

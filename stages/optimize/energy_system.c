@@ -3,22 +3,6 @@
 
 #include "optimize/energy.h"
 
-npg_status npg_edge_ring_take(npg_edge_ring *ring, npg_arena *arena, const uint32_t (*edges)[2],
-                              size_t edge_count, size_t vert_count)
-{
-    ring->start = npg_arena_take(arena, vert_count + 2, sizeof *ring->start);
-    ring->neighbour = npg_arena_take(arena, 2 * edge_count + 1, sizeof *ring->neighbour);
-    NPG_TRY(npg_arena_status(arena));
-    uint32_t *at = ring->start + 1; /* shifted by one while it is filled */
-    for (size_t e = 0; e < 2 * edge_count; e++) at[edges[e / 2][e % 2] + 1]++;
-    for (size_t v = 0; v < vert_count; v++) at[v + 1] += at[v];
-    for (size_t e = 0; e < 2 * edge_count; e++)
-        ring->neighbour[at[edges[e / 2][e % 2]]++] = edges[e / 2][1 - e % 2];
-    return NPG_OK;
-}
-
-/* ---- products ---- */
-
 /* Row t of B = D^T D for T frames: coefficient of frame t + k, k = -2 .. 2. */
 static float bend_of(size_t frames, size_t t, int k)
 {
@@ -52,7 +36,7 @@ static void add_shape(float *restrict image, const npg_energy_system *s, const f
         float degree = (float)(s->ring.start[v + 1] - s->ring.start[v]);
         float sum[3] = {degree * x[3 * v], degree * x[3 * v + 1], degree * x[3 * v + 2]};
         for (uint32_t k = s->ring.start[v]; k < s->ring.start[v + 1]; k++) {
-            const float *other = x + 3 * (size_t)s->ring.neighbour[k];
+            const float *other = x + 3 * (size_t)s->ring.of[k];
             for (int a = 0; a < 3; a++) sum[a] -= other[a];
         }
         for (size_t a = 0; a < 3; a++) image[3 * v + a] += shape * sum[a];

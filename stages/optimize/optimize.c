@@ -23,15 +23,12 @@ typedef struct state {
     const npg_solver *row;
     npg_device *device;
     npg_window_solver *solver;
-    npg_held *held; /* owned, with what they own; in order of arrival */
-    size_t held_count, held_capacity;
+    npg_hand hand; /* held frames in order of arrival; window_at: the one at work */
     npg_window window;
-    int64_t window_at, window_count;
-    int64_t total; /* frames of the capture, -1 until the stream has ended */
+    int64_t window_count;
     npg_window_result result;
     npg_solver_step last_step; /* of the window at work */
-    int64_t emitted;
-    double saved_s, saving_s; /* when the last state was written, and how long that took */
+    double saved_s, saving_s;  /* when the last state was written, and how long that took */
 } state;
 
 /* ---- options ---- */
@@ -156,7 +153,7 @@ static npg_status open_device(npg_worker *worker)
 static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    s->total = -1;
+    s->hand.total = -1;
     s->row = npg_solver_of(worker);
     NPG_TRY(check_widths(&s->settings.grid));
     NPG_TRY(refuse_unused(worker, s->row));
@@ -175,16 +172,16 @@ static void uninit(npg_worker *worker)
     state *s = npg_worker_state(worker);
     npg_window_solver_close(&s->solver);
     npg_device_close(&s->device);
-    for (size_t i = 0; i < s->held_count; i++) clear_held(&s->held[i]);
-    npg_release(&s->held);
+    for (size_t i = 0; i < s->hand.held_count; i++) clear_held(&s->hand.held[i]);
+    npg_release(&s->hand.held);
 }
 
 static npg_status open_solver(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    s->window_count = npg_plan_window_count(&facts->plan, s->total);
-    s->window = npg_plan_window(&facts->plan, 0, s->total);
+    s->window_count = npg_plan_window_count(&facts->plan, s->hand.total);
+    s->window = npg_plan_window(&facts->plan, 0, s->hand.total);
     s->saved_s = npg_clock_s();
     return npg_window_solver_open(&s->solver, s->row, s->device, &s->settings, facts,
                                   (uint64_t)npg_worker_settings(worker)->seed);
@@ -194,8 +191,8 @@ static npg_status open_solver(npg_worker *worker)
 
 static npg_held *held_frame(state *s, int64_t index)
 {
-    for (size_t i = 0; i < s->held_count; i++)
-        if (s->held[i].frame.index == index) return &s->held[i];
+    for (size_t i = 0; i < s->hand.held_count; i++)
+        if (s->hand.held[i].frame.index == index) return &s->hand.held[i];
     return NULL;
 }
 
@@ -210,12 +207,12 @@ static bool window_is_complete(state *s)
 static void report_progress(npg_worker *worker, const npg_solver_step *step, double of_window)
 {
     state *s = npg_worker_state(worker);
-    npg_progress progress = {.share = ((double)s->window_at + of_window) / (double)s->window_count,
+    npg_progress progress = {.share = ((double)s->hand.window_at + of_window) / (double)s->window_count,
                              .step = step->step + 1,
                              .steps = step->steps,
-                             .window = s->window_at,
+                             .window = s->hand.window_at,
                              .windows = s->window_count,
-                             .frames_done = s->emitted,
+                             .frames_done = s->hand.emitted,
                              .frames = npg_worker_facts(worker)->frame_count,
                              .loss = step->loss};
     npg_worker_progress(worker, &progress);
@@ -230,8 +227,8 @@ static npg_status watch(void *user, const npg_solver_step *step)
     s->last_step = *step;
     report_progress(worker, step, (double)(step->step + 1) / (double)step->steps);
     if (step->step % 25 == 0 || step->step + 1 == step->steps)
-        npg_worker_log(worker, NPG_LOG_DEBUG, -1, "window %lld step %lld: loss %.4g", (long long)s->window_at,
-                       (long long)step->step, step->loss);
+        npg_worker_log(worker, NPG_LOG_DEBUG, -1, "window %lld step %lld: loss %.4g",
+                       (long long)s->hand.window_at, (long long)step->step, step->loss);
     if (npg_window_keeps_inside(s->solver)) NPG_TRY(keep_inside(worker));
     return npg_worker_stopping(worker) ? NPG_STOPPED : NPG_OK;
 }
@@ -245,11 +242,11 @@ static void note_result(npg_worker *worker)
             worker, NPG_LOG_INFO, -1,
             "window %lld: %s fit in %lld steps: points %.5f off, vertices moved by %.5f in the mean, "
             "energy %.4f of the smoothed poses'",
-            (long long)s->window_at, s->row->name, (long long)r->solved.steps, r->noise, r->moved,
+            (long long)s->hand.window_at, s->row->name, (long long)r->solved.steps, r->noise, r->moved,
             r->solved.energy);
     else
         npg_worker_log(worker, NPG_LOG_INFO, -1, "window %lld: Chamfer distance %.4g, edges changed by %.4g",
-                       (long long)s->window_at, r->solved.distance, r->solved.isometry);
+                       (long long)s->hand.window_at, r->solved.distance, r->solved.isometry);
 }
 
 static npg_status solve_window(npg_worker *worker)
@@ -266,7 +263,7 @@ static npg_status solve_window(npg_worker *worker)
         note_result(worker);
         report_progress(worker, &s->last_step, 1);
     }
-    return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->window_at,
+    return npg_error_prefix(status, "window %lld (frames %lld to %lld)", (long long)s->hand.window_at,
                             (long long)s->window.first, (long long)s->window.last);
 }
 
@@ -276,7 +273,7 @@ static bool is_needed_later(npg_worker *worker, int64_t index)
 {
     state *s = npg_worker_state(worker);
     const npg_plan *plan = &npg_worker_facts(worker)->plan;
-    return npg_plan_is_needed_after(plan, index, s->window_at, s->total);
+    return npg_plan_is_needed_after(plan, index, s->hand.window_at, s->hand.total);
 }
 
 /* Pass a solved frame on; its vertices are now the solved ones. */
@@ -291,7 +288,7 @@ static npg_status emit(npg_worker *worker, npg_held *held)
     held->frame.fields |= NPG_FIELD_VERTICES;
     held->solved = NULL;
     npg_chunk_add(chunk, &held->frame);
-    s->emitted++;
+    s->hand.emitted++;
     npg_status status = npg_worker_push(worker, &chunk);
     npg_chunk_close(&chunk);
     return status;
@@ -302,18 +299,18 @@ static npg_status emit_done(npg_worker *worker)
     state *s = npg_worker_state(worker);
     size_t kept = 0;
     npg_status status = NPG_OK;
-    for (size_t i = 0; i < s->held_count; i++) {
-        npg_held *held = &s->held[i];
+    for (size_t i = 0; i < s->hand.held_count; i++) {
+        npg_held *held = &s->hand.held[i];
         if (!status && held->solved && !is_needed_later(worker, held->frame.index)) {
             status = emit(worker, held);
             clear_held(held);
         } else {
             npg_held moved = *held;
             memset(held, 0, sizeof *held);
-            s->held[kept++] = moved;
+            s->hand.held[kept++] = moved;
         }
     }
-    s->held_count = kept;
+    s->hand.held_count = kept;
     return status;
 }
 
@@ -326,8 +323,9 @@ static npg_status save_state(npg_worker *worker, bool is_inside)
     state *s = npg_worker_state(worker);
     double begun_s = npg_clock_s();
     if (!npg_job_of(worker)) return NPG_OK;
-    const npg_hand hand = {s->held,    s->held_count, s->held_capacity, s->window_at - is_inside,
-                           s->emitted, s->total,      s->result.solved};
+    npg_hand hand = s->hand;
+    hand.window_at -= is_inside;
+    hand.last = s->result.solved;
     NPG_TRY(npg_checkpoint_save(worker, &hand, s->solver, is_inside));
     s->saved_s = npg_clock_s();
     s->saving_s = s->saved_s - begun_s;
@@ -347,32 +345,26 @@ static npg_status resume(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    npg_hand hand = {0};
-    npg_status status = npg_checkpoint_restore(worker, &hand);
-    s->held = hand.held;
-    s->held_count = hand.held_count;
-    s->held_capacity = hand.held_capacity;
-    s->emitted = hand.emitted;
-    s->result.solved = hand.last;
-    s->total = hand.total;
+    npg_status status = npg_checkpoint_restore(worker, &s->hand);
+    s->result.solved = s->hand.last;
     if (!status) status = open_solver(worker);
     if (!status) status = npg_window_restore(s->solver, npg_job_state(npg_job_of(worker)));
     if (status) return npg_error_prefix(status, "the state to resume from");
-    s->window_at = hand.window_at;
-    if (s->window_at >= 0) NPG_TRY(emit_done(worker));
-    if (++s->window_at < s->window_count) s->window = npg_plan_window(&facts->plan, s->window_at, s->total);
+    if (s->hand.window_at >= 0) NPG_TRY(emit_done(worker));
+    if (++s->hand.window_at < s->window_count)
+        s->window = npg_plan_window(&facts->plan, s->hand.window_at, s->hand.total);
     return NPG_OK;
 }
 
 static npg_status solve_complete_windows(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
-    while (s->window_at < s->window_count && window_is_complete(s)) {
+    while (s->hand.window_at < s->window_count && window_is_complete(s)) {
         NPG_TRY(solve_window(worker));
         NPG_TRY(save_state(worker, false));
         NPG_TRY(emit_done(worker));
-        if (++s->window_at < s->window_count)
-            s->window = npg_plan_window(&npg_worker_facts(worker)->plan, s->window_at, s->total);
+        if (++s->hand.window_at < s->window_count)
+            s->window = npg_plan_window(&npg_worker_facts(worker)->plan, s->hand.window_at, s->hand.total);
     }
     return NPG_OK;
 }
@@ -382,9 +374,10 @@ static npg_status solve_the_rest(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    s->total = facts->frame_count;
-    s->window_count = npg_plan_window_count(&facts->plan, s->total);
-    if (s->window_at < s->window_count) s->window = npg_plan_window(&facts->plan, s->window_at, s->total);
+    s->hand.total = facts->frame_count;
+    s->window_count = npg_plan_window_count(&facts->plan, s->hand.total);
+    if (s->hand.window_at < s->window_count)
+        s->window = npg_plan_window(&facts->plan, s->hand.window_at, s->hand.total);
     NPG_TRY(solve_complete_windows(worker));
     return emit_done(worker);
 }
@@ -395,10 +388,11 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
     size_t count = npg_chunk_count(*chunk);
     if (count && !s->solver) NPG_TRY(open_solver(worker));
-    NPG_TRY(npg_grow(&s->held, &s->held_capacity, s->held_count + count, sizeof *s->held, NPG_FOR_FRAMES));
+    NPG_TRY(npg_grow(&s->hand.held, &s->hand.held_capacity, s->hand.held_count + count, sizeof *s->hand.held,
+                     NPG_FOR_FRAMES));
     for (size_t i = 0; i < count; i++) {
         npg_frame *frame = npg_chunk_frame(*chunk, i);
-        s->held[s->held_count++] = (npg_held){.frame = *frame};
+        s->hand.held[s->hand.held_count++] = (npg_held){.frame = *frame};
         memset(frame, 0, sizeof *frame);
     }
     npg_chunk_close(chunk);
@@ -410,9 +404,9 @@ static npg_status flush(npg_worker *worker)
     state *s = npg_worker_state(worker);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
     if (npg_plan_is_open(&npg_worker_facts(worker)->plan)) NPG_TRY(solve_the_rest(worker));
-    if (s->held_count)
+    if (s->hand.held_count)
         return npg_error(NPG_FAILED, "window %lld (frames %lld to %lld) did not get all its frames",
-                         (long long)s->window_at, (long long)s->window.first, (long long)s->window.last);
+                         (long long)s->hand.window_at, (long long)s->window.first, (long long)s->window.last);
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "windows", json_integer(s->window_count));
     json_object_set_new(report, "epochs", json_integer(s->settings.epochs));

@@ -46,13 +46,8 @@ static bool aim_view(view *v, const npg_bounds *bounds, const double sensor[3], 
     }
     double distance = v->distance = npg_vec3_length(v->forward);
     if (!(distance > 1.15 * radius)) return false;
-    int least = fabs(v->forward[0]) < fabs(v->forward[1]) ? 0 : 1;
-    if (fabs(v->forward[2]) < fabs(v->forward[least])) least = 2;
-    double axis[3] = {least == 0, least == 1, least == 2};
     npg_vec3_make_unit(v->forward);
-    npg_vec3_cross(v->right, axis, v->forward);
-    npg_vec3_make_unit(v->right);
-    npg_vec3_cross(v->up, v->forward, v->right);
+    npg_vec3_span_plane(v->right, v->up, v->forward);
     v->half_width = radius / sqrt(distance * distance - radius * radius);
     v->cells = (size_t)sqrt((double)point_count / 4); /* four points a cell, if they filled the picture */
     if (v->cells > VIEW_CELLS_MAX) v->cells = VIEW_CELLS_MAX;

@@ -13,12 +13,10 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "outlier/normals.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-#define NEIGHBOURS NPG_NEIGHBOURS
 /* All set by trial. */
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
 #define FOLLOWED       5    /* core points that each other point asks for its side                 */
@@ -34,9 +32,9 @@ static void set_areas(npg_sided_cloud *c, const float *dist_sq)
 {
     double mean = 0;
     for (size_t i = 0; i < c->count; i++) {
-        size_t last = c->count < NEIGHBOURS ? c->count - 1 : NEIGHBOURS - 1;
+        size_t last = c->count < NPG_NEIGHBOURS ? c->count - 1 : NPG_NEIGHBOURS - 1;
         /* The disc that reaches to the last neighbour is the surface of that many points. */
-        c->area[i] = 3.14159265f * dist_sq[NEIGHBOURS * i + last] / (float)last;
+        c->area[i] = 3.14159265f * dist_sq[NPG_NEIGHBOURS * i + last] / (float)last;
         mean += (double)c->area[i] / (double)c->count;
     }
     /* Far outliers have a large disc around them: no point may outweigh many. */
@@ -48,13 +46,13 @@ static npg_status find_neighbours(npg_sided_cloud *c)
 {
     npg_kdtree *tree;
     size_t n = c->count;
-    c->index = npg_arena_take(&c->arena, n, NEIGHBOURS * sizeof *c->index);
+    c->index = npg_arena_take(&c->arena, n, NPG_NEIGHBOURS * sizeof *c->index);
     c->area = npg_arena_take(&c->arena, n, sizeof *c->area);
     c->winding = npg_arena_take(&c->arena, n, sizeof *c->winding);
-    float *dist_sq = npg_arena_take(&c->arena, n, NEIGHBOURS * sizeof *dist_sq);
+    float *dist_sq = npg_arena_take(&c->arena, n, NPG_NEIGHBOURS * sizeof *dist_sq);
     NPG_TRY(npg_arena_status(&c->arena));
     NPG_TRY(npg_kdtree_open(&tree, c->points, n));
-    npg_status status = npg_kdtree_nearest(tree, c->index, dist_sq, c->points, n, NEIGHBOURS, 0);
+    npg_status status = npg_kdtree_nearest(tree, c->index, dist_sq, c->points, n, NPG_NEIGHBOURS, 0);
     if (!status) set_areas(c, dist_sq);
     npg_kdtree_close(&tree);
     return status;
@@ -71,12 +69,12 @@ static int surest_first(const void *left, const void *right)
 
 static npg_status make_links(npg_sided_cloud *c)
 {
-    c->links = npg_arena_take(&c->arena, c->count, NEIGHBOURS * sizeof *c->links);
+    c->links = npg_arena_take(&c->arena, c->count, NPG_NEIGHBOURS * sizeof *c->links);
     NPG_TRY(npg_arena_status(&c->arena));
     c->link_count = 0;
     for (uint32_t i = 0; i < c->count; i++)
-        for (size_t k = 0; k < NEIGHBOURS; k++) {
-            uint32_t j = c->index[NEIGHBOURS * (size_t)i + k];
+        for (size_t k = 0; k < NPG_NEIGHBOURS; k++) {
+            uint32_t j = c->index[NPG_NEIGHBOURS * (size_t)i + k];
             if (j == UINT32_MAX || j == i) continue;
             c->links[c->link_count++] = (npg_link){i, j, agreement(c, i, j)};
         }
@@ -106,8 +104,8 @@ static npg_status face_out(npg_sided_cloud *c)
 static double vote(const npg_sided_cloud *c, uint32_t i)
 {
     double sum = 0, weight = 0;
-    for (size_t k = 0; k < NEIGHBOURS; k++) {
-        uint32_t j = c->index[NEIGHBOURS * (size_t)i + k];
+    for (size_t k = 0; k < NPG_NEIGHBOURS; k++) {
+        uint32_t j = c->index[NPG_NEIGHBOURS * (size_t)i + k];
         if (j == UINT32_MAX || j == i) continue;
         double a = (double)agreement(c, i, j);
         sum += a * fabs(a);

@@ -10,7 +10,6 @@
 
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
-#include "outlier/normals.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/clock.h"
 #include "pipeline/options.h"
@@ -86,26 +85,8 @@ static void outlier_uninit(npg_worker *worker)
     npg_sensors_close(&s->sensors);
 }
 
-#define KEPT_RESULTS_MAX ((size_t)4 << 20) /* bytes of what the statistical filter found; set by trial */
-
-static void release_isolated(void *thing)
-{
-    npg_isolated *isolated = thing;
-    npg_isolated_close(&isolated);
-}
-
-static npg_status open_isolated(npg_worker *worker)
-{
-    npg_isolated *isolated;
-    if (npg_worker_kept(worker)) return NPG_OK;
-    NPG_TRY(npg_isolated_open(&isolated, npg_worker_facts(worker)->is_live ? 0 : KEPT_RESULTS_MAX));
-    npg_worker_keep(worker, isolated, release_isolated);
-    return NPG_OK;
-}
-
 static npg_status outlier_init(npg_worker *worker)
 {
-    NPG_TRY(open_isolated(worker));
     return parse_sensor(npg_worker_state(worker));
 }
 
@@ -363,7 +344,7 @@ static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
     for (size_t i = 0; i < frame_count; i++)
         if (!is_done(npg_chunk_frame(chunk, i))) frames[count++] = npg_chunk_frame(chunk, i);
-    npg_status status = npg_isolated_drop(npg_worker_kept(worker), frames, count, NPG_NEIGHBOURS, s->ratio);
+    npg_status status = npg_isolated_drop(frames, count, NPG_NEIGHBOURS, s->ratio);
     npg_release(&frames);
     return status;
 }
@@ -419,7 +400,7 @@ static npg_status outlier_flush(npg_worker *worker)
 }
 
 /* One frame at work: the hash table and the normals with their trials; as many as there are threads in the
- * search for isolated points; what is remembered of all. */
+ * search for isolated points. */
 static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -428,7 +409,7 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
     return 17 * points + 60 * thinned + (s->sensor_kind == SENSOR_FIND ? npg_one_view_memory() : 0) +
-           threads * npg_find_isolated_memory(thinned) + KEPT_RESULTS_MAX;
+           threads * npg_find_isolated_memory(thinned);
 }
 
 const npg_stage npg_stage_outlier = {.name = "outlier",

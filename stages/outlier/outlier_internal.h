@@ -7,6 +7,7 @@
 #include <stddef.h>
 
 #include "geometry/geometry.h"
+#include "outlier/normals.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
@@ -35,22 +36,6 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max);
 /* NPG_BAD_INPUT when there are fewer than 16 points, or all lie in one place, on one line or on one plane. */
 npg_status npg_clean_check(const npg_frame *frame);
 
-/* Isolated: drops frames' isolated points, and keeps which they were for the later passes that bring the
- * same frame again: the statistical filter is the costliest part of cleaning, and its answer does not
- * change. */
-
-typedef struct npg_isolated npg_isolated;
-
-/* What is kept takes byte_max at most; frames beyond that are filtered in every pass. */
-npg_status npg_isolated_open(npg_isolated **isolated, size_t byte_max);
-void npg_isolated_close(npg_isolated **isolated);
-
-/* Drop the isolated points of frames that have been cleaned of all else, several at a time in
- * threads; skipped and empty frames are left alone.  A frame is known by its index and the hash of its
- * points.  NPG_MEMORY; errors name the frame. */
-npg_status npg_isolated_drop(npg_isolated *isolated, npg_frame *const *frames, size_t count, int neighbours,
-                             double ratio);
-
 /* Outliers: the points of a cloud that lie farther from their neighbours than others do.
  *
  * Based on: R. B. Rusu et al., Towards 3D Point Cloud Based Object Maps for Household Environments, 2008 (the
@@ -67,6 +52,10 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t point_co
 
 /* Bytes that takes at most. */
 size_t npg_find_isolated_memory(size_t point_count);
+
+/* Drop the isolated points of frames that have been cleaned of all else, several at a time in threads; skipped
+ * and empty frames are left alone.  NPG_MEMORY; errors name the frame. */
+npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbours, double ratio);
 
 /* One view: whether one sensor saw all points of a cloud, and from where.
  *
@@ -120,8 +109,7 @@ npg_status npg_sensors_set(const npg_sensors *sensors, npg_frame *frame, const n
 /* Sides: what orient.c (the order of the steps) and sides.c (tree, patches, winding number) share: a
  * npg_sided_cloud whose normals have a direction each, and are to be turned to the side that is out. */
 
-#define NPG_NEIGHBOURS  12 /* of a point, itself among them: of its side, and whether it is isolated */
-#define NPG_SIDE_ROUNDS 4  /* of turning points or patches: what turns changes what is best for others */
+#define NPG_SIDE_ROUNDS 4 /* of turning points or patches: what turns changes what is best for others */
 
 typedef struct npg_link { /* two neighbours and how well their sides agree, -1..1 */
     uint32_t a, b;

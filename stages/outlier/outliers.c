@@ -1,11 +1,13 @@
 /* Outliers: mean distances in one walk over a k-d tree, and rounds of taking away. */
 #include "outlier/outlier_internal.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
 #include "geometry/geometry.h"
 #include "pipeline/memory.h"
+#include "pipeline/parallel.h"
 
 #define ROUNDS 8 /* of the filter, each on what the one before has left; set by trial */
 
@@ -116,4 +118,52 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, i
 size_t npg_find_isolated_memory(size_t count)
 {
     return npg_kdtree_memory(count) + count * (2 * sizeof(float) + 1 + 3 * sizeof(float));
+}
+
+/* ---- several frames ---- */
+
+typedef struct searches {
+    npg_frame *const *frames;
+    uint8_t **keep; /* of each frame's points; NULL: not searched */
+    size_t count, parts;
+    int neighbours;
+    double ratio;
+} searches;
+
+static npg_status filter_share(void *user, size_t part)
+{
+    const searches *s = user;
+    int threads = s->parts > 1 ? 1 : 0; /* one frame is searched by all cores */
+    for (size_t i = part; i < s->count; i += s->parts) {
+        const npg_frame *frame = s->frames[i];
+        if (!s->keep[i]) continue;
+        npg_status status = npg_find_isolated(s->keep[i], frame->pos_local, frame->point_count, s->neighbours,
+                                              s->ratio, threads);
+        if (status) return npg_error_prefix(status, "frame %" PRId64, frame->number);
+    }
+    return NPG_OK;
+}
+
+static void drop_from(npg_frame *frame, const uint8_t *keep)
+{
+    size_t before = frame->point_count;
+    if (memchr(keep, 0, before)) npg_frame_keep(frame, keep);
+    frame->cleaning.isolated += before - frame->point_count;
+}
+
+npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbours, double ratio)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    searches s = {frames,     npg_arena_take(&scratch, count, sizeof *s.keep),
+                  count,      npg_parallel_parts(count, 1, count),
+                  neighbours, ratio};
+    for (size_t i = 0; i < count && s.keep; i++)
+        if (!frames[i]->is_skipped && frames[i]->point_count)
+            s.keep[i] = npg_arena_take(&scratch, frames[i]->point_count, 1);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status && s.parts) status = npg_parallel(filter_share, &s, s.parts);
+    for (size_t i = 0; i < count && !status; i++)
+        if (s.keep[i]) drop_from(frames[i], s.keep[i]);
+    npg_arena_release(&scratch);
+    return status;
 }

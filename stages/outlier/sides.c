@@ -6,7 +6,6 @@
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-#define NEIGHBOURS    NPG_NEIGHBOURS
 #define BORDER_WEIGHT 0.1         /* of a patch's border beside its winding number; set by trial         */
 #define FULL_ANGLE    12.5663706f /* 4 pi: the winding number is a solid angle in units of it            */
 
@@ -156,8 +155,8 @@ npg_status npg_sided_patches(uint32_t *patch_of, const npg_sided_cloud *c, const
     uint8_t turned;
     npg_status status = open_forest(&f, c->count);
     for (uint32_t i = 0; i < c->count && !status; i++)
-        for (size_t k = 0; k < NEIGHBOURS && (!among || among[i]); k++) {
-            uint32_t j = c->index[NEIGHBOURS * (size_t)i + k];
+        for (size_t k = 0; k < NPG_NEIGHBOURS && (!among || among[i]); k++) {
+            uint32_t j = c->index[NPG_NEIGHBOURS * (size_t)i + k];
             if (j == UINT32_MAX || (among && !among[j]) || !(agreement(c, i, j) > sure)) continue;
             join(&f, &(npg_link){i, j, 1});
         }
@@ -221,8 +220,8 @@ static double border_agreement(const npg_sided_cloud *c, const patches *p, size_
 {
     double sum = 0, weight = 0;
     for (size_t m = p->first[k]; m < p->first[k + 1]; m++)
-        for (size_t n = 0; n < NEIGHBOURS; n++) {
-            uint32_t i = p->members[m], j = c->index[NEIGHBOURS * (size_t)i + n];
+        for (size_t n = 0; n < NPG_NEIGHBOURS; n++) {
+            uint32_t i = p->members[m], j = c->index[NPG_NEIGHBOURS * (size_t)i + n];
             if (j == UINT32_MAX || patch_of[j] == patch_of[i]) continue;
             double a = (double)agreement(c, i, j);
             sum += a * fabs(a);

@@ -191,11 +191,10 @@ static int64_t handles_of_legs(double feet, npg_gap_way way, size_t *moved)
     npg_frame frame = {0};
     npg_mesh *mesh;
     size_t turned;
-    int rounds;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, feet, 5), NPG_OK);
-    assert_int_equal(npg_resurface_widened(&mesh, moved, &turned, &rounds, frame.normals, frame.pos_local,
-                                           LEGS_POINTS, 0.05, &settings),
+    assert_int_equal(npg_resurface_widened(&mesh, moved, &turned, frame.normals, frame.pos_local, LEGS_POINTS,
+                                           0.05, &settings),
                      NPG_OK);
     assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
     npg_mesh_unref(&mesh);

@@ -253,7 +253,7 @@ static void of_shreds_nothing_is_left(void **state)
     for (int i = 0; i < 2; i++) {
         assert_int_equal(npg_mesh_mend(&mesh, &done), NPG_OK);
         assert_int_equal(done.duplicate, i ? 0 : 2);
-        assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 0.01, 0.1), NPG_OK);
+        assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 1), NPG_OK);
         assert_int_equal(pieces.found + pieces.kept, 0);
         assert_int_equal(mesh->face_count, 0);
     }
@@ -283,7 +283,7 @@ static void cubes_that_touch_are_parted(void **state)
     assert_int_equal(euler(mesh), 4);
     assert_int_equal(mesh->face_count, 24);
     npg_pieces pieces;
-    assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 0, 0), NPG_OK);
+    assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 0), NPG_OK);
     assert_int_equal(pieces.found, 2);
     assert_int_equal(pieces.kept, 1);
     assert_true(fabs(pieces.lost_share - 0.5) < 1e-6);
@@ -302,7 +302,7 @@ static void pieces_near_the_main_one_stay(void **state)
         for (uint32_t i = 0; i < 36; i++) faces[36 * k + i] = cube_faces[i] + 8 * k;
     }
     npg_mesh *mesh = mesh_of(pos, 24, faces, 36);
-    assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 0.01, 0.1), NPG_OK);
+    assert_int_equal(npg_mesh_keep_main(&mesh, &pieces, 1), NPG_OK);
     assert_int_equal(pieces.found, 3);
     assert_int_equal(pieces.kept, 2);
     assert_int_equal(mesh->face_count, 24);

@@ -90,19 +90,17 @@ static void too_many_points_are_thinned(void **state)
     }
 }
 
-static npg_status drop_isolated(npg_isolated *isolated, npg_frame *frame)
+static npg_status drop_isolated(npg_frame *frame)
 {
-    return npg_isolated_drop(isolated, &frame, 1, 12, 5);
+    return npg_isolated_drop(&frame, 1, 12, 5);
 }
 
 static void isolated_points_go_and_others_stay(void **state)
 {
     (void)state;
     npg_frame frame;
-    npg_isolated *isolated;
-    assert_int_equal(npg_isolated_open(&isolated, 0), NPG_OK);
     open_frame(&frame, 10000, 5);
-    assert_int_equal(drop_isolated(isolated, &frame), NPG_OK);
+    assert_int_equal(drop_isolated(&frame), NPG_OK);
     assert_true(frame.cleaning.isolated <= 50); /* of a clean cloud, 0.5 % at most */
     npg_frame_clear(&frame);
 
@@ -114,7 +112,7 @@ static void isolated_points_go_and_others_stay(void **state)
         for (int a = 0; a < 3; a++) p[a] = (float)(4 * shape_uniform(&r) - 2);
     }
     shape_put(frame.pos_local, 900, 900, 900); /* so far that it hides the others from one round */
-    assert_int_equal(drop_isolated(isolated, &frame), NPG_OK);
+    assert_int_equal(drop_isolated(&frame), NPG_OK);
     for (size_t i = 0; i < frame.point_count; i++) {
         const float *p = frame.pos_local + 3 * i;
         double off = fabs(hypot(hypot((double)p[0], (double)p[1]) - 1, (double)p[2]) - 0.3);
@@ -124,7 +122,6 @@ static void isolated_points_go_and_others_stay(void **state)
     assert_int_equal(far, 0);
     assert_true(near > 9700 * 0.995);
     npg_frame_clear(&frame);
-    npg_isolated_close(&isolated);
 }
 
 static void open_dusty_frame(npg_frame *frame, uint64_t seed)
@@ -136,41 +133,30 @@ static void open_dusty_frame(npg_frame *frame, uint64_t seed)
         shape_put(frame->pos_local + 3 * (100 * i), 5 * shape_uniform(&r), 5 * shape_uniform(&r), 5);
 }
 
-/* The frames of four passes: three that are the same again, the last with another content. */
-static void what_was_isolated_is_known_by_heart(void **state)
+static void frames_are_searched_together(void **state)
 {
-    enum { FRAMES = 5, PASSES = 4 };
-    static const size_t limits[] = {0, 200, 1 << 20}; /* bytes: for none, for one, for all */
+    enum { FRAMES = 5 };
     (void)state;
-    for (size_t l = 0; l < 3; l++) {
-        npg_isolated *isolated;
-        npg_frame frames[PASSES][FRAMES], *pointers[FRAMES];
-        assert_int_equal(npg_isolated_open(&isolated, limits[l]), NPG_OK);
-        for (size_t pass = 0; pass < PASSES; pass++) {
-            for (size_t i = 0; i < FRAMES; i++) {
-                open_dusty_frame(&frames[pass][i], i);
-                pointers[i] = &frames[pass][i];
-                if (pass == 3) shape_put(pointers[i]->pos_local + 3 * 50, 6, 6, 6);
-            }
-            pointers[1]->is_skipped = true;
-            assert_int_equal(npg_isolated_drop(isolated, pointers, FRAMES, 12, 5), NPG_OK);
-            assert_int_equal(pointers[1]->point_count, 3000);
+    npg_frame frames[FRAMES], *pointers[FRAMES], alone;
+    for (size_t i = 0; i < FRAMES; i++) {
+        open_dusty_frame(&frames[i], i);
+        pointers[i] = &frames[i];
+    }
+    pointers[1]->is_skipped = true;
+    assert_int_equal(npg_isolated_drop(pointers, FRAMES, 12, 5), NPG_OK);
+    assert_int_equal(pointers[1]->point_count, 3000);
+    for (size_t i = 0; i < FRAMES; i++) {
+        if (i != 1) {
+            open_dusty_frame(&alone, i);
+            assert_int_equal(drop_isolated(&alone), NPG_OK);
+            assert_in_range(alone.cleaning.isolated, 25, 60);
+            assert_int_equal(alone.point_count + alone.cleaning.isolated, 3000);
+            assert_int_equal(frames[i].point_count, alone.point_count);
+            assert_memory_equal(frames[i].pos_local, alone.pos_local,
+                                alone.point_count * 3 * sizeof *alone.pos_local);
+            npg_frame_clear(&alone);
         }
-        for (size_t i = 0; i < FRAMES; i++) {
-            if (i == 1) continue;
-            const npg_frame *first = &frames[0][i];
-            assert_in_range(first->cleaning.isolated, 25, 60);
-            assert_int_equal(first->point_count + first->cleaning.isolated, 3000);
-            for (size_t pass = 1; pass < 3; pass++) {
-                assert_int_equal(frames[pass][i].point_count, first->point_count);
-                assert_int_equal(frames[pass][i].cleaning.isolated, first->cleaning.isolated);
-                assert_memory_equal(frames[pass][i].pos_local, first->pos_local,
-                                    first->point_count * 3 * sizeof *first->pos_local);
-            }
-            assert_int_equal(frames[3][i].cleaning.isolated, first->cleaning.isolated + 1);
-        }
-        for (size_t i = 0; i < PASSES * FRAMES; i++) npg_frame_clear(&frames[i / FRAMES][i % FRAMES]);
-        npg_isolated_close(&isolated);
+        npg_frame_clear(&frames[i]);
     }
 }
 
@@ -210,17 +196,14 @@ static void refused_memory_is_survived(void **state)
     size_t before = npg_memory_used(), refused = 0;
     for (uint64_t n = 1;; n++) {
         npg_frame frame;
-        npg_isolated *isolated = NULL;
         double side;
         open_frame(&frame, 3000, 9);
         npg_memory_fail_at(n, true);
         npg_status status = npg_clean_finite(&frame);
         if (!status) status = npg_clean_duplicates(&frame);
         if (!status) status = npg_clean_cap(&frame, &side, 1000);
-        if (!status) status = npg_isolated_open(&isolated, 1 << 20);
-        if (!status) status = drop_isolated(isolated, &frame);
+        if (!status) status = drop_isolated(&frame);
         npg_memory_fail_at(0, false);
-        npg_isolated_close(&isolated);
         npg_frame_clear(&frame);
         assert_int_equal(npg_memory_used(), before);
         if (!status) break;
@@ -310,7 +293,7 @@ int main(void)
                                        cmocka_unit_test(cells_keep_one_point),
                                        cmocka_unit_test(too_many_points_are_thinned),
                                        cmocka_unit_test(isolated_points_go_and_others_stay),
-                                       cmocka_unit_test(what_was_isolated_is_known_by_heart),
+                                       cmocka_unit_test(frames_are_searched_together),
                                        cmocka_unit_test(what_is_no_surface_is_refused),
                                        cmocka_unit_test(refused_memory_is_survived),
                                        cmocka_unit_test(the_stage_skips_or_refuses),

@@ -17,9 +17,7 @@
 #include "pipeline/parallel.h"
 
 #define SAMPLES       1500 /* vertices that the field moves */
-#define TIME_SPAN     0.8  /* of the time code: that of 1 is nearly that of 0 */
 #define FEATURE_START 3
-#define RATE_END      0.1
 #define NOISE_USUAL   0.01 /* units: of a capture that the learning rates were found with */
 #define THREADS_MAX   64
 
@@ -59,8 +57,10 @@ static void grids_close(void **slot)
 
 static npg_fit_settings settings_of(const npg_solver_settings *settings)
 {
-    return (npg_fit_settings){
-        .grid = settings->grid, .is_of_ways = true, .rate_end = RATE_END, .feature_start = FEATURE_START};
+    return (npg_fit_settings){.grid = settings->grid,
+                              .is_of_ways = true,
+                              .rate_end = NPG_GRIDS_RATE_END,
+                              .feature_start = FEATURE_START};
 }
 
 static npg_status grids_open(void **out, const npg_solver_setup *setup)
@@ -162,9 +162,9 @@ static npg_status begin(grids *g, const npg_problem *problem)
     if (window->from == 0 && g->first.bytes) NPG_TRY(npg_fit_copy_give(&g->first, g->fit));
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, problem->count, sizeof *frames));
     for (size_t t = 0; t < problem->count; t++)
-        frames[t] =
-            (npg_fit_frame){.index = problem->frames[t].index,
-                            .time = npg_grids_time(&g->facts->plan, TIME_SPAN, problem->frames[t].index)};
+        frames[t] = (npg_fit_frame){
+            .index = problem->frames[t].index,
+            .time = npg_grids_time(&g->facts->plan, NPG_GRIDS_SPAN, problem->frames[t].index)};
     npg_status status = npg_fit_begin_measured(g->fit, frames, problem->count, measure, g);
     if (!status) status = npg_fit_run(g->fit, 0, 0, NULL, NULL);
     for (size_t t = 0; t < problem->count && !status; t++)

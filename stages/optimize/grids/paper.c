@@ -13,11 +13,8 @@
 /* By trial (tests/bed/decisions.md, "Warm starts"). */
 #define SAMPLES     1500 /* vertices that new frames are brought near their pose with    */
 #define OPEN_EPOCHS 60   /* of each                                                      */
-#define NEAR        3    /* solved frames beside a new one, which hold the field in place */
-#define FAR         3    /* and others, by turns                                         */
-#define RATE_FACTOR 2    /* of that fit's rates to those over all vertices               */
-#define RATE_END    0.1  /* of windows: those of the paper's own fit do not fall          */
-#define TIME_SPAN   0.8  /* of windows: the code of 1 is nearly that of 0; paper's own: 1 */
+#define BESIDE      3 /* solved frames beside a new one, which hold the field in place, and others by turns */
+#define RATE_FACTOR 2 /* of that fit's rates to those over all vertices               */
 
 /* Adam's steps keep their length, and what the last one leaves is one draw of many: the result is the state of
  * least loss. */
@@ -106,7 +103,8 @@ static npg_fit_frame frame_of(const paper *p, size_t t)
 {
     const npg_solver_frame *from = &p->problem->frames[t];
     return (npg_fit_frame){.index = from->index,
-                           .time = npg_grids_time(&p->facts->plan, p->is_alone ? 1 : TIME_SPAN, from->index),
+                           .time =
+                               npg_grids_time(&p->facts->plan, p->is_alone ? 1 : NPG_GRIDS_SPAN, from->index),
                            .points = from->points,
                            .count = from->point_count,
                            .tie = from->solved};
@@ -137,7 +135,7 @@ static npg_status open_probe(opening *o)
     settings.grid.grid_rate *= RATE_FACTOR;
     settings.grid.mlp_rate *= RATE_FACTOR;
     settings.paper.confidence = NPG_CONFIDENCE_CONSTANT;
-    settings.rate_end = RATE_END;
+    settings.rate_end = NPG_GRIDS_RATE_END;
     NPG_TRY(npg_proxy_open(&o->samples, p->facts->reference, SAMPLES));
     NPG_TRY(npg_fit_open(&o->probe, p->device, &settings, o->samples->mesh, p->seed));
     NPG_TRY(npg_fit_hand_over(o->probe, p->fit));
@@ -153,11 +151,11 @@ static npg_status open_probe(opening *o)
 /* The next frame, and those that are held meanwhile. */
 static npg_status open_frame(opening *o)
 {
-    size_t size = 3 * o->samples->mesh->vert_count, count = 0, places[NEAR + FAR];
-    npg_fit_frame frames[NEAR + FAR + 1];
-    while (count < NEAR && count < o->known) places[count] = o->known - 1 - count, count++;
-    size_t others = o->known - count, every = (others + FAR - 1) / FAR;
-    for (size_t k = o->known % (every ? every : 1); k < others && count < NEAR + FAR; k += every)
+    size_t size = 3 * o->samples->mesh->vert_count, count = 0, places[2 * BESIDE];
+    npg_fit_frame frames[2 * BESIDE + 1];
+    while (count < BESIDE && count < o->known) places[count] = o->known - 1 - count, count++;
+    size_t others = o->known - count, every = (others + BESIDE - 1) / BESIDE;
+    for (size_t k = o->known % (every ? every : 1); k < others && count < 2 * BESIDE; k += every)
         places[count++] = k;
     for (size_t i = 0; i < count; i++) {
         frames[i] = frame_of(o->p, place_of(o, places[i]));
@@ -219,7 +217,7 @@ static npg_status solve(paper *p)
     if (!p->is_alone)
         npg_fit_set_pace(p->fit,
                          is_warm ? NPG_CONFIDENCE_CONSTANT : (npg_confidence)p->settings.paper.confidence,
-                         RATE_END);
+                         NPG_GRIDS_RATE_END);
     NPG_TRY(begin(p));
     p->is_opened = true;
     NPG_TRY(npg_fit_run(p->fit, p->at.next, p->settings.epochs, watch_epoch, p));
@@ -248,7 +246,7 @@ static size_t paper_memory(const npg_solver_settings *settings, size_t verts, si
     const npg_fit_settings fit = settings_of(settings);
     size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
     return npg_fit_memory(&fit, verts, frames, points) +
-           npg_fit_memory(&fit, samples, NEAR + FAR + 1, points) +
+           npg_fit_memory(&fit, samples, 2 * BESIDE + 1, points) +
            frames * (samples + verts) * 3 * sizeof(float);
 }
 
