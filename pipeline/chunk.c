@@ -55,11 +55,19 @@ void npg_frame_clear(npg_frame *frame)
     npg_release(&frame->pos_local);
     npg_release(&frame->normals);
     npg_release(&frame->colours);
-    npg_release(&frame->sensors);
-    npg_release(&frame->sensor_local);
+    npg_frame_forget_sensors(frame);
     npg_release(&frame->vert_unit);
     npg_release(&frame->vert_colours);
     *frame = (npg_frame){0};
+}
+
+void npg_frame_forget_sensors(npg_frame *frame)
+{
+    npg_release(&frame->sensors);
+    npg_release(&frame->sensor_local);
+    npg_release(&frame->views);
+    npg_release(&frame->view_cells);
+    frame->sensor_count = frame->view_cell_count = 0;
 }
 
 static npg_status copy_rows(void *out, const void *rows, size_t count, size_t row_size)
@@ -78,6 +86,8 @@ npg_frame npg_frame_bare(const npg_frame *frame)
     bare.path = NULL;
     bare.pos_local = bare.normals = bare.vert_unit = bare.sensor_local = NULL;
     bare.colours = bare.sensors = bare.vert_colours = NULL;
+    bare.views = NULL;
+    bare.view_cells = NULL;
     return bare;
 }
 
@@ -91,6 +101,9 @@ npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
     if (!status) status = copy_rows(&out->colours, frame->colours, n, 4);
     if (!status) status = copy_rows(&out->sensors, frame->sensors, n, 1);
     if (!status) status = copy_rows(&out->sensor_local, frame->sensor_local, frame->sensor_count, row);
+    if (!status) status = copy_rows(&out->views, frame->views, frame->sensor_count, sizeof *frame->views);
+    if (!status)
+        status = copy_rows(&out->view_cells, frame->view_cells, frame->view_cell_count, sizeof(float));
     if (!status) status = copy_rows(&out->vert_colours, frame->vert_colours, frame->vert_count, 4);
     if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count, row);
     if (status) npg_frame_clear(out);

@@ -47,6 +47,7 @@ enum {
     NPG_FAULT_FLIPPED,
     NPG_FAULT_STRETCHED,
     NPG_FAULT_UNSUPPORTED,
+    NPG_FAULT_NOWHERE,
     NPG_FAULT_UNCOVERED,
     NPG_FAULT_DISTANCE,
     NPG_FAULT_JUMP,
@@ -67,12 +68,25 @@ typedef struct npg_figures {
     /* Share of the area that no points are near, of this frame or of those that the reference was made from
      * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
     double unsupported_share, unsupported_at[3];
+    double nowhere_share; /* of the area, where depth images show that nothing is; NaN without any */
     npg_misfit misfits[NPG_MISFITS];
     float marks[3 * NPG_MARKS]; /* vertices far from each other, the same in all frames; unit coordinates
                                    in diagonals; NaN: not measured */
     int fault;                  /* NPG_FAULT_* of the frame by itself */
     bool good;                  /* the frame is above the quality bar */
 } npg_figures;
+
+/* What the depth image of one sensor says of the space before it: how far ahead nothing is, on a small grid of
+ * directions (stages/geometry/free_space.c). */
+#define NPG_VIEW_SIDE 160 /* cells along its longer side, at most: two or four pixels each of usual cameras */
+typedef struct npg_depth_view {
+    double to_sensor[12];   /* [R | t], local to the sensor's axes: x right, y down, z ahead              */
+    double first[2], step;  /* x / z and y / z where the first cell begins, and the side of a cell        */
+    uint32_t width, height; /* 0: there was no image                                                      */
+    size_t at;              /* where its cells begin in npg_frame.view_cells, row by row: the least depth
+                               that was measured in one, local units; infinite: nothing is there as far as
+                               sensors see; 0: not known                                                   */
+} npg_depth_view;
 
 typedef struct npg_frame {
     int64_t index;   /* place in time: 0 is the first frame of the run, gaps count             */
@@ -89,6 +103,9 @@ typedef struct npg_frame {
     bool has_sure_normals; /* they face the sensor that saw them: no side is open  */
     size_t sensor_count;   /* S, 0: where sensors stood is not known                  */
     float *sensor_local;   /* S x 3, owned, world - origin; NaN: it saw nothing, or NULL */
+    npg_depth_view *views; /* S, owned: of sensors whose images are known, or NULL         */
+    float *view_cells;     /* owned                                                        */
+    size_t view_cell_count;
     npg_cleaning cleaning;
     size_t vert_count;     /* V                                                         */
     float *vert_unit;      /* V x 3, owned; the deformed reference, in unit coordinates */
@@ -111,6 +128,9 @@ void npg_chunk_add(npg_chunk *chunk, npg_frame *frame);
 
 /* Free what a frame owns and empty it. */
 void npg_frame_clear(npg_frame *frame);
+
+/* Where its points were seen from is not known any more. */
+void npg_frame_forget_sensors(npg_frame *frame);
 
 /* The frame without its arrays, which stay its own. */
 npg_frame npg_frame_bare(const npg_frame *frame);

@@ -65,7 +65,7 @@ static const struct {
     const char *title, *names;
 } groups[] = {
     {"Frames", "*frames missing keep-going confine cache *follow follow-end look-ahead"},
-    {"Sensors", "*sensor sensor-poses align-sensors depth-range"},
+    {"Sensors", "*sensor sensor-poses align-sensors depth-range background"},
     {"Points", "outliers normals"},
     {"Reference", "*reference keyframe *faces unseen colour"},
     {"Method", "*method device seed"},

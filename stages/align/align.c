@@ -192,7 +192,8 @@ static npg_status take_points(const npg_worker *worker, npg_waiting *w)
     npg_points_spread(w->points, w->normals, most, frame->pos_local, frame->normals, frame->point_count);
     npg_box_local_to_unit(box, w->points, w->points, count);
     if (frame->sensor_count) npg_box_local_to_unit(box, w->sensors, frame->sensor_local, frame->sensor_count);
-    w->cloud = (npg_tracker_cloud){w->points, w->normals, count, w->sensors, frame->sensor_count};
+    NPG_TRY(npg_free_space_open(&w->space, frame, box));
+    w->cloud = (npg_tracker_cloud){w->points, w->normals, count, w->sensors, frame->sensor_count, w->space};
     return NPG_OK;
 }
 
@@ -328,7 +329,7 @@ static npg_status finish_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool is_of_one_side = facts->brief.growing_passes || is_growing(worker, facts->sensor_count_max);
+    bool is_of_one_side = facts->brief.is_side || is_growing(worker, facts->sensor_count_max);
     npg_recover_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group.count + NPG_GROUP_FIXED, sizeof *frames));
     size_t count = npg_group_list(&s->group, frames);

@@ -209,6 +209,7 @@ typedef struct npg_waiting {
     double *pose;            /* K x 12 */
     float *points, *normals; /* of the frame, thinned, unit; normals or NULL */
     float *sensors;          /* unit; where they are not known NULL */
+    npg_free_space *space;   /* where nothing is, or NULL; owned */
     npg_tracker_cloud cloud; /* all of these */
     float *since;            /* K: frames since a sensor saw what a node carries; NULL: no sensor is known */
     npg_tracked tracked;

@@ -77,6 +77,7 @@ npg_status npg_candidate_clouds_add(npg_candidate_clouds *clouds, const npg_fram
         clouds->given += frame->cleaning.normals_given;
         clouds->flipped += frame->cleaning.normals_flipped;
     }
+    NPG_TRY(npg_free_space_open(&cloud->space, frame, box));
     return copy_points(cloud, &clouds->arena, frame, box);
 }
 
@@ -99,6 +100,7 @@ void npg_candidate_clouds_close(npg_candidate_clouds **slot)
 {
     npg_candidate_clouds *clouds = *slot;
     if (!clouds) return;
+    for (size_t i = 0; i < clouds->count; i++) npg_free_space_close(&clouds->list[i].space);
     npg_arena_release(&clouds->arena);
     npg_release(&clouds->list);
     npg_release(slot);
@@ -152,7 +154,8 @@ static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
                                     .normals = f->with_normals ? next->fit_normals : NULL,
                                     .count = next->fit_count,
                                     .sensors = next->sensors,
-                                    .sensor_count = next->sensor_count};
+                                    .sensor_count = next->sensor_count,
+                                    .space = next->space};
     NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, f->is_judged ? &some : &all, NULL, NULL));
     npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
     return f->seen(f->user, next, f->vert_unit, &tracked);

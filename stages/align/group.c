@@ -19,6 +19,7 @@ void npg_group_clear(npg_group *group)
 {
     for (size_t i = 0; i < group->count; i++) {
         npg_frame_clear(&group->frames[i].frame);
+        npg_free_space_close(&group->frames[i].space);
         npg_arena_release(&group->frames[i].arena);
     }
     group->count = 0;

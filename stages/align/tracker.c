@@ -57,7 +57,8 @@ struct npg_tracker {
     uint32_t *start_face;  /* M: where the step before found each point's nearest */
     uint32_t *near;        /* samples: nearest target */
     float *near_sq, *sample_pos;
-    uint8_t *is_seen; /* samples: by a sensor, in the pose at work */
+    uint8_t *is_seen;  /* samples: by a sensor, in the pose at work */
+    uint8_t *is_empty; /* samples: where a sensor saw that nothing is */
     npg_visible visible;
     npg_occlusion_prior prior; /* edges of what no sensor sees */
 };
@@ -138,6 +139,7 @@ static npg_status open_arrays(npg_tracker *t)
     t->near_sq = npg_arena_take(arena, s, sizeof *t->near_sq);
     t->sample_pos = npg_arena_take(arena, s, 3 * sizeof(float));
     t->is_seen = npg_arena_take(arena, s, 1);
+    t->is_empty = npg_arena_take(arena, s, 1);
     npg_visible_open(&t->visible, arena, s);
     return npg_arena_status(arena);
 }
@@ -315,13 +317,23 @@ static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_
     *compared_count = compared;
 }
 
+/* Surface where nothing is goes towards the nearest point, seen or not, however far that is. */
+static void add_stray(npg_tracker *t, const double *pose, pull *p, const float *place, double weight,
+                      double width)
+{
+    double way[3];
+    for (size_t c = 0; c < 3; c++) p->normal[c] = way[c] = p->target[c] - (double)place[c];
+    if (!npg_vec3_make_unit(p->normal)) return;
+    add_pull(t, TO_POINTS, p, pose, weight, fmax(width, npg_vec3_length(way)));
+}
+
 /* Surface -> points, for samples whose nearest point is close enough to be theirs. */
 static void add_samples(npg_tracker *t, const double *pose, const float *points, const float *normals,
                         double width)
 {
     double share = REVERSE / (double)t->sample_count;
     for (size_t s = 0; s < t->sample_count; s++) {
-        if (!t->is_seen[s]) continue;
+        if (!t->is_seen[s] && !t->is_empty[s]) continue;
         size_t v = t->samples[s];
         pull p;
         double facing = 0;
@@ -331,11 +343,14 @@ static void add_samples(npg_tracker *t, const double *pose, const float *points,
             p.target[c] = (double)points[3 * (size_t)t->near[s] + c];
             if (normals) facing += p.normal[c] * (double)normals[3 * (size_t)t->near[s] + c];
         }
-        if (facing < NPG_AGAINST || (double)t->near_sq[s] > PAIR_WIDTHS * PAIR_WIDTHS * width * width)
-            continue;
+        bool is_far = (double)t->near_sq[s] > PAIR_WIDTHS * PAIR_WIDTHS * width * width;
+        if (!t->is_empty[s] && (facing < NPG_AGAINST || is_far)) continue;
         memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
         memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
-        add_pull(t, TO_POINTS, &p, pose, share, width);
+        if (t->is_empty[s])
+            add_stray(t, pose, &p, t->sample_pos + 3 * s, share, width);
+        else
+            add_pull(t, TO_POINTS, &p, pose, share, width);
     }
 }
 
@@ -455,6 +470,8 @@ static npg_status find_pairs(void *user, size_t part)
     NPG_TRY(npg_visible_find(&t->visible, t->is_seen, t->surface, s->cloud->sensors, s->cloud->sensor_count,
                              t->sample_pos, t->samples, t->vert_normals, t->sample_count,
                              NPG_SEEN_OFFSET * t->size));
+    for (size_t i = 0; i < t->sample_count; i++)
+        t->is_empty[i] = npg_free_space_is_empty(s->cloud->space, t->sample_pos + 3 * i);
     return find_on_surface(s, 0, lent);
 }
 

@@ -226,6 +226,7 @@ typedef struct npg_tracker_cloud {
     size_t count;                  /* N     */
     const float *sensors; /* S x 3: where the points were seen from, not finite where one saw nothing */
     size_t sensor_count;  /* S, 0: not known; the points are taken to be of all sides                 */
+    const npg_free_space *space; /* where nothing is, or NULL */
 } npg_tracker_cloud;
 
 /* How a fit goes about it. */
@@ -272,6 +273,7 @@ typedef struct npg_candidate_cloud {
     size_t held_count;
     float *sensors; /* S x 3, unit: where it was seen from; the list's */
     size_t sensor_count;
+    npg_free_space *space; /* or NULL; the list's */
 } npg_candidate_cloud;
 
 typedef struct npg_candidate_clouds {

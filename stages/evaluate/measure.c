@@ -330,6 +330,21 @@ static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const np
                             m->vert_unit, NULL, m->normals, mesh->vert_count, spacing);
 }
 
+/* Of the area, where depth images show that nothing is. */
+static npg_status measure_nowhere(const npg_measure *m, npg_frame *frame, const npg_frame_box *box,
+                                  double whole)
+{
+    npg_free_space *space;
+    double sum = 0;
+    NPG_TRY(npg_free_space_open(&space, frame, box));
+    if (!space) return NPG_OK;
+    for (size_t i = 0; i < m->proxy->mesh->vert_count; i++)
+        if (npg_free_space_is_empty(space, m->vert_unit + 3 * i)) sum += m->vert_areas[i];
+    frame->figures.nowhere_share = whole > 0 ? sum / whole : 0;
+    npg_free_space_close(&space);
+    return NPG_OK;
+}
+
 /* After measure_points() of the same frame. */
 static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_frame_box *box,
                                    size_t point_count, double per_unit, double *mean_sq)
@@ -355,6 +370,7 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
     NPG_TRY(measure_unsupported(m, figures, box, radius, area));
+    NPG_TRY(measure_nowhere(m, frame, box, area));
     npg_misfit_frame found = {.points = m->points,
                               .hits = m->hits,
                               .point_count = point_count,

@@ -131,7 +131,8 @@ void npg_carving_close(npg_carving **cells)
 typedef struct looking {
     npg_carving *c;
     const npg_skin *skin;
-    const npg_depth_map *map;
+    const npg_depth_map *map; /* or: */
+    const npg_free_space *space;
     size_t parts;
 } looking;
 
@@ -157,7 +158,9 @@ static npg_status look_part(void *user, size_t part)
     for (size_t i = first_of(l, part); i < first_of(l, part + 1); i++) {
         uint8_t *says = &l->c->cells[i].says;
         if (*says == FILLED) continue;
-        npg_sight_kind kind = npg_depth_map_look(l->map, l->c->now + 3 * i);
+        const float *place = l->c->now + 3 * i;
+        npg_sight_kind kind =
+            l->space ? npg_free_space_look(l->space, place) : npg_depth_map_look(l->map, place);
         if (kind == NPG_SEEN_AT) *says = FILLED;
         if (kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE) *says = EMPTY;
     }
@@ -176,9 +179,10 @@ static void count_frame(npg_carving *c)
 /* One map at a time: they are large. */
 npg_status npg_carving_see(npg_carving *c, const npg_skin *skin, const npg_seen *seen)
 {
-    looking l = {c, skin, NULL, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
+    looking l = {c, skin, NULL, seen->space, npg_parallel_parts(c->count, 1000, PARTS_MOST)};
     npg_status status = npg_parallel(move_part, &l, l.parts);
-    for (size_t i = 0; i < seen->sensor_count && !status; i++) {
+    if (!status && seen->space) status = npg_parallel(look_part, &l, l.parts);
+    for (size_t i = 0; i < seen->sensor_count && !status && !seen->space; i++) {
         const float *sensor = seen->sensors + 3 * i;
         npg_depth_map *map;
         if (!isfinite(sensor[0] + sensor[1] + sensor[2])) continue;

@@ -163,11 +163,10 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
     return NPG_OK;
 }
 
-/* Not of a rig by itself: its images lose what lies at outlines and at a slant, and what is missing there
- * passes for empty (by trial). */
+/* Of a rig by its images, not by its points: these lack what lies at outlines and at a slant. */
 static bool knows_empty(const npg_frame *frame)
 {
-    return frame->sensor_count && !frame->sensors;
+    return frame->sensor_count && (frame->views || !frame->sensors);
 }
 
 /* What the sensors of the frame say of the space around the surface. */
@@ -187,7 +186,10 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
     if (!s->empty)
         NPG_TRY(npg_carving_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
                                  EMPTY_BAND * s->spacing, EMPTY_MOST));
-    return npg_carving_see(s->empty, s->skin, &seen);
+    NPG_TRY(npg_free_space_open(&seen.space, frame, &facts->box));
+    npg_status status = npg_carving_see(s->empty, s->skin, &seen);
+    npg_free_space_close(&seen.space);
+    return status;
 }
 
 static size_t most_cells(const npg_facts *facts)
@@ -372,9 +374,10 @@ static npg_status begin(npg_worker *worker)
 /* The pass's points are gathered as what comes next needs them. */
 static npg_status settle(npg_worker *worker)
 {
+    const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
-    const npg_pass_result result = {facts->unreached_count, npg_facts_has_changed(facts)};
+    const npg_pass_result result = {facts->unreached_count, npg_facts_has_changed(facts), s->grow_dist > 0};
     *npg_own(worker, brief) = npg_reference_next(npg_worker_kept(worker), &result);
     if (result.unreached_count)
         npg_worker_log(worker, NPG_LOG_INFO, -1,

@@ -89,7 +89,8 @@ typedef struct npg_seen {
     size_t sensor_count;
     const float *points; /* N x 3; which sensor saw one is not known: all count for each */
     size_t point_count;
-    double bin, margin; /* of the depth maps */
+    double bin, margin;    /* of the depth maps */
+    npg_free_space *space; /* what the images say, instead of maps of the points; or NULL */
 } npg_seen;
 
 /* One frame; skin is where the surface is in it.  NPG_MEMORY. */

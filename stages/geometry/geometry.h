@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "pipeline/chunk.h"
+#include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 #include "pipeline/mesh.h"
 
@@ -684,5 +686,29 @@ npg_sight_kind npg_depth_map_look(const npg_depth_map *map, const float place[3]
 
 /* Bytes of one at most. */
 size_t npg_depth_map_memory(void);
+
+/* Free space: what the depth images of a frame's sensors say of places, those of which nothing was measured
+ * there among them.
+ *
+ * A place x falls into a cell of a sensor's grid of directions, z ahead of it (npg_depth_view).  With d the
+ * least depth measured in that cell and those around it, and m = 3 times the width of a cell at z:
+ *
+ *     beside  nothing was measured within three cells, and all of these are known to be empty
+ *     empty   z < d - m
+ *     at      else, up to m behind the depth of its own cell
+ *     hidden  farther behind
+ *     unknown elsewhere: outside of the image, where the sensor could not tell, close to an outline
+ *
+ * One sensor that saw a place empty is enough, whatever others say. */
+
+typedef struct npg_free_space npg_free_space;
+
+/* In the coordinates of the box; NULL where the frame has no views.  NPG_MEMORY. */
+npg_status npg_free_space_open(npg_free_space **space, const npg_frame *frame, const npg_frame_box *box);
+void npg_free_space_close(npg_free_space **space);
+
+/* Both thread-safe.  is_empty: whether a sensor saw that nothing is there; false of no space (NULL). */
+npg_sight_kind npg_free_space_look(const npg_free_space *space, const float place[3]);
+bool npg_free_space_is_empty(const npg_free_space *space, const float place[3]);
 
 #endif

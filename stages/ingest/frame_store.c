@@ -42,27 +42,32 @@ npg_status npg_frame_store_open(npg_frame_store **out, size_t byte_max, const ch
     return status;
 }
 
-void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], size_t point_count)
+void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *frame)
 {
+    size_t n = frame->point_count;
     const npg_store_array arrays[NPG_FRAME_ARRAYS] = {
-        {"points", offsetof(npg_frame, pos_local), point_count, ROW},
-        {"normals", offsetof(npg_frame, normals), point_count, ROW},
-        {"colours", offsetof(npg_frame, colours), point_count, 4},
-        {"sensors", offsetof(npg_frame, sensors), point_count, 1}};
+        {"points", offsetof(npg_frame, pos_local), n, ROW},
+        {"normals", offsetof(npg_frame, normals), n, ROW},
+        {"colours", offsetof(npg_frame, colours), n, 4},
+        {"sensors", offsetof(npg_frame, sensors), n, 1},
+        {"views", offsetof(npg_frame, views), frame->sensor_count, sizeof *frame->views},
+        {"view_cells", offsetof(npg_frame, view_cells), frame->view_cell_count, sizeof(float)}};
     memcpy(list, arrays, sizeof arrays);
 }
 
-/* Of a point, in the arrays that the frame has. */
-static size_t point_bytes(const npg_frame *frame)
+/* Of the arrays that the frame has. */
+static size_t array_bytes(const npg_frame *frame)
 {
-    return (frame->pos_local ? ROW : 0) + (frame->normals ? ROW : 0) + (frame->colours ? 4 : 0) +
-           (frame->sensors ? 1 : 0);
+    size_t of_a_point = (frame->pos_local ? ROW : 0) + (frame->normals ? ROW : 0) + (frame->colours ? 4 : 0) +
+                        (frame->sensors ? 1 : 0);
+    return frame->point_count * of_a_point + (frame->views ? frame->sensor_count * sizeof *frame->views : 0) +
+           (frame->view_cells ? frame->view_cell_count * sizeof(float) : 0);
 }
 
 static size_t bytes_of(const entry *e)
 {
     if (!e->frame) return 0;
-    return sizeof *e->frame + e->frame->point_count * (point_bytes(e->frame) + (e->made ? ROW : 0));
+    return sizeof *e->frame + array_bytes(e->frame) + (e->made ? e->frame->point_count * ROW : 0);
 }
 
 static void drop(npg_frame_store *s, entry *e)
@@ -147,8 +152,8 @@ static void put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool
 {
     npg_store_array arrays[NPG_FRAME_ARRAYS];
     npg_frame kept = *frame;
-    size_t bytes = frame->point_count * point_bytes(frame);
-    npg_frame_arrays(arrays, frame->point_count);
+    size_t bytes = array_bytes(frame);
+    npg_frame_arrays(arrays, frame);
     e->is_on_disk = !fits(s, sizeof *frame + bytes);
     if (e->is_on_disk) {
         if (!is_final || !write_arrays(s, NPG_RECORD_FRAME, frame, bytes, arrays, NPG_FRAME_ARRAYS)) return;
@@ -178,7 +183,7 @@ npg_status npg_frame_store_put(npg_frame_store *s, const npg_frame *frame, bool 
 static npg_status get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
 {
     npg_store_array arrays[NPG_FRAME_ARRAYS];
-    npg_frame_arrays(arrays, e->frame->point_count);
+    npg_frame_arrays(arrays, e->frame);
     NPG_TRY(npg_frame_copy(frame, e->frame));
     npg_status status = read_arrays(s, NPG_RECORD_FRAME, e->frame->index, frame, arrays, NPG_FRAME_ARRAYS);
     if (status) npg_frame_clear(frame);

@@ -42,6 +42,10 @@ static const npg_option ingest_options[] = {
         "How the poses of a rig's sensors are meant. As its files say (sensor to world), the other way "
         "round (world to sensor), or none: every sensor stands at the origin, for a body that moves before "
         "one sensor"),
+    NPG_ROW_CHOICE(       "background",       AT(rig.background),  "auto",        "auto|removed|unknown",
+        "Whether depth 0 and what a mask hides say that nothing of the body is there. removed: they do; "
+        "unknown: they say nothing; auto: they do where there is a mask, or most pixels of an image have no "
+        "depth"),
     NPG_KEY(REAL,         "sensor-tolerance", AT(rig.tolerance_s), "0.02",        0,    3600,    "SECONDS",
         "Images of a rig with time stamps belong together when they are no further apart"),
     NPG_ROW_FLAG(         "align-sensors",    AT(align_sensors),   "no",

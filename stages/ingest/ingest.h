@@ -82,9 +82,16 @@ typedef struct npg_camera {
 #define NPG_RIG_SENSORS_MAX NPG_FRAME_SENSORS_MOST
 /* What to make of the poses in the files (option sensor-poses). */
 typedef enum npg_rig_poses { NPG_POSES_FILE, NPG_POSES_INVERSE, NPG_POSES_NONE } npg_rig_poses;
+/* Whether pixels without depth say that nothing is there (option background). */
+typedef enum npg_background {
+    NPG_BACKGROUND_AUTO,
+    NPG_BACKGROUND_REMOVED,
+    NPG_BACKGROUND_UNKNOWN
+} npg_background;
 
 typedef struct npg_rig_settings {
     int poses;            /* npg_rig_poses                                                            */
+    int background;       /* npg_background                                                           */
     double step_share;    /* neighbouring pixels whose depths differ by more than this share of the   */
                           /* nearer one are not one surface                                           */
     int64_t margin;       /* pixels beside such a step and beside missing depth that are dropped      */

@@ -37,7 +37,7 @@ npg_status npg_spool_add(npg_store *spool, npg_spooled *entry, const npg_frame *
     npg_status status = npg_store_put(spool, "entry", entry, sizeof *entry);
     if (!status && frame->path) status = npg_store_put(spool, "path", frame->path, strlen(frame->path) + 1);
     if (!status && cause) status = npg_store_put(spool, "cause", cause, strlen(cause) + 1);
-    npg_frame_arrays(arrays, frame->point_count);
+    npg_frame_arrays(arrays, frame);
     if (!status && with_points) status = npg_store_put_arrays(spool, frame, arrays, NPG_FRAME_ARRAYS);
     return npg_store_end(spool, status, false);
 }
@@ -68,7 +68,7 @@ npg_status npg_spool_frame(const npg_spooled *entry, const npg_record *record, n
     npg_store_array arrays[NPG_FRAME_ARRAYS];
     size_t size = 0;
     if (npg_record_find(record, "points", &size)) frame->point_count = size / ROW;
-    npg_frame_arrays(arrays, frame->point_count);
+    npg_frame_arrays(arrays, frame);
     npg_status status = path ? npg_copy_text(&frame->path, path) : NPG_OK;
     if (!status) status = npg_record_get_arrays(record, frame, arrays, NPG_FRAME_ARRAYS, NPG_FOR_FRAMES);
     if (status == NPG_BAD_INPUT)

@@ -43,9 +43,12 @@ static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
     size_t moved, turned;
     npg_pieces pieces;
     npg_mending mending;
+    double share;
     NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, normals, cloud->fit, cloud->fit_count, spacing,
                                   settings));
-    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, 1));
+    /* What sensors did not see is none of its surface. */
+    if (cloud->sensor_count) NPG_TRY(npg_mesh_trim(mesh, &share, cloud->fit, cloud->fit_count, 2 * spacing));
+    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, cloud->sensor_count ? HUGE_VAL : 1));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
     NPG_TRY(npg_mesh_mend(mesh, &mending));
     return npg_mesh_make_normals(*mesh);

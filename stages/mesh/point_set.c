@@ -52,7 +52,7 @@ static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *
     fused->points = fused->normals = NULL;
     if (!fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
-    return npg_worker_facts(worker)->brief.growing_passes ? drop_empty(set, worker) : NPG_OK;
+    return npg_worker_facts(worker)->brief.is_side ? drop_empty(set, worker) : NPG_OK;
 }
 
 static npg_status measure(npg_point_set *set, npg_worker *worker)

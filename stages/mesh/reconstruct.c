@@ -27,6 +27,7 @@ typedef struct reconstruction { /* what is known while the mesh is made */
     const npg_reconstruct_settings *settings;
     npg_point_set *set;
     bool is_rough;         /* the points were smoothed, and a frame's are noisy beyond doubt */
+    bool trims_unseen;     /* nobody saw a side: what has no points near it goes             */
     double invented_share; /* of the mesh, once it is trimmed: what no point saw             */
     npg_mesh *mesh;        /* so far; owned                                                  */
 } reconstruction;
@@ -91,10 +92,12 @@ static npg_status draw_surface(reconstruction *r)
 
 /* ---- its main pieces ---- */
 
+/* Of a side all pieces stay that are no crumbs: what joins them, out of sight or at a slant, may be as long as
+ * half an arm. */
 static npg_status keep_main(reconstruction *r, const char *when)
 {
     npg_pieces pieces;
-    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, r->set->diagonal));
+    NPG_TRY(npg_mesh_keep_main(&r->mesh, &pieces, r->trims_unseen ? HUGE_VAL : r->set->diagonal));
     npg_mesh_note_count(r->worker, "components", pieces.kept);
     if (pieces.kept > 1)
         npg_mesh_warn(r->worker, false, r->set->key_number,
@@ -109,23 +112,23 @@ static npg_status keep_main(reconstruction *r, const char *when)
 /* ---- what lies near the points ---- */
 
 /* What no point saw: measured on the closed surface, before anything is trimmed. */
-static npg_status judge_unseen(reconstruction *r, bool *trim_unseen)
+static npg_status judge_unseen(reconstruction *r)
 {
     const npg_facts *facts = npg_worker_facts(r->worker);
     const npg_point_set *p = r->set;
     int way = r->settings->unseen;
     double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
-    *trim_unseen =
+    r->trims_unseen =
         way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way == NPG_UNSEEN_AUTO && share > side);
     npg_mesh_note(r->worker, "unseen_share", share);
     json_object_set_new(npg_worker_report(r->worker), "unseen",
-                        json_string(*trim_unseen ? "trimmed" : "kept"));
+                        json_string(r->trims_unseen ? "trimmed" : "kept"));
     if (share > UNSEEN_TOLERATED)
         npg_mesh_warn(r->worker, false, p->key_number,
                       "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
                       100 * share, p->is_fused ? "all frames" : "the keyframe",
-                      *trim_unseen             ? "trimmed off"
+                      r->trims_unseen          ? "trimmed off"
                       : way == NPG_UNSEEN_KEEP ? "kept as Poisson closed it"
                                                : "closed tightly");
     return NPG_OK;
@@ -146,16 +149,14 @@ static npg_status drop_shreds(reconstruction *r)
 static npg_status trim(reconstruction *r)
 {
     const npg_point_set *p = r->set;
-    bool trim_unseen;
     double limit = TRIM_DIST * p->diagonal, share;
-    NPG_TRY(judge_unseen(r, &trim_unseen));
-    if (trim_unseen) limit = fmin(limit, p->seen_dist);
+    if (r->trims_unseen) limit = fmin(limit, p->seen_dist);
     NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, limit));
     npg_mesh_note(r->worker, "trimmed_share", share);
     if (!r->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
-    if (trim_unseen) NPG_TRY(drop_shreds(r));
+    if (r->trims_unseen) NPG_TRY(drop_shreds(r));
     NPG_TRY(npg_mesh_unseen(&r->invented_share, r->mesh, p->points, p->count, p->seen_dist));
-    if (!trim_unseen && share > LOST_TOLERATED)
+    if (!r->trims_unseen && share > LOST_TOLERATED)
         npg_mesh_warn(r->worker, false, p->key_number,
                       "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
                       "and was trimmed off",
@@ -281,7 +282,9 @@ static npg_status make(reconstruction *r)
     npg_mesh *whole = NULL;
     bool sound = false, closed = false;
     NPG_TRY(draw_surface(r));
-    NPG_TRY(keep_main(r, "as reconstructed"));
+    NPG_TRY(judge_unseen(r));
+    /* Of a side all parts are small beside the balloon that closes it, until that is trimmed. */
+    if (!r->trims_unseen) NPG_TRY(keep_main(r, "as reconstructed"));
     NPG_TRY(npg_mesh_copy(&whole, r->mesh));
     npg_status status = shape(r, &sound);
     if (!status && !sound) status = is_closed(&closed, whole);

@@ -237,9 +237,7 @@ static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status 
     npg_release(&frame->pos_local);
     npg_release(&frame->normals);
     npg_release(&frame->colours);
-    npg_release(&frame->sensors);
-    npg_release(&frame->sensor_local);
-    frame->sensor_count = 0;
+    npg_frame_forget_sensors(frame);
     s->skipped++;
     return NPG_OK;
 }
@@ -293,9 +291,7 @@ static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
     const outlier_state *s = npg_worker_state(worker);
     if (frame->is_skipped || s->sensor_kind == SENSOR_AUTO) return NPG_OK;
     if (s->sensor_kind == SENSOR_FIND && is_done(frame)) return NPG_OK; /* kept with what was found */
-    npg_release(&frame->sensors);
-    npg_release(&frame->sensor_local);
-    frame->sensor_count = 0;
+    npg_frame_forget_sensors(frame);
     if (s->sensor_kind != SENSOR_GIVEN) return NPG_OK;
     return npg_sensors_set(&s->sensors, frame, &npg_worker_facts(worker)->origin);
 }

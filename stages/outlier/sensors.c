@@ -156,8 +156,7 @@ npg_status npg_sensors_set(const npg_sensors *s, npg_frame *frame, const npg_ori
     if (count > NPG_FRAME_SENSORS_MOST)
         return npg_error(NPG_BAD_INPUT, "%s has %zu sensors for frame %lld; more than %d are not read",
                          s->text, count, (long long)wanted, NPG_FRAME_SENSORS_MOST);
-    npg_release(&frame->sensor_local);
-    frame->sensor_count = 0;
+    npg_frame_forget_sensors(frame);
     NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
     frame->sensor_count = count;
     for (size_t i = 0; i < 3 * count; i++)

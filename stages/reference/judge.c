@@ -128,8 +128,9 @@ static npg_status surface_off(double *mean, judging *j, const npg_candidate_clou
                              vert_unit, NULL, j->normals, v, NPG_SEEN_OFFSET));
     NPG_TRY(npg_points_nearest(j->near, j->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
     for (size_t i = 0; i < v; i++) {
-        double weight = j->areas[i] * expected(j, cloud, vert_unit, i);
-        sum += weight * rho(j, (double)j->dist_sq[i]);
+        bool is_nowhere = npg_free_space_is_empty(cloud->space, vert_unit + 3 * i);
+        double weight = j->areas[i] * (is_nowhere ? 1 : expected(j, cloud, vert_unit, i));
+        sum += weight * (is_nowhere ? 1 : rho(j, (double)j->dist_sq[i]));
         area += weight;
     }
     *mean = area > 0 ? sum / area : 1;

@@ -38,7 +38,8 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->is_growing && !is_whole_now;
     /* Parts that come, go or open belong to no common surface, and hiding them in one would silence the
-     * alarm.  A side of the body that grows explains what it has reached, and no more is gathered. */
-    brief->takes_gathered = brief->growing_passes || !result->has_changed;
+     * alarm.  A side of the body never explains all. */
+    brief->is_side = result->is_side;
+    brief->takes_gathered = result->is_side || !result->has_changed;
     return *brief;
 }

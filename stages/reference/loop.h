@@ -14,6 +14,7 @@
 typedef struct npg_pass_result {
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
     bool has_changed;        /* it does not explain the capture to both its ends */
+    bool is_side;            /* it is a side of the body: what it lacks says nothing of how that is joined */
 } npg_pass_result;
 
 /* {0} before npg_reference_begin().  Nothing to close. */

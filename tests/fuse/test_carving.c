@@ -155,7 +155,7 @@ static void frames_vote(void **state)
     assert_true(find(&c, 1, 0.6).pit > 0);
     assert_int_equal(find(&c, 2, 0.6).pit, 0);
     for (size_t i = 0; i < POINTS; i++) c.points[3 * i + 2] = 0.45f; /* a lid: the cells below its height */
-    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.2};
+    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.2, NULL};
     for (int f = 0; f < 2; f++) assert_int_equal(npg_carving_see(c.cells, c.carry, &seen), NPG_OK);
     assert_int_equal(find(&c, 1, 0.6).pit, 0);
     close_capture(&c);
@@ -196,7 +196,7 @@ static void memory_that_fails_is_reported(void **state)
     assert_int_equal(status, NPG_OK);
     npg_carving_close(&cells);
     assert_int_equal(see(&c, above, 0), NPG_OK);
-    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.02};
+    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.02, NULL};
     npg_memory_fail_at(1, false);
     assert_int_equal(npg_carving_see(c.cells, c.carry, &seen), NPG_MEMORY);
     npg_memory_fail_at(0, false);

@@ -175,6 +175,65 @@ static void edges_and_flying_pixels_are_dropped(void **state)
 
 /* ---- several sensors ---- */
 
+/* A wall at 1 m with a hole in its middle; most of the picture has no depth where `is_bare`. */
+static void write_wall(const char *name, bool is_bare)
+{
+    static uint16_t depth[WIDE * HIGH];
+    for (int i = 0; i < WIDE * HIGH; i++) {
+        int x = i % WIDE, y = i / WIDE;
+        bool is_hole = x >= 15 && x < 25 && y >= 10 && y < 20;
+        depth[i] = is_hole || (is_bare && x >= 10) ? 0 : (uint16_t)(1000 + x);
+    }
+    write_png(name, PNG_FORMAT_LINEAR_Y, WIDE, HIGH, depth);
+}
+
+static float view_at(const npg_frame *frame, int x, int y)
+{
+    return frame->view_cells[frame->views[0].at + (size_t)(y * WIDE + x)];
+}
+
+/* A hole in a whole picture is what the sensor failed at; where most is missing, it was taken away. */
+static void a_view_says_where_nothing_is(void **state)
+{
+    static const struct {
+        bool is_bare, has_mask;
+        int background;
+        float hole, right; /* cells in the hole, and on the right: 0 not known, INFINITY nothing */
+    } cases[] = {{false, false, NPG_BACKGROUND_AUTO, 0, 1.035f},
+                 {true, false, NPG_BACKGROUND_AUTO, INFINITY, INFINITY},
+                 {true, false, NPG_BACKGROUND_UNKNOWN, 0, 0},
+                 {false, false, NPG_BACKGROUND_REMOVED, INFINITY, 1.035f},
+                 {false, true, NPG_BACKGROUND_AUTO, 0, INFINITY},
+                 {false, true, NPG_BACKGROUND_UNKNOWN, 0, 1.035f}};
+    (void)state;
+    make_folder("view");
+    write_mask_jpeg("view/m_0.jpg");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        npg_rig_settings settings = usual_settings();
+        npg_frame frame;
+        settings.background = cases[i].background;
+        write_wall("view/d_0.png", cases[i].is_bare);
+        write_text("view/rig.json",
+                   cases[i].has_mask ? "{\"neupig_rig\": 1, \"sensors\": [{\"depth\": \"d_%d.png\", "
+                                       "\"mask\": \"m_%d.jpg\", " CAMERA ", " POSE "}]}"
+                                     : "{\"neupig_rig\": 1, \"sensors\": [{\"depth\": \"d_%d.png\", " CAMERA
+                                       ", " POSE "}]}");
+        assert_int_equal(read_rig_frame(&frame, "view", 0, &settings), NPG_OK);
+        const npg_depth_view *view = &frame.views[0];
+        assert_int_equal(view->width, WIDE);
+        assert_int_equal(view->height, HIGH);
+        assert_float_equal(view->to_sensor[3], -5, 1e-9);
+        assert_float_equal(view->to_sensor[11], -7, 1e-9);
+        assert_float_equal(view_at(&frame, 5, 5), 1.005, 1e-6);
+        assert_true(view_at(&frame, 18, 15) == cases[i].hole);
+        if (isinf(cases[i].right))
+            assert_true(isinf(view_at(&frame, 35, 15)));
+        else
+            assert_float_equal(view_at(&frame, 35, 15), cases[i].right, 1e-6);
+        npg_frame_clear(&frame);
+    }
+}
+
 static void a_missing_image_is_a_gap_of_its_sensor(void **state)
 {
     (void)state;
@@ -469,6 +528,7 @@ int main(void)
                                        cmocka_unit_test(opengl_axes),
                                        cmocka_unit_test(normals_of_a_slanted_plane),
                                        cmocka_unit_test(edges_and_flying_pixels_are_dropped),
+                                       cmocka_unit_test(a_view_says_where_nothing_is),
                                        cmocka_unit_test(a_missing_image_is_a_gap_of_its_sensor),
                                        cmocka_unit_test(tum_layout),
                                        cmocka_unit_test(redwood_layout),

@@ -10,7 +10,14 @@
 
 static npg_brief next(npg_reference_loop *loop, int64_t unreached, bool has_changed)
 {
-    const npg_pass_result result = {unreached, has_changed};
+    const npg_pass_result result = {.unreached_count = unreached, .has_changed = has_changed};
+    return npg_reference_next(loop, &result);
+}
+
+/* The same of a reference that is one side of the body. */
+static npg_brief next_side(npg_reference_loop *loop, int64_t unreached)
+{
+    const npg_pass_result result = {.unreached_count = unreached, .has_changed = true, .is_side = true};
     return npg_reference_next(loop, &result);
 }
 
@@ -46,18 +53,26 @@ static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **s
     npg_brief brief = npg_reference_begin(&loop, 1);
     int64_t passes = 0;
     for (int64_t unreached = 60; unreached > 0; unreached -= 20, passes++) {
-        brief = next(&loop, unreached, true);
+        brief = next_side(&loop, unreached);
         assert_true(brief.is_growing && brief.takes_gathered);
         assert_int_equal(brief.rounds_left, 1);
         assert_int_equal(brief.growing_passes, passes + 1);
     }
-    brief = next(&loop, 0, true); /* whole now, and its newest part has nothing around it */
+    brief = next_side(&loop, 0); /* whole now, and its newest part has nothing around it */
     assert_false(brief.is_growing);
     assert_int_equal(brief.rounds_left, 1);
-    brief = next(&loop, 0, true);
+    brief = next_side(&loop, 0);
     assert_int_equal(brief.rounds_left, 0);
     assert_int_equal(brief.growing_passes, passes);
     assert_true(brief.takes_gathered);
+}
+
+static void a_side_that_reaches_all_is_gathered_whatever_it_lacks(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1);
+    assert_true(next_side(&loop, 0).takes_gathered);
 }
 
 static void growth_in_vain_asks_for_less_and_then_ends(void **state)
@@ -94,6 +109,7 @@ int main(void)
         cmocka_unit_test(every_round_is_walked_once),
         cmocka_unit_test(what_a_reference_does_not_explain_is_not_gathered),
         cmocka_unit_test(a_side_grows_until_all_is_reached_and_is_gathered_once_more),
+        cmocka_unit_test(a_side_that_reaches_all_is_gathered_whatever_it_lacks),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
         cmocka_unit_test(growth_never_goes_on_for_ever),
     };

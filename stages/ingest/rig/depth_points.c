@@ -10,6 +10,13 @@
  * 1 / Z = (n_x x + n_y y + n_z) / h.  So n is had from a least-squares fit of 1 / Z over a window of the
  * image, of those pixels that lie on the same surface; it faces the sensor by construction.
  *
+ * Steps.  Depths come in steps, of one disparity far off: within half of one the plane of the same window says
+ * where a pixel lies.
+ *
+ * View.  How far ahead nothing is: the least depth of the pixels in each cell of a coarser grid, those at edges
+ * among them, as they are measured; where the background was removed, a cell of pixels without depth is
+ * empty as far as the sensor sees.
+ *
  * Based on: Badino, Huber, Park, Kanade, Fast and accurate computation of surface normals from range images,
  * 2011 (the fit in inverse depth). */
 #include <math.h>
@@ -20,9 +27,11 @@
 #define WINDOW    3 /* pixels to each side: 7 x 7; less is noisier, more rounds off fingers (set by trial) */
 #define FIT_MIN   8 /* pixels of a window that a plane needs                                               */
 #define MASK_ON   128
+#define LEVELS    65536
 #define INNER     1    /* of keep: a pixel outside of the margin; planes are fitted to these         */
 #define EDGE      2    /* of keep: in the margin, but it continues the surface                       */
 #define BESIDE    2    /* inner pixels beside one of the margin, of eight, that make it a candidate  */
+#define MOST_OF   0.5  /* of the pixels without depth: nobody's scene but one whose background was removed */
 #define CONTINUES 0.25 /* of a depth step: how far from the plane it may lie                         */
 
 typedef struct grid {
@@ -30,9 +39,10 @@ typedef struct grid {
     const npg_rig_sensor *sensor;
     npg_image depth, mask, colour;
     size_t width, height;
-    npg_arena arena; /* of what follows */
-    float *z;        /* H x W: depth, 0 where the pixel can't be used */
-    uint8_t *keep;   /* H x W: INNER or EDGE where the pixel is used  */
+    npg_arena arena;         /* of what follows */
+    float *z;                /* H x W: depth, 0 where the pixel can't be used */
+    uint8_t *keep;           /* H x W: INNER or EDGE where the pixel is used  */
+    uint16_t *below, *above; /* LEVELS: the next depth, in steps, that the image has; itself at its ends */
 } grid;
 
 /* ---- images ---- */
@@ -165,11 +175,9 @@ static bool fit_plane(const grid *g, size_t px, size_t py, double abc[3])
 }
 
 /* Its normal, turned to the sensor. */
-static bool fit_normal(const grid *g, size_t px, size_t py, float normal[3])
+static bool fit_normal(const grid *g, size_t at, const double abc[3], float normal[3])
 {
-    double abc[3], n = 0;
-    size_t at = py * g->width + px;
-    if (!fit_plane(g, px, py, abc)) return false;
+    double n = 0;
     /* back from rays and depth relative to the middle's */
     double c = abc[2] + 1 / (double)g->z[at];
     c -= abc[0] * (double)g->sensor->rays[2 * at] + abc[1] * (double)g->sensor->rays[2 * at + 1];
@@ -177,6 +185,37 @@ static bool fit_normal(const grid *g, size_t px, size_t py, float normal[3])
     for (int k = 0; k < 3; k++) n += out[k] * out[k];
     for (int k = 0; k < 3; k++) normal[k] = (float)(out[k] / sqrt(n));
     return n > 0 && isfinite(n);
+}
+
+/* ---- the steps of depth ---- */
+
+/* Sensors that measure disparities know few depths far off: the true one lies between the middles to the next
+ * ones that the image has.  What lies farther apart is two surfaces. */
+static void find_levels(grid *g)
+{
+    for (size_t i = 0; i < g->width * g->height; i++) g->above[g->depth.depth[i]] = 1;
+    uint16_t last = 0;
+    for (size_t d = 1; d < LEVELS; d++) {
+        g->below[d] = last ? last : (uint16_t)d;
+        if (g->above[d]) last = (uint16_t)d;
+    }
+    last = 0;
+    for (size_t d = LEVELS - 1; d > 0; d--) {
+        bool is_there = g->above[d];
+        g->above[d] = last ? last : (uint16_t)d;
+        if (is_there) last = (uint16_t)d;
+    }
+}
+
+/* The depth of a pixel on the plane around it, as far as its step leaves that open. */
+static float depth_between(const grid *g, size_t at, const double abc[3])
+{
+    uint16_t step = g->depth.depth[at];
+    double z = (double)g->z[at], scale = g->sensor->scale, most = g->rig->settings.step_share * z;
+    double below = (step - g->below[step]) * scale, above = (g->above[step] - step) * scale;
+    double fitted = 1 / (1 / z + abc[2]);
+    if (below <= most && fitted < z) return (float)fmax(fitted, z - below / 2);
+    return above <= most && fitted > z ? (float)fmin(fitted, z + above / 2) : g->z[at];
 }
 
 /* ---- the margin ---- */
@@ -263,14 +302,76 @@ static void add_points(npg_depth_points *points, const grid *g)
         for (size_t x = 0; x < g->width; x++) {
             size_t at = y * g->width + x, n = points->count;
             float *pos = points->pos + 3 * n;
-            if (!g->keep[at] || !fit_normal(g, x, y, points->normals + 3 * n)) continue;
-            pos[0] = rays[2 * at] * g->z[at];
-            pos[1] = rays[2 * at + 1] * g->z[at];
-            pos[2] = g->z[at];
+            double abc[3];
+            if (!g->keep[at] || !fit_plane(g, x, y, abc) || !fit_normal(g, at, abc, points->normals + 3 * n))
+                continue;
+            pos[2] = depth_between(g, at, abc);
+            pos[0] = rays[2 * at] * pos[2];
+            pos[1] = rays[2 * at + 1] * pos[2];
             points->pixels[n] = (uint32_t)at;
             if (points->colours) take_colour(g, at, pos, points->colours + 4 * n);
             points->count++;
         }
+}
+
+/* ---- the view ---- */
+
+/* Whether a pixel that shows nothing says that nothing is there. */
+static bool is_background_removed(const grid *g)
+{
+    size_t pixels = g->width * g->height, without = 0;
+    int background = g->rig->settings.background;
+    if (background != NPG_BACKGROUND_AUTO || g->mask.bytes) return background != NPG_BACKGROUND_UNKNOWN;
+    for (size_t i = 0; i < pixels; i++) without += !g->depth.depth[i];
+    return (double)without > MOST_OF * (double)pixels;
+}
+
+/* A cell takes its least measured depth; without any it is not known as soon as one of its pixels is not. */
+static void look_at(float *cell, float depth)
+{
+    if (isnan(*cell))
+        *cell = depth;
+    else if (depth > 0 && !isinf(depth))
+        *cell = *cell > 0 ? fminf(*cell, depth) : depth;
+    else if (isinf(*cell))
+        *cell = depth;
+}
+
+static float depth_seen(const grid *g, size_t i, bool is_removed)
+{
+    bool is_hidden = g->mask.bytes && g->mask.bytes[i] < MASK_ON;
+    double z = g->depth.depth[i] * g->sensor->scale,
+           near_m = larger(g->sensor->near_m, g->rig->settings.near_m);
+    if (is_hidden) return is_removed ? INFINITY : (float)z;
+    if (!(z > 0)) return is_removed && !g->mask.bytes ? INFINITY : 0;
+    return z < near_m ? 0 : (float)z;
+}
+
+static npg_status make_view(npg_depth_points *points, const grid *g)
+{
+    const npg_camera *c = &g->sensor->camera;
+    npg_depth_view *view = &points->view;
+    bool is_removed = is_background_removed(g);
+    size_t longest = g->width > g->height ? g->width : g->height;
+    size_t pixels = (longest + NPG_VIEW_SIDE - 1) / NPG_VIEW_SIDE; /* of a side of a cell, about */
+    view->first[0] = -(c->cx + 0.5) / c->fx;
+    view->first[1] = -(c->cy + 0.5) / c->fy;
+    view->step = (double)pixels / fmin(c->fx, c->fy);
+    view->width = (uint32_t)ceil((double)g->width / c->fx / view->step);
+    view->height = (uint32_t)ceil((double)g->height / c->fy / view->step);
+    size_t count = (size_t)view->width * view->height;
+    points->cells = npg_arena_take(&points->arena, count, sizeof *points->cells);
+    NPG_TRY(npg_arena_status(&points->arena));
+    for (size_t i = 0; i < count; i++) points->cells[i] = NAN;
+    for (size_t i = 0; i < g->width * g->height; i++) {
+        double x = ((double)g->sensor->rays[2 * i] - view->first[0]) / view->step;
+        double y = ((double)g->sensor->rays[2 * i + 1] - view->first[1]) / view->step;
+        if (!(x >= 0 && y >= 0 && x < view->width && y < view->height)) continue;
+        look_at(&points->cells[(size_t)y * view->width + (size_t)x], depth_seen(g, i, is_removed));
+    }
+    for (size_t i = 0; i < count; i++)
+        if (isnan(points->cells[i])) points->cells[i] = 0;
+    return NPG_OK;
 }
 
 static npg_status make_rays(npg_rig_sensor *sensor)
@@ -293,8 +394,12 @@ static npg_status make_points(npg_depth_points *points, grid *g, const npg_rig_s
     size_t pixels = g->width * g->height;
     g->z = npg_arena_take(&g->arena, pixels, sizeof *g->z);
     g->keep = npg_arena_take(&g->arena, pixels, 1);
+    g->below = npg_arena_take(&g->arena, LEVELS, sizeof *g->below);
+    g->above = npg_arena_take(&g->arena, LEVELS, sizeof *g->above);
     NPG_TRY(npg_arena_status(&g->arena));
     fill_depths(g);
+    find_levels(g);
+    NPG_TRY(make_view(points, g));
     NPG_TRY(mark_inner(g));
     add_edges(g);
     NPG_TRY(reserve(points, g));

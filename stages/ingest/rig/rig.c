@@ -313,6 +313,7 @@ uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame)
 {
     const npg_rig_settings *set = &rig->settings;
     XXH64_hash_t hash = XXH3_64bits(&set->step_share, sizeof set->step_share);
+    hash = XXH3_64bits_withSeed(&set->background, sizeof set->background, hash);
     for (size_t s = 0; s < rig->sensor_count; s++) {
         const npg_rig_sensor *sensor = &rig->sensors[s];
         const npg_rig_shot *shot = npg_rig_shot_of(rig, frame, s);

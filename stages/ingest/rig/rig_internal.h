@@ -100,6 +100,8 @@ typedef struct npg_depth_points {
     uint8_t *colours;     /* N x 4, sRGB, alpha 0: not seen         */
     uint32_t *pixels;     /* N, y x width + x, growing              */
     bool has_colours;
+    npg_depth_view view; /* but for the pose */
+    float *cells;        /* of the view      */
 } npg_depth_points;
 
 npg_status npg_depth_points_read(npg_depth_points *points, npg_rig *rig, size_t sensor,

@@ -24,6 +24,7 @@ static npg_status reserve(npg_frame *frame, const reading *r)
     bool has_colours = false;
     for (size_t s = 0; s < r->rig->sensor_count; s++) {
         count += r->of[s].count;
+        frame->view_cell_count += (size_t)r->of[s].view.width * r->of[s].view.height;
         has_colours = has_colours || r->of[s].has_colours;
     }
     NPG_TRY(npg_alloc_array(&frame->pos_local, NPG_FOR_FRAMES, count, 3 * sizeof(float)));
@@ -31,6 +32,8 @@ static npg_status reserve(npg_frame *frame, const reading *r)
     NPG_TRY(npg_alloc(&frame->sensors, NPG_FOR_FRAMES, count));
     NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, r->rig->sensor_count, 3 * sizeof(float)));
     frame->sensor_count = r->rig->sensor_count;
+    NPG_TRY(npg_alloc_array(&frame->views, NPG_FOR_FRAMES, frame->sensor_count, sizeof *frame->views));
+    NPG_TRY(npg_alloc_array(&frame->view_cells, NPG_FOR_FRAMES, frame->view_cell_count, sizeof(float)));
     for (size_t i = 0; i < 3 * frame->sensor_count; i++) frame->sensor_local[i] = NAN;
     return has_colours ? npg_alloc_array(&frame->colours, NPG_FOR_FRAMES, count, 4) : NPG_OK;
 }
@@ -57,13 +60,31 @@ static void add_sensor(npg_frame *frame, const reading *r, size_t s, npg_origin 
         frame->sensor_local[3 * s + a] = (float)(pose[4 * a + 3] - origin->world[a]);
 }
 
+/* *at: where the cells of the sensors before it end. */
+static void add_view(npg_frame *frame, const reading *r, size_t s, const npg_origin *origin, size_t *at)
+{
+    npg_depth_view *view = &frame->views[s];
+    size_t count = (size_t)r->of[s].view.width * r->of[s].view.height;
+    double pose[12];
+    *view = r->of[s].view;
+    view->at = *at;
+    if (!count) return;
+    npg_rig_pose(r->rig, pose, s, npg_rig_shot_of(r->rig, r->frame, s));
+    for (size_t a = 0; a < 3; a++) pose[4 * a + 3] -= origin->world[a];
+    npg_pose_invert(view->to_sensor, pose);
+    memcpy(frame->view_cells + *at, r->of[s].cells, count * sizeof *r->of[s].cells);
+    *at += count;
+}
+
 npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *origin)
 {
     reading r = {.rig = rig, .frame = at};
     npg_status status = npg_parallel(read_sensor, &r, rig->sensor_count);
     if (!status) status = reserve(frame, &r);
+    size_t cells = 0;
     for (size_t s = 0; s < rig->sensor_count && !status; s++)
         if (r.of[s].count) add_sensor(frame, &r, s, origin);
+    for (size_t s = 0; s < rig->sensor_count && !status; s++) add_view(frame, &r, s, origin, &cells);
     for (size_t s = 0; s < rig->sensor_count; s++) npg_arena_release(&r.of[s].arena);
     frame->has_sure_normals = true;
     if (status) npg_frame_clear(frame);

@@ -1,0 +1,147 @@
+/* Free space: what the depth images of a frame say of places. */
+#include <math.h>
+
+#include "geometry/geometry.h"
+#include "pipeline/memory.h"
+
+/* In cells: so far beside all that was seen is clearly outside of its outline, where a sensor mixes the body with
+ * what is behind it, and so far before it is clearly in front; and so far off lies what one ray may have hit. */
+#define BESIDE 3
+#define AROUND 1
+
+typedef struct view {
+    double to_sensor[12], first[2], step; /* as npg_depth_view, but of unit coordinates */
+    ptrdiff_t width, height;
+    float *cells;           /* H x W: the depth of each, infinite: nothing, 0: not known */
+    float *nearest;         /* H x W: the least depth within AROUND, infinite: none      */
+    float *near_by, *known; /* H x W: the same within BESIDE, and whether all is known there */
+} view;
+
+struct npg_free_space {
+    npg_arena arena;
+    size_t count;
+    view *views;
+};
+
+/* ---- making ---- */
+
+static void take_pose(view *v, const npg_depth_view *from, const npg_frame_box *box)
+{
+    for (int a = 0; a < 3; a++) {
+        const double *row = from->to_sensor + 4 * a;
+        double *to = v->to_sensor + 4 * a;
+        to[3] = row[3];
+        for (int c = 0; c < 3; c++) {
+            to[c] = row[c];
+            to[3] += row[c] * box->centre[c];
+        }
+        to[3] *= box->scale;
+    }
+}
+
+/* out[i] = the least of the cells within reach of it along a line. */
+static void take_least(float *out, const float *in, ptrdiff_t count, ptrdiff_t stride, ptrdiff_t reach)
+{
+    for (ptrdiff_t i = 0; i < count; i++) {
+        ptrdiff_t first = i < reach ? 0 : i - reach, last = i + reach < count ? i + reach : count - 1;
+        out[i * stride] = INFINITY;
+        for (ptrdiff_t k = first; k <= last; k++) out[i * stride] = fminf(out[i * stride], in[k * stride]);
+    }
+}
+
+/* The same over squares, in place. */
+static void spread_least(float *cells, float *scratch, const view *v, ptrdiff_t reach)
+{
+    for (ptrdiff_t y = 0; y < v->height; y++)
+        take_least(scratch + y * v->width, cells + y * v->width, v->width, 1, reach);
+    for (ptrdiff_t x = 0; x < v->width; x++) take_least(cells + x, scratch + x, v->height, v->width, reach);
+}
+
+static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *from, const float *cells,
+                            const npg_frame_box *box)
+{
+    size_t count = (size_t)from->width * from->height;
+    *v = (view){.first = {from->first[0], from->first[1]},
+                .step = from->step,
+                .width = from->width,
+                .height = from->height};
+    take_pose(v, from, box);
+    v->cells = npg_arena_take(arena, count, sizeof *v->cells);
+    v->nearest = npg_arena_take(arena, count, sizeof *v->nearest);
+    v->near_by = npg_arena_take(arena, count, sizeof *v->near_by);
+    v->known = npg_arena_take(arena, count, sizeof *v->known);
+    float *scratch = npg_arena_take(arena, count, sizeof *scratch);
+    NPG_TRY(npg_arena_status(arena));
+    for (size_t i = 0; i < count; i++) {
+        v->cells[i] = (float)(box->scale * (double)cells[i]);
+        v->nearest[i] = v->near_by[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
+        v->known[i] = v->cells[i] > 0;
+    }
+    spread_least(v->nearest, scratch, v, AROUND);
+    spread_least(v->near_by, scratch, v, BESIDE);
+    spread_least(v->known, scratch, v, BESIDE);
+    return NPG_OK;
+}
+
+npg_status npg_free_space_open(npg_free_space **out, const npg_frame *frame, const npg_frame_box *box)
+{
+    *out = NULL;
+    if (!frame->views) return NPG_OK;
+    NPG_TRY(npg_object_open(out, NPG_FOR_FIT, sizeof **out));
+    npg_free_space *s = *out;
+    s->views = npg_arena_take(&s->arena, frame->sensor_count, sizeof *s->views);
+    npg_status status = npg_arena_status(&s->arena);
+    for (size_t i = 0; i < frame->sensor_count && !status; i++)
+        if (frame->views[i].width)
+            status = open_view(&s->views[s->count++], &s->arena, &frame->views[i],
+                               frame->view_cells + frame->views[i].at, box);
+    if (status) npg_free_space_close(out);
+    return status;
+}
+
+void npg_free_space_close(npg_free_space **space)
+{
+    npg_object_close(space);
+}
+
+/* ---- looking ---- */
+
+static npg_sight_kind look(const view *v, const float place[3])
+{
+    double at[3];
+    for (int a = 0; a < 3; a++) {
+        const double *row = v->to_sensor + 4 * a;
+        at[a] = row[3];
+        for (int c = 0; c < 3; c++) at[a] += row[c] * (double)place[c];
+    }
+    if (!(at[2] > 0)) return NPG_SEEN_UNKNOWN;
+    double x = floor((at[0] / at[2] - v->first[0]) / v->step),
+           y = floor((at[1] / at[2] - v->first[1]) / v->step);
+    if (!(x >= 0 && y >= 0 && x < (double)v->width && y < (double)v->height)) return NPG_SEEN_UNKNOWN;
+    ptrdiff_t i = (ptrdiff_t)y * v->width + (ptrdiff_t)x;
+    double margin = BESIDE * v->step * at[2];
+    if (!(v->cells[i] > 0)) return NPG_SEEN_UNKNOWN;
+    if (isinf(v->near_by[i])) return v->known[i] > 0 ? NPG_SEEN_BESIDE : NPG_SEEN_UNKNOWN;
+    if (at[2] < (double)v->near_by[i] - margin) return NPG_SEEN_EMPTY;
+    if (isinf(v->cells[i])) return NPG_SEEN_UNKNOWN; /* beside the outline, but not clearly */
+    if (at[2] < (double)v->nearest[i] - margin) return NPG_SEEN_EMPTY;
+    return at[2] <= (double)v->cells[i] + margin ? NPG_SEEN_AT : NPG_SEEN_HIDDEN;
+}
+
+npg_sight_kind npg_free_space_look(const npg_free_space *space, const float place[3])
+{
+    npg_sight_kind all = NPG_SEEN_UNKNOWN;
+    for (size_t i = 0; i < space->count; i++) {
+        npg_sight_kind one = look(&space->views[i], place);
+        if (one == NPG_SEEN_EMPTY || one == NPG_SEEN_BESIDE) return one;
+        if (one == NPG_SEEN_AT || (one == NPG_SEEN_HIDDEN && all == NPG_SEEN_UNKNOWN)) all = one;
+    }
+    return all;
+}
+
+bool npg_free_space_is_empty(const npg_free_space *space, const float place[3])
+{
+    if (!space) return false;
+    npg_sight_kind kind = npg_free_space_look(space, place);
+    return kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE;
+}

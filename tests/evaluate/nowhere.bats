@@ -1,0 +1,65 @@
+# Surface where depth images show that nothing is: measured in every frame, with a bar; only where that is known.
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR"
+    "$NEUPIG" synth -o capture --rig --cameras 2 --frames 3 --cycles 0.1 --width 120 --height 90 --depth-noise 1 >synth.log
+    run_it plain --export obj || [ "$code" -eq 7 ] # two coarse sensors leave much to be closed
+    ball capture-plain.obj >with_ball.obj
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR"
+}
+
+# A short run of the capture into OUT; $code is its exit code.
+run_it() { # OUT OPTION...
+    code=0
+    "$NEUPIG" run capture/rig/rig.json -o "$1" --keyframe 0 --bars invented=100,unsupported=100 -q \
+        --method '{"epochs": 10, "poisson-depth": 6}' "${@:2}" >"$1.log" 2>&1 || code=$?
+    cp "$1"/meshes/frame_0000.obj "capture-$1.obj" 2>/dev/null || true
+    return $code
+}
+
+# The mesh, and half a metre beside it an octahedron of 15 cm.
+ball() { # MESH.obj
+    awk '$1 == "v" { n++ } { print } END {
+        split("1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1", d, " ")
+        for (i = 0; i < 6; i++) print "v", 0.9 + 0.15 * d[3 * i + 1], 0.9 + 0.15 * d[3 * i + 2], 0.15 * d[3 * i + 3]
+        split("1 3 5 3 2 5 2 4 5 4 1 5 3 1 6 2 3 6 4 2 6 1 4 6", f, " ")
+        for (i = 0; i < 8; i++) print "f", n + f[3 * i + 1], n + f[3 * i + 2], n + f[3 * i + 3]
+    }' "$1"
+}
+
+# The share of each frame, one a line.
+shares() { # OUT
+    sed 's/.*"nowhere_share":\([^,]*\),.*/\1/' "$1/frames.jsonl"
+}
+
+@test "a body that sensors see has none" {
+    shares plain | awk '{ print } $1 > 0.002 { exit 1 }'
+}
+
+@test "a ball beside it in the reference: the frame is bad, and says why" {
+    run_it ball --reference with_ball.obj || [ "$code" -eq 7 ]
+    [ "$code" -eq 7 ]
+    shares ball | awk '{ print } NR == 1 && ($1 < 0.02 || $1 > 0.1) { exit 1 }'
+    head -n 1 ball/frames.jsonl | grep -q '"fault":"nowhere"'
+    grep -q "below the bar: share of the surface where sensors saw that nothing is, in %, is [0-9.]*, the bar 1" ball.log
+    run_it lenient --reference with_ball.obj --bars invented=100,unsupported=100,nowhere=20
+    [ "$(grep -c '"good":true' lenient/frames.jsonl)" -eq 3 ]
+}
+
+@test "it is pulled to where something is in the frames that are followed" {
+    shares ball | awk 'NR == 1 { first = $1 } { last = $1; print } END { exit !(last < first / 2) }'
+}
+
+@test "where the background was not removed, no depth says nothing" {
+    run_it unknown --reference with_ball.obj --background unknown
+    shares unknown | awk '{ print } $1 != 0 { exit 1 }'
+}
+
+@test "clouds without images have no such figure" {
+    "$NEUPIG" synth -o clouds --frames 3 --points 500 >/dev/null
+    "$NEUPIG" run clouds/points -o clouds-out -q --method '{"epochs": 5, "poisson-depth": 5}' >/dev/null 2>&1 || [ $? -eq 7 ]
+    [ "$(grep -c '"nowhere_share":null' clouds-out/frames.jsonl)" -eq 3 ]
+}
