@@ -130,6 +130,14 @@ static void print_pose(FILE *out, const job *j, size_t s)
     fprintf(out, "pose      %-12s %s\n", rig->sensors[s].name, text);
 }
 
+/* What no run can make of a capture, or NULL. */
+static const char *limit_of(const job *j)
+{
+    return j->list && j->list->rig && j->list->rig->sensor_count == 1
+               ? "one sensor: the surface is an open shell without a back, unless the body turns before it"
+               : NULL;
+}
+
 static void print_sensors(FILE *out, const job *j)
 {
     const npg_rig *rig = j->list ? j->list->rig : NULL;
@@ -145,6 +153,7 @@ static void print_sensors(FILE *out, const job *j)
     }
     for (size_t s = 0; rig && j->views && rig->sensor_count > 1 && s < rig->sensor_count; s++)
         print_pose(out, j, s);
+    if (limit_of(j)) fprintf(out, "limit     %s\n", limit_of(j));
 }
 
 static json_t *json_of_sensors(const job *j)
@@ -189,6 +198,7 @@ static npg_status set_json(npg_capture_facts *facts, job *j, const npg_estimate 
         "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes, "disk_bytes", e->disk_bytes,
         "time_s", e->time_s, "per_frame", p->per_frame);
     if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
+    if (limit_of(j)) json_object_set_new(all, "limit", json_string(limit_of(j)));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     npg_status status =
         text ? npg_copy_text((char **)&facts->json, text) : npg_error(NPG_MEMORY, "no memory");

@@ -63,3 +63,11 @@ shares() { # OUT
     "$NEUPIG" run clouds/points -o clouds-out -q --method '{"epochs": 5, "poisson-depth": 5}' >/dev/null 2>&1 || [ $? -eq 7 ]
     [ "$(grep -c '"nowhere_share":null' clouds-out/frames.jsonl)" -eq 3 ]
 }
+
+@test "probe says what one sensor can't show" {
+    "$NEUPIG" synth -o alone --rig --cameras 1 --frames 2 --width 120 --height 90 >/dev/null
+    "$NEUPIG" probe alone/rig/rig.json >probe.log || [ $? -eq 7 ]
+    grep -q "^limit .*one sensor: the surface is an open shell" probe.log
+    "$NEUPIG" probe capture/rig/rig.json >probe.log || [ $? -eq 7 ]
+    ! grep -q "^limit" probe.log
+}
