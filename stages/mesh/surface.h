@@ -149,7 +149,7 @@ typedef struct npg_pieces {
 
 /* Keep the component of the largest area, and those with a hundredth of all area that come within a tenth of
  * `size` of it (a hand that a hole in the points cuts off belongs to the body; a ball beside it does not).
- * size 0: the largest alone.  A mesh without faces stays as it is. */
+ * size 0: the largest alone; HUGE_VAL: wherever they are.  A mesh without faces stays as it is. */
 npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double size);
 
 /* At most face_max faces, by edge collapse (meshoptimizer). */
