@@ -39,22 +39,22 @@ static void take_pose(view *v, const npg_depth_view *from, const npg_frame_box *
     }
 }
 
-/* out[i] = the least of the cells within reach of it along a line. */
-static void take_least(float *out, const float *in, ptrdiff_t count, ptrdiff_t stride, ptrdiff_t reach)
-{
-    for (ptrdiff_t i = 0; i < count; i++) {
-        ptrdiff_t first = i < reach ? 0 : i - reach, last = i + reach < count ? i + reach : count - 1;
-        out[i * stride] = INFINITY;
-        for (ptrdiff_t k = first; k <= last; k++) out[i * stride] = fminf(out[i * stride], in[k * stride]);
-    }
-}
-
-/* The same over squares, in place. */
-static void spread_least(float *cells, float *scratch, const view *v, ptrdiff_t reach)
+/* out[i] = the least of the cells whose middles are within reach of that of cell i. */
+static void take_least(float *out, const float *in, const view *v, ptrdiff_t reach)
 {
     for (ptrdiff_t y = 0; y < v->height; y++)
-        take_least(scratch + y * v->width, cells + y * v->width, v->width, 1, reach);
-    for (ptrdiff_t x = 0; x < v->width; x++) take_least(cells + x, scratch + x, v->height, v->width, reach);
+        for (ptrdiff_t x = 0; x < v->width; x++) {
+            float least = INFINITY;
+            for (ptrdiff_t dy = -reach; dy <= reach; dy++)
+                for (ptrdiff_t dx = -reach; dx <= reach; dx++) {
+                    ptrdiff_t i = x + dx, j = y + dy;
+                    if (dx * dx + dy * dy > reach * reach || i < 0 || j < 0 || i >= v->width ||
+                        j >= v->height)
+                        continue;
+                    least = fminf(least, in[j * v->width + i]);
+                }
+            out[y * v->width + x] = least;
+        }
 }
 
 static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *from, const float *cells,
@@ -70,16 +70,17 @@ static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *fro
     v->nearest = npg_arena_take(arena, count, sizeof *v->nearest);
     v->near_by = npg_arena_take(arena, count, sizeof *v->near_by);
     v->known = npg_arena_take(arena, count, sizeof *v->known);
-    float *scratch = npg_arena_take(arena, count, sizeof *scratch);
+    float *least = npg_arena_take(arena, count, sizeof *least),
+          *is_known = npg_arena_take(arena, count, sizeof *is_known);
     NPG_TRY(npg_arena_status(arena));
     for (size_t i = 0; i < count; i++) {
         v->cells[i] = (float)(box->scale * (double)cells[i]);
-        v->nearest[i] = v->near_by[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
-        v->known[i] = v->cells[i] > 0;
+        is_known[i] = v->cells[i] > 0;
+        least[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
     }
-    spread_least(v->nearest, scratch, v, AROUND);
-    spread_least(v->near_by, scratch, v, BESIDE);
-    spread_least(v->known, scratch, v, BESIDE);
+    take_least(v->nearest, least, v, AROUND);
+    take_least(v->near_by, least, v, BESIDE);
+    take_least(v->known, is_known, v, BESIDE);
     return NPG_OK;
 }
 

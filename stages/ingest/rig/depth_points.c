@@ -32,6 +32,7 @@
 #define EDGE      2    /* of keep: in the margin, but it continues the surface                       */
 #define BESIDE    2    /* inner pixels beside one of the margin, of eight, that make it a candidate  */
 #define MOST_OF   0.5  /* of the pixels without depth: nobody's scene but one whose background was removed */
+#define GRAZING   0.25 /* cosine below which a surface is no surface that a sensor measures              */
 #define CONTINUES 0.25 /* of a depth step: how far from the plane it may lie                         */
 
 typedef struct grid {
@@ -283,6 +284,14 @@ static void take_colour(const grid *g, size_t at, const float pos[3], uint8_t rg
 
 /* ---- the points ---- */
 
+/* Whether a sensor sees a plane so much from the side that it may as well be a smear between two surfaces. */
+static bool is_grazing(const float normal[3], const float ray[2])
+{
+    double along =
+        -((double)normal[0] * (double)ray[0] + (double)normal[1] * (double)ray[1] + (double)normal[2]);
+    return along < GRAZING * sqrt(1 + (double)ray[0] * (double)ray[0] + (double)ray[1] * (double)ray[1]);
+}
+
 static npg_status reserve(npg_depth_points *points, const grid *g)
 {
     size_t kept = 0;
@@ -303,8 +312,9 @@ static void add_points(npg_depth_points *points, const grid *g)
             size_t at = y * g->width + x, n = points->count;
             float *pos = points->pos + 3 * n;
             double abc[3];
-            if (!g->keep[at] || !fit_plane(g, x, y, abc) || !fit_normal(g, at, abc, points->normals + 3 * n))
-                continue;
+            float *normal = points->normals + 3 * n;
+            if (!g->keep[at] || !fit_plane(g, x, y, abc) || !fit_normal(g, at, abc, normal)) continue;
+            if (is_grazing(normal, rays + 2 * at)) continue;
             pos[2] = depth_between(g, at, abc);
             pos[0] = rays[2 * at] * pos[2];
             pos[1] = rays[2 * at + 1] * pos[2];
