@@ -232,6 +232,13 @@ npg_status npg_file_commit(npg_file **slot)
     return status;
 }
 
+npg_status npg_file_end(npg_file **file, npg_status status)
+{
+    if (!status) return npg_file_commit(file);
+    npg_file_discard(file);
+    return status;
+}
+
 void npg_file_discard(npg_file **slot)
 {
     npg_file *file = *slot;

@@ -30,6 +30,9 @@ npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, siz
 /* Make the file appear under its name; closes it in any case. */
 npg_status npg_file_commit(npg_file **file);
 
+/* The one after success, the other after a failure, which comes back. */
+npg_status npg_file_end(npg_file **file, npg_status status);
+
 /* Close without a result: the hidden file is removed.  NULL is fine. */
 void npg_file_discard(npg_file **file);
 
@@ -89,10 +92,10 @@ bool npg_is_in_folder(const char *folder, const char *name);
 
 /* ---- whole folders (folder.c) ---- */
 
-/* The numbers N of the files "<prefix>N.<extension>" in a folder, ascending; *numbers is to be given to
- * npg_release(), NULL where there are none, nor a folder.  NPG_DISK when it can't be listed. */
-npg_status npg_folder_numbers(int64_t **numbers, size_t *count, const char *folder, const char *prefix,
-                              const char *extension);
+/* Call visit(user, name) for each name in a folder that is neither "." nor "..", in no order, until one
+ * fails.  `failure` is what a folder that can't be listed means; with NPG_DISK one that is not there is empty. */
+npg_status npg_folder_each(const char *folder, npg_status failure,
+                           npg_status (*visit)(void *user, const char *name), void *user);
 
 /* Remove a file, or a folder with all that is in it; links are removed, not followed.  What is not there is
  * no failure; what can't be removed does not keep the rest, and NPG_DISK names the first. */

@@ -5,46 +5,21 @@
 #include <errno.h>
 #include <ftw.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#include "pipeline/memory.h"
-#include "pipeline/order.h"
 
 enum { WALK_FDS = 16 }; /* folders that nftw() keeps open at a time */
 
-/* The number between prefix and extension; false for any other name. */
-static bool number_in(const char *name, const char *prefix, const char *extension, int64_t *number)
-{
-    size_t length = strlen(prefix);
-    char *end;
-    if (strncmp(name, prefix, length) != 0 || name[length] < '0' || name[length] > '9') return false;
-    errno = 0;
-    *number = strtoll(name + length, &end, 10);
-    return !errno && *end == '.' && !strcmp(end + 1, extension);
-}
-
-npg_status npg_folder_numbers(int64_t **numbers, size_t *count, const char *folder, const char *prefix,
-                              const char *extension)
+npg_status npg_folder_each(const char *folder, npg_status failure,
+                           npg_status (*visit)(void *user, const char *name), void *user)
 {
     npg_status status = NPG_OK;
-    size_t capacity = 0;
-    int64_t number;
-    *numbers = NULL;
-    *count = 0;
     DIR *listing = opendir(folder);
-    if (!listing && errno == ENOENT) return NPG_OK;
-    if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", folder);
-    for (struct dirent *entry; !status && (entry = readdir(listing));) {
-        if (!number_in(entry->d_name, prefix, extension, &number)) continue;
-        status = npg_grow(numbers, &capacity, *count + 1, sizeof **numbers, NPG_FOR_FILES);
-        if (!status) (*numbers)[(*count)++] = number;
-    }
+    if (!listing && errno == ENOENT && failure == NPG_DISK) return NPG_OK;
+    if (!listing) return npg_error_errno(failure, "can't list %s", folder);
+    for (struct dirent *entry; !status && (entry = readdir(listing));)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            status = visit(user, entry->d_name);
     closedir(listing);
-    if (status)
-        npg_release(numbers);
-    else if (*count)
-        qsort(*numbers, *count, sizeof **numbers, npg_order_int64);
     return status;
 }
 

@@ -76,24 +76,15 @@ npg_status npg_json_read(json_t **root, char **text, const char *path, size_t li
 
 /* ---- values ---- */
 
-/* Length of the UTF-8 sequence that begins at text, 0 if it is none (too long, cut off, a surrogate). */
-/* Bounds as in RFC 3629: c0, c1 and e0 8x, f0 8x would be too long, ed ax a surrogate, f4 9x beyond
- * 10ffff. */
-static size_t sequence_length(const unsigned char *text)
+/* Length of the UTF-8 sequence that begins at text, 0 if it is none. */
+static size_t sequence_length(const char *text)
 {
-    unsigned char c = text[0];
-    size_t length = c < 0x80                ? 1
-                    : c >= 0xc2 && c < 0xe0 ? 2
-                    : c >= 0xe0 && c < 0xf0 ? 3
-                    : c >= 0xf0 && c < 0xf5 ? 4
-                                            : 0;
-    for (size_t i = 1; i < length; i++)
-        if ((text[i] & 0xc0) != 0x80) return 0;
-    if (c == 0xe0 && text[1] < 0xa0) return 0;
-    if (c == 0xed && text[1] >= 0xa0) return 0;
-    if (c == 0xf0 && text[1] < 0x90) return 0;
-    if (c == 0xf4 && text[1] >= 0x90) return 0;
-    return length;
+    for (size_t length = 1; length <= 4 && strnlen(text, length) == length; length++) {
+        json_t *sequence = json_stringn(text, length);
+        json_decref(sequence);
+        if (sequence) return length;
+    }
+    return 0;
 }
 
 json_t *npg_json_text(const char *text)
@@ -103,7 +94,7 @@ json_t *npg_json_text(const char *text)
     if (value) return value;
     char *copy;
     if (npg_copy_text(&copy, text)) return NULL;
-    for (unsigned char *c = (unsigned char *)copy; *c;) {
+    for (char *c = copy; *c;) {
         size_t length = sequence_length(c);
         if (!length) *c = '?';
         c += length ? length : 1;
@@ -118,17 +109,11 @@ json_t *npg_json_real(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
-static npg_status save(const char *path, const json_t *value)
+npg_status npg_json_print(npg_file *file, const json_t *value, size_t flags)
 {
-    char *text = json_dumps(value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-    npg_file *file = NULL;
-    if (!text) return npg_error(NPG_MEMORY, "no memory for %s", path);
-    npg_status status = npg_file_open(&file, path);
-    if (!status) {
-        npg_file_write(file, text, strlen(text));
-        npg_file_write(file, "\n", 1);
-        status = npg_file_commit(&file);
-    }
+    char *text = json_dumps(value, flags);
+    if (!text) return npg_error(NPG_MEMORY, "no memory for a file's text");
+    npg_status status = npg_file_write(file, text, strlen(text));
     free(text);
     return status;
 }
@@ -136,8 +121,12 @@ static npg_status save(const char *path, const json_t *value)
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
 {
     char path[NPG_PATH_SIZE];
+    npg_file *file;
     NPG_TRY(npg_path_of(path, folder, name));
-    return save(path, value);
+    NPG_TRY(npg_file_open(&file, path));
+    npg_status status = npg_json_print(file, value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    if (!status) npg_file_write(file, "\n", 1);
+    return npg_file_end(&file, status);
 }
 
 /* ---- lines ---- */

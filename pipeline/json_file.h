@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pipeline/status.h"
+#include "pipeline/file.h"
 
 /* Parse a file of at most `limit` bytes; comments go from // to the end of the line, a key may stand only
  * once.  *text gets what was parsed, comments blanked out, lines as they were: npg_release().  The caller
@@ -32,6 +32,9 @@ json_t *npg_json_real(double value);
 
 /* Write <folder>/<name>, a file that appears whole.  NPG_DISK, NPG_MEMORY. */
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value);
+
+/* Its text into a file that is being written; flags as jansson's. */
+npg_status npg_json_print(npg_file *file, const json_t *value, size_t flags);
 
 /* ---- JSON lines: one object a line, read so that memory does not grow with the file ---- */
 

@@ -344,10 +344,7 @@ static npg_status write_anew(npg_store *s)
     npg_status status = npg_file_open(&file, s->path);
     for (size_t i = 0; i < s->count && !status; i++) status = copy_record(file, s, &places[i]);
     int64_t end = status ? 0 : (int64_t)npg_file_size(file);
-    if (!status)
-        status = npg_file_commit(&file);
-    else
-        npg_file_discard(&file);
+    status = npg_file_end(&file, status);
     int fd = status ? -1 : open(s->path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
     if (!status && fd < 0) status = fail(s, "open");
     if (!status) {

@@ -1,13 +1,11 @@
 /* Apply: another mesh, or points, carried through all frames of a finished run. */
-#include <dirent.h>
-#include <errno.h>
 #include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
 
-#include "export/files.h"
+#include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/file.h"
@@ -34,7 +32,7 @@ typedef struct applying {
     bool turns_normals; /* they are the file's own                                                */
     bool is_like;       /* OBJ from OBJ: the file's lines are kept                                */
     npg_mesh_names names;
-    npg_file *done; /* collects OUT/done.json; appears last */
+    npg_done done; /* OUT/done.json; appears last */
     npg_applied *applied;
     size_t frame_count;
     int64_t number_max;
@@ -182,24 +180,15 @@ static bool is_own_name(const applying *a, const char *name)
 }
 
 /* Remove the mesh files of this prefix, or without overwrite refuse the first. */
-static npg_status clear_files(const applying *a)
+static npg_status clear_file(void *user, const char *name)
 {
-    char path[NPG_PATH_SIZE];
-    npg_status status = NPG_OK;
-    DIR *folder = opendir(a->s->output);
-    if (!folder) return npg_error_errno(NPG_DISK, "can't list %s", a->s->output);
-    for (struct dirent *entry; !status && (entry = readdir(folder));) {
-        if (!is_own_name(a, entry->d_name)) continue;
-        status = npg_path_of(path, a->s->output, entry->d_name);
-        if (!status && !a->s->overwrite)
-            status = npg_error(NPG_USAGE,
-                               "%s lies there already and would mix with the new files: "
-                               "choose another folder, or --overwrite removes what is there",
-                               path);
-        if (!status && unlink(path)) status = npg_error_errno(NPG_DISK, "can't remove %s", path);
-    }
-    closedir(folder);
-    return status;
+    const applying *a = user;
+    if (!is_own_name(a, name)) return NPG_OK;
+    if (a->s->overwrite) return npg_file_remove(a->s->output, name);
+    return npg_error(NPG_USAGE,
+                     "%s/%s lies there already and would mix with the new files: "
+                     "choose another folder, or --overwrite removes what is there",
+                     a->s->output, name);
 }
 
 static void choose_names(applying *a)
@@ -216,34 +205,19 @@ static void choose_names(applying *a)
 
 static npg_status open_output(applying *a)
 {
-    char path[NPG_PATH_SIZE];
+    const char *output = a->s->output;
     choose_names(a);
-    NPG_TRY(npg_folder_probe(a->s->output));
-    if (npg_is_in_folder(a->s->output, "frames.jsonl") || npg_is_in_folder(a->s->output, "job"))
-        return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", a->s->output);
-    NPG_TRY(npg_path_of(path, a->s->output, "done.json"));
-    if (!a->s->overwrite) NPG_TRY(clear_files(a));
-    if (unlink(path) && errno != ENOENT) return npg_error_errno(NPG_DISK, "can't remove %s", path);
-    if (a->s->overwrite) NPG_TRY(clear_files(a)); /* after done.json: what is left can't pass for whole */
-    return npg_file_open(&a->done, path);
+    NPG_TRY(npg_folder_probe(output));
+    if (npg_is_in_folder(output, "frames.jsonl") || npg_is_in_folder(output, "job"))
+        return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", output);
+    if (!a->s->overwrite) NPG_TRY(npg_folder_each(output, NPG_DISK, clear_file, a));
+    NPG_TRY(npg_file_remove(output, "done.json")); /* first: what is left can't pass for whole */
+    if (a->s->overwrite) NPG_TRY(npg_folder_each(output, NPG_DISK, clear_file, a));
+    NPG_TRY(npg_export_open(&a->done.file, output, "done.json"));
+    return npg_file_print(a->done.file, "{\n  \"files\": [");
 }
 
 /* ---- writing ---- */
-
-static npg_status list_file(applying *a, const char *name)
-{
-    json_t *entry = json_pack("{ss}", "path", name);
-    npg_status status = npg_file_facts(entry, a->s->output, name);
-    char *text = status ? NULL : json_dumps(entry, JSON_COMPACT);
-    if (!status && !text) status = npg_error(NPG_MEMORY, "no memory for done.json");
-    if (text) {
-        npg_file_print(a->done, "%s\n    ", a->applied->frames ? "," : "{\n  \"files\": [");
-        status = npg_file_write(a->done, text, strlen(text));
-    }
-    free(text);
-    json_decref(entry);
-    return status;
-}
 
 /* The carried mesh as it is when the reference's vertices are at vert_pos. */
 static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
@@ -266,7 +240,7 @@ static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
     npg_mesh_name(name, &a->names, number);
     NPG_TRY(npg_path_of(path, a->s->output, name));
     NPG_TRY(a->is_like ? npg_write_obj_like(path, a->s->mesh, &view) : npg_write_mesh(path, &view));
-    NPG_TRY(list_file(a, name));
+    NPG_TRY(npg_done_add_file(&a->done, a->s->output, name));
     a->applied->frames++;
     return NPG_OK;
 }
@@ -349,14 +323,10 @@ static npg_status write_done(applying *a)
     char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(facts);
     if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
-    npg_status status = npg_file_print(a->done, "\n  ],%s\n", text + 1); /* the rest of the same object */
+    npg_status status =
+        npg_file_print(a->done.file, "\n  ],%s\n", text + 1); /* the rest of the same object */
     free(text);
-    NPG_TRY(status);
-    status = npg_file_commit(&a->done);
-    char path[NPG_PATH_SIZE];
-    if (status && npg_path_of(path, a->s->output, "done.json") == NPG_OK)
-        unlink(path); /* whole it may be, but what fails at its last step is not done */
-    return status;
+    return npg_done_end(&a->done, a->s->output, status);
 }
 
 static npg_status apply(applying *a)
@@ -383,7 +353,7 @@ npg_status npg_apply(npg_applied *applied, const npg_apply_settings *settings)
     if (own.fps_scale < 1) own.fps_scale = 1;
     applying a = {.s = &own, .applied = &found, .arena = {.purpose = NPG_FOR_MESH}};
     npg_status status = apply(&a);
-    npg_file_discard(&a.done);
+    npg_file_discard(&a.done.file);
     npg_attach_close(&a.attachment);
     npg_mesh_unref(&a.reference);
     npg_mesh_unref(&a.carried);

@@ -1,7 +1,5 @@
 /* The results' folder: can it be written, and what of an earlier run lies in it. */
 #include <ctype.h>
-#include <dirent.h>
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,19 +62,25 @@ bool npg_mesh_name_read(const char *name, const char *endings, int64_t *number)
 /* Call visit(user, folder, name, number) for each mesh file; a folder that does not exist has none. */
 typedef npg_status visit_mesh(void *user, const char *folder, const char *name, int64_t number);
 
+typedef struct meshes {
+    const char *folder;
+    visit_mesh *visit;
+    void *user;
+} meshes;
+
+static npg_status visit_name(void *user, const char *name)
+{
+    const meshes *m = user;
+    int64_t number;
+    return npg_mesh_name_read(name, ".ply .obj ", &number) ? m->visit(m->user, m->folder, name, number)
+                                                           : NPG_OK;
+}
+
 static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
 {
     char folder[NPG_PATH_SIZE];
-    int64_t number;
-    npg_status status = NPG_OK;
     NPG_TRY(npg_path_of(folder, output, "meshes"));
-    DIR *listing = opendir(folder);
-    if (!listing && errno != ENOENT) status = npg_error_errno(NPG_DISK, "can't list %s", folder);
-    for (struct dirent *entry; listing && !status && (entry = readdir(listing));)
-        if (npg_mesh_name_read(entry->d_name, ".ply .obj ", &number))
-            status = visit(user, folder, entry->d_name, number);
-    if (listing) closedir(listing);
-    return status;
+    return npg_folder_each(folder, NPG_DISK, visit_name, &(meshes){folder, visit, user});
 }
 
 typedef struct own_meshes {

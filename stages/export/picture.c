@@ -112,7 +112,7 @@ static void shade(float out[3], const npg_scene *scene, const camera *eye, const
 {
     static const float inside[3] = {0.75f, 0.35f, 0.30f};
     double normal[3], light[3];
-    bool is_back = hit->is_back && !scene->ball_middle;
+    bool is_back = hit->is_back && !scene->is_cloud;
     shading_normal(normal, scene, hit);
     if (npg_vec3_dot(normal, eye->axes + 6) > 0)
         for (int k = 0; k < 3; k++) normal[k] = -normal[k];
@@ -176,7 +176,7 @@ static npg_status draw_tile(drawing *d, size_t i)
     int64_t column = (int64_t)i % d->columns, row = (int64_t)i / d->columns;
     double radius = d->s->point_size * npg_bounds_diagonal(&d->reach);
     NPG_TRY(npg_scene_open(&scene, d->files[i], &d->origin, radius, d->s->colour, d->first));
-    if (!d->first && !scene.ball_middle) d->first = npg_mesh_ref(scene.mesh);
+    if (!d->first && !scene.is_cloud) d->first = npg_mesh_ref(scene.mesh);
     if (scene.total > p->points_total) {
         p->points_total = scene.total;
         p->points_drawn = scene.shown;

@@ -1,89 +1,43 @@
 /* Scenes to draw: a mesh, or a cloud as small balls, with colours. */
 #include "export/exporters/exporters_internal.h"
 
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-#include <unistd.h>
 
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
-#include "pipeline/file.h"
 
 enum { BALLS_MAX = 200000 }; /* points drawn at most: each is a mesh of 8 faces */
-
-/* Whether a file holds faces: a PLY that declares some, an OBJ with an f line. */
-static npg_status has_faces(bool *faces, const char *path)
-{
-    char line[512];
-    const char *dot = strrchr(path, '.');
-    bool ply = dot && !strcasecmp(dot, ".ply"), obj = dot && !strcasecmp(dot, ".obj");
-    *faces = false;
-    if (!ply && !obj) return NPG_OK;
-    int fd;
-    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
-    FILE *file = fdopen(fd, "rb");
-    if (!file) {
-        close(fd);
-        return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
-    }
-    while (!*faces && fgets(line, sizeof line, file)) {
-        if (ply && !strncmp(line, "element face ", 13)) *faces = strtoll(line + 13, NULL, 10) > 0;
-        if (ply && !strncmp(line, "end_header", 10)) break;
-        if (obj && line[0] == 'f' && (line[1] == ' ' || line[1] == '\t')) *faces = true;
-    }
-    fclose(file);
-    return NPG_OK;
-}
-
-/* ---- reading ---- */
 
 static bool is_finite(const float *p)
 {
     return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
 }
 
-/* A cloud as a mesh without faces, unusable points left out. */
-static npg_status read_cloud(npg_mesh **out, const char *path, npg_origin *origin)
+/* A mesh, or a cloud as one without faces, unusable points left out. */
+static npg_status read_any(npg_mesh **out, const char *path, npg_origin *origin)
 {
-    npg_frame frame = {0};
-    NPG_TRY(npg_read_cloud(&frame, path, origin));
+    NPG_TRY(npg_read_shape(out, path, origin));
+    npg_mesh *mesh = *out;
     size_t kept = 0;
-    for (size_t i = 0; i < frame.point_count; i++) {
-        if (!is_finite(frame.pos_local + 3 * i)) continue;
-        memmove(frame.pos_local + 3 * kept, frame.pos_local + 3 * i, 3 * sizeof(float));
-        if (frame.normals) memmove(frame.normals + 3 * kept, frame.normals + 3 * i, 3 * sizeof(float));
+    npg_status status = mesh->face_count ? npg_mesh_require_finite(mesh, path) : NPG_OK;
+    for (size_t i = 0; i < mesh->vert_count && !mesh->face_count; i++) {
+        if (!is_finite(mesh->vert_pos + 3 * i)) continue;
+        memmove(mesh->vert_pos + 3 * kept, mesh->vert_pos + 3 * i, 3 * sizeof(float));
+        if (mesh->vert_normals)
+            memmove(mesh->vert_normals + 3 * kept, mesh->vert_normals + 3 * i, 3 * sizeof(float));
+        if (mesh->vert_colours) memmove(mesh->vert_colours + 4 * kept, mesh->vert_colours + 4 * i, 4);
         kept++;
     }
-    npg_status status = npg_mesh_open(out, 0, 0);
-    if (!status) {
-        (*out)->vert_count = kept;
-        (*out)->vert_pos = frame.pos_local;
-        (*out)->vert_normals = frame.normals;
-        frame.pos_local = frame.normals = NULL;
-    }
-    npg_frame_clear(&frame);
-    return status;
-}
-
-static npg_status read_any(npg_mesh **mesh, bool *faces, const char *path, npg_origin *origin)
-{
-    NPG_TRY(has_faces(faces, path));
-    if (!*faces) return read_cloud(mesh, path, origin);
-    NPG_TRY(npg_read_mesh(mesh, path, origin));
-    npg_status status = npg_mesh_require_finite(*mesh, path);
-    if (status) npg_mesh_unref(mesh);
+    if (!mesh->face_count) mesh->vert_count = kept;
+    if (status) npg_mesh_unref(out);
     return status;
 }
 
 npg_status npg_scene_measure(npg_bounds *reach, const char *path, npg_origin *origin, const double axes[9])
 {
     npg_mesh *mesh = NULL;
-    bool faces;
-    NPG_TRY(read_any(&mesh, &faces, path, origin));
+    NPG_TRY(read_any(&mesh, path, origin));
     for (size_t v = 0; v < mesh->vert_count; v++)
         for (int axis = 0; axis < 3; axis++) {
             double along = 0;
@@ -157,12 +111,10 @@ static npg_status make_balls(npg_scene *scene, npg_mesh *cloud, double radius)
     if (!status && !balls->vert_normals)
         status = npg_alloc_array(&balls->vert_normals, NPG_FOR_MESH, 6 * count, 3 * sizeof(float));
     if (!status) status = npg_alloc_array(&scene->colours, NPG_FOR_MESH, 6 * count, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&scene->ball_middle, NPG_FOR_MESH, count, 3 * sizeof(float));
     for (size_t b = 0; b < count && !status; b++) {
         const float *middle = cloud->vert_pos + 3 * b * step;
         put_ball(balls, b, middle, cloud->vert_normals ? cloud->vert_normals + 3 * b * step : NULL,
                  (float)radius);
-        memcpy(scene->ball_middle + 3 * b, middle, 3 * sizeof(float));
         for (size_t c = 0; c < 6; c++)
             memcpy(scene->colours + 3 * (6 * b + c), point_colours + 3 * b * step, 3 * sizeof(float));
     }
@@ -170,6 +122,7 @@ static npg_status make_balls(npg_scene *scene, npg_mesh *cloud, double radius)
     scene->shown = count;
     scene->total = total;
     scene->mesh = balls;
+    scene->is_cloud = true;
     return status;
 }
 
@@ -179,9 +132,9 @@ npg_status npg_scene_open(npg_scene *scene, const char *path, npg_origin *origin
                           npg_picture_colour colour, const npg_mesh *first)
 {
     npg_mesh *mesh = NULL;
-    bool faces;
     *scene = (npg_scene){0};
-    NPG_TRY(read_any(&mesh, &faces, path, origin));
+    NPG_TRY(read_any(&mesh, path, origin));
+    bool faces = mesh->face_count;
     npg_status status = NPG_OK;
     if (!mesh->vert_count) status = npg_error(NPG_BAD_INPUT, "%s: nothing to draw", path);
     if (!status && faces && !mesh->vert_normals)
@@ -203,6 +156,5 @@ void npg_scene_close(npg_scene *scene)
 {
     npg_mesh_unref(&scene->mesh);
     npg_release(&scene->colours);
-    npg_release(&scene->ball_middle);
     *scene = (npg_scene){0};
 }

@@ -1,7 +1,6 @@
 /* Follow: the frames of a folder that grows. */
 #include "ingest/ingest_internal.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fnmatch.h>
 #include <poll.h>
@@ -129,12 +128,6 @@ static bool is_frame_name(const npg_follow *follow, const char *name)
     return !follow->ending[0] || !strcasecmp(strrchr(name, '.'), follow->ending);
 }
 
-static file *find_file(npg_follow *follow, const char *name)
-{
-    const file key = {.name = (char *)name};
-    return follow->count ? bsearch(&key, follow->files, follow->count, sizeof key, npg_natural_order) : NULL;
-}
-
 /* Size and time of the file now, against those of the scan before. */
 static void note_change(npg_follow *follow, file *f, const struct stat *now)
 {
@@ -158,19 +151,25 @@ static npg_status add_file(npg_follow *follow, const char *name)
     return NPG_OK;
 }
 
-/* One name of the folder: known, new, or not after the last frame in natural order.  *passed counts these:
+/* One name of the folder: known, new, or not after the last frame in natural order.  passed counts these:
  * frames that were accepted, and files that came too late. */
-static npg_status note_name(npg_follow *follow, const char *name, size_t known, size_t *passed)
+typedef struct scan {
+    npg_follow *follow;
+    size_t known, passed;
+} scan;
+
+static npg_status note_name(void *user, const char *name)
 {
+    scan *s = user;
+    npg_follow *follow = s->follow;
+    const file key = {.name = (char *)name};
     if (!is_frame_name(follow, name)) return NPG_OK;
     if (follow->last && npg_natural_compare(name, follow->last) <= 0) {
-        ++*passed;
+        s->passed++;
         return NPG_OK;
     }
-    size_t count = follow->count;
-    follow->count = known; /* find_file() needs sorted names; those added by this scan are not yet */
-    bool is_known = find_file(follow, name) != NULL;
-    follow->count = count;
+    /* those added by this scan are not in order yet */
+    bool is_known = s->known && bsearch(&key, follow->files, s->known, sizeof key, npg_natural_order);
     return is_known ? NPG_OK : add_file(follow, name);
 }
 
@@ -212,22 +211,15 @@ static void forget_taken(npg_follow *follow)
 static npg_status scan_folder(npg_follow *follow)
 {
     forget_taken(follow);
-    size_t known = follow->count, passed = 0;
-    npg_status status = NPG_OK;
+    scan s = {.follow = follow, .known = follow->count};
     /* Asked before the names are listed: who writes the end file last has written all frames by then. */
     const char *end_name = follow->settings.end_name;
     bool is_end = end_name[0] && npg_is_in_folder(follow->folder, end_name);
-    DIR *directory = opendir(follow->folder);
-    if (!directory)
-        return npg_error(NPG_BAD_INPUT, "%s: can't be read any more: %s", follow->folder, strerror(errno));
-    for (struct dirent *entry; !status && (entry = readdir(directory));)
-        status = note_name(follow, entry->d_name, known, &passed);
-    closedir(directory);
-    if (!status) status = stat_files(follow);
-    if (status) return status;
+    NPG_TRY(npg_folder_each(follow->folder, NPG_BAD_INPUT, note_name, &s));
+    NPG_TRY(stat_files(follow));
     if (follow->count) qsort(follow->files, follow->count, sizeof(file), npg_natural_order);
     /* Of the names that were passed, all but the accepted ones turned up behind a later frame. */
-    size_t late = passed > follow->taken_count ? passed - follow->taken_count : 0;
+    size_t late = s.passed > follow->taken_count ? s.passed - follow->taken_count : 0;
     if (late > follow->late_count) follow->late_count = late;
     follow->is_ended |= is_end;
     return NPG_OK;

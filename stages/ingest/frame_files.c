@@ -121,28 +121,18 @@ static npg_status fill(npg_frame_files *list, const char *input, const npg_selec
     return NPG_OK;
 }
 
-static npg_status open_list(npg_frame_files **out, const char *input, const char *text, bool finds_gaps,
-                            const npg_rig_settings *rig)
+npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const char *text, bool finds_gaps,
+                                const npg_rig_settings *settings)
 {
     npg_selection selection;
     *out = NULL;
     NPG_TRY(npg_selection_parse(&selection, text));
     npg_status status = npg_object_open(out, NPG_FOR_FILES, sizeof **out);
-    if (!status) status = fill(*out, input, &selection, finds_gaps, rig);
+    if (!status)
+        status = fill(*out, input, &selection, finds_gaps, settings && npg_rig_is(input) ? settings : NULL);
     if (status) npg_frame_files_close(out);
     npg_selection_clear(&selection);
     return status;
-}
-
-npg_status npg_frame_files_open(npg_frame_files **out, const char *input, const char *text, bool finds_gaps)
-{
-    return open_list(out, input, text, finds_gaps, NULL);
-}
-
-npg_status npg_frame_files_open_any(npg_frame_files **out, const char *input, const char *text,
-                                    bool finds_gaps, const npg_rig_settings *settings)
-{
-    return open_list(out, input, text, finds_gaps, npg_rig_is(input) ? settings : NULL);
 }
 
 npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_frame *frame,

@@ -1,8 +1,6 @@
 /* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
 #include "ingest/ingest_internal.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,22 +42,27 @@ static bool has_ending(const char *name, const char *const *endings)
 
 /* Names in a folder that do not begin with a dot: the sub-folders, or the files with one of the endings (NULL: with
  * one that readers know). */
+typedef struct wanted {
+    npg_paths *out;
+    const char *folder, *const *endings;
+    bool folders;
+} wanted;
+
+static npg_status add_wanted(void *user, const char *name)
+{
+    const wanted *w = user;
+    bool is_wanted = w->folders || (w->endings ? has_ending(name, w->endings) : !!npg_format_by_ending(name));
+    if (name[0] == '.' || !is_wanted) return NPG_OK;
+    char *path = npg_arena_path(w->out->arena, w->folder, name);
+    NPG_TRY(npg_arena_status(w->out->arena));
+    return w->endings || is_folder(path) == w->folders ? add_path(w->out, path) : NPG_OK;
+}
+
 static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders,
                               const char *const *endings)
 {
-    DIR *directory = opendir(folder);
-    npg_status status = NPG_OK;
-    if (!directory) return npg_error(NPG_BAD_INPUT, "%s: can't be read: %s", folder, strerror(errno));
-    for (struct dirent *entry; !status && (entry = readdir(directory));) {
-        const char *name = entry->d_name;
-        bool is_wanted =
-            wants_folders || (endings ? has_ending(name, endings) : !!npg_format_by_ending(name));
-        if (name[0] == '.' || !is_wanted) continue;
-        char *path = npg_arena_path(out->arena, folder, name);
-        status = npg_arena_status(out->arena);
-        if (!status && (endings || is_folder(path) == wants_folders)) status = add_path(out, path);
-    }
-    closedir(directory);
+    wanted w = {out, folder, endings, wants_folders};
+    npg_status status = npg_folder_each(folder, NPG_BAD_INPUT, add_wanted, &w);
     sort_paths(out);
     return status;
 }

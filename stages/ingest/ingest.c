@@ -3,10 +3,8 @@
 #include "ingest/ingest_internal.h"
 
 typedef struct state {
-    const char *frames, *follow_end;
-    double follow_idle_s, follow_settle_s;
-    int missing;
-    int64_t cache_mib, look_ahead;
+    npg_live_settings live; /* of a capture in files, too: frames and missing */
+    int64_t cache_mib;
     bool align_sensors;
     npg_rig_settings rig;
     int64_t next; /* place in the pass's order */
@@ -17,25 +15,25 @@ typedef struct state {
 /* clang-format off */
 static const npg_option ingest_options[] = {
     /* type               name                place                default        least most  shown as or words */
-    NPG_ROW_TEXT(         "frames",           AT(frames),          "",            "SELECTION",
+    NPG_ROW_TEXT(         "frames",           AT(live.frames),          "",            "SELECTION",
         "Which frames, in order or by number. a:b:step are positions in time as Python counts them (from 0, "
         "without b, negative from the end); 1-5,8 are the numbers in the file names, both ends included; "
         "empty: all"),
-    NPG_ROW_CHOICE(       "missing",          AT(missing),         "error",       "error|skip|hold|ignore",
+    NPG_ROW_CHOICE(       "missing",          AT(live.missing),         "error",       "error|skip|hold|ignore",
         "What to do about gaps in the numbering. error refuses, skip leaves the frame without points, hold "
         "repeats the points of the frame before it, ignore takes numbers for mere names"),
     NPG_ROW_INT(          "cache",            AT(cache_mib),       "256",         0,    1048576, "MIB",
         "Memory for frames that were read and cleaned. Later passes need not do that again; what does not "
         "fit goes to a file in OUT/job that has no name, and is gone with the run; 0: nothing is kept, "
         "neither in memory nor on disk"),
-    NPG_ROW_INT(          "look-ahead",       AT(look_ahead),      "64",          1,    1e6,     NULL,
+    NPG_ROW_INT(          "look-ahead",       AT(live.look_ahead),      "64",          1,    1e6,     NULL,
         "Live: frames that the reference is made from. They are kept first: box, keyframe and reference are "
         "made from them as from a capture of that many frames"),
-    NPG_PART(REAL,        "follow-end.idle",  AT(follow_idle_s),   "30",          0,    1e9,     "SECONDS",
+    NPG_PART(REAL,        "follow-end.idle",  AT(live.follow_idle_s),   "30",          0,    1e9,     "SECONDS",
         "... or so many seconds without any change; 0: only the file"),
-    NPG_PART(TEXT,        "follow-end.name",  AT(follow_end),      "capture.end", "NAME",
+    NPG_PART(TEXT,        "follow-end.name",  AT(live.follow_end),      "capture.end", "NAME",
         "A file of this name, once it is there; empty: none does"),
-    NPG_PROGRAM_ROW(REAL, "follow-settle",    AT(follow_settle_s), "2",           0,    1e6,     "SECONDS",
+    NPG_PROGRAM_ROW(REAL, "follow-settle",    AT(live.follow_settle_s), "2",           0,    1e6,     "SECONDS",
         "Seconds without a change after which a file that can't be read, "
         "and that others follow, is given up"),
     NPG_ROW_CHOICE(       "sensor-poses",     AT(rig.poses),       "file",        "file|inverse|none",
@@ -94,7 +92,7 @@ static void report_list(npg_worker *worker, const npg_frame_files *list)
                        list->left_out);
     if (!list->gap_count) return;
     const state *s = npg_worker_state(worker);
-    bool is_held = s->missing == NPG_MISSING_HOLD;
+    bool is_held = s->live.missing == NPG_MISSING_HOLD;
     npg_frame_files_gaps(numbers, sizeof numbers, list);
     json_object_set_new(report, "missing_numbers", json_string(numbers));
     npg_worker_warn(worker, !is_held, -1, "%zu of %zu frames are missing and %s: %s", list->gap_count,
@@ -153,24 +151,19 @@ static npg_status list_frames(npg_frame_files **list, const state *s, const npg_
     npg_rig_settings rig = s->rig;
     rig.confine = settings->confine;
     NPG_TRY(
-        npg_frame_files_open_any(list, settings->input, selection, s->missing != NPG_MISSING_IGNORE, &rig));
+        npg_frame_files_open(list, settings->input, selection, s->live.missing != NPG_MISSING_IGNORE, &rig));
     npg_status status = settings->confine ? npg_frame_files_confine(*list, settings->input) : NPG_OK;
     if (status) npg_frame_files_close(list);
     return status;
 }
 
-npg_status npg_capture_select(npg_frame_files **list, const npg_options *options, const char *selection)
+npg_status npg_capture_list(npg_frame_files **list, const npg_options *options, const char *selection)
 {
     npg_settings settings;
     state s = {0};
     npg_options_fill(options, npg_run_options, &settings);
     npg_options_fill(options, ingest_options, &s);
-    return list_frames(list, &s, &settings, selection ? selection : s.frames);
-}
-
-npg_status npg_capture_list(npg_frame_files **list, const npg_options *options)
-{
-    return npg_capture_select(list, options, NULL);
+    return list_frames(list, &s, &settings, selection ? selection : s.live.frames);
 }
 
 /* Where frames go that the cache does not hold; *folder is NULL, or the path. */
@@ -193,9 +186,9 @@ static npg_status open_capture(npg_worker *worker)
     char path[NPG_PATH_SIZE];
     const char *folder;
     NPG_TRY(spill_folder(path, &folder, worker));
-    NPG_TRY(list_frames(&list, s, settings, s->frames));
-    NPG_TRY(npg_capture_open(&capture, &list, settings->input, (npg_missing)s->missing, settings->keep_going,
-                             cache_limit(worker), folder));
+    NPG_TRY(list_frames(&list, s, settings, s->live.frames));
+    NPG_TRY(npg_capture_open(&capture, &list, settings->input, (npg_missing)s->live.missing,
+                             settings->keep_going, cache_limit(worker), folder));
     npg_worker_keep(worker, capture, release_capture);
     NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
     /* A resumed run has restored it. */
@@ -292,17 +285,11 @@ static void release_live(void *thing)
 static npg_status open_live(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    const npg_live_settings settings = {.frames = s->frames,
-                                        .follow_end = s->follow_end,
-                                        .follow_idle_s = s->follow_idle_s,
-                                        .follow_settle_s = s->follow_settle_s,
-                                        .missing = (npg_missing)s->missing,
-                                        .look_ahead = s->look_ahead};
     npg_live_source *live;
     char path[NPG_PATH_SIZE];
     const char *folder;
     NPG_TRY(spill_folder(path, &folder, worker));
-    NPG_TRY(npg_live_source_open(&live, worker, &settings, cache_limit(worker), folder));
+    NPG_TRY(npg_live_source_open(&live, worker, &s->live, cache_limit(worker), folder));
     npg_worker_keep(worker, live, release_live);
     return npg_worker_publish(worker, &npg_fact_frame_store, npg_live_source_cache(live));
 }
@@ -316,7 +303,7 @@ static npg_status next_from_source(npg_worker *worker, npg_chunk *chunk)
          is_last = npg_worker_pass(worker) == NPG_PASS_SOLVE;
     npg_status status = NPG_END;
     npg_frame frame;
-    if (is_first && s->next < s->look_ahead)
+    if (is_first && s->next < s->live.look_ahead)
         status = npg_live_source_read(live, &frame, s->next++, false);
     else if (!is_first)
         while (status == NPG_END && s->next < place_count(worker))
@@ -324,7 +311,7 @@ static npg_status next_from_source(npg_worker *worker, npg_chunk *chunk)
     if (!status) npg_chunk_add(chunk, &frame);
     if (status != NPG_END) return status;
     report_cache(worker);
-    if (is_first) NPG_TRY(npg_live_source_plan(live, s->look_ahead));
+    if (is_first) NPG_TRY(npg_live_source_plan(live, s->live.look_ahead));
     return is_last ? npg_live_source_end(live) : NPG_END;
 }
 

@@ -251,8 +251,7 @@ bool npg_selection_needs_count(const npg_selection *selection);
  *   a shell glob    "scan_*.ply"
  *   a list file     one path per line, relative to the list or to the working folder; # begins a comment
  *   one file        a capture of one frame
- *   a rig           a rig.json, or a folder of depth images with their calibration;
- *                   npg_frame_files_open_any alone takes these
+ *   a rig           a rig.json, or a folder of depth images with their calibration
  * Names sort naturally (f2 before f10), a list file keeps its own order.  A frame's number comes from its
  * name; the step of the numbering is the largest that all numbers share, and what it leaves out is a gap. */
 
@@ -270,14 +269,12 @@ typedef struct npg_frame_files {
     npg_rig *rig;     /* whose frames these are; owned, or NULL for files                  */
 } npg_frame_files;
 
-/* finds_gaps false: frames follow each other whatever their numbers are.
+/* finds_gaps false: frames follow each other whatever their numbers are.  settings NULL: the input is no rig; of
+ * a rig paths are those of each frame's first depth image.
  * NPG_BAD_INPUT: nothing there, nothing readable, a list with a path that is not there.  NPG_USAGE: a
  * selection that is malformed or chooses nothing.  NPG_MEMORY. */
 npg_status npg_frame_files_open(npg_frame_files **list, const char *input, const char *selection,
-                                bool finds_gaps);
-/* The same for an input that may be a rig: paths are then those of each frame's first depth image. */
-npg_status npg_frame_files_open_any(npg_frame_files **list, const char *input, const char *selection,
-                                    bool finds_gaps, const npg_rig_settings *settings);
+                                bool finds_gaps, const npg_rig_settings *settings);
 
 /* Read frame `slot`, which has a path: npg_read_cloud(), or npg_rig_read(). */
 npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_frame *frame,
@@ -311,12 +308,9 @@ int npg_natural_order(const void *left, const void *right);
 /* Input list: the frames that the options of a run name, those of files or of a rig (ingest.c). */
 
 /* The files that the options of a run (input, frames, missing, confine, those of rigs) name as its frames; of
- * a rig the description is read, else nothing.  As npg_frame_files_open_any() and, with confine,
- * npg_frame_files_confine(). */
-npg_status npg_capture_list(npg_frame_files **list, const npg_options *options);
-
-/* The same with another selection than option frames says, and with the gaps of that selection. */
-npg_status npg_capture_select(npg_frame_files **list, const npg_options *options, const char *selection);
+ * a rig the description is read, else nothing.  As npg_frame_files_open() and, with confine,
+ * npg_frame_files_confine().  selection: in place of option frames, with its own gaps; NULL: as that says. */
+npg_status npg_capture_list(npg_frame_files **list, const npg_options *options, const char *selection);
 
 /* Listing: files of a folder in natural order. */
 
@@ -425,53 +419,5 @@ uint64_t npg_spool_hash(const npg_frame *frame);
 
 /* Of a job that is done: NPG_USAGE where the files of a followed folder are others, or more came. */
 npg_status npg_live_check_done(npg_worker *worker, npg_store *spool);
-
-/* Probe: what a capture holds, frame by frame and as a whole, and what a run of it would take. */
-
-typedef struct npg_probe {
-    size_t frames, unreadable, with_normals;
-    size_t point_total, not_finite, zero_normals;
-    size_t *counts; /* points of every readable frame, owned */
-    size_t count_room;
-    npg_origin origin;
-    npg_bounds bounds; /* local, of finite points */
-    npg_bounds last;   /* of the last frame with points */
-    uint64_t bytes;
-    double read_s;
-    json_t *formats, *attention, *per_frame; /* owned */
-    char first_fault[1024];
-} npg_probe;
-
-void npg_probe_init(npg_probe *probe);
-void npg_probe_uninit(npg_probe *probe);
-
-/* Add to the list under "attention": what a run would stumble over, or the user should know. */
-void npg_probe_warn(npg_probe *probe, const char *format, ...) NPG_PRINTF(2, 3);
-
-/* Count a frame that was read with `status`, and clear it.  Bad data goes into the list; any other failure
- * is returned. */
-npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
-                           int64_t number);
-
-/* Read all frames of a list. */
-npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list);
-
-/* Add what only shows when all frames have been read. */
-void npg_probe_warn_of_all(npg_probe *probe);
-
-typedef struct npg_probe_spread {
-    size_t least, median, most;
-} npg_probe_spread;
-
-npg_probe_spread npg_probe_counts(npg_probe *probe);
-
-/* What a run with these options would take on this machine's cores, were they as fast as those of the guide's
- * figures; memory: of the process and of Poisson's together. */
-typedef struct npg_estimate {
-    size_t vertices, window;
-    double memory_bytes, disk_bytes, time_s;
-} npg_estimate;
-
-npg_estimate npg_probe_estimate(npg_probe *probe, const npg_options *options);
 
 #endif

@@ -268,7 +268,7 @@ size_t npg_follow_late_count(const npg_follow *follow);
 typedef struct npg_live_settings {
     const char *frames, *follow_end;
     double follow_idle_s, follow_settle_s;
-    npg_missing missing;
+    int missing;        /* npg_missing */
     int64_t look_ahead; /* without a job more is not kept */
 } npg_live_settings;
 
@@ -293,5 +293,33 @@ npg_status npg_live_source_plan(npg_live_source *live, int64_t most);
 
 /* Solving pass, when all its frames were read: the source's last word. */
 npg_status npg_live_source_end(npg_live_source *live);
+
+/* Probe: what a capture holds, frame by frame and as a whole, and what a run of it would take. */
+
+typedef struct npg_probe {
+    npg_capture_facts *facts; /* what is counted; a loan */
+    size_t *counts;           /* points of every readable frame, owned */
+    size_t count_room, zero_normals;
+    npg_origin origin;
+    npg_bounds bounds; /* local, of finite points */
+    npg_bounds last;   /* of the last frame with points */
+    double read_s;
+    json_t *formats, *attention, *per_frame; /* owned */
+    char first_fault[1024];
+} npg_probe;
+
+/* Add to the list under "attention": what a run would stumble over, or the user should know. */
+void npg_probe_warn(npg_probe *probe, const char *format, ...) NPG_PRINTF(2, 3);
+
+/* Count a frame that was read with `status`, and clear it.  Bad data goes into the list; any other failure
+ * is returned. */
+npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
+                           int64_t number);
+
+/* Read all frames of a list. */
+npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list);
+
+/* When all have been read: what only shows then, and what a run with these options would take. */
+void npg_probe_finish(npg_probe *probe, const npg_options *options);
 
 #endif

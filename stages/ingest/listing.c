@@ -1,7 +1,6 @@
 /* Listing: files of a folder in natural order, for those who take folders of meshes or clouds. */
 #include "ingest/ingest.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,20 +34,24 @@ static npg_status add_path(npg_listing *listing, char *path)
     return status;
 }
 
+typedef struct adding {
+    npg_listing *listing;
+    const char *folder, *endings;
+} adding;
+
+static npg_status add_name(void *user, const char *name)
+{
+    const adding *a = user;
+    char *joined;
+    if (!ends_in(name, a->endings)) return NPG_OK;
+    NPG_TRY(npg_join_path(&joined, a->folder, name));
+    return add_path(a->listing, joined);
+}
+
 static npg_status add_folder(npg_listing *listing, const char *path, const char *endings)
 {
     size_t before = listing->count;
-    npg_status status = NPG_OK;
-    const struct dirent *entry;
-    DIR *folder = opendir(path);
-    if (!folder) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
-    while (!status && (entry = readdir(folder))) {
-        char *joined;
-        if (!ends_in(entry->d_name, endings)) continue;
-        status = npg_join_path(&joined, path, entry->d_name);
-        if (!status) status = add_path(listing, joined);
-    }
-    closedir(folder);
+    npg_status status = npg_folder_each(path, NPG_BAD_INPUT, add_name, &(adding){listing, path, endings});
     if (!status && listing->count == before)
         return npg_error(NPG_BAD_INPUT, "%s: the folder has no file that ends in %s", path, endings);
     if (!status)

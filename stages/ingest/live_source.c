@@ -273,7 +273,7 @@ static npg_status check_step(npg_live_source *live, int64_t step, int64_t number
  * pushed frames only skip and hold ask for those that lie between; a pipe has no numbers of its own. */
 static npg_status count_gap(npg_live_source *live, const npg_frame *frame)
 {
-    npg_missing missing = live->settings.missing;
+    int missing = live->settings.missing;
     int64_t step = live->follow ? npg_follow_step(live->follow) : 1;
     bool fills = missing == NPG_MISSING_SKIP || missing == NPG_MISSING_HOLD;
     bool is_checked = live->follow ? missing != NPG_MISSING_IGNORE : fills && !live->stream;
@@ -534,7 +534,7 @@ static npg_status pass_over(npg_live_source *live, const npg_spooled *entry, con
 static npg_status stand_behind(npg_live_source *live, npg_follow_place *place)
 {
     npg_frame *previous = &live->previous;
-    npg_missing missing = live->settings.missing;
+    int missing = live->settings.missing;
     npg_record *record;
     npg_spooled entry;
     const int64_t number = previous->number;

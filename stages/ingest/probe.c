@@ -11,23 +11,6 @@
 
 #include "pipeline/cost.h"
 
-void npg_probe_init(npg_probe *probe)
-{
-    *probe = (npg_probe){.bounds = npg_bounds_empty(),
-                         .last = npg_bounds_empty(),
-                         .formats = json_object(),
-                         .attention = json_array(),
-                         .per_frame = json_array()};
-}
-
-void npg_probe_uninit(npg_probe *probe)
-{
-    npg_release(&probe->counts);
-    json_decref(probe->formats);
-    json_decref(probe->attention);
-    json_decref(probe->per_frame);
-}
-
 void npg_probe_warn(npg_probe *probe, const char *format, ...)
 {
     char text[1200];
@@ -100,13 +83,13 @@ static void warn_of_frame(npg_probe *probe, const cloud_facts *facts, const npg_
 static npg_status add_frame(npg_probe *probe, const npg_frame *frame, const char *format, int64_t number)
 {
     cloud_facts facts = measure_cloud(frame);
-    NPG_TRY(npg_grow(&probe->counts, &probe->count_room, probe->frames - probe->unreadable + 1,
+    npg_capture_facts *all = probe->facts;
+    NPG_TRY(npg_grow(&probe->counts, &probe->count_room, all->frames - all->unreadable + 1,
                      sizeof *probe->counts, NPG_FOR_FILES));
-    probe->counts[probe->frames - probe->unreadable] = frame->point_count;
-    probe->frames++;
-    probe->with_normals += frame->normals != NULL;
-    probe->point_total += frame->point_count;
-    probe->not_finite += facts.not_finite;
+    probe->counts[all->frames++ - all->unreadable] = frame->point_count;
+    all->with_normals += frame->normals != NULL;
+    all->points_total += frame->point_count;
+    all->not_finite += facts.not_finite;
     probe->zero_normals += facts.zero_normals;
     if (!is_empty(&facts.bounds)) npg_bounds_add(&probe->bounds, &facts.bounds);
     json_int_t seen = json_integer_value(json_object_get(probe->formats, format));
@@ -122,9 +105,8 @@ static npg_status add_frame(npg_probe *probe, const npg_frame *frame, const char
 static void add_fault(npg_probe *probe, int64_t number)
 {
     const char *text = npg_error_text();
-    if (!probe->unreadable) snprintf(probe->first_fault, sizeof probe->first_fault, "%s", text);
-    probe->frames++;
-    probe->unreadable++;
+    if (!probe->facts->unreadable++) snprintf(probe->first_fault, sizeof probe->first_fault, "%s", text);
+    probe->facts->frames++;
     npg_probe_warn(probe, "%s", text);
     json_array_append_new(probe->per_frame,
                           json_pack("{s:I,s:s}", "number", (json_int_t)number, "error", text));
@@ -145,9 +127,9 @@ npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame
 
 static npg_status add_bytes(void *user, const char *path)
 {
-    npg_probe *probe = user;
+    npg_capture_facts *facts = user;
     struct stat info;
-    if (!stat(path, &info)) probe->bytes += (uint64_t)info.st_size;
+    if (!stat(path, &info)) facts->bytes += (uint64_t)info.st_size;
     return NPG_OK;
 }
 
@@ -158,10 +140,11 @@ npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
         npg_frame frame = {0};
         if (!slot->path) continue;
         const char *format = list->rig ? list->rig->layout : npg_reader_for(slot->path);
-        NPG_TRY(npg_frame_files_each(list, i, add_bytes, probe));
+        NPG_TRY(npg_frame_files_each(list, i, add_bytes, probe->facts));
         npg_status status = npg_frame_files_read(list, i, &frame, &probe->origin);
         NPG_TRY(npg_probe_count(probe, status, &frame, format ? format : "unknown", slot->number));
     }
+    probe->facts->missing = list->gap_count;
     if (list->gap_count) {
         char gaps[256];
         npg_frame_files_gaps(gaps, sizeof gaps, list);
@@ -177,30 +160,33 @@ static int compare_sizes(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-npg_probe_spread npg_probe_counts(npg_probe *probe)
+/* What only shows when all frames have been read. */
+static void finish_counts(npg_probe *probe)
 {
-    size_t count = probe->frames - probe->unreadable;
-    if (!count) return (npg_probe_spread){0};
-    qsort(probe->counts, count, sizeof *probe->counts, compare_sizes);
-    return (npg_probe_spread){probe->counts[0], probe->counts[count / 2], probe->counts[count - 1]};
-}
-
-void npg_probe_warn_of_all(npg_probe *probe)
-{
-    size_t readable = probe->frames - probe->unreadable;
-    npg_probe_spread counts = npg_probe_counts(probe);
+    npg_capture_facts *all = probe->facts;
+    size_t readable = all->frames - all->unreadable;
     npg_frame_box box;
-    bool has_points = probe->bounds.lo[0] <= probe->bounds.hi[0];
-    if (has_points && npg_frame_box_set(&box, &probe->origin, &probe->bounds))
+    for (int a = 0; a < 3; a++) {
+        all->box_low[a] = probe->origin.world[a] + probe->bounds.lo[a];
+        all->box_high[a] = probe->origin.world[a] + probe->bounds.hi[a];
+    }
+    if (readable) {
+        qsort(probe->counts, readable, sizeof *probe->counts, compare_sizes);
+        all->points_least = probe->counts[0];
+        all->points_median = probe->counts[readable / 2];
+        all->points_most = probe->counts[readable - 1];
+    }
+    if (!is_empty(&probe->bounds) && npg_frame_box_set(&box, &probe->origin, &probe->bounds))
         npg_probe_warn(probe, "%s", npg_error_text());
-    if (probe->not_finite)
-        npg_probe_warn(probe, "%zu points have coordinates that are not finite", probe->not_finite);
+    if (all->not_finite)
+        npg_probe_warn(probe, "%zu points have coordinates that are not finite", all->not_finite);
     if (probe->zero_normals) npg_probe_warn(probe, "%zu normals have no direction", probe->zero_normals);
-    if (probe->with_normals && probe->with_normals < readable)
-        npg_probe_warn(probe, "only %zu of %zu frames have normals", probe->with_normals, readable);
-    if (counts.most > COUNTS_DIFFER * counts.least)
-        npg_probe_warn(probe, "point counts differ by more than ten times: %zu to %zu", counts.least,
-                       counts.most);
+    if (all->with_normals && all->with_normals < readable)
+        npg_probe_warn(probe, "only %zu of %zu frames have normals", all->with_normals, readable);
+    if (all->points_most > COUNTS_DIFFER * all->points_least)
+        npg_probe_warn(probe, "point counts differ by more than ten times: %zu to %zu", all->points_least,
+                       all->points_most);
+    all->attention = json_array_size(probe->attention);
 }
 
 /* ---- what a run would take ---- */
@@ -221,11 +207,11 @@ static bool is_set_to(const npg_options *options, const char *name, const char *
 }
 
 /* Processor seconds of a run that aligns its frames. */
-static double aligned_s(const npg_probe *probe, const npg_options *options, double most)
+static double aligned_s(const npg_capture_facts *all, const npg_options *options, double most)
 {
-    const double per_read_point = 2e-6, frames = (double)probe->frames, points = (double)probe->point_total;
+    const double per_read_point = 2e-6, frames = (double)all->frames, points = (double)all->points_total;
     double pass_s = npg_cost_pass_s(frames, points / fmax(frames, 1));
-    double work_s = per_read_point * points + npg_cost_choice_s(most, probe->with_normals == probe->frames) +
+    double work_s = per_read_point * points + npg_cost_choice_s(most, all->with_normals == all->frames) +
                     npg_cost_surface_s(fmin(most, NPG_START_POINTS_MOST)) + pass_s;
     if (!is_set_to(options, "reference-from", "all") || !is_set_to(options, "reference", "")) return work_s;
     return work_s + pass_s + npg_cost_surface_s(fmin(points, NPG_COST_FUSED_POINTS));
@@ -240,26 +226,35 @@ static double network_s(const npg_options *options, double vertex_frames, double
                               cores * NPG_COST_CORE_FLOPS);
 }
 
-npg_estimate npg_probe_estimate(npg_probe *probe, const npg_options *options)
+/* What a run with these options would take on this machine's cores, were they as fast as those of the guide's
+ * figures; memory: of the process and of Poisson's together. */
+static void estimate(npg_probe *probe, const npg_options *options)
 {
+    npg_capture_facts *all = probe->facts;
     const double decoder_bytes = 1.4e6, poisson_bytes = 125e6 + 2e3 * NPG_COST_FUSED_POINTS;
-    const double frames = (double)probe->frames, most = (double)npg_probe_counts(probe).most;
+    const double frames = (double)all->frames, most = (double)all->points_most;
     const double cores = fmax((double)sysconf(_SC_NPROCESSORS_ONLN), 1);
     /* a closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point */
     const double vertices = fmin(number_of(options, "faces", 20000), 4 * most) / 2;
     const bool is_aligned = is_set_to(options, "align", "yes");
-    double window = (double)npg_plan_window_asked((int64_t)number_of(options, "window", 0), probe->frames);
+    double window = (double)npg_plan_window_asked((int64_t)number_of(options, "window", 0), all->frames);
     if (!(window > 0 && window < frames)) window = frames;
-    npg_estimate e = {.vertices = (size_t)vertices, .window = (size_t)window};
+    all->vertices = (size_t)vertices;
+    all->window = (size_t)window;
     if (is_aligned) {
         /* the second core waits while Poisson and the chain's serial parts run */
-        e.time_s = probe->read_s + aligned_s(probe, options, most) / (cores < 2 ? 1 : NPG_COST_BUSY);
-        e.memory_bytes = 100e6 + window * vertices * 200 + 40 * 24 * most + poisson_bytes;
+        all->time_s = probe->read_s + aligned_s(all, options, most) / (cores < 2 ? 1 : NPG_COST_BUSY);
+        all->memory_bytes = 100e6 + window * vertices * 200 + 40 * 24 * most + poisson_bytes;
     } else { /* all samples and activations of a window's frames */
-        e.time_s = 3 * probe->read_s + network_s(options, frames * vertices, cores);
-        e.memory_bytes = 320e6 + window * (vertices * 2400 + 48 * most) + 40 * 24 * most;
+        all->time_s = 3 * probe->read_s + network_s(options, frames * vertices, cores);
+        all->memory_bytes = 320e6 + window * (vertices * 2400 + 48 * most) + 40 * 24 * most;
     }
     /* a mesh, and in job/ the alignment, of every frame; the decoder of every window */
-    e.disk_bytes = frames * vertices * (24 + 2 * 13 + 12) + frames / window * decoder_bytes;
-    return e;
+    all->disk_bytes = frames * vertices * (24 + 2 * 13 + 12) + frames / window * decoder_bytes;
+}
+
+void npg_probe_finish(npg_probe *probe, const npg_options *options)
+{
+    finish_counts(probe);
+    estimate(probe, options);
 }

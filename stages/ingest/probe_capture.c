@@ -5,9 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "ingest/ingest.h"
+#include "ingest/ingest_internal.h"
 #include "pipeline/clock.h"
-#include "pipeline/json_file.h"
 
 typedef struct job {
     const npg_options *options;
@@ -92,7 +91,7 @@ static void warn_of_sensors(job *j)
 
 static npg_status read_files(job *j)
 {
-    NPG_TRY(npg_capture_list(&j->list, j->options));
+    NPG_TRY(npg_capture_list(&j->list, j->options, NULL));
     NPG_TRY(align_sensors(j));
     double begin_s = npg_clock_s();
     npg_status status = npg_probe_files(&j->probe, j->list);
@@ -105,7 +104,7 @@ static npg_status read_files(job *j)
 static npg_status read_all(job *j)
 {
     npg_status status = strcmp(j->input, "-") ? read_files(j) : read_stream(j);
-    if (!status && !j->probe.frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
+    if (!status && !j->probe.facts->frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
     return status;
 }
 
@@ -177,61 +176,56 @@ static json_t *json_of_sensors(const job *j)
     return list;
 }
 
-static npg_status set_json(npg_capture_facts *facts, job *j, const npg_estimate *e)
+static npg_status set_json(job *j)
 {
-    npg_probe *p = &j->probe;
-    npg_probe_spread counts = npg_probe_counts(p);
-    const double *origin = p->origin.world, *lo = p->bounds.lo, *hi = p->bounds.hi;
-    bool has_box = lo[0] <= hi[0];
-    json_t *box = has_box ? json_pack("{s:[fff],s:[fff],s:f}", "low", origin[0] + lo[0], origin[1] + lo[1],
-                                      origin[2] + lo[2], "high", origin[0] + hi[0], origin[1] + hi[1],
-                                      origin[2] + hi[2], "diagonal", npg_bounds_diagonal(&p->bounds))
-                          : json_null();
+    const npg_probe *p = &j->probe;
+    npg_capture_facts *f = p->facts;
+    const double *lo = f->box_low, *hi = f->box_high;
+    json_t *box = lo[0] <= hi[0] ? json_pack("{s:[fff],s:[fff],s:f}", "low", lo[0], lo[1], lo[2], "high",
+                                             hi[0], hi[1], hi[2], "diagonal", npg_bounds_diagonal(&p->bounds))
+                                 : json_null();
     json_t *all = json_pack(
         "{s:s,s:I,s:I,s:I,s:O,s:{s:I,s:I,s:I,s:I},s:I,s:I,s:o,s:I,s:f,s:O,s:{s:I,s:I,s:f,s:f,s:f},s:O}",
-        "input", j->input, "frames", (json_int_t)p->frames, "gaps",
-        (json_int_t)(j->list ? j->list->gap_count : 0), "unreadable", (json_int_t)p->unreadable, "formats",
-        p->formats, "points", "least", (json_int_t)counts.least, "median", (json_int_t)counts.median, "most",
-        (json_int_t)counts.most, "total", (json_int_t)p->point_total, "not_finite", (json_int_t)p->not_finite,
-        "frames_with_normals", (json_int_t)p->with_normals, "box", box, "bytes", (json_int_t)p->bytes,
-        "read_s", p->read_s, "attention", p->attention, "estimate", "vertices", (json_int_t)e->vertices,
-        "window", (json_int_t)e->window, "memory_bytes", e->memory_bytes, "disk_bytes", e->disk_bytes,
-        "time_s", e->time_s, "per_frame", p->per_frame);
+        "input", j->input, "frames", (json_int_t)f->frames, "gaps", (json_int_t)f->missing, "unreadable",
+        (json_int_t)f->unreadable, "formats", p->formats, "points", "least", (json_int_t)f->points_least,
+        "median", (json_int_t)f->points_median, "most", (json_int_t)f->points_most, "total",
+        (json_int_t)f->points_total, "not_finite", (json_int_t)f->not_finite, "frames_with_normals",
+        (json_int_t)f->with_normals, "box", box, "bytes", (json_int_t)f->bytes, "read_s", p->read_s,
+        "attention", p->attention, "estimate", "vertices", (json_int_t)f->vertices, "window",
+        (json_int_t)f->window, "memory_bytes", f->memory_bytes, "disk_bytes", f->disk_bytes, "time_s",
+        f->time_s, "per_frame", p->per_frame);
     if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     if (limit_of(j)) json_object_set_new(all, "limit", json_string(limit_of(j)));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
-    npg_status status =
-        text ? npg_copy_text((char **)&facts->json, text) : npg_error(NPG_MEMORY, "no memory");
+    npg_status status = text ? npg_copy_text((char **)&f->json, text) : npg_error(NPG_MEMORY, "no memory");
     free(text);
     json_decref(all);
     return status;
 }
 
-static void print_text(FILE *out, job *j, const npg_estimate *e)
+static void print_text(FILE *out, const job *j)
 {
-    npg_probe *p = &j->probe;
-    npg_probe_spread counts = npg_probe_counts(p);
+    const npg_probe *p = &j->probe;
+    const npg_capture_facts *f = p->facts;
+    const double *lo = f->box_low, *hi = f->box_high;
     const char *format;
     json_t *value;
     size_t i;
-    fprintf(out, "frames    %zu", p->frames);
+    fprintf(out, "frames    %zu", f->frames);
     json_object_foreach(p->formats, format, value)
         fprintf(out, ", %s %d", format, (int)json_integer_value(value));
-    fprintf(out, "; missing %zu, unreadable %zu\n", j->list ? j->list->gap_count : 0, p->unreadable);
-    fprintf(out, "points    %zu to %zu per frame, median %zu; %zu not finite\n", counts.least, counts.most,
-            counts.median, p->not_finite);
-    fprintf(out, "normals   in %zu of %zu frames\n", p->with_normals, p->frames - p->unreadable);
-    if (p->bounds.lo[0] <= p->bounds.hi[0]) {
-        const double *o = p->origin.world, *lo = p->bounds.lo, *hi = p->bounds.hi;
-        fprintf(out, "box       %.6g %.6g %.6g .. %.6g %.6g %.6g, diagonal %.6g\n", o[0] + lo[0],
-                o[1] + lo[1], o[2] + lo[2], o[0] + hi[0], o[1] + hi[1], o[2] + hi[2],
-                npg_bounds_diagonal(&p->bounds));
-    }
-    fprintf(out, "files     %.1f MiB, read in %.2f s\n", (double)p->bytes / 0x1p20, p->read_s);
+    fprintf(out, "; missing %zu, unreadable %zu\n", f->missing, f->unreadable);
+    fprintf(out, "points    %zu to %zu per frame, median %zu; %zu not finite\n", f->points_least,
+            f->points_most, f->points_median, f->not_finite);
+    fprintf(out, "normals   in %zu of %zu frames\n", f->with_normals, f->frames - f->unreadable);
+    if (lo[0] <= hi[0])
+        fprintf(out, "box       %.6g %.6g %.6g .. %.6g %.6g %.6g, diagonal %.6g\n", lo[0], lo[1], lo[2],
+                hi[0], hi[1], hi[2], npg_bounds_diagonal(&p->bounds));
+    fprintf(out, "files     %.1f MiB, read in %.2f s\n", (double)f->bytes / 0x1p20, p->read_s);
     fprintf(out,
             "estimate  memory %.0f MiB, disk %.0f MiB, time %.0f s "
             "(%zu vertices, windows of %zu frames; bodies that move fast take twice the time)\n",
-            e->memory_bytes / 0x1p20, e->disk_bytes / 0x1p20, e->time_s, e->vertices, e->window);
+            f->memory_bytes / 0x1p20, f->disk_bytes / 0x1p20, f->time_s, f->vertices, f->window);
     print_sensors(out, j);
     json_array_foreach(p->attention, i, value) fprintf(out, "attention %s\n", json_string_value(value));
 }
@@ -239,80 +233,57 @@ static void print_text(FILE *out, job *j, const npg_estimate *e)
 /* Unreadable frames are bad input unless the run would continue without them. */
 static npg_status status_of(const job *j)
 {
-    if (j->probe.unreadable && !option_on(j->options, "keep-going"))
+    if (j->probe.facts->unreadable && !option_on(j->options, "keep-going"))
         return npg_error(NPG_BAD_INPUT, "%s", j->probe.first_fault);
-    return json_array_size(j->probe.attention) ? NPG_PARTIAL : NPG_OK;
+    return j->probe.facts->attention ? NPG_PARTIAL : NPG_OK;
 }
 
-static npg_status set_text(npg_capture_facts *facts, job *j, const npg_estimate *e)
+static npg_status set_text(const job *j)
 {
     char *text = NULL;
     size_t size;
     FILE *out = open_memstream(&text, &size);
-    if (out) print_text(out, j, e);
+    if (out) print_text(out, j);
     bool is_whole = out && fclose(out) == 0;
     npg_status status =
-        is_whole ? npg_copy_text((char **)&facts->text, text) : npg_error(NPG_MEMORY, "no memory");
+        is_whole ? npg_copy_text((char **)&j->probe.facts->text, text) : npg_error(NPG_MEMORY, "no memory");
     free(text);
     return status;
 }
 
-static void set_numbers(npg_capture_facts *facts, job *j, const npg_estimate *e)
-{
-    const npg_probe *p = &j->probe;
-    npg_probe_spread counts = npg_probe_counts(&j->probe);
-    facts->frames = p->frames;
-    facts->missing = j->list ? j->list->gap_count : 0;
-    facts->unreadable = p->unreadable;
-    facts->with_normals = p->with_normals;
-    facts->points_least = counts.least;
-    facts->points_median = counts.median;
-    facts->points_most = counts.most;
-    facts->points_total = p->point_total;
-    facts->not_finite = p->not_finite;
-    facts->attention = json_array_size(p->attention);
-    for (int a = 0; a < 3; a++) {
-        facts->box_low[a] = p->origin.world[a] + p->bounds.lo[a];
-        facts->box_high[a] = p->origin.world[a] + p->bounds.hi[a];
-    }
-    facts->bytes = p->bytes;
-    facts->vertices = e->vertices;
-    facts->window = e->window;
-    facts->memory_bytes = e->memory_bytes;
-    facts->disk_bytes = e->disk_bytes;
-    facts->time_s = e->time_s;
-}
-
-static npg_status look(npg_capture_facts *facts, job *j)
+static npg_status look(job *j)
 {
     NPG_TRY(read_all(j));
-    npg_probe_warn_of_all(&j->probe);
-    npg_estimate estimate = npg_probe_estimate(&j->probe, j->options);
-    set_numbers(facts, j, &estimate);
-    NPG_TRY(set_json(facts, j, &estimate));
-    return set_text(facts, j, &estimate);
+    npg_probe_finish(&j->probe, j->options);
+    NPG_TRY(set_json(j));
+    return set_text(j);
 }
 
 npg_status npg_capture_probe(npg_capture_facts **out, const npg_options *options)
 {
-    npg_capture_facts *facts = NULL;
-    job j = {.options = options};
     NPG_REQUIRE(out && options);
-    *out = NULL;
-    j.input = npg_options_get(options, "input");
-    npg_probe_init(&j.probe);
-    npg_status status = npg_alloc(&facts, NPG_FOR_FILES, sizeof *facts);
-    if (!status) facts->struct_size = sizeof *facts;
-    if (!status) status = look(facts, &j);
+    NPG_TRY(npg_alloc(out, NPG_FOR_FILES, sizeof **out));
+    (*out)->struct_size = sizeof **out;
+    job j = {.options = options,
+             .input = npg_options_get(options, "input"),
+             .probe = {.facts = *out,
+                       .bounds = npg_bounds_empty(),
+                       .last = npg_bounds_empty(),
+                       .formats = json_object(),
+                       .attention = json_array(),
+                       .per_frame = json_array()}};
+    npg_status status = look(&j);
     if (status)
-        npg_capture_facts_close(&facts);
+        npg_capture_facts_close(out);
     else
         status = status_of(&j);
-    *out = facts;
     npg_release(&j.views);
     npg_release(&j.before);
     npg_frame_files_close(&j.list);
-    npg_probe_uninit(&j.probe);
+    npg_release(&j.probe.counts);
+    json_decref(j.probe.formats);
+    json_decref(j.probe.attention);
+    json_decref(j.probe.per_frame);
     return status;
 }
 

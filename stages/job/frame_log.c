@@ -300,9 +300,5 @@ npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts, con
     NPG_TRY(npg_path_of(path, list->output, "frames.jsonl"));
     NPG_TRY(npg_file_open(&file, path));
     npg_status status = copy_lines(list, file, facts, late);
-    if (status)
-        npg_file_discard(&file);
-    else
-        status = npg_file_commit(&file);
-    return status;
+    return npg_file_end(&file, status);
 }

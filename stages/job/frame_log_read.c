@@ -60,10 +60,7 @@ static npg_status shorten(const char *from, const char *to, int64_t below, int64
     if (stat(from, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", from);
     NPG_TRY(npg_file_open(&list.file, to));
     npg_status status = npg_json_lines_each(from, (int64_t)info.st_size, keep_line, &list);
-    if (!status)
-        status = npg_file_commit(&list.file);
-    else
-        npg_file_discard(&list.file);
+    status = npg_file_end(&list.file, status);
     *lines = list.lines;
     *bytes = list.bytes;
     return status;

@@ -1,7 +1,6 @@
 /* Job: the folder OUT/job, its lock and its states. */
 #include "job/job_internal.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -42,15 +41,10 @@ static bool is_stale(const npg_job *job, const char *name)
     return is_hidden || !strstr(name, ".vdb") || !(job->keeps_grids || is_kept(job, serial));
 }
 
-static npg_status remove_stale(const npg_job *job)
+static npg_status remove_stale(void *user, const char *name)
 {
-    npg_status status = NPG_OK;
-    DIR *listing = opendir(job->folder);
-    if (!listing) return npg_error_errno(NPG_DISK, "can't list %s", job->folder);
-    for (struct dirent *entry; !status && (entry = readdir(listing));)
-        if (is_stale(job, entry->d_name)) status = npg_file_remove(job->folder, entry->d_name);
-    closedir(listing);
-    return status;
+    const npg_job *job = user;
+    return is_stale(job, name) ? npg_file_remove(job->folder, name) : NPG_OK;
 }
 
 /* ---- the lock ---- */
@@ -391,7 +385,7 @@ npg_status npg_job_write(npg_job *job, bool keeps_grids)
     if (job->forgets) {
         NPG_TRY(npg_file_remove(job->folder, "job.json"));
         NPG_TRY(rename_store(job->store, job, STORE_NAME));
-        NPG_TRY(remove_stale(job));
+        NPG_TRY(npg_folder_each(job->folder, NPG_DISK, remove_stale, job));
         NPG_TRY(job->frames ? rename_store(job->frames, job, FRAMES_NAME)
                             : npg_file_remove(job->folder, FRAMES_NAME));
         NPG_TRY(npg_json_write(job->folder, "job.json", job->now));
@@ -420,7 +414,7 @@ npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment)
     job->serial += !moment->is_inside;
     if (moment->is_forward_end) job->forward_serial = job->serial;
     NPG_TRY(npg_store_forget(job->store, is_needed, job));
-    return remove_stale(job);
+    return npg_folder_each(job->folder, NPG_DISK, remove_stale, job);
 }
 
 /* ---- frames on disk ---- */

@@ -134,7 +134,7 @@ static npg_status describe_capture(json_t *frames, const npg_options *options, n
 {
     npg_frame_files *list;
     if (source) return NPG_OK;
-    NPG_TRY(npg_capture_list(&list, options));
+    NPG_TRY(npg_capture_list(&list, options, NULL));
     npg_status status = describe_frames(frames, list);
     npg_frame_files_close(&list);
     return status;

@@ -84,10 +84,7 @@ npg_status npg_vdb_file_write(const char *path, uint64_t *hash,
     if (!status) status = fix_identity(fd);
     if (!status) status = npg_file_open(&file, path);
     if (!status) status = pass_bytes(&wide, hash ? hash : &own_hash, file, fd, 0);
-    if (!status)
-        status = npg_file_commit(&file);
-    else
-        npg_file_discard(&file);
+    status = npg_file_end(&file, status);
     close(fd);
     return status;
 }

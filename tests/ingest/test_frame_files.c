@@ -33,7 +33,7 @@ static const char *listed(const char *input, const char *selection, bool finds_g
     static char text[4096];
     npg_frame_files *list;
     size_t used = 0;
-    if (npg_frame_files_open(&list, input, selection, finds_gaps)) {
+    if (npg_frame_files_open(&list, input, selection, finds_gaps, NULL)) {
         assert_null(list);
         return npg_error_text();
     }
@@ -114,7 +114,7 @@ static void gaps_as_text(void **state)
     char text[64], small[16];
     const char *path =
         make_files("gap_text", FILES("f1.xyz", "f3.xyz", "f6.xyz", "f10.xyz", "f12.xyz", "f14.xyz"));
-    assert_int_equal(npg_frame_files_open(&list, path, "", true), NPG_OK);
+    assert_int_equal(npg_frame_files_open(&list, path, "", true, NULL), NPG_OK);
     assert_int_equal(list->gap_count, 8);
     npg_frame_files_gaps(text, sizeof text, list);
     assert_string_equal(text, "2, 4, 5, 7-9, 11, 13");
@@ -185,7 +185,7 @@ static void endings_do_not_mix(void **state)
     (void)state;
     npg_frame_files *list;
     const char *path = make_files("mixed", FILES("1.xyz", "2.xyz", "readme.txt", "3.XYZ"));
-    assert_int_equal(npg_frame_files_open(&list, path, "", true), NPG_OK);
+    assert_int_equal(npg_frame_files_open(&list, path, "", true, NULL), NPG_OK);
     assert_int_equal(list->count, 3);
     assert_int_equal(list->left_out, 1);
     npg_frame_files_close(&list);
@@ -261,7 +261,7 @@ static void odd_inputs(void **state)
 static npg_status confined(const char *input)
 {
     npg_frame_files *list;
-    assert_int_equal(npg_frame_files_open(&list, input, "", false), NPG_OK);
+    assert_int_equal(npg_frame_files_open(&list, input, "", false, NULL), NPG_OK);
     npg_status status = npg_frame_files_confine(list, input);
     npg_frame_files_close(&list);
     return status;
@@ -308,7 +308,7 @@ static void no_memory_at_any_point(void **state)
         for (; status; n++) {
             npg_frame_files *list;
             npg_memory_fail_at(n + 1, false);
-            status = npg_frame_files_open(&list, input, "0:3", true);
+            status = npg_frame_files_open(&list, input, "0:3", true, NULL);
             npg_memory_fail_at(0, false);
             if (status) assert_int_equal(status, NPG_MEMORY);
             npg_frame_files_close(&list);

@@ -20,7 +20,7 @@ static npg_status open_capture(npg_capture **capture, const char *path, npg_miss
 {
     npg_frame_files *list;
     *capture = NULL;
-    npg_status status = npg_frame_files_open(&list, path, "", missing != NPG_MISSING_IGNORE);
+    npg_status status = npg_frame_files_open(&list, path, "", missing != NPG_MISSING_IGNORE, NULL);
     return status ? status : npg_capture_open(capture, &list, path, missing, keep_going, limit, spill);
 }
 

@@ -224,35 +224,33 @@ static void any_bytes_become_a_json_text(void **state)
     npg_memory_fail_at(0, false);
 }
 
-static void files_are_found_by_their_numbers(void **state)
+static npg_status count_letter(void *user, const char *name)
 {
-    static const char *const names[] = {"w_000010.vdb",
-                                        "w_2.vdb",
-                                        "w_000003.vdb",
-                                        "w_.vdb",
-                                        "w_4.vdbx",
-                                        "w_5.npg",
-                                        "xw_6.vdb",
-                                        "w_7",
-                                        "w_8vdb",
-                                        "w_-9.vdb",
-                                        "w_ 9.vdb",
-                                        "w_9.9.vdb",
-                                        "w_99999999999999999999.vdb"};
-    int64_t *numbers;
-    size_t count;
+    int *counts = user;
+    if (name[0] == 'x') return npg_error(NPG_FAILED, "%s", name);
+    counts[name[0] - 'a']++;
+    return NPG_OK;
+}
+
+static void each_name_of_a_folder_is_visited_until_one_fails(void **state)
+{
+    int counts[26] = {0};
+    char visited[600];
     (void)state;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        assert_int_equal(write_text_file(in_folder(&folder, names[i]), ""), 0);
-    assert_int_equal(npg_folder_numbers(&numbers, &count, folder.path, "w_", "vdb"), NPG_OK);
-    assert_int_equal(count, 3);
-    assert_true(numbers[0] == 2 && numbers[1] == 3 && numbers[2] == 10);
-    npg_release(&numbers);
-    assert_int_equal(npg_folder_numbers(&numbers, &count, in_folder(&folder, "none"), "w_", "vdb"), NPG_OK);
-    assert_true(!numbers && !count);
-    assert_int_equal(npg_folder_numbers(&numbers, &count, in_folder(&folder, "w_7"), "w_", "vdb"), NPG_DISK);
-    assert_non_null(strstr(npg_error_text(), "w_7"));
-    assert_int_equal(npg_memory_used(), 0);
+    snprintf(visited, sizeof visited, "%s/visited", folder.path);
+    assert_int_equal(npg_make_folder(in_folder(&folder, "visited/c")), NPG_OK);
+    assert_int_equal(write_text_file(in_folder(&folder, "visited/a"), ""), 0);
+    assert_int_equal(write_text_file(in_folder(&folder, "visited/b"), ""), 0);
+    assert_int_equal(npg_folder_each(visited, NPG_DISK, count_letter, counts), NPG_OK);
+    assert_true(counts[0] == 1 && counts[1] == 1 && counts[2] == 1);
+    assert_int_equal(write_text_file(in_folder(&folder, "visited/x"), ""), 0);
+    assert_int_equal(npg_folder_each(visited, NPG_DISK, count_letter, counts), NPG_FAILED);
+    assert_int_equal(npg_folder_each(in_folder(&folder, "none"), NPG_DISK, count_letter, counts), NPG_OK);
+    assert_int_equal(npg_folder_each(in_folder(&folder, "none"), NPG_BAD_INPUT, count_letter, counts),
+                     NPG_BAD_INPUT);
+    assert_int_equal(npg_folder_each(in_folder(&folder, "visited/a"), NPG_DISK, count_letter, counts),
+                     NPG_DISK);
+    assert_non_null(strstr(npg_error_text(), "visited/a"));
 }
 
 static void a_folder_goes_but_not_what_its_links_lead_to(void **state)
@@ -304,7 +302,7 @@ int main(void)
         cmocka_unit_test(a_link_in_the_way_is_not_followed),
         cmocka_unit_test(paths_join),
         cmocka_unit_test(any_bytes_become_a_json_text),
-        cmocka_unit_test(files_are_found_by_their_numbers),
+        cmocka_unit_test(each_name_of_a_folder_is_visited_until_one_fails),
         cmocka_unit_test(a_folder_goes_but_not_what_its_links_lead_to),
         cmocka_unit_test(no_memory_is_said),
     };

@@ -2,8 +2,6 @@
  *
  * The layout of the paper's published code is understood: <capture>/point_clouds/0000.ply ... beside
  * <capture>/gt/0000.obj ..., or gt/ alone; and that of neupig synth: points/ beside truth/. */
-#include <dirent.h>
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -89,13 +87,6 @@ npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *
 
 /* ---- the folder ---- */
 
-static int by_name(const void *a, const void *b)
-{
-    const char *x = *(char *const *)a, *y = *(char *const *)b;
-    int order = npg_natural_compare(x, y);
-    return order ? order : strcmp(x, y);
-}
-
 /* Whether the entry is a folder, and not the one that the results go to. */
 static npg_status is_capture(bool *yes, const npg_batch *batch, const char *name)
 {
@@ -109,22 +100,22 @@ static npg_status is_capture(bool *yes, const npg_batch *batch, const char *name
     return NPG_OK;
 }
 
-static npg_status list_captures(npg_listing *names, const npg_batch *batch)
+typedef struct listed {
+    const npg_batch *batch;
+    npg_listing names;
+} listed;
+
+static npg_status list_capture(void *user, const char *name)
 {
-    npg_status status = NPG_OK;
-    DIR *folder = opendir(batch->path);
-    if (!folder) return npg_error(NPG_BAD_INPUT, "%s: %s", batch->path, strerror(errno));
-    for (struct dirent *entry; !status && (entry = readdir(folder));) {
-        bool yes;
-        status = is_capture(&yes, batch, entry->d_name);
-        if (status || !yes) continue;
-        status = npg_grow(&names->paths, &names->room, names->count + 1, sizeof *names->paths, NPG_FOR_FILES);
-        if (!status) status = npg_copy_text(&names->paths[names->count], entry->d_name);
-        if (!status) names->count++;
-    }
-    closedir(folder);
-    if (!status && names->count) qsort(names->paths, names->count, sizeof *names->paths, by_name);
-    return status;
+    listed *l = user;
+    npg_listing *names = &l->names;
+    bool yes;
+    NPG_TRY(is_capture(&yes, l->batch, name));
+    if (!yes) return NPG_OK;
+    NPG_TRY(npg_grow(&names->paths, &names->room, names->count + 1, sizeof *names->paths, NPG_FOR_FILES));
+    NPG_TRY(npg_copy_text(&names->paths[names->count], name));
+    names->count++;
+    return NPG_OK;
 }
 
 /* The name of its folder in the output: without what can't be one (npg_batch_add()),
@@ -161,12 +152,13 @@ static npg_status add_captures(npg_batch *batch, const npg_listing *names, const
 
 npg_status npg_batch_read_folder(npg_batch *batch, const npg_batch_given *given)
 {
-    npg_listing names = {0};
+    listed l = {.batch = batch};
     if (!batch->output) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
-    npg_status status = list_captures(&names, batch);
-    if (!status && !names.count)
+    npg_status status = npg_folder_each(batch->path, NPG_BAD_INPUT, list_capture, &l);
+    if (l.names.count) qsort(l.names.paths, l.names.count, sizeof *l.names.paths, npg_natural_order);
+    if (!status && !l.names.count)
         status = npg_error(NPG_BAD_INPUT, "%s: no sub-folder here, and each would be a capture", batch->path);
-    if (!status) status = add_captures(batch, &names, given);
-    npg_listing_close(&names);
+    if (!status) status = add_captures(batch, &l.names, given);
+    npg_listing_close(&l.names);
     return status;
 }

@@ -23,7 +23,7 @@ static int64_t option_number(const npg_options *options, const char *name)
 static npg_status count_all(int64_t *count, const npg_options *options)
 {
     npg_frame_files *all;
-    NPG_TRY(npg_capture_select(&all, options, ""));
+    NPG_TRY(npg_capture_list(&all, options, ""));
     *count = (int64_t)all->count;
     npg_frame_files_close(&all);
     return NPG_OK;
@@ -227,7 +227,7 @@ static npg_status load_or_begin(npg_segments *s, const npg_options *options)
 static npg_status run_all(npg_segments *s, const npg_options *options, npg_reporter *reporter)
 {
     bool is_partial = false;
-    NPG_TRY(npg_capture_select(&s->frames, options, s->selection));
+    NPG_TRY(npg_capture_list(&s->frames, options, s->selection));
     NPG_TRY(load_or_begin(s, options));
     NPG_TRY(solve_all(s, options, reporter));
     for (size_t i = 0; i < s->count; i++) is_partial |= s->list[i].is_partial;

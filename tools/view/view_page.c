@@ -169,7 +169,5 @@ npg_status npg_view_page_write(npg_view_facts *facts, const npg_view_order *orde
     npg_status status = npg_file_open(&file, order->output);
     if (!status) status = write_page(file, facts, &page, order);
     npg_view_template_close(&page);
-    if (!status) return npg_file_commit(&file);
-    npg_file_discard(&file);
-    return status;
+    return npg_file_end(&file, status);
 }

@@ -21,7 +21,7 @@
 
 #include <jansson.h>
 
-#include "export/files.h"
+#include "export/export.h"
 #include "pipeline/file.h"
 #include "pipeline/source.h"
 
@@ -157,6 +157,20 @@ npg_status npg_folder_check(const char *output, const npg_mesh_names *names, con
 
 /* ---- the last file ---- */
 
+/* A done.json that is being written: within its list of files. */
+typedef struct npg_done {
+    npg_file *file;
+    size_t count; /* of entries so far */
+} npg_done;
+
+/* Add an entry (consumed), or that of OUT/<name>, whose size and checksum are taken now. */
+npg_status npg_done_add(npg_done *done, json_t *entry);
+npg_status npg_done_add_file(npg_done *done, const char *output, const char *name);
+
+/* All is written, or has failed, and status comes back.  What fails at its last step is not done: then the file
+ * goes, though it may be whole. */
+npg_status npg_done_end(npg_done *done, const char *output, npg_status status);
+
 /* OUT/done.json: version, status, settings, and every file of the run, with has_exports those that
  * OUT/exports.jsonl lists too; the frame log goes.  head is consumed. */
 npg_status npg_done_write(const char *output, json_t *head, bool has_exports);
@@ -270,11 +284,10 @@ npg_status npg_zip_finish(npg_zip *zip);
 /* ---- scenes to draw: a mesh, or a cloud as small balls, with colours ---- */
 
 typedef struct npg_scene {
-    npg_mesh *mesh; /* what rays meet, with vertex normals; owned */
-    float *colours; /* V x 3, 0..1, owned                         */
-    float
-        *ball_middle; /* clouds: the middle of each ball, owned; ball b has faces 8 b .. 8 b + 7; else NULL */
-    size_t shown, total; /* clouds: points drawn and points there */
+    npg_mesh *mesh;      /* what rays meet, with vertex normals; owned              */
+    float *colours;      /* V x 3, 0..1, owned                                      */
+    bool is_cloud;       /* each 8 faces are a ball                                 */
+    size_t shown, total; /* clouds: points drawn and points there                   */
 } npg_scene;
 
 /* Read only what a file fills of the space, along three axes (rows of unit length); points that are not

@@ -1,6 +1,5 @@
 /* Exporters: the pass over a run's meshes in the order of time that writes all of them at once. */
-#include <dirent.h>
-#include <errno.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,42 +47,37 @@ static bool is_single(const char *name)
     return rest == strrchr(name, '.');
 }
 
-static bool is_numbered(const char *name)
+typedef struct clearing {
+    const char *folder;
+    bool is_output; /* the results' folder itself; else one of numbered files */
+} clearing;
+
+static bool is_ours(const clearing *c, const char *name)
 {
     int64_t number;
-    return npg_mesh_name_read(name, ".obj .vdb ", &number);
-}
-
-static npg_status clear_folder(const char *folder, bool (*is_ours)(const char *name))
-{
-    npg_status status = NPG_OK;
-    DIR *listing = opendir(folder);
-    if (!listing) return errno == ENOENT ? NPG_OK : npg_error_errno(NPG_DISK, "can't list %s", folder);
-    for (struct dirent *entry; !status && (entry = readdir(listing));) {
-        char name[NAME_MAX + 1];
-        size_t length = strlen(entry->d_name);
-        /* What a killed run left half-written (pipeline/file.h): ".<name>.part". */
-        bool is_part = entry->d_name[0] == '.' && length > 6 && !strcmp(entry->d_name + length - 5, ".part");
-        snprintf(name, sizeof name, "%.*s", (int)(is_part ? length - 6 : length), entry->d_name + is_part);
-        if (is_ours(name)) status = npg_file_remove(folder, entry->d_name);
-    }
-    closedir(listing);
-    return status;
-}
-
-static bool is_in_output(const char *name)
-{
+    if (!c->is_output) return npg_mesh_name_read(name, ".obj .vdb ", &number);
     return is_single(name) || !strcmp(name, "reference.obj") || !strcmp(name, "exports.jsonl");
+}
+
+/* Also what a killed run left half-written (pipeline/file.h): ".<name>.part". */
+static npg_status remove_ours(void *user, const char *entry)
+{
+    const clearing *c = user;
+    char name[NAME_MAX + 1];
+    size_t length = strlen(entry);
+    bool is_part = entry[0] == '.' && length > 6 && !strcmp(entry + length - 5, ".part");
+    snprintf(name, sizeof name, "%.*s", (int)(is_part ? length - 6 : length), entry + is_part);
+    return is_ours(c, name) ? npg_file_remove(c->folder, entry) : NPG_OK;
 }
 
 npg_status npg_exporters_clear(const char *output)
 {
     static const char *const folders[] = {"obj", "volumes", "latents"};
-    npg_status status = clear_folder(output, is_in_output);
+    npg_status status = npg_folder_each(output, NPG_DISK, remove_ours, &(clearing){output, true});
     for (size_t i = 0; i < sizeof folders / sizeof *folders && !status; i++) {
         char folder[NPG_PATH_SIZE];
         NPG_TRY(npg_path_of(folder, output, folders[i]));
-        status = clear_folder(folder, is_numbered);
+        status = npg_folder_each(folder, NPG_DISK, remove_ours, &(clearing){folder, false});
         if (!status) rmdir(folder); /* stays where something else lies in it */
     }
     return status;
@@ -97,14 +91,9 @@ npg_status npg_export_made(npg_export_log *log, const char *format, const char *
     json_t *entry = json_pack("{ss ss sI sI}", "form", format, "file", file, "first", (json_int_t)first,
                               "frames", (json_int_t)pose_count);
     npg_status status = npg_file_facts(entry, log->output, file);
-    char *text = status ? NULL : json_dumps(entry, JSON_COMPACT);
+    if (!status) status = npg_json_print(log->file, entry, JSON_COMPACT);
     json_decref(entry);
-    NPG_TRY(status);
-    if (!text) return npg_error(NPG_MEMORY, "no memory for exports.jsonl");
-    npg_file_write(log->file, text, strlen(text));
-    status = npg_file_write(log->file, "\n", 1);
-    free(text);
-    return status;
+    return status ? status : npg_file_write(log->file, "\n", 1);
 }
 
 static npg_status open_log(exporters_pass *p)

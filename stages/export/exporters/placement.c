@@ -1,5 +1,5 @@
 /* Placement: from the capture's coordinates to those of the written files. */
-#include "export/files.h"
+#include "export/export.h"
 
 #include <math.h>
 #include <string.h>

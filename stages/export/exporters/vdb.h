@@ -2,7 +2,7 @@
 #ifndef NPG_EXPORTERS_VDB_H
 #define NPG_EXPORTERS_VDB_H
 
-#include "export/files.h"
+#include "export/export.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -123,10 +123,7 @@ npg_status npg_write_obj_like(const char *path, const char *like, const npg_mesh
     NPG_TRY(npg_source_open_file(&c.source, like));
     npg_status status = npg_file_open(&c.file, path);
     if (!status) status = copy_lines(&c);
-    if (!status)
-        status = npg_file_commit(&c.file);
-    else
-        npg_file_discard(&c.file);
+    status = npg_file_end(&c.file, status);
     npg_source_close(&c.source);
     return status;
 }

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "export/files.h"
+#include "export/export.h"
 #include "pipeline/file.h"
 #include "pipeline/source.h"
 

@@ -3,7 +3,6 @@
 
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 enum { PLY, OBJ, NPY, XYZ, XYZN, TXT, PTS, PCD, FORMATS };
 
@@ -118,30 +117,22 @@ static npg_status read_file(npg_builder *b, const char *path)
     return status;
 }
 
-static npg_status read_points(npg_frame *frame, const char *path, npg_origin *origin)
+/* The same into an empty builder that has only what is asked for.  The first file settles the origin.  Where its
+ * first point turns out to lie far off (many sensors write 0 0 0 for a pixel they could not see), float has lost
+ * the detail of all others: read again around the median. */
+static npg_status read_settled(npg_builder *b, const char *path, npg_origin *origin)
 {
-    npg_builder b = {.origin = origin, .purpose = NPG_FOR_FRAMES};
-    NPG_TRY(read_file(&b, path));
-    npg_builder_frame(frame, &b);
-    npg_builder_clear(&b);
-    return NPG_OK;
-}
-
-/* The first file settles the origin.  Where its first point turns out to lie far off
- * (many sensors write 0 0 0 for a pixel they could not see), float has lost the detail of all others:
- * read again around the median. */
-static npg_status read_first(npg_frame *frame, const char *path, npg_origin *origin)
-{
-    struct stat info;
-    npg_origin found = {0};
-    NPG_TRY(read_points(frame, path, &found));
-    bool is_file = !stat(path, &info) && S_ISREG(info.st_mode);
-    if (is_file && npg_origin_improve(&found, frame->pos_local, frame->point_count)) {
-        npg_frame_clear(frame);
-        NPG_TRY(read_points(frame, path, &found));
+    npg_builder empty = *b;
+    npg_origin found = *origin;
+    empty.origin = b->origin = &found;
+    npg_status status = read_file(b, path);
+    if (!status && !origin->known && npg_origin_improve(&found, b->pos, b->vert_count)) {
+        npg_builder_clear(b);
+        *b = empty;
+        status = read_file(b, path);
     }
-    *origin = found;
-    return NPG_OK;
+    if (!status && !origin->known) *origin = found; /* else others may be reading it */
+    return status;
 }
 
 /* What every frame that was read has. */
@@ -157,16 +148,18 @@ static npg_status finish(npg_frame *frame, npg_status status, const char *path)
 
 npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin)
 {
-    return finish(frame, origin->known ? read_points(frame, path, origin) : read_first(frame, path, origin),
-                  path);
+    npg_builder b = {.purpose = NPG_FOR_FRAMES};
+    npg_status status = read_settled(&b, path, origin);
+    if (!status) npg_builder_frame(frame, &b);
+    npg_builder_clear(&b);
+    return finish(frame, status, path);
 }
 
 static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin, bool may_be_points)
 {
-    npg_builder b = {
-        .origin = origin, .purpose = NPG_FOR_MESH, .wants_faces = true, .may_be_points = may_be_points};
+    npg_builder b = {.purpose = NPG_FOR_MESH, .wants_faces = true, .may_be_points = may_be_points};
     *mesh = NULL;
-    NPG_TRY(read_file(&b, path));
+    NPG_TRY(read_settled(&b, path, origin));
     npg_status status = npg_builder_mesh(mesh, &b, path);
     npg_builder_clear(&b);
     return status;
