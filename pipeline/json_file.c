@@ -205,6 +205,23 @@ npg_status npg_json_lines_in(const char *folder, const char *name, npg_json_line
     return npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
 }
 
+npg_status npg_json_load(json_t **value, const char *folder, const char *name, npg_status damaged)
+{
+    char path[NPG_PATH_SIZE];
+    json_error_t error;
+    int fd;
+    *value = NULL;
+    NPG_TRY(npg_path_of(path, folder, name));
+    if (access(path, F_OK) && errno == ENOENT) return NPG_OK;
+    NPG_TRY(npg_file_open_plain(&fd, path, damaged));
+    *value = json_loadfd(fd, 0, &error);
+    close(fd);
+    if (json_is_object(*value)) return NPG_OK;
+    json_decref(*value);
+    *value = NULL;
+    return npg_error(damaged, "%s is damaged (line %d: %s)", path, error.line, error.text);
+}
+
 json_t *npg_json_in(const char *folder, const char *name)
 {
     char path[NPG_PATH_SIZE];

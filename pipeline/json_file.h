@@ -21,6 +21,9 @@ npg_status npg_json_parse(json_t **root, char *text, const char *place);
  * lost.  NULL gives null. */
 json_t *npg_json_text(const char *text);
 
+/* <folder>/<name>, an object that the program wrote; NULL where there is none.  `damaged`: it can't be read. */
+npg_status npg_json_load(json_t **value, const char *folder, const char *name, npg_status damaged);
+
 /* The JSON file of a folder; NULL where there is none, or none that can be read. */
 json_t *npg_json_in(const char *folder, const char *name);
 

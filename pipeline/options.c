@@ -35,15 +35,11 @@ static const npg_option *in_table(const npg_option *table, size_t *i)
     return NULL;
 }
 
-/* The run's, then those of its services, then the stages'. */
+/* The run's, then the stages'. */
 static const npg_option *option_at(const npg_stage *const *chain, size_t i, const char **stage)
 {
     const char *name = "run";
     const npg_option *option = in_table(npg_run_options, &i);
-    for (const npg_service *const *s = npg_services_of(chain); !option && *s; s++) {
-        option = in_table((*s)->options, &i);
-        name = (*s)->name;
-    }
     for (; !option && *chain; chain++) {
         option = in_table((*chain)->options, &i);
         name = (*chain)->name;

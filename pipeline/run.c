@@ -127,10 +127,10 @@ static void announce_memory(npg_run *run)
 
 /* ---- one pass ---- */
 
-static npg_status open_state(npg_worker *worker, size_t size, const npg_option *options)
+static npg_status open_state(npg_worker *worker)
 {
-    NPG_TRY(npg_alloc(&worker->state, NPG_FOR_RUN, size + 1)); /* a stage may have none */
-    npg_options_fill(worker->run->options, options, worker->state);
+    NPG_TRY(npg_alloc(&worker->state, NPG_FOR_RUN, worker->stage->state_size + 1)); /* it may have none */
+    npg_options_fill(worker->run->options, worker->stage->options, worker->state);
     return NPG_OK;
 }
 
@@ -140,7 +140,7 @@ static npg_status open_worker_states(npg_run *run)
     for (size_t i = 0; i < run->worker_count; i++) {
         npg_worker *worker = &run->workers[i];
         const npg_stage *stage = worker->stage;
-        NPG_TRY(open_state(worker, stage->state_size, stage->options));
+        NPG_TRY(open_state(worker));
         worker->is_in_pass = (stage->passes & run->pass) && npg_worker_takes_part(worker);
     }
     return NPG_OK;
@@ -321,10 +321,11 @@ static npg_status conclude(npg_run *run)
 static npg_status begin(npg_run *run)
 {
     npg_status status = NPG_OK;
-    for (size_t i = 0; i < run->service_count && !status; i++) {
-        npg_worker *worker = &run->services[i];
-        status = open_state(worker, worker->service->state_size, worker->service->options);
-        if (!status) status = worker->service->begin(worker);
+    for (size_t i = 0; i < run->worker_count && !status; i++) {
+        npg_worker *worker = &run->workers[i];
+        if (!worker->stage->begin) continue;
+        status = open_state(worker);
+        if (!status) status = worker->stage->begin(worker);
         if (status && status != NPG_END) npg_run_fail(run, worker->name, status);
         npg_release(&worker->state);
     }
@@ -390,7 +391,7 @@ static npg_status check_chain(const npg_run *run)
 
 static npg_status add_worker(npg_run *run, const npg_stage *stage)
 {
-    json_t *stages = json_object_get(run->report, "stages");
+    json_t *stages = stage->begin ? run->report : json_object_get(run->report, "stages");
     if (run->worker_count == NPG_STAGES_MAX)
         return npg_error(NPG_USAGE, "more than %d stages", NPG_STAGES_MAX);
     npg_worker *worker = &run->workers[run->worker_count++];
@@ -411,29 +412,9 @@ static npg_status add_custom(npg_run *run, const npg_stage *before, uint32_t fie
     return NPG_OK;
 }
 
-const npg_service *const *npg_services_of(const npg_stage *const *chain)
-{
-    static const npg_service *const none[] = {NULL};
-    return chain == npg_chain ? npg_services : none;
-}
-
-static npg_status open_services(npg_run *run, const npg_service *const *services)
-{
-    for (; *services; services++) {
-        if (run->service_count == NPG_SERVICES_MAX)
-            return npg_error(NPG_USAGE, "more than %d services", NPG_SERVICES_MAX);
-        npg_worker *worker = &run->services[run->service_count++];
-        *worker = (npg_worker){
-            .run = run, .name = (*services)->name, .service = *services, .report = json_object()};
-        json_object_set_new(run->report, worker->name, worker->report);
-    }
-    return NPG_OK;
-}
-
 static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
 {
     uint32_t fields = 0;
-    NPG_TRY(open_services(run, npg_services_of(chain)));
     json_object_set_new(run->report, "stages", json_object());
     for (; *chain; chain++) {
         fields |= (*chain)->gives;

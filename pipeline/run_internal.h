@@ -11,8 +11,7 @@
 #include "pipeline/ring.h"
 #include "pipeline/stage.h"
 
-#define NPG_STAGES_MAX   16
-#define NPG_SERVICES_MAX 2
+#define NPG_STAGES_MAX   17
 #define NPG_FACTS_MAX    8 /* of stages' own kinds */
 #define NPG_LATCHES_MAX  4
 #define NPG_WARNINGS_MAX 1000 /* that the report lists; the log gets all */
@@ -33,14 +32,13 @@ npg_custom npg_custom_make(const npg_custom_stage *given, const npg_stage *befor
 
 /* ---- a run ---- */
 
-/* One stage at work, or a service that begins. */
+/* One stage at work. */
 struct npg_worker {
     npg_run *run;
     const char *name;
-    const npg_stage *stage;     /* NULL for a service */
-    const npg_service *service; /* NULL for a stage   */
+    const npg_stage *stage;
     bool is_in_pass;
-    void *state;        /* state_size bytes of the stage or service, owned, for one pass */
+    void *state;        /* state_size bytes of the stage, owned, for one pass */
     npg_ring *in, *out; /* loans; in is NULL for the first, out for the last without pull */
     pthread_t thread;
     bool started;
@@ -90,10 +88,8 @@ struct npg_run {
     npg_pass pass;
     npg_worker workers[NPG_STAGES_MAX];
     size_t worker_count;
-    npg_worker services[NPG_SERVICES_MAX];
-    size_t service_count;
     npg_custom custom[NPG_CUSTOM_STAGES_MAX]; /* what some of the workers' stages point to */
-    npg_latch *begun_latch;                   /* 1: the services have begun; one of: */
+    npg_latch *begun_latch;                   /* 1: the stages have begun; one of: */
     npg_latch *latches[NPG_LATCHES_MAX];      /* owned, for the run's whole life; only under lock */
     size_t latch_count;
     npg_ring *

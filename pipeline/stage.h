@@ -77,7 +77,7 @@ typedef struct npg_brief {
 
 /* What the stages find out about the capture as a whole.  A fact is written by its owner, the stage named,
  * and by nobody else (npg_own), before it passes on the first chunk (or ends the pass) that depends on it; the
- * rings' locks publish it downstream.  A service that resumes a run writes all of them, before the passes.
+ * rings' locks publish it downstream.  What resumes a run (begin) writes all of them, before the passes.
  * Where a live source goes on behind the look-ahead, number_min, number_max, point_count_max and bounds_local
  * are those of the look-ahead, and plan is an open one (pipeline/plan.h) in all passes. */
 typedef struct npg_facts {
@@ -111,7 +111,7 @@ typedef struct npg_facts {
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
-    /* the service job, before the first pass */
+    /* job, before the first pass */
     bool is_resumed;       /* all facts above are known; only the solving pass is walked */
     int64_t resumed_read;  /* frames of the plan that need not be read again             */
     int64_t wanted_number; /* pushed frames: those with smaller numbers need not come again; else INT64_MIN */
@@ -127,7 +127,7 @@ typedef struct npg_worker npg_worker;
 typedef struct npg_option npg_option; /* pipeline/options.h */
 typedef struct npg_store npg_store;   /* job/store.h */
 
-/* A fact whose type is a room's own.  The kind names its owner, a stage or service: nobody else can write it,
+/* A fact whose type is a room's own.  The kind names its owner, a stage: nobody else can write it,
  * and it is written once in a run. */
 typedef struct npg_fact_kind {
     const char *name, *owner;
@@ -144,6 +144,10 @@ typedef struct npg_stage {
     /* False: under these options the stage is left out of all passes.  The state has the options,
      * nothing else is known yet.  NULL: it always takes part. */
     bool (*takes_part)(const npg_worker *worker);
+    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run
+     * ends well at once; with facts.is_resumed only the solving pass is walked.  Who has this hook takes part in
+     * no pass, and its report stands beside those of the stages.  May be NULL. */
+    npg_status (*begin)(npg_worker *worker);
     /* Take what the pass needs.  Called on the stage's own thread.  May be NULL. */
     npg_status (*init)(npg_worker *worker);
     /* Take one chunk.  Left in *chunk, it is passed on; nulled, the stage kept it (or pushed it itself).
@@ -175,22 +179,8 @@ typedef struct npg_stage {
     npg_status (*conclude)(npg_worker *worker);
 } npg_stage;
 
-/* What a run has beside its stages: no frame passes through it. */
-typedef struct npg_service {
-    const char *name, *help;
-    const npg_option *options; /* may be NULL */
-    size_t state_size;         /* zeroed, filled from the options, then given to begin */
-    /* Before the first pass, on the run's own thread: NPG_END when there is nothing left to do and the run
-     * ends well at once; with facts.is_resumed only the solving pass is walked. */
-    npg_status (*begin)(npg_worker *worker);
-} npg_service;
-
-/* In the order of the data's way, NULL at the end (stages/chain.c); the services of a run with that chain. */
+/* In the order of the data's way, NULL at the end (stages/chain.c). */
 extern const npg_stage *const npg_chain[];
-extern const npg_service *const npg_services[];
-
-/* Of a run with this chain: npg_services with npg_chain, none with any other. */
-const npg_service *const *npg_services_of(const npg_stage *const *chain);
 
 /* ---- what a stage may ask of its worker ---- */
 
@@ -202,7 +192,7 @@ const npg_facts *npg_worker_facts(const npg_worker *worker);
 #define npg_own(worker, fact) (&npg_worker_own_facts((worker), offsetof(npg_facts, fact), #fact)->fact)
 npg_facts *npg_worker_own_facts(npg_worker *worker, size_t offset, const char *fact);
 
-/* For a service: all facts as an earlier run had them. */
+/* For begin(): all facts as an earlier run had them. */
 npg_status npg_worker_restore_facts(npg_worker *worker, const npg_facts *facts);
 const npg_settings *npg_worker_settings(const npg_worker *worker);
 const npg_options *npg_worker_options(const npg_worker *worker);

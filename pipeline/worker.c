@@ -35,7 +35,7 @@ static const char *owner_of(size_t offset)
 npg_facts *npg_worker_own_facts(npg_worker *worker, size_t offset, const char *fact)
 {
     npg_run *run = worker->run;
-    if (worker->service || !strcmp(worker->name, owner_of(offset))) return &run->facts;
+    if (worker->stage->begin || !strcmp(worker->name, owner_of(offset))) return &run->facts;
     npg_run_fail(run, worker->name,
                  npg_error(NPG_USAGE, "the fact %s is not stage %s's to write", fact, worker->name));
     return &run->nobodys;
@@ -43,7 +43,7 @@ npg_facts *npg_worker_own_facts(npg_worker *worker, size_t offset, const char *f
 
 npg_status npg_worker_restore_facts(npg_worker *worker, const npg_facts *facts)
 {
-    NPG_REQUIRE(worker->service);
+    NPG_REQUIRE(worker->stage->begin);
     worker->run->facts = *facts;
     return NPG_OK;
 }

@@ -3,10 +3,10 @@
 #include "pipeline/stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
-    npg_stage_align, npg_stage_fuse, npg_stage_optimize, npg_stage_evaluate, npg_stage_export;
-extern const npg_service npg_service_job;
+    npg_stage_align, npg_stage_fuse, npg_stage_optimize, npg_stage_evaluate, npg_stage_export, npg_stage_job;
 
 const npg_stage *const npg_chain[] = {
+    &npg_stage_job,      /* resumes what an earlier run of the same job left     */
     &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points */
     &npg_stage_outlier,  /* drops what is no surface, makes or mends normals     */
     &npg_stage_keyframe, /* box, keyframe, plan of the windows                   */
@@ -16,10 +16,6 @@ const npg_stage *const npg_chain[] = {
     &npg_stage_optimize, /* its deformation in every frame                       */
     &npg_stage_evaluate, /* figures and a verdict per frame                      */
     &npg_stage_export,   /* meshes, report, done.json                            */
-    NULL};
-
-const npg_service *const npg_services[] = {
-    &npg_service_job, /* resumes what an earlier run of the same job left */
     NULL};
 
 /* clang-format off */

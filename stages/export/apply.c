@@ -44,7 +44,6 @@ typedef struct applying {
 
 static npg_status check_job(applying *a)
 {
-    char path[NPG_PATH_SIZE];
     static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
                                          "job/job.json"};
     bool is_job = false;
@@ -54,13 +53,8 @@ static npg_status check_job(applying *a)
     if (!npg_is_in_folder(a->s->job, "done.json") || !npg_is_in_folder(a->s->job, "frames.jsonl"))
         return npg_error(NPG_BAD_INPUT, "%s: the run is not finished (there is no %s); run it again first",
                          a->s->job, npg_is_in_folder(a->s->job, "done.json") ? "frames.jsonl" : "done.json");
-    NPG_TRY(npg_path_of(path, a->s->job, "done.json"));
-    json_error_t error;
-    int fd;
-    NPG_TRY(npg_file_open_plain(&fd, path, NPG_BAD_INPUT));
-    json_t *done = json_loadfd(fd, 0, &error);
-    close(fd);
-    if (!done) return npg_error(NPG_BAD_INPUT, "%s:%d: %s", path, error.line, error.text);
+    json_t *done;
+    NPG_TRY(npg_json_load(&done, a->s->job, "done.json", NPG_BAD_INPUT));
     a->fps = json_number_value(json_object_get(done, "fps"));
     json_decref(done);
     return NPG_OK;

@@ -31,8 +31,8 @@ npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin
  * kept where given.  vert_pos is local.  Indices are checked; a mesh without faces is NPG_BAD_INPUT. */
 npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin);
 
-/* The points of a file, whatever else it holds, as a mesh without faces (maybe without points); normals where
- * the file has them.  Errors are those of npg_read_cloud. */
+/* The points of a file, whatever else it holds, as a mesh without faces; normals and colours where the file has
+ * them.  NPG_BAD_INPUT where there is no point. */
 npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin);
 
 /* The same for any of the formats, faces or not: points alone become a mesh with face_count 0.  NPG_BAD_INPUT
@@ -391,7 +391,7 @@ typedef struct npg_spooled {
     uint32_t is_held, is_skipped, has_file;
 } npg_spooled;
 
-/* A store, written by the service job where a live run keeps state. */
+/* A store, written by stage job where a live run keeps state. */
 extern const npg_fact_kind npg_fact_spool;
 
 /* How many are there. */

@@ -1,4 +1,4 @@
-/* job: the service that, before anything else, finds out whether an earlier run of the same
+/* job: the stage that, before anything else, finds out whether an earlier run of the same
  * job can be resumed. */
 #include "job/job_internal.h"
 
@@ -131,9 +131,9 @@ static npg_status begin(npg_worker *worker)
     return NPG_OK;
 }
 
-extern const npg_service npg_service_job;
-const npg_service npg_service_job = {.name = "job",
-                                     .help = "resumes an earlier run of the same job",
-                                     .options = options,
-                                     .state_size = sizeof(job_state),
-                                     .begin = begin};
+extern const npg_stage npg_stage_job;
+const npg_stage npg_stage_job = {.name = "job",
+                                 .help = "resumes an earlier run of the same job",
+                                 .options = options,
+                                 .state_size = sizeof(job_state),
+                                 .begin = begin};

@@ -1,5 +1,5 @@
 /* Job: what OUT/job/ holds so that a run which was stopped, killed or broken off is resumed by itself.
- * A service of the run, not a stage: no frame passes through it.
+ * A stage that no frame passes through: it begins before the first pass.
  *
  *     OUT/job/lock                 empty; the run at work holds a lock (flock) on it, which ends with its
  *                                  process
@@ -21,7 +21,7 @@
  * is noticed and the one before it used.
  * No file says that a run is at work.
  *
- * Threads: a run's npg_job belongs to the service until the passes begin.
+ * Threads: a run's npg_job belongs to stage job until the passes begin.
  * From then on stage optimize writes states, stage export says how many frames are on disk;
  * functions marked so may be called from any thread. */
 #ifndef NPG_JOB_H
@@ -34,7 +34,7 @@
 typedef struct npg_job npg_job;
 
 /* The job of the worker's run; NULL where nothing is kept on disk (pulled from, or no output).
- * Written by the service job before the first pass. */
+ * Written by stage job before the first pass. */
 npg_job *npg_job_of(const npg_worker *worker);
 
 /* Whether this run discards what is there (option restart). */

@@ -61,23 +61,6 @@ static npg_status take_lock(npg_job *job)
 
 /* ---- what is there ---- */
 
-npg_status npg_job_read_json(json_t **value, const char *folder, const char *name)
-{
-    char path[NPG_PATH_SIZE];
-    json_error_t error;
-    int fd;
-    *value = NULL;
-    NPG_TRY(npg_path_of(path, folder, name));
-    if (access(path, F_OK) && errno == ENOENT) return NPG_OK;
-    NPG_TRY(npg_file_open_plain(&fd, path, NPG_USAGE));
-    *value = json_loadfd(fd, 0, &error);
-    close(fd);
-    if (json_is_object(*value)) return NPG_OK;
-    json_decref(*value);
-    *value = NULL;
-    return npg_error(NPG_USAGE, "%s is damaged (line %d: %s)", path, error.line, error.text);
-}
-
 static npg_status check_listed(const npg_job *job, const json_t *files)
 {
     for (size_t i = 0; i < json_array_size(files); i++) {
@@ -100,7 +83,7 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
 {
     json_t *done;
     *is_done = *was_partial = false;
-    NPG_TRY(npg_job_read_json(&done, job->output, "done.json"));
+    NPG_TRY(npg_json_load(&done, job->output, "done.json", NPG_USAGE));
     if (!done) return NPG_OK;
     size_t frames = json_array_size(json_object_get(job->then, "frames"));
     *is_done = job->source || json_integer_value(json_object_get(done, "frames")) == (json_int_t)frames;
@@ -302,7 +285,7 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
 {
     bool is_done, was_partial;
     *start = NPG_JOB_FRESH;
-    npg_status status = npg_job_read_json(&job->then, job->folder, "job.json");
+    npg_status status = npg_json_load(&job->then, job->folder, "job.json", NPG_USAGE);
     if (!status && !job->then) return NPG_OK;
     if (!status && !json_equal(json_object_get(job->then, "layout"), json_object_get(job->now, "layout")))
         status = npg_error(NPG_USAGE, "it was begun by another version of neupig");

@@ -286,7 +286,7 @@ npg_status npg_options_load_job(npg_options *options, const char *folder)
 {
     json_t *job;
     NPG_REQUIRE(options && folder);
-    npg_status status = npg_job_read_json(&job, folder, "job/job.json");
+    npg_status status = npg_json_load(&job, folder, "job/job.json", NPG_USAGE);
     if (status)
         status = npg_error_prefix(status, "%s holds no job", folder);
     else

@@ -54,9 +54,6 @@ void npg_job_close(npg_job **job);
 /* The job is extended by frames that came since: write job.json with them. */
 npg_status npg_job_extend(npg_job *job);
 
-/* <folder>/<name>, which the program wrote; NULL where there is none.  NPG_USAGE: it is damaged. */
-npg_status npg_job_read_json(json_t **value, const char *folder, const char *name);
-
 /* Open the state that later frames start from in place of the newest one. */
 npg_status npg_job_open_forward(npg_job *job);
 

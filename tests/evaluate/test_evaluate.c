@@ -10,7 +10,7 @@
 #include <stdlib.h>
 
 #include "evaluate/evaluate_internal.h"
-#include "export/export.h"
+#include "export/files.h"
 #include "mesh/mesh_internal.h"
 #include "tests/support/group_folder.h"
 #include "tests/support/test_chain.h"

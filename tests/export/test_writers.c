@@ -7,7 +7,7 @@
 #include <cmocka.h>
 #include <math.h>
 
-#include "export/export.h"
+#include "export/files.h"
 #include "ingest/ingest.h"
 #include "tests/support/group_folder.h"
 

@@ -82,14 +82,9 @@ static bool is_of_these(const npg_segments *s, const json_t *saved)
 
 static npg_status load(npg_segments *s, const char *name)
 {
-    char path[NPG_PATH_SIZE];
-    json_error_t error;
-    NPG_TRY(npg_path_of(path, s->output, name));
-    npg_status status = NPG_OK;
-    json_t *saved = npg_is_there(path) ? json_load_file(path, 0, &error) : json_null();
-    if (!saved)
-        status =
-            npg_error(NPG_USAGE, "%s is damaged (%s); --restart discards what is there", path, error.text);
+    json_t *saved;
+    npg_status status = npg_json_load(&saved, s->output, name, NPG_USAGE);
+    if (status == NPG_USAGE) npg_error(status, "%s; --restart discards what is there", npg_error_text());
     const json_t *list = json_object_get(saved, "segments");
     for (size_t i = 0; i < json_array_size(list) && !status; i++)
         status = add_saved(s, json_array_get(list, i));

@@ -97,9 +97,6 @@ void npg_view_result_close(npg_view_result *result);
 /* What the page knows of it beside meshes and points; a new reference, NULL: no memory (view_facts.c). */
 json_t *npg_view_result_json(const npg_view_result *result);
 
-/* A JSON file of a folder; NULL (and NPG_OK) where it is not there. */
-npg_status npg_view_load_json(json_t **out, const char *folder, const char *name);
-
 /* Frame: meshes and points of a result as blocks of bytes for the page.
  *
  * A group block (frames that are packed together), little-endian:
@@ -173,7 +170,8 @@ npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count);
 /* The page without data, as the build has bundled it: build/view/page.html, or share/neupig/view/page.html of
  * what is installed. */
 typedef struct npg_view_template {
-    char *text;  /* owned */
+    npg_arena arena; /* of the text */
+    char *text;
     size_t size; /* in bytes */
     size_t data; /* where data go in */
 } npg_view_template;

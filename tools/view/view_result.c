@@ -14,25 +14,12 @@
 #include "pipeline/json_file.h"
 #include "tools/segments/segments.h"
 
-#define JSON_SIZE_MAX ((size_t)256 << 20)
 enum {
     GROUP_FRAMES = 16,
     GROUP_VERTS = 1 << 22
 }; /* more frames a group take less, and longer to jump into */
 
 /* ---- files ---- */
-
-npg_status npg_view_load_json(json_t **out, const char *folder, const char *name)
-{
-    char *text = NULL, path[NPG_PATH_SIZE];
-    *out = NULL;
-    if (!npg_is_in_folder(folder, name)) return NPG_OK;
-    NPG_TRY(npg_path_of(path, folder, name));
-    npg_status status = npg_json_read(out, &text, path, JSON_SIZE_MAX);
-    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
-    npg_release(&text);
-    return status;
-}
 
 /* The bytes of a file up to its last whole line: a run may be at work on it. */
 static int64_t whole_lines(const char *path)
@@ -155,9 +142,9 @@ static void set_lengths(npg_view_part *part)
 
 static npg_status fill_part(npg_view_part *part, int64_t every, bool may_be_empty)
 {
-    NPG_TRY(npg_view_load_json(&part->report, part->folder, "report.json"));
-    NPG_TRY(npg_view_load_json(&part->done, part->folder, "done.json"));
-    NPG_TRY(npg_view_load_json(&part->job, part->folder, "job/job.json"));
+    NPG_TRY(npg_json_load(&part->report, part->folder, "report.json", NPG_BAD_INPUT));
+    NPG_TRY(npg_json_load(&part->done, part->folder, "done.json", NPG_BAD_INPUT));
+    NPG_TRY(npg_json_load(&part->job, part->folder, "job/job.json", NPG_BAD_INPUT));
     NPG_TRY(set_placement(part));
     NPG_TRY(read_frames(part, every, may_be_empty));
     NPG_TRY(read_reference(part, may_be_empty));
@@ -186,7 +173,7 @@ static npg_status list_parts(npg_view_result *result)
     for (size_t i = 0; i < segments.count && !status; i++) status = add_part(result, segments.list[i].folder);
     npg_segments_clear(&segments);
     if (!status && !result->part_count) status = add_part(result, ".");
-    if (!status) status = npg_view_load_json(&result->segments, result->path, "segments.json");
+    if (!status) status = npg_json_load(&result->segments, result->path, "segments.json", NPG_BAD_INPUT);
     return status;
 }
 

@@ -1,16 +1,15 @@
 /* The page without data: where the bundle lies, and where data go into it. */
 #include <limits.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "pipeline/file.h"
 #include "tools/view/view_internal.h"
 
-#define NAME "view/page.html"
-#define MARK "<!--neupig-data-->"
-enum { SIZE_MAX_BYTES = 64 << 20 };
+#define NAME      "view/page.html"
+#define MARK      "<!--neupig-data-->"
+#define SIZE_MOST ((size_t)64 << 20)
 
 /* Beside this program (a build folder), in the share/ of its installation, or where it was meant to be
  * installed. */
@@ -29,30 +28,16 @@ static bool find_template(char path[PATH_MAX])
     return access(path, R_OK) == 0;
 }
 
-static npg_status read_all(npg_view_template *page, const char *path)
-{
-    struct stat info;
-    FILE *file = fopen(path, "re");
-    if (!file || fstat(fileno(file), &info) || info.st_size > SIZE_MAX_BYTES) {
-        if (file) fclose(file);
-        return npg_error(NPG_FAILED, "can't read %s", path);
-    }
-    npg_status status = npg_alloc(&page->text, NPG_FOR_FILES, (size_t)info.st_size + 1);
-    if (!status) page->size = fread(page->text, 1, (size_t)info.st_size, file);
-    fclose(file);
-    return status;
-}
-
 npg_status npg_view_template_open(npg_view_template *page)
 {
     char path[PATH_MAX];
-    *page = (npg_view_template){0};
+    *page = (npg_view_template){.arena = {.purpose = NPG_FOR_FILES}};
     if (!find_template(path))
         return npg_error(NPG_FAILED,
                          "the page's script was not built: it needs Node and npm. Install them "
                          "(Debian: nodejs and npm), configure with -DNPG_VIEW=ON and build again");
-    NPG_TRY(read_all(page, path));
-    const char *mark = page->text ? strstr(page->text, MARK) : NULL;
+    NPG_TRY(npg_file_whole(&page->arena, &page->text, &page->size, path, SIZE_MOST, "page"));
+    const char *mark = strstr(page->text, MARK);
     if (!mark) {
         npg_view_template_close(page);
         return npg_error(NPG_FAILED, "%s is not the page that belongs to this program", path);
@@ -63,5 +48,5 @@ npg_status npg_view_template_open(npg_view_template *page)
 
 void npg_view_template_close(npg_view_template *page)
 {
-    npg_release(&page->text);
+    npg_arena_release(&page->arena);
 }

@@ -21,7 +21,7 @@
 
 #include <jansson.h>
 
-#include "export/export.h"
+#include "export/files.h"
 #include "pipeline/file.h"
 #include "pipeline/source.h"
 

@@ -1,5 +1,5 @@
 /* Placement: from the capture's coordinates to those of the written files. */
-#include "export/export.h"
+#include "export/files.h"
 
 #include <math.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 #ifndef NPG_EXPORTERS_VDB_H
 #define NPG_EXPORTERS_VDB_H
 
-#include "export/export.h"
+#include "export/files.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "export/export.h"
+#include "export/files.h"
 #include "pipeline/file.h"
 #include "pipeline/source.h"
 

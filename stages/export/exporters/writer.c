@@ -1,5 +1,5 @@
 /* Writers: the format by the name's ending. */
-#include "export/export.h"
+#include "export/files.h"
 
 #include <string.h>
 #include <strings.h>

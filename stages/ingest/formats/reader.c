@@ -155,9 +155,10 @@ npg_status npg_read_cloud(npg_frame *frame, const char *path, npg_origin *origin
     return finish(frame, status, path);
 }
 
-static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin, bool may_be_points)
+static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin, bool wants_faces,
+                            bool may_be_points)
 {
-    npg_builder b = {.purpose = NPG_FOR_MESH, .wants_faces = true, .may_be_points = may_be_points};
+    npg_builder b = {.purpose = NPG_FOR_MESH, .wants_faces = wants_faces, .may_be_points = may_be_points};
     *mesh = NULL;
     NPG_TRY(read_settled(&b, path, origin));
     npg_status status = npg_builder_mesh(mesh, &b, path);
@@ -167,39 +168,19 @@ static npg_status read_mesh(npg_mesh **mesh, const char *path, npg_origin *origi
 
 npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin)
 {
-    return read_mesh(mesh, path, origin, false);
+    return read_mesh(mesh, path, origin, true, false);
 }
 
 npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin)
 {
-    npg_frame frame = {0};
-    NPG_TRY(npg_read_cloud(&frame, path, origin));
-    npg_status status = npg_mesh_open(mesh, 0, 0);
-    if (!status) {
-        (*mesh)->vert_count = frame.point_count;
-        (*mesh)->vert_pos = frame.pos_local;
-        (*mesh)->vert_normals = frame.normals;
-        frame.pos_local = frame.normals = NULL;
-    }
-    npg_frame_clear(&frame);
-    return status;
-}
-
-/* A format that knows no faces. */
-static npg_status read_bare_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
-{
-    NPG_TRY(npg_read_points(mesh, path, origin));
-    if ((*mesh)->vert_count) return NPG_OK;
-    npg_mesh_unref(mesh);
-    return npg_error(NPG_BAD_INPUT, "%s: there are no points", path);
+    return read_mesh(mesh, path, origin, false, true);
 }
 
 npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
 {
     const char *format = npg_reader_for(path);
-    *mesh = NULL;
     bool has_faces = !format || !strcmp(format, "ply") || !strcmp(format, "obj");
-    return has_faces ? read_mesh(mesh, path, origin, true) : read_bare_shape(mesh, path, origin);
+    return read_mesh(mesh, path, origin, has_faces, true);
 }
 
 /* ---- frames one after the other from a pipe ---- */

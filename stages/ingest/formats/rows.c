@@ -111,7 +111,7 @@ void npg_builder_frame(npg_frame *frame, npg_builder *b)
 
 static npg_status check_faces(const npg_builder *b, const char *name)
 {
-    if (!b->vert_count) return npg_error(NPG_BAD_INPUT, "%s: the mesh has no vertices", name);
+    if (!b->vert_count) return npg_error(NPG_BAD_INPUT, "%s: there are no points", name);
     if (!b->face_count && !b->may_be_points)
         return npg_error(NPG_BAD_INPUT, "%s: no faces, so it is not a mesh", name);
     for (size_t i = 0; i < 3 * b->face_count; i++)
