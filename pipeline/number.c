@@ -1,7 +1,6 @@
 /* Number: decimal numbers from text, fast and the same under every locale. */
 #include "pipeline/source.h"
 
-#include <ctype.h>
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>

@@ -1,7 +1,6 @@
 /* Store: one file that records are appended to, each with its checksum. */
 #include "pipeline/store.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>

@@ -1,11 +1,9 @@
 /* Command line: options from tables, operands, and how a verb ends. */
 #include "tools/cli.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "pipeline/options.h"
-#include "pipeline/stage.h"
 #include "tools/help.h"
 
 enum { NAME_LIMIT = 64 };

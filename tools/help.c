@@ -2,10 +2,7 @@
 #include "tools/help.h"
 
 #include <jansson.h>
-#include <stdlib.h>
 #include <string.h>
-
-#include "pipeline/stage.h"
 
 enum { SPELL_LIMIT = 96, LIMITS_LIMIT = 256, HELP_INDENT = 28, HELP_WIDTH = 100 };
 

@@ -1,7 +1,6 @@
 /* neupig: the command.  One verb per file; this one holds their table and the small verbs. */
 #include <malloc.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "pipeline/options.h"

@@ -176,11 +176,6 @@ static void draw_bar(npg_reporter *reporter, const npg_progress *progress)
     reporter->bar_drawn = true;
 }
 
-static void set_real(json_t *object, const char *name, double value)
-{
-    json_object_set_new(object, name, isfinite(value) ? json_real(value) : json_null());
-}
-
 static void print_line(json_t *object)
 {
     char *text = json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(6));
@@ -192,19 +187,14 @@ static void print_line(json_t *object)
 
 static void print_json(const npg_progress *progress)
 {
-    json_t *line =
-        json_pack("{s:s,s:s}", "event", "progress", "stage", progress->stage ? progress->stage : "");
-    set_real(line, "share", progress->share);
-    set_real(line, "elapsed_s", progress->elapsed_s);
-    set_real(line, "left_s", progress->left_s >= 0 ? progress->left_s : (double)NAN);
-    json_object_set_new(line, "frames_done", json_integer(progress->frames_done));
-    json_object_set_new(line, "frames", json_integer(progress->frames));
-    json_object_set_new(line, "step", json_integer(progress->step));
-    json_object_set_new(line, "steps", json_integer(progress->steps));
-    json_object_set_new(line, "window", json_integer(progress->window));
-    json_object_set_new(line, "windows", json_integer(progress->windows));
-    set_real(line, "loss", progress->loss);
-    print_line(line);
+    print_line(json_pack("{ss ss so so so sI sI sI sI sI sI so}", "event", "progress", "stage",
+                         progress->stage ? progress->stage : "", "share", npg_json_real(progress->share),
+                         "elapsed_s", npg_json_real(progress->elapsed_s), "left_s",
+                         npg_json_real(progress->left_s >= 0 ? progress->left_s : (double)NAN), "frames_done",
+                         (json_int_t)progress->frames_done, "frames", (json_int_t)progress->frames, "step",
+                         (json_int_t)progress->step, "steps", (json_int_t)progress->steps, "window",
+                         (json_int_t)progress->window, "windows", (json_int_t)progress->windows, "loss",
+                         npg_json_real(progress->loss)));
 }
 
 static void show_progress(void *user, const npg_progress *progress)

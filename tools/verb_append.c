@@ -1,7 +1,5 @@
 /* neupig append: continues a finished job with frames that came after it. */
 #include <stddef.h>
-#include <stdio.h>
-#include <unistd.h>
 
 #include "pipeline/file.h"
 #include "tools/cli.h"

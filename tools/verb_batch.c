@@ -1,6 +1,5 @@
 /* neupig batch: many captures, each in its own folder and process. */
 #include <stddef.h>
-#include <string.h>
 
 #include "tools/batch/batch.h"
 #include "tools/cli.h"

@@ -3,9 +3,8 @@
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "neupig.h"
+#include "pipeline/json_file.h"
 #include "tools/cli.h"
 
 typedef struct settings {
@@ -40,11 +39,6 @@ const npg_option npg_eval_options[] = {
 
 /* ---- output ---- */
 
-static void set_real(json_t *object, const char *name, double value)
-{
-    json_object_set_new(object, name, isfinite(value) ? json_real(value) : json_null());
-}
-
 static json_t *json_of_figures(const npg_eval_figures *m)
 {
     const struct {
@@ -59,7 +53,7 @@ static json_t *json_of_figures(const npg_eval_figures *m)
                    {"recall", m->recall}};
     json_t *object = json_object();
     for (size_t i = 0; i < sizeof figures / sizeof *figures; i++)
-        set_real(object, figures[i].name, figures[i].value);
+        json_object_set_new(object, figures[i].name, npg_json_real(figures[i].value));
     return object;
 }
 
@@ -73,7 +67,7 @@ static void tell_frame(void *user, const npg_eval_figures *m)
     told *t = user;
     json_t *line = json_of_figures(m);
     json_object_set_new(line, "frame", json_integer(m->frames));
-    set_real(line, "Corr", m->corr);
+    json_object_set_new(line, "Corr", npg_json_real(m->corr));
     json_array_append_new(t->frames, line);
     if (!t->s->per_frame || t->s->json) return;
     printf("%5lld  CD %9.4f  NC %7.5f  F %7.5f", (long long)m->frames, m->cd, m->nc, m->f);
@@ -89,13 +83,13 @@ static void print_json(const npg_eval_figures *e, const told *t)
                   (json_int_t)t->s->samples, "pred_vertices", (json_int_t)e->vertices, "pred_faces",
                   (json_int_t)e->faces, "gt_vertices", (json_int_t)e->truth_vertices, "gt_faces",
                   (json_int_t)e->truth_faces, "pred_constant_topology", e->constant_topology);
-    set_real(more, "tau", t->s->tau);
-    set_real(more, "diagonal", e->diagonal);
-    set_real(more, "Corr", e->corr);
-    set_real(more, "jitter", e->jitter);
-    set_real(more, "edge", e->edge);
-    set_real(more, "rigidity", e->rigidity);
-    set_real(more, "bad_area", e->bad_area);
+    json_object_set_new(more, "tau", npg_json_real(t->s->tau));
+    json_object_set_new(more, "diagonal", npg_json_real(e->diagonal));
+    json_object_set_new(more, "Corr", npg_json_real(e->corr));
+    json_object_set_new(more, "jitter", npg_json_real(e->jitter));
+    json_object_set_new(more, "edge", npg_json_real(e->edge));
+    json_object_set_new(more, "rigidity", npg_json_real(e->rigidity));
+    json_object_set_new(more, "bad_area", npg_json_real(e->bad_area));
     json_object_update(object, more);
     json_object_set(object, "per_frame", t->frames);
     char *text = json_dumps(object, JSON_INDENT(1) | JSON_REAL_PRECISION(10));

@@ -1,7 +1,6 @@
 /* neupig man: the manual page, made from the tables of options. */
 #include <string.h>
 
-#include "pipeline/stage.h"
 #include "tools/help.h"
 
 /* Text as roff shows it letter by letter. */

@@ -1,7 +1,5 @@
 /* neupig synth: moving bodies as captures, with their exact ground truth. */
 #include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "export/export.h"
 #include "geometry/geometry.h"

@@ -1,7 +1,6 @@
 /* neupig view: a result, or two, as one page to look at, also of a run that is at work. */
 #include <stddef.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "pipeline/file.h"
 #include "pipeline/memory.h"

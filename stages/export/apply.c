@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <unistd.h>
 
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"

@@ -29,9 +29,10 @@ typedef struct export_state {
     int64_t *numbers; /* of all frames, while measuring; owned */
     size_t number_count, number_capacity;
     npg_frame_log *list;
-    uint32_t *faces;     /* F x 3 as they are written; owned */
-    double *vert_world;  /* V x 3; owned */
-    float *vert_normals; /* V x 3; owned */
+    npg_arena arena;     /* of what follows */
+    uint32_t *faces;     /* F x 3 as they are written */
+    double *vert_world;  /* V x 3 */
+    float *vert_normals; /* V x 3 */
     int64_t mesh_count, skipped_count;
 } export_state;
 
@@ -292,9 +293,11 @@ static npg_status begin_meshes(npg_worker *worker)
     size_t v = reference->vert_count, f = reference->face_count;
     set_width(state, facts);
     NPG_TRY(check_exporters(worker));
-    NPG_TRY(npg_alloc_array(&state->vert_world, NPG_FOR_FILES, v, 3 * sizeof *state->vert_world));
-    NPG_TRY(npg_alloc_array(&state->vert_normals, NPG_FOR_FILES, v, 3 * sizeof *state->vert_normals));
-    NPG_TRY(npg_alloc_array(&state->faces, NPG_FOR_FILES, f, 3 * sizeof *state->faces));
+    state->arena.purpose = NPG_FOR_FILES;
+    state->vert_world = npg_arena_take(&state->arena, v, 3 * sizeof *state->vert_world);
+    state->vert_normals = npg_arena_take(&state->arena, v, 3 * sizeof *state->vert_normals);
+    state->faces = npg_arena_take(&state->arena, f, 3 * sizeof *state->faces);
+    NPG_TRY(npg_arena_status(&state->arena));
     npg_place_faces(&state->map, state->faces, reference->faces, f);
     return write_mesh(worker, "reference.ply", reference->vert_pos, NULL, true, NULL);
 }
@@ -307,11 +310,12 @@ static npg_status colour_frame(npg_worker *worker, npg_frame *frame)
     if (npg_worker_settings(worker)->colour != NPG_COLOUR_FRAMES || !frame->vert_unit) return NPG_OK;
     if (!reference->vert_colours || frame->vert_count != reference->vert_count) return NPG_OK;
     size_t v = frame->vert_count, n = frame->colours ? frame->point_count : 0;
-    float *normals = NULL, *points = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    float *normals = npg_arena_take(&scratch, v, 3 * sizeof *normals);
+    float *points = npg_arena_take(&scratch, n, 3 * sizeof *points);
     npg_release(&frame->vert_colours);
-    npg_status status = npg_alloc_array(&frame->vert_colours, NPG_FOR_FRAMES, v, 4);
-    if (!status) status = npg_alloc_array(&normals, NPG_FOR_FILES, v, 3 * sizeof *normals);
-    if (!status) status = npg_alloc_array(&points, NPG_FOR_FILES, n, 3 * sizeof *points);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_alloc_array(&frame->vert_colours, NPG_FOR_FRAMES, v, 4);
     if (!status && n) {
         npg_mesh_vertex_normals(normals, frame->vert_unit, v, reference->faces, reference->face_count);
         npg_box_local_to_unit(&facts->box, points, frame->pos_local, n);
@@ -323,8 +327,7 @@ static npg_status colour_frame(npg_worker *worker, npg_frame *frame)
         memcpy(frame->vert_colours + 4 * i, reference->vert_colours + 4 * i, 3);
         frame->vert_colours[4 * i + 3] = NPG_COLOUR_LENT;
     }
-    npg_release(&normals);
-    npg_release(&points);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -376,20 +379,19 @@ static void report_settings(json_t *object, const export_state *state)
 /* ---- the other formats ---- */
 
 /* What of the reference is the same in all poses. */
-static npg_status place_reference(npg_worker *worker, npg_export_facts *facts, float **rest, float **corners)
+static npg_status place_reference(npg_worker *worker, npg_export_facts *facts)
 {
     export_state *state = npg_worker_state(worker);
     const npg_mesh *reference = npg_worker_facts(worker)->reference;
     size_t v = reference->vert_count, f = reference->face_count;
-    NPG_TRY(npg_alloc_array(rest, NPG_FOR_FILES, v, 3 * sizeof **rest));
+    float *rest = npg_arena_take(&state->arena, v, 3 * sizeof *rest);
+    float *corners = reference->corner_uvs ? npg_arena_take(&state->arena, f, 6 * sizeof *corners) : NULL;
+    NPG_TRY(npg_arena_status(&state->arena));
     npg_place_points(&state->map, state->vert_world, &npg_worker_facts(worker)->box, reference->vert_pos, v);
-    for (size_t i = 0; i < 3 * v; i++) (*rest)[i] = (float)state->vert_world[i];
-    if (reference->corner_uvs) {
-        NPG_TRY(npg_alloc_array(corners, NPG_FOR_FILES, f, 6 * sizeof **corners));
-        npg_place_corners(&state->map, *corners, reference->corner_uvs, f);
-    }
-    facts->rest = *rest;
-    facts->corner_uvs = *corners;
+    for (size_t i = 0; i < 3 * v; i++) rest[i] = (float)state->vert_world[i];
+    if (corners) npg_place_corners(&state->map, corners, reference->corner_uvs, f);
+    facts->rest = rest;
+    facts->corner_uvs = corners;
     facts->faces = state->faces;
     facts->colours = reference->vert_colours;
     facts->has_pose_colours =
@@ -403,18 +405,15 @@ static npg_status write_exports(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     npg_export_watch watch = {.should_stop = npg_worker_should_stop, .user = worker};
-    float *rest = NULL, *corners = NULL;
     if (!npg_exporters_any(&state->choice)) return NPG_OK;
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_export_facts facts = export_facts(worker);
-    npg_status status = place_reference(worker, &facts, &rest, &corners);
+    npg_status status = place_reference(worker, &facts);
     if (!status && facts.has_pose_colours && npg_exporters_name(state->exports, "glb"))
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "motion.glb has the reference's colours: morph targets of colours are an option of "
                        "glTF that few programs read");
     if (!status) status = npg_exporters_write(&state->choice, &facts, &watch);
-    npg_release(&rest);
-    npg_release(&corners);
     if (!status && npg_exporters_name(state->exports, "vdb") && !facts.has_grids)
         npg_worker_warn(
             worker, false, -1,
@@ -533,9 +532,7 @@ static void uninit(npg_worker *worker)
     export_state *state = npg_worker_state(worker);
     npg_frame_log_close(&state->list);
     npg_release(&state->numbers);
-    npg_release(&state->faces);
-    npg_release(&state->vert_world);
-    npg_release(&state->vert_normals);
+    npg_arena_release(&state->arena);
 }
 
 /* A place per frame in the list; coordinates, normals and two faces per vertex; the buffers of two files. */

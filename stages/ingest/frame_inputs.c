@@ -2,7 +2,6 @@
 #include "ingest/ingest_internal.h"
 
 #include <glob.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>

@@ -1,7 +1,6 @@
 /* Frame names: natural order, and the frame number inside a file's name. */
 #include "ingest/ingest_internal.h"
 
-#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,6 @@
 /* Frame log: the lines of an earlier run. */
 #include "job/job_internal.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>

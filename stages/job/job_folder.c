@@ -1,7 +1,6 @@
 /* Job: the folder OUT/job, its lock and its states. */
 #include "job/job_internal.h"
 
-#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,8 +1,6 @@
 /* What the results of a job are made of: version, options, inputs; and whether they changed. */
-#include <errno.h>
 #include <limits.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -1,10 +1,7 @@
 /* Table of a batch: on the terminal, and in batch.json with the figures of the captures that are done. */
-#include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

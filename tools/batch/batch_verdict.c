@@ -1,16 +1,12 @@
 /* Verdicts: how a capture's run ended, in a word, and OUT/<name>/verdict.json. */
 #include "tools/batch/batch.h"
 
-#include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
-#include "pipeline/memory.h"
 
 #define FILE_NAME "verdict.json"
 

@@ -1,12 +1,9 @@
 /* Segments: a capture whose topology changes, as several runs with a reference each. */
 #include "tools/segments/segments.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include "pipeline/file.h"

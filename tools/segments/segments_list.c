@@ -1,10 +1,7 @@
 /* The list of segments, and the folders they lie in. */
-#include <dirent.h>
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "export/export.h"

@@ -1,7 +1,5 @@
 /* Synthetic cameras: a ring of depth cameras around the body, each with its own depth buffer. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "geometry/geometry.h"
 #include "pipeline/random.h"

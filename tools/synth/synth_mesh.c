@@ -1,6 +1,5 @@
 /* Synthetic bodies: from a distance field to a closed manifold with even triangles. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/geometry.h"

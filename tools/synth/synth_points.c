@@ -2,7 +2,6 @@
 #include "tools/synth/synth.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/geometry.h"

@@ -31,29 +31,19 @@ static void gather_links(uint32_t *place, uint32_t *of, const npg_mesh *mesh)
     }
 }
 
-npg_status npg_view_links_open(npg_view_links *links, const npg_mesh *mesh)
+npg_status npg_view_links_open(npg_view_links *links, npg_arena *arena, const npg_mesh *mesh)
 {
     size_t v = mesh->vert_count;
-    uint32_t *place = NULL;
-    *links = (npg_view_links){.vert_count = v};
-    npg_status status = npg_alloc_array(&links->start, NPG_FOR_MESH, v + 1, sizeof *links->start);
-    if (!status) status = npg_alloc_array(&place, NPG_FOR_MESH, v + 1, sizeof *place);
-    if (!status) {
-        gather_links(place, NULL, mesh);
-        for (size_t i = 0; i < v; i++) links->start[i + 1] = links->start[i] + place[i];
-        memcpy(place, links->start, (v + 1) * sizeof *place);
-        status = npg_alloc_array(&links->of, NPG_FOR_MESH, links->start[v], sizeof *links->of);
-    }
-    if (!status) gather_links(place, links->of, mesh);
-    npg_release(&place);
-    if (status) npg_view_links_close(links);
-    return status;
-}
-
-void npg_view_links_close(npg_view_links *links)
-{
-    npg_release(&links->start);
-    npg_release(&links->of);
+    *links = (npg_view_links){.vert_count = v, .start = npg_arena_take(arena, v + 1, sizeof *links->start)};
+    uint32_t *place = npg_arena_take(arena, v + 1, sizeof *place);
+    NPG_TRY(npg_arena_status(arena));
+    gather_links(place, NULL, mesh);
+    for (size_t i = 0; i < v; i++) links->start[i + 1] = links->start[i] + place[i];
+    memcpy(place, links->start, (v + 1) * sizeof *place);
+    links->of = npg_arena_take(arena, links->start[v], sizeof *links->of);
+    NPG_TRY(npg_arena_status(arena));
+    gather_links(place, links->of, mesh);
+    return NPG_OK;
 }
 
 static int64_t floor_div(int64_t a, int64_t b)

@@ -9,26 +9,12 @@
 npg_status npg_view_frames_open(npg_view_frames *frames, const npg_view_part *part, size_t point_limit)
 {
     const npg_mesh *mesh = part->reference;
-    *frames = (npg_view_frames){.part = part, .point_limit = point_limit};
-    npg_status status = npg_alloc_array(&frames->vert_pos, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float));
-    if (!status) status = npg_alloc_array(&frames->seen, NPG_FOR_MESH, mesh->vert_count, sizeof(int32_t));
-    if (!status) memcpy(frames->vert_pos, mesh->vert_pos, 3 * mesh->vert_count * sizeof(float));
-    if (!status && mesh->vert_colours) {
-        status = npg_alloc_array(&frames->colours, NPG_FOR_MESH, mesh->vert_count, 3);
-        for (size_t i = 0; i < mesh->vert_count && !status; i++)
-            memcpy(frames->colours + 3 * i, mesh->vert_colours + 4 * i, 3);
-    }
-    if (status) npg_view_frames_close(frames);
+    *frames = (npg_view_frames){.arena = {.purpose = NPG_FOR_MESH}, .part = part, .point_limit = point_limit};
+    frames->vert_pos = npg_arena_copy(&frames->arena, mesh->vert_pos, mesh->vert_count, 3 * sizeof(float));
+    frames->seen = npg_arena_take(&frames->arena, mesh->vert_count, sizeof *frames->seen);
+    npg_status status = npg_view_take_colours(frames, mesh);
+    if (status) npg_arena_release(&frames->arena);
     return status;
-}
-
-void npg_view_frames_close(npg_view_frames *frames)
-{
-    npg_release(&frames->vert_pos);
-    npg_release(&frames->points);
-    npg_release(&frames->some);
-    npg_release(&frames->seen);
-    npg_release(&frames->colours);
 }
 
 /* ---- grids ---- */
@@ -52,6 +38,7 @@ static npg_view_grid grid_of_one(const float *points, size_t count)
 /* ---- what a group is made of ---- */
 
 typedef struct group {
+    npg_arena arena; /* of what follows */
     npg_view_frames *frames;
     size_t count, v;
     float *positions; /* count x V x 3 */
@@ -61,21 +48,6 @@ typedef struct group {
     uint32_t *point_counts; /* count */
     npg_view_grid grid;
 } group;
-
-static npg_status open_group(group *g)
-{
-    NPG_TRY(npg_alloc_array(&g->positions, NPG_FOR_MESH, g->count * g->v, 3 * sizeof *g->positions));
-    NPG_TRY(npg_alloc_array(&g->errors, NPG_FOR_MESH, g->count * g->v, sizeof *g->errors));
-    return npg_alloc_array(&g->point_counts, NPG_FOR_MESH, g->count, sizeof *g->point_counts);
-}
-
-static void close_group(group *g)
-{
-    npg_release(&g->positions);
-    npg_release(&g->errors);
-    npg_release(&g->points);
-    npg_release(&g->point_counts);
-}
 
 static npg_status gather_frame(group *g, size_t i, const npg_view_frame *frame)
 {
@@ -87,8 +59,8 @@ static npg_status gather_frame(group *g, size_t i, const npg_view_frame *frame)
     if (frame->file || frame->source) NPG_TRY(npg_view_read_points(frames, frame));
     if (frame->file) NPG_TRY(npg_view_measure(frames, g->errors + g->v * i));
     NPG_TRY(npg_view_choose_points(frames, &shown));
-    NPG_TRY(npg_grow(&g->points, &g->point_capacity, g->point_total + shown, 3 * sizeof *g->points,
-                     NPG_FOR_FRAMES));
+    NPG_TRY(npg_arena_grow(&g->arena, &g->points, &g->point_capacity, g->point_total + shown,
+                           3 * sizeof *g->points));
     if (shown) memcpy(g->points + 3 * g->point_total, frames->some, 3 * shown * sizeof *g->points);
     g->point_total += shown;
     g->point_counts[i] = (uint32_t)shown;
@@ -99,6 +71,10 @@ static npg_status gather(group *g, size_t first)
 {
     npg_bounds all = npg_bounds_empty();
     double shortest = INFINITY;
+    g->positions = npg_arena_take(&g->arena, g->count * g->v, 3 * sizeof *g->positions);
+    g->errors = npg_arena_take(&g->arena, g->count * g->v, sizeof *g->errors);
+    g->point_counts = npg_arena_take(&g->arena, g->count, sizeof *g->point_counts);
+    NPG_TRY(npg_arena_status(&g->arena));
     for (size_t i = 0; i < g->count; i++) {
         npg_bounds bounds = npg_bounds_empty();
         NPG_TRY(gather_frame(g, i, &g->frames->part->frames[first + i]));
@@ -128,17 +104,17 @@ static npg_status pack_positions(npg_bytes *out, size_t *size, const npg_view_li
                                  const npg_view_grid *grid, const float *positions, size_t count)
 {
     size_t v = links->vert_count;
-    int32_t *rooms, *left = NULL;
-    NPG_TRY(npg_alloc_array(&rooms, NPG_FOR_MESH, 7 * v, sizeof *rooms));
-    npg_status status = npg_alloc_array(&left, NPG_FOR_MESH, 3 * v * count, sizeof *left);
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    int32_t *rooms = npg_arena_take(&scratch, 7 * v, sizeof *rooms);
+    int32_t *left = npg_arena_take(&scratch, 3 * v * count, sizeof *left);
+    npg_status status = npg_arena_status(&scratch);
     for (size_t t = 0; t < count && !status; t++) {
         int32_t *now = rooms + 3 * v * (t % 2), *before = rooms + 3 * v * (1 - t % 2);
         npg_view_round(grid, now, positions + 3 * v * t, v);
         predict_frame(links, left + 3 * v * t, rooms + 6 * v, now, t ? before : NULL);
     }
     if (!status) status = npg_view_pack(out, size, left, 3 * v * count);
-    npg_release(&rooms);
-    npg_release(&left);
+    npg_arena_release(&scratch);
     return status;
 }
 
@@ -211,11 +187,13 @@ static npg_status pack_group(npg_bytes *out, const group *g)
 
 npg_status npg_view_group_block(npg_bytes *out, npg_view_frames *frames, size_t first, size_t count)
 {
-    group g = {.frames = frames, .count = count, .v = frames->part->reference->vert_count};
-    npg_status status = open_group(&g);
-    if (!status) status = gather(&g, first);
+    group g = {.arena = {.purpose = NPG_FOR_MESH},
+               .frames = frames,
+               .count = count,
+               .v = frames->part->reference->vert_count};
+    npg_status status = gather(&g, first);
     if (!status) status = pack_group(out, &g);
-    close_group(&g);
+    npg_arena_release(&g.arena);
     return status;
 }
 

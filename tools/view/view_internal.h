@@ -35,11 +35,10 @@ npg_status npg_bytes_add(npg_bytes *bytes, const void *data, size_t size);
  * of[start[v + 1]]. */
 typedef struct npg_view_links {
     size_t vert_count;
-    uint32_t *start, *of; /* V + 1; owned */
+    uint32_t *start, *of; /* V + 1 */
 } npg_view_links;
 
-npg_status npg_view_links_open(npg_view_links *links, const npg_mesh *mesh);
-void npg_view_links_close(npg_view_links *links);
+npg_status npg_view_links_open(npg_view_links *links, npg_arena *arena, const npg_mesh *mesh);
 
 /* left[i] for the V values; another array than values. */
 void npg_view_predict(const npg_view_links *links, int32_t *left, const int32_t *values);
@@ -68,11 +67,11 @@ typedef struct npg_view_frame {
 
 /* What has one reference: a run, or one of its segments. */
 typedef struct npg_view_part {
-    char *folder, *label;   /* owned; label: "." or the segment's folder */
+    char *folder, *label;   /* label: "." or the segment's folder        */
     npg_mesh *reference;    /* owned; NULL: not there yet                */
     npg_view_links links;   /* of the reference                          */
     npg_origin origin;      /* of reference.ply                          */
-    npg_view_frame *frames; /* in time order, owned                      */
+    npg_view_frame *frames; /* in time order                             */
     size_t count, capacity;
     size_t group;                /* frames that are packed together           */
     json_t *report, *done, *job; /* report.json, done.json, job/job.json; owned, NULL: none */
@@ -82,7 +81,8 @@ typedef struct npg_view_part {
 } npg_view_part;
 
 typedef struct npg_view_result {
-    char *path, *name; /* owned; name: the folder's own */
+    npg_arena arena;   /* of all that is not said to be owned */
+    char *path, *name; /* name: the folder's own */
     npg_view_part *parts;
     size_t part_count, capacity;
     json_t *segments; /* segments.json, owned; NULL: the run has one reference */
@@ -128,22 +128,22 @@ json_t *npg_view_result_json(const npg_view_result *result);
 #define NPG_VIEW_POINT_STEP 16
 #define NPG_VIEW_ERROR_MAX  0.05
 
-/* Works through the frames of a part. */
+/* Works through the frames of a part; to be closed by releasing its arena. */
 typedef struct npg_view_frames {
+    npg_arena arena;           /* of the arrays */
     const npg_view_part *part; /* loan */
     size_t point_limit;        /* points of a frame that are shown; all are measured from */
-    float *vert_pos;           /* V x 3 of the frame at hand, owned                       */
-    float *points, *some;      /* N x 3, and those shown; owned                           */
+    float *vert_pos;           /* V x 3 of the frame at hand                              */
+    float *points, *some;      /* N x 3, and those shown                                  */
     size_t point_count, point_capacity, some_capacity;
-    int32_t *seen;         /* V, owned                                                */
-    uint8_t *colours;      /* V x 3 of the first mesh that has any, owned, or NULL    */
+    int32_t *seen;         /* V                                                       */
+    uint8_t *colours;      /* V x 3 of the first mesh that has any, or NULL           */
     size_t without_points; /* frames whose points could not be read                   */
     size_t with_points;
     char why[512]; /* ... why not, of the first                               */
 } npg_view_frames;
 
 npg_status npg_view_frames_open(npg_view_frames *frames, const npg_view_part *part, size_t point_limit);
-void npg_view_frames_close(npg_view_frames *frames);
 
 /* Append the block of the frames first .. first + count - 1 of the part.  NPG_BAD_INPUT names a mesh that is
  * damaged or not of the reference. */
@@ -156,6 +156,9 @@ npg_status npg_view_part_block(npg_bytes *out, const npg_view_frames *frames, bo
 
 /* Fill frames->vert_pos, relative to the part's origin: from the mesh's file; without one it stays. */
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame);
+
+/* The first mesh that has colours gives those of all. */
+npg_status npg_view_take_colours(npg_view_frames *frames, const npg_mesh *mesh);
 
 /* Fill frames->points, in the coordinates of the meshes and relative to the part's origin.  None where the
  * file can't be read: noted in `frames`, no failure.  NPG_MEMORY. */

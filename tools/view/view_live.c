@@ -1,11 +1,9 @@
 /* Live: the page of a run that is at work, written anew until the run has ended. */
 #include <stdio.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "pipeline/clock.h"
-#include "pipeline/file.h"
 #include "tools/view/view_internal.h"
 
 #define LOOK_S     2  /* between two looks at the folder; a run that begins is not taken for one that ended */

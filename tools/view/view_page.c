@@ -117,7 +117,7 @@ static npg_status write_part(npg_file *file, npg_view_facts *facts, json_t *json
     add_facts(facts, &frames);
     json_object_set_new(json, "with_points", json_integer((json_int_t)frames.with_points));
     if (frames.without_points) json_object_set_new(json, "no_points", npg_json_text(frames.why));
-    npg_view_frames_close(&frames);
+    npg_arena_release(&frames.arena);
     return status;
 }
 

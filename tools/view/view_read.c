@@ -13,6 +13,18 @@
 
 /* ---- the mesh ---- */
 
+npg_status npg_view_take_colours(npg_view_frames *frames, const npg_mesh *mesh)
+{
+    if (!frames->colours && mesh->vert_colours)
+        frames->colours = npg_arena_take(&frames->arena, mesh->vert_count, 3);
+    else
+        mesh = NULL;
+    NPG_TRY(npg_arena_status(&frames->arena));
+    for (size_t i = 0; mesh && i < mesh->vert_count; i++)
+        memcpy(frames->colours + 3 * i, mesh->vert_colours + 4 * i, 3);
+    return NPG_OK;
+}
+
 static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const char *path)
 {
     const npg_mesh *reference = frames->part->reference;
@@ -22,10 +34,7 @@ static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const
                          v);
     NPG_TRY(npg_mesh_require_finite(mesh, path));
     memcpy(frames->vert_pos, mesh->vert_pos, 3 * v * sizeof *frames->vert_pos);
-    if (frames->colours || !mesh->vert_colours) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&frames->colours, NPG_FOR_MESH, v, 3));
-    for (size_t i = 0; i < v; i++) memcpy(frames->colours + 3 * i, mesh->vert_colours + 4 * i, 3);
-    return NPG_OK;
+    return npg_view_take_colours(frames, mesh);
 }
 
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame)
@@ -60,8 +69,8 @@ static npg_status find_source(char **path, const npg_view_frames *frames, const 
 static npg_status place_points(npg_view_frames *frames, const npg_frame *cloud, const npg_origin *of_cloud)
 {
     const npg_origin *origin = &frames->part->origin;
-    NPG_TRY(npg_grow(&frames->points, &frames->point_capacity, cloud->point_count, 3 * sizeof *frames->points,
-                     NPG_FOR_FRAMES));
+    NPG_TRY(npg_arena_grow(&frames->arena, &frames->points, &frames->point_capacity, cloud->point_count,
+                           3 * sizeof *frames->points));
     for (size_t i = 0; i < cloud->point_count; i++) {
         float *out = frames->points + 3 * frames->point_count;
         double at[3];
@@ -165,8 +174,8 @@ npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count)
     npg_bounds bounds = npg_bounds_empty();
     *count = frames->point_count < limit ? frames->point_count : limit;
     if (!*count) return NPG_OK;
-    NPG_TRY(
-        npg_grow(&frames->some, &frames->some_capacity, *count, 3 * sizeof *frames->some, NPG_FOR_FRAMES));
+    NPG_TRY(npg_arena_grow(&frames->arena, &frames->some, &frames->some_capacity, *count,
+                           3 * sizeof *frames->some));
     NPG_TRY(npg_alloc_array(&order, NPG_FOR_FRAMES, *count, sizeof *order));
     *count = npg_points_spread(frames->some, NULL, *count, frames->points, NULL, frames->point_count);
     npg_bounds_add_points(&bounds, frames->some, *count);

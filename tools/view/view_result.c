@@ -38,6 +38,7 @@ static int64_t whole_lines(const char *path)
 /* ---- the frames ---- */
 
 typedef struct reading {
+    npg_arena *arena;
     npg_view_part *part;
     int64_t every;
 } reading;
@@ -52,7 +53,7 @@ static npg_status add_frame(void *user, const json_t *line, const char *text, si
     if (!json_is_integer(index) || json_integer_value(index) < 0)
         return npg_error(NPG_BAD_INPUT, "%s: a line of its list of frames has no index", part->folder);
     if (json_integer_value(index) % r->every && !json_is_true(json_object_get(line, "key"))) return NPG_OK;
-    NPG_TRY(npg_grow(&part->frames, &part->capacity, part->count + 1, sizeof *part->frames, NPG_FOR_FILES));
+    NPG_TRY(npg_arena_grow(r->arena, &part->frames, &part->capacity, part->count + 1, sizeof *part->frames));
     npg_view_frame *frame = &part->frames[part->count++];
     frame->line = json_incref((json_t *)line);
     frame->index = (int64_t)json_integer_value(index);
@@ -68,11 +69,11 @@ static int by_index(const void *left, const void *right)
     return (a->index > b->index) - (a->index < b->index);
 }
 
-static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_empty)
+static npg_status read_frames(npg_arena *arena, npg_view_part *part, int64_t every, bool may_be_empty)
 {
     const char *name =
         npg_is_in_folder(part->folder, "frames.jsonl") ? "frames.jsonl" : "frames.partial.jsonl";
-    reading r = {part, every};
+    reading r = {arena, part, every};
     char path[NPG_PATH_SIZE];
     NPG_TRY(npg_path_of(path, part->folder, name));
     int64_t size = whole_lines(path);
@@ -90,14 +91,14 @@ static npg_status read_frames(npg_view_part *part, int64_t every, bool may_be_em
 
 /* ---- the reference ---- */
 
-static npg_status read_reference(npg_view_part *part, bool may_be_empty)
+static npg_status read_reference(npg_arena *arena, npg_view_part *part, bool may_be_empty)
 {
     char path[NPG_PATH_SIZE];
     if (may_be_empty && !npg_is_in_folder(part->folder, "reference.ply")) return NPG_OK;
     NPG_TRY(npg_path_of(path, part->folder, "reference.ply"));
     npg_status status = npg_read_mesh(&part->reference, path, &part->origin);
     if (!status) status = npg_mesh_require_finite(part->reference, path);
-    if (!status) status = npg_view_links_open(&part->links, part->reference);
+    if (!status) status = npg_view_links_open(&part->links, arena, part->reference);
     if (!status) part->group = GROUP_VERTS / part->reference->vert_count;
     if (part->group < 1) part->group = 1;
     if (part->group > GROUP_FRAMES) part->group = GROUP_FRAMES;
@@ -140,14 +141,14 @@ static void set_lengths(npg_view_part *part)
     part->cover_share = 0.01 * number_in(options, "bars.cover", 1);
 }
 
-static npg_status fill_part(npg_view_part *part, int64_t every, bool may_be_empty)
+static npg_status fill_part(npg_arena *arena, npg_view_part *part, int64_t every, bool may_be_empty)
 {
     NPG_TRY(npg_json_load(&part->report, part->folder, "report.json", NPG_BAD_INPUT));
     NPG_TRY(npg_json_load(&part->done, part->folder, "done.json", NPG_BAD_INPUT));
     NPG_TRY(npg_json_load(&part->job, part->folder, "job/job.json", NPG_BAD_INPUT));
     NPG_TRY(set_placement(part));
-    NPG_TRY(read_frames(part, every, may_be_empty));
-    NPG_TRY(read_reference(part, may_be_empty));
+    NPG_TRY(read_frames(arena, part, every, may_be_empty));
+    NPG_TRY(read_reference(arena, part, may_be_empty));
     set_lengths(part);
     return NPG_OK;
 }
@@ -156,13 +157,13 @@ static npg_status fill_part(npg_view_part *part, int64_t every, bool may_be_empt
 
 static npg_status add_part(npg_view_result *result, const char *label)
 {
-    NPG_TRY(npg_grow(&result->parts, &result->capacity, result->part_count + 1, sizeof *result->parts,
-                     NPG_FOR_FILES));
+    npg_arena *arena = &result->arena;
+    NPG_TRY(npg_arena_grow(arena, &result->parts, &result->capacity, result->part_count + 1,
+                           sizeof *result->parts));
     npg_view_part *part = &result->parts[result->part_count++];
-    *part = (npg_view_part){.group = 1};
-    NPG_TRY(npg_copy_text(&part->label, label));
-    if (!strcmp(label, ".")) return npg_copy_text(&part->folder, result->path);
-    return npg_join_path(&part->folder, result->path, label);
+    *part = (npg_view_part){.group = 1, .label = npg_arena_text(arena, label)};
+    part->folder = strcmp(label, ".") ? npg_arena_path(arena, result->path, label) : result->path;
+    return npg_arena_status(arena);
 }
 
 static npg_status list_parts(npg_view_result *result)
@@ -181,9 +182,9 @@ static npg_status set_name(npg_view_result *result)
 {
     char *real = realpath(result->path, NULL);
     const char *slash = real ? strrchr(real, '/') : NULL;
-    npg_status status = npg_copy_text(&result->name, slash && slash[1] ? slash + 1 : result->path);
+    result->name = npg_arena_text(&result->arena, slash && slash[1] ? slash + 1 : result->path);
     free(real);
-    return status;
+    return npg_arena_status(&result->arena);
 }
 
 static npg_status check_folder(const char *path, bool may_be_empty)
@@ -202,13 +203,13 @@ static npg_status check_folder(const char *path, bool may_be_empty)
 
 npg_status npg_view_result_open(npg_view_result *result, const char *path, int64_t every, bool may_be_empty)
 {
-    *result = (npg_view_result){0};
-    npg_status status = check_folder(path, may_be_empty);
-    if (!status) status = npg_copy_text(&result->path, path);
-    if (!status) status = set_name(result);
+    *result = (npg_view_result){.arena = {.purpose = NPG_FOR_FILES}};
+    NPG_TRY(check_folder(path, may_be_empty));
+    result->path = npg_arena_text(&result->arena, path);
+    npg_status status = result->path ? set_name(result) : npg_arena_status(&result->arena);
     if (!status) status = list_parts(result);
     for (size_t i = 0; i < result->part_count && !status; i++)
-        status = fill_part(&result->parts[i], every, may_be_empty);
+        status = fill_part(&result->arena, &result->parts[i], every, may_be_empty);
     result->is_done = !status && npg_is_in_folder(path, "done.json");
     if (status) npg_view_result_close(result);
     return status;
@@ -217,10 +218,6 @@ npg_status npg_view_result_open(npg_view_result *result, const char *path, int64
 static void close_part(npg_view_part *part)
 {
     for (size_t i = 0; i < part->count; i++) json_decref(part->frames[i].line);
-    npg_release(&part->frames);
-    npg_release(&part->folder);
-    npg_release(&part->label);
-    npg_view_links_close(&part->links);
     npg_mesh_unref(&part->reference);
     json_decref(part->report);
     json_decref(part->done);
@@ -230,9 +227,7 @@ static void close_part(npg_view_part *part)
 void npg_view_result_close(npg_view_result *result)
 {
     for (size_t i = 0; i < result->part_count; i++) close_part(&result->parts[i]);
-    npg_release(&result->parts);
-    npg_release(&result->path);
-    npg_release(&result->name);
     json_decref(result->segments);
+    npg_arena_release(&result->arena);
     *result = (npg_view_result){0};
 }

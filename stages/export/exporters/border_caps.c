@@ -16,18 +16,20 @@ static int by_from(const void *left, const void *right)
     return a->to < b->to ? -1 : a->to > b->to;
 }
 
-static npg_status find_border(border **edges, size_t *count, const uint32_t *faces, size_t face_count)
+static npg_status find_border(npg_arena *scratch, border **edges, size_t *count, const uint32_t *faces,
+                              size_t face_count)
 {
-    uint32_t *twin;
+    uint32_t *twin = npg_arena_take(scratch, face_count, 3 * sizeof *twin);
     *count = 0;
-    NPG_TRY(npg_alloc_array(&twin, NPG_FOR_FILES, face_count, 3 * sizeof *twin));
-    npg_status status = npg_mesh_twins(twin, faces, face_count);
-    for (size_t i = 0; i < 3 * face_count && !status; i++) *count += twin[i] == UINT32_MAX;
-    if (!status) status = npg_alloc_array(edges, NPG_FOR_FILES, *count + 1, sizeof **edges);
-    for (size_t i = 0, k = 0; i < 3 * face_count && !status; i++)
+    NPG_TRY(npg_arena_status(scratch));
+    NPG_TRY(npg_mesh_twins(twin, faces, face_count));
+    for (size_t i = 0; i < 3 * face_count; i++) *count += twin[i] == UINT32_MAX;
+    *edges = npg_arena_take(scratch, *count, sizeof **edges);
+    NPG_TRY(npg_arena_status(scratch));
+    for (size_t i = 0, k = 0; i < 3 * face_count; i++)
         if (twin[i] == UINT32_MAX) (*edges)[k++] = (border){faces[i - i % 3 + (i + 1) % 3], faces[i]};
-    npg_release(&twin);
-    return status;
+    if (*count) qsort(*edges, *count, sizeof **edges, by_from);
+    return NPG_OK;
 }
 
 /* The place of the first edge from a vertex on that is not used, count if there is none. */
@@ -68,19 +70,16 @@ static size_t fill_loops(uint32_t *caps, const border *edges, uint8_t *is_used, 
 
 npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, const uint32_t *faces, size_t face_count)
 {
-    border *edges = NULL;
-    uint8_t *is_used = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    border *edges;
     size_t count;
     *caps = NULL;
     *cap_count = 0;
-    npg_status status = find_border(&edges, &count, faces, face_count);
-    if (!status && count) {
-        qsort(edges, count, sizeof *edges, by_from);
-        status = npg_alloc_array(&is_used, NPG_FOR_FILES, count, 1);
-        if (!status) status = npg_alloc_array(caps, NPG_FOR_FILES, count, 3 * sizeof **caps);
-        if (!status) *cap_count = fill_loops(*caps, edges, is_used, count);
-    }
-    npg_release(&edges);
-    npg_release(&is_used);
+    npg_status status = find_border(&scratch, &edges, &count, faces, face_count);
+    uint8_t *is_used = status ? NULL : npg_arena_take(&scratch, count, 1);
+    if (!status) status = npg_arena_status(&scratch);
+    if (!status) status = npg_alloc_array(caps, NPG_FOR_FILES, count, 3 * sizeof **caps);
+    if (!status) *cap_count = fill_loops(*caps, edges, is_used, count);
+    npg_arena_release(&scratch);
     return status;
 }

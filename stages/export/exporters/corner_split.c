@@ -31,43 +31,28 @@ static uint32_t copy_for(splitting *s, uint32_t vertex, const float uv[2])
     return at;
 }
 
-static npg_status split_corners(npg_corner_split *split, size_t vert_count, const uint32_t *faces,
-                                size_t face_count, const float *corner_uvs)
-{
-    splitting s = {.split = split};
-    npg_status status = npg_alloc_array(&s.next, NPG_FOR_FILES, vert_count + 3 * face_count, sizeof *s.next);
-    if (!status) status = npg_alloc_array(&s.is_used, NPG_FOR_FILES, vert_count, 1);
-    if (!status) memset(s.next, 0xff, vert_count * sizeof *s.next);
-    for (size_t i = 0; i < 3 * face_count && !status; i++)
-        split->indices[i] = copy_for(&s, faces[i], corner_uvs + 2 * i);
-    npg_release(&s.next);
-    npg_release(&s.is_used);
-    return status;
-}
-
-npg_status npg_corner_split_make(npg_corner_split *split, size_t vert_count, const uint32_t *faces,
-                                 size_t face_count, const float *uvs, const float *corner_uvs)
+npg_status npg_corner_split_make(npg_corner_split *split, npg_arena *arena, size_t vert_count,
+                                 const uint32_t *faces, size_t face_count, const float *uvs,
+                                 const float *corner_uvs)
 {
     size_t most = vert_count + (corner_uvs ? 3 * face_count : 0);
-    *split = (npg_corner_split){.count = vert_count};
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
     NPG_REQUIRE(most < UINT32_MAX);
-    npg_status status = npg_alloc_array(&split->vertex, NPG_FOR_FILES, most, sizeof *split->vertex);
-    if (!status)
-        status = npg_alloc_array(&split->indices, NPG_FOR_FILES, face_count, 3 * sizeof *split->indices);
-    if (!status && (uvs || corner_uvs))
-        status = npg_alloc_array(&split->uvs, NPG_FOR_FILES, most, 2 * sizeof *split->uvs);
-    for (size_t i = 0; i < vert_count && !status; i++) split->vertex[i] = (uint32_t)i;
-    if (!status && corner_uvs) status = split_corners(split, vert_count, faces, face_count, corner_uvs);
-    if (!status && !corner_uvs) memcpy(split->indices, faces, face_count * 3 * sizeof *faces);
+    splitting s = {split, npg_arena_take(&scratch, most, sizeof *s.next),
+                   npg_arena_take(&scratch, vert_count, 1)};
+    *split = (npg_corner_split){.count = vert_count,
+                                .vertex = npg_arena_take(arena, most, sizeof *split->vertex),
+                                .indices = npg_arena_copy(arena, faces, face_count, 3 * sizeof *faces)};
+    if (uvs || corner_uvs) split->uvs = npg_arena_take(arena, most, 2 * sizeof *split->uvs);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_arena_status(arena);
+    for (size_t i = 0; i < vert_count && !status; i++) {
+        split->vertex[i] = (uint32_t)i;
+        s.next[i] = UINT32_MAX;
+    }
+    for (size_t i = 0; i < 3 * face_count && corner_uvs && !status; i++)
+        split->indices[i] = copy_for(&s, faces[i], corner_uvs + 2 * i);
     if (!status && !corner_uvs && uvs) memcpy(split->uvs, uvs, vert_count * 2 * sizeof *uvs);
-    if (status) npg_corner_split_clear(split);
+    npg_arena_release(&scratch);
     return status;
-}
-
-void npg_corner_split_clear(npg_corner_split *split)
-{
-    npg_release(&split->vertex);
-    npg_release(&split->uvs);
-    npg_release(&split->indices);
-    *split = (npg_corner_split){0};
 }

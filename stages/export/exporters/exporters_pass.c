@@ -1,14 +1,12 @@
 /* Exporters: the pass over a run's meshes in the order of time that writes all of them at once. */
 #include <limits.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
-#include "job/job.h"
 #include "pipeline/json_file.h"
 
 struct npg_export_log {

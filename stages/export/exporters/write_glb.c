@@ -9,7 +9,6 @@
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "export/exporters/exporters_internal.h"
@@ -19,6 +18,7 @@
 
 typedef struct glb_state {
     npg_writer writer;
+    npg_arena arena; /* of the split and the base */
     npg_corner_split split;
     size_t poses_most;      /* in one file                 */
     int64_t done, segments; /* poses so far; files in all  */
@@ -26,7 +26,7 @@ typedef struct glb_state {
     npg_glb_layout layout;
     char name[32];
     size_t text_length;
-    float *base, *base_normals; /* V x 3, of the first pose of the file; owned */
+    float *base, *base_normals; /* V x 3, of the first pose of the file */
 } glb_state;
 
 /* ---- how many go into one file ---- */
@@ -207,13 +207,14 @@ static npg_status open_glb(void *state)
 {
     glb_state *s = state;
     const npg_export_facts *facts = s->writer.facts;
-    NPG_TRY(npg_corner_split_make(&s->split, facts->vert_count, facts->faces, facts->face_count, facts->uvs,
-                                  facts->corner_uvs));
+    s->arena.purpose = NPG_FOR_FILES;
+    NPG_TRY(npg_corner_split_make(&s->split, &s->arena, facts->vert_count, facts->faces, facts->face_count,
+                                  facts->uvs, facts->corner_uvs));
     s->poses_most = poses_for(facts, s->split.count);
     s->segments = (facts->pose_count + (int64_t)s->poses_most - 1) / (int64_t)s->poses_most;
-    NPG_TRY(npg_alloc_array(&s->base, NPG_FOR_FILES, facts->vert_count, 3 * sizeof *s->base));
-    if (!facts->has_normals) return NPG_OK;
-    return npg_alloc_array(&s->base_normals, NPG_FOR_FILES, facts->vert_count, 3 * sizeof *s->base_normals);
+    s->base = npg_arena_take(&s->arena, facts->vert_count, 3 * sizeof *s->base);
+    s->base_normals = npg_arena_take(&s->arena, facts->vert_count, 3 * sizeof *s->base_normals);
+    return npg_arena_status(&s->arena);
 }
 
 static npg_status write_pose(void *state, const npg_pose *pose)
@@ -239,10 +240,7 @@ static npg_status finish_glb(void *state)
 
 static void close_glb(void *state)
 {
-    glb_state *s = state;
-    npg_corner_split_clear(&s->split);
-    npg_release(&s->base);
-    npg_release(&s->base_normals);
+    npg_arena_release(&((glb_state *)state)->arena);
 }
 
 const npg_exporter npg_exporter_glb = {.name = "glb",

@@ -1,5 +1,4 @@
 /* OBJ sequence beside a PLY one: OUT/obj/<prefix>_0000.obj. */
-#include <stdio.h>
 
 #include "export/exporters/exporters_internal.h"
 

@@ -3,7 +3,6 @@
  *
  * A level set needs a closed surface: openings are covered by fans over their rims, the same in every frame.
  * The voxel is a share of the longest side of the capture's box. */
-#include <stdio.h>
 #include <string.h>
 
 #include "export/exporters/exporters_internal.h"

@@ -1,5 +1,4 @@
 /* NPY reader: arrays N x 3 or N x 6 of 4- or 8-byte floats, either byte order, C or Fortran order. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,6 +1,4 @@
 /* OBJ reader: vertices with normals, colours and texture coordinates; polygons become fans. */
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "ingest/ingest_internal.h"

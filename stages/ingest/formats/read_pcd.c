@@ -2,7 +2,6 @@
 #include <lzf.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "ingest/ingest_internal.h"

@@ -2,7 +2,6 @@
  * normals where columns 4 to 6 are. */
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 #include "geometry/geometry.h"
 #include "ingest/ingest_internal.h"
