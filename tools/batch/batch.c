@@ -13,14 +13,16 @@
 #include "pipeline/options.h"
 #include "pipeline/stage.h"
 
-npg_status npg_path_from(char **path, const char *folder, const char *text)
+npg_status npg_path_from(npg_arena *arena, char **path, const char *folder, const char *text)
 {
-    char here[PATH_MAX], joined[NPG_PATH_SIZE];
-    if (*text == '/') return npg_copy_text(path, text);
-    if (*folder == '/') return npg_join_path(path, folder, text);
-    if (!getcwd(here, sizeof here)) return npg_error_errno(NPG_FAILED, "the working folder has no name");
-    NPG_TRY(npg_path_of(joined, here, strcmp(folder, ".") ? folder : ""));
-    return npg_join_path(path, joined, text);
+    char here[PATH_MAX];
+    if (*text != '/' && *folder != '/') {
+        if (!getcwd(here, sizeof here)) return npg_error_errno(NPG_FAILED, "the working folder has no name");
+        folder = strcmp(folder, ".") ? npg_arena_path(arena, here, folder) : here;
+        NPG_TRY(npg_arena_status(arena));
+    }
+    *path = *text == '/' ? npg_arena_text(arena, text) : npg_arena_path(arena, folder, text);
+    return npg_arena_status(arena);
 }
 
 /* ---- captures ---- */
@@ -44,11 +46,11 @@ static npg_status check_name(const npg_batch *batch, const char *name)
 npg_status npg_batch_add(npg_batch *batch, npg_capture **out, const char *name)
 {
     NPG_TRY(check_name(batch, name));
-    NPG_TRY(
-        npg_grow(&batch->captures, &batch->capacity, batch->count + 1, sizeof *batch->captures, NPG_FOR_RUN));
-    npg_capture *capture = &batch->captures[batch->count++];
-    NPG_TRY(npg_copy_text(&capture->name, name));
-    *out = capture;
+    NPG_TRY(npg_arena_grow(&batch->arena, &batch->captures, &batch->capacity, batch->count + 1,
+                           sizeof *batch->captures));
+    npg_capture *capture = *out = &batch->captures[batch->count++];
+    capture->name = npg_arena_text(&batch->arena, name);
+    NPG_TRY(npg_arena_status(&batch->arena));
     return npg_options_open(&capture->options);
 }
 
@@ -90,34 +92,31 @@ static npg_status confine(bool *is_confined, npg_options *options)
 }
 
 /* Of a batch that is a folder, whoever fills it, a capture is not read that is a link out of it. */
-static npg_status find_input(char **input, const npg_batch *batch, npg_capture *capture, const char *path,
-                             bool is_confined)
+static npg_status find_input(npg_batch *batch, npg_capture *capture, bool is_confined)
 {
     struct stat info;
-    if (stat(path, &info) || !S_ISDIR(info.st_mode)) return npg_copy_text(input, path);
-    if (is_confined && batch->is_folder) NPG_TRY(npg_path_confine(path, batch->path));
-    return npg_batch_find_input(capture, input, path, is_confined);
+    if (stat(capture->input, &info) || !S_ISDIR(info.st_mode)) return NPG_OK;
+    if (is_confined && batch->is_folder) NPG_TRY(npg_path_confine(capture->input, batch->path));
+    return npg_batch_find_input(batch, capture, is_confined);
 }
 
 npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
                               const npg_batch_given *given)
 {
-    char *path;
     bool is_confined;
     NPG_TRY(set_given(capture->options, given->options));
     NPG_TRY(check_options(capture->options));
     NPG_TRY(confine(&is_confined, capture->options));
     if (given->max_time_s >= 0) capture->max_time_s = given->max_time_s;
     if (given->segments) capture->segments = given->segments;
-    NPG_TRY(npg_path_from(&path, folder, text));
-    npg_status status = find_input(&capture->input, batch, capture, path, is_confined);
-    if (status == NPG_BAD_INPUT) {
-        status = npg_copy_text(&capture->refusal, npg_error_text());
-        if (!status) status = npg_copy_text(&capture->input, path);
-    }
-    npg_release(&path);
-    NPG_TRY(status);
-    NPG_TRY(npg_join_path(&capture->output, batch->output, capture->name));
+    NPG_TRY(npg_path_from(&batch->arena, &capture->input, folder, text));
+    npg_status status = find_input(batch, capture, is_confined);
+    if (status == NPG_BAD_INPUT)
+        capture->refusal = npg_arena_text(&batch->arena, npg_error_text());
+    else
+        NPG_TRY(status);
+    capture->output = npg_arena_path(&batch->arena, batch->output, capture->name);
+    NPG_TRY(npg_arena_status(&batch->arena));
     NPG_TRY(npg_options_set(capture->options, "input", capture->input));
     return npg_options_set(capture->options, "output", capture->output);
 }
@@ -132,14 +131,15 @@ bool npg_batch_is_mine(const npg_batch *batch, size_t i)
 static npg_status set_output(npg_batch *batch, const npg_batch_given *given)
 {
     const char *text = npg_options_get(given->options, "output");
-    return text[0] ? npg_path_from(&batch->output, ".", text) : NPG_OK;
+    return text[0] ? npg_path_from(&batch->arena, &batch->output, ".", text) : NPG_OK;
 }
 
 static npg_status fill(npg_batch *batch, const char *path, const npg_batch_given *given)
 {
     struct stat info;
     batch->task_count = 1;
-    NPG_TRY(npg_copy_text(&batch->path, path));
+    batch->path = npg_arena_text(&batch->arena, path);
+    NPG_TRY(npg_arena_status(&batch->arena));
     NPG_TRY(set_output(batch, given));
     if (stat(path, &info)) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
     batch->is_folder = S_ISDIR(info.st_mode);
@@ -148,31 +148,17 @@ static npg_status fill(npg_batch *batch, const char *path, const npg_batch_given
 
 npg_status npg_batch_open(npg_batch **out, const char *path, const npg_batch_given *given)
 {
-    npg_batch *batch;
     *out = NULL;
     if (npg_options_is_set(given->options, "input"))
         return npg_error(NPG_USAGE, "option input is not for a batch: its captures have theirs");
-    NPG_TRY(npg_alloc(&batch, NPG_FOR_RUN, sizeof *batch));
-    npg_status status = fill(batch, path, given);
-    if (status) npg_batch_close(&batch);
-    *out = batch;
+    NPG_TRY(npg_object_open(out, NPG_FOR_RUN, sizeof **out));
+    npg_status status = fill(*out, path, given);
+    if (status) npg_batch_close(out);
     return status;
 }
 
-void npg_batch_close(npg_batch **slot)
+void npg_batch_close(npg_batch **batch)
 {
-    npg_batch *batch = *slot;
-    if (!batch) return;
-    for (size_t i = 0; i < batch->count; i++) {
-        npg_capture *capture = &batch->captures[i];
-        npg_release(&capture->name);
-        npg_release(&capture->input);
-        npg_release(&capture->output);
-        npg_release(&capture->refusal);
-        npg_options_close(&capture->options);
-    }
-    npg_release(&batch->captures);
-    npg_release(&batch->path);
-    npg_release(&batch->output);
-    npg_release(slot);
+    for (size_t i = 0; *batch && i < (*batch)->count; i++) npg_options_close(&(*batch)->captures[i].options);
+    npg_object_close(batch);
 }

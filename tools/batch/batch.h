@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <sys/types.h>
 
+#include "pipeline/memory.h"
 #include "pipeline/options.h"
 #include "tools/progress.h"
 
@@ -25,10 +26,10 @@ typedef struct npg_verdict {
 enum { NPG_BATCH_SEGMENTS_UNSAID, NPG_BATCH_SEGMENTS_ONE, NPG_BATCH_SEGMENTS_AUTO };
 
 typedef struct npg_capture {
-    char *name;            /* of its folder in the output; owned                           */
-    char *input, *output;  /* absolute paths; owned                                        */
+    char *name;            /* of its folder in the output                                  */
+    char *input, *output;  /* absolute paths                                               */
     npg_options *options;  /* of its run, input and output among them; owned               */
-    char *refusal;         /* why it is not even started, NULL: it is; owned               */
+    char *refusal;         /* why it is not even started, NULL: it is                      */
     double max_time_s;     /* 0: no limit                                                  */
     int segments;          /* NPG_BATCH_SEGMENTS_..                                        */
     bool of_mesh_vertices; /* its points are the vertices of meshes: nothing else is there */
@@ -36,9 +37,10 @@ typedef struct npg_capture {
 } npg_capture;
 
 typedef struct npg_batch {
-    char *path, *output;   /* owned */
-    bool is_folder;        /* path is that of a folder of captures, not of a manifest */
-    npg_capture *captures; /* owned */
+    npg_arena arena; /* of all texts, of the captures' too */
+    char *path, *output;
+    bool is_folder; /* path is that of a folder of captures, not of a manifest */
+    npg_capture *captures;
     size_t count, capacity;
     size_t task_index, task_count; /* this process does captures i with i mod task_count == task_index */
 } npg_batch;
@@ -76,13 +78,13 @@ npg_status npg_batch_add(npg_batch *batch, npg_capture **capture, const char *na
 npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
                               const npg_batch_given *given);
 
-/* Where frames lie in a folder of a capture: its sub-folder points/, point_clouds/, points_clouds/ or
- * pcl_seqs/ when that holds any, else the folder; only meshes in truth/ or gt/: that.  *input is to be given to
- * npg_release().  NPG_BAD_INPUT: one of these sub-folders leads out of the folder, and is_confined. */
-npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *folder, bool is_confined);
+/* Where frames lie in the folder that is a capture's input becomes its input: the sub-folder points/,
+ * point_clouds/, points_clouds/ or pcl_seqs/ when that holds any, else the folder; only meshes in truth/ or gt/:
+ * that.  NPG_BAD_INPUT: one of these sub-folders leads out of the folder, and is_confined. */
+npg_status npg_batch_find_input(npg_batch *batch, npg_capture *capture, bool is_confined);
 
-/* An absolute path of `text` seen from `folder`; to be given to npg_release(). */
-npg_status npg_path_from(char **path, const char *folder, const char *text);
+/* An absolute path of `text` seen from `folder`. */
+npg_status npg_path_from(npg_arena *arena, char **path, const char *folder, const char *text);
 
 /* ---- run ---- */
 

@@ -12,15 +12,9 @@
 #include "pipeline/memory.h"
 #include "tools/batch/batch.h"
 
-#define CLOUD_ENDINGS ".ply .obj .xyz .xyzn .txt .pts .npy .pcd"
-#define MESH_ENDINGS  ".ply .obj"
+#define MESH_ENDINGS ".ply .obj"
 
 /* ---- inside of a capture ---- */
-
-typedef struct inside {
-    const char *folder;
-    bool is_confined;
-} inside;
 
 static bool is_folder(const char *path)
 {
@@ -38,51 +32,43 @@ static npg_status holds(bool *found, const char *folder, const char *endings)
     return status == NPG_MEMORY ? status : NPG_OK;
 }
 
-/* *path: that of the sub-folder when it holds files of these endings, else NULL; to be given to
- * npg_release(). */
-static npg_status find_inside(char **path, const inside *in, const char *name, const char *endings)
-{
-    bool found = false;
-    NPG_TRY(npg_join_path(path, in->folder, name));
-    npg_status status = NPG_OK;
-    if (is_folder(*path)) {
-        if (in->is_confined) status = npg_path_confine(*path, in->folder);
-        if (!status) status = holds(&found, *path, endings);
-    }
-    if (status || !found) npg_release(path);
-    return status;
-}
+typedef struct inside {
+    npg_arena *arena;
+    const char *folder;
+    bool is_confined;
+} inside;
 
-/* The first of the names that holds files; NULL when none does. */
-static npg_status find_first(char **path, const inside *in, const char *const *names, const char *endings)
+/* The first of the names that is a sub-folder with files of these endings; NULL when none is. */
+static npg_status find_first(char **found, const inside *in, const char *const *names, const char *endings)
 {
-    *path = NULL;
-    for (; *names && !*path; names++) NPG_TRY(find_inside(path, in, *names, endings));
+    for (*found = NULL; *names && !*found; names++) {
+        bool is_there;
+        char *path = npg_arena_path(in->arena, in->folder, *names);
+        NPG_TRY(npg_arena_status(in->arena));
+        if (!is_folder(path)) continue;
+        if (in->is_confined) NPG_TRY(npg_path_confine(path, in->folder));
+        NPG_TRY(holds(&is_there, path, endings));
+        if (is_there) *found = path;
+    }
     return NPG_OK;
 }
 
-static npg_status find_input(char **input, bool *of_mesh_vertices, const inside *in, const char *truth)
-{
-    static const char *const of_clouds[] = {"points", "point_clouds", "points_clouds", NULL};
-    static const char *const raw[] = {"pcl_seqs", NULL};
-    bool own = false;
-    NPG_TRY(find_first(input, in, of_clouds, CLOUD_ENDINGS));
-    if (!*input) NPG_TRY(holds(&own, in->folder, CLOUD_ENDINGS));
-    if (!*input && !own) NPG_TRY(find_first(input, in, raw, CLOUD_ENDINGS));
-    *of_mesh_vertices = !*input && !own && truth;
-    return *input ? NPG_OK : npg_copy_text(input, *of_mesh_vertices ? truth : in->folder);
-}
-
-npg_status npg_batch_find_input(npg_capture *capture, char **input, const char *folder, bool is_confined)
+npg_status npg_batch_find_input(npg_batch *batch, npg_capture *capture, bool is_confined)
 {
     static const char *const truths[] = {"truth", "gt", NULL};
-    const inside in = {folder, is_confined};
-    char *truth;
+    static const char *const of_clouds[] = {"points", "point_clouds", "points_clouds", NULL};
+    static const char *const raw[] = {"pcl_seqs", NULL};
+    const inside in = {&batch->arena, capture->input, is_confined};
+    bool own = false;
+    char *truth, *found;
     NPG_TRY(find_first(&truth, &in, truths, MESH_ENDINGS));
-    npg_status status = find_input(input, &capture->of_mesh_vertices, &in, truth);
-    npg_release(&truth);
-    if (status) npg_release(input);
-    return status;
+    NPG_TRY(find_first(&found, &in, of_clouds, NPG_CLOUDS));
+    if (!found) NPG_TRY(holds(&own, in.folder, NPG_CLOUDS));
+    if (!found && !own) NPG_TRY(find_first(&found, &in, raw, NPG_CLOUDS));
+    capture->of_mesh_vertices = !found && !own && truth;
+    if (capture->of_mesh_vertices) found = truth;
+    if (found) capture->input = found;
+    return NPG_OK;
 }
 
 /* ---- the folder ---- */
@@ -101,21 +87,21 @@ static npg_status is_capture(bool *yes, const npg_batch *batch, const char *name
 }
 
 typedef struct listed {
-    const npg_batch *batch;
-    npg_listing names;
+    npg_batch *batch;
+    char **names;
+    size_t count, capacity;
 } listed;
 
 static npg_status list_capture(void *user, const char *name)
 {
     listed *l = user;
-    npg_listing *names = &l->names;
+    npg_arena *arena = &l->batch->arena;
     bool yes;
     NPG_TRY(is_capture(&yes, l->batch, name));
     if (!yes) return NPG_OK;
-    NPG_TRY(npg_grow(&names->paths, &names->room, names->count + 1, sizeof *names->paths, NPG_FOR_FILES));
-    NPG_TRY(npg_copy_text(&names->paths[names->count], name));
-    names->count++;
-    return NPG_OK;
+    NPG_TRY(npg_arena_grow(arena, &l->names, &l->capacity, l->count + 1, sizeof *l->names));
+    l->names[l->count++] = npg_arena_text(arena, name);
+    return npg_arena_status(arena);
 }
 
 /* The name of its folder in the output: without what can't be one (npg_batch_add()),
@@ -137,28 +123,24 @@ static void name_of(char *out, size_t size, const npg_batch *batch, const char *
         }
 }
 
-static npg_status add_captures(npg_batch *batch, const npg_listing *names, const npg_batch_given *given)
+static npg_status add_capture(npg_batch *batch, const char *folder, const npg_batch_given *given)
 {
-    for (size_t i = 0; i < names->count; i++) {
-        char name[256];
-        npg_capture *capture;
-        name_of(name, sizeof name, batch, names->paths[i]);
-        npg_status status = npg_batch_add(batch, &capture, name);
-        if (!status) status = npg_batch_complete(batch, capture, batch->path, names->paths[i], given);
-        if (status) return npg_error_prefix(status, "%s/%s", batch->path, names->paths[i]);
-    }
-    return NPG_OK;
+    char name[256];
+    npg_capture *capture;
+    name_of(name, sizeof name, batch, folder);
+    NPG_TRY(npg_batch_add(batch, &capture, name));
+    return npg_batch_complete(batch, capture, batch->path, folder, given);
 }
 
 npg_status npg_batch_read_folder(npg_batch *batch, const npg_batch_given *given)
 {
     listed l = {.batch = batch};
     if (!batch->output) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
-    npg_status status = npg_folder_each(batch->path, NPG_BAD_INPUT, list_capture, &l);
-    if (l.names.count) qsort(l.names.paths, l.names.count, sizeof *l.names.paths, npg_natural_order);
-    if (!status && !l.names.count)
-        status = npg_error(NPG_BAD_INPUT, "%s: no sub-folder here, and each would be a capture", batch->path);
-    if (!status) status = add_captures(batch, &l.names, given);
-    npg_listing_close(&l.names);
-    return status;
+    NPG_TRY(npg_folder_each(batch->path, NPG_BAD_INPUT, list_capture, &l));
+    if (!l.count)
+        return npg_error(NPG_BAD_INPUT, "%s: no sub-folder here, and each would be a capture", batch->path);
+    qsort(l.names, l.count, sizeof *l.names, npg_natural_order);
+    for (size_t i = 0; i < l.count; i++)
+        NPG_TRY(npg_error_prefix(add_capture(batch, l.names[i], given), "%s/%s", batch->path, l.names[i]));
+    return NPG_OK;
 }

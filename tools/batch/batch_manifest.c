@@ -27,17 +27,9 @@
 typedef struct manifest {
     npg_batch *batch;
     const npg_batch_given *given;
-    char *folder;     /* of the file; owned                          */
+    char *folder;     /* of the file                                 */
     npg_capture base; /* what "defaults" says; its options are owned */
 } manifest;
-
-static npg_status folder_of(char **out, const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    NPG_TRY(npg_copy_text(out, slash ? path : "."));
-    if (slash) (*out)[slash == path ? 1 : slash - path] = 0;
-    return NPG_OK;
-}
 
 /* ---- options ---- */
 
@@ -52,10 +44,8 @@ static npg_status set_path(const manifest *m, npg_options *options, const char *
     const char *text = json_string_value(value);
     if (!text) return npg_error(NPG_USAGE, "not a path");
     if (!*text) return npg_options_set(options, key, "");
-    NPG_TRY(npg_path_from(&path, m->folder, text));
-    npg_status status = npg_options_set(options, key, path);
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_path_from(&m->batch->arena, &path, m->folder, text));
+    return npg_options_set(options, key, path);
 }
 
 static npg_status set_segments(npg_capture *capture, const json_t *value)
@@ -87,11 +77,10 @@ static npg_status set_method(const manifest *m, npg_capture *capture, const json
     if (!value) return NPG_OK;
     if (!text || *text == '{' || !strpbrk(text, "./"))
         return npg_options_set_json(capture->options, "method", value);
-    NPG_TRY(npg_path_from(&path, m->folder, text));
-    npg_status status = npg_options_set(capture->options, "method", path);
-    if (!status) npg_batch_warn_of_ignored(capture->options, path);
-    npg_release(&path);
-    return status;
+    NPG_TRY(npg_path_from(&m->batch->arena, &path, m->folder, text));
+    NPG_TRY(npg_options_set(capture->options, "method", path));
+    npg_batch_warn_of_ignored(capture->options, path);
+    return NPG_OK;
 }
 
 /* All of an object, the method first. */
@@ -120,7 +109,7 @@ static bool is_generic(const char *name, size_t length)
 }
 
 /* A name from the input's path: the last part of it that says something; a file's without its ending. */
-static npg_status name_of(char **name, const char *folder, const char *input)
+static npg_status name_of(const manifest *m, char **name, const char *input)
 {
     char *path;
     struct stat info;
@@ -130,12 +119,11 @@ static npg_status name_of(char **name, const char *folder, const char *input)
         for (begin = end; begin && input[begin - 1] != '/';) begin--;
         if (begin == end || !is_generic(input + begin, end - begin)) break;
     }
-    NPG_TRY(npg_copy_text(name, input + begin));
+    *name = npg_arena_text(&m->batch->arena, input + begin);
+    NPG_TRY(npg_path_from(&m->batch->arena, &path, m->folder, input));
     (*name)[end - begin] = 0;
-    NPG_TRY(npg_path_from(&path, folder, input));
     char *dot = strrchr(*name, '.');
     if (dot && dot != *name && !input[end] && !stat(path, &info) && S_ISREG(info.st_mode)) *dot = 0;
-    npg_release(&path);
     return NPG_OK;
 }
 
@@ -151,10 +139,8 @@ static npg_status add_capture(const manifest *m, npg_capture **capture, json_t *
         return npg_error(NPG_USAGE, "its input can't be standard input");
     if (given && !json_is_string(given)) return npg_error(NPG_USAGE, "its name is not a text");
     if (given) return npg_batch_add(m->batch, capture, json_string_value(given));
-    NPG_TRY(name_of(&name, m->folder, json_string_value(input)));
-    npg_status status = npg_batch_add(m->batch, capture, name);
-    npg_release(&name);
-    return status;
+    NPG_TRY(name_of(m, &name, json_string_value(input)));
+    return npg_batch_add(m->batch, capture, name);
 }
 
 static npg_status read_capture(const manifest *m, json_t *object, const char *place)
@@ -206,7 +192,7 @@ static npg_status find_output(const manifest *m, const json_t *root)
         return npg_error(NPG_USAGE, "output: not a path");
     if (m->batch->output) return NPG_OK;
     if (!output) return npg_error(NPG_USAGE, "no \"output\" here, and no -o DIR");
-    return npg_path_from(&m->batch->output, m->folder, json_string_value(output));
+    return npg_path_from(&m->batch->arena, &m->batch->output, m->folder, json_string_value(output));
 }
 
 static npg_status read_all(manifest *m, json_t *root)
@@ -229,11 +215,13 @@ npg_status npg_batch_read_manifest(npg_batch *batch, const npg_batch_given *give
     manifest m = {.batch = batch, .given = given};
     json_t *root;
     char *text;
+    const char *slash = strrchr(batch->path, '/');
+    m.folder = npg_arena_text(&batch->arena, slash ? batch->path : ".");
+    NPG_TRY(npg_arena_status(&batch->arena));
+    if (slash) m.folder[slash == batch->path ? 1 : slash - batch->path] = 0;
     NPG_TRY(npg_json_read(&root, &text, batch->path, MANIFEST_LIMIT));
-    npg_status status = folder_of(&m.folder, batch->path);
-    if (!status) status = npg_error_prefix(read_all(&m, root), "%s", batch->path);
+    npg_status status = npg_error_prefix(read_all(&m, root), "%s", batch->path);
     npg_options_close(&m.base.options);
-    npg_release(&m.folder);
     npg_release(&text);
     json_decref(root);
     return status;
