@@ -52,7 +52,7 @@ typedef struct npg_batch_given {
     int segments;               /* NPG_BATCH_SEGMENTS_.. */
 } npg_batch_given;
 
-/* path: a manifest (batch_manifest.c) or a folder whose sub-folders are captures (batch_folder.c).
+/* path: a manifest (batch_manifest.c) or a folder whose sub-folders are captures.
  * NPG_USAGE: file, place and cause of what makes no sense.  NPG_BAD_INPUT: nothing there. */
 npg_status npg_batch_open(npg_batch **batch, const char *path, const npg_batch_given *given);
 void npg_batch_close(npg_batch **batch);
@@ -63,7 +63,6 @@ bool npg_batch_is_mine(const npg_batch *batch, size_t i);
 /* ---- for the two that fill a batch ---- */
 
 npg_status npg_batch_read_manifest(npg_batch *batch, const npg_batch_given *given);
-npg_status npg_batch_read_folder(npg_batch *batch, const npg_batch_given *given);
 
 /* Say on standard error what a method of the published code asks for that has no counterpart here; place: where
  * it was read. */
@@ -77,11 +76,6 @@ npg_status npg_batch_add(npg_batch *batch, npg_capture **capture, const char *na
  * not absolute is taken from `folder`. */
 npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
                               const npg_batch_given *given);
-
-/* Where frames lie in the folder that is a capture's input becomes its input: the sub-folder points/,
- * point_clouds/, points_clouds/ or pcl_seqs/ when that holds any, else the folder; only meshes in truth/ or gt/:
- * that.  NPG_BAD_INPUT: one of these sub-folders leads out of the folder, and is_confined. */
-npg_status npg_batch_find_input(npg_batch *batch, npg_capture *capture, bool is_confined);
 
 /* An absolute path of `text` seen from `folder`. */
 npg_status npg_path_from(npg_arena *arena, char **path, const char *folder, const char *text);

@@ -97,12 +97,6 @@ npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const np
 
 #define NPG_FOR_CAMERAS 10 /* key of the cameras' random stream */
 
-npg_status npg_scanned_add(npg_scanned *points, const double pos[3], const double normal[3]);
-
-/* All surface points that a ring of cameras sees, one per pixel, in the order of cameras and pixels. */
-npg_status npg_cameras_see(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
-                           uint64_t frame);
-
 /* ---- depth cameras: where they stand, and what a mesh looks like from there ---- */
 
 /* Pixel (x, y) has its centre at x + 0.5, y + 0.5; y goes up. */

@@ -170,17 +170,4 @@ npg_status npg_view_measure(npg_view_frames *frames, int32_t *errors);
 /* Copy at most frames->point_limit of the points to frames->some, in the order of a space-filling curve. */
 npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count);
 
-/* The page without data, as the build has bundled it: build/view/page.html, or share/neupig/view/page.html of
- * what is installed. */
-typedef struct npg_view_template {
-    npg_arena arena; /* of the text */
-    char *text;
-    size_t size; /* in bytes */
-    size_t data; /* where data go in */
-} npg_view_template;
-
-/* NPG_FAILED where it was not built, with what to install. */
-npg_status npg_view_template_open(npg_view_template *page);
-void npg_view_template_close(npg_view_template *page);
-
 #endif

@@ -1,12 +1,68 @@
 /* Page: one HTML file that needs no other, of one result or of two side by side. */
 #include "tools/view/view_internal.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "pipeline/clock.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
+
+/* ---- the page without data ---- */
+
+/* As the build has bundled it: build/view/page.html, or share/neupig/view/page.html of what is installed. */
+typedef struct template
+{
+    npg_arena arena; /* of the text */
+    char *text;
+    size_t size; /* in bytes */
+    size_t data; /* where data go in */
+}
+template;
+
+#define NAME      "view/page.html"
+#define MARK      "<!--neupig-data-->"
+#define SIZE_MOST ((size_t)64 << 20)
+
+/* Beside this program (a build folder), in the share/ of its installation, or where it was meant to be
+ * installed. */
+static bool find_template(char path[PATH_MAX])
+{
+    static const char *const ways[] = {"", "../share/neupig/"};
+    char self[PATH_MAX];
+    ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    self[length > 0 ? length : 0] = 0;
+    const char *slash = strrchr(self, '/');
+    for (size_t i = 0; slash && i < sizeof ways / sizeof *ways; i++) {
+        int size = snprintf(path, PATH_MAX, "%.*s%s" NAME, (int)(slash - self + 1), self, ways[i]);
+        if (size < PATH_MAX && access(path, R_OK) == 0) return true;
+    }
+    snprintf(path, PATH_MAX, "%s/%s", NPG_DATA_DIR, NAME);
+    return access(path, R_OK) == 0;
+}
+
+/* NPG_FAILED where it was not built, with what to install. */
+static npg_status open_template(template *page)
+{
+    char path[PATH_MAX];
+    *page = (template){.arena = {.purpose = NPG_FOR_FILES}};
+    if (!find_template(path))
+        return npg_error(NPG_FAILED,
+                         "the page's script was not built: it needs Node and npm. Install them "
+                         "(Debian: nodejs and npm), configure with -DNPG_VIEW=ON and build again");
+    NPG_TRY(npg_file_whole(&page->arena, &page->text, &page->size, path, SIZE_MOST, "page"));
+    const char *mark = strstr(page->text, MARK);
+    if (!mark) {
+        npg_arena_release(&page->arena);
+        return npg_error(NPG_FAILED, "%s is not the page that belongs to this program", path);
+    }
+    page->data = (size_t)(mark - page->text);
+    return NPG_OK;
+}
 
 /* ---- JSON inside of HTML ---- */
 
@@ -144,7 +200,7 @@ static npg_status write_result(npg_file *file, npg_view_facts *facts, json_t *re
     return status;
 }
 
-static npg_status write_page(npg_file *file, npg_view_facts *facts, const npg_view_template *page,
+static npg_status write_page(npg_file *file, npg_view_facts *facts, const template *page,
                              const npg_view_order *order)
 {
     json_t *results = json_array();
@@ -162,12 +218,75 @@ static npg_status write_page(npg_file *file, npg_view_facts *facts, const npg_vi
 
 npg_status npg_view_page_write(npg_view_facts *facts, const npg_view_order *order)
 {
-    npg_view_template page;
+    template page;
     npg_file *file = NULL;
     *facts = (npg_view_facts){0};
-    NPG_TRY(npg_view_template_open(&page));
+    NPG_TRY(open_template(&page));
     npg_status status = npg_file_open(&file, order->output);
     if (!status) status = write_page(file, facts, &page, order);
-    npg_view_template_close(&page);
+    npg_arena_release(&page.arena);
     return npg_file_end(&file, status);
+}
+
+/* ---- of a run that is at work ---- */
+
+#define LOOK_S     2  /* between two looks at the folder; a run that begins is not taken for one that ended */
+#define PAUSE_MOST 10 /* a page that takes long to make is made more rarely: a tenth of a processor at most */
+
+/* Whether any process has a lock on this file of the folder.  Asked of the system's list: to try the lock
+ * oneself could keep a run from it.  Where there is no list it counts as held. */
+static bool is_locked(const char *folder, const char *name)
+{
+    char path[4096], line[256];
+    struct stat info;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    if (stat(path, &info)) return false;
+    FILE *list = fopen("/proc/locks", "re");
+    bool found = !list;
+    while (list && !found && fgets(line, sizeof line, list)) {
+        unsigned long long there;
+        found = sscanf(line, "%*d: %*s %*s %*s %*d %*x:%*x:%llu", &there) == 1 &&
+                there == (unsigned long long)info.st_ino;
+    }
+    if (list) fclose(list);
+    return found;
+}
+
+static bool is_at_work(const char *path)
+{
+    return is_locked(path, "job/lock") || is_locked(path, ".segments.lock");
+}
+
+/* How many frames there are; -1: the lists can't be read just now (a run begins anew). */
+static int64_t count_frames(const char *path)
+{
+    npg_view_result result;
+    int64_t count = 0;
+    if (npg_view_result_open(&result, path, 1, true)) return -1;
+    for (size_t i = 0; i < result.part_count; i++) count += (int64_t)result.parts[i].count;
+    npg_view_result_close(&result);
+    return count;
+}
+
+npg_status npg_view_follow(npg_view_facts *facts, const npg_view_order *order)
+{
+    npg_view_order now = *order;
+    int64_t shown = -2;
+    double due_s = 0;
+    now.is_live = true;
+    for (bool was_at_work = true;; sleep(LOOK_S)) {
+        bool is_now = is_at_work(order->paths[0]);
+        if (!is_now && !was_at_work) return npg_view_page_write(facts, order);
+        was_at_work = is_now;
+        int64_t count = count_frames(order->paths[0]);
+        double begin_s = npg_clock_s();
+        if (count == shown || count < 0 || begin_s < due_s) continue;
+        NPG_TRY(npg_view_page_write(facts, &now));
+        if (shown == -2) {
+            printf("%s\n", order->output);
+            fflush(stdout);
+        }
+        shown = count;
+        due_s = npg_clock_s() + PAUSE_MOST * (npg_clock_s() - begin_s);
+    }
 }

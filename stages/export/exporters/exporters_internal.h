@@ -188,33 +188,12 @@ void npg_obj_add_numbers(char *line, size_t size, int decimals, const double *va
 npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, const float *pos,
                               const float *normals, const uint8_t *colours);
 
-/* ---- vertices doubled where their corners have more than one texture coordinate ---- */
-
-typedef struct npg_corner_split {
-    size_t count;      /* G >= V                                     */
-    uint32_t *vertex;  /* G: the vertex each one is a copy of        */
-    float *uvs;        /* G x 2 or NULL                              */
-    uint32_t *indices; /* F x 3 of them                              */
-} npg_corner_split;
-
-/* corner_uvs (F x 3 x 2) or uvs (V x 2) may be NULL; with both the corners' count.  Without corner_uvs the
- * vertices stay as they are.  Vertices that no face uses are kept.  NPG_MEMORY. */
-npg_status npg_corner_split_make(npg_corner_split *split, npg_arena *arena, size_t vert_count,
-                                 const uint32_t *faces, size_t face_count, const float *uvs,
-                                 const float *corner_uvs);
-
 /* ---- faces that close the openings of a surface ---- */
 
 /* Fans over the loops of a mesh's border, turned as the faces around them, so that mesh and caps together are
  * closed: 3 indices each, to be given to npg_release(); NULL where there is no border.  They need not be flat
  * nor free of crossings.  The border's edges go in circles, as those of oriented faces do.  NPG_MEMORY. */
 npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, const uint32_t *faces, size_t face_count);
-
-/* ---- the latent grids of a run's windows ---- */
-
-/* OUT/latents/window_000000.vdb of every OUT/job/window_000000.vdb there is (vdb_latents.h says what is
- * in them); nothing without facts->has_grids.  NPG_DISK, NPG_BAD_INPUT. */
-npg_status npg_latents_write(const npg_export_facts *facts);
 
 /* ---- the JSON part of a GLB with one animated mesh ---- */
 

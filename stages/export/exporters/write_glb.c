@@ -16,10 +16,18 @@
 /* Of a file's binary part: lengths have 32 bits, and a MiB is left for the JSON. */
 #define BYTES_MOST (UINT64_C(0xffffffff) - (1 << 20))
 
+/* Vertices doubled where their corners have more than one texture coordinate. */
+typedef struct corner_split {
+    size_t count;      /* G >= V                              */
+    uint32_t *vertex;  /* G: the vertex each one is a copy of */
+    float *uvs;        /* G x 2 or NULL                       */
+    uint32_t *indices; /* F x 3 of them                       */
+} corner_split;
+
 typedef struct glb_state {
     npg_writer writer;
     npg_arena arena; /* of the split and the base */
-    npg_corner_split split;
+    corner_split split;
     size_t poses_most;      /* in one file                 */
     int64_t done, segments; /* poses so far; files in all  */
     size_t at;              /* poses in the file under way */
@@ -28,6 +36,64 @@ typedef struct glb_state {
     size_t text_length;
     float *base, *base_normals; /* V x 3, of the first pose of the file */
 } glb_state;
+
+/* ---- vertices with more than one texture coordinate ---- */
+
+/* The copies of one vertex are a list: the vertex itself, then next[] until UINT32_MAX. */
+typedef struct splitting {
+    corner_split *split;
+    uint32_t *next;   /* one per copy                                */
+    uint8_t *is_used; /* one per vertex: it has a texture coordinate */
+} splitting;
+
+static uint32_t copy_for(splitting *s, uint32_t vertex, const float uv[2])
+{
+    corner_split *split = s->split;
+    uint32_t at = vertex;
+    if (!s->is_used[vertex]) {
+        s->is_used[vertex] = 1;
+        memcpy(split->uvs + 2 * (size_t)vertex, uv, 2 * sizeof *uv);
+    }
+    while (memcmp(split->uvs + 2 * (size_t)at, uv, 2 * sizeof *uv) != 0) {
+        if (s->next[at] == UINT32_MAX) {
+            uint32_t made = (uint32_t)split->count++;
+            s->next[at] = made;
+            s->next[made] = UINT32_MAX;
+            split->vertex[made] = vertex;
+            memcpy(split->uvs + 2 * (size_t)made, uv, 2 * sizeof *uv);
+        }
+        at = s->next[at];
+    }
+    return at;
+}
+
+/* corner_uvs (F x 3 x 2) or uvs (V x 2) may be NULL; with both the corners' count.  Without corner_uvs the
+ * vertices stay as they are.  Vertices that no face uses are kept. */
+static npg_status split_vertices(corner_split *split, npg_arena *arena, size_t vert_count,
+                                 const uint32_t *faces, size_t face_count, const float *uvs,
+                                 const float *corner_uvs)
+{
+    size_t most = vert_count + (corner_uvs ? 3 * face_count : 0);
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    NPG_REQUIRE(most < UINT32_MAX);
+    splitting s = {split, npg_arena_take(&scratch, most, sizeof *s.next),
+                   npg_arena_take(&scratch, vert_count, 1)};
+    *split = (corner_split){.count = vert_count,
+                            .vertex = npg_arena_take(arena, most, sizeof *split->vertex),
+                            .indices = npg_arena_copy(arena, faces, face_count, 3 * sizeof *faces)};
+    if (uvs || corner_uvs) split->uvs = npg_arena_take(arena, most, 2 * sizeof *split->uvs);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = npg_arena_status(arena);
+    for (size_t i = 0; i < vert_count && !status; i++) {
+        split->vertex[i] = (uint32_t)i;
+        s.next[i] = UINT32_MAX;
+    }
+    for (size_t i = 0; i < 3 * face_count && corner_uvs && !status; i++)
+        split->indices[i] = copy_for(&s, faces[i], corner_uvs + 2 * i);
+    if (!status && !corner_uvs && uvs) memcpy(split->uvs, uvs, vert_count * 2 * sizeof *uvs);
+    npg_arena_release(&scratch);
+    return status;
+}
 
 /* ---- how many go into one file ---- */
 
@@ -208,8 +274,8 @@ static npg_status open_glb(void *state)
     glb_state *s = state;
     const npg_export_facts *facts = s->writer.facts;
     s->arena.purpose = NPG_FOR_FILES;
-    NPG_TRY(npg_corner_split_make(&s->split, &s->arena, facts->vert_count, facts->faces, facts->face_count,
-                                  facts->uvs, facts->corner_uvs));
+    NPG_TRY(split_vertices(&s->split, &s->arena, facts->vert_count, facts->faces, facts->face_count,
+                           facts->uvs, facts->corner_uvs));
     s->poses_most = poses_for(facts, s->split.count);
     s->segments = (facts->pose_count + (int64_t)s->poses_most - 1) / (int64_t)s->poses_most;
     s->base = npg_arena_take(&s->arena, facts->vert_count, 3 * sizeof *s->base);

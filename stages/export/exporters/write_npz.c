@@ -127,29 +127,10 @@ static npg_status put_header(npz_state *s, int which)
     return npg_zip_put(&s->zip, (size_t)s->at[which], text, HEADER);
 }
 
-/* The next values of an array, little-endian on any machine. */
+/* The next values of an array, as they stand in memory: the machines this runs on are little-endian. */
 static npg_status put(npz_state *s, int which, const void *words, size_t word_size, size_t count)
 {
-    unsigned char block[4096];
-    const unsigned char *from = words;
-    for (size_t i = 0; i < count;) {
-        size_t n = 0;
-        for (; i < count && n + word_size <= sizeof block; i++) {
-            uint64_t word = 0;
-            uint32_t half;
-            if (word_size == 8) {
-                memcpy(&word, from + 8 * i, 8);
-            } else if (word_size == 4) {
-                memcpy(&half, from + 4 * i, 4);
-                word = half;
-            } else {
-                word = from[i];
-            }
-            n += npg_put_little(block + n, word, word_size);
-        }
-        NPG_TRY(npg_zip_put(&s->zip, (size_t)s->at[which], block, n));
-    }
-    return NPG_OK;
+    return npg_zip_put(&s->zip, (size_t)s->at[which], words, word_size * count);
 }
 
 static npg_status put_fixed(npz_state *s)

@@ -1,7 +1,8 @@
-/* OBJ writer. */
+/* OBJ writer, and the writer of any format. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "export/exporters/exporters_internal.h"
 #include "pipeline/file.h"
@@ -79,4 +80,13 @@ npg_status npg_write_obj(const char *path, const npg_mesh_view *mesh)
     write_rows(file, "vn", mesh->vert_normals, mesh->vert_count, 3);
     for (size_t f = 0; f < mesh->face_count; f++) write_face(file, mesh, mesh->faces + 3 * f);
     return npg_file_commit(&file);
+}
+
+/* By the ending. */
+npg_status npg_write_mesh(const char *path, const npg_mesh_view *mesh)
+{
+    const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+    if (dot && !strcasecmp(dot, ".ply")) return npg_write_ply(path, mesh);
+    if (dot && !strcasecmp(dot, ".obj")) return npg_write_obj(path, mesh);
+    return npg_error(NPG_USAGE, "%s: a mesh is written as .ply or .obj", path);
 }
