@@ -237,6 +237,9 @@ bool npg_worker_stopping(const npg_worker *worker);
 /* The same of an npg_worker, as libraries and the parts of stages ask: their should_stop(user). */
 bool npg_worker_should_stop(void *worker);
 
+/* The output holds another job than this run's: npg_error_text() with what to do about it.  NPG_USAGE. */
+npg_status npg_worker_refuse_job(const npg_worker *worker);
+
 /* A line of the log; frame is the number of the frame it is about, -1 if none. */
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)
     NPG_PRINTF(4, 5);

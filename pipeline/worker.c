@@ -179,6 +179,14 @@ npg_status npg_worker_feed(npg_worker *worker, npg_chunk **chunk)
     return npg_ring_pop(worker->run->feed, chunk);
 }
 
+npg_status npg_worker_refuse_job(const npg_worker *worker)
+{
+    return npg_error(NPG_USAGE,
+                     "%s holds another job: %s; "
+                     "give --restart to discard what is there, or choose another output folder",
+                     npg_worker_settings(worker)->output, npg_error_text());
+}
+
 /* ---- log and warnings ---- */
 
 void npg_worker_log(npg_worker *worker, npg_log_level level, int64_t frame, const char *format, ...)

@@ -48,13 +48,8 @@ static void thin_out(npg_listing *files, size_t count)
 {
     size_t all = files->count;
     if (!count || count >= all) return;
-    for (size_t i = 0, next = 0; i < all; i++) {
-        size_t wanted = count == 1 ? all / 2 : next * (all - 1) / (count - 1);
-        if (next < count && i == wanted)
-            files->paths[next++] = files->paths[i];
-        else
-            npg_release(&files->paths[i]);
-    }
+    for (size_t i = 0; i < count; i++)
+        files->paths[i] = files->paths[count == 1 ? all / 2 : i * (all - 1) / (count - 1)];
     files->count = count;
 }
 

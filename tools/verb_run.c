@@ -1,6 +1,5 @@
 /* neupig run: the main job. */
 #include <errno.h>
-#include <jansson.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stddef.h>
@@ -10,7 +9,7 @@
 #include <unistd.h>
 
 #include "pipeline/clock.h"
-#include "pipeline/file.h"
+#include "pipeline/json_file.h"
 #include "tools/cli.h"
 #include "tools/progress.h"
 #include "tools/segments/segments.h"
@@ -140,9 +139,7 @@ static void end_watching(watcher *w)
 /* The last line: how good it is, and how to look at it. */
 static void print_verdict(const char *output)
 {
-    char path[4096];
-    snprintf(path, sizeof path, "%s/done.json", output);
-    json_t *done = json_load_file(path, 0, NULL);
+    json_t *done = npg_json_in(output, "done.json");
     const char *verdict = json_string_value(json_object_get(done, "verdict"));
     if (verdict) printf("%s: neupig view %s\n", verdict, output);
     json_decref(done);

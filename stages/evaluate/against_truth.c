@@ -127,7 +127,7 @@ static npg_status eval_all(evaluation *e)
 
 npg_status npg_eval(npg_eval_figures *all, const npg_eval_settings *settings)
 {
-    evaluation e = {.truth = {0}};
+    evaluation e = {.origin = {0}};
     NPG_TRY(npg_struct_take(&e.s, sizeof e.s, settings, NPG_SIZE_UP_TO(npg_eval_settings, frame),
                             "the settings"));
     NPG_REQUIRE(all && e.s.predicted && e.s.truth);

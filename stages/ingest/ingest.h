@@ -317,7 +317,8 @@ npg_status npg_capture_list(npg_frame_files **list, const npg_options *options, 
 #define NPG_CLOUDS ".ply .obj .xyz .xyzn .txt .pts .npy .pcd" /* endings of all that is read */
 
 typedef struct npg_listing {
-    char **paths; /* count of them, owned */
+    npg_arena arena; /* of the paths */
+    char **paths;    /* count of them */
     size_t count, room;
 } npg_listing;
 

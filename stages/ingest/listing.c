@@ -25,13 +25,10 @@ static bool ends_in(const char *name, const char *endings)
 
 static npg_status add_path(npg_listing *listing, char *path)
 {
-    npg_status status =
-        npg_grow(&listing->paths, &listing->room, listing->count + 1, sizeof *listing->paths, NPG_FOR_FILES);
-    if (status)
-        npg_release(&path);
-    else
-        listing->paths[listing->count++] = path;
-    return status;
+    NPG_TRY(
+        npg_arena_grow(&listing->arena, &listing->paths, &listing->room, listing->count + 1, sizeof path));
+    listing->paths[listing->count++] = path;
+    return NPG_OK;
 }
 
 typedef struct adding {
@@ -42,10 +39,8 @@ typedef struct adding {
 static npg_status add_name(void *user, const char *name)
 {
     const adding *a = user;
-    char *joined;
     if (!ends_in(name, a->endings)) return NPG_OK;
-    NPG_TRY(npg_join_path(&joined, a->folder, name));
-    return add_path(a->listing, joined);
+    return add_path(a->listing, npg_arena_path(&a->listing->arena, a->folder, name));
 }
 
 static npg_status add_folder(npg_listing *listing, const char *path, const char *endings)
@@ -62,30 +57,24 @@ static npg_status add_folder(npg_listing *listing, const char *path, const char 
 npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings)
 {
     struct stat facts;
-    char *copy;
+    listing->arena.purpose = NPG_FOR_FILES;
     if (stat(path, &facts) != 0) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
     if (S_ISDIR(facts.st_mode)) return add_folder(listing, path, endings);
-    NPG_TRY(npg_copy_text(&copy, path));
-    return add_path(listing, copy);
+    return add_path(listing, npg_arena_text(&listing->arena, path));
 }
 
 void npg_listing_keep(npg_listing *listing, const npg_selection *selection)
 {
     size_t kept = 0;
     int64_t count = (int64_t)listing->count;
-    for (int64_t i = 0; i < count; i++) {
-        if (npg_selection_takes(selection, i, i, count))
-            listing->paths[kept++] = listing->paths[i];
-        else
-            npg_release(&listing->paths[i]);
-    }
+    for (int64_t i = 0; i < count; i++)
+        if (npg_selection_takes(selection, i, i, count)) listing->paths[kept++] = listing->paths[i];
     listing->count = kept;
 }
 
 void npg_listing_close(npg_listing *listing)
 {
-    for (size_t i = 0; i < listing->count; i++) npg_release(&listing->paths[i]);
-    npg_release(&listing->paths);
+    npg_arena_release(&listing->arena);
     *listing = (npg_listing){0};
 }
 

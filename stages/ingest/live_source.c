@@ -1,7 +1,6 @@
 /* Live source: frames that come one after the other. */
 #include "ingest/ingest_internal.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -132,23 +131,10 @@ static npg_status next_streamed(npg_live_source *live, npg_frame *frame)
 }
 
 /* What is there is not of this source. */
-static npg_status refuse_job(const npg_live_source *live, const char *format, ...) NPG_PRINTF(2, 3);
-static npg_status refuse_job(const npg_live_source *live, const char *format, ...)
-{
-    char text[512];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    return npg_error(NPG_USAGE,
-                     "%s holds another job: %s; "
-                     "give --restart to discard what is there, or choose another output folder",
-                     npg_worker_settings(live->worker)->output, text);
-}
-
 static npg_status refuse(const npg_live_source *live, int64_t number, const char *what)
 {
-    return refuse_job(live, "frame %lld of %s %s", (long long)number, name_of(live), what);
+    npg_error(NPG_USAGE, "frame %lld of %s %s", (long long)number, name_of(live), what);
+    return npg_worker_refuse_job(live->worker);
 }
 
 static npg_status check_content(const npg_live_source *live, const npg_spooled *entry, const npg_frame *frame)
@@ -332,9 +318,11 @@ static npg_status check_end(npg_live_source *live)
         npg_frame_clear(&frame);
     }
     if (status && status != NPG_END) return status;
-    if (live->next < live->total)
-        return refuse_job(live, "%s had %lld frames and has %lld", name_of(live), (long long)live->total,
-                          (long long)live->next);
+    if (live->next < live->total) {
+        npg_error(NPG_USAGE, "%s had %lld frames and has %lld", name_of(live), (long long)live->total,
+                  (long long)live->next);
+        return npg_worker_refuse_job(live->worker);
+    }
     if (live->follow) NPG_TRY(npg_follow_count_new(live->follow, &fresh));
     if (fresh)
         npg_worker_warn(live->worker, false, -1,
@@ -481,9 +469,9 @@ static npg_status check_file(npg_live_source *live, const npg_spooled *entry, co
     *gone += !is_there;
     if (!is_there && is_needed) what = "missing";
     if (is_there && hash != entry->hash) what = "not the one it was";
-    return what ? refuse_job(live, "the input %s is %s (frame %lld)", slash + 1, what,
-                             (long long)entry->number)
-                : NPG_OK;
+    if (!what) return NPG_OK;
+    npg_error(NPG_USAGE, "the input %s is %s (frame %lld)", slash + 1, what, (long long)entry->number);
+    return npg_worker_refuse_job(live->worker);
 }
 
 /* The state may be older than what was said of the frame. */

@@ -242,23 +242,13 @@ npg_status npg_job_open_forward(npg_job *job)
 
 /* ---- opening ---- */
 
-npg_status npg_job_differs(const npg_job *job)
-{
-    char text[1024];
-    snprintf(text, sizeof text, "%s", npg_error_text());
-    return npg_error(NPG_USAGE,
-                     "%s holds another job: %s; "
-                     "give --restart to discard what is there, or choose another output folder",
-                     job->output, text);
-}
-
 /* What a run of the same job does that was begun before, whose state is open if there is one. */
 static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *worker, bool is_done,
                                bool append)
 {
     int64_t added, planned;
     npg_status status = npg_job_compare(&added, job->then, job->now);
-    if (status == NPG_USAGE) return npg_job_differs(job);
+    if (status == NPG_USAGE) return npg_worker_refuse_job(worker);
     NPG_TRY(status);
     *start = is_done ? NPG_JOB_DONE : NPG_JOB_RESUME;
     if (added && is_done && !append)
@@ -289,7 +279,7 @@ static npg_status look_around(npg_job *job, npg_job_start *start, npg_worker *wo
     if (!status && !json_equal(json_object_get(job->then, "layout"), json_object_get(job->now, "layout")))
         status = npg_error(NPG_USAGE, "it was begun by another version of neupig");
     if (!status) status = look_for_end(job, &is_done, &was_partial);
-    if (status == NPG_USAGE) return npg_job_differs(job);
+    if (status == NPG_USAGE) return npg_worker_refuse_job(worker);
     NPG_TRY(status);
     /* a stream, or frames that are pushed, may be others: stage export has the word on what is there */
     if (is_done && job->source > NPG_JOB_FOLLOW) return NPG_OK;

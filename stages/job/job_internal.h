@@ -81,9 +81,6 @@ npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment);
 
 #define NPG_BLOCK_FRAMES "frames" /* of a state: how many had come */
 
-/* The job is not the one that lies there: npg_error_text() with what to do about it.  NPG_USAGE. */
-npg_status npg_job_differs(const npg_job *job);
-
 /* ---- what the results are made of (job_inputs.c) ---- */
 
 /* A new JSON object.  */

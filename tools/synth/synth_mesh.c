@@ -12,7 +12,8 @@ static const int tetrahedra[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
                                      {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
 
 typedef struct field {
-    size_t size[3]; /* nodes along each axis */
+    npg_arena arena; /* of what follows      */
+    size_t size[3];  /* nodes along each axis */
     double lo[3], cell;
     double *value;      /* at every node; never 0                                          */
     uint32_t (*cut)[7]; /* the vertex on the edge from a node in each of 7 directions, + 1 */
@@ -20,14 +21,6 @@ typedef struct field {
     uint32_t *faces;
     size_t vert_count, vert_room, face_count, face_room;
 } field;
-
-static void close_field(field *f)
-{
-    npg_release(&f->value);
-    npg_release(&f->cut);
-    npg_release(&f->vert_pos);
-    npg_release(&f->faces);
-}
 
 static void node_position(const field *f, size_t node, double p[3])
 {
@@ -39,14 +32,15 @@ static npg_status open_field(field *f, npg_distance_fn *distance, const void *us
                              const double hi[3], double cell)
 {
     size_t count = 1;
-    *f = (field){.cell = cell};
+    *f = (field){.arena = {.purpose = NPG_FOR_MESH}, .cell = cell};
     for (int k = 0; k < 3; k++) {
         f->lo[k] = lo[k];
         f->size[k] = (size_t)ceil((hi[k] - lo[k]) / cell) + 1;
         count *= f->size[k];
     }
-    NPG_TRY(npg_alloc_array(&f->value, NPG_FOR_MESH, count, sizeof *f->value));
-    NPG_TRY(npg_alloc_array(&f->cut, NPG_FOR_MESH, count, sizeof *f->cut));
+    f->value = npg_arena_take(&f->arena, count, sizeof *f->value);
+    f->cut = npg_arena_take(&f->arena, count, sizeof *f->cut);
+    NPG_TRY(npg_arena_status(&f->arena));
     for (size_t n = 0; n < count; n++) {
         double p[3];
         node_position(f, n, p);
@@ -71,7 +65,7 @@ static npg_status cut_edge(field *f, size_t a, size_t b, uint32_t *vertex)
     uint32_t *slot = &f->cut[a][direction - 1];
     if (!*slot) {
         double pa[3], pb[3], t = f->value[a] / (f->value[a] - f->value[b]);
-        NPG_TRY(npg_grow(&f->vert_pos, &f->vert_room, f->vert_count + 1, 3 * sizeof(float), NPG_FOR_MESH));
+        NPG_TRY(npg_arena_grow(&f->arena, &f->vert_pos, &f->vert_room, f->vert_count + 1, 3 * sizeof(float)));
         node_position(f, a, pa);
         node_position(f, b, pb);
         t = fmin(fmax(t, 0.05), 0.95); /* vertices that nearly coincide would give faces without area */
@@ -84,7 +78,7 @@ static npg_status cut_edge(field *f, size_t a, size_t b, uint32_t *vertex)
 
 static npg_status add_face(field *f, uint32_t a, uint32_t b, uint32_t c)
 {
-    NPG_TRY(npg_grow(&f->faces, &f->face_room, f->face_count + 1, 3 * sizeof *f->faces, NPG_FOR_MESH));
+    NPG_TRY(npg_arena_grow(&f->arena, &f->faces, &f->face_room, f->face_count + 1, 3 * sizeof *f->faces));
     memcpy(f->faces + 3 * f->face_count++, (uint32_t[3]){a, b, c}, 3 * sizeof(uint32_t));
     return NPG_OK;
 }
@@ -223,7 +217,7 @@ npg_status npg_body_mesh(npg_mesh **out, npg_distance_fn *distance, const void *
         memcpy(mesh->faces, f.faces, f.face_count * 3 * sizeof(uint32_t));
         status = even_out(mesh, distance, user, cell);
     }
-    close_field(&f);
+    npg_arena_release(&f.arena);
     if (!status) status = check_closed(mesh);
     if (status) npg_mesh_unref(&mesh);
     *out = mesh;
