@@ -176,32 +176,34 @@ static void draw_bar(npg_reporter *reporter, const npg_progress *progress)
     reporter->bar_drawn = true;
 }
 
-static void print_line(json_t *object)
+void npg_reporter_print(const npg_reporter *reporter, json_t *record)
 {
-    char *text = json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(6));
+    bool is_shown = reporter->show == NPG_SHOW_JSON;
+    char *text = is_shown ? json_dumps(record, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
     if (text) puts(text);
     fflush(stdout);
     free(text);
-    json_decref(object);
+    json_decref(record);
 }
 
-static void print_json(const npg_progress *progress)
+static void print_json(const npg_reporter *reporter, const npg_progress *progress)
 {
-    print_line(json_pack("{ss ss so so so sI sI sI sI sI sI so}", "event", "progress", "stage",
-                         progress->stage ? progress->stage : "", "share", npg_json_real(progress->share),
-                         "elapsed_s", npg_json_real(progress->elapsed_s), "left_s",
-                         npg_json_real(progress->left_s >= 0 ? progress->left_s : (double)NAN), "frames_done",
-                         (json_int_t)progress->frames_done, "frames", (json_int_t)progress->frames, "step",
-                         (json_int_t)progress->step, "steps", (json_int_t)progress->steps, "window",
-                         (json_int_t)progress->window, "windows", (json_int_t)progress->windows, "loss",
-                         npg_json_real(progress->loss)));
+    npg_reporter_print(
+        reporter, json_pack("{ss ss so so so sI sI sI sI sI sI so}", "event", "progress", "stage",
+                            progress->stage ? progress->stage : "", "share", npg_json_real(progress->share),
+                            "elapsed_s", npg_json_real(progress->elapsed_s), "left_s",
+                            npg_json_real(progress->left_s >= 0 ? progress->left_s : (double)NAN),
+                            "frames_done", (json_int_t)progress->frames_done, "frames",
+                            (json_int_t)progress->frames, "step", (json_int_t)progress->step, "steps",
+                            (json_int_t)progress->steps, "window", (json_int_t)progress->window, "windows",
+                            (json_int_t)progress->windows, "loss", npg_json_real(progress->loss)));
 }
 
 static void show_progress(void *user, const npg_progress *progress)
 {
     npg_reporter *reporter = user;
     if (reporter->show == NPG_SHOW_BAR) draw_bar(reporter, progress);
-    if (reporter->show == NPG_SHOW_JSON) print_json(progress);
+    if (reporter->show == NPG_SHOW_JSON) print_json(reporter, progress);
 }
 
 npg_hooks npg_reporter_hooks(npg_reporter *reporter)
@@ -216,10 +218,7 @@ void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *out
                              "exit_code", npg_status_exit_code(status), "output", npg_json_text(output));
     if (line && status < 0) json_object_set_new(line, "message", npg_json_text(npg_error_text()));
     npg_log_file_write(&reporter->log_fd, json_incref(line));
-    if (line && reporter->show == NPG_SHOW_JSON)
-        print_line(line);
-    else
-        json_decref(line);
+    npg_reporter_print(reporter, line);
     if (reporter->log_fd >= 0) close(reporter->log_fd);
     reporter->log_fd = -1;
 }

@@ -38,6 +38,9 @@ void npg_reporter_pause(npg_reporter *reporter);
 /* Remove the bar, and write the closing record to the log file and in JSON mode to standard output. */
 void npg_reporter_end(npg_reporter *reporter, npg_status status, const char *output);
 
+/* In JSON mode a record (consumed; NULL does nothing) as a line on standard output. */
+void npg_reporter_print(const npg_reporter *reporter, json_t *record);
+
 /* Append a record (consumed; NULL does nothing) with "time" put in front to a log file: one write, so that
  * several processes may append to the same one.  A write that fails is reported once on standard error, and
  * *fd (-1: does nothing) becomes -1. */

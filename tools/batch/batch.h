@@ -141,7 +141,6 @@ bool npg_verdict_is_done(const npg_verdict *verdict);
 /* What verdict.json says; is_known is false when there is none. */
 void npg_verdict_read(npg_verdict *verdict, const npg_capture *capture);
 npg_status npg_verdict_write(const npg_capture *capture);
-npg_status npg_verdict_remove(const npg_capture *capture);
 
 /* Exit code of a batch: 75 when it was stopped before its end, 1 when a capture has failed
  * or is not done, 7 when one is done with frames skipped or below the quality bar, else 0.

@@ -175,7 +175,7 @@ npg_status npg_process_start(npg_process *p, npg_capture *capture)
     *p = (npg_process){.capture = capture, .out = -1, .err = -1, .begun_s = npg_clock_s()};
     npg_status status = npg_make_folder(capture->output);
     if (!status) stat_done(p->done_before, capture);
-    if (!status && !p->done_before[1]) status = npg_verdict_remove(capture);
+    if (!status && !p->done_before[1]) status = npg_file_remove(capture->output, "verdict.json");
     if (!status) status = npg_path_of(log_path, capture->output, "log.jsonl");
     if (!status) status = make_command(&c, capture, log_path);
     if (!status) log_command(capture, &c);

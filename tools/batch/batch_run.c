@@ -32,16 +32,6 @@ typedef struct work {
 
 /* ---- reports ---- */
 
-static void print_record(work *w, json_t *record)
-{
-    char *text =
-        w->reporter->show == NPG_SHOW_JSON ? json_dumps(record, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
-    if (text) puts(text);
-    fflush(stdout);
-    free(text);
-    json_decref(record);
-}
-
 static void report_start(work *w, const npg_capture *capture)
 {
     npg_reporter_log(w->reporter, NPG_LOG_INFO, npg_clock_s() - w->begun_s, capture->name,
@@ -49,7 +39,8 @@ static void report_start(work *w, const npg_capture *capture)
     if (capture->of_mesh_vertices)
         npg_reporter_log(w->reporter, NPG_LOG_WARNING, npg_clock_s() - w->begun_s, capture->name,
                          "%s holds meshes and no clouds: their vertices are the points", capture->input);
-    print_record(w, json_pack("{s:s,s:o}", "event", "start", "name", npg_json_text(capture->name)));
+    npg_reporter_print(w->reporter,
+                       json_pack("{s:s,s:o}", "event", "start", "name", npg_json_text(capture->name)));
 }
 
 static void report_end(work *w, const npg_capture *capture)
@@ -67,7 +58,7 @@ static void report_end(work *w, const npg_capture *capture)
     json_t *record = npg_verdict_json(capture);
     json_object_set_new(record, "event", json_string("verdict"));
     json_object_set_new(record, "was_done", json_boolean(v->was_done));
-    print_record(w, record);
+    npg_reporter_print(w->reporter, record);
 }
 
 /* ---- progress ---- */
@@ -107,7 +98,7 @@ static void print_progress(work *w, size_t i)
     w->reported_s[i] = now_s;
     json_t *record = json_pack("{s:s,s:o}", "event", "progress", "name", npg_json_text(p->capture->name));
     json_object_update_missing(record, p->progress);
-    print_record(w, record);
+    npg_reporter_print(w->reporter, record);
 }
 
 /* ---- signals ---- */

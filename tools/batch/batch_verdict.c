@@ -14,13 +14,8 @@
 
 static const char *word_of(int exit_code)
 {
-    static const struct {
-        int code;
-        const char *word;
-    } words[] = {{0, "done"}, {1, "failed"}, {2, "usage"},   {3, "bad input"}, {4, "device"},
-                 {5, "disk"}, {6, "memory"}, {7, "partial"}, {75, "stopped"}};
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (words[i].code == exit_code) return words[i].word;
+    for (int status = NPG_MEMORY; status < NPG_FAILED; status++)
+        if (npg_status_exit_code((npg_status)status) == exit_code) return npg_status_name((npg_status)status);
     return "failed";
 }
 
@@ -157,11 +152,6 @@ npg_status npg_verdict_write(const npg_capture *capture)
                                : npg_error(NPG_MEMORY, "no memory for a verdict");
     json_decref(object);
     return status;
-}
-
-npg_status npg_verdict_remove(const npg_capture *capture)
-{
-    return npg_file_remove(capture->output, FILE_NAME);
 }
 
 void npg_verdict_read(npg_verdict *v, const npg_capture *capture)
