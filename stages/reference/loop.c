@@ -33,7 +33,9 @@ static void grow(npg_reference_loop *loop, int64_t unreached)
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result)
 {
     npg_brief *brief = &loop->brief;
-    bool is_whole_now = loop->unreached_before && !result->unreached_count;
+    /* What a side has taken from past its border was not followed yet: what other frames see through shows then. */
+    bool is_whole_now =
+        loop->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
     grow(loop, result->unreached_count);
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->is_growing && !is_whole_now;

@@ -28,8 +28,9 @@ typedef struct npg_reference_loop {
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
 
 /* The brief of the next one.  A side of the body grows until all frames are reached, or two passes in a row
- * that ask for the least have reached no more.  What has grown is gathered once more: the last frames that
- * were reached had nothing around them yet. */
+ * that ask for the least have reached no more.  What has grown, or been taken from past its border by
+ * a side that reaches all, is gathered once more: the last frames that were reached had nothing around them
+ * yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
 
 #endif

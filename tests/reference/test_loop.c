@@ -72,7 +72,12 @@ static void a_side_that_reaches_all_is_gathered_whatever_it_lacks(void **state)
     (void)state;
     npg_reference_loop loop;
     npg_reference_begin(&loop, 1);
-    assert_true(next_side(&loop, 0).takes_gathered);
+    npg_brief brief = next_side(&loop, 0);
+    assert_true(brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 1); /* what was past its border was not followed */
+    brief = next_side(&loop, 0);
+    assert_true(brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 0);
 }
 
 static void growth_in_vain_asks_for_less_and_then_ends(void **state)
