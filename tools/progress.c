@@ -14,14 +14,15 @@
 
 #include "pipeline/json_file.h"
 
-void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose)
+void npg_reporter_init(npg_reporter *reporter, const npg_reporter_settings *s)
 {
     bool terminal = isatty(STDERR_FILENO);
-    if (show == NPG_SHOW_AUTO) show = terminal && !quiet ? NPG_SHOW_BAR : NPG_SHOW_NONE;
+    int show = s->show;
+    if (show == NPG_SHOW_AUTO) show = terminal && !s->quiet ? NPG_SHOW_BAR : NPG_SHOW_NONE;
     *reporter = (npg_reporter){.show = show,
-                               .level = quiet     ? NPG_LOG_WARNING
-                                        : verbose ? NPG_LOG_DEBUG
-                                                  : NPG_LOG_INFO,
+                               .level = s->quiet     ? NPG_LOG_WARNING
+                                        : s->verbose ? NPG_LOG_DEBUG
+                                                     : NPG_LOG_INFO,
                                .colour = terminal && !getenv("NO_COLOR"),
                                .drawn_s = -1,
                                .log_fd = -1};

@@ -18,8 +18,24 @@ typedef struct npg_reporter {
     int log_fd;     /* of the log file; -1: none, or it could not be written */
 } npg_reporter;
 
+/* What the verbs that start runs take of it, and the rows of their tables; place: where it is in their values. */
+typedef struct npg_reporter_settings {
+    int show;
+    bool quiet, verbose;
+} npg_reporter_settings;
+
+#define NPG_REPORTER_ROWS(place)                                                                             \
+    NPG_ROW_CHOICE(                                                                                          \
+        "progress", (place) + offsetof(npg_reporter_settings, show), "auto", "auto|bar|json|none",           \
+        "How to show progress. json writes one line per step to standard output; auto: a bar on a "          \
+        "terminal"),                                                                                         \
+        NPG_ROW_FLAG("quiet", (place) + offsetof(npg_reporter_settings, quiet), "no",                        \
+                     "Log warnings and errors only (also -q)"),                                              \
+        NPG_ROW_FLAG("verbose", (place) + offsetof(npg_reporter_settings, verbose), "no",                    \
+                     "Log everything (also -v)")
+
 /* AUTO is a bar when standard error is a terminal, else nothing. */
-void npg_reporter_init(npg_reporter *reporter, int show, bool quiet, bool verbose);
+void npg_reporter_init(npg_reporter *reporter, const npg_reporter_settings *settings);
 
 /* Every log record, the start and the end also as a line of JSON at the end of a file, in whole lines, so
  * that several runs may share it.  "" for none.  NPG_DISK.  Closed by npg_reporter_end(). */

@@ -8,8 +8,7 @@
 
 typedef struct settings {
     const char *input;
-    int progress;
-    bool quiet, verbose;
+    npg_reporter_settings shown;
 } settings;
 
 #define AT(member) offsetof(settings, member)
@@ -19,19 +18,9 @@ const npg_option npg_append_options[] = {
     /* type        name        place         default  words or shown as */
     NPG_ROW_TEXT  ("input",    AT(input),    "",      "PATH",
         "Where the frames are now, if they were moved; all of them, the old ones too"),
-    NPG_ROW_CHOICE("progress", AT(progress), "auto",  "auto|bar|json|none",
-        "How to show progress; json writes one line per step to standard output; auto: a bar on a terminal"),
-    NPG_ROW_FLAG  ("quiet",    AT(quiet),    "no",
-        "Log warnings and errors only (also -q)"),
-    NPG_ROW_FLAG  ("verbose",  AT(verbose),  "no",
-        "Log everything (also -v)"),
+    NPG_REPORTER_ROWS(AT(shown)),
     {0}};
 /* clang-format on */
-
-static bool is_done(const char *folder)
-{
-    return npg_is_in_folder(folder, "done.json");
-}
 
 /* A job that is not done yet is first brought to its end as it was begun. */
 static npg_status append(npg_options *options, const npg_cli *cli, const settings *s)
@@ -40,8 +29,9 @@ static npg_status append(npg_options *options, const npg_cli *cli, const setting
     NPG_TRY(npg_segments_refuse(cli->operands[0], cli->verb->name, true));
     NPG_TRY(npg_options_load_job(options, cli->operands[0]));
     if (s->input[0]) NPG_TRY(npg_options_set(options, "input", s->input));
-    npg_reporter_init(&reporter, s->progress, s->quiet, s->verbose);
-    npg_status status = is_done(cli->operands[0]) ? NPG_OK : npg_run_job(options, &reporter);
+    npg_reporter_init(&reporter, &s->shown);
+    npg_status status =
+        npg_is_in_folder(cli->operands[0], "done.json") ? NPG_OK : npg_run_job(options, &reporter);
     if (status != NPG_OK && status != NPG_PARTIAL) return status;
     NPG_TRY(npg_options_set(options, "append", "yes"));
     status = npg_run_job(options, &reporter);

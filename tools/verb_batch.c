@@ -5,8 +5,9 @@
 #include "tools/cli.h"
 
 typedef struct settings {
-    int progress, segments;
-    bool quiet, verbose, list, report;
+    npg_reporter_settings shown;
+    int segments;
+    bool list, report;
     int64_t jobs, task_index, task_count;
     double max_time_s;
 } settings;
@@ -32,12 +33,7 @@ const npg_option npg_batch_options[] = {
         "With several processes or machines: the number of this one, from 0"),
     NPG_ROW_INT   ("task-count", AT(task_count), "1",        1,     1e6,  "N",
         "... of so many; each capture is done by exactly one"),
-    NPG_ROW_CHOICE("progress",   AT(progress),   "auto",     "auto|bar|json|none",
-        "How to show progress; json writes one line per event to standard output; auto: a bar on a terminal"),
-    NPG_ROW_FLAG  ("quiet",      AT(quiet),      "no",
-        "Log warnings and errors only (also -q)"),
-    NPG_ROW_FLAG  ("verbose",    AT(verbose),    "no",
-        "Log everything (also -v)"),
+    NPG_REPORTER_ROWS(AT(shown)),
     {0}};
 /* clang-format on */
 
@@ -64,7 +60,7 @@ static npg_status run(npg_batch *batch, const settings *s)
 {
     npg_reporter reporter;
     bool stopped;
-    npg_reporter_init(&reporter, s->progress, s->quiet, s->verbose);
+    npg_reporter_init(&reporter, &s->shown);
     npg_status status = npg_batch_run(batch, &reporter, (size_t)s->jobs, &stopped);
     npg_reporter_pause(&reporter);
     if (!status) status = npg_batch_report(batch, reporter.show == NPG_SHOW_JSON ? NULL : stdout);
@@ -86,7 +82,7 @@ static npg_status report(npg_batch *batch, const settings *s)
     batch->task_count = 1;
     for (size_t i = 0; i < batch->count; i++)
         npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
-    NPG_TRY(npg_batch_report(batch, s->quiet ? NULL : stdout));
+    NPG_TRY(npg_batch_report(batch, s->shown.quiet ? NULL : stdout));
     return status_of(batch, npg_batch_exit_code(batch, true, false));
 }
 

@@ -16,8 +16,7 @@
 
 typedef struct settings {
     const char *log_file;
-    int progress;
-    bool quiet, verbose;
+    npg_reporter_settings shown;
     int segments;
 } settings;
 
@@ -26,14 +25,9 @@ typedef struct settings {
 /* clang-format off */
 const npg_option npg_run_verb_options[] = {
     /* type        name        place         default  words or shown as */
-    NPG_ROW_CHOICE("progress", AT(progress), "auto",  "auto|bar|json|none",
-        "How to show progress. json writes one line per step to standard output; auto: a bar on a terminal"),
+    NPG_REPORTER_ROWS(AT(shown)),
     NPG_ROW_TEXT  ("log-file", AT(log_file), "",      "FILE",
         "Append the log to FILE, one JSON object per line"),
-    NPG_ROW_FLAG  ("quiet",    AT(quiet),    "no",
-        "Log warnings and errors only (also -q)"),
-    NPG_ROW_FLAG  ("verbose",  AT(verbose),  "no",
-        "Log everything (also -v)"),
     NPG_ROW_CHOICE("segments", AT(segments), "one",   "one|auto",
         "Where the topology changes: one reference, or others from there on. With one an alarm says from "
         "where; with auto each has its frames in OUT/segment_*"),
@@ -220,7 +214,7 @@ int npg_verb_run(int argc, char **argv)
     if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
     if (!status) status = check_paths(options, &cli);
     if (!status) {
-        npg_reporter_init(&reporter, s.progress, s.quiet, s.verbose);
+        npg_reporter_init(&reporter, &s.shown);
         status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
         if (!status) status = run_or_segment(options, &s, &reporter);
         if (reporter.show != NPG_SHOW_JSON)

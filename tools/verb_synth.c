@@ -88,8 +88,7 @@ static npg_status make_folders(const settings *s)
     for (int i = 0; i < 2; i++) {
         char path[NPG_PATH_SIZE];
         NPG_TRY(npg_path_of(path, s->output, kinds[i]));
-        npg_status status = npg_make_folder(path);
-        NPG_TRY(status);
+        NPG_TRY(npg_make_folder(path));
     }
     return NPG_OK;
 }

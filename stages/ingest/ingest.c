@@ -291,7 +291,7 @@ static npg_status open_live(npg_worker *worker)
     NPG_TRY(spill_folder(path, &folder, worker));
     NPG_TRY(npg_live_source_open(&live, worker, &s->live, cache_limit(worker), folder));
     npg_worker_keep(worker, live, release_live);
-    return npg_worker_publish(worker, &npg_fact_frame_store, npg_live_source_cache(live));
+    return NPG_OK;
 }
 
 /* One frame per chunk, so that nothing waits for frames that may come much later. */

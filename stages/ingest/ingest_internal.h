@@ -274,14 +274,11 @@ typedef struct npg_live_settings {
 
 typedef struct npg_live_source npg_live_source;
 
-/* For the whole run.  Frames that were read and cleaned take cache_bytes, and beyond that a file in spill_folder
+/* For the whole run.  Frames that were read and cleaned (npg_fact_frame_store) take cache_bytes, and beyond that a file in spill_folder
  *.  NPG_USAGE, NPG_BAD_INPUT. */
 npg_status npg_live_source_open(npg_live_source **live, npg_worker *worker, const npg_live_settings *settings,
                                 size_t cache_bytes, const char *spill_folder);
 void npg_live_source_close(npg_live_source **live);
-
-/* What was read and cleaned; a loan. */
-npg_frame_store *npg_live_source_cache(npg_live_source *live);
 
 /* Frame `index` into *frame: any of the look-ahead, with is_last_use only once more; in the measuring pass and
  * behind the look-ahead in the solving one also the next that comes.  NPG_END: there is none with this index;

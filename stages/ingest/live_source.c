@@ -599,6 +599,7 @@ npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const
     if (!status) status = npg_frame_store_open(&live->cache, cache_bytes, spill_folder);
     if (!status) status = open_source(live);
     if (!status && facts->is_resumed) status = walk_again(live, false);
+    if (!status) status = npg_worker_publish(worker, &npg_fact_frame_store, live->cache);
     if (status) npg_live_source_close(&live);
     *out = live;
     return status;
@@ -619,11 +620,6 @@ void npg_live_source_close(npg_live_source **slot)
     npg_store_close(&live->own);
     npg_release(&live->entries);
     npg_release(slot);
-}
-
-npg_frame_store *npg_live_source_cache(npg_live_source *live)
-{
-    return live->cache;
 }
 
 npg_status npg_live_check_done(npg_worker *worker, npg_store *spool)

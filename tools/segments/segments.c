@@ -127,11 +127,6 @@ static npg_status read_topology(json_t **topology, const npg_segments *s, const 
     return *topology ? NPG_OK : npg_error(NPG_DISK, "can't read back %s/topology.json", folder);
 }
 
-static int64_t min_of(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
-}
-
 /* The segment of the keyframe keeps its side of the cut; the result is the other. */
 static npg_segment cut_segment(npg_segment *kept, const json_t *topology, int64_t overlap)
 {
@@ -144,12 +139,12 @@ static npg_segment cut_segment(npg_segment *kept, const json_t *topology, int64_
     if (!strcmp(json_string_value(json_object_get(topology, "direction")), "forward")) {
         rest.first = from;
         kept->last = from - 1;
-        rest.shared_first = min_of(overlap, from - kept->first);
+        rest.shared_first = overlap < from - kept->first ? overlap : from - kept->first;
         kept->shared_last = 0;
     } else {
         rest.last = from;
         kept->first = from + 1;
-        rest.shared_last = min_of(overlap, kept->last - from);
+        rest.shared_last = overlap < kept->last - from ? overlap : kept->last - from;
         kept->shared_first = 0;
     }
     return rest;
