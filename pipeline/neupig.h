@@ -433,9 +433,10 @@ NPG_API npg_status npg_apply(npg_applied *applied, const npg_apply_settings *set
 
 typedef enum npg_picture_colour {
     NPG_PICTURE_PLAIN,
-    NPG_PICTURE_VERTEX,  /* the file's own                                                             */
-    NPG_PICTURE_NORMAL,  /* by the direction of the surface                                            */
-    NPG_PICTURE_IDENTITY /* by place in the first mesh: shows that vertices keep their place on the body */
+    NPG_PICTURE_VERTEX,   /* the file's own                                                             */
+    NPG_PICTURE_NORMAL,   /* by the direction of the surface                                            */
+    NPG_PICTURE_IDENTITY, /* by place in the first mesh: shows that vertices keep their place on the body */
+    NPG_PICTURE_AUTO      /* a cloud's own where it has any, else plain                                  */
 } npg_picture_colour;
 
 typedef struct npg_picture_settings {

@@ -66,7 +66,7 @@ const npg_verb npg_verbs[] = {
      "(DIR/truth).  The same options and seed give the same bytes.",
      npg_synth_options, false, npg_verb_synth},
     {"render", "FILE... -o IMAGE.png", 1, 4096, "Draw meshes or clouds to a PNG without a display",
-     "Draws each FILE (a mesh or a cloud; a folder stands for its files) into one tile of a picture.  "
+     "Draws each FILE (a mesh or a cloud; a folder stands for its files, a rig.json for its frames) into one tile of a picture.  "
      "All tiles share one camera, so that motion shows.",
      npg_render_options, false, npg_verb_render},
     {"view", "OUT [OTHER] [-o PAGE.html]", 1, 2, "A page with the moving mesh and where it is wrong",

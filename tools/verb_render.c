@@ -34,8 +34,8 @@ const npg_option npg_render_options[] = {
         "Degrees above the horizon"),
     NPG_ROW_CHOICE("up",         AT(up),         "y",     "y|z",
         "The upward axis"),
-    NPG_ROW_CHOICE("colour",     AT(colour),     "plain", "plain|vertex|normal|identity",
-        "plain; vertex: colours in the file; normal; "
+    NPG_ROW_CHOICE("colour",     AT(colour),     "auto",  "plain|vertex|normal|identity|auto",
+        "auto: clouds in their own colours, meshes plain; vertex: colours in the file; normal; "
         "identity: by place in the first file, to see vertices keep their place on the body"),
     NPG_ROW_REAL  ("point-size", AT(point_size), "0.35",  0.01,  20,   "PERCENT",
         "Radius of a cloud's points, in % of the diagonal"),

@@ -56,11 +56,11 @@ static void colour_vertex(float *colour, const npg_mesh *mesh, size_t v, int kin
                           const npg_bounds *bounds)
 {
     static const float plain[3] = {0.80f, 0.78f, 0.74f};
+    bool is_own = kind == NPG_PICTURE_VERTEX || (kind == NPG_PICTURE_AUTO && !mesh->face_count);
     for (size_t k = 0; k < 3; k++) {
         double extent = bounds->hi[k] - bounds->lo[k];
         colour[k] = plain[k];
-        if (kind == NPG_PICTURE_VERTEX && mesh->vert_colours)
-            colour[k] = (float)mesh->vert_colours[4 * v + k] / 255;
+        if (is_own && mesh->vert_colours) colour[k] = (float)mesh->vert_colours[4 * v + k] / 255;
         if (kind == NPG_PICTURE_NORMAL && mesh->vert_normals)
             colour[k] = 0.5f + 0.5f * mesh->vert_normals[3 * v + k];
         if (kind == NPG_PICTURE_IDENTITY && extent > 0)

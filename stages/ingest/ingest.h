@@ -36,7 +36,7 @@ npg_status npg_read_mesh(npg_mesh **mesh, const char *path, npg_origin *origin);
 npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin);
 
 /* The same for any of the formats, faces or not: points alone become a mesh with face_count 0.  NPG_BAD_INPUT
- * where there is not even a point. */
+ * where there is not even a point.  "rig.json#NUMBER": that frame of a rig, as npg_rig_usual has it. */
 npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin);
 
 /* Frames concatenated on a stream (a pipe will do): PLY or NPY files one after the other.  NPG_END at a clean
@@ -100,6 +100,9 @@ typedef struct npg_rig_settings {
     double tolerance_s;   /* images of different sensors belong together within this                  */
     bool confine;         /* refuse what the rig names outside its folder                             */
 } npg_rig_settings;
+
+/* What the options of a run say when none is given. */
+extern const npg_rig_settings npg_rig_usual;
 
 /* Images of one sensor at one time. */
 typedef struct npg_rig_shot {
@@ -174,6 +177,11 @@ uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame);
  * colour images, the sensor of each.  frame must be empty.  Sensors are decoded in parallel; the result does
  * not depend on it.  NPG_BAD_INPUT names the image.  A frame without a usable pixel has 0 points. */
 npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *origin);
+
+/* The same as a mesh without faces, of the frame with a number: "PATH#NUMBER", and whether a text is that of a
+ * rig that is there.  NPG_BAD_INPUT. */
+bool npg_rig_is_frame(const char *text);
+npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin);
 
 /* ---- agreement (rig_overlap.c) ---- */
 

@@ -54,12 +54,29 @@ static npg_status add_folder(npg_listing *listing, const char *path, const char 
     return status;
 }
 
+/* The frames of a rig, each as "rig.json#NUMBER" (npg_read_shape()). */
+static npg_status add_rig(npg_listing *listing, const char *path)
+{
+    npg_rig *rig;
+    NPG_TRY(npg_rig_open(&rig, path, &npg_rig_usual));
+    npg_status status = NPG_OK;
+    for (size_t f = 0; f < rig->frame_count && !status; f++) {
+        char *name = npg_arena_take(&listing->arena, strlen(path) + 24, 1);
+        if (name) sprintf(name, "%s#%lld", path, (long long)rig->numbers[f]);
+        status = name ? add_path(listing, name) : npg_arena_status(&listing->arena);
+    }
+    npg_rig_close(&rig);
+    return status;
+}
+
 npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings)
 {
     struct stat facts;
     listing->arena.purpose = NPG_FOR_FILES;
+    if (npg_rig_is_frame(path)) return add_path(listing, npg_arena_text(&listing->arena, path));
     if (stat(path, &facts) != 0) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
     if (S_ISDIR(facts.st_mode)) return add_folder(listing, path, endings);
+    if (npg_rig_is(path)) return add_rig(listing, path);
     return add_path(listing, npg_arena_text(&listing->arena, path));
 }
 

@@ -33,6 +33,21 @@ size_of() { od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $
     done
 }
 
+@test "the frames of a rig, in their colours" {
+    "$NEUPIG" synth -o r --rig --cameras 2 --frames 4 --width 80 --height 60 >/dev/null
+    "$NEUPIG" render r/rig/rig.json -o strip.png --height 50 --width 40
+    [ "$(size_of strip.png)" = "160 50" ]
+    "$NEUPIG" render r/rig/rig.json -o one.png --height 50 --count 1
+    "$NEUPIG" render 'r/rig/rig.json#2' -o two.png --height 50
+    cmp one.png two.png
+    "$NEUPIG" render r/rig/rig.json -o plain.png --height 50 --count 1 --colour plain
+    run cmp -s one.png plain.png
+    [ "$status" -eq 1 ]
+    run "$NEUPIG" render 'r/rig/rig.json#9' -o none.png
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"rig.json#9: the rig has no such frame"* ]]
+}
+
 @test "colours in the file are shown" {
     printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n' >c.ply
     printf 'property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n' >>c.ply

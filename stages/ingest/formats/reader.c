@@ -178,6 +178,7 @@ npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin
 
 npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin)
 {
+    if (npg_rig_is_frame(path)) return npg_rig_read_shape(mesh, path, origin);
     const char *format = npg_reader_for(path);
     bool has_faces = !format || !strcmp(format, "ply") || !strcmp(format, "obj");
     return read_mesh(mesh, path, origin, has_faces, true);

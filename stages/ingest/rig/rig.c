@@ -69,6 +69,8 @@ bool npg_rig_is(const char *path)
     return layout_of(path, &name) != NULL;
 }
 
+const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
+
 /* ---- open and close ---- */
 
 /* The folder that names start from: the path itself, or the one its file lies in. */

@@ -1,9 +1,12 @@
 /* One frame of a rig: the points of all its sensors in one cloud, in world coordinates. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "ingest/rig/rig_internal.h"
 #include "pipeline/parallel.h"
+
+#define PATH_MOST 4096
 
 typedef struct reading {
     npg_rig *rig;
@@ -88,5 +91,60 @@ npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *o
     for (size_t s = 0; s < rig->sensor_count; s++) npg_arena_release(&r.of[s].arena);
     frame->has_sure_normals = true;
     if (status) npg_frame_clear(frame);
+    return status;
+}
+
+/* ---- a frame by its name ---- */
+
+/* Split "PATH#NUMBER"; false where it is none. */
+static bool split(char path[PATH_MOST], int64_t *number, const char *text)
+{
+    const char *mark = strrchr(text, '#');
+    char *end = NULL;
+    if (!mark || (size_t)(mark - text) >= PATH_MOST) return false;
+    memcpy(path, text, (size_t)(mark - text));
+    path[mark - text] = 0;
+    *number = strtoll(mark + 1, &end, 10);
+    return mark[1] && !*end && npg_rig_is(path);
+}
+
+bool npg_rig_is_frame(const char *text)
+{
+    char path[PATH_MOST];
+    int64_t number;
+    return split(path, &number, text);
+}
+
+/* Its points become the mesh's. */
+static npg_status give_points(npg_mesh **mesh, npg_frame *frame)
+{
+    NPG_TRY(npg_mesh_open(mesh, 0, 0));
+    (*mesh)->vert_count = frame->point_count;
+    npg_release(&(*mesh)->vert_pos);
+    npg_release(&(*mesh)->vert_normals);
+    (*mesh)->vert_pos = frame->pos_local;
+    (*mesh)->vert_normals = frame->normals;
+    (*mesh)->vert_colours = frame->colours;
+    frame->pos_local = frame->normals = NULL;
+    frame->colours = NULL;
+    return NPG_OK;
+}
+
+npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
+{
+    char path[PATH_MOST];
+    int64_t number;
+    npg_rig *rig;
+    npg_frame frame = {0};
+    *mesh = NULL;
+    if (!split(path, &number, text)) return npg_error(NPG_BAD_INPUT, "%s: no frame of a rig", text);
+    NPG_TRY(npg_rig_open(&rig, path, &npg_rig_usual));
+    size_t at = npg_rig_find(rig, number);
+    npg_status status = at == SIZE_MAX ? npg_error(NPG_BAD_INPUT, "%s: the rig has no such frame", text)
+                                       : npg_rig_read(rig, &frame, at, origin);
+    if (!status && !frame.point_count) status = npg_error(NPG_BAD_INPUT, "%s: the frame has no points", text);
+    if (!status) status = give_points(mesh, &frame);
+    npg_frame_clear(&frame);
+    npg_rig_close(&rig);
     return status;
 }
