@@ -3,19 +3,42 @@
 
 #include <math.h>
 
-void npg_check_values(npg_arena *arena, float **values, double **wide, size_t n, double scale,
-                      npg_random *random)
+npg_status npg_kernel_case_run(const npg_kernel_case *c, npg_device *device, int size, uint64_t seed,
+                               double *error)
 {
-    *values = npg_arena_take(arena, n, sizeof **values);
-    if (wide) *wide = npg_arena_take(arena, n, sizeof **wide);
-    for (size_t i = 0; i < n && !npg_arena_status(arena); i++) {
-        (*values)[i] = (float)(scale * (2 * npg_random_real(random) - 1));
-        if (wide) (*wide)[i] = (double)(*values)[i];
+    npg_check check = {.device = device,
+                       .random =
+                           npg_random_stream(seed, (uint64_t)(10 + c - npg_kernel_cases), (uint64_t)size),
+                       .arena.purpose = NPG_FOR_RUN};
+    npg_status status = c->check(&check, size);
+    for (size_t i = 0; i < check.buffer_count; i++) npg_buffer_close(&check.buffers[i]);
+    npg_arena_release(&check.arena);
+    *error = check.error;
+    return status;
+}
+
+float *npg_check_values(npg_check *c, double **wide, size_t n, double scale)
+{
+    float *values = npg_arena_take(&c->arena, n, sizeof *values);
+    double *same = wide ? npg_arena_take(&c->arena, n, sizeof *same) : NULL;
+    for (size_t i = 0; i < n && !npg_arena_status(&c->arena); i++) {
+        values[i] = (float)(scale * (2 * npg_random_real(&c->random) - 1));
+        if (same) same[i] = (double)values[i];
     }
+    if (wide) *wide = same;
+    return values;
+}
+
+npg_status npg_check_buffer(npg_check *c, npg_buffer **out, const float *values, size_t n)
+{
+    NPG_REQUIRE(c->buffer_count < NPG_CHECK_BUFFERS);
+    *out = &c->buffers[c->buffer_count++];
+    return values ? npg_buffer_from(*out, c->device, values, n * sizeof *values)
+                  : npg_buffer_open(*out, c->device, n * sizeof *values);
 }
 
 /* 1e-30: what is all zero is compared as it is, not divided by 0. */
-void npg_check_compare(double *error, const float *got, const double *want, size_t n)
+void npg_check_compare(npg_check *c, const float *got, const double *want, size_t n)
 {
     double largest = 1e-30, worst = 0;
     for (size_t i = 0; i < n; i++) {
@@ -23,15 +46,14 @@ void npg_check_compare(double *error, const float *got, const double *want, size
         largest = fmax(largest, fabs(want[i]));
         worst = isfinite(off) ? fmax(worst, off) : (double)INFINITY;
     }
-    *error = fmax(*error, worst / largest);
+    c->error = fmax(c->error, worst / largest);
 }
 
-npg_status npg_check_buffer(double *error, const npg_buffer *got, const double *want, size_t n)
+npg_status npg_check_compare_buffer(npg_check *c, const npg_buffer *got, const double *want, size_t n)
 {
-    float *values;
-    NPG_TRY(npg_alloc_array(&values, NPG_FOR_RUN, n, sizeof *values));
-    npg_status status = npg_buffer_read(got, 0, values, n * sizeof *values);
-    if (!status) npg_check_compare(error, values, want, n);
-    npg_release(&values);
-    return status;
+    float *values = npg_arena_take(&c->arena, n, sizeof *values);
+    NPG_TRY(npg_arena_status(&c->arena));
+    NPG_TRY(npg_buffer_read(got, 0, values, n * sizeof *values));
+    npg_check_compare(c, values, want, n);
+    return NPG_OK;
 }

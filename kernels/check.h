@@ -6,17 +6,30 @@
 #include "kernels/runtime/device.h"
 #include "pipeline/random.h"
 
-/* n values in +-scale, as float and (when `wide` is not NULL) the same in double, from an arena whose status
- * is to be asked before they are used. */
-void npg_check_values(npg_arena *arena, float **values, double **wide, size_t n, double scale,
-                      npg_random *random);
+#define NPG_CHECK_BUFFERS 8 /* of one case, at most */
 
-/* *error = max(*error, max |got - want| / max |want|); a value that is not finite counts
- * as infinitely wrong. */
-void npg_check_compare(double *error, const float *got, const double *want, size_t n);
+/* One case at work, and what goes with it when it ends: arrays from the arena, and buffers. */
+typedef struct npg_check {
+    npg_device *device; /* loan */
+    npg_random random;
+    npg_arena arena;
+    npg_buffer buffers[NPG_CHECK_BUFFERS];
+    size_t buffer_count;
+    double error; /* the largest so far, relative to the largest value */
+} npg_check;
+
+/* n values in +-scale, as float and (when `wide` is not NULL) the same in double, from the arena, whose status
+ * is to be asked before they are used. */
+float *npg_check_values(npg_check *check, double **wide, size_t n, double scale);
+
+/* A buffer of n floats, with these values or (NULL) zero. */
+npg_status npg_check_buffer(npg_check *check, npg_buffer **buffer, const float *values, size_t n);
+
+/* error = max(error, max |got - want| / max |want|); a value that is not finite counts as infinitely wrong. */
+void npg_check_compare(npg_check *check, const float *got, const double *want, size_t n);
 
 /* The same for what is in a buffer. */
-npg_status npg_check_buffer(double *error, const npg_buffer *got, const double *want, size_t n);
+npg_status npg_check_compare_buffer(npg_check *check, const npg_buffer *got, const double *want, size_t n);
 
 /* The cases, one per op. */
 npg_kernel_check npg_check_latent, npg_check_sobolev, npg_check_mlp, npg_check_adam, npg_check_transform,

@@ -1,6 +1,5 @@
 /* latent and sobolev: the checker's cases. */
 #include <math.h>
-#include <string.h>
 
 #include "kernels/check.h"
 #include "kernels/latent.h"
@@ -20,110 +19,79 @@ static void make_levels(npg_levels *levels, int size)
 
 /* ---- latent ---- */
 
-typedef struct latent_data {
+static npg_status run_latent(npg_check *c, npg_latent *latent, npg_samples *samples, int size)
+{
     npg_levels levels;
-    npg_samples samples;
-    float *positions, *normals, *nodes, *dz;
-    double *nodes_wide, *dz_wide, *z, *dnodes;
-    size_t real, rows;
-    npg_arena arrays; /* holds all arrays but those of the samples */
-} latent_data;
-
-static npg_status open_latent_data(latent_data *d, int size, uint64_t seed)
-{
-    npg_random random = npg_random_stream(seed, 10, (uint64_t)size);
-    d->real = size == 1 ? 5 : (size_t)size * 397 + 3;
-    d->rows = NPG_PADDED(d->real);
-    make_levels(&d->levels, size);
-    size_t nodes = d->levels.row_count * CHANNELS, z = d->rows * CHANNELS;
-    npg_arena *a = &d->arrays;
-    a->purpose = NPG_FOR_RUN;
-    npg_check_values(a, &d->positions, NULL, d->real * 3, 1.05, &random); /* some outside the cube */
-    npg_check_values(a, &d->normals, NULL, d->real * 3, 1, &random);
-    npg_check_values(a, &d->nodes, &d->nodes_wide, nodes, 1, &random);
-    npg_check_values(a, &d->dz, &d->dz_wide, z, 1, &random);
-    d->z = npg_arena_take(a, z, sizeof(double));
-    d->dnodes = npg_arena_take(a, nodes, sizeof(double));
-    NPG_TRY(npg_arena_status(a));
-    for (size_t i = d->real * CHANNELS; i < z; i++) d->dz[i] = 0, d->dz_wide[i] = 0;
-    return npg_samples_open(&d->samples, &d->levels, d->positions, d->normals, d->real, d->rows);
+    npg_buffer *z, *nodes, *dnodes, *dz;
+    make_levels(&levels, size);
+    size_t real = size == 1 ? 5 : (size_t)size * 397 + 3, rows = NPG_PADDED(real);
+    size_t node_size = levels.row_count * CHANNELS, row_size = rows * CHANNELS;
+    double *nodes_wide, *dz_wide;
+    const float *positions = npg_check_values(c, NULL, real * 3, 1.05); /* some outside the cube */
+    const float *normals = npg_check_values(c, NULL, real * 3, 1);
+    const float *node_values = npg_check_values(c, &nodes_wide, node_size, 1);
+    float *dz_values = npg_check_values(c, &dz_wide, row_size, 1);
+    double *want_z = npg_arena_take(&c->arena, row_size, sizeof *want_z);
+    double *want_nodes = npg_arena_take(&c->arena, node_size, sizeof *want_nodes);
+    NPG_TRY(npg_arena_status(&c->arena));
+    for (size_t i = real * CHANNELS; i < row_size; i++) dz_values[i] = 0, dz_wide[i] = 0;
+    NPG_TRY(npg_samples_open(samples, &levels, positions, normals, real, rows));
+    NPG_TRY(npg_latent_open(latent, c->device, samples));
+    NPG_TRY(npg_check_buffer(c, &z, NULL, row_size));
+    NPG_TRY(npg_check_buffer(c, &nodes, node_values, node_size));
+    NPG_TRY(npg_check_buffer(c, &dnodes, NULL, node_size));
+    NPG_TRY(npg_check_buffer(c, &dz, dz_values, row_size));
+    NPG_TRY(npg_latent_sample(latent, z, nodes));
+    NPG_TRY(npg_latent_back(latent, dnodes, dz, z));
+    npg_latent_sample_ref(want_z, nodes_wide, samples);
+    npg_latent_back_ref(want_nodes, dz_wide, want_z, samples);
+    NPG_TRY(npg_check_compare_buffer(c, z, want_z, row_size));
+    return npg_check_compare_buffer(c, dnodes, want_nodes, node_size);
 }
 
-typedef struct latent_buffers {
-    npg_latent latent;
-    npg_buffer z, nodes, dnodes, dz;
-} latent_buffers;
-
-static npg_status compare_latent(npg_device *device, latent_data *d, latent_buffers *b, double *error)
+npg_status npg_check_latent(npg_check *c, int size)
 {
-    size_t nodes = d->levels.row_count * CHANNELS, z = d->rows * CHANNELS;
-    NPG_TRY(npg_latent_open(&b->latent, device, &d->samples));
-    NPG_TRY(npg_buffer_open(&b->z, device, z * sizeof(float)));
-    NPG_TRY(npg_buffer_from(&b->nodes, device, d->nodes, nodes * sizeof(float)));
-    NPG_TRY(npg_buffer_open(&b->dnodes, device, nodes * sizeof(float)));
-    NPG_TRY(npg_buffer_from(&b->dz, device, d->dz, z * sizeof(float)));
-    NPG_TRY(npg_latent_sample(&b->latent, &b->z, &b->nodes));
-    NPG_TRY(npg_latent_back(&b->latent, &b->dnodes, &b->dz, &b->z));
-    npg_latent_sample_ref(d->z, d->nodes_wide, &d->samples);
-    npg_latent_back_ref(d->dnodes, d->dz_wide, d->z, &d->samples);
-    NPG_TRY(npg_check_buffer(error, &b->z, d->z, z));
-    return npg_check_buffer(error, &b->dnodes, d->dnodes, nodes);
-}
-
-npg_status npg_check_latent(npg_device *device, int size, uint64_t seed, double *error)
-{
-    latent_data d = {0};
-    latent_buffers b = {0};
-    *error = 0;
-    npg_status status = open_latent_data(&d, size, seed);
-    if (!status) status = compare_latent(device, &d, &b, error);
-    npg_latent_close(&b.latent);
-    npg_buffer_close(&b.z);
-    npg_buffer_close(&b.nodes);
-    npg_buffer_close(&b.dnodes);
-    npg_buffer_close(&b.dz);
-    npg_samples_close(&d.samples);
-    npg_arena_release(&d.arrays);
+    npg_latent latent = {0};
+    npg_samples samples = {0};
+    npg_status status = run_latent(c, &latent, &samples, size);
+    npg_latent_close(&latent);
+    npg_samples_close(&samples);
     return status;
 }
 
 /* ---- sobolev: the residual of the matrix itself ---- */
 
-static npg_status residual_of(npg_device *device, const npg_levels *levels, npg_random *random, double *error)
+static npg_status run_sobolev(npg_check *c, npg_sobolev *sobolev, const npg_levels *levels)
 {
-    npg_sobolev sobolev = {0};
-    npg_buffer x = {0}, y = {0};
+    npg_buffer *x, *y;
     size_t n = levels->row_count * CHANNELS;
-    npg_arena scratch = {.purpose = NPG_FOR_RUN};
-    float *right, *solution = npg_arena_take(&scratch, n, sizeof *solution);
-    double *right_wide, *wide = npg_arena_take(&scratch, n, sizeof *wide);
-    double *again = npg_arena_take(&scratch, n, sizeof *again);
-    npg_check_values(&scratch, &right, &right_wide, n, 1, random);
-    npg_status status = npg_arena_status(&scratch);
-    if (!status) status = npg_sobolev_open(&sobolev, device, levels);
-    if (!status) status = npg_buffer_from(&y, device, right, n * sizeof(float));
-    if (!status) status = npg_buffer_open(&x, device, n * sizeof(float));
-    if (!status) status = npg_sobolev_solve(&sobolev, &x, &y);
-    if (!status) status = npg_buffer_read(&x, 0, solution, n * sizeof(float));
-    double off = 0, size = 0;
-    for (size_t i = 0; !status && i < n; i++) wide[i] = (double)solution[i];
-    if (!status) npg_sobolev_apply_ref(again, wide, levels);
-    for (size_t i = 0; !status && i < n; i++) {
+    double *right_wide, off = 0, size = 0;
+    const float *right = npg_check_values(c, &right_wide, n, 1);
+    float *solution = npg_arena_take(&c->arena, n, sizeof *solution);
+    double *wide = npg_arena_take(&c->arena, n, sizeof *wide);
+    double *again = npg_arena_take(&c->arena, n, sizeof *again);
+    NPG_TRY(npg_arena_status(&c->arena));
+    NPG_TRY(npg_sobolev_open(sobolev, c->device, levels));
+    NPG_TRY(npg_check_buffer(c, &y, right, n));
+    NPG_TRY(npg_check_buffer(c, &x, NULL, n));
+    NPG_TRY(npg_sobolev_solve(sobolev, x, y));
+    NPG_TRY(npg_buffer_read(x, 0, solution, n * sizeof *solution));
+    for (size_t i = 0; i < n; i++) wide[i] = (double)solution[i];
+    npg_sobolev_apply_ref(again, wide, levels);
+    for (size_t i = 0; i < n; i++) {
         off += (again[i] - right_wide[i]) * (again[i] - right_wide[i]);
         size += right_wide[i] * right_wide[i];
     }
-    *error = sqrt(off / size);
-    npg_sobolev_close(&sobolev);
-    npg_buffer_close(&x);
-    npg_buffer_close(&y);
-    npg_arena_release(&scratch);
-    return status;
+    c->error = sqrt(off / size);
+    return NPG_OK;
 }
 
-npg_status npg_check_sobolev(npg_device *device, int size, uint64_t seed, double *error)
+npg_status npg_check_sobolev(npg_check *c, int size)
 {
     npg_levels levels;
-    npg_random random = npg_random_stream(seed, 11, (uint64_t)size);
+    npg_sobolev sobolev = {0};
     make_levels(&levels, size);
-    return residual_of(device, &levels, &random, error);
+    npg_status status = run_sobolev(c, &sobolev, &levels);
+    npg_sobolev_close(&sobolev);
+    return status;
 }

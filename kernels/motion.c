@@ -16,13 +16,6 @@ void npg_pack16(float *out, const float *points, size_t count, size_t padded)
     }
 }
 
-void npg_unpack16(float *points, const float *packed, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        for (size_t axis = 0; axis < 3; axis++)
-            points[3 * i + axis] = packed[NPG_POINT_AT(i) + axis * NPG_LANES];
-}
-
 size_t npg_tree_blocks(size_t count)
 {
     size_t total = 0, children = NPG_BLOCKS(count);

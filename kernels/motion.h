@@ -6,9 +6,8 @@
 #include "kernels/layout.h"
 #include "kernels/runtime/device.h"
 
-/* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last; and back. */
+/* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last. */
 void npg_pack16(float *out, const float *points, size_t count, size_t padded);
-void npg_unpack16(float *points, const float *packed, size_t count);
 
 /* Order of points along a Morton curve of their own box: order[i] is the index of the i-th.
  * Points are finite. */

@@ -9,169 +9,151 @@
 #define FRAMES 3
 
 typedef struct motion_data {
+    npg_check *check; /* its arena has the arrays */
+    npg_motion motion;
+    npg_buffer *out_buffer, *dout_buffer;
     size_t real, rows, edge_count, count[FRAMES];
     float *rest, *out, *points[FRAMES];
     double *rest_wide, *out_wide, *points_wide[FRAMES], *edge_rest;
-    double *x, *g, *dout; /* of all frames: real x 3, real x 3, rows x 8 */
+    double *x, *g; /* of all frames: real x 3 each */
     uint32_t (*edges)[2];
     size_t *to_points, *to_verts; /* of one frame */
-    npg_arena arrays;             /* holds all of these */
 } motion_data;
 
-/* Put points into Morton order, in both copies. */
-static npg_status sort_points(float *points, double *wide, size_t count)
+static double distance_to(const double *a, const double *b)
 {
-    uint32_t *order;
-    NPG_TRY(npg_alloc_array(&order, NPG_FOR_RUN, count, sizeof *order));
-    npg_status status = npg_morton_order(order, points, count);
-    for (size_t i = 0; !status && i < 3 * count; i++) wide[i] = (double)points[3 * order[i / 3] + i % 3];
-    for (size_t i = 0; !status && i < 3 * count; i++) points[i] = (float)wide[i];
-    npg_release(&order);
-    return status;
+    return sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
 }
 
-static npg_status make_points(motion_data *d, int size, npg_random *random)
+/* Put points into Morton order, in both copies. */
+static npg_status sort_points(motion_data *d, float *points, double *wide, size_t count)
 {
-    size_t most = 0;
+    uint32_t *order = npg_arena_take(&d->check->arena, count, sizeof *order);
+    NPG_TRY(npg_arena_status(&d->check->arena));
+    NPG_TRY(npg_morton_order(order, points, count));
+    for (size_t i = 0; i < 3 * count; i++) wide[i] = (double)points[3 * order[i / 3] + i % 3];
+    for (size_t i = 0; i < 3 * count; i++) points[i] = (float)wide[i];
+    return NPG_OK;
+}
+
+static npg_status make_points(motion_data *d, int size)
+{
     for (size_t t = 0; t < FRAMES; t++) {
         /* one point, a full leaf, and many; some of them in one place */
         d->count[t] = t == 0 ? 1 : t == 1 ? 16 * (size_t)size : 61 * (size_t)(size * size) + 5;
-        npg_check_values(&d->arrays, &d->points[t], &d->points_wide[t], d->count[t] * 3, 0.7, random);
-        NPG_TRY(npg_arena_status(&d->arrays));
+        d->points[t] = npg_check_values(d->check, &d->points_wide[t], d->count[t] * 3, 0.7);
+        NPG_TRY(npg_arena_status(&d->check->arena));
         for (size_t i = d->count[t] / 2; i < d->count[t] / 2 + 3 && i < d->count[t]; i++)
             memcpy(d->points[t] + 3 * i, d->points[t], 3 * sizeof(float));
-        NPG_TRY(sort_points(d->points[t], d->points_wide[t], d->count[t]));
-        if (d->count[t] > most) most = d->count[t];
+        NPG_TRY(sort_points(d, d->points[t], d->points_wide[t], d->count[t]));
     }
-    d->to_verts = npg_arena_take(&d->arrays, most, sizeof(size_t));
-    d->to_points = npg_arena_take(&d->arrays, d->real, sizeof(size_t));
-    return npg_arena_status(&d->arrays);
+    return NPG_OK;
 }
 
-static npg_status open_motion_data(motion_data *d, int size, uint64_t seed)
+static npg_status make_data(motion_data *d, int size)
 {
-    npg_random random = npg_random_stream(seed, 14, (uint64_t)size);
+    npg_arena *a = &d->check->arena;
     d->real = size == 1 ? 4 : (size_t)(size * size) * 53 + 1;
     d->rows = NPG_PADDED(d->real);
     d->edge_count = 2 * d->real - 3;
-    d->arrays.purpose = NPG_FOR_RUN;
-    npg_check_values(&d->arrays, &d->rest, &d->rest_wide, d->real * 3, 0.9, &random);
-    npg_check_values(&d->arrays, &d->out, &d->out_wide, FRAMES * d->rows * NPG_MLP_OUT, 2, &random);
-    d->edges = npg_arena_take(&d->arrays, d->edge_count, sizeof *d->edges);
-    d->edge_rest = npg_arena_take(&d->arrays, d->edge_count, sizeof(double));
-    d->x = npg_arena_take(&d->arrays, FRAMES * d->real * 3, sizeof(double));
-    d->g = npg_arena_take(&d->arrays, FRAMES * d->real * 3, sizeof(double));
-    d->dout = npg_arena_take(&d->arrays, FRAMES * d->rows * NPG_MLP_OUT, sizeof(double));
-    NPG_TRY(npg_arena_status(&d->arrays));
-    NPG_TRY(sort_points(d->rest, d->rest_wide, d->real));
+    d->rest = npg_check_values(d->check, &d->rest_wide, d->real * 3, 0.9);
+    d->out = npg_check_values(d->check, &d->out_wide, FRAMES * d->rows * NPG_MLP_OUT, 2);
+    d->edges = npg_arena_take(a, d->edge_count, sizeof *d->edges);
+    d->edge_rest = npg_arena_take(a, d->edge_count, sizeof(double));
+    d->x = npg_arena_take(a, FRAMES * d->real * 3, sizeof(double));
+    d->g = npg_arena_take(a, FRAMES * d->real * 3, sizeof(double));
+    d->to_points = npg_arena_take(a, d->real, sizeof(size_t));
+    NPG_TRY(npg_arena_status(a));
+    NPG_TRY(sort_points(d, d->rest, d->rest_wide, d->real));
     for (size_t i = 0; i < FRAMES * d->rows; i++) { /* padding repeats the last vertex, as in a fit */
         size_t v = i % d->rows < d->real ? i : i / d->rows * d->rows + d->real - 1;
         memcpy(d->out + i * NPG_MLP_OUT, d->out + v * NPG_MLP_OUT, NPG_MLP_OUT * sizeof(float));
         memcpy(d->out_wide + i * NPG_MLP_OUT, d->out_wide + v * NPG_MLP_OUT, NPG_MLP_OUT * sizeof(double));
     }
-    NPG_TRY(make_points(d, size, &random));
+    NPG_TRY(make_points(d, size));
+    d->to_verts = npg_arena_take(a, d->count[FRAMES - 1], sizeof(size_t));
     for (size_t e = 0; e < d->edge_count; e++) { /* a strip: every vertex with the next two */
         d->edges[e][0] = (uint32_t)(e / 2);
         d->edges[e][1] = (uint32_t)(e / 2 + 1 + e % 2);
-        const double *a = d->rest_wide + 3 * d->edges[e][0], *b = d->rest_wide + 3 * d->edges[e][1];
         d->edge_rest[e] =
-            (double)(float)sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
+            (double)(float)distance_to(d->rest_wide + 3 * d->edges[e][0], d->rest_wide + 3 * d->edges[e][1]);
     }
+    return npg_arena_status(a);
+}
+
+static npg_status open_motion(motion_data *d)
+{
+    npg_target targets[FRAMES];
+    size_t size = FRAMES * d->rows * NPG_MLP_OUT;
+    for (size_t t = 0; t < FRAMES; t++) targets[t] = (npg_target){d->points[t], d->count[t]};
+    NPG_TRY(npg_motion_open(&d->motion, d->check->device, d->rest, d->real, d->rows,
+                            (const uint32_t(*)[2])d->edges, d->edge_count, targets, FRAMES));
+    NPG_TRY(npg_check_buffer(d->check, &d->out_buffer, d->out, size));
+    NPG_TRY(npg_check_buffer(d->check, &d->dout_buffer, NULL, size));
+    return npg_motion_apply(&d->motion, d->out_buffer, 0, FRAMES);
+}
+
+/* Positions of all frames from the device, real x 3 each; from the arena. */
+static npg_status read_frames(float **points, const npg_buffer *buffer, const motion_data *d)
+{
+    npg_arena *a = &d->check->arena;
+    float *packed = npg_arena_take(a, FRAMES * d->rows, 3 * sizeof *packed);
+    *points = npg_arena_take(a, FRAMES * d->real, 3 * sizeof **points);
+    NPG_TRY(npg_arena_status(a));
+    NPG_TRY(npg_buffer_read(buffer, 0, packed, FRAMES * d->rows * 3 * sizeof *packed));
+    for (size_t i = 0; i < FRAMES * d->real; i++)
+        for (size_t axis = 0; axis < 3; axis++)
+            (*points)[3 * i + axis] =
+                packed[3 * (i / d->real) * d->rows + NPG_POINT_AT(i % d->real) + axis * NPG_LANES];
     return NPG_OK;
 }
 
-static npg_status open_motion(npg_motion *motion, npg_buffer *out, npg_device *device, const motion_data *d)
-{
-    npg_target targets[FRAMES];
-    for (size_t t = 0; t < FRAMES; t++) targets[t] = (npg_target){d->points[t], d->count[t]};
-    NPG_TRY(npg_motion_open(motion, device, d->rest, d->real, d->rows, (const uint32_t(*)[2])d->edges,
-                            d->edge_count, targets, FRAMES));
-    NPG_TRY(npg_buffer_from(out, device, d->out, FRAMES * d->rows * NPG_MLP_OUT * sizeof(float)));
-    return npg_motion_apply(motion, out, 0, FRAMES);
-}
-
-/* Positions of all frames from the device, real x 3 each, into a float list. */
-static npg_status read_frames(float *points, const npg_buffer *buffer, const motion_data *d)
-{
-    float *packed;
-    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_RUN, d->rows, 3 * sizeof(float)));
-    npg_status status = NPG_OK;
-    for (size_t t = 0; t < FRAMES && !status; t++) {
-        size_t bytes = d->rows * 3 * sizeof(float);
-        status = npg_buffer_read(buffer, t * bytes, packed, bytes);
-        npg_unpack16(points + t * d->real * 3, packed, d->real);
-    }
-    npg_release(&packed);
-    return status;
-}
-
-static npg_status compare_frames(double *error, const npg_buffer *buffer, const double *want,
-                                 const motion_data *d)
+static npg_status compare_frames(const motion_data *d, const npg_buffer *buffer, const double *want)
 {
     float *got;
-    NPG_TRY(npg_alloc_array(&got, NPG_FOR_RUN, FRAMES * d->real, 3 * sizeof(float)));
-    npg_status status = read_frames(got, buffer, d);
-    if (!status) npg_check_compare(error, got, want, FRAMES * d->real * 3);
-    npg_release(&got);
+    NPG_TRY(read_frames(&got, buffer, d));
+    npg_check_compare(d->check, got, want, FRAMES * d->real * 3);
+    return NPG_OK;
+}
+
+typedef npg_status compare_with(motion_data *d);
+
+static npg_status check_motion(npg_check *check, int size, compare_with *compare)
+{
+    motion_data d = {.check = check};
+    npg_status status = make_data(&d, size);
+    if (!status) status = open_motion(&d);
+    if (!status) status = compare(&d);
+    npg_motion_close(&d.motion);
     return status;
 }
 
 /* ---- transform ---- */
 
-static void transform_twins(motion_data *d)
-{
-    for (size_t t = 0; t < FRAMES; t++)
-        for (size_t v = 0; v < d->real; v++) {
-            const double *out = d->out_wide + (t * d->rows + v) * NPG_MLP_OUT;
-            npg_transform_ref(d->x + (t * d->real + v) * 3, out, d->rest_wide + 3 * v);
-        }
-}
-
-static void transform_back_twins(motion_data *d)
-{
-    for (size_t t = 0; t < FRAMES; t++)
-        for (size_t v = 0; v < d->real; v++) {
-            size_t at = (t * d->rows + v) * NPG_MLP_OUT;
-            npg_transform_back_ref(d->dout + at, d->g + (t * d->real + v) * 3, d->out_wide + at,
-                                   d->rest_wide + 3 * v);
-        }
-}
-
-/* The gradient that is passed back here is the positions themselves, brought in as the
- * data term with gain 1. */
-static npg_status compare_transform(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                                    npg_buffer *dout, double *error)
+/* The gradient that is passed back here is the positions themselves, brought in as the data term with gain 1. */
+static npg_status compare_transform(motion_data *d)
 {
     const float gains[FRAMES] = {1, 1, 1};
-    float *x;
-    NPG_TRY(open_motion(motion, out, device, d));
-    transform_twins(d);
-    NPG_TRY(compare_frames(error, &motion->x, d->x, d));
-    NPG_TRY(npg_alloc_array(&x, NPG_FOR_RUN, FRAMES * d->rows, 3 * sizeof(float)));
-    npg_status status = npg_buffer_read(&motion->x, 0, x, FRAMES * d->rows * 3 * sizeof(float));
-    if (!status) status = npg_buffer_write(&motion->g, 0, x, FRAMES * d->rows * 3 * sizeof(float));
-    npg_release(&x);
-    NPG_TRY(status);
-    memcpy(d->g, d->x, FRAMES * d->real * 3 * sizeof *d->g);
-    transform_back_twins(d);
-    NPG_TRY(npg_buffer_open(dout, device, FRAMES * d->rows * NPG_MLP_OUT * sizeof(float)));
-    NPG_TRY(npg_motion_back(motion, dout, out, gains, 0, 0, FRAMES));
-    return npg_check_buffer(error, dout, d->dout, FRAMES * d->rows * NPG_MLP_OUT);
+    npg_motion *motion = &d->motion;
+    size_t size = FRAMES * d->rows * NPG_MLP_OUT, bytes = FRAMES * d->rows * 3 * sizeof(float);
+    float *x = npg_arena_take(&d->check->arena, 1, bytes);
+    double *dout = npg_arena_take(&d->check->arena, size, sizeof *dout);
+    NPG_TRY(npg_arena_status(&d->check->arena));
+    for (size_t i = 0; i < FRAMES * d->real; i++) {
+        size_t v = i % d->real, at = (i / d->real * d->rows + v) * NPG_MLP_OUT;
+        npg_transform_ref(d->x + 3 * i, d->out_wide + at, d->rest_wide + 3 * v);
+        npg_transform_back_ref(dout + at, d->x + 3 * i, d->out_wide + at, d->rest_wide + 3 * v);
+    }
+    NPG_TRY(compare_frames(d, &motion->x, d->x));
+    NPG_TRY(npg_buffer_read(&motion->x, 0, x, bytes));
+    NPG_TRY(npg_buffer_write(&motion->g, 0, x, bytes));
+    NPG_TRY(npg_motion_back(motion, d->dout_buffer, d->out_buffer, gains, 0, 0, FRAMES));
+    return npg_check_compare_buffer(d->check, d->dout_buffer, dout, size);
 }
 
-npg_status npg_check_transform(npg_device *device, int size, uint64_t seed, double *error)
+npg_status npg_check_transform(npg_check *check, int size)
 {
-    motion_data d = {0};
-    npg_motion motion = {0};
-    npg_buffer out = {0}, dout = {0};
-    *error = 0;
-    npg_status status = open_motion_data(&d, size, seed);
-    if (!status) status = compare_transform(device, &d, &motion, &out, &dout, error);
-    npg_motion_close(&motion);
-    npg_buffer_close(&out);
-    npg_buffer_close(&dout);
-    npg_arena_release(&d.arrays);
-    return status;
+    return check_motion(check, size, compare_transform);
 }
 
 /* ---- nearest and chamfer ---- */
@@ -186,117 +168,83 @@ static void pair_up(motion_data *d, const double *x, size_t t)
         d->to_verts[p] = npg_nearest_ref(&dist_sq, d->points_wide[t] + 3 * p, x, d->real);
 }
 
-static double distance_to(const double *a, const double *b)
+/* Indices may differ where distances are equal: what must agree is the distance.  `first`: where the frame's
+ * answers begin. */
+static npg_status compare_answers(motion_data *d, const npg_buffer *answers, size_t first, const double *from,
+                                  size_t count, const double *to, const size_t *want)
 {
-    return sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
+    int32_t *index = npg_arena_take(&d->check->arena, count, sizeof *index);
+    NPG_TRY(npg_arena_status(&d->check->arena));
+    NPG_TRY(npg_buffer_read(answers, first * sizeof *index, index, count * sizeof *index));
+    for (size_t i = 0; i < count; i++)
+        d->check->error = fmax(d->check->error, fabs(distance_to(from + 3 * i, to + 3 * index[i]) -
+                                                     distance_to(from + 3 * i, to + 3 * want[i])));
+    return NPG_OK;
 }
 
-/* Indices may differ where distances are equal: what must agree is the distance. */
-static npg_status compare_pairs(npg_motion *motion, motion_data *d, double *error)
+static npg_status compare_pairs(motion_data *d)
 {
-    int32_t *index;
-    size_t first = 0, most = d->real;
-    for (size_t t = 0; t < FRAMES; t++) most = d->count[t] > most ? d->count[t] : most;
-    NPG_TRY(npg_alloc_array(&index, NPG_FOR_RUN, most, sizeof *index));
-    npg_status status = NPG_OK;
-    for (size_t t = 0; t < FRAMES && !status; t++) {
-        const double *x = d->x + t * d->real * 3;
+    size_t first = 0;
+    for (size_t t = 0; t < FRAMES; first += d->count[t++]) {
+        const double *x = d->x + t * d->real * 3, *points = d->points_wide[t];
         pair_up(d, x, t);
-        status = npg_buffer_read(&motion->to_points, t * d->rows * 4, index, d->real * 4);
-        for (size_t v = 0; v < d->real && !status; v++)
-            *error = fmax(*error, fabs(distance_to(x + 3 * v, d->points_wide[t] + 3 * index[v]) -
-                                       distance_to(x + 3 * v, d->points_wide[t] + 3 * d->to_points[v])));
-        if (!status) status = npg_buffer_read(&motion->to_verts, first * 4, index, d->count[t] * 4);
-        for (size_t p = 0; p < d->count[t] && !status; p++)
-            *error = fmax(*error, fabs(distance_to(d->points_wide[t] + 3 * p, x + 3 * index[p]) -
-                                       distance_to(d->points_wide[t] + 3 * p, x + 3 * d->to_verts[p])));
-        first += d->count[t];
+        NPG_TRY(compare_answers(d, &d->motion.to_points, t * d->rows, x, d->real, points, d->to_points));
+        NPG_TRY(compare_answers(d, &d->motion.to_verts, first, points, d->count[t], x, d->to_verts));
     }
-    npg_release(&index);
-    return status;
+    return NPG_OK;
 }
 
-/* Positions as the device has them, so that both sides pair the same points. */
-static npg_status take_positions(npg_motion *motion, motion_data *d)
+/* From positions as the device has them, so that both sides pair the same points. */
+static npg_status run_chamfer(motion_data *d)
 {
     float *x;
-    NPG_TRY(npg_alloc_array(&x, NPG_FOR_RUN, FRAMES * d->real, 3 * sizeof(float)));
-    npg_status status = read_frames(x, &motion->x, d);
+    NPG_TRY(read_frames(&x, &d->motion.x, d));
     for (size_t i = 0; i < FRAMES * d->real * 3; i++) d->x[i] = (double)x[i];
-    npg_release(&x);
-    return status;
+    return npg_motion_chamfer(&d->motion, 0.3, 0, FRAMES);
 }
 
-static npg_status run_chamfer(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                              double alpha)
+static npg_status compare_nearest(motion_data *d)
 {
-    NPG_TRY(open_motion(motion, out, device, d));
-    NPG_TRY(take_positions(motion, d));
-    return npg_motion_chamfer(motion, alpha, 0, FRAMES);
-}
-
-static npg_status compare_nearest(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                                  double *error)
-{
-    NPG_TRY(run_chamfer(device, d, motion, out, 0.3));
-    NPG_TRY(compare_pairs(motion, d, error));
+    NPG_TRY(run_chamfer(d));
+    NPG_TRY(compare_pairs(d));
     /* again, now from the answers as candidates */
-    NPG_TRY(npg_motion_chamfer(motion, 0.3, 0, FRAMES));
-    return compare_pairs(motion, d, error);
+    NPG_TRY(npg_motion_chamfer(&d->motion, 0.3, 0, FRAMES));
+    return compare_pairs(d);
 }
 
-static npg_status compare_chamfer(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                                  double *error)
+static npg_status compare_chamfer(motion_data *d)
 {
-    NPG_TRY(run_chamfer(device, d, motion, out, 0.3));
     double want[FRAMES];
+    NPG_TRY(run_chamfer(d));
     for (size_t t = 0; t < FRAMES; t++) {
         pair_up(d, d->x + t * d->real * 3, t);
         want[t] = npg_chamfer_pairs_ref(d->g + t * d->real * 3, d->x + t * d->real * 3, d->real,
                                         d->points_wide[t], d->count[t], d->to_points, d->to_verts, 0.3);
     }
-    NPG_TRY(npg_check_buffer(error, &motion->cd, want, FRAMES));
-    return compare_frames(error, &motion->g, d->g, d);
+    NPG_TRY(npg_check_compare_buffer(d->check, &d->motion.cd, want, FRAMES));
+    return compare_frames(d, &d->motion.g, d->g);
 }
 
-typedef npg_status compare_with(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                                double *error);
-
-static npg_status check_motion(npg_device *device, int size, uint64_t seed, compare_with *compare,
-                               double *error)
+npg_status npg_check_nearest(npg_check *check, int size)
 {
-    motion_data d = {0};
-    npg_motion motion = {0};
-    npg_buffer out = {0};
-    *error = 0;
-    npg_status status = open_motion_data(&d, size, seed);
-    if (!status) status = compare(device, &d, &motion, &out, error);
-    npg_motion_close(&motion);
-    npg_buffer_close(&out);
-    npg_arena_release(&d.arrays);
-    return status;
+    return check_motion(check, size, compare_nearest);
 }
 
-npg_status npg_check_nearest(npg_device *device, int size, uint64_t seed, double *error)
+npg_status npg_check_chamfer(npg_check *check, int size)
 {
-    return check_motion(device, size, seed, compare_nearest, error);
-}
-npg_status npg_check_chamfer(npg_device *device, int size, uint64_t seed, double *error)
-{
-    return check_motion(device, size, seed, compare_chamfer, error);
+    return check_motion(check, size, compare_chamfer);
 }
 
 /* ---- isometry ---- */
 
-static npg_status compare_isometry(npg_device *device, motion_data *d, npg_motion *motion, npg_buffer *out,
-                                   double *error)
+static npg_status compare_isometry(motion_data *d)
 {
     const float gains[FRAMES] = {0.5f, 2, 0};
-    npg_buffer dout = {0};
     double want[FRAMES] = {0};
-    float *part;
     size_t blocks = d->rows / NPG_LANES;
-    NPG_TRY(compare_chamfer(device, d, motion, out, error));
+    float sums[FRAMES] = {0}, *part = npg_arena_take(&d->check->arena, FRAMES * blocks, sizeof *part);
+    NPG_TRY(npg_arena_status(&d->check->arena));
+    NPG_TRY(compare_chamfer(d));
     for (size_t t = 0; t < FRAMES; t++) {
         double *g = d->g + t * d->real * 3;
         for (size_t i = 0; i < d->real * 3; i++) g[i] *= (double)gains[t] / 7;
@@ -304,21 +252,15 @@ static npg_status compare_isometry(npg_device *device, motion_data *d, npg_motio
                                    d->edge_count);
         for (size_t i = 0; i < d->real * 3; i++) g[i] *= 7;
     }
-    NPG_TRY(npg_buffer_open(&dout, device, FRAMES * d->rows * NPG_MLP_OUT * sizeof(float)));
-    npg_status status = npg_motion_back(motion, &dout, out, gains, 7, 0, FRAMES);
-    npg_buffer_close(&dout);
-    NPG_TRY(status);
-    NPG_TRY(compare_frames(error, &motion->g, d->g, d));
-    NPG_TRY(npg_alloc_array(&part, NPG_FOR_RUN, FRAMES * blocks, sizeof *part));
-    status = npg_buffer_read(&motion->part, 0, part, FRAMES * blocks * sizeof *part);
-    float sums[FRAMES] = {0};
+    NPG_TRY(npg_motion_back(&d->motion, d->dout_buffer, d->out_buffer, gains, 7, 0, FRAMES));
+    NPG_TRY(compare_frames(d, &d->motion.g, d->g));
+    NPG_TRY(npg_buffer_read(&d->motion.part, 0, part, FRAMES * blocks * sizeof *part));
     for (size_t i = 0; i < FRAMES * blocks; i++) sums[i / blocks] += 0.5f * part[i];
-    if (!status) npg_check_compare(error, sums, want, FRAMES);
-    npg_release(&part);
-    return status;
+    npg_check_compare(d->check, sums, want, FRAMES);
+    return NPG_OK;
 }
 
-npg_status npg_check_isometry(npg_device *device, int size, uint64_t seed, double *error)
+npg_status npg_check_isometry(npg_check *check, int size)
 {
-    return check_motion(device, size, seed, compare_isometry, error);
+    return check_motion(check, size, compare_isometry);
 }

@@ -19,7 +19,8 @@ static void check_all(npg_device *on, const int *sizes, size_t size_count)
     for (const npg_kernel_case *c = npg_kernel_cases; c->op; c++)
         for (size_t i = 0; i < size_count; i++) {
             double error = 1;
-            if (c->check(on, sizes[i], 100 + i, &error)) fail_msg("%s: %s", c->op, npg_error_text());
+            if (npg_kernel_case_run(c, on, sizes[i], 100 + i, &error))
+                fail_msg("%s: %s", c->op, npg_error_text());
             print_message("%-24s size %d: error %.2g, allowed %.2g\n", c->op, sizes[i], error, c->tolerance);
             if (!(error <= c->tolerance)) fail_msg("%s of size %d is off by %g", c->op, sizes[i], error);
         }
@@ -57,17 +58,16 @@ static void sampling_gives_equal_bytes(void **state)
     npg_levels levels = {0};
     npg_samples samples;
     npg_latent latent;
-    npg_random random = npg_random_stream(5, 0, 0);
-    npg_arena arena = {.purpose = NPG_FOR_RUN};
-    float *points, *nodes, *dz, *first = NULL;
+    npg_check check = {.random = npg_random_stream(5, 0, 0), .arena.purpose = NPG_FOR_RUN};
+    float *first = NULL;
     (void)state;
     for (int l = 0; l < 8; l++)
         npg_levels_add(&levels, (npg_level){NPG_LEVEL_POSITION, 2 + 3 * l, 0, 0, 0, 30, 0.125, 0.4, 1});
     size_t size = levels.row_count * NPG_LATENT_CHANNELS;
-    npg_check_values(&arena, &points, NULL, POINTS * 3, 1, &random);
-    npg_check_values(&arena, &nodes, NULL, size, 1, &random);
-    npg_check_values(&arena, &dz, NULL, ROWS * NPG_LATENT_CHANNELS, 1, &random);
-    assert_int_equal(npg_arena_status(&arena), 0);
+    const float *points = npg_check_values(&check, NULL, POINTS * 3, 1);
+    const float *nodes = npg_check_values(&check, NULL, size, 1);
+    const float *dz = npg_check_values(&check, NULL, ROWS * NPG_LATENT_CHANNELS, 1);
+    assert_int_equal(npg_arena_status(&check.arena), 0);
     assert_int_equal(npg_samples_open(&samples, &levels, points, points, POINTS, ROWS), 0);
     assert_int_equal(npg_latent_open(&latent, device, &samples), 0);
     for (int run = 0; run < 2; run++) {
@@ -90,7 +90,7 @@ static void sampling_gives_equal_bytes(void **state)
         npg_buffer_close(&slope);
     }
     npg_release(&first);
-    npg_arena_release(&arena);
+    npg_arena_release(&check.arena);
     npg_samples_close(&samples);
     npg_latent_close(&latent);
 }
