@@ -59,7 +59,6 @@ typedef struct bench {
     npg_surface *surface; /* closest */
     npg_surface_hit *hits;
     npg_tracker *tracker; /* track */
-    void *joint;          /* joint */
     npg_energy *energy;
     npg_energy_frame *window;
     float *ways;
@@ -177,10 +176,10 @@ static npg_status track(bench *b)
     return status;
 }
 
+static const npg_solver_settings usual_joint = {.epochs = 60, .energy = {.points = 5000, .shape = 0.1}};
+
 static npg_status open_joint(bench *b)
 {
-    static const npg_solver_settings usual = {.epochs = 60, .energy = {.points = 5000, .shape = 0.1}};
-    const npg_solver_setup setup = {.settings = &usual, .surface = b->mesh};
     size_t count = (size_t)b->s.frames;
     b->window = npg_arena_take(&b->arena, count, sizeof *b->window);
     b->ways = npg_arena_take(&b->arena, count * b->mesh->vert_count, 3 * sizeof(float));
@@ -190,18 +189,18 @@ static npg_status open_joint(bench *b)
                                           .points = b->clouds[t].pos,
                                           .normals = b->clouds[t].normals,
                                           .point_count = b->clouds[t].count};
-    NPG_TRY(npg_solver_joint.open(&b->joint, &setup));
-    return npg_energy_open(&b->energy, b->mesh, &usual.energy);
+    return npg_energy_open(&b->energy, b->mesh, &usual_joint.energy);
 }
 
 /* The whole window, always from the same poses. */
 static npg_status joint(bench *b)
 {
     npg_solved solved;
-    const npg_problem problem = {.count = (size_t)b->s.frames, .energy = b->energy, .result = b->ways};
+    const npg_problem problem = {
+        .settings = &usual_joint, .count = (size_t)b->s.frames, .energy = b->energy, .result = b->ways};
     npg_energy_set_noise(b->energy, 0);
     NPG_TRY(npg_energy_set(b->energy, b->window, problem.count));
-    return npg_solver_joint.solve(b->joint, &solved, &problem, NULL, NULL);
+    return npg_solver_joint.solve(NULL, &solved, &problem, NULL, NULL);
 }
 
 static npg_status poisson(bench *b)
@@ -319,7 +318,6 @@ static void print_table(const bench *b)
 
 static void close_bench(bench *b)
 {
-    if (b->joint) npg_solver_joint.close(&b->joint);
     npg_energy_close(&b->energy);
     npg_tracker_close(&b->tracker);
     npg_surface_close(&b->surface);

@@ -44,8 +44,7 @@ static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
     npg_pieces pieces;
     npg_mending mending;
     double share;
-    NPG_TRY(npg_resurface_widened(mesh, &moved, &turned, normals, cloud->fit, cloud->fit_count, spacing,
-                                  settings));
+    NPG_TRY(npg_resurface(mesh, &moved, &turned, normals, cloud->fit, cloud->fit_count, spacing, settings));
     /* What sensors did not see is none of its surface. */
     if (cloud->sensor_count) NPG_TRY(npg_mesh_trim(mesh, &share, cloud->fit, cloud->fit_count, 2 * spacing));
     NPG_TRY(npg_mesh_keep_main(mesh, &pieces, cloud->sensor_count ? HUGE_VAL : 1));

@@ -6,15 +6,12 @@
 
 #include "geometry/geometry.h"
 
-#define LONGER          2.0 /* times its length: an edge that speaks against its face    */
-#define FAR_SPACINGS    1.0 /* mean distance of a face's corners from the points         */
-#define EXPLAINED       0.5 /* spacings from points to surface, in a frame that votes */
+#define LONGER          2.0 /* times its length: an edge that speaks against its face              */
+#define FAR_SPACINGS    1.0 /* of a face's corners from the points; of a voting frame's from it, at most */
 #define NEARLY_LONGER   1.4 /* the same, for faces that go with those beside them        */
 #define NEARLY_SPACINGS 0.6
 #define FRAMES_LEAST    3    /* that speak against a face                                             */
 #define SEEDS_LEAST     2    /* faces of a patch that are spoken against                              */
-#define BORDER_NEAR     0.85 /* times the faces' distance from the points, for the border around them */
-#define SAVED_LEAST     0.7  /* the new faces' area, at most, of the patch in its worst pose          */
 #define LOOPS_LEAST     2    /* of its border: a tube between two parts; a cap or a crease is left    */
 #define ISLAND_MOST     0.02 /* of the faces: a piece of the rest that belongs to the patch around it */
 #define PATCH_MOST      0.2  /* of the faces: more is no false bridge but a surface that fits nowhere */
@@ -27,7 +24,6 @@ typedef struct ballot {
     const npg_mesh *mesh;
     uint8_t *against; /* F: frames that speak against a face          */
     uint8_t *nearly;  /* F: frames that do so or nearly               */
-    double *dist_sum; /* V: over the voting frames                     */
     float *poses;     /* frames x V x 3: the mesh in the voting frames */
     size_t frames, room;
     float *dist_sq; /* V */
@@ -64,10 +60,9 @@ static npg_status vote(void *user, const npg_candidate_cloud *cloud, const float
     size_t v = b->mesh->vert_count;
     if (b->settings->should_stop && b->settings->should_stop(b->settings->user))
         return npg_error(NPG_STOPPED, "stopped while false bridges were looked for");
-    if (tracked->point_dist_mean > EXPLAINED * b->settings->spacing_unit || b->frames == b->room)
+    if (tracked->point_dist_mean > FAR_SPACINGS * b->settings->spacing_unit || b->frames == b->room)
         return NPG_OK;
     NPG_TRY(npg_points_nearest(b->near, b->dist_sq, cloud->points, cloud->point_count, vert_unit, v, 1));
-    for (size_t i = 0; i < v; i++) b->dist_sum[i] += sqrt((double)b->dist_sq[i]);
     for (size_t f = 0; f < b->mesh->face_count; f++) count_face(b, f, vert_unit);
     memcpy(b->poses + b->frames++ * v * 3, vert_unit, v * 3 * sizeof(float));
     return NPG_OK;
@@ -79,7 +74,6 @@ static npg_status open_ballot(ballot *b, size_t room)
     b->room = room;
     b->against = npg_arena_take(&b->arena, b->mesh->face_count, 1);
     b->nearly = npg_arena_take(&b->arena, b->mesh->face_count, 1);
-    b->dist_sum = npg_arena_take(&b->arena, v, sizeof *b->dist_sum);
     b->dist_sq = npg_arena_take(&b->arena, v, sizeof *b->dist_sq);
     b->near = npg_arena_take(&b->arena, v, sizeof *b->near);
     b->poses = npg_arena_take(&b->arena, room * v, 3 * sizeof *b->poses);
@@ -241,10 +235,10 @@ static double worst_pose(const float **pose, const ballot *b, const patches *p, 
 
 /* next[v] = the vertex after v on the patch's border, in the direction of the patch's own faces; all of them
  * once.  False where the border is no set of simple loops. */
-static bool link_border(uint32_t *next, size_t *border_count, const npg_mesh *mesh, const patches *p,
-                        uint32_t patch, const uint32_t *twin)
+static bool link_border(uint32_t *next, const npg_mesh *mesh, const patches *p, uint32_t patch,
+                        const uint32_t *twin)
 {
-    *border_count = 0;
+    bool found = false;
     for (size_t i = 0; i < 3 * mesh->face_count; i++) {
         if (p->of_face[i / 3] != patch) continue;
         if (twin[i] == UINT32_MAX) return false; /* a border of the mesh */
@@ -252,9 +246,9 @@ static bool link_border(uint32_t *next, size_t *border_count, const npg_mesh *me
         uint32_t from = mesh->faces[i], to = mesh->faces[i - i % 3 + (i + 1) % 3];
         if (next[from] != UINT32_MAX) return false;
         next[from] = to;
-        ++*border_count;
+        found = true;
     }
-    return *border_count > 0;
+    return found;
 }
 
 typedef struct cutting {
@@ -304,23 +298,6 @@ static size_t count_seeds(const cutting *c, uint32_t patch)
     for (size_t f = 0; f < c->ballot->mesh->face_count; f++)
         seeds += c->patches->of_face[f] == patch && c->ballot->against[f] >= FRAMES_LEAST;
     return seeds;
-}
-
-/* Whether the border lies much nearer the points than the faces that are spoken against. */
-static bool is_worth(const cutting *c, uint32_t patch)
-{
-    const ballot *b = c->ballot;
-    size_t seeds = count_seeds(c, patch), border = 0;
-    double border_dist = 0, seed_dist = 0;
-    for (size_t f = 0; f < b->mesh->face_count; f++)
-        for (size_t k = 0; k < 3 && c->patches->of_face[f] == patch && b->against[f] >= FRAMES_LEAST; k++)
-            seed_dist += b->dist_sum[b->mesh->faces[3 * f + k]] / 3;
-    for (size_t v = 0; v < b->mesh->vert_count; v++) {
-        if (c->next[v] == UINT32_MAX) continue;
-        border++;
-        border_dist += b->dist_sum[v];
-    }
-    return border_dist * (double)seeds < BORDER_NEAR * seed_dist * (double)border;
 }
 
 /* ---- all of them ---- */
@@ -389,15 +366,14 @@ static npg_status try_patch(bool *is_cut, cutting *c, const npg_bridge_cut *done
 {
     const npg_mesh *mesh = c->ballot->mesh;
     const float *pose = NULL;
-    size_t border_count, loop_count;
+    size_t loop_count;
     double area;
     *is_cut = false;
     memset(c->next, 0xff, mesh->vert_count * sizeof *c->next);
-    if (!link_border(c->next, &border_count, mesh, c->patches, patch, c->twin) || !is_worth(c, patch))
-        return NPG_OK;
+    if (!link_border(c->next, mesh, c->patches, patch, c->twin)) return NPG_OK;
     double worst = worst_pose(&pose, c->ballot, c->patches, patch);
     NPG_TRY(fill_loops(c, &area, &loop_count, is_cut, pose));
-    *is_cut = *is_cut && loop_count >= LOOPS_LEAST && area < SAVED_LEAST * worst;
+    *is_cut = *is_cut && loop_count >= LOOPS_LEAST && area < worst;
     if (!*is_cut) return NPG_OK;
     npg_mesh *after;
     size_t count = done->faces + mark_cut(c, patch, 1);

@@ -53,14 +53,11 @@ void npg_point_set_close(npg_point_set *set);
  * In this order:
  *
  *     noisy points are smoothed, and Poisson's surface drawn through them, in which parts that
- *         nearly touch are held apart (npg_resurface_widened())
+ *         nearly touch are held apart (npg_resurface())
  *     of its pieces the main one is kept, and what belongs to it
  *     what lies far from every point is trimmed off; of what no point saw, all of it, or it is drawn tight
  *         between what was seen and out of empty space (membrane fairing)
- *     faces are decimated and mended; those of noisy points follow the points' normals
- *
- * Where that leaves folds and the whole surface is closed, it is taken through a level set (vdb.h), trimmed
- * and decimated once more. */
+ *     faces are decimated and mended; those of noisy points follow the points' normals */
 
 /* Surface that no point saw: drawn tight, or trimmed where it is a whole side; kept as Poisson closed it;
  * trimmed.  The words of --unseen, in their order. */
@@ -83,7 +80,7 @@ typedef struct npg_reconstruct_settings {
  * Figures and warnings go to the report and the log of the worker's stage; called on its thread.  It uses all
  * cores, and the same input gives the same mesh.
  * NPG_BAD_INPUT: the set has no normals, or is one that npg_poisson() refuses.  NPG_FAILED: npg_poisson()
- * failed, no surface lies near the points or nothing but shreds, or it can't be taken through a level set.
+ * failed, or no surface lies near the points or nothing but shreds.
  * NPG_MEMORY, NPG_STOPPED.  Faces that are still turned over after all mending are a warning. */
 npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *worker, npg_point_set *set,
                            const npg_reconstruct_settings *settings);
@@ -230,12 +227,12 @@ json_t *npg_unseen_place(const npg_patch *largest, const npg_frame_box *box, cha
  * The reference is followed through the other frames (npg_candidate_follow()).  A frame contradicts a face when
  * it stretches the face's longest edge to twice its length and has the corners far from every point, though
  * the surface explains the frame on the whole; faces beside it that are nearly contradicted go with it.
- * Patches of faces that three frames or more contradict are cut where the surface around them lies on
- * the points, and the holes are closed in the pose that stretched the patch most, where its sides are apart.
+ * Patches of faces that three frames or more contradict are cut, and the holes are closed in the pose that
+ * stretched the patch most, where its sides are apart.
  * Only tubes are cut, patches with two border loops or more, which takes a handle from the mesh:
  * a crease that was closed too far can't be told from a part that was followed badly, so it stays
  * (gap widening and the choice of the keyframe see to those).  The result is closed and oriented where the
- * mesh was; a cut that can't be closed so, that would save little area or that would leave the mesh in pieces,
+ * mesh was; a cut that can't be closed so, that would save no area or that would leave the mesh in pieces,
  * is not made. */
 
 typedef struct npg_bridge_cut {

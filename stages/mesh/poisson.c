@@ -71,7 +71,8 @@ static size_t count_against(const float *normals, const uint32_t *index, size_t 
     return against;
 }
 
-npg_status npg_normals_disagreement(double *share, const float *points, const float *normals, size_t n)
+/* Share of points whose normal points against most of those of its near neighbours on the same sheet, 0..1. */
+static npg_status disagreement_of(double *share, const float *points, const float *normals, size_t n)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     npg_neighbours near;
@@ -81,7 +82,7 @@ npg_status npg_normals_disagreement(double *share, const float *points, const fl
     return status;
 }
 
-npg_status npg_poisson_check(const float *points, const float *normals, size_t point_count)
+static npg_status check_points(const float *points, const float *normals, size_t point_count)
 {
     double share;
     if (point_count < NPG_SURFACE_POINTS)
@@ -90,7 +91,7 @@ npg_status npg_poisson_check(const float *points, const float *normals, size_t p
     NPG_TRY(check_finite(points, normals, point_count));
     NPG_TRY(check_extent(points, point_count));
     NPG_TRY(check_spread(normals, point_count));
-    NPG_TRY(npg_normals_disagreement(&share, points, normals, point_count));
+    NPG_TRY(disagreement_of(&share, points, normals, point_count));
     if (share > DISAGREEMENT_MAX)
         return npg_error(NPG_BAD_INPUT,
                          "the normals contradict each other: %.1f %% point against their neighbours",
@@ -218,7 +219,7 @@ npg_status npg_poisson(npg_mesh **out, const float *points, const float *normals
     float *rows;
     npg_mesh *mesh = NULL;
     *out = NULL;
-    NPG_TRY(npg_poisson_check(points, normals, point_count));
+    NPG_TRY(check_points(points, normals, point_count));
     NPG_TRY(npg_alloc_array(&rows, NPG_FOR_MESH, point_count, 6 * sizeof *rows));
     for (size_t i = 0; i < point_count; i++) {
         memcpy(rows + 6 * i, points + 3 * i, 3 * sizeof *rows);

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "mesh/vdb.h"
 #include "pipeline/clock.h"
 
 #define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
@@ -19,8 +18,6 @@
 #define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
 #define UNSEEN_IS_LEFT    0.05 /* the same of one that has grown: where the body goes on, out of sight */
 #define FLAT_SHARE        0.6  /* of seen_dist: surface farther than this from every point is drawn tight */
-#define REBUILD_AREA_MIN  0.8  /* of the area; less is not the same surface */
-#define REBUILD_VOXELS    384  /* along the longest side of the unit box */
 
 typedef struct reconstruction { /* what is known while the mesh is made */
     npg_worker *worker;
@@ -60,12 +57,10 @@ static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned,
     size_t count;
     /* noisy normals do not say what lies between, nor those that were estimated across both sides */
     if (r->is_rough || !p->has_given_normals)
-        return npg_resurface_widened(&r->mesh, moved, turned, p->normals, p->points, p->count, p->spacing,
-                                     settings);
+        return npg_resurface(&r->mesh, moved, turned, p->normals, p->points, p->count, p->spacing, settings);
     NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
     npg_mesh_note_count(r->worker, "points_between", count - p->count);
-    npg_status status =
-        npg_resurface_widened(&r->mesh, moved, turned, normals, points, count, p->spacing, settings);
+    npg_status status = npg_resurface(&r->mesh, moved, turned, normals, points, count, p->spacing, settings);
     if (!status) memcpy(p->normals, normals, 3 * p->count * sizeof *normals); /* their sides are mended */
     npg_release(&points);
     npg_release(&normals);
@@ -230,7 +225,7 @@ static npg_status is_sound(bool *sound, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-static npg_status shape(reconstruction *r, bool *sound)
+static npg_status shape(reconstruction *r)
 {
     NPG_TRY(trim(r));
     NPG_TRY(leave_empty_space(r));
@@ -239,61 +234,24 @@ static npg_status shape(reconstruction *r, bool *sound)
     NPG_TRY(fair(r));
     if (r->set->empty)
         npg_mesh_note(r->worker, "seen_empty_left_share", npg_mesh_share_in(r->mesh, r->set->empty));
-    return is_sound(sound, r->mesh);
-}
-
-/* ---- through a level set ---- */
-
-/* A level set knows inside from outside only where the surface is closed. */
-static npg_status is_closed(bool *closed, const npg_mesh *mesh)
-{
-    npg_manifold manifold;
-    NPG_TRY(npg_mesh_manifold(&manifold, mesh));
-    *closed = !manifold.border_edges;
     return NPG_OK;
-}
-
-static npg_status rebuild(reconstruction *r)
-{
-    double voxel = 2 * NPG_UNIT_EXTENT / REBUILD_VOXELS, area = npg_mesh_area(r->mesh);
-    NPG_TRY(npg_vdb_remesh(&r->mesh, voxel));
-    npg_mesh_note_count(r->worker, "faces_rebuilt", r->mesh->face_count);
-    double ratio = npg_mesh_area(r->mesh) / area;
-    if (ratio < REBUILD_AREA_MIN || ratio > 1 / REBUILD_AREA_MIN)
-        return npg_error(NPG_FAILED, "rebuilt through a level set, the surface has %.0f %% of its area",
-                         100 * ratio);
-    return NPG_OK;
-}
-
-/* Try again from the whole surface, taken through a level set. */
-static npg_status shape_again(reconstruction *r, npg_mesh **whole, bool *sound)
-{
-    npg_mesh_unref(&r->mesh);
-    r->mesh = *whole;
-    *whole = NULL;
-    NPG_TRY(rebuild(r));
-    return shape(r, sound);
 }
 
 /* ---- the whole ---- */
 
 static npg_status make(reconstruction *r)
 {
-    npg_mesh *whole = NULL;
-    bool sound = false, closed = false;
+    bool sound;
     NPG_TRY(draw_surface(r));
     NPG_TRY(judge_unseen(r));
     /* Of a side all parts are small beside the balloon that closes it, until that is trimmed. */
     if (!r->trims_unseen) NPG_TRY(keep_main(r, "as reconstructed"));
-    NPG_TRY(npg_mesh_copy(&whole, r->mesh));
-    npg_status status = shape(r, &sound);
-    if (!status && !sound) status = is_closed(&closed, whole);
-    if (!status && !sound && closed) status = shape_again(r, &whole, &sound);
-    if (!status && !sound)
+    NPG_TRY(shape(r));
+    NPG_TRY(is_sound(&sound, r->mesh));
+    if (!sound)
         npg_mesh_warn(r->worker, false, r->set->key_number,
                       "the reference mesh still has flipped or degenerate faces after all mending");
-    npg_mesh_unref(&whole);
-    return status;
+    return NPG_OK;
 }
 
 npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *worker, npg_point_set *set,

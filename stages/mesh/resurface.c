@@ -34,8 +34,8 @@ static npg_status turn_to_surface(size_t *turned, float *normals, const npg_mesh
     return status;
 }
 
-npg_status npg_resurface(npg_mesh **mesh, size_t *turned, float *normals, const float *points, size_t n,
-                         const npg_poisson_settings *settings)
+static npg_status draw_twice(npg_mesh **mesh, size_t *turned, float *normals, const float *points, size_t n,
+                             const npg_poisson_settings *settings)
 {
     npg_poisson_settings quick = *settings;
     if (quick.depth > NPG_DRAFT_DEPTH) quick.depth = NPG_DRAFT_DEPTH;
@@ -48,17 +48,16 @@ npg_status npg_resurface(npg_mesh **mesh, size_t *turned, float *normals, const 
     return status || is_draft_alone ? status : npg_poisson(mesh, points, normals, n, settings);
 }
 
-npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals,
-                                 const float *points, size_t n, double spacing,
-                                 const npg_poisson_settings *settings)
+npg_status npg_resurface(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals, const float *points,
+                         size_t n, double spacing, const npg_poisson_settings *settings)
 {
     npg_gap_widening gaps;
     *mesh = NULL;
     *moved = 0;
-    if (settings->gaps == NPG_GAPS_KEPT) return npg_resurface(mesh, turned, normals, points, n, settings);
+    if (settings->gaps == NPG_GAPS_KEPT) return draw_twice(mesh, turned, normals, points, n, settings);
     NPG_TRY(npg_gaps_widen(&gaps, points, normals, n, spacing, settings->gaps));
     *moved = gaps.moved;
-    npg_status status = npg_resurface(mesh, turned, normals, gaps.shifted, n, settings);
+    npg_status status = draw_twice(mesh, turned, normals, gaps.shifted, n, settings);
     if (!status) status = npg_gaps_bring_back(&gaps, *mesh);
     if (status) npg_mesh_unref(mesh);
     npg_gaps_close(&gaps);

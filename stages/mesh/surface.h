@@ -46,7 +46,7 @@ typedef enum npg_gap_way { NPG_GAPS_TIGHT, NPG_GAPS_LOOSE, NPG_GAPS_KEPT } npg_g
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                     */
     double point_weight; /* of the screening term, 10             */
-    npg_gap_way gaps;    /* npg_resurface_widened(): how          */
+    npg_gap_way gaps;    /* npg_resurface(): how          */
     double time_limit_s;
     size_t memory_limit; /* bytes of address space of the child; 0: none */
     const char *program; /* NULL: neupig-poisson                         */
@@ -65,14 +65,6 @@ npg_poisson_settings npg_poisson_settings_of(const npg_options *options);
 npg_status npg_poisson(npg_mesh **mesh, const float *points, const float *normals, size_t point_count,
                        const npg_poisson_settings *settings);
 
-/* The checks before, alone. */
-npg_status npg_poisson_check(const float *points, const float *normals, size_t point_count);
-
-/* Share of points whose normal points against most of those of its near neighbours on
- * the same sheet, 0..1. */
-npg_status npg_normals_disagreement(double *share, const float *points, const float *normals,
-                                    size_t point_count);
-
 /* Resurface: Poisson twice, with the sides of normals that the first surface says.
  *
  * Where a patch of normals is on the wrong side, the surface that Poisson draws through it faces the other
@@ -82,16 +74,11 @@ npg_status npg_normals_disagreement(double *share, const float *points, const fl
 
 #define NPG_DRAFT_DEPTH 7 /* of the octree of surfaces that are looked at, and not delivered */
 
-/* As npg_poisson(), with normals (N x 3) mended in place; *turned counts the normals whose side changed.  The
- * first surface has NPG_DRAFT_DEPTH, and is the last where no more is asked for. */
-npg_status npg_resurface(npg_mesh **mesh, size_t *turned, float *normals, const float *points,
-                         size_t point_count, const npg_poisson_settings *settings);
-
-/* The same, with parts that nearly touch kept from being joined (gap widening); *moved counts the points that
- * were moved for it.  spacing: npg_cloud_spacing(). */
-npg_status npg_resurface_widened(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals,
-                                 const float *points, size_t point_count, double spacing,
-                                 const npg_poisson_settings *settings);
+/* As npg_poisson(), with normals (N x 3) mended in place, and parts that nearly touch kept from being joined (gap
+ * widening): *turned counts the normals whose side changed, *moved the points that were moved for it.  spacing:
+ * npg_cloud_spacing().  The first surface has NPG_DRAFT_DEPTH, and is the last where no more is asked for. */
+npg_status npg_resurface(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals, const float *points,
+                         size_t point_count, double spacing, const npg_poisson_settings *settings);
 
 /* Denoise: how noisy a cloud is, and a smoother version of an oriented one.  N x 3 arrays; NPG_MEMORY. */
 
@@ -119,12 +106,6 @@ npg_status npg_points_dist(float *dist, const float *places, size_t place_count,
 
 /* Median distance to the 8th neighbour, over the points: how dense a cloud is. */
 npg_status npg_cloud_spacing(double *spacing, const float *points, size_t point_count);
-
-/* Keep the faces whose keep_face (F) is not 0.  *share gets the share of the area that went. */
-npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face);
-
-/* The largest of three vertices' distances. */
-float npg_farthest_corner(const float *dist, const uint32_t face[3]);
 
 /* Drop the faces of which a vertex is farther than dist_max from every point.  *share gets the share of the
  * area that went. */

@@ -55,6 +55,7 @@ typedef struct npg_solver_frame {
 
 /* One window, its frames in order of time. */
 typedef struct npg_problem {
+    const npg_solver_settings *settings;
     const npg_window *window;
     const npg_solver_frame *frames;
     size_t count;       /* T                                                                      */
@@ -89,7 +90,7 @@ typedef struct npg_solver_moment {
 typedef struct npg_solver {
     const char *name;
     bool needs_device, needs_poses;
-    npg_status (*open)(void **solver, const npg_solver_setup *setup);
+    npg_status (*open)(void **solver, const npg_solver_setup *setup); /* NULL, as close: nothing is kept */
     npg_status (*solve)(void *solver, npg_solved *solved, const npg_problem *problem, npg_solver_watch *watch,
                         void *user);
     /* Bytes at most for a surface of so many vertices, windows of so many frames of so many points. */

@@ -60,7 +60,7 @@ npg_status npg_window_solver_open(npg_window_solver **out, const npg_solver *row
     npg_status status = row->needs_poses ? open_surface(s) : NPG_OK;
     const npg_solver_setup setup = {&s->settings, facts, s->surface ? s->surface->mesh : facts->reference,
                                     device, seed};
-    if (!status) status = row->open(&s->solver, &setup);
+    if (!status && row->open) status = row->open(&s->solver, &setup);
     if (status) npg_window_solver_close(&s);
     *out = s;
     return status;
@@ -113,7 +113,9 @@ static npg_status set_energy(npg_window_solver *s, npg_held *const *held)
     return npg_energy_set(s->energy, s->posed, s->count);
 }
 
-double npg_window_share(const npg_window *window, double index)
+/* How much a window says of a frame against what the windows before it have said: 1 where it is the first to
+ * solve, less the farther into the overlap, 0 on the first frame outside. */
+static double share_of(const npg_window *window, double index)
 {
     double first = (double)window->new_first, last = (double)window->new_last;
     if (!window->direction || (index >= first && index <= last)) return 1;
@@ -176,7 +178,7 @@ static npg_status keep(npg_window_solver *s, npg_window_result *result, npg_held
 {
     if (s->energy) NPG_TRY(add_smoothing(s, &result->moved));
     for (size_t t = 0; t < s->count; t++) {
-        float share = (float)npg_window_share(window, (double)held[t]->frame.index);
+        float share = (float)share_of(window, (double)held[t]->frame.index);
         if (s->energy)
             keep_posed(s, held[t], t, share);
         else
@@ -198,7 +200,7 @@ npg_status npg_window_solve(npg_window_solver *s, npg_window_result *result, npg
         return NPG_OK;
     }
     npg_status status = take_frames(s, held);
-    const npg_problem problem = {window, s->frames, s->count, s->energy, s->result};
+    const npg_problem problem = {&s->settings, window, s->frames, s->count, s->energy, s->result};
     if (!status && s->energy) status = set_energy(s, held);
     if (!status) status = s->row->solve(s->solver, &result->solved, &problem, watch, user);
     if (!status) status = keep(s, result, held, window);

@@ -9,7 +9,7 @@
  * With poses (stage align) the window's surface is the thinned reference, which carries the whole one (carry.h);
  * a solver moves it from the smoothed poses (energy.h).  Without poses a solver gives the whole reference's
  * positions.  Frames that an earlier window has solved go only the share of the way that this window has in them
- * (npg_window_share), so that windows meet without a seam. */
+ * (share_of in window.c), so that windows meet without a seam. */
 
 /* A frame in hand. */
 typedef struct npg_held {
@@ -38,9 +38,6 @@ void npg_window_solver_close(npg_window_solver **solver);
 /* Bytes that it takes at most, with windows of `frames` frames of at most `points` points. */
 size_t npg_window_memory(const npg_solver *row, const npg_solver_settings *settings, size_t vert_count,
                          size_t frames, size_t points);
-
-/* How much a window says of a frame against what the windows before it have said: 1 where it is the first to solve, less the farther into the overlap, 0 on the first frame outside. */
-double npg_window_share(const npg_window *window, double index);
 
 /* Solve a window: held[i] are its frames in order of time; `solved` of each is filled, or moved where it is there
  * already.  A frame that is solved for the first time gives its vert_unit for it.  Where this fails nothing has

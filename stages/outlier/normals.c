@@ -58,18 +58,6 @@ static void estimate_point(void *user, uint32_t point, const uint32_t *index, co
     }
 }
 
-npg_status npg_normals_estimate_several(float *const *normals, const float *points, size_t n,
-                                        const int *neighbours, size_t count)
-{
-    npg_kdtree *tree = NULL;
-    estimate e = {.normals = normals, .neighbours = neighbours, .count = count, .points = points};
-    NPG_REQUIRE(count && neighbours[0] >= 3 && neighbours[count - 1] <= NPG_KDTREE_NEIGHBOURS);
-    NPG_TRY(npg_kdtree_open(&tree, points, n));
-    npg_status status = npg_kdtree_each(tree, (size_t)neighbours[count - 1], NULL, estimate_point, &e, 0);
-    npg_kdtree_close(&tree);
-    return status;
-}
-
 npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, size_t at_count,
                                    const float *points, size_t n, const int *neighbours, size_t count)
 {
@@ -93,7 +81,13 @@ npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, si
 
 npg_status npg_normals_estimate(float *normals, const float *points, size_t n, int neighbours)
 {
-    return npg_normals_estimate_several(&normals, points, n, &neighbours, 1);
+    npg_kdtree *tree = NULL;
+    estimate e = {.normals = &normals, .neighbours = &neighbours, .count = 1, .points = points};
+    NPG_REQUIRE(neighbours >= 3 && neighbours <= NPG_KDTREE_NEIGHBOURS);
+    NPG_TRY(npg_kdtree_open(&tree, points, n));
+    npg_status status = npg_kdtree_each(tree, (size_t)neighbours, NULL, estimate_point, &e, 0);
+    npg_kdtree_close(&tree);
+    return status;
 }
 
 /* ---- sensor ---- */

@@ -19,11 +19,8 @@ void npg_normal_of(float normal[3], const float *points, size_t point_count);
 /* Unit normals without a side: the direction in which the `neighbours` nearest points spread least. */
 npg_status npg_normals_estimate(float *normals, const float *points, size_t point_count, int neighbours);
 
-/* The same for several numbers of neighbours, ascending, at once: normals[i] are those of neighbours[i]. */
-npg_status npg_normals_estimate_several(float *const *normals, const float *points, size_t point_count,
-                                        const int *neighbours, size_t count);
-
-/* The same at `at_count` of the points alone, with neighbours among all N: at_count x 3 normals each. */
+/* The same at `at_count` of the points alone, for several numbers of neighbours among all N, ascending, at once:
+ * normals[i] (at_count x 3) are those of neighbours[i]. */
 npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, size_t at_count,
                                    const float *points, size_t point_count, const int *neighbours,
                                    size_t count);
@@ -32,13 +29,8 @@ npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, si
 void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t point_count,
                              const double sensor[3]);
 
-/* Give normals without sides their sides: a spanning tree over neighbours, surest agreement first, then whole
- * patches and single points by the winding number, then the sign of the whole.  Outward for closed bodies, to
- * the convex side for open ones.  *score says how well the sides fit together, to compare results by. */
-npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count);
-
-/* Estimate and orient with several numbers of neighbours and keep the result of the best score: few follow
- * thin limbs, many see through noise. */
+/* Estimate and orient with several numbers of neighbours and keep the result whose sides fit together best: few
+ * follow thin limbs, many see through noise.  Outward for closed bodies, to the convex side for open ones. */
 npg_status npg_normals_make(float *normals, const float *points, size_t point_count);
 
 /* Find normals on the wrong side among given ones and turn them: by neighbours and winding number, beginning

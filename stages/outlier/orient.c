@@ -21,9 +21,8 @@
 #define CORE_MAX       8000 /* points oriented together: the winding number takes all their pairs  */
 #define FOLLOWED       5    /* core points that each other point asks for its side                 */
 #define POINT_ROUNDS   30   /* of turning single points by the vote, until none is left            */
-#define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
-#define MISFIT_WEIGHT  4.0  /* of the winding number's misfit beside the neighbours' agreement     */
 #define WINDING_WEIGHT 0.6  /* of the winding number beside the neighbours' vote, of single points */
+#define GIVEN_TRUST    0.08 /* gain without which a patch keeps the side it was given              */
 
 /* ---- neighbours ---- */
 
@@ -203,7 +202,7 @@ static npg_status orient_from_given(npg_sided_cloud *c)
 }
 
 /* How well the sides fit together, larger is better: agreement of neighbours less the misfit of the winding
- * number.  Its weight is such that a limb turned inside out costs more than rough normals. */
+ * number. */
 static npg_status score_of(double *score, npg_sided_cloud *c)
 {
     double lost = 0, area = 0, votes = 0;
@@ -213,7 +212,7 @@ static npg_status score_of(double *score, npg_sided_cloud *c)
         area += (double)c->area[i];
         votes += vote(c, i);
     }
-    *score = votes / (double)c->count - MISFIT_WEIGHT * lost / area;
+    *score = votes / (double)c->count - lost / area;
     return NPG_OK;
 }
 
@@ -229,11 +228,11 @@ static npg_status orient_core(npg_sided_cloud *c, bool from_given, double *score
 
 /* ---- large clouds: a core is oriented, the rest follows ---- */
 
-/* CORE_MAX of n points, spread by index: clouds come in scan or random order, and either is spread over the
+/* `count` of n points, spread by index: clouds come in scan or random order, and either is spread over the
  * surface. */
-static void list_core(uint32_t *from, size_t n)
+static void list_core(uint32_t *from, size_t count, size_t n)
 {
-    for (size_t i = 0; i < CORE_MAX; i++) from[i] = (uint32_t)npg_spread_index(i, CORE_MAX, n);
+    for (size_t i = 0; i < count; i++) from[i] = (uint32_t)npg_spread_index(i, count, n);
 }
 
 /* Turn a normal to the side that the core points around it agree on. */
@@ -273,6 +272,8 @@ static npg_status follow_core(float *all_normals, const float *all_points, size_
     return status;
 }
 
+/* Without given sides: a spanning tree over neighbours, surest agreement first, then whole patches and single
+ * points by the winding number, then the sign of the whole.  *score says how well the sides fit together. */
 static npg_status orient(float *normals, double *score, const float *points, size_t n, bool from_given)
 {
     npg_sided_cloud whole = {.count = n, .points = points, .normals = normals};
@@ -283,7 +284,7 @@ static npg_status orient(float *normals, double *score, const float *points, siz
     float *core_normals = npg_arena_take(&scratch, CORE_MAX, 3 * sizeof *core_normals);
     uint32_t *from = npg_arena_take(&scratch, CORE_MAX, sizeof *from);
     npg_status status = npg_arena_status(&scratch);
-    if (!status) list_core(from, n);
+    if (!status) list_core(from, CORE_MAX, n);
     if (!status) npg_rows_gather(core_points, points, from, CORE_MAX);
     if (!status) npg_rows_gather(core_normals, normals, from, CORE_MAX);
     npg_sided_cloud core = {.count = CORE_MAX, .points = core_points, .normals = core_normals};
@@ -291,12 +292,6 @@ static npg_status orient(float *normals, double *score, const float *points, siz
     if (!status) status = follow_core(normals, points, n, core_points, core_normals, CORE_MAX);
     npg_arena_release(&scratch);
     return status;
-}
-
-npg_status npg_normals_orient(float *normals, double *score, const float *points, size_t point_count)
-{
-    *score = 0;
-    return orient(normals, score, points, point_count, false);
 }
 
 /* ---- several numbers of neighbours ---- */
@@ -322,7 +317,7 @@ static npg_status orient_share(void *user, size_t part)
 {
     trials *t = user;
     for (size_t i = part; i < TRIALS; i += t->parts)
-        NPG_TRY(npg_normals_orient(t->normals[i], &t->score[i], t->points, t->count));
+        NPG_TRY(orient(t->normals[i], &t->score[i], t->points, t->count, false));
     return NPG_OK;
 }
 
@@ -336,43 +331,27 @@ static npg_status run_trials(trials *t, size_t *best)
     return NPG_OK;
 }
 
-static npg_status make_small(float *normals, const float *points, size_t n)
-{
-    trials t;
-    size_t best;
-    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
-    npg_status status = open_trials(&t, &scratch, points, n);
-    if (!status) status = npg_normals_estimate_several(t.normals, points, n, trial_neighbours, TRIALS);
-    if (!status) status = run_trials(&t, &best);
-    if (!status) memcpy(normals, t.normals[best], n * 3 * sizeof *normals);
-    npg_arena_release(&scratch);
-    return status;
-}
-
-/* The core decides on the number of neighbours, and all others are estimated with that one alone. */
-static npg_status make_large(float *normals, const float *points, size_t n)
-{
-    trials t;
-    size_t best;
-    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
-    float *core = npg_arena_take(&scratch, CORE_MAX, 3 * sizeof *core);
-    uint32_t *from = npg_arena_take(&scratch, CORE_MAX, sizeof *from);
-    npg_status status = open_trials(&t, &scratch, core, CORE_MAX);
-    if (!status) {
-        list_core(from, n);
-        npg_rows_gather(core, points, from, CORE_MAX);
-        status = npg_normals_estimate_at(t.normals, from, CORE_MAX, points, n, trial_neighbours, TRIALS);
-    }
-    if (!status) status = run_trials(&t, &best);
-    if (!status) status = npg_normals_estimate(normals, points, n, trial_neighbours[best]);
-    if (!status) status = follow_core(normals, points, n, core, t.normals[best], CORE_MAX);
-    npg_arena_release(&scratch);
-    return status;
-}
-
+/* The core (of a small cloud all points) decides on the number of neighbours, and all others are estimated with
+ * that one alone. */
 npg_status npg_normals_make(float *normals, const float *points, size_t n)
 {
-    return n > CORE_MAX ? make_large(normals, points, n) : make_small(normals, points, n);
+    trials t;
+    size_t best, count = n < CORE_MAX ? n : CORE_MAX;
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    float *core = npg_arena_take(&scratch, count, 3 * sizeof *core);
+    uint32_t *from = npg_arena_take(&scratch, count, sizeof *from);
+    npg_status status = open_trials(&t, &scratch, core, count);
+    if (!status) {
+        list_core(from, count, n);
+        npg_rows_gather(core, points, from, count);
+        status = npg_normals_estimate_at(t.normals, from, count, points, n, trial_neighbours, TRIALS);
+    }
+    if (!status) status = run_trials(&t, &best);
+    if (!status && count == n) memcpy(normals, t.normals[best], n * 3 * sizeof *normals);
+    if (!status && count < n) status = npg_normals_estimate(normals, points, n, trial_neighbours[best]);
+    if (!status && count < n) status = follow_core(normals, points, n, core, t.normals[best], count);
+    npg_arena_release(&scratch);
+    return status;
 }
 
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t n)

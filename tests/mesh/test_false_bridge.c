@@ -193,9 +193,9 @@ static int64_t handles_of_legs(double feet, npg_gap_way way, size_t *moved)
     size_t turned;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, feet, 5), NPG_OK);
-    assert_int_equal(npg_resurface_widened(&mesh, moved, &turned, frame.normals, frame.pos_local, LEGS_POINTS,
-                                           0.05, &settings),
-                     NPG_OK);
+    assert_int_equal(
+        npg_resurface(&mesh, moved, &turned, frame.normals, frame.pos_local, LEGS_POINTS, 0.05, &settings),
+        NPG_OK);
     assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
     npg_mesh_unref(&mesh);
     npg_frame_clear(&frame);

@@ -11,7 +11,6 @@
 
 #include "geometry/geometry.h"
 #include "mesh/surface.h"
-#include "mesh/vdb.h"
 #include "pipeline/child.h"
 #include "pipeline/stage.h"
 #include "tests/support/shapes.h"
@@ -352,17 +351,6 @@ static void a_folded_face_is_found_and_unfolded(void **state)
     npg_mesh_unref(&mesh);
 }
 
-static void the_level_set_rebuilds_a_closed_mesh(void **state)
-{
-    (void)state;
-    npg_mesh *mesh = mesh_of(cube_pos, 8, cube_faces, 12);
-    assert_int_equal(npg_vdb_remesh(&mesh, 0.05), NPG_OK);
-    assert_true(mesh->face_count > 1000);
-    assert_true(fabs(npg_mesh_volume(mesh) - 1) < 0.03);
-    assert_int_equal(euler(mesh), 2);
-    npg_mesh_unref(&mesh);
-}
-
 static void the_first_bad_edge_is_named(void **state)
 {
     (void)state;
@@ -549,7 +537,6 @@ int main(void)
         cmocka_unit_test(pieces_near_the_main_one_stay),
         cmocka_unit_test(decimation_keeps_the_shape),
         cmocka_unit_test(a_folded_face_is_found_and_unfolded),
-        cmocka_unit_test(the_level_set_rebuilds_a_closed_mesh),
         cmocka_unit_test(the_first_bad_edge_is_named),
         cmocka_unit_test(the_stage_makes_the_reference),
         cmocka_unit_test(the_unseen_side_is_told_and_trimmed),

@@ -43,7 +43,7 @@ static void gather_diagonal(const work *w, size_t t)
     float *factors = w->factors + 3 * t * s->vert_count;
     for (size_t v = 0; v < s->vert_count; v++)
         factors[3 * v] = (float)s->shape * (float)(s->ring.start[v + 1] - s->ring.start[v]) +
-                         s->shares[t] * s->ties[v] + 1e-6f;
+                         s->shares[t] * s->tie + 1e-6f;
     for (size_t i = 0; i < s->pull_counts[t]; i++) {
         const npg_point_pull *p = &s->pulls[t * s->most + i];
         for (size_t c = 0; c < 3; c++) /* a third: the mean over the directions */
@@ -166,28 +166,10 @@ static npg_status iterate(work *w, npg_solved *solved, int64_t most, npg_solver_
 
 /* ---- the solver ---- */
 
-typedef struct joint {
-    int64_t steps;
-} joint;
-
-static npg_status joint_open(void **out, const npg_solver_setup *setup)
-{
-    joint *j;
-    NPG_TRY(npg_alloc(&j, NPG_FOR_FIT, sizeof *j));
-    j->steps = setup->settings->epochs;
-    *out = j;
-    return NPG_OK;
-}
-
-static void joint_close(void **solver)
-{
-    npg_release(solver);
-}
-
 static npg_status joint_solve(void *solver, npg_solved *solved, const npg_problem *problem,
                               npg_solver_watch *watch, void *user)
 {
-    const joint *j = solver;
+    (void)solver;
     const npg_energy_system *s = npg_energy_system_of(problem->energy);
     size_t count = s->frame_count * s->vert_count, vector = 3 * sizeof(float);
     npg_arena arena = {.purpose = NPG_FOR_FIT};
@@ -203,7 +185,7 @@ static npg_status joint_solve(void *solver, npg_solved *solved, const npg_proble
     memset(w.step, 0, count * vector);
     if (!status) status = npg_parallel(gather_diagonals, &w, w.threads);
     if (!status) status = npg_parallel(factor_vertices, &w, w.threads);
-    if (!status) status = iterate(&w, solved, j->steps, watch, user);
+    if (!status) status = iterate(&w, solved, problem->settings->epochs, watch, user);
     npg_arena_release(&arena);
     return status;
 }
@@ -218,8 +200,6 @@ static size_t joint_memory(const npg_solver_settings *settings, size_t verts, si
 const npg_solver npg_solver_joint = {
     .name = "joint",
     .needs_poses = true,
-    .open = joint_open,
     .solve = joint_solve,
     .memory = joint_memory,
-    .close = joint_close,
 };
