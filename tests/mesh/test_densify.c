@@ -71,6 +71,8 @@ static void what_is_not_thin_stays(void **state)
     assert_int_equal(npg_cloud_spacing(&spacing, points, N), NPG_OK);
     assert_int_equal(npg_cloud_densify(&dense, &dense_normals, &count, points, normals, N, spacing), NPG_OK);
     assert_int_equal(count, N);
+    assert_memory_equal(dense, points, sizeof points);
+    assert_memory_equal(dense_normals, normals, sizeof normals);
     npg_release(&dense);
     npg_release(&dense_normals);
 }
