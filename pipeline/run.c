@@ -95,7 +95,7 @@ static void announce_memory(npg_run *run)
     const npg_facts *facts = &run->facts;
     size_t verts = npg_worker_verts_at_most(&run->workers[0]);
     size_t frame_bytes = facts->point_count_max * 6 * sizeof(float) + verts * 3 * sizeof(float) +
-                         facts->sensor_count_max * NPG_VIEW_SIDE * NPG_VIEW_SIDE * sizeof(float);
+                         facts->view_count_max * NPG_VIEW_SIDE * NPG_VIEW_SIDE * sizeof(float);
     size_t chunk_bytes = frame_bytes * (size_t)run->settings.chunk_frames;
     size_t rings = 0, held = 0, stages = 0;
     json_t *parts = json_object();

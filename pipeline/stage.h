@@ -101,6 +101,7 @@ typedef struct npg_facts {
     /* fuse */
     npg_brief brief;         /* between passes */
     size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
+    size_t view_count_max;   /* those of them whose images are known               */
     /* align, at the end of a fusing pass */
     int64_t
         unreached_count; /* frames that see too much that the reference does not have, and those beyond them */

@@ -506,11 +506,11 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     *chunks_held = (group + chunk - 1) / chunk + 1;
     /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node, and how both ends hold
      * them; per vertex weights and the graph's search for them, positions, normals; the waiting frames'
-     * poses, once more for the log, what they hide, and thinned points */
+     * poses, once more for the log, what they hide, thinned points, and free space */
     return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + PRIOR_BYTES + known) +
            verts * 320 +
-           group *
-               (nodes * (2 * NPG_POSE_SIZE * sizeof(double) + sizeof(float)) + points * 6 * sizeof(float)) +
+           group * (nodes * (2 * NPG_POSE_SIZE * sizeof(double) + sizeof(float)) +
+                    points * 6 * sizeof(float) + npg_free_space_memory(facts->view_count_max)) +
            (size_t)s->samples * RAY_BYTES;
 }
 

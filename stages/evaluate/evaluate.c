@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "evaluate/evaluate_internal.h"
+#include "geometry/geometry.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"
@@ -386,7 +387,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     const evaluate_state *state = npg_worker_state(worker);
     *chunks_held = 1;
     return npg_measure_memory(&state->measured, npg_worker_facts(worker)->point_count_max,
-                              npg_worker_verts_at_most(worker));
+                              npg_worker_verts_at_most(worker)) +
+           npg_free_space_memory(npg_worker_facts(worker)->view_count_max);
 }
 
 #define AT(member) offsetof(evaluate_state, member)

@@ -63,8 +63,8 @@ enum { FROM_KEY, FROM_ALL };
 typedef struct state {
     int from;       /* option */
     int64_t rounds; /* option */
-    int64_t usable; /* frames with points, and most sensors of one: of the measuring pass */
-    size_t sensors;
+    int64_t usable; /* frames with points, and most sensors and images of one: of the measuring pass */
+    size_t sensors, views;
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: it is not known where sensors stood */
@@ -346,6 +346,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
             s->usable += !frame->is_skipped;
             if (frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
+            if (frame->views && frame->sensor_count > s->views) s->views = frame->sensor_count;
         } else {
             NPG_TRY(gather_frame(worker, frame));
         }
@@ -368,6 +369,7 @@ static npg_status begin(npg_worker *worker)
     npg_worker_keep(worker, loop, release_loop);
     *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0);
     *npg_own(worker, sensor_count_max) = s->sensors;
+    *npg_own(worker, view_count_max) = s->views;
     return NPG_OK;
 }
 
@@ -414,7 +416,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
         npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(COLOURS_MOST);
     size_t empty = facts->sensor_count_max ? npg_carving_memory(EMPTY_MOST) : 0;
     return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
-           npg_skin_memory(npg_worker_verts_at_most(worker), points);
+           npg_skin_memory(npg_worker_verts_at_most(worker), points) +
+           npg_free_space_memory(facts->view_count_max);
 }
 
 extern const npg_stage npg_stage_fuse;

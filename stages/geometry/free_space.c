@@ -12,9 +12,9 @@
 typedef struct view {
     double to_sensor[12], first[2], step; /* as npg_depth_view, but of unit coordinates */
     ptrdiff_t width, height;
-    float *cells;           /* H x W: the depth of each, infinite: nothing, 0: not known */
-    float *nearest;         /* H x W: the least depth within AROUND, infinite: none      */
-    float *near_by, *known; /* H x W: the same within BESIDE, and whether all is known there */
+    float *cells;   /* H x W: the depth of each, infinite: nothing, 0: not known           */
+    float *nearest; /* H x W: the least depth within AROUND, infinite: none                */
+    float *near_by; /* H x W: the same within BESIDE; NaN: none, but not all is known there */
 } view;
 
 struct npg_free_space {
@@ -60,6 +60,7 @@ static void take_least(float *out, const float *in, const view *v, ptrdiff_t rea
 static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *from, const float *cells,
                             const npg_frame_box *box)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
     size_t count = (size_t)from->width * from->height;
     *v = (view){.first = {from->first[0], from->first[1]},
                 .step = from->step,
@@ -69,19 +70,22 @@ static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *fro
     v->cells = npg_arena_take(arena, count, sizeof *v->cells);
     v->nearest = npg_arena_take(arena, count, sizeof *v->nearest);
     v->near_by = npg_arena_take(arena, count, sizeof *v->near_by);
-    v->known = npg_arena_take(arena, count, sizeof *v->known);
-    float *least = npg_arena_take(arena, count, sizeof *least),
-          *is_known = npg_arena_take(arena, count, sizeof *is_known);
-    NPG_TRY(npg_arena_status(arena));
-    for (size_t i = 0; i < count; i++) {
+    float *of_each = npg_arena_take(&scratch, count, sizeof *of_each),
+          *known = npg_arena_take(&scratch, count, sizeof *known);
+    npg_status status = npg_arena_status(arena);
+    if (!status) status = npg_arena_status(&scratch);
+    for (size_t i = 0; i < count && !status; i++) {
         v->cells[i] = (float)(box->scale * (double)cells[i]);
-        is_known[i] = v->cells[i] > 0;
-        least[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
+        of_each[i] = v->cells[i] > 0;
     }
-    take_least(v->nearest, least, v, AROUND);
-    take_least(v->near_by, least, v, BESIDE);
-    take_least(v->known, is_known, v, BESIDE);
-    return NPG_OK;
+    if (!status) take_least(known, of_each, v, BESIDE);
+    for (size_t i = 0; i < count && !status; i++) of_each[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
+    if (!status) take_least(v->nearest, of_each, v, AROUND);
+    if (!status) take_least(v->near_by, of_each, v, BESIDE);
+    for (size_t i = 0; i < count && !status; i++)
+        if (isinf(v->near_by[i]) && !(known[i] > 0)) v->near_by[i] = NAN;
+    npg_arena_release(&scratch);
+    return status;
 }
 
 npg_status npg_free_space_open(npg_free_space **out, const npg_frame *frame, const npg_frame_box *box)
@@ -122,7 +126,8 @@ static npg_sight_kind look(const view *v, const float place[3])
     ptrdiff_t i = (ptrdiff_t)y * v->width + (ptrdiff_t)x;
     double margin = BESIDE * v->step * at[2];
     if (!(v->cells[i] > 0)) return NPG_SEEN_UNKNOWN;
-    if (isinf(v->near_by[i])) return v->known[i] > 0 ? NPG_SEEN_BESIDE : NPG_SEEN_UNKNOWN;
+    if (isnan(v->near_by[i])) return NPG_SEEN_UNKNOWN;
+    if (isinf(v->near_by[i])) return NPG_SEEN_BESIDE;
     if (at[2] < (double)v->near_by[i] - margin) return NPG_SEEN_EMPTY;
     if (isinf(v->cells[i])) return NPG_SEEN_UNKNOWN; /* beside the outline, but not clearly */
     if (at[2] < (double)v->nearest[i] - margin) return NPG_SEEN_EMPTY;
@@ -145,4 +150,9 @@ bool npg_free_space_is_empty(const npg_free_space *space, const float place[3])
     if (!space) return false;
     npg_sight_kind kind = npg_free_space_look(space, place);
     return kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE;
+}
+
+size_t npg_free_space_memory(size_t sensor_count)
+{
+    return sensor_count * (sizeof(view) + (size_t)NPG_VIEW_SIDE * NPG_VIEW_SIDE * 3 * sizeof(float));
 }
