@@ -126,10 +126,67 @@ static void a_piece_without_points_goes_along(void **state)
     npg_mesh_unref(&both);
 }
 
+/* How far the second ball moves towards the first, of which alone there are points, in three fits. */
+static double moved_inward(const npg_free_space *space)
+{
+    static const npg_tracker_settings settings = {100, 1500, 15, 0.1, 0.02};
+    static const float sensor[3] = {0, 0, -4};
+    size_t v;
+    npg_mesh *both = two_balls(&v);
+    npg_tracker *tracker;
+    npg_tracked tracked;
+    assert_int_equal(npg_tracker_open(&tracker, both, &settings), NPG_OK);
+    size_t nodes = npg_tracker_node_count(tracker);
+    float *found;
+    double *pose, moved = 0;
+    assert_int_equal(npg_alloc_array(&found, NPG_FOR_RUN, 2 * v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&pose, NPG_FOR_RUN, nodes, NPG_POSE_SIZE * sizeof(double)), NPG_OK);
+    npg_pose_rest(pose, nodes);
+    const npg_tracker_cloud cloud = {
+        .points = both->vert_pos, .count = v, .sensors = sensor, .sensor_count = 1, .space = space};
+    for (int frame = 0; frame < 3; frame++)
+        assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL, NULL), NPG_OK);
+    npg_tracker_vertices(tracker, found, pose);
+    for (size_t i = v; i < 2 * v; i++)
+        moved += ((double)both->vert_pos[3 * i] - (double)found[3 * i]) / (double)v;
+    npg_release(&found);
+    npg_release(&pose);
+    npg_tracker_close(&tracker);
+    npg_mesh_unref(&both);
+    return moved;
+}
+
+static void surface_where_nothing_is_is_pulled_out(void **state)
+{
+    enum { SIDE = 60 };
+    static float cells[SIDE * SIDE];
+    static const npg_frame_box unit = {.scale = 1};
+    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4},
+                           .first = {-0.3, -0.3},
+                           .step = 0.01,
+                           .width = SIDE,
+                           .height = SIDE};
+    const npg_frame frame = {
+        .sensor_count = 1, .views = &view, .view_cells = cells, .view_cell_count = SIDE * SIDE};
+    npg_free_space *space;
+    (void)state;
+    for (int i = 0; i < SIDE * SIDE; i++) { /* the first ball as a disc, around it nothing */
+        double x = (i % SIDE + 0.5) / 100 - 0.3, y = (i / SIDE + 0.5) / 100 - 0.3;
+        cells[i] = hypot(x, y) < 0.125 ? 3.5F : INFINITY;
+    }
+    assert_int_equal(npg_free_space_open(&space, &frame, &unit), NPG_OK);
+    double without = moved_inward(NULL), with = moved_inward(space);
+    print_message("the second ball moved by %.4f, where nothing says that it can't be there by %.4f\n", with,
+                  without);
+    assert_true(fabs(without) < 0.02 && with > 0.05);
+    npg_free_space_close(&space);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_piece_without_points_goes_along),
+        cmocka_unit_test(surface_where_nothing_is_is_pulled_out),
         cmocka_unit_test(thin_meshes_are_made_of_the_whole_one_s_vertices),
         cmocka_unit_test(a_fine_reference_is_aligned_whole),
     };
