@@ -212,7 +212,7 @@ npg_status npg_json_load(json_t **value, const char *folder, const char *name, n
     int fd;
     *value = NULL;
     NPG_TRY(npg_path_of(path, folder, name));
-    if (access(path, F_OK) && errno == ENOENT) return NPG_OK;
+    if (access(path, F_OK) && (errno == ENOENT || errno == ENOTDIR)) return NPG_OK;
     NPG_TRY(npg_file_open_plain(&fd, path, damaged));
     *value = json_loadfd(fd, 0, &error);
     close(fd);

@@ -11,6 +11,13 @@
 #define THREADS_MAX 8
 #define WIDTH       3    /* of the robust weight, in standard deviations of the frame */
 #define NOISE_LEAST 1e-5 /* units: points without noise still have a width */
+/* A frame's own pose counts as much as TRUST times its points where frames move smoothly without help (lambda
+ * small), half at EVEN, and TRUST_LEAST where it takes neighbours in time to see the motion (lambda large):
+ * what slides along the surface is seen by poses alone. */
+#define TRUST       3
+#define TRUST_LEAST 0.1
+#define EVEN        0.02
+
 struct npg_energy {
     npg_energy_settings settings;
     npg_mesh *mesh; /* counted reference */
@@ -21,7 +28,7 @@ struct npg_energy {
     npg_point_matcher matchers[THREADS_MAX];
     npg_arena window; /* holds what follows, of the window at work */
     float *positions; /* T x W x 3: where the frames' surfaces are */
-    float *shares, *lambda, *bend;
+    float *shares, *lambda, *bend, *ties;
     const npg_energy_frame *given; /* loan */
     bool *is_known;
     double *spreads, *scores; /* T */
@@ -30,7 +37,7 @@ struct npg_energy {
     size_t *pull_counts;
     npg_time_quadric *quadrics; /* T x W: what the points say of the frames as they came */
     npg_energy_system system;
-    double noise;
+    double noise, lambda_median;
 };
 
 void npg_energy_close(npg_energy **slot)
@@ -86,6 +93,7 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
     e->shares = npg_arena_take(a, count, sizeof(float));
     e->lambda = npg_arena_take(a, w, sizeof(float));
     e->bend = npg_arena_take(a, w, sizeof(float));
+    e->ties = npg_arena_take(a, w, sizeof(float));
     e->is_known = npg_arena_take(a, count, sizeof(bool));
     e->spreads = npg_arena_take(a, count, sizeof(double));
     e->scores = npg_arena_take(a, count, sizeof(double));
@@ -101,6 +109,7 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
                                     .pulls = e->pulls,
                                     .pull_counts = e->pull_counts,
                                     .most = most,
+                                    .ties = e->ties,
                                     .shares = e->shares,
                                     .right = npg_arena_take(a, count * w, 3 * sizeof(float))};
     NPG_TRY(npg_arena_status(a));
@@ -149,6 +158,15 @@ static npg_status weigh_frames(npg_energy *e, size_t count)
         e->shares[t] = e->frames[t].point_count ? (float)(1 / (1 + off * off)) : 0;
     }
     return NPG_OK;
+}
+
+/* Uses bend as scratch. */
+static double lambda_median(npg_energy *e)
+{
+    size_t w = e->mesh->vert_count;
+    memcpy(e->bend, e->lambda, w * sizeof *e->bend);
+    qsort(e->bend, w, sizeof *e->bend, npg_order_float);
+    return (double)e->bend[w / 2];
 }
 
 static npg_status match_frames(void *user, size_t part)
@@ -200,6 +218,7 @@ static npg_status smooth(npg_energy *e, size_t count)
     NPG_TRY(npg_parallel(gather_quadrics, &r, e->threads));
     NPG_TRY(
         npg_time_smooth_choose(e->lambda, &f, e->quadrics, (const uint32_t(*)[2])e->edges, e->edge_count));
+    e->lambda_median = lambda_median(e);
     NPG_TRY(npg_time_smooth_apply(&f, e->lambda));
     NPG_TRY(npg_parallel(measure_frames, &r, e->threads));
     e->noise = fmax(median_spread(e, count), NOISE_LEAST);
@@ -212,7 +231,7 @@ static void pull_to_pose(npg_energy *e, float *right, size_t t)
 {
     const float *now = e->frames[t].positions, *pose = e->given[t].positions;
     for (size_t i = 0; i < 3 * e->mesh->vert_count; i++)
-        right[i] += e->shares[t] * e->system.tie * (pose[i] - now[i]);
+        right[i] += e->shares[t] * e->ties[i / 3] * (pose[i] - now[i]);
 }
 
 /* The right side: -gradient / 2 of the energy where the surface is now. */
@@ -241,8 +260,8 @@ static npg_status fill_frames(void *user, size_t part)
     return NPG_OK;
 }
 
-/* Poses and motion in units of the points that pull at a vertex. */
-static void set_weights(npg_energy *e, size_t count)
+/* lambda in units of the points that pull at a vertex. */
+static void set_bend(npg_energy *e, size_t count)
 {
     double strength = 0, frames = 0;
     for (size_t t = 0; t < count; t++) {
@@ -251,8 +270,11 @@ static void set_weights(npg_energy *e, size_t count)
         frames += e->pull_counts[t] > 0;
     }
     double each = frames > 0 ? strength / (frames * (double)e->mesh->vert_count) : 1;
-    e->system.tie = (float)each;
-    for (size_t v = 0; v < e->mesh->vert_count; v++) e->bend[v] = (float)(2 * each * (double)e->lambda[v]);
+    for (size_t v = 0; v < e->mesh->vert_count; v++) {
+        double even = (double)e->lambda[v] * e->lambda_median / (EVEN * EVEN);
+        e->ties[v] = (float)(each * (TRUST_LEAST + TRUST / (1 + even)));
+        e->bend[v] = (float)((double)e->lambda[v] * (each + (double)e->ties[v]));
+    }
 }
 
 npg_status npg_energy_set(npg_energy *e, const npg_energy_frame *frames, size_t count)
@@ -263,7 +285,7 @@ npg_status npg_energy_set(npg_energy *e, const npg_energy_frame *frames, size_t 
     e->given = frames;
     NPG_TRY(smooth(e, count));
     NPG_TRY(npg_parallel(match_frames, &r, e->threads));
-    set_weights(e, count);
+    set_bend(e, count);
     return npg_parallel(fill_frames, &r, e->threads);
 }
 
@@ -275,6 +297,11 @@ const float *npg_energy_smoothed(const npg_energy *e)
 double npg_energy_noise(const npg_energy *e)
 {
     return e->noise;
+}
+
+double npg_energy_lambda(const npg_energy *e)
+{
+    return e->lambda_median;
 }
 
 npg_energy_system *npg_energy_system_of(npg_energy *e)
@@ -306,7 +333,7 @@ static double poses_and_bend_at_start(const npg_energy *e, size_t t)
     for (size_t i = 0; i < row; i++) {
         double off = (double)now[i] - (double)pose[i];
         double bend = is_inner ? (double)now[i] - 2 * (double)now[i + row] + (double)now[i + 2 * row] : 0;
-        sum += (double)(e->shares[t] * e->system.tie) * off * off + (double)e->bend[i / 3] * bend * bend;
+        sum += (double)(e->shares[t] * e->ties[i / 3]) * off * off + (double)e->bend[i / 3] * bend * bend;
     }
     return sum;
 }

@@ -8,15 +8,19 @@
 /* Energy: what a window of aligned frames is moved by: the points of all of them at once.
  *
  *     E = sum_t sum_p w_p (n_p . (x(c_p) - p))^2                                 points
- *       + 2 e sum_v sum_t lambda_v |x_(t-1) - 2 x_t + x_(t+1)|^2                 motion
- *       + e sum_v sum_t share_t |x_t - y_t|^2                                    poses
+ *       + c sum_v sum_t lambda_v |x_(t-1) - 2 x_t + x_(t+1)|^2                   motion
+ *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
  *
  * y: the frames' own aligned poses; s: those, smoothed in time; lambda_v: how even a vertex's motion is,
  * found by cross-validation (time_smooth.c).  c_p: the closest point of the surface to the point p, n_p its
  * normal there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
- * e: the points per vertex.  share_t: small where the frame's pose is far from its points, 0 without points: its
+ *     tie_v = e (least + trust / (1 + lambda_v median(lambda) / even^2))          c = e + tie_v
+ *
+ * e: the points per vertex.  Where frames agree with each other already (small lambda), their poses are
+ * believed; where each is off by its own noise, or has few points, the points of all frames decide, and the
+ * motion is even.  share_t: small where the frame's pose is far from its points, 0 without points: its
  * neighbours in time carry it.
  *
  * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic in the way
@@ -52,8 +56,9 @@ void npg_energy_set_noise(npg_energy *energy, double noise);
  * gives equal bits, however many threads.  NPG_MEMORY. */
 npg_status npg_energy_set(npg_energy *energy, const npg_energy_frame *frames, size_t frame_count);
 
-/* Of the frames that were set: s (T x W x 3), and A and r. */
+/* Of the frames that were set: s (T x W x 3), median of lambda, and A and r. */
 const float *npg_energy_smoothed(const npg_energy *energy);
+double npg_energy_lambda(const npg_energy *energy);
 struct npg_energy_system *npg_energy_system_of(npg_energy *energy);
 
 /* E(s). */
@@ -138,8 +143,8 @@ typedef struct npg_energy_system {
     const npg_point_pull *pulls;    /* `most` per frame; loan */
     const size_t *pull_counts;      /* T; loan */
     size_t most;
-    float tie;           /* weight of staying where a frame's own pose is */
-    const float *shares; /* T: of it; loan                                */
+    const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
+    const float *shares; /* T: of the frames' ties; loan                     */
     float *right;        /* T x W x 3: r                                     */
 } npg_energy_system;
 

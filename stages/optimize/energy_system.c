@@ -45,7 +45,7 @@ static void add_shape(float *restrict image, const npg_energy_system *s, const f
 
 static void add_tie(float *restrict image, const npg_energy_system *s, const float *restrict x, size_t t)
 {
-    for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += s->shares[t] * s->tie * x[i];
+    for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += s->shares[t] * s->ties[i / 3] * x[i];
 }
 
 static void add_pull(float *image, const npg_point_pull *p, const float *x)

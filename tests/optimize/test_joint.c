@@ -91,8 +91,7 @@ static void solve_some(capture *c, const npg_energy_frame *frames, size_t count,
     assert_int_equal(npg_solver_joint.solve(NULL, &solved, &problem, NULL, NULL), NPG_OK);
     for (size_t i = 0; i < 3 * VERTS * count; i++)
         frames[i / (3 * VERTS)].positions[i % (3 * VERTS)] = npg_energy_smoothed(energy)[i] + ways[i];
-    const npg_energy_system *system = npg_energy_system_of(energy);
-    if (lambda) *lambda = (double)system->lambda[VERTS / 2] / (double)system->tie;
+    if (lambda) *lambda = npg_energy_lambda(energy);
     npg_energy_close(&energy);
 }
 

@@ -43,7 +43,7 @@ static void gather_diagonal(const work *w, size_t t)
     float *factors = w->factors + 3 * t * s->vert_count;
     for (size_t v = 0; v < s->vert_count; v++)
         factors[3 * v] = (float)s->shape * (float)(s->ring.start[v + 1] - s->ring.start[v]) +
-                         s->shares[t] * s->tie + 1e-6f;
+                         s->shares[t] * s->ties[v] + 1e-6f;
     for (size_t i = 0; i < s->pull_counts[t]; i++) {
         const npg_point_pull *p = &s->pulls[t * s->most + i];
         for (size_t c = 0; c < 3; c++) /* a third: the mean over the directions */
