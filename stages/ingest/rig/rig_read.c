@@ -4,9 +4,8 @@
 #include <string.h>
 
 #include "ingest/rig/rig_internal.h"
+#include "pipeline/file.h"
 #include "pipeline/parallel.h"
-
-#define PATH_MOST 4096
 
 typedef struct reading {
     npg_rig *rig;
@@ -97,11 +96,11 @@ npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *o
 /* ---- a frame by its name ---- */
 
 /* Split "PATH#NUMBER"; false where it is none. */
-static bool split(char path[PATH_MOST], int64_t *number, const char *text)
+static bool split(char path[NPG_PATH_SIZE], int64_t *number, const char *text)
 {
     const char *mark = strrchr(text, '#');
     char *end = NULL;
-    if (!mark || (size_t)(mark - text) >= PATH_MOST) return false;
+    if (!mark || (size_t)(mark - text) >= NPG_PATH_SIZE) return false;
     memcpy(path, text, (size_t)(mark - text));
     path[mark - text] = 0;
     *number = strtoll(mark + 1, &end, 10);
@@ -110,7 +109,7 @@ static bool split(char path[PATH_MOST], int64_t *number, const char *text)
 
 bool npg_rig_is_frame(const char *text)
 {
-    char path[PATH_MOST];
+    char path[NPG_PATH_SIZE];
     int64_t number;
     return split(path, &number, text);
 }
@@ -132,7 +131,7 @@ static npg_status give_points(npg_mesh **mesh, npg_frame *frame)
 
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
 {
-    char path[PATH_MOST];
+    char path[NPG_PATH_SIZE];
     int64_t number;
     npg_rig *rig;
     npg_frame frame = {0};
