@@ -184,14 +184,13 @@ npg_status npg_file_facts(json_t *entry, const char *output, const char *file)
 npg_status npg_file_check(const json_t *entry, const char *output, const char *file)
 {
     if (!npg_path_stays(file))
-        return npg_error(NPG_BAD_INPUT, "%s: the list of frames names %s, which is not in it", output, file);
+        return npg_error(NPG_BAD_INPUT, "%s: the list of files names %s, which is not in it", output, file);
+    if (!npg_is_in_folder(output, file)) return npg_error(NPG_BAD_INPUT, "%s/%s is missing", output, file);
     json_t *now = json_object();
     npg_status status = npg_file_facts(now, output, file);
     if (!status && (!json_equal(json_object_get(now, "bytes"), json_object_get(entry, "bytes")) ||
                     !json_equal(json_object_get(now, "xxh3"), json_object_get(entry, "xxh3"))))
-        status = npg_error(NPG_BAD_INPUT,
-                           "%s/%s was changed since it was written; --restart discards what is there", output,
-                           file);
+        status = npg_error(NPG_BAD_INPUT, "%s/%s was changed since it was written", output, file);
     json_decref(now);
     return status == NPG_DISK ? NPG_BAD_INPUT : status;
 }

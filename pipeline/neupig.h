@@ -429,6 +429,20 @@ typedef struct npg_applied {
  * different output folders. */
 NPG_API npg_status npg_apply(npg_applied *applied, const npg_apply_settings *settings);
 
+/* ---- whether results are as they were written ---- */
+
+typedef struct npg_verified {
+    size_t struct_size;
+    size_t files, damaged; /* that done.json lists; of those, how many are gone or have other bytes */
+} npg_verified;
+
+/* Compares size and checksum (XXH3) of every file that output/done.json lists: of a run, of its segments, of
+ * npg_apply().  damaged() (NULL: nobody) is told of each that is not as it was written: path and cause.
+ * NPG_BAD_INPUT: there is one, whose text names the first, or no list; NPG_USAGE, NPG_MEMORY.  Reads all of them
+ * once.  Thread-safe. */
+NPG_API npg_status npg_verify(npg_verified *found, const char *output, void *user,
+                              void (*damaged)(void *user, const char *text));
+
 /* ---- pictures of meshes and clouds, without a display ---- */
 
 typedef enum npg_picture_colour {

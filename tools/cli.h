@@ -25,6 +25,9 @@ npg_status npg_cli_parse(npg_cli *cli, const char *verb, void *values, npg_optio
 /* Print to stderr how it failed, and return the exit code of the status.  NPG_END counts as success. */
 int npg_cli_end(const char *verb, npg_status status);
 
+/* A warning on stderr where a folder has a done.json and a file that it lists is not as it was written (npg_verify). */
+void npg_cli_warn_of_damage(const char *verb, const char *folder);
+
 /* The i-th option of a verb, as its help lists them: of run in groups (the group is info->stage), of others their
  * own.  is_short (may be NULL): whether the short help shows it.  NPG_END after the last. */
 npg_status npg_cli_option(npg_option_info *info, bool *is_short, const npg_verb *verb, size_t i);

@@ -61,6 +61,12 @@ const npg_verb npg_verbs[] = {
      "with those of TRUTH, frame by frame, and prints Chamfer distance (x 1e5), normal consistency, "
      "F-score and correspondence error; lengths are in diagonals of the first ground-truth frame's box.",
      npg_eval_options, false, npg_verb_eval},
+    {"verify", "OUT...", 1, 4096, "Check that results are as they were written",
+     "OUT is the output folder of run or apply.  "
+     "Size and checksum of every file that its done.json lists, those of segments among them, are compared; each that "
+     "is gone or has other bytes is named.  Exit code 0 when all are as they were written, 3 when one is not "
+     "or there is no done.json.",
+     NULL, false, npg_verb_verify},
     {"synth", "-o DIR", 0, 0, "Make a capture with an exact ground truth",
      "Writes a moving body as point clouds (DIR/points) and as meshes whose vertices keep their identity "
      "(DIR/truth).  The same options and seed give the same bytes.",

@@ -120,6 +120,7 @@ int npg_verb_eval(int argc, char **argv)
     npg_eval_figures found = {.struct_size = sizeof found};
     told t = {&s, json_array()};
     npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
+    if (!status) npg_cli_warn_of_damage(argv[0], cli.operands[0]);
     if (!status)
         status = npg_eval(&found, &(npg_eval_settings){.struct_size = sizeof(npg_eval_settings),
                                                        .predicted = cli.operands[0],

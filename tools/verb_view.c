@@ -48,6 +48,7 @@ static npg_status write_page(const settings *s, const npg_cli *cli)
                                   .output = output,
                                   .point_limit = (size_t)s->points,
                                   .every = s->every};
+    for (int i = 0; i < cli->operand_count; i++) npg_cli_warn_of_damage("view", cli->operands[i]);
     npg_status status = s->live ? npg_view_follow(&facts, &order) : npg_view_page_write(&facts, &order);
     if (!status && facts.without_points)
         fprintf(stderr, "neupig view: warning: %zu of %zu frames without points (%s)\n", facts.without_points,

@@ -27,6 +27,7 @@ int npg_verb_batch(int argc, char **argv);
 int npg_verb_apply(int argc, char **argv);
 int npg_verb_probe(int argc, char **argv);
 int npg_verb_eval(int argc, char **argv);
+int npg_verb_verify(int argc, char **argv);
 int npg_verb_synth(int argc, char **argv);
 int npg_verb_render(int argc, char **argv);
 int npg_verb_view(int argc, char **argv);

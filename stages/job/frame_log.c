@@ -195,7 +195,8 @@ static npg_status take_line(void *user, const json_t *frame, const char *line, s
     (void)line;
     r->mesh_count += file != NULL;
     r->skipped_count += json_is_true(json_object_get(frame, "skipped"));
-    if (file) NPG_TRY(npg_file_check(frame, r->list->output, file));
+    npg_status status = file ? npg_file_check(frame, r->list->output, file) : NPG_OK;
+    if (status) return npg_error(status, "%s; --restart discards what is there", npg_error_text());
     return add_place(r->list, (int64_t)json_integer_value(json_object_get(frame, "index")), size);
 }
 

@@ -60,36 +60,20 @@ static npg_status take_lock(npg_job *job)
 
 /* ---- what is there ---- */
 
-static npg_status check_listed(const npg_job *job, const json_t *files)
-{
-    for (size_t i = 0; i < json_array_size(files); i++) {
-        const json_t *entry = json_array_get(files, i);
-        const char *name = json_string_value(json_object_get(entry, "path"));
-        struct stat info;
-        char path[NPG_PATH_SIZE];
-        NPG_TRY(npg_path_of(path, job->output, name ? name : ""));
-        bool is_there = name && npg_path_stays(name) && !stat(path, &info) &&
-                        info.st_size == (off_t)json_integer_value(json_object_get(entry, "bytes"));
-        if (!is_there)
-            return npg_error(NPG_USAGE, "%s/%s is missing or has another size than when it was done",
-                             job->output, name ? name : "?");
-    }
-    return NPG_OK;
-}
-
 /* Whether the earlier run ended well, and how. */
 static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_partial)
 {
     json_t *done;
+    npg_verified files = {.struct_size = sizeof files};
     *is_done = *was_partial = false;
     NPG_TRY(npg_json_load(&done, job->output, "done.json", NPG_USAGE));
     if (!done) return NPG_OK;
     size_t frames = json_array_size(json_object_get(job->then, "frames"));
     *is_done = job->source || json_integer_value(json_object_get(done, "frames")) == (json_int_t)frames;
     *was_partial = json_integer_value(json_object_get(done, "exit_code")) == 7;
-    npg_status status = *is_done ? check_listed(job, json_object_get(done, "files")) : NPG_OK;
     json_decref(done);
-    return status;
+    npg_status status = *is_done ? npg_verify(&files, job->output, NULL, NULL) : NPG_OK;
+    return status == NPG_BAD_INPUT ? npg_error_restore(NPG_USAGE, npg_error_text()) : status;
 }
 
 /* ---- the store ---- */

@@ -132,6 +132,9 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_applied, frames, 8),
                                  AT(npg_applied, worst_share, 48),
                                  SIZE(npg_applied, 56),
+                                 AT(npg_verified, files, 8),
+                                 AT(npg_verified, damaged, 16),
+                                 SIZE(npg_verified, 24),
                                  AT(npg_picture_settings, width, 8),
                                  AT(npg_picture_settings, azimuth, 40),
                                  AT(npg_picture_settings, is_z_up, 56),
@@ -357,6 +360,11 @@ static void results_that_are_not_there(void **state)
     assert_int_equal(npg_apply(&applied, &apply), NPG_USAGE);
     apply.mesh = NULL;
     assert_int_equal(npg_apply(&applied, &apply), NPG_USAGE);
+
+    npg_verified verified = {.struct_size = sizeof verified};
+    assert_int_equal(npg_verify(&verified, NULL, NULL, NULL), NPG_USAGE);
+    assert_int_equal(npg_verify(NULL, "/nowhere", NULL, NULL), NPG_USAGE);
+    assert_int_equal(npg_verify(&verified, "/nowhere", NULL, NULL), NPG_BAD_INPUT);
 
     assert_int_equal(npg_picture_write(NULL, "a.png", files, 1, &draw), NPG_USAGE);
     assert_int_equal(npg_picture_write(&picture, "a.png", files, 1, NULL), NPG_USAGE);
