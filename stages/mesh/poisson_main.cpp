@@ -1,8 +1,15 @@
 // neupig-poisson: screened Poisson reconstruction in a process of its own (PCL), because it may crash, eat
 // all memory or call exit() on bad input.  Based on:
 // M. Kazhdan, H. Hoppe, Screened Poisson Surface Reconstruction, 2013.
+#include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
-#include <pcl/surface/poisson.h>
+#include <pcl/surface/3rdparty/poisson4/octree_poisson.h>
+// The product comes before PCL's templates that call it.
+#include "mesh/poisson_product.hpp"
+#include <pcl/surface/3rdparty/poisson4/function_data.h>
+#include <pcl/surface/3rdparty/poisson4/geometry.h>
+#include <pcl/surface/3rdparty/poisson4/multi_grid_octree_data.h>
+#include <pcl/surface/3rdparty/poisson4/ppolynomial.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -95,18 +102,54 @@ struct Mesh {
     std::vector<Face> faces;
 };
 
-Mesh triangles(const pcl::PointCloud<pcl::PointNormal> &points, const std::vector<pcl::Vertices> &polygons)
+using Surface = pcl::poisson::CoredVectorMeshData;
+using Place = pcl::poisson::Point3D<float>;
+
+// The first level of the octree is whole: where no points are the function is as smooth as this.
+constexpr int whole_depth = 5;
+constexpr int divided_depth = 8; // levels below are solved, and their surface drawn, part by part
+constexpr float points_per_cell = 1.5f, box_growth = 1.1f, accuracy = 1e-3f;
+constexpr int least_steps = 8;
+
+void draw(Surface &surface, Place &center, float &scale, const npg_poisson_request &request,
+          const pcl::PointCloud<pcl::PointNormal>::ConstPtr &cloud)
+{
+    using namespace pcl::poisson;
+    int depth = int(request.depth);
+    Octree<2> tree;
+    TreeNodeData::UseIndex = 1;
+    TreeOctNode::SetAllocator(1 << 12);
+    tree.threads = thread_count;
+    tree.setBSplineData(depth, Real(1) / Real(1 << depth), true);
+    tree.setTree<pcl::PointNormal>(cloud, depth, whole_depth, depth - 2, points_per_cell, box_growth, center,
+                                   scale, false, request.point_weight, true);
+    tree.ClipTree();
+    tree.finalize();
+    tree.RefineBoundary(divided_depth);
+    tree.SetLaplacianConstraints();
+    tree.LaplacianMatrixIteration(divided_depth, false, least_steps, accuracy);
+    tree.GetMCIsoTriangles(tree.GetIsoValue(), divided_depth, &surface, 0, 1, true, false);
+}
+
+Mesh triangles(Surface &surface, const Place &center, float scale)
 {
     Mesh mesh;
-    for (const auto &p : points) {
-        if (!std::isfinite(p.x + p.y + p.z)) throw std::runtime_error("a vertex is not finite");
-        mesh.positions.push_back(
-            {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f}); // -0 becomes 0: equal means equal bits
+    auto add = [&](const Place &p) {
+        Position at;
+        for (size_t i = 0; i < 3; i++) at[i] = p.coords[i] * scale + center.coords[i] + 0.0f; // -0 becomes 0
+        if (!std::isfinite(at[0] + at[1] + at[2])) throw std::runtime_error("a vertex is not finite");
+        mesh.positions.push_back(at);
+    };
+    size_t first = surface.inCorePoints.size();
+    for (const Place &p : surface.inCorePoints) add(p);
+    Place p;
+    while (surface.nextOutOfCorePoint(p)) add(p);
+    std::vector<pcl::poisson::CoredVertexIndex> corners;
+    while (surface.nextPolygon(corners)) {
+        std::vector<uint32_t> at;
+        for (const auto &c : corners) at.push_back(uint32_t(c.inCore ? c.idx : c.idx + int(first)));
+        for (size_t k = 2; k < at.size(); k++) mesh.faces.push_back({at[0], at[k - 1], at[k]});
     }
-    for (const auto &polygon : polygons)
-        for (size_t k = 2; k < polygon.vertices.size(); k++)
-            mesh.faces.push_back({uint32_t(polygon.vertices[0]), uint32_t(polygon.vertices[k - 1]),
-                                  uint32_t(polygon.vertices[k])});
     return mesh;
 }
 
@@ -159,18 +202,11 @@ int reconstruct(int out)
                      (unsigned long long)request.point_count);
         return 3;
     }
-    pcl::Poisson<pcl::PointNormal> poisson;
-    poisson.setDepth(int(request.depth));
-    poisson.setPointWeight(request.point_weight);
-    poisson.setSamplesPerNode(1.5f);
-    poisson.setScale(1.1f);
-    poisson.setManifold(true);
-    poisson.setThreads(thread_count);
-    poisson.setInputCloud(cloud);
-    pcl::PointCloud<pcl::PointNormal> points;
-    std::vector<pcl::Vertices> polygons;
-    poisson.reconstruct(points, polygons);
-    return write_mesh(out, in_order(triangles(points, polygons))) ? 0 : 1;
+    Surface surface;
+    Place center;
+    float scale = 1;
+    draw(surface, center, scale, request, cloud);
+    return write_mesh(out, in_order(triangles(surface, center, scale))) ? 0 : 1;
 }
 
 int guarded(int out)
