@@ -28,6 +28,7 @@ npg_status npg_capture_open(npg_capture **out, npg_frame_files **list, const cha
     c->keep_going = keep_going;
     status = refuse_gaps(c, input);
     if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
+    if (!status) status = npg_alloc_array(&c->hashes, NPG_FOR_FILES, c->list->count, sizeof *c->hashes);
     if (!status) status = npg_frame_store_open(&c->store, cache_limit, spill_folder);
     if (status) npg_capture_close(&c);
     *out = c;
@@ -40,8 +41,26 @@ void npg_capture_close(npg_capture **slot)
     if (!c) return;
     npg_frame_store_close(&c->store);
     npg_release(&c->is_bad);
+    npg_release(&c->hashes);
     npg_frame_files_close(&c->list);
     npg_release(slot);
+}
+
+/* A file that somebody exchanges while the run is on would give meshes of two captures.  Asked after it was read, so
+ * that none slips in between. */
+static npg_status check_unchanged(npg_capture *c, int64_t index)
+{
+    npg_input_sum now;
+    const npg_frame_slot *slot = &c->list->slots[index];
+    NPG_TRY(npg_frame_files_sum(c->list, (size_t)index, &now));
+    if (c->hashes[index] && c->hashes[index] != now.hash)
+        return npg_error(
+            NPG_USAGE,
+            "the input %s was exchanged while the run is on (frame %lld): put it back and run again, "
+            "or begin anew with --restart",
+            slot->path, (long long)slot->number);
+    c->hashes[index] = now.hash;
+    return NPG_OK;
 }
 
 static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg_origin *origin,
@@ -50,6 +69,7 @@ static npg_status read_slot(npg_capture *c, npg_frame *frame, int64_t index, npg
     if (!npg_frame_store_get(c->store, frame, index, is_last_use)) return NPG_OK;
     c->reads++;
     NPG_TRY(npg_frame_files_read(c->list, (size_t)index, frame, origin));
+    NPG_TRY(check_unchanged(c, index));
     frame->index = index; /* what the store keeps it under; a gap that holds it has another one */
     return is_last_use ? NPG_OK : npg_frame_store_put(c->store, frame, false);
 }

@@ -20,7 +20,8 @@ static int64_t step_of(const int64_t *numbers, size_t count)
 static npg_status add_slot(npg_frame_files *list, size_t *capacity, char *path, int64_t number)
 {
     NPG_TRY(npg_arena_grow(&list->arena, &list->slots, capacity, list->count + 1, sizeof *list->slots));
-    list->slots[list->count++] = (npg_frame_slot){path, number};
+    list->slots[list->count++] = (npg_frame_slot){
+        path, number, path && list->rig ? npg_rig_frame_hash(list->rig, npg_rig_find(list->rig, number)) : 0};
     list->gap_count += !path;
     return NPG_OK;
 }
@@ -166,6 +167,37 @@ npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
     if (!list->rig) return visit(user, at->path);
     return npg_rig_each_image(list->rig, npg_rig_find(list->rig, at->number), visit, user);
 }
+
+/* ---- checksums ---- */
+
+static void release_hashes(void *value)
+{
+    npg_release(&value);
+}
+
+const npg_fact_kind npg_fact_input_hashes = {"input_hashes", "job", release_hashes};
+
+npg_status npg_input_sum_add(void *user, const char *path)
+{
+    npg_input_sum *sum = user;
+    struct stat info;
+    uint64_t hash;
+    if (stat(path, &info)) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
+    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
+    if (status) return status == NPG_DISK ? NPG_BAD_INPUT : status;
+    sum->bytes += (int64_t)info.st_size;
+    sum->hash = sum->is_begun ? (sum->hash ^ hash) * 0x9e3779b97f4a7c15u : hash;
+    sum->is_begun = true;
+    return NPG_OK;
+}
+
+npg_status npg_frame_files_sum(const npg_frame_files *list, size_t slot, npg_input_sum *sum)
+{
+    *sum = (npg_input_sum){.hash = list->slots[slot].calibration, .is_begun = list->rig != NULL};
+    return npg_frame_files_each(list, slot, npg_input_sum_add, sum);
+}
+
+/* ---- option confine ---- */
 
 static npg_status confine_to(void *user, const char *path)
 {

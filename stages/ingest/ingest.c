@@ -2,6 +2,8 @@
  * from standard input, from a folder that grows, or from those that are pushed. */
 #include "ingest/ingest_internal.h"
 
+#include <string.h>
+
 typedef struct state {
     npg_live_settings live; /* of a capture in files, too: frames and missing */
     int64_t cache_mib;
@@ -190,6 +192,8 @@ static npg_status open_capture(npg_worker *worker)
     NPG_TRY(npg_capture_open(&capture, &list, settings->input, (npg_missing)s->live.missing,
                              settings->keep_going, cache_limit(worker), folder));
     npg_worker_keep(worker, capture, release_capture);
+    const uint64_t *hashes = npg_worker_fact(worker, &npg_fact_input_hashes);
+    if (hashes) memcpy(capture->hashes, hashes, capture->list->count * sizeof *hashes);
     NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
     /* A resumed run has restored it. */
     if (!npg_worker_facts(worker)->is_resumed)

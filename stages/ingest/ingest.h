@@ -266,6 +266,7 @@ bool npg_selection_needs_count(const npg_selection *selection);
 typedef struct npg_frame_slot {
     char *path; /* NULL: a gap */
     int64_t number;
+    uint64_t calibration; /* npg_rig_frame_hash() when the list was opened; 0: of a file */
 } npg_frame_slot;
 
 typedef struct npg_frame_files {
@@ -294,6 +295,23 @@ npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view *vi
 /* Call visit for each file that the frame `slot` is made of; ends with the first status but NPG_OK. */
 npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
                                 npg_status (*visit)(void *user, const char *path), void *user);
+
+/* Size and checksum of one file, or of all that a frame is made of; begins as zero. */
+typedef struct npg_input_sum {
+    int64_t bytes;
+    uint64_t hash;
+    bool is_begun;
+} npg_input_sum;
+
+/* Add a file to a npg_input_sum; the order counts.  NPG_BAD_INPUT. */
+npg_status npg_input_sum_add(void *sum, const char *path);
+
+/* That of frame `slot`, which has a path; of a rig its calibration counts, too. */
+npg_status npg_frame_files_sum(const npg_frame_files *list, size_t slot, npg_input_sum *sum);
+
+/* What stage job found before the first pass: the hash of every slot (uint64_t; 0: it could not be read).  Frames that
+ * are read later must have it. */
+extern const npg_fact_kind npg_fact_input_hashes;
 
 /* Refuse a list with a file that is not in the input's folder (of a pattern, list or file: the one it lies
  * in) after all links are followed.  NPG_BAD_INPUT names it; nothing has been opened then. */

@@ -171,6 +171,7 @@ typedef struct npg_capture {
     npg_missing missing;
     bool keep_going;
     uint8_t *is_bad;        /* per slot: could not be read; owned */
+    uint64_t *hashes;       /* per slot, 0: not known yet; owned  */
     npg_frame_store *store; /* of what was read; owned            */
     uint64_t reads;         /* files parsed so far                */
 } npg_capture;
@@ -184,7 +185,8 @@ npg_status npg_capture_open(npg_capture **capture, npg_frame_files **list, const
 
 void npg_capture_close(npg_capture **capture);
 
-/* Frame `index` (0 <= index < list->count) into the empty *frame.  NPG_PARTIAL: with keep_going, a file that
+/* Frame `index` (0 <= index < list->count) into the empty *frame.  NPG_USAGE where its file is not the one that it
+ * was before (hashes), keep_going or not.  NPG_PARTIAL: with keep_going, a file that
  * can't be used for the first time; the frame is_skipped and npg_error_text() says why.  is_last_use: the
  * store may give its copy away.  frame->fields has NPG_FIELD_CLEAN where the store has it clean. */
 npg_status npg_capture_read(npg_capture *capture, npg_frame *frame, int64_t index, npg_origin *origin,

@@ -113,6 +113,7 @@ static npg_status begin(npg_worker *worker)
         return npg_error(NPG_USAGE, "frames can be appended to a job of files, not to one of a live source");
     NPG_TRY(npg_job_open(&job, &start, worker, state->restart, state->append));
     NPG_TRY(npg_worker_publish(worker, &job_fact, job));
+    NPG_TRY(npg_job_publish_hashes(worker, job));
     if (is_live) NPG_TRY(npg_worker_publish(worker, &npg_fact_spool, job->frames));
     switch (start) {
     case NPG_JOB_FRESH: return NPG_OK;

@@ -1,8 +1,8 @@
 /* What the results of a job are made of: version, options, inputs; and whether they changed. */
 #include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "ingest/ingest.h"
@@ -57,50 +57,19 @@ static json_t *describe_custom_stages(const npg_options *options)
     return list;
 }
 
-/* Of one file, or of all that a frame is made of. */
-typedef struct file_sum {
-    json_int_t bytes;
-    uint64_t hash;
-    bool is_begun;
-} file_sum;
-
-static npg_status add_file(void *user, const char *path)
-{
-    file_sum *sum = user;
-    struct stat info;
-    uint64_t hash;
-    if (stat(path, &info)) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
-    npg_status status = npg_hash_file(&hash, path, UINT64_MAX);
-    if (status) return status == NPG_DISK ? NPG_BAD_INPUT : status;
-    sum->bytes += (json_int_t)info.st_size;
-    sum->hash = sum->is_begun ? (sum->hash ^ hash) * 0x9e3779b97f4a7c15u : hash; /* the order counts */
-    sum->is_begun = true;
-    return NPG_OK;
-}
-
-static void describe_sum(json_t *entry, const char *path, const file_sum *sum)
+static void describe_sum(json_t *entry, const char *path, const npg_input_sum *sum)
 {
     const char *slash = strrchr(path, '/');
     json_object_set_new(entry, "name", npg_json_text(slash ? slash + 1 : path));
-    json_object_set_new(entry, "bytes", json_integer(sum->bytes));
+    json_object_set_new(entry, "bytes", json_integer((json_int_t)sum->bytes));
     json_object_set_new(entry, "xxh3", json_sprintf("%016llx", (unsigned long long)sum->hash));
 }
 
 static npg_status describe_file(json_t *entry, const char *path)
 {
-    file_sum sum = {0};
-    NPG_TRY(add_file(&sum, path));
+    npg_input_sum sum = {0};
+    NPG_TRY(npg_input_sum_add(&sum, path));
     describe_sum(entry, path, &sum);
-    return NPG_OK;
-}
-
-/* The images of a frame, and the calibration that it is made with. */
-static npg_status describe_rig_frame(json_t *entry, const npg_frame_files *list, size_t i)
-{
-    file_sum sum = {.hash = npg_rig_frame_hash(list->rig, npg_rig_find(list->rig, list->slots[i].number)),
-                    .is_begun = true};
-    NPG_TRY(npg_frame_files_each(list, i, add_file, &sum));
-    describe_sum(entry, list->slots[i].path, &sum);
     return NPG_OK;
 }
 
@@ -110,8 +79,9 @@ static npg_status describe_frames(json_t *frames, const npg_frame_files *list)
         json_t *entry = json_pack("{sI}", "number", (json_int_t)list->slots[i].number);
         json_array_append_new(frames, entry);
         if (!list->slots[i].path) continue;
-        npg_status status =
-            list->rig ? describe_rig_frame(entry, list, i) : describe_file(entry, list->slots[i].path);
+        npg_input_sum sum;
+        npg_status status = npg_frame_files_sum(list, i, &sum);
+        if (!status) describe_sum(entry, list->slots[i].path, &sum);
         /* what can't be read is for ingest to refuse or skip; here it only must not pass for one that can */
         if (status && status != NPG_BAD_INPUT) return status;
     }
@@ -177,13 +147,25 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     return status;
 }
 
-/* ---- comparing ---- */
-
 static const char *text_of(const json_t *object, const char *key)
 {
     const char *text = json_string_value(json_object_get(object, key));
     return text ? text : "";
 }
+
+npg_status npg_job_publish_hashes(npg_worker *worker, const npg_job *job)
+{
+    uint64_t *hashes;
+    const json_t *frames = json_object_get(job->now, "frames");
+    size_t count = json_array_size(frames);
+    if (!count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&hashes, NPG_FOR_FILES, count, sizeof *hashes));
+    for (size_t i = 0; i < count; i++)
+        hashes[i] = strtoull(text_of(json_array_get(frames, i), "xxh3"), NULL, 16);
+    return npg_worker_publish(worker, &npg_fact_input_hashes, hashes);
+}
+
+/* ---- comparing ---- */
 
 static const char *source_of(const json_t *description)
 {

@@ -86,6 +86,9 @@ npg_status npg_job_commit(npg_job *job, const npg_job_moment *moment);
 /* A new JSON object.  */
 npg_status npg_job_describe(json_t **description, const npg_options *options);
 
+/* The checksums of its frames, for stage ingest (npg_fact_input_hashes); of files alone. */
+npg_status npg_job_publish_hashes(npg_worker *worker, const npg_job *job);
+
 /* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.
  * NPG_USAGE says what differs first. */
 npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now);

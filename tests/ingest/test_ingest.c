@@ -192,6 +192,32 @@ static void nothing_to_read(void **state)
     assert_non_null(strstr(failure, "not-there: there is no such file or folder"));
 }
 
+static void a_file_that_is_exchanged_is_refused_one_that_is_touched_is_not(void **state)
+{
+    (void)state;
+    npg_capture *capture;
+    npg_origin origin = {0};
+    npg_frame frame;
+    const char *path = in_folder(&folder, "exchanged");
+    mkdir(path, 0777);
+    write_text_file(in_folder(&folder, "exchanged/f0.xyz"), "1 2 3\n");
+    assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, true, 0, NULL), NPG_OK);
+    for (int touched = 0; touched < 2; touched++) {
+        assert_int_equal(npg_capture_read(capture, &frame, 0, &origin, false), NPG_OK);
+        npg_frame_clear(&frame);
+        write_text_file(in_folder(&folder, "exchanged/f0.xyz"), "1 2 3\n");
+    }
+    write_text_file(in_folder(&folder, "exchanged/f0.xyz"), "1 2 4\n");
+    assert_int_equal(npg_capture_read(capture, &frame, 0, &origin, false), NPG_USAGE);
+    assert_non_null(strstr(npg_error_text(), "f0.xyz was exchanged"));
+    npg_capture_close(&capture);
+    /* nor is one that is not what stage job saw */
+    assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, true, 1 << 20, NULL), NPG_OK);
+    capture->hashes[0] = 1;
+    assert_int_equal(npg_capture_read(capture, &frame, 0, &origin, false), NPG_USAGE);
+    npg_capture_close(&capture);
+}
+
 static void few_files_are_parsed_twice(void **state)
 {
     (void)state;
@@ -325,14 +351,16 @@ static void no_memory_at_any_point(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(three_passes_each_in_its_order),
-                                       cmocka_unit_test(gaps_are_refused_skipped_held_or_ignored),
-                                       cmocka_unit_test(a_selection_makes_its_own_capture),
-                                       cmocka_unit_test(a_bad_file_stops_or_is_skipped),
-                                       cmocka_unit_test(nothing_to_read),
-                                       cmocka_unit_test(few_files_are_parsed_twice),
-                                       cmocka_unit_test(frames_from_standard_input),
-                                       cmocka_unit_test(frames_that_are_pushed),
-                                       cmocka_unit_test(no_memory_at_any_point)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(three_passes_each_in_its_order),
+        cmocka_unit_test(gaps_are_refused_skipped_held_or_ignored),
+        cmocka_unit_test(a_selection_makes_its_own_capture),
+        cmocka_unit_test(a_bad_file_stops_or_is_skipped),
+        cmocka_unit_test(nothing_to_read),
+        cmocka_unit_test(a_file_that_is_exchanged_is_refused_one_that_is_touched_is_not),
+        cmocka_unit_test(few_files_are_parsed_twice),
+        cmocka_unit_test(frames_from_standard_input),
+        cmocka_unit_test(frames_that_are_pushed),
+        cmocka_unit_test(no_memory_at_any_point)};
     return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

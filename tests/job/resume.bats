@@ -132,6 +132,23 @@ same() {
     same changed
 }
 
+@test "an input that is exchanged while the run is on is named; put back, the run goes on" {
+    cp -r capture/points exchanged
+    "$NEUPIG" run exchanged -o torn "${small[@]}" --cache 0 >torn.log 2>&1 &
+    local pid=$!
+    while kill -0 $pid && [ ! -e torn/job/store.new ]; do sleep 0.01; done
+    cp capture/points/frame_0005.ply next && mv next exchanged/frame_0000.ply
+    status=0
+    wait $pid || status=$?
+    cat torn.log
+    [ "$status" -eq 2 ]
+    grep -q "exchanged/frame_0000.ply was exchanged while the run is on" torn.log
+    [ ! -e torn/done.json ]
+    cp capture/points/frame_0000.ply exchanged/
+    "$NEUPIG" run exchanged -o torn "${small[@]}"
+    diff -r whole/meshes torn/meshes
+}
+
 @test "a job of a version before the store is refused, and --restart discards it" {
     cp -r whole older
     sed -i '/"layout"/d' older/job/job.json
