@@ -87,7 +87,8 @@ static npg_status spawn(child *c, const char *path, int in, int out, int err)
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     sigset_t none, all;
-    char *arguments[] = {(char *)(uintptr_t)path, NULL};
+    char parent[24], *arguments[] = {(char *)(uintptr_t)path, parent, NULL};
+    snprintf(parent, sizeof parent, "%ld", (long)getpid());
     posix_spawn_file_actions_init(&actions);
     posix_spawnattr_init(&attributes);
     posix_spawn_file_actions_adddup2(&actions, in, 0);

@@ -7,7 +7,8 @@
 #include "pipeline/status.h"
 
 typedef struct npg_child_job {
-    /* name of the helper, "neupig-poisson", or an absolute path; a name is looked for beside this program and
+    /* name of the helper, "neupig-poisson", or an absolute path; started with our process id as its argument, for
+     * npg_end_with_parent(); a name is looked for beside this program and
      * this library, in their ../libexec/neupig (or ../../libexec/neupig), and where it was to be installed */
     const char *program;
     const void *input[2]; /* written one after the other, then standard input is closed */

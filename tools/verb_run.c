@@ -5,11 +5,11 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
+#include "pipeline/with_parent.h"
 #include "tools/cli.h"
 #include "tools/progress.h"
 #include "tools/segments/segments.h"
@@ -106,10 +106,7 @@ static void *watch_signals(void *argument)
 /* A run that a batch started stops when the batch is gone, however that ended. */
 static void stop_with_parent(void)
 {
-    const char *parent = getenv(NPG_PARENT_VARIABLE);
-    if (!parent) return;
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (getppid() != (pid_t)strtol(parent, NULL, 10)) kill(getpid(), SIGTERM);
+    npg_end_with_parent(getenv(NPG_PARENT_VARIABLE), SIGTERM);
 }
 
 static npg_status start_watching(watcher *w, npg_run *run)

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "kernels/runtime/device_internal.h"
+#include "pipeline/with_parent.h"
 
 static void ask_platform(cl_platform_id platform)
 {
@@ -19,10 +20,11 @@ static void ask_platform(cl_platform_id platform)
         clGetDeviceInfo(devices[i], CL_DEVICE_GLOBAL_MEM_SIZE, sizeof memory, &memory, NULL);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     cl_platform_id platforms[NPG_PLATFORMS_MAX];
     cl_uint count = 0;
+    npg_end_with_parent(argc > 1 ? argv[1] : NULL, SIGKILL);
     prctl(PR_SET_DUMPABLE, 0); /* its death is reported; no core file for it */
     if (!clGetPlatformIDs(NPG_PLATFORMS_MAX, platforms, &count))
         for (cl_uint i = 0; i < count && i < NPG_PLATFORMS_MAX; i++) ask_platform(platforms[i]);

@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "mesh/poisson_wire.h"
+#include "pipeline/with_parent.h"
 
 namespace
 {
@@ -236,8 +237,8 @@ void wait_asleep(char **argv)
 
 int main(int, char **argv)
 {
+    npg_end_with_parent(argv[1], SIGKILL); // before all else
     wait_asleep(argv);
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
     // What libraries print must not get between the bytes of the answer.
     int out = dup(STDOUT_FILENO);
     dup2(STDERR_FILENO, STDOUT_FILENO);

@@ -69,6 +69,23 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
     cmp own/reference.ply own-live/reference.ply
 }
 
+@test "a helper process ends with the one that started it, also where that ended first" {
+    helper=$(dirname "$NEUPIG")/neupig-poisson
+    mkfifo held
+    exec 4<>held
+    run timeout 5 "$helper" 1 <&4 # of a process that is not its parent
+    [ "$status" -eq 137 ]
+    bash -c "'$helper' \$\$ <&4 & echo \$! >child; wait" &
+    parent=$!
+    while [ ! -s child ]; do sleep 0.01; done
+    sleep 0.1
+    works() { tr '\0' ' ' <"/proc/$(cat child)/cmdline" 2>/dev/null | grep -q poisson; } # one that nobody reaped has no words
+    works
+    kill -KILL $parent
+    for try in {1..50}; do works || return 0; sleep 0.01; done
+    false
+}
+
 @test "frames on standard input give the same meshes as the files" {
     "$NEUPIG" run capture/points -o from-files "${small[@]}" --bars residual=100 >/dev/null
     cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --bars residual=100 >/dev/null
