@@ -2,7 +2,11 @@
 #ifndef NPG_CHILD_H
 #define NPG_CHILD_H
 
+#include <signal.h>
 #include <stdbool.h>
+#include <stdlib.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 #include "pipeline/status.h"
 
@@ -30,5 +34,16 @@ typedef struct npg_child_result {
  * last line.  No process, descriptor or signal is left behind; the caller's SIGPIPE setting does not matter.
  * Threads: any number at a time. */
 npg_status npg_child_run(npg_child_result *result, const npg_child_job *job);
+
+/* ---- for the helper ---- */
+
+/* From now on the signal comes when the parent ends; it comes at once where that has ended before, so that it is not
+ * the parent any more.  parent: its process id as text; NULL does nothing.  Lasts over exec. */
+static inline void npg_end_with_parent(const char *parent, int signal)
+{
+    if (!parent) return;
+    prctl(PR_SET_PDEATHSIG, signal);
+    if (getppid() != (pid_t)strtol(parent, NULL, 10)) kill(getpid(), signal);
+}
 
 #endif

@@ -52,7 +52,8 @@ const npg_option npg_run_options[] = {
     NPG_PROGRAM_ROW(INT,  "chunk",      AT(chunk_frames),   "4",         1, 1024, NULL,
         "Frames per chunk"),
     NPG_ROW_INT(          "max-memory", AT(max_memory_mib), "0",         0, 1e9,  "MIB",
-        "Stop rather than use more memory than this. 0: no limit"),
+        "Stop rather than take more memory than this. What neupig takes itself; the process has code, libraries "
+        "and the device's compiler besides, and a warning says where it passed the limit. 0: no limit"),
     NPG_PROGRAM_ROW(FLAG, "pull",       AT(pull),           "no",
         "Finished frames are also pulled through the library"),
     {0}};
@@ -298,9 +299,24 @@ static json_int_t resident_peak(void)
     return getrusage(RUSAGE_SELF, &usage) ? 0 : (json_int_t)usage.ru_maxrss * 1024;
 }
 
+/* Where option max-memory held and the process is larger all the same. */
+static void warn_of_resident(npg_run *run)
+{
+    char text[256];
+    long long limit = run->settings.max_memory_mib, had = (long long)(resident_peak() >> 20);
+    if (!limit || had <= limit) return;
+    snprintf(
+        text, sizeof text,
+        "the process had %lld MiB in memory, more than max-memory (%lld MiB): %zu MiB were taken by neupig, the "
+        "rest are code, libraries and what these take",
+        had, limit, npg_memory_peak() >> 20);
+    npg_run_log(run, NPG_LOG_WARNING, "run", -1, text);
+}
+
 static npg_status conclude(npg_run *run)
 {
     json_t *r = run->report;
+    warn_of_resident(run);
     json_object_set_new(r, "status", json_string(run->is_partial ? "partial" : "ok"));
     json_object_set_new(r, "warning_count", json_integer((json_int_t)run->warning_count));
     json_object_set_new(r, "exit_code", json_integer(run->is_partial ? 7 : 0));

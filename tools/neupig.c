@@ -1,5 +1,6 @@
 /* neupig: the command.  One verb per file; this one holds their table and the small verbs. */
 #include <malloc.h>
+#include <signal.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -196,6 +197,7 @@ static void set_heap(void)
 int main(int argc, char **argv)
 {
     set_heap();
+    signal(SIGXFSZ, SIG_IGN); /* then a file past ulimit -f is a failed write (5), named like any other */
     if (argc < 2) {
         npg_help_verbs(stderr);
         return npg_status_exit_code(NPG_USAGE);

@@ -7,9 +7,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "pipeline/child.h"
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
-#include "pipeline/with_parent.h"
 #include "tools/cli.h"
 #include "tools/progress.h"
 #include "tools/segments/segments.h"

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "kernels/runtime/device_internal.h"
-#include "pipeline/with_parent.h"
+#include "pipeline/child.h"
 
 static void ask_platform(cl_platform_id platform)
 {

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "export/exporters/exporters_internal.h"
+#include "job/job.h"
 #include "pipeline/order.h"
 
 #define PROBE_BYTES (256 << 10)
@@ -84,6 +85,7 @@ static npg_status each_mesh(const char *output, visit_mesh *visit, void *user)
 }
 
 typedef struct own_meshes {
+    bool are_ours; /* a run was here before: what has our names may be its */
     const npg_mesh_names *names;
     const int64_t *numbers;
     size_t number_count;
@@ -95,11 +97,11 @@ static npg_status refuse_foreign(void *user, const char *folder, const char *nam
     char own_name[NPG_MESH_NAME_SIZE];
     npg_mesh_name(own_name, own->names, number);
     if (name[0] == '.') return NPG_OK;
-    if (!strcmp(name, own_name) && own->number_count &&
+    if (own->are_ours && !strcmp(name, own_name) && own->number_count &&
         bsearch(&number, own->numbers, own->number_count, sizeof number, npg_order_int64))
         return NPG_OK;
     return npg_error(NPG_USAGE,
-                     "%s/%s is of another run and would mix with this one's frames: "
+                     "%s/%s is not of this job, and would be lost or mix with its frames: "
                      "choose another output folder, or set overwrite to remove what earlier runs left",
                      folder, name);
 }
@@ -107,7 +109,11 @@ static npg_status refuse_foreign(void *user, const char *folder, const char *nam
 npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,
                             size_t number_count)
 {
-    return each_mesh(output, refuse_foreign, &(own_meshes){names, numbers, number_count});
+    static const char *const traces[] = {"done.json", "frames.jsonl", NPG_FRAME_LOG_NAME, "job/job.json"};
+    own_meshes own = {false, names, numbers, number_count};
+    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
+        own.are_ours = own.are_ours || npg_is_in_folder(output, traces[i]);
+    return each_mesh(output, refuse_foreign, &own);
 }
 
 /* ---- room ---- */

@@ -217,6 +217,7 @@ static npg_status read_reference(making *m)
     NPG_TRY(npg_mesh_require_finite(m->mesh, path));
     NPG_TRY(npg_mesh_require_manifold(m->mesh, path));
     npg_box_local_to_unit(&facts->box, m->mesh->vert_pos, m->mesh->vert_pos, m->mesh->vert_count);
+    if (!(npg_mesh_area(m->mesh) > 0)) return npg_error(NPG_BAD_INPUT, "%s: its faces have no area", path);
     NPG_TRY(npg_mesh_unseen(&m->invented_share, m->mesh, m->set.points, m->set.count, m->set.seen_dist));
     npg_mesh_note(m->worker, "unseen_share", m->invented_share);
     if (m->invented_share > 0.5)

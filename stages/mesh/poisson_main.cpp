@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "mesh/poisson_wire.h"
-#include "pipeline/with_parent.h"
+#include "pipeline/child.h"
 
 namespace
 {

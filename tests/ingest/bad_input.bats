@@ -81,6 +81,22 @@ box() {
     [ "$(grep -c '"skipped":true' kept/frames.jsonl)" -eq 5 ]
 }
 
+@test "a frame whose bytes stand in the wrong order is bad input, and never the keyframe" {
+    for order in '0<' '1>' '2<'; do
+        /usr/bin/python3 -c 'import random, struct, sys
+print("ply\nformat binary_little_endian 1.0\nelement vertex 900\nproperty float x\nproperty float y\nproperty float z\nend_header", flush=True)
+for _ in range(900):
+    p = [random.gauss(0, 1) for _ in range(3)]
+    sys.stdout.buffer.write(struct.pack(sys.argv[1][1] + "3f", *(c / sum(c * c for c in p) ** 0.5 for c in p)))' "$order" >"ball_${order::1}.ply"
+    done
+    refused 3 "ball_1.ply" .
+    [[ "$output" == *"wrong order"* ]]
+    refused 3 "ball_1.ply" "ball_1.ply"
+    run "$NEUPIG" run . -o kept "${small[@]}" --keep-going
+    [ "$status" -eq 7 ]
+    sed -n 2p kept/frames.jsonl | grep -q '"key":false,"skipped":true'
+}
+
 @test "a file without permission is bad input" {
     moved locked 0 0 0
     chmod 000 locked/frame_0001.xyz
@@ -130,6 +146,8 @@ box() {
     refused 3 "nan.obj: vertex 2 is not finite" in --reference nan.obj
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 7\n' >corner.obj
     refused 3 "corner.obj: line 4: vertex 7" in --reference corner.obj
+    printf 'v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n' >point.obj
+    refused 3 "point.obj: its faces have no area" in --reference point.obj
     refused 3 "in/frame_0000.xyz: a mesh must be PLY or OBJ" in --reference in/frame_0000.xyz
     refused 3 "none.obj" in --reference none.obj
 }

@@ -70,6 +70,16 @@ static const struct bad_file {
      "line 7: unknown word \"colour\""},
     {"a.ply", BYTES(PLY("element ver\0tex 1\n" XYZ "end_header\n")), "line 3: zero byte"},
     /* PLY: the body */
+    {"a.ply", BYTES(PLY("element vertex 3\n" XYZ "end_header\n1 2 3\n1e30 0 0\n0 -inf 0\n")),
+     "2 of 3 points lie farther than 1e+12 away"},
+    {"a.ply",
+     BYTES(PLY("element vertex 1\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
+               "end_header\n1 2 3\n3 0 0 2147483647\n")),
+     "face 0 uses vertex 2147483647, but there are only 1"},
+    {"a.ply",
+     BYTES(LE "element vertex 1\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
+              "end_header\n000011112222\x01\xff\xff\xff\x7f"),
+     "face 0 uses vertex 2147483647, but there are only 1"},
     {"a.ply", BYTES(PLY("element vertex 2\n" XYZ "end_header\n1.2345 2.3456 3\n")),
      "the file ends in 1 of the 2 rows"},
     {"a.ply", BYTES(PLY("element vertex 2\n" XYZ "end_header\n1 2\n3 4 5.000\n")),

@@ -177,8 +177,31 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
     [ "$status" -eq 5 ]
 }
 
-@test "too little memory is 6" {
+@test "a file past the limit of the shell is a failed write, by name" {
+    limited() { (ulimit -f 300; "$NEUPIG" run capture/points -o limited "${small[@]}" --export npz,usda); }
+    run limited
+    echo "$output"
+    [ "$status" -eq 5 ]
+    [[ "$output" == *"can't write limited/"*"File too large"* ]]
+    [ ! -e limited/done.json ]
+}
+
+@test "too little memory is 6; what the process has beside the limit is said" {
     run_bad 6 "memory limit of 4 MiB" capture/points --max-memory 4
+    run "$NEUPIG" run capture/points -o little "${small[@]}" --bars residual=100 --max-memory 30 --no-quiet
+    [ "$status" -eq 0 ]
+    [[ "$output" =~ "the process had "[0-9]+" MiB in memory, more than max-memory (30 MiB)" ]]
+}
+
+@test "a mesh of somebody else in the output folder is not lost" {
+    mkdir -p foreign/meshes
+    echo mine >foreign/meshes/frame_0000.ply
+    run "$NEUPIG" run capture/points -o foreign "${small[@]}"
+    echo "$output"
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"foreign/meshes/frame_0000.ply is not of this job"*overwrite* ]]
+    [ "$(cat foreign/meshes/frame_0000.ply)" = mine ]
+    "$NEUPIG" run capture/points -o foreign "${small[@]}" --bars residual=100 --overwrite >/dev/null
 }
 
 @test "results of another numbering are not mixed in" {

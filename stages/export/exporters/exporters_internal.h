@@ -151,7 +151,7 @@ npg_status npg_export_folder(const char *output, const char *name);
 npg_status npg_folder_has_room(const char *output, uint64_t bytes);
 
 /* NPG_USAGE when OUT/meshes holds mesh files that this run would not write over: their numbering would mix
- * with the run's.  numbers: the frames' numbers, sorted; with none every mesh file is in the way. */
+ * with the run's; and any where no run was before.  numbers: the frames' numbers, sorted; with none every mesh file is in the way. */
 npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,
                             size_t number_count);
 

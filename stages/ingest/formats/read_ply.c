@@ -233,7 +233,7 @@ static const struct {
 typedef struct reader {
     npg_source *source;
     ply_header *header;
-    const ply_element *vertex, *face; /* into header; face is NULL when a cloud is read */
+    const ply_element *vertex, *face; /* into header; face: NULL where none has corners */
     int slot_of[PROPERTIES];          /* of each vertex property, -1: of no interest    */
     npg_columns columns;
     npg_builder *builder;
@@ -299,12 +299,14 @@ static bool is_corner_list(const ply_property *property)
 static npg_status find_corner_list(reader *r)
 {
     const char *name = r->source->name;
-    if (!r->builder->wants_faces) return NPG_OK;
+    bool needs_faces = r->builder->wants_faces && !r->builder->may_be_points;
     r->face = find_element(r->header, "face");
-    if (!r->face && r->builder->may_be_points) return NPG_OK;
-    if (!r->face) return npg_error(NPG_BAD_INPUT, "%s: no faces, so it is not a mesh", name);
+    if (!r->face)
+        return needs_faces ? npg_error(NPG_BAD_INPUT, "%s: no faces, so it is not a mesh", name) : NPG_OK;
     for (size_t p = 0; p < r->face->property_count; p++)
         if (is_corner_list(&r->face->properties[p])) return NPG_OK;
+    r->face = NULL;
+    if (!r->builder->wants_faces) return NPG_OK;
     return npg_error(NPG_BAD_INPUT, "%s: header: element face has no list vertex_indices", name);
 }
 
@@ -416,9 +418,13 @@ static npg_status read_corner(reader *r, cursor *c, npg_ply_type type, uint32_t 
     return NPG_OK;
 }
 
+/* A cloud has no faces, but of a damaged file it is not its points either. */
 static npg_status read_corners(reader *r, cursor *c, npg_ply_type type, uint64_t length)
 {
     uint32_t corners[CORNERS_MAX];
+    for (uint64_t i = 0; i < length && !r->builder->wants_faces; i++)
+        NPG_TRY(read_corner(r, c, type, corners));
+    if (!r->builder->wants_faces) return NPG_OK;
     if (length < 3 || length > CORNERS_MAX)
         return npg_source_bad_byte(r->source, "face %llu has %llu corners", (unsigned long long)c->row,
                                    (unsigned long long)length);

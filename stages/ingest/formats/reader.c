@@ -1,6 +1,7 @@
 /* Readers: which format a file has, and the calls that do not care. */
 #include "ingest/ingest_internal.h"
 
+#include <math.h>
 #include <string.h>
 #include <strings.h>
 
@@ -117,6 +118,23 @@ static npg_status read_file(npg_builder *b, const char *path)
     return status;
 }
 
+/* Numbers whose bytes stand in the wrong order have any size, and no box could hold them. */
+static npg_status check_sizes(const npg_builder *b, const char *name)
+{
+    size_t far = 0, known = 0;
+    for (size_t i = 0; i < b->vert_count; i++) {
+        const float *p = b->pos + 3 * i;
+        float largest = fmaxf(fabsf(p[0]), fmaxf(fabsf(p[1]), fabsf(p[2])));
+        far += (double)largest > NPG_SIDE_MAX;
+        known += !isnan(p[0] + p[1] + p[2]) || isinf(largest);
+    }
+    if (2 * far <= known) return NPG_OK;
+    return npg_error(
+        NPG_BAD_INPUT,
+        "%s: %zu of %zu points lie farther than %g away: are bytes of its numbers in the wrong order?", name,
+        far, b->vert_count, NPG_SIDE_MAX);
+}
+
 /* The same into an empty builder that has only what is asked for.  The first file settles the origin.  Where its
  * first point turns out to lie far off (many sensors write 0 0 0 for a pixel they could not see), float has lost
  * the detail of all others: read again around the median. */
@@ -131,6 +149,7 @@ static npg_status read_settled(npg_builder *b, const char *path, npg_origin *ori
         *b = empty;
         status = read_file(b, path);
     }
+    if (!status && (status = check_sizes(b, path))) npg_builder_clear(b);
     if (!status && !origin->known) *origin = found; /* else others may be reading it */
     return status;
 }
@@ -234,6 +253,7 @@ npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *ori
 {
     npg_builder b = {.origin = origin, .purpose = NPG_FOR_FRAMES};
     npg_status status = read_one(stream, &b);
+    if (!status) status = check_sizes(&b, stream->source->name);
     if (status == NPG_BAD_INPUT) npg_error_prefix(status, "frame %lld", (long long)stream->frames);
     if (!status) npg_builder_frame(frame, &b);
     npg_builder_clear(&b);
