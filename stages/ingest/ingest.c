@@ -226,6 +226,13 @@ static void report_cache(npg_worker *worker)
     json_object_set_new(report, "cache_disk_bytes", json_integer((json_int_t)use.disk_bytes));
 }
 
+static void warn_of_blank(npg_worker *worker, const npg_rig *rig)
+{
+    if (!rig || !rig->blank_count || npg_worker_pass(worker) != NPG_PASS_MEASURE) return;
+    npg_worker_warn(worker, false, -1, "%zu depth images have no depth in any pixel, the first is %s",
+                    rig->blank_count, rig->first_blank);
+}
+
 /* Figures of the capture as it was read; the first pass sees every frame once. */
 static npg_status end_files(npg_worker *worker)
 {
@@ -235,6 +242,7 @@ static npg_status end_files(npg_worker *worker)
     json_object_set_new(report, "skipped", json_integer((json_int_t)facts->skipped_count));
     json_object_set_new(report, "files_parsed", json_integer((json_int_t)capture->reads));
     report_cache(worker);
+    warn_of_blank(worker, capture->list->rig);
     if (facts->skipped_count == facts->frame_count)
         return npg_error(NPG_BAD_INPUT, "%s: none of the %lld frames can be used",
                          npg_worker_settings(worker)->input, (long long)facts->frame_count);

@@ -143,6 +143,9 @@ typedef struct npg_rig {
     int64_t *numbers; /* per frame, growing                      */
     int32_t *shot_of; /* frame_count x sensor_count, -1: a gap   */
     size_t left_out;  /* images without a pose or without a time */
+    /* of those that npg_rig_read() has read: how many have no depth at all, and the first */
+    size_t blank_count;
+    const char *first_blank;
 } npg_rig;
 
 /* Whether a path is one: rig.json (any file *.json), or a folder of one of the known layouts that has no

@@ -150,6 +150,9 @@ npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
         npg_frame_files_gaps(gaps, sizeof gaps, list);
         npg_probe_warn(probe, "%zu frames are missing in the numbering: %s", list->gap_count, gaps);
     }
+    if (list->rig && list->rig->blank_count)
+        npg_probe_warn(probe, "%zu depth images have no depth in any pixel, the first is %s",
+                       list->rig->blank_count, list->rig->first_blank);
     if (list->left_out) npg_probe_warn(probe, "%zu files with other endings were left out", list->left_out);
     return NPG_OK;
 }

@@ -234,6 +234,8 @@ static void a_view_says_where_nothing_is(void **state)
     }
 }
 
+#define RIG(sensor) "{\"neupig_rig\": 1, \"sensors\": [" sensor "]}"
+
 static void a_missing_image_is_a_gap_of_its_sensor(void **state)
 {
     (void)state;
@@ -263,6 +265,31 @@ static void a_missing_image_is_a_gap_of_its_sensor(void **state)
         assert_int_equal(!isnan(frame.sensor_local[3]), f > 0);
         npg_frame_clear(&frame);
     }
+}
+
+static void an_image_without_depth_is_counted_and_named(void **state)
+{
+    (void)state;
+    static uint16_t depth[WIDE * HIGH]; /* 0 */
+    npg_rig_settings usual = usual_settings();
+    npg_origin origin = {.known = true};
+    npg_frame frame = {0};
+    npg_rig *rig;
+    make_folder("blank");
+    write_depth("blank/a_0000.png", 0);
+    write_png("blank/a_0001.png", PNG_FORMAT_LINEAR_Y, WIDE, HIGH, depth);
+    memset(depth, 255, sizeof depth);
+    write_png("blank/a_0002.png", PNG_FORMAT_LINEAR_Y, WIDE, HIGH, depth);
+    write_text("blank/rig.json", RIG("{\"depth\": \"a_%04d.png\", " CAMERA "}"));
+    assert_int_equal(npg_rig_open(&rig, in_folder(&folder, "blank"), &usual), NPG_OK);
+    for (size_t f = 0; f < 3; f++) {
+        assert_int_equal(npg_rig_read(rig, &frame, f, &origin), NPG_OK);
+        assert_int_equal(frame.point_count > 0, f == 0);
+        assert_int_equal(rig->blank_count, f);
+        npg_frame_clear(&frame);
+    }
+    assert_non_null(strstr(rig->first_blank, "a_0001.png"));
+    npg_rig_close(&rig);
 }
 
 /* ---- layouts of others ---- */
@@ -351,7 +378,6 @@ static void opencv_layout(void **state)
 
 /* ---- what is refused ---- */
 
-#define RIG(sensor)     "{\"neupig_rig\": 1, \"sensors\": [" sensor "]}"
 #define DEPTH           "\"depth\": \"d_%04d.png\""
 #define GOOD            "{" DEPTH ", " CAMERA "}"
 #define WITH_POSE(p)    RIG("{" DEPTH ", " CAMERA ", \"pose\": [" p "]}")
@@ -387,7 +413,12 @@ static const struct {
     {OTHER_CAMERA("\"width\": 40.5, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 20, \"cy\": 15"),
      "whole numbers of pixels"},
     {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 0, \"fy\": 50, \"cx\": 20, \"cy\": 15"),
-     "fx and fy"},
+     "fx 0 and fy 50 are no focal lengths"},
+    {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 1e-30, \"cx\": 20, \"cy\": 15"),
+     "fx 50 and fy 1e-30 are no focal lengths"},
+    {WITH("\"near\": 2, \"far\": 1"), "sensors[0].near: must be less than far"},
+    {RIG("{\"name\": \"one\", " DEPTH ", " CAMERA "}, " GOOD),
+     "sensors[1].depth: its images are those of sensor one"},
     {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 900, \"cy\": 15"),
      "far outside"},
     {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 20, \"cy\": 15, "
@@ -530,6 +561,7 @@ int main(void)
                                        cmocka_unit_test(edges_and_flying_pixels_are_dropped),
                                        cmocka_unit_test(a_view_says_where_nothing_is),
                                        cmocka_unit_test(a_missing_image_is_a_gap_of_its_sensor),
+                                       cmocka_unit_test(an_image_without_depth_is_counted_and_named),
                                        cmocka_unit_test(tum_layout),
                                        cmocka_unit_test(redwood_layout),
                                        cmocka_unit_test(opencv_layout),

@@ -220,6 +220,18 @@ assert len(before[2]["correction"]) == 16'
     run "$NEUPIG" run bad -o out_bad "${small[@]}"
     [ "$status" -eq 3 ]
     [[ "$output" == *"depth_0003.png: a 8-bit RGB PNG; a depth image must be 16-bit grey"* ]]
+    cp capture/rig/camera1/depth_0003.png bad/camera1/depth_0003.png
+    /usr/bin/python3 -c 'import struct, sys, zlib
+def chunk(name, data): return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+sys.stdout.buffer.write(b"\x89PNG\r\n\x1a\n"
+    + chunk(b"IHDR", struct.pack(">IIBBBBB", 240, 180, 16, 0, 0, 0, 0))
+    + chunk(b"IDAT", zlib.compress((b"\0" + 480 * b"\xff") * 180)) + chunk(b"IEND", b""))' >bad/camera2/depth_0002.png
+    run "$NEUPIG" probe bad
+    [ "$status" -eq 7 ]
+    [[ "$output" == *"1 depth images have no depth in any pixel, the first is bad/camera2/depth_0002.png"* ]]
+    run "$NEUPIG" run bad -o out_blank "${small[@]}" --no-quiet
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"warning: 1 depth images have no depth in any pixel, the first is bad/camera2/depth_0002.png"* ]]
     run "$NEUPIG" run --rig bad -o out_bad
     [ "$status" -eq 2 ]
     [[ "$output" == *"the rig is the input"* ]]

@@ -14,8 +14,10 @@ npg_status npg_camera_check(const npg_camera *c, const char *where)
 {
     if (c->width < 1 || c->height < 1 || c->width > NPG_IMAGE_SIDE_MAX || c->height > NPG_IMAGE_SIDE_MAX)
         return npg_error(NPG_BAD_INPUT, "%s: width and height must be 1 to %d", where, NPG_IMAGE_SIDE_MAX);
-    if (!(c->fx > 0 && c->fy > 0 && c->fx < 1e6 && c->fy < 1e6))
-        return npg_error(NPG_BAD_INPUT, "%s: fx and fy must be more than 0 pixels", where);
+    /* Less than a thousandth of a side is no lens, but a length in metres. */
+    if (!(1e3 * c->fx > (double)c->width && 1e3 * c->fy > (double)c->height && c->fx < 1e6 && c->fy < 1e6))
+        return npg_error(NPG_BAD_INPUT, "%s: fx %g and fy %g are no focal lengths in pixels", where, c->fx,
+                         c->fy);
     bool is_in = c->cx > -(double)c->width && c->cx < 2 * (double)c->width && c->cy > -(double)c->height &&
                  c->cy < 2 * (double)c->height;
     if (!is_in)

@@ -62,6 +62,16 @@ static npg_status read_images(grid *g, const npg_rig_shot *shot)
     return NPG_OK;
 }
 
+/* All pixels 0 or all 65535: it says nothing about depth. */
+static bool is_blank(const npg_image *depth)
+{
+    uint16_t first = depth->depth[0];
+    if (first && first != UINT16_MAX) return false;
+    for (size_t i = 1; i < depth->width * depth->height; i++)
+        if (depth->depth[i] != first) return false;
+    return true;
+}
+
 static double larger(double a, double b)
 {
     return a > b ? a : b;
@@ -401,6 +411,8 @@ static npg_status make_rays(npg_rig_sensor *sensor)
 static npg_status make_points(npg_depth_points *points, grid *g, const npg_rig_shot *shot)
 {
     NPG_TRY(read_images(g, shot));
+    points->is_blank = is_blank(&g->depth);
+    if (points->is_blank && g->depth.depth[0]) return NPG_OK; /* nor that nothing is there */
     size_t pixels = g->width * g->height;
     g->z = npg_arena_take(&g->arena, pixels, sizeof *g->z);
     g->keep = npg_arena_take(&g->arena, pixels, 1);

@@ -100,6 +100,7 @@ typedef struct npg_depth_points {
     uint8_t *colours;     /* N x 4, sRGB, alpha 0: not seen         */
     uint32_t *pixels;     /* N, y x width + x, growing              */
     bool has_colours;
+    bool is_blank;       /* no pixel has a depth, or all have the largest number, which then is none */
     npg_depth_view view; /* but for the pose */
     float *cells;        /* of the view      */
 } npg_depth_points;

@@ -262,6 +262,18 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
     return poses ? read_poses(rig, sensor, p, poses) : NPG_OK;
 }
 
+/* Two sensors with the same images: a copied line of the description. */
+static npg_status check_alone(const npg_rig *rig, const npg_rig_sensor *sensor, const place *p)
+{
+    char what[160];
+    for (const npg_rig_sensor *other = rig->sensors; other < sensor && sensor->shot_count; other++) {
+        if (!other->shot_count || strcmp(other->shots[0].depth, sensor->shots[0].depth) != 0) continue;
+        snprintf(what, sizeof what, "its images are those of sensor %.80s, too", other->name);
+        return bad(p, "depth", what);
+    }
+    return NPG_OK;
+}
+
 static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object, double scale,
                               bool is_opengl)
 {
@@ -281,6 +293,7 @@ static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object
     NPG_TRY(get_number(p, object, "near", false, &sensor->near_m));
     NPG_TRY(get_number(p, object, "far", false, &sensor->far_m));
     if (!(sensor->scale > 0)) return bad(p, "depth_scale", "must be more than 0");
+    if (sensor->far_m > 0 && sensor->near_m >= sensor->far_m) return bad(p, "near", "must be less than far");
     const json_t *camera = json_object_get(object, "camera"),
                  *other = json_object_get(object, "colour_camera");
     if (!camera) return bad(p, "camera", "is missing: the intrinsics of the depth image");
@@ -291,7 +304,8 @@ static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object
     NPG_TRY(get_pose(p, object, "pose", sensor->pose, &has_pose));
     if (has_pose && json_object_get(object, "poses"))
         return bad(p, "poses", "a sensor has either one pose or one per frame");
-    return load_images(rig, sensor, p, object);
+    NPG_TRY(load_images(rig, sensor, p, object));
+    return check_alone(rig, sensor, p);
 }
 
 static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)

@@ -78,11 +78,19 @@ static void add_view(npg_frame *frame, const reading *r, size_t s, const npg_ori
     *at += count;
 }
 
+static void note_blank(npg_rig *rig, const reading *r)
+{
+    for (size_t s = 0; s < rig->sensor_count; s++)
+        if (r->of[s].is_blank && !rig->blank_count++)
+            rig->first_blank = npg_rig_shot_of(rig, r->frame, s)->depth;
+}
+
 npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *origin)
 {
     reading r = {.rig = rig, .frame = at};
     npg_status status = npg_parallel(read_sensor, &r, rig->sensor_count);
     if (!status) status = reserve(frame, &r);
+    if (!status) note_blank(rig, &r);
     size_t cells = 0;
     for (size_t s = 0; s < rig->sensor_count && !status; s++)
         if (r.of[s].count) add_sensor(frame, &r, s, origin);
