@@ -48,6 +48,8 @@ typedef struct npg_builder {
     bool may_be_points; /* faces are not asked for */
     bool has_normals, has_colours, has_uvs;
     size_t vert_count, face_count, vert_capacity, face_capacity;
+    size_t finite_count,
+        far_count; /* of the points: as they stand in the file; farther off than any box reaches */
     float *pos, *normals, *uvs; /* owned */
     uint8_t *colours;           /* owned */
     float *corner_uvs;          /* F x 3 x 2 or NULL, owned */

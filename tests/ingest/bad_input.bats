@@ -91,7 +91,7 @@ for _ in range(900):
     done
     refused 3 "ball_1.ply" .
     [[ "$output" == *"wrong order"* ]]
-    refused 3 "ball_1.ply" "ball_1.ply"
+    refused 3 "ball_1.ply" ball_1.ply
     run "$NEUPIG" run . -o kept "${small[@]}" --keep-going
     [ "$status" -eq 7 ]
     sed -n 2p kept/frames.jsonl | grep -q '"key":false,"skipped":true'

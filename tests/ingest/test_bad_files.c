@@ -70,7 +70,7 @@ static const struct bad_file {
      "line 7: unknown word \"colour\""},
     {"a.ply", BYTES(PLY("element ver\0tex 1\n" XYZ "end_header\n")), "line 3: zero byte"},
     /* PLY: the body */
-    {"a.ply", BYTES(PLY("element vertex 3\n" XYZ "end_header\n1 2 3\n1e30 0 0\n0 -inf 0\n")),
+    {"a.ply", BYTES(PLY("element vertex 3\n" XYZ "end_header\n1 2 3\n1e30 0 0\n0 -1e300 0\n")),
      "2 of 3 points lie farther than 1e+12 away"},
     {"a.ply",
      BYTES(PLY("element vertex 1\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"

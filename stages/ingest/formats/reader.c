@@ -1,7 +1,6 @@
 /* Readers: which format a file has, and the calls that do not care. */
 #include "ingest/ingest_internal.h"
 
-#include <math.h>
 #include <string.h>
 #include <strings.h>
 
@@ -121,18 +120,11 @@ static npg_status read_file(npg_builder *b, const char *path)
 /* Numbers whose bytes stand in the wrong order have any size, and no box could hold them. */
 static npg_status check_sizes(const npg_builder *b, const char *name)
 {
-    size_t far = 0, known = 0;
-    for (size_t i = 0; i < b->vert_count; i++) {
-        const float *p = b->pos + 3 * i;
-        float largest = fmaxf(fabsf(p[0]), fmaxf(fabsf(p[1]), fabsf(p[2])));
-        far += (double)largest > NPG_SIDE_MAX;
-        known += !isnan(p[0] + p[1] + p[2]) || isinf(largest);
-    }
-    if (2 * far <= known) return NPG_OK;
+    if (2 * b->far_count <= b->finite_count) return NPG_OK;
     return npg_error(
         NPG_BAD_INPUT,
         "%s: %zu of %zu points lie farther than %g away: are bytes of its numbers in the wrong order?", name,
-        far, b->vert_count, NPG_SIDE_MAX);
+        b->far_count, b->vert_count, NPG_SIDE_MAX);
 }
 
 /* The same into an empty builder that has only what is asked for.  The first file settles the origin.  Where its

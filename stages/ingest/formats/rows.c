@@ -74,10 +74,19 @@ npg_status npg_builder_reserve(npg_builder *b, size_t vertices, size_t triangles
                     b->purpose);
 }
 
+static void count_far(npg_builder *b, const double world[3])
+{
+    double largest = 0, sum = world[0] + world[1] + world[2];
+    for (int a = 0; a < 3; a++) largest = fmax(largest, fabs(world[a] - b->origin->world[a]));
+    b->finite_count += isfinite(sum);
+    b->far_count += isfinite(sum) && largest > NPG_SIDE_MAX;
+}
+
 size_t npg_builder_add(npg_builder *b, const double values[NPG_SLOTS])
 {
     size_t at = b->vert_count++;
     npg_local_of(b->pos + 3 * at, b->origin, values + NPG_X);
+    count_far(b, values + NPG_X);
     if (b->has_normals) npg_unit_normal(b->normals + 3 * at, values + NPG_NX);
     for (size_t c = 0; c < 4 && b->has_colours; c++) {
         double value = values[NPG_RED + c];
