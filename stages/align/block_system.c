@@ -112,26 +112,38 @@ void npg_block_clear(npg_block_system *s, size_t which)
     memset(p->right, 0, s->n * 6 * sizeof(double));
 }
 
-/* The number of the pair (a, b), a < b; pair_count when it is not in the set. */
+/* The number of the pair (a, b), a < b; pair_count when it is not in the set.  Of the dozen that have this a
+ * all are counted: a branch that goes either way costs more. */
 static size_t pair_of(const npg_block_system *s, uint32_t a, uint32_t b)
 {
-    uint32_t lo = s->first[a], hi = s->first[a + 1];
-    while (lo < hi) {
-        uint32_t mid = (lo + hi) / 2;
-        if (s->pairs[mid][1] < b)
-            lo = mid + 1;
-        else
-            hi = mid;
-    }
-    return lo < s->first[a + 1] && s->pairs[lo][1] == b ? lo : s->pair_count;
+    uint32_t at = s->first[a], end = s->first[a + 1];
+    for (uint32_t e = s->first[a]; e < end; e++) at += s->pairs[e][1] < b;
+    return at < end && s->pairs[at][1] == b ? at : s->pair_count;
 }
 
-/* block += scale u v^T. */
-NPG_WIDE static void add_outer(double *restrict block, double scale, const double *restrict u,
-                               const double *restrict v)
+/* A coupling of two of a term's nodes. */
+typedef struct coupling {
+    double *block, share;
+    size_t a, b;
+} coupling;
+
+typedef double four __attribute__((vector_size(4 * sizeof(double)), aligned(sizeof(double))));
+
+/* Each block += scale share u_a u_b^T; two of its rows are three vectors. */
+NPG_WIDE static void add_outers(coupling *list, size_t count, double scale, double (*u)[6])
 {
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++) block[6 * i + j] += scale * u[i] * v[j];
+    for (size_t n = 0; n < count; n++) {
+        const double *v = u[list[n].b], factor = scale * list[n].share;
+        const four begin = {v[0], v[1], v[2], v[3]}, middle = {v[4], v[5], v[0], v[1]},
+                   end = {v[2], v[3], v[4], v[5]};
+        for (int i = 0; i < 6; i += 2) {
+            double x = factor * u[list[n].a][i], y = factor * u[list[n].a][i + 1];
+            four *rows = (four *)(list[n].block + 6 * i);
+            rows[0] += (four){x, x, x, x} * begin;
+            rows[1] += (four){x, x, y, y} * middle;
+            rows[2] += (four){y, y, y, y} * end;
+        }
+    }
 }
 
 /* block += scale K(a)^T K(b), K(y) = (-[y]x, I): a turn moves by turn x arm.  In blocks of 3 x 3:
@@ -154,6 +166,22 @@ static void add_arms(double *block, double scale, const double a[3], const doubl
     }
 }
 
+/* Of each block once; pairs that are not in the set are left out. */
+static size_t list_couplings(coupling *list, const npg_block_system *s, const part *p,
+                             const npg_block_term *t)
+{
+    size_t count = 0;
+    for (size_t a = 0; a < t->count; a++)
+        for (size_t b = 0; b < t->count; b++) {
+            if (t->nodes[a] > t->nodes[b]) continue;
+            size_t pair = a == b ? 0 : pair_of(s, t->nodes[a], t->nodes[b]);
+            if (pair == s->pair_count && a != b) continue;
+            double *block = a == b ? p->diagonal + 36 * (size_t)t->nodes[a] : p->off + 36 * pair;
+            list[count++] = (coupling){block, t->shares[a] * t->shares[b], a, b};
+        }
+    return count;
+}
+
 void npg_block_add(npg_block_system *s, size_t which, const npg_block_term *t)
 {
     part *p = &s->parts[which];
@@ -170,16 +198,11 @@ void npg_block_add(npg_block_system *s, size_t which, const npg_block_term *t)
             right[3 + c] += t->shares[k] * pull[c];
         }
     }
-    for (size_t a = 0; a < t->count; a++)
-        for (size_t b = 0; b < t->count; b++) {
-            if (t->nodes[a] > t->nodes[b]) continue;
-            size_t pair = a == b ? 0 : pair_of(s, t->nodes[a], t->nodes[b]);
-            if (pair == s->pair_count && a != b) continue;
-            double *block = a == b ? p->diagonal + 36 * (size_t)t->nodes[a] : p->off + 36 * pair;
-            double share = t->shares[a] * t->shares[b];
-            if (t->across != 0) add_outer(block, t->across * share, lever[a], lever[b]);
-            if (t->along != 0) add_arms(block, t->along * share, t->arms[a], t->arms[b]);
-        }
+    coupling list[NPG_BLOCK_NODES * NPG_BLOCK_NODES];
+    size_t count = list_couplings(list, s, p, t);
+    if (t->across != 0) add_outers(list, count, t->across, lever);
+    for (size_t n = 0; n < count && t->along != 0; n++)
+        add_arms(list[n].block, t->along * list[n].share, t->arms[list[n].a], t->arms[list[n].b]);
 }
 
 /* ---- solving ---- */

@@ -192,11 +192,31 @@ static float radius_of(const search *s)
     return sqrtf(s->best.dist_sq) * 1.00001f + 1e-18f;
 }
 
+/* Whether the face's box is farther than the best, by more than floats round: most faces are, and the exact
+ * distance takes many times as long. */
+static bool is_beyond(const search *s, uint32_t face)
+{
+    const uint32_t *corners = s->surface->faces + 3 * (size_t)face;
+    float dist_sq = 0;
+    for (size_t a = 0; a < 3; a++) {
+        float low = s->surface->vert_pos[3 * (size_t)corners[0] + a], high = low;
+        for (size_t k = 1; k < 3; k++) {
+            float x = s->surface->vert_pos[3 * (size_t)corners[k] + a];
+            low = x < low ? x : low;
+            high = x > high ? x : high;
+        }
+        float below = low - s->point[a], above = s->point[a] - high, gap = below > above ? below : above;
+        dist_sq += gap > 0 ? gap * gap : 0;
+    }
+    return dist_sq * 0.99999f > s->best.dist_sq;
+}
+
 /* Embree also calls for faces outside the radius: the exact distance decides. */
 static bool on_face(struct RTCPointQueryFunctionArguments *arguments)
 {
     search *s = arguments->userPtr;
     float before = s->best.dist_sq;
+    if (is_beyond(s, arguments->primID)) return false;
     try_face(s, arguments->primID);
     if (!(s->best.dist_sq < before)) return false;
     arguments->query->radius = radius_of(s);
