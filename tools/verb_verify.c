@@ -11,7 +11,7 @@ static void tell(void *user, const char *text)
 void npg_cli_warn_of_damage(const char *verb, const char *folder)
 {
     npg_verified found = {.struct_size = sizeof found};
-    if (npg_is_in_folder(folder, "done.json") && npg_verify(&found, folder, NULL, NULL))
+    if (npg_is_in_folder(folder, "done.json") && npg_verify(&found, folder, NULL, NULL) && found.damaged)
         fprintf(stderr, "neupig %s: warning: %s\n", verb, npg_error_text());
 }
 
