@@ -2,6 +2,7 @@
 #include "pipeline/chunk.h"
 
 #include <assert.h>
+#include <stddef.h>
 #include <string.h>
 
 struct npg_chunk {
@@ -49,15 +50,35 @@ void npg_chunk_add(npg_chunk *chunk, npg_frame *frame)
     *frame = (npg_frame){0};
 }
 
+#define ROW (3 * sizeof(float))
+
+void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *f)
+{
+    const npg_store_array arrays[NPG_FRAME_ARRAYS] = {
+        {"points", offsetof(npg_frame, pos_local), f->point_count, ROW},
+        {"normals", offsetof(npg_frame, normals), f->point_count, ROW},
+        {"colours", offsetof(npg_frame, colours), f->point_count, 4},
+        {"sensors", offsetof(npg_frame, sensors), f->point_count, 1},
+        {"sensor_local", offsetof(npg_frame, sensor_local), f->sensor_count, ROW},
+        {"views", offsetof(npg_frame, views), f->sensor_count, sizeof *f->views},
+        {"view_cells", offsetof(npg_frame, view_cells), f->view_cell_count, sizeof(float)},
+        {"vertices", offsetof(npg_frame, vert_unit), f->vert_count, ROW},
+        {"vert_colours", offsetof(npg_frame, vert_colours), f->vert_count, 4}};
+    memcpy(list, arrays, sizeof arrays);
+}
+
+/* The pointer that an entry of the list is of. */
+static void **array_of(npg_frame *frame, const npg_store_array *array)
+{
+    return (void **)(void *)((char *)frame + array->offset);
+}
+
 void npg_frame_clear(npg_frame *frame)
 {
+    npg_store_array list[NPG_FRAME_ARRAYS];
+    npg_frame_arrays(list, frame);
     npg_release(&frame->path);
-    npg_release(&frame->pos_local);
-    npg_release(&frame->normals);
-    npg_release(&frame->colours);
-    npg_frame_forget_sensors(frame);
-    npg_release(&frame->vert_unit);
-    npg_release(&frame->vert_colours);
+    for (size_t i = 0; i < NPG_FRAME_ARRAYS; i++) npg_release(array_of(frame, &list[i]));
     *frame = (npg_frame){0};
 }
 
@@ -70,42 +91,29 @@ void npg_frame_forget_sensors(npg_frame *frame)
     frame->sensor_count = frame->view_cell_count = 0;
 }
 
-static npg_status copy_rows(void *out, const void *rows, size_t count, size_t row_size)
-{
-    void *copy;
-    if (!rows) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&copy, NPG_FOR_FRAMES, count, row_size));
-    if (copy) memcpy(copy, rows, count * row_size);
-    memcpy(out, &copy, sizeof copy);
-    return NPG_OK;
-}
-
 npg_frame npg_frame_bare(const npg_frame *frame)
 {
+    npg_store_array list[NPG_FRAME_ARRAYS];
     npg_frame bare = *frame;
+    npg_frame_arrays(list, frame);
     bare.path = NULL;
-    bare.pos_local = bare.normals = bare.vert_unit = bare.sensor_local = NULL;
-    bare.colours = bare.sensors = bare.vert_colours = NULL;
-    bare.views = NULL;
-    bare.view_cells = NULL;
+    for (size_t i = 0; i < NPG_FRAME_ARRAYS; i++) *array_of(&bare, &list[i]) = NULL;
     return bare;
 }
 
 npg_status npg_frame_copy(npg_frame *out, const npg_frame *frame)
 {
+    npg_store_array list[NPG_FRAME_ARRAYS];
+    npg_frame from = *frame;
+    npg_frame_arrays(list, frame);
     *out = npg_frame_bare(frame);
     npg_status status = frame->path ? npg_copy_text(&out->path, frame->path) : NPG_OK;
-    size_t n = frame->point_count, row = 3 * sizeof(float);
-    if (!status) status = copy_rows(&out->pos_local, frame->pos_local, n, row);
-    if (!status) status = copy_rows(&out->normals, frame->normals, n, row);
-    if (!status) status = copy_rows(&out->colours, frame->colours, n, 4);
-    if (!status) status = copy_rows(&out->sensors, frame->sensors, n, 1);
-    if (!status) status = copy_rows(&out->sensor_local, frame->sensor_local, frame->sensor_count, row);
-    if (!status) status = copy_rows(&out->views, frame->views, frame->sensor_count, sizeof *frame->views);
-    if (!status)
-        status = copy_rows(&out->view_cells, frame->view_cells, frame->view_cell_count, sizeof(float));
-    if (!status) status = copy_rows(&out->vert_colours, frame->vert_colours, frame->vert_count, 4);
-    if (!status) status = copy_rows(&out->vert_unit, frame->vert_unit, frame->vert_count, row);
+    for (const npg_store_array *a = list; a < list + NPG_FRAME_ARRAYS && !status; a++) {
+        void *rows = *array_of(&from, a), **copy = array_of(out, a);
+        if (!rows) continue;
+        status = npg_alloc_array(copy, NPG_FOR_FRAMES, a->count, a->row);
+        if (*copy) memcpy(*copy, rows, a->count * a->row);
+    }
     if (status) npg_frame_clear(out);
     return status;
 }

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 
 #include "pipeline/memory.h"
+#include "pipeline/store.h"
 
 /* What a frame carries.  Stages say which fields they need and give;
  * the chain is checked when it is built. */
@@ -131,6 +132,10 @@ void npg_frame_clear(npg_frame *frame);
 
 /* Where its points were seen from is not known any more. */
 void npg_frame_forget_sensors(npg_frame *frame);
+
+/* The arrays that a frame owns: what it is copied, kept on disk and freed by. */
+enum { NPG_FRAME_ARRAYS = 9 };
+void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *frame);
 
 /* The frame without its arrays, which stay its own. */
 npg_frame npg_frame_bare(const npg_frame *frame);

@@ -42,26 +42,18 @@ npg_status npg_frame_store_open(npg_frame_store **out, size_t byte_max, const ch
     return status;
 }
 
-void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *frame)
-{
-    size_t n = frame->point_count;
-    const npg_store_array arrays[NPG_FRAME_ARRAYS] = {
-        {"points", offsetof(npg_frame, pos_local), n, ROW},
-        {"normals", offsetof(npg_frame, normals), n, ROW},
-        {"colours", offsetof(npg_frame, colours), n, 4},
-        {"sensors", offsetof(npg_frame, sensors), n, 1},
-        {"views", offsetof(npg_frame, views), frame->sensor_count, sizeof *frame->views},
-        {"view_cells", offsetof(npg_frame, view_cells), frame->view_cell_count, sizeof(float)}};
-    memcpy(list, arrays, sizeof arrays);
-}
-
 /* Of the arrays that the frame has. */
 static size_t array_bytes(const npg_frame *frame)
 {
-    size_t of_a_point = (frame->pos_local ? ROW : 0) + (frame->normals ? ROW : 0) + (frame->colours ? 4 : 0) +
-                        (frame->sensors ? 1 : 0);
-    return frame->point_count * of_a_point + (frame->views ? frame->sensor_count * sizeof *frame->views : 0) +
-           (frame->view_cells ? frame->view_cell_count * sizeof(float) : 0);
+    npg_store_array list[NPG_FRAME_ARRAYS];
+    size_t bytes = 0;
+    npg_frame_arrays(list, frame);
+    for (size_t i = 0; i < NPG_FRAME_ARRAYS; i++) {
+        const void *rows;
+        memcpy(&rows, (const char *)frame + list[i].offset, sizeof rows);
+        if (rows) bytes += list[i].count * list[i].row;
+    }
+    return bytes;
 }
 
 static size_t bytes_of(const entry *e)
@@ -158,8 +150,7 @@ static void put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool
     if (e->is_on_disk) {
         if (!is_final || !write_arrays(s, NPG_RECORD_FRAME, frame, bytes, arrays, NPG_FRAME_ARRAYS)) return;
         kept = npg_frame_bare(frame);
-        kept.path = frame->path; /* these stay in memory */
-        kept.sensor_local = frame->sensor_local;
+        kept.path = frame->path; /* stays in memory */
     }
     if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return;
     if (npg_frame_copy(e->frame, &kept)) npg_release(&e->frame);

@@ -154,10 +154,6 @@ npg_status npg_paths_find(npg_paths *out, const char *input);
 /* The files of a folder with one of these endings, whatever its case, in natural order. */
 npg_status npg_paths_list(npg_paths *out, const char *folder, const char *const *endings);
 
-/* The arrays of a frame as blocks of a record (pipeline/store.h), for the frame store and the spool. */
-enum { NPG_FRAME_ARRAYS = 6 };
-void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *frame);
-
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 
 /* What to do about numbers that no file has. */

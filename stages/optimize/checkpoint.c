@@ -13,29 +13,23 @@ typedef struct saved_progress {
     npg_solved last;
 } saved_progress;
 
-static void block_name(char name[NPG_BLOCK_NAME], const char *what, int64_t index)
+/* Blocks are of a frame: its index goes behind their names. */
+static void add_index(char name[NPG_BLOCK_NAME], int64_t index)
 {
-    snprintf(name, NPG_BLOCK_NAME, "%s.%lld", what, (long long)index);
+    size_t used = strlen(name);
+    snprintf(name + used, NPG_BLOCK_NAME - used, ".%lld", (long long)index);
 }
 
-static const struct {
-    const char *name;
-    size_t offset, row;
-    bool is_of_points;
-} arrays[] = {{"points", offsetof(npg_held, frame.pos_local), 12, true},
-              {"normals", offsetof(npg_held, frame.normals), 12, true},
-              {"colours", offsetof(npg_held, frame.colours), 4, true},
-              {"aligned", offsetof(npg_held, frame.vert_unit), 12, false},
-              {"solved", offsetof(npg_held, solved), 12, false}};
-enum { ARRAYS = sizeof arrays / sizeof *arrays };
+enum { ARRAYS = NPG_FRAME_ARRAYS + 1, SOLVED = NPG_FRAME_ARRAYS };
 
+/* The frame's, and where its vertices were solved to. */
 static void list_arrays(npg_store_array list[ARRAYS], const npg_frame *frame, size_t vert_count)
 {
+    npg_frame_arrays(list, frame);
+    list[SOLVED] = (npg_store_array){"solved", offsetof(npg_held, solved), vert_count, 3 * sizeof(float)};
     for (size_t i = 0; i < ARRAYS; i++) {
-        block_name(list[i].name, arrays[i].name, frame->index);
-        list[i].offset = arrays[i].offset;
-        list[i].row = arrays[i].row;
-        list[i].count = arrays[i].is_of_points ? frame->point_count : vert_count;
+        add_index(list[i].name, frame->index);
+        if (i != SOLVED) list[i].offset += offsetof(npg_held, frame);
     }
 }
 
@@ -45,15 +39,14 @@ static npg_status put_frame(npg_store *out, const npg_held *held, size_t vert_co
 {
     const npg_frame *f = &held->frame;
     npg_store_array list[ARRAYS];
-    char name[NPG_BLOCK_NAME];
-    npg_frame bare = npg_frame_bare(f);
-    bare.sensor_count = 0;
-    block_name(name, "frame", f->index);
+    char name[NPG_BLOCK_NAME] = "frame", path_name[NPG_BLOCK_NAME] = "path";
+    const npg_frame bare = npg_frame_bare(f);
+    add_index(name, f->index);
     NPG_TRY(npg_store_put(out, name, &bare, sizeof bare));
     list_arrays(list, f, vert_count);
     NPG_TRY(npg_store_put_arrays(out, held, list, ARRAYS));
-    block_name(name, "path", f->index);
-    return f->path ? npg_store_put(out, name, f->path, strlen(f->path) + 1) : NPG_OK;
+    add_index(path_name, f->index);
+    return f->path ? npg_store_put(out, path_name, f->path, strlen(f->path) + 1) : NPG_OK;
 }
 
 static npg_status put_frames(npg_store *out, const npg_hand *hand, size_t vert_count)
@@ -114,16 +107,16 @@ npg_status npg_checkpoint_save(npg_worker *worker, const npg_hand *hand, npg_win
 static npg_status get_frame(npg_held *held, const npg_record *in, int64_t index, size_t vert_count)
 {
     npg_store_array list[ARRAYS];
-    char name[NPG_BLOCK_NAME];
+    char name[NPG_BLOCK_NAME] = "frame", path_name[NPG_BLOCK_NAME] = "path";
     size_t size;
     npg_frame *f = &held->frame;
-    block_name(name, "frame", index);
+    add_index(name, index);
     NPG_TRY(npg_record_get(in, name, f, sizeof *f));
     list_arrays(list, f, vert_count);
     NPG_TRY(npg_record_get_arrays(in, held, list, ARRAYS, NPG_FOR_FRAMES));
     if (!held->solved) return npg_error(NPG_BAD_INPUT, "frame %lld is not solved", (long long)index);
-    block_name(name, "path", index);
-    const char *path = npg_record_find(in, name, &size);
+    add_index(path_name, index);
+    const char *path = npg_record_find(in, path_name, &size);
     return path ? npg_copy_text(&f->path, path) : NPG_OK;
 }
 

@@ -20,12 +20,12 @@ setup() {
     cd "$BATS_FILE_TMPDIR"
 }
 
-# Start a run into $1 and kill it with signal $2 once it has $3 states; the arguments after that are its options.
+# Start a run of $input into $1 and kill it with signal $2 once it has $3 states; the arguments after that are its options.
 kill_at() {
     local out=$1 signal=$2 states=$3
     shift 3
     rm -rf "$out"
-    "$NEUPIG" run capture/points -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
+    "$NEUPIG" run "${input:-capture/points}" -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
     local pid=$!
     while kill -0 $pid 2>/dev/null && [ "$(records "$out")" -lt "$states" ]; do
         sleep 0.02
@@ -45,6 +45,22 @@ same() {
     cmp whole/reference.ply "$1/reference.ply"
     cmp whole/frames.jsonl "$1/frames.jsonl"
     diff -r whole/meshes "$1/meshes"
+}
+
+@test "what sensors saw of the frames at hand is known when a killed run goes on" {
+    "$NEUPIG" synth -o seen --rig --cameras 2 --frames 12 --cycles 0.2 --width 100 --height 80 >synth.log
+    input=seen/rig/rig.json
+    local judged=(--bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100,nowhere=100)
+    kill_at seen-broken KILL 1 "${judged[@]}"
+    [ ! -e seen-broken/done.json ]
+    for out in seen-whole seen-broken; do
+        run "$NEUPIG" run $input -o $out "${small[@]}" "${judged[@]}"
+        echo "$output"
+        [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
+    done
+    grep -q resumed_frames seen-broken/report.json
+    grep -q '"nowhere_share":0' seen-whole/frames.jsonl
+    cmp seen-whole/frames.jsonl seen-broken/frames.jsonl
 }
 
 @test "a killed run goes on and gives the same bytes" {
