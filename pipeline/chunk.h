@@ -49,6 +49,7 @@ enum {
     NPG_FAULT_STRETCHED,
     NPG_FAULT_UNSUPPORTED,
     NPG_FAULT_NOWHERE,
+    NPG_FAULT_LOST,
     NPG_FAULT_UNCOVERED,
     NPG_FAULT_DISTANCE,
     NPG_FAULT_JUMP,
@@ -70,6 +71,7 @@ typedef struct npg_figures {
      * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
     double unsupported_share, unsupported_at[3];
     double nowhere_share; /* of the area, where depth images show that nothing is; NaN without any */
+    double lost_share; /* of the points, farther from the surface than these images are sure of; as above */
     npg_misfit misfits[NPG_MISFITS];
     float marks[3 * NPG_MARKS]; /* vertices far from each other, the same in all frames; unit coordinates
                                    in diagonals; NaN: not measured */

@@ -35,6 +35,7 @@ static const struct {
     {"coverage",          offsetof(npg_figures, coverage),          true},
     {"unsupported_share", offsetof(npg_figures, unsupported_share), false},
     {"nowhere_share",     offsetof(npg_figures, nowhere_share),     false},
+    {"lost_share",        offsetof(npg_figures, lost_share),        false},
     {"flipped_share",     offsetof(npg_figures, flipped_share),     false},
     {"stretched_share",   offsetof(npg_figures, stretched_share),   false},
     {"edge_change",       offsetof(npg_figures, edge_change),       false},
@@ -49,7 +50,7 @@ typedef struct fault {
 
 typedef struct evaluate_state {
     /* options; the shares in per cent */
-    double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max, nowhere_max;
+    double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max, nowhere_max, lost_max;
     npg_measure_settings measured;
     npg_topology_settings watch;
     /* of the run */
@@ -116,6 +117,7 @@ static const char *const fault_texts[NPG_FAULTS] = {
     "share of stretched faces, in %,",
     "share of the surface that no points support, in %,",
     "share of the surface where sensors saw that nothing is, in %,",
+    "share of the points that have no surface near them, in %,",
     "share of the surface without points near it, in %, unlike in other frames,",
     "mean distance of the surface to the points, in % of the diagonal, unlike in other frames,",
     "motion since the frame before, in % of the diagonal, unlike in the frames around,"};
@@ -133,7 +135,8 @@ static fault fault_of(const evaluate_state *state, const npg_figures *f, double 
         {NPG_FAULT_STRETCHED, f->stretched_share, state->stretched_max},
         {NPG_FAULT_UNSUPPORTED, isnan(f->unsupported_share) ? 0 : f->unsupported_share,
          state->unsupported_max},
-        {NPG_FAULT_NOWHERE, isnan(f->nowhere_share) ? 0 : f->nowhere_share, state->nowhere_max}};
+        {NPG_FAULT_NOWHERE, isnan(f->nowhere_share) ? 0 : f->nowhere_share, state->nowhere_max},
+        {NPG_FAULT_LOST, isnan(f->lost_share) ? 0 : f->lost_share, state->lost_max}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         double value = 100 * kinds[i].value, bound = kinds[i].bound;
         bool is_above = kinds[i].kind == NPG_FAULT_COVERAGE ? value >= bound : value <= bound;
@@ -413,6 +416,9 @@ static const npg_option options[] = {
     NPG_PART(REAL,          "bars.nowhere",     AT(nowhere_max),        "1",      0, 100,  "PERCENT",
         "most of its surface in space that a depth image shows to be empty: clearly before what was measured, "
         "or outside the outline of a body whose background was removed, in per cent"),
+    NPG_PART(REAL,          "bars.lost",        AT(lost_max),           "2",      0, 100,  "PERCENT",
+        "most of its points that lie farther from the surface than depth images are sure of, three cells of "
+        "160 along an image, in per cent"),
     NPG_PART(REAL,          "bars.cover",       AT(measured.cover_dist), "1",      0, 100,  "PERCENT",
         "how near a point must be to cover the surface, in per cent of the diagonal"),
     NPG_KEY(INT,            "evaluate-points",  AT(measured.point_limit), "100000", 0, 1e12, NULL,

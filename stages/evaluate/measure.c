@@ -330,9 +330,21 @@ static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const np
                             m->vert_unit, NULL, m->normals, mesh->vert_count, spacing);
 }
 
-/* Of the area, where depth images show that nothing is. */
-static npg_status measure_nowhere(const npg_measure *m, npg_frame *frame, const npg_frame_box *box,
-                                  double whole)
+/* Of the points, farther from the surface than the images are sure of. */
+static double lost_share(const npg_measure *m, const npg_free_space *space, size_t point_count)
+{
+    size_t known = 0, lost = 0;
+    for (size_t i = 0; i < point_count; i++) {
+        double margin = npg_free_space_margin(space, m->points + 3 * i);
+        known += margin > 0;
+        lost += margin > 0 && (double)m->hits[i].dist_sq > margin * margin;
+    }
+    return known ? (double)lost / (double)known : 0;
+}
+
+/* What depth images say: of the area, where they show that nothing is, and of the points. */
+static npg_status measure_by_images(const npg_measure *m, npg_frame *frame, const npg_frame_box *box,
+                                    size_t point_count, double whole)
 {
     npg_free_space *space;
     double sum = 0;
@@ -341,6 +353,7 @@ static npg_status measure_nowhere(const npg_measure *m, npg_frame *frame, const 
     for (size_t i = 0; i < m->proxy->mesh->vert_count; i++)
         if (npg_free_space_is_empty(space, m->vert_unit + 3 * i)) sum += m->vert_areas[i];
     frame->figures.nowhere_share = whole > 0 ? sum / whole : 0;
+    frame->figures.lost_share = lost_share(m, space, point_count);
     npg_free_space_close(&space);
     return NPG_OK;
 }
@@ -370,7 +383,7 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
     NPG_TRY(measure_unsupported(m, figures, box, radius, area));
-    NPG_TRY(measure_nowhere(m, frame, box, area));
+    NPG_TRY(measure_by_images(m, frame, box, point_count, area));
     npg_misfit_frame found = {.points = m->points,
                               .hits = m->hits,
                               .point_count = point_count,

@@ -48,8 +48,9 @@
 #define EMPTY_BIN    0.5    /* of a depth map, at the points' distance                            */
 #define EMPTY_MARGIN 0.3    /* that a place must be before what was seen ...                      */
 #define EMPTY_NOISE  2.5    /* ... and so many deviations of the points' noise                    */
-#define EMPTY_SHARE  0.6    /* of the frames that say anything must say that it is empty, and ... */
 #define EMPTY_FRAMES 2      /* ... so many                                                        */
+/* Of the frames that say anything of a place: what is left is how often a frame is wrongly followed. */
+#define CONTRADICTED 0.2
 
 /* While a reference that is one side of the body grows. */
 #define GROW_SIZE        0.1  /* of its diagonal: so far past its border points are taken to be of the body */
@@ -68,6 +69,7 @@ typedef struct state {
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: it is not known where sensors stood */
+    npg_votes *votes;          /* NULL: no frame has images yet                   */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
     int64_t key;               /* index of the keyframe */
     double spacing, noise;     /* of the keyframe's points */
@@ -188,6 +190,8 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                                  EMPTY_BAND * s->spacing, EMPTY_MOST));
     NPG_TRY(npg_free_space_open(&seen.space, frame, &facts->box));
     npg_status status = npg_carving_see(s->empty, s->skin, &seen);
+    if (!status && seen.space && !s->votes) status = npg_votes_open(&s->votes, facts->reference);
+    if (!status && seen.space) npg_votes_cast(s->votes, seen.space, frame->vert_unit);
     npg_free_space_close(&seen.space);
     return status;
 }
@@ -303,8 +307,17 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
     NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
     fused->empty_side = npg_carving_side(s->empty);
     fused->empty_count = npg_carving_find(s->empty, fused->empty,
-                                          s->frames < 2 * EMPTY_FRAMES ? 1 : EMPTY_FRAMES, EMPTY_SHARE);
+                                          s->frames < 2 * EMPTY_FRAMES ? 1 : EMPTY_FRAMES, CONTRADICTED);
     return NPG_OK;
+}
+
+static npg_status collect_votes(const npg_worker *worker, npg_fused *fused)
+{
+    const state *s = npg_worker_state(worker);
+    if (!s->votes) return NPG_OK;
+    NPG_TRY(
+        npg_alloc(&fused->is_contradicted, NPG_FOR_MESH, npg_worker_facts(worker)->reference->vert_count));
+    return npg_votes_count(s->votes, fused->is_contradicted, CONTRADICTED);
 }
 
 static npg_status publish(npg_worker *worker)
@@ -315,6 +328,7 @@ static npg_status publish(npg_worker *worker)
     npg_status status = collect(worker, fused);
     if (!status) status = collect_colours(s, fused);
     if (!status) status = collect_empty(s, fused);
+    if (!status) status = collect_votes(worker, fused);
     if (status) {
         npg_fused_close(&fused);
         return status;
@@ -379,7 +393,10 @@ static npg_status settle(npg_worker *worker)
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
-    const npg_pass_result result = {facts->unreached_count, npg_facts_has_changed(facts), s->grow_dist > 0};
+    const npg_pass_result result = {.unreached_count = facts->unreached_count,
+                                    .has_changed = npg_facts_has_changed(facts),
+                                    .is_side = s->grow_dist > 0,
+                                    .has_images = s->votes != NULL};
     *npg_own(worker, brief) = npg_reference_next(npg_worker_kept(worker), &result);
     if (result.unreached_count)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
@@ -395,6 +412,7 @@ static void uninit(npg_worker *worker)
     npg_skin_close(&s->skin);
     npg_cells_close(&s->cells);
     npg_carving_close(&s->empty);
+    npg_votes_close(&s->votes);
     npg_colour_cells_close(&s->colours);
 }
 
@@ -417,7 +435,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t empty = facts->sensor_count_max ? npg_carving_memory(EMPTY_MOST) : 0;
     return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_skin_memory(npg_worker_verts_at_most(worker), points) +
-           npg_free_space_memory(facts->view_count_max);
+           npg_free_space_memory(facts->view_count_max) +
+           (facts->view_count_max ? npg_votes_memory(npg_worker_verts_at_most(worker)) : 0);
 }
 
 extern const npg_stage npg_stage_fuse;

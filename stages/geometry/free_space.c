@@ -111,7 +111,7 @@ void npg_free_space_close(npg_free_space **space)
 
 /* ---- looking ---- */
 
-static npg_sight_kind look(const view *v, const float place[3])
+static npg_sight_kind look(const view *v, const float place[3], double *margin)
 {
     double at[3];
     for (int a = 0; a < 3; a++) {
@@ -124,21 +124,22 @@ static npg_sight_kind look(const view *v, const float place[3])
            y = floor((at[1] / at[2] - v->first[1]) / v->step);
     if (!(x >= 0 && y >= 0 && x < (double)v->width && y < (double)v->height)) return NPG_SEEN_UNKNOWN;
     ptrdiff_t i = (ptrdiff_t)y * v->width + (ptrdiff_t)x;
-    double margin = BESIDE * v->step * at[2];
+    *margin = BESIDE * v->step * at[2];
     if (!(v->cells[i] > 0)) return NPG_SEEN_UNKNOWN;
     if (isnan(v->near_by[i])) return NPG_SEEN_UNKNOWN;
     if (isinf(v->near_by[i])) return NPG_SEEN_BESIDE;
-    if (at[2] < (double)v->near_by[i] - margin) return NPG_SEEN_EMPTY;
+    if (at[2] < (double)v->near_by[i] - *margin) return NPG_SEEN_EMPTY;
     if (isinf(v->cells[i])) return NPG_SEEN_UNKNOWN; /* beside the outline, but not clearly */
-    if (at[2] < (double)v->nearest[i] - margin) return NPG_SEEN_EMPTY;
-    return at[2] <= (double)v->cells[i] + margin ? NPG_SEEN_AT : NPG_SEEN_HIDDEN;
+    if (at[2] < (double)v->nearest[i] - *margin) return NPG_SEEN_EMPTY;
+    return at[2] <= (double)v->cells[i] + *margin ? NPG_SEEN_AT : NPG_SEEN_HIDDEN;
 }
 
 npg_sight_kind npg_free_space_look(const npg_free_space *space, const float place[3])
 {
     npg_sight_kind all = NPG_SEEN_UNKNOWN;
+    double margin;
     for (size_t i = 0; i < space->count; i++) {
-        npg_sight_kind one = look(&space->views[i], place);
+        npg_sight_kind one = look(&space->views[i], place, &margin);
         if (one == NPG_SEEN_EMPTY || one == NPG_SEEN_BESIDE) return one;
         if (one == NPG_SEEN_AT || (one == NPG_SEEN_HIDDEN && all == NPG_SEEN_UNKNOWN)) all = one;
     }
@@ -150,6 +151,15 @@ bool npg_free_space_is_empty(const npg_free_space *space, const float place[3])
     if (!space) return false;
     npg_sight_kind kind = npg_free_space_look(space, place);
     return kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE;
+}
+
+double npg_free_space_margin(const npg_free_space *space, const float place[3])
+{
+    double least = 0, margin;
+    for (size_t i = 0; i < space->count; i++)
+        if (look(&space->views[i], place, &margin) == NPG_SEEN_AT && (!(least > 0) || margin < least))
+            least = margin;
+    return least;
 }
 
 size_t npg_free_space_memory(size_t sensor_count)

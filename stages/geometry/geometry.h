@@ -711,6 +711,10 @@ void npg_free_space_close(npg_free_space **space);
 npg_sight_kind npg_free_space_look(const npg_free_space *space, const float place[3]);
 bool npg_free_space_is_empty(const npg_free_space *space, const float place[3]);
 
+/* How far off a place that was seen may lie from what was seen there: m of the sensor that sees it best; 0
+ * where none sees it.  Thread-safe. */
+double npg_free_space_margin(const npg_free_space *space, const float place[3]);
+
 /* Bytes of one at most. */
 size_t npg_free_space_memory(size_t sensor_count);
 

@@ -56,6 +56,7 @@ static json_t *json_of_figures(const npg_figures *f)
                   {"coverage", f->coverage},
                   {"unsupported_share", f->unsupported_share},
                   {"nowhere_share", f->nowhere_share},
+                  {"lost_share", f->lost_share},
                   {"flipped_share", f->flipped_share},
                   {"stretched_share", f->stretched_share},
                   {"edge_change", f->edge_change},
@@ -99,9 +100,9 @@ void npg_frame_line_read(npg_figures *figures, const json_t *line)
 }
 
 /* Words of the faults; those of a bar are its name. */
-static const char *const fault_names[NPG_FAULTS] = {NULL,        "residual",  "residual",    "coverage",
-                                                    "flipped",   "stretched", "unsupported", "nowhere",
-                                                    "uncovered", "distance",  "jump"};
+static const char *const fault_names[NPG_FAULTS] = {NULL,      "residual",  "residual",    "coverage",
+                                                    "flipped", "stretched", "unsupported", "nowhere",
+                                                    "lost",    "uncovered", "distance",    "jump"};
 
 static json_t *json_of_marks(const npg_figures *f)
 {

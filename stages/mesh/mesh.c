@@ -115,6 +115,34 @@ static npg_status make(making *m)
     return npg_reconstruct(&m->mesh, &m->invented_share, m->worker, &m->set, &settings);
 }
 
+/* ---- without what frames contradict ---- */
+
+/* The reference that was followed last, less the faces at places that were seen to be empty. */
+static npg_status keep_uncontradicted(making *m)
+{
+    const uint8_t *against = m->fused->is_contradicted;
+    const npg_mesh *all = m->mesh = npg_mesh_ref(npg_worker_facts(m->worker)->reference);
+    double before = npg_mesh_area(all);
+    npg_pieces pieces;
+    npg_mending mending;
+    uint8_t *keep;
+    NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, all->face_count));
+    for (size_t f = 0; f < all->face_count; f++) {
+        const uint32_t *c = all->faces + 3 * f;
+        keep[f] = against[c[0]] + against[c[1]] + against[c[2]] < 2;
+    }
+    npg_status status = npg_mesh_keep_faces(&m->mesh, keep);
+    npg_release(&keep);
+    NPG_TRY(status);
+    if (!m->mesh->face_count)
+        return npg_error(NPG_FAILED, "depth images show nothing at any place of the reference: are the "
+                                     "sensors' poses right?");
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    NPG_TRY(npg_mesh_keep_main(&m->mesh, &pieces, HUGE_VAL));
+    npg_mesh_note(m->worker, "contradicted_share", 1 - npg_mesh_area(m->mesh) / before);
+    return NPG_OK;
+}
+
 /* ---- false bridges ---- */
 
 static void report_false_bridges(making *m, const npg_bridge_cut *cut)
@@ -323,12 +351,13 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
 {
     making m = {.worker = worker, .state = npg_worker_state(worker), .key = key, .fused = fused};
     bool is_given = npg_worker_settings(worker)->reference[0];
+    bool trims = fused && fused->is_contradicted && npg_worker_facts(worker)->brief.trims_only;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
-    if (!status) status = is_given ? read_reference(&m) : make(&m);
-    if (!status && !is_given) status = cut_false_bridges(&m);
+    if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
+    if (!status && !is_given && !trims) status = cut_false_bridges(&m);
     if (!status) status = measure_reference(&m);
-    if (!status) status = take_back_if_worse(&m);
+    if (!status && !trims) status = take_back_if_worse(&m);
     if (!status) status = judge_invented(&m);
     if (!status) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);

@@ -26,6 +26,8 @@ typedef struct npg_fused {
     float *empty; /* K x 3, owned, or NULL */
     size_t empty_count;
     double empty_side;
+    /* V of the reference that was followed: vertices that depth images contradict; owned, or NULL: no images. */
+    uint8_t *is_contradicted;
 } npg_fused;
 
 /* Written by stage fuse at the end of a fusing pass; stage mesh takes it in the pass that follows. */

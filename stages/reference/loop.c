@@ -39,6 +39,10 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     grow(loop, result->unreached_count);
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->is_growing && !is_whole_now;
+    /* What was gathered last is followed by nothing yet that could contradict it. */
+    brief->trims_only = loop->is_last_look;
+    loop->is_last_look = !loop->is_last_look && !brief->rounds_left && result->is_side && result->has_images;
+    brief->rounds_left += loop->is_last_look;
     /* Parts that come, go or open belong to no common surface, and hiding them in one would silence the
      * alarm.  A side of the body never explains all. */
     brief->is_side = result->is_side;

@@ -15,6 +15,7 @@ typedef struct npg_pass_result {
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
     bool has_changed;        /* it does not explain the capture to both its ends */
     bool is_side;            /* it is a side of the body: what it lacks says nothing of how that is joined */
+    bool has_images;         /* frames can contradict it */
 } npg_pass_result;
 
 /* {0} before npg_reference_begin().  Nothing to close. */
@@ -22,6 +23,7 @@ typedef struct npg_reference_loop {
     npg_brief brief;          /* the last one given */
     int64_t unreached_before; /* of the pass before ...                             */
     int64_t in_vain;          /* ... and passes in a row that reached no more since */
+    bool is_last_look;        /* the pass to come is walked for what it contradicts */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points. */

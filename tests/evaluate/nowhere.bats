@@ -49,6 +49,17 @@ shares() { # OUT
     [ "$(grep -c '"good":true' lenient/frames.jsonl)" -eq 3 ]
 }
 
+@test "half of the body in the reference: points are lost, and the frame says so" {
+    half=(--bars residual=100,coverage=0,stretched=100,invented=100,unsupported=100,nowhere=100)
+    awk '$1 == "v" { n++; low[n] = $3 < 0.9; print } $1 == "f" { if (low[$2 + 0] && low[$3 + 0] && low[$4 + 0]) print }' \
+        capture-plain.obj >half.obj
+    run_it half --reference half.obj "${half[@]}" || [ "$code" -eq 7 ]
+    [ "$code" -eq 7 ]
+    [ "$(grep -c '"fault":"lost"' half/frames.jsonl)" -eq 3 ]
+    grep -q "below the bar: share of the points that have no surface near them, in %, is [0-9.]*, the bar 2" half.log
+    grep -q '"lost_share":0' plain/frames.jsonl
+}
+
 @test "where the background was not removed, no depth says nothing" {
     run_it unknown --reference with_ball.obj --background unknown
     shares unknown | awk '{ print } $1 != 0 { exit 1 }'
@@ -57,7 +68,7 @@ shares() { # OUT
 @test "clouds without images have no such figure" {
     "$NEUPIG" synth -o clouds --frames 3 --points 500 >/dev/null
     "$NEUPIG" run clouds/points -o clouds-out -q --method '{"epochs": 5, "poisson-depth": 5}' >/dev/null 2>&1 || [ $? -eq 7 ]
-    [ "$(grep -c '"nowhere_share":null' clouds-out/frames.jsonl)" -eq 3 ]
+    [ "$(grep -c '"nowhere_share":null,"lost_share":null' clouds-out/frames.jsonl)" -eq 3 ]
 }
 
 @test "probe says what one sensor can't show" {

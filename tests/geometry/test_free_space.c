@@ -68,6 +68,19 @@ static void one_sensor_says_five_things(void **state)
     assert_int_equal(look(&s, &unit, 9, 0, 0), NPG_SEEN_UNKNOWN);  /* outside of the image */
 }
 
+static void a_margin_is_three_cells_of_the_best_sensor(void **state)
+{
+    static scene s;
+    npg_free_space *space;
+    const float there[3] = {0, 0, 0}, beside[3] = {0.6f, 0, 0};
+    (void)state;
+    make_scene(&s, INFINITY);
+    assert_int_equal(npg_free_space_open(&space, &s.frame, &unit), NPG_OK);
+    assert_float_equal(npg_free_space_margin(space, there), 0.12, 1e-6);
+    assert_float_equal(npg_free_space_margin(space, beside), 0, 0);
+    npg_free_space_close(&space);
+}
+
 static void what_is_not_known_is_not_empty(void **state)
 {
     static scene s;
@@ -151,6 +164,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_sensor_says_five_things),
+        cmocka_unit_test(a_margin_is_three_cells_of_the_best_sensor),
         cmocka_unit_test(what_is_not_known_is_not_empty),
         cmocka_unit_test(a_background_that_was_measured_is_no_end),
         cmocka_unit_test(one_of_two_sensors_is_enough),

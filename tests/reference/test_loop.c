@@ -80,6 +80,34 @@ static void a_side_that_reaches_all_is_gathered_whatever_it_lacks(void **state)
     assert_int_equal(brief.rounds_left, 0);
 }
 
+static void a_side_before_cameras_is_looked_at_once_more_and_trimmed(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    const npg_pass_result side = {.is_side = true, .has_images = true};
+    npg_reference_begin(&loop, 1);
+    npg_brief brief = npg_reference_next(&loop, &side);
+    assert_int_equal(brief.rounds_left, 1); /* what was past its border was not followed */
+    assert_false(brief.trims_only);
+    brief = npg_reference_next(&loop, &side);
+    assert_int_equal(brief.rounds_left, 1); /* nor what was gathered last */
+    assert_false(brief.trims_only);
+    brief = npg_reference_next(&loop, &side);
+    assert_int_equal(brief.rounds_left, 0);
+    assert_true(brief.trims_only);
+}
+
+static void a_whole_body_is_not_trimmed(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    const npg_pass_result whole = {.has_images = true};
+    npg_reference_begin(&loop, 1);
+    npg_brief brief = npg_reference_next(&loop, &whole);
+    assert_int_equal(brief.rounds_left, 0);
+    assert_false(brief.trims_only);
+}
+
 static void growth_in_vain_asks_for_less_and_then_ends(void **state)
 {
     (void)state;
@@ -115,6 +143,8 @@ int main(void)
         cmocka_unit_test(what_a_reference_does_not_explain_is_not_gathered),
         cmocka_unit_test(a_side_grows_until_all_is_reached_and_is_gathered_once_more),
         cmocka_unit_test(a_side_that_reaches_all_is_gathered_whatever_it_lacks),
+        cmocka_unit_test(a_side_before_cameras_is_looked_at_once_more_and_trimmed),
+        cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
         cmocka_unit_test(growth_never_goes_on_for_ever),
     };
