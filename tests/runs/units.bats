@@ -57,8 +57,8 @@ make_capture() { # FOLDER UNIT
         [ ! -e out/job/window_000000.vdb ] && [ ! -e out/done.json ]
     }
     refused 1e-30 "the longest side of the box of all points is 2.99571e-30; it must be from 1e-13 to 1e+12"
-    refused 9e11 "the longest side of the box of all points is"
-    refused 1e30 "frame_0000.xyz): 0 usable points of 700, a surface takes 16 (700 not finite or farther than 1e+12"
+    refused 9e11 "in/frame_0000.xyz: 440 of 700 points lie farther than 1e+12 away: another unit, or bytes in the wrong order?"
+    refused 1e30 "in/frame_0000.xyz: 700 of 700 points lie farther than 1e+12 away: another unit, or bytes in the wrong order?"
     refused 0 "frame_0000.xyz): 1 usable points of 700, a surface takes 16"
     make_capture probed 1e-30
     run "$NEUPIG" probe probed

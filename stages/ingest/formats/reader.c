@@ -123,7 +123,7 @@ static npg_status check_sizes(const npg_builder *b, const char *name)
     if (2 * b->far_count <= b->finite_count) return NPG_OK;
     return npg_error(
         NPG_BAD_INPUT,
-        "%s: %zu of %zu points lie farther than %g away: are bytes of its numbers in the wrong order?", name,
+        "%s: %zu of %zu points lie farther than %g away: another unit, or bytes in the wrong order?", name,
         b->far_count, b->vert_count, NPG_SIDE_MAX);
 }
 
