@@ -48,7 +48,7 @@
 #define EMPTY_BIN    0.5    /* of a depth map, at the points' distance                            */
 #define EMPTY_MARGIN 0.3    /* that a place must be before what was seen ...                      */
 #define EMPTY_NOISE  2.5    /* ... and so many deviations of the points' noise                    */
-#define EMPTY_FRAMES 2      /* ... so many                                                        */
+#define EMPTY_FRAMES 2      /* at least must have seen it empty                                   */
 /* Of the frames that say anything of a place: what is left is how often a frame is wrongly followed. */
 #define CONTRADICTED 0.2
 
