@@ -1,4 +1,4 @@
-/* adam: the optimiser's step; kernel in adam.cl, twin in adam_ref.c. */
+/* adam: the optimiser's step; kernel in adam.cl. */
 #ifndef NPG_ADAM_H
 #define NPG_ADAM_H
 
@@ -25,9 +25,5 @@ void npg_adam_close(npg_adam *adam);
 
 /* One step: parameters -= rate m^ / (sqrt(v^) + epsilon). */
 npg_status npg_adam_step(npg_adam *adam, const npg_buffer *parameters, const npg_buffer *gradient);
-
-/* The plain twin, in double: step counts from 1. */
-void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
-                       const float *rates, size_t row, size_t count, int64_t step);
 
 #endif

@@ -1,4 +1,4 @@
-/* latent: grid features sampled at fixed points; kernels in latent.cl, plain twin in latent_ref.c. */
+/* latent: grid features sampled at fixed points; kernels in latent.cl. */
 #ifndef NPG_LATENT_H
 #define NPG_LATENT_H
 
@@ -36,9 +36,5 @@ npg_status npg_latent_sample(const npg_latent *latent, const npg_buffer *z, cons
 /* dnodes = samples^T (dz (1 - z^2)); dz is overwritten with the product in brackets. */
 npg_status npg_latent_back(const npg_latent *latent, const npg_buffer *dnodes, const npg_buffer *dz,
                            const npg_buffer *z);
-
-/* The plain twins, in double. */
-void npg_latent_sample_ref(double *z, const double *nodes, const npg_samples *samples);
-void npg_latent_back_ref(double *dnodes, const double *dz, const double *z, const npg_samples *samples);
 
 #endif

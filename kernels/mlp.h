@@ -1,5 +1,4 @@
-/* mlp: the decoder, forward and backward, for many vertices in many frames; kernels in mlp.cl and time.cl,
- * twins in mlp_ref.c.
+/* mlp: the decoder, forward and backward, for many vertices in many frames; kernels in mlp.cl and time.cl.
  *
  * Parameters, gradient and Adam's moments are one list of floats, in the order
  *     W_2 (packed W1 x W2) | head (W2 x 16) | b_2 (W2) | bias of the head (16) | W1z (packed 32 x W1) |
@@ -68,12 +67,5 @@ npg_status npg_mlp_backward(npg_mlp *mlp, size_t first, size_t count);
 
 /* grad and dz, after all frames have gone backward. */
 npg_status npg_mlp_end(npg_mlp *mlp);
-
-/* The plain twins, in double, for one vertex in one frame: out (7) of z (32) and code (M); and the gradients,
- * added to grad and dz. */
-void npg_mlp_forward_ref(double *out, const double *z, const double *code, const double *params,
-                         const npg_mlp_shape *shape);
-void npg_mlp_backward_ref(double *grad, double *dz, const double *dout, const double *z, const double *code,
-                          const double *params, const npg_mlp_shape *shape);
 
 #endif

@@ -1,5 +1,5 @@
 /* motion: what follows the decoder: transform, nearest, chamfer, isometry;
- * one .cl and one _ref.c for each.  Positions on the device are in blocks of 16 (layout.h). */
+ * one .cl for each.  Positions on the device are in blocks of 16 (layout.h). */
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H
 
@@ -54,17 +54,5 @@ npg_status npg_motion_chamfer(npg_motion *motion, double alpha, size_t first, si
  * part [frames][blocks of the rows] gets the sums of edge changes over half-edges. */
 npg_status npg_motion_back(npg_motion *motion, const npg_buffer *dout, const npg_buffer *out,
                            const float *gains, double iso_gain, size_t first, size_t count);
-
-/* Plain twins, in double; one vertex each where no more is said. */
-void npg_transform_ref(double x[3], const double out[7], const double rest[3]);
-void npg_transform_back_ref(double dout[7], const double g[3], const double out[7], const double rest[3]);
-/* index of the nearest of count points (count x 3), lowest index on ties. */
-size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *points, size_t count);
-/* cd and its gradient g (real x 3, overwritten) of one frame with given correspondences. */
-double npg_chamfer_pairs_ref(double *g, const double *x, size_t real, const double *points, size_t count,
-                             const size_t *to_points, const size_t *to_verts, double alpha);
-/* Sum over edges of | |x_i - x_j| - rest |, gradient added to g. */
-double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest,
-                        size_t edge_count);
 
 #endif

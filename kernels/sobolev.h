@@ -1,5 +1,4 @@
-/* sobolev: the exact solve (I + lambda L) x = y, L = 2 D - A (levels.h), on every grid level; kernels in sobolev.cl, twin in
- * sobolev_ref.c. */
+/* sobolev: the exact solve (I + lambda L) x = y, L = 2 D - A (levels.h), on every grid level; kernels in sobolev.cl. */
 #ifndef NPG_SOBOLEV_H
 #define NPG_SOBOLEV_H
 
@@ -20,8 +19,5 @@ void npg_sobolev_close(npg_sobolev *sobolev);
 /* x = (I + lambda L)^-1 y, [nodes][32]; x may be y.  Levels with lambda = 0 are copied.
  * The matrix is symmetric: the same call passes gradients back. */
 npg_status npg_sobolev_solve(npg_sobolev *sobolev, const npg_buffer *x, const npg_buffer *y);
-
-/* y = (I + lambda L) x, the matrix itself, in double: what the solve must invert. */
-void npg_sobolev_apply_ref(double *y, const double *x, const npg_levels *levels);
 
 #endif

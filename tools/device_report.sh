@@ -17,7 +17,7 @@ read -ra bench_options <<<"${BENCH_OPTIONS:-}"
 read -ra run_options <<<"${RUN_OPTIONS:-}"
 mkdir -p "$out"
 
-echo "1 self-test: every kernel on every device, beside its plain twin"
+echo "1 self-test: every kernel on every device, beside known answers"
 if ! "$neupig" doctor >"$out/doctor.txt" 2>&1; then
     cat "$out/doctor.txt"
     echo "no device is right; the drivers that OpenCL was told of:"

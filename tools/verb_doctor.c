@@ -29,7 +29,7 @@ const npg_option npg_doctor_options[] = {
 
 /* ---- devices ---- */
 
-/* The self-test compares every kernel on the device with its plain twin. */
+/* The self-test compares every kernel on the device with known answers. */
 static json_t *json_of_device(size_t i, const npg_device_info *info)
 {
     npg_device *device;

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 
 #include "export/exporters/vdb.h"
-#include "kernels/sobolev.h"
+#include "tests/kernels/twins/twins.h"
 
 /* What the solve gives back must be what the matrix takes to the unknowns. */
 static void features_invert_the_grid_matrix(void **state)

@@ -7,11 +7,10 @@
 
 #include <cmocka.h>
 
-#include "kernels/latent.h"
-#include "kernels/mlp.h"
 #include "kernels/motion.h"
 #include "pipeline/memory.h"
 #include "pipeline/random.h"
+#include "tests/kernels/twins/twins.h"
 #include "tests/support/slope.h"
 
 enum { CHANNELS = NPG_LATENT_CHANNELS, VERTS = 213, POINTS = 249, EDGES = 2 * VERTS - 3 };

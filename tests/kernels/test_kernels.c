@@ -8,10 +8,10 @@
 
 #include <cmocka.h>
 
-#include "kernels/check.h"
 #include "kernels/kernels.h"
 #include "kernels/latent.h"
 #include "kernels/mlp.h"
+#include "tests/kernels/twins/check.h"
 #include "tests/support/group_device.h"
 
 static void check_all(npg_device *on, const int *sizes, size_t size_count)
@@ -47,6 +47,7 @@ static void ops_agree_with_the_parameters_of_other_devices(void **state)
         assert_ptr_equal(npg_device_tuning(other), sets[i]);
         print_message("%s:\n", sets[i]->name);
         check_all(other, sizes, 3);
+        if (npg_kernels_self_test(other)) fail_msg("%s", npg_error_text());
         npg_device_close(&other);
     }
 }

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernels/latent.h"
+#include "tests/kernels/twins/twins.h"
 
 void npg_latent_sample_ref(double *z, const double *nodes, const npg_samples *samples)
 {

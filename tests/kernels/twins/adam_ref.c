@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "kernels/adam.h"
+#include "tests/kernels/twins/twins.h"
 
 void npg_adam_step_ref(double *parameters, double *first, double *second, const double *gradient,
                        const float *rates, size_t row, size_t count, int64_t step)

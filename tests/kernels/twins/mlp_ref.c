@@ -1,5 +1,5 @@
 /* mlp: the plain twins of mlp.cl and time.cl, in double, written as the paper writes the network. */
-#include "kernels/mlp.h"
+#include "tests/kernels/twins/twins.h"
 
 #define CHANNELS  NPG_LATENT_CHANNELS
 #define WIDTH_MAX 4096 /* of a hidden layer: the most that options width-1 and width-2 take */

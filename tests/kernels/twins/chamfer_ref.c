@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernels/motion.h"
+#include "tests/kernels/twins/twins.h"
 
 /* One pair: w d^2, and its gradient (w constant) added to g. */
 static double add_pair(double g[3], const double x[3], const double p[3], double falloff)

@@ -1,5 +1,5 @@
 /* sobolev: the matrix that the kernels invert, written out node by node, in double. */
-#include "kernels/sobolev.h"
+#include "tests/kernels/twins/twins.h"
 
 /* Row (i, j, k) of I + lambda (2 D - A): D counts the neighbours inside the grid, A sums them. */
 static double apply_at(const double *x, const npg_level *level, int i, int j, int k, size_t channel)

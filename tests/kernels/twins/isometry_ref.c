@@ -1,7 +1,7 @@
 /* isometry: the plain twin of isometry.cl, in double, edge by edge. */
 #include <math.h>
 
-#include "kernels/motion.h"
+#include "tests/kernels/twins/twins.h"
 
 double npg_isometry_ref(double *g, const double *x, const uint32_t (*edges)[2], const double *rest,
                         size_t edge_count)

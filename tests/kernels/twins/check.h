@@ -1,8 +1,7 @@
-/* Check: what the checker's cases share. */
-#ifndef NPG_CHECK_H
-#define NPG_CHECK_H
+/* Check: every op on the device beside its twin; what the cases share. */
+#ifndef NPG_TEST_CHECK_H
+#define NPG_TEST_CHECK_H
 
-#include "kernels/kernels.h"
 #include "kernels/runtime/device.h"
 #include "pipeline/random.h"
 
@@ -17,6 +16,22 @@ typedef struct npg_check {
     size_t buffer_count;
     double error; /* the largest so far, relative to the largest value */
 } npg_check;
+
+typedef npg_status npg_kernel_check(npg_check *check, int size);
+
+typedef struct npg_kernel_case {
+    const char *op;
+    npg_kernel_check *check;
+    double tolerance;
+} npg_kernel_case;
+
+/* Ends with op NULL. */
+extern const npg_kernel_case npg_kernel_cases[];
+
+/* Run one op on the device and its twin on the host over random data of the given size (1 is small; the
+ * figures of size 8 are large and odd) and give the largest error, relative to the largest value. */
+npg_status npg_kernel_case_run(const npg_kernel_case *op, npg_device *device, int size, uint64_t seed,
+                               double *error);
 
 /* n values in +-scale, as float and (when `wide` is not NULL) the same in double, from the arena, whose status
  * is to be asked before they are used. */

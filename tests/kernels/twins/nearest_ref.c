@@ -1,5 +1,5 @@
 /* nearest: the plain twin of nearest.cl, in double: compares with every point. */
-#include "kernels/motion.h"
+#include "tests/kernels/twins/twins.h"
 
 size_t npg_nearest_ref(double *dist_sq, const double query[3], const double *points, size_t count)
 {

@@ -1,9 +1,10 @@
 /* latent and sobolev: the checker's cases. */
 #include <math.h>
 
-#include "kernels/check.h"
 #include "kernels/latent.h"
 #include "kernels/sobolev.h"
+#include "tests/kernels/twins/check.h"
+#include "tests/kernels/twins/twins.h"
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 

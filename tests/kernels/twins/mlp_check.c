@@ -2,9 +2,10 @@
 #include <math.h>
 
 #include "kernels/adam.h"
-#include "kernels/check.h"
 #include "kernels/levels.h"
 #include "kernels/mlp.h"
+#include "tests/kernels/twins/check.h"
+#include "tests/kernels/twins/twins.h"
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 

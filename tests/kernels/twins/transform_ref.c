@@ -1,7 +1,7 @@
 /* transform: the plain twins of transform.cl, in double, through the rotation matrix. */
 #include <math.h>
 
-#include "kernels/motion.h"
+#include "tests/kernels/twins/twins.h"
 
 #define REACH 0.1 /* as in transform.cl */
 

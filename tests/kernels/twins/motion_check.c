@@ -2,9 +2,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernels/check.h"
 #include "kernels/mlp.h"
 #include "kernels/motion.h"
+#include "tests/kernels/twins/check.h"
+#include "tests/kernels/twins/twins.h"
 
 #define FRAMES 3
 

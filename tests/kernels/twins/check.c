@@ -1,5 +1,5 @@
-/* Check: random values, comparison. */
-#include "kernels/check.h"
+/* Check: the table of ops, random values, comparison. */
+#include "tests/kernels/twins/check.h"
 
 #include <math.h>
 
@@ -57,3 +57,13 @@ npg_status npg_check_compare_buffer(npg_check *c, const npg_buffer *got, const d
     npg_check_compare(c, values, want, n);
     return NPG_OK;
 }
+
+const npg_kernel_case npg_kernel_cases[] = {{"latent", npg_check_latent, 2e-5},
+                                            {"sobolev", npg_check_sobolev, 1e-5},
+                                            {"mlp", npg_check_mlp, 2e-5},
+                                            {"adam", npg_check_adam, 1e-5},
+                                            {"transform", npg_check_transform, 2e-5},
+                                            {"nearest", npg_check_nearest, 1e-6},
+                                            {"chamfer", npg_check_chamfer, 2e-5},
+                                            {"isometry", npg_check_isometry, 2e-5},
+                                            {0}};
