@@ -1,7 +1,7 @@
 /* sobolev: tables of the levels and the six passes. */
 #include "kernels/sobolev.h"
 
-#include "kernels/path_spectrum.h"
+#include "kernels/jacobi.h"
 
 typedef struct tables {
     int32_t level[NPG_LEVELS_MAX][NPG_GRID];
@@ -32,15 +32,27 @@ static void fill_tables(tables *t, const npg_levels *levels)
     }
 }
 
+#define SWEEPS 60 /* of rotations, ample: what is 0 already is passed over */
+
+/* What makes the smoothing of a grid diagonal, axis by axis.  Along one axis of n nodes M = 2 D - A is a
+ * tridiagonal matrix: D counts a node's neighbours on the axis (1 at the ends, 2 between), A joins neighbours.  An
+ * n^3 grid's 2 D - A is the Kronecker sum of three of these.  M = matrix^T diag(eigen) matrix, rows orthonormal. */
 static npg_status fill_transform(float *matrix, float *eigen, size_t n)
 {
-    double *basis;
-    NPG_TRY(npg_alloc_array(&basis, NPG_FOR_FIT, n + 1, n * sizeof *basis));
-    double *values = basis + n * n;
-    npg_status status = npg_path_spectrum(basis, values, (int)n);
-    for (size_t i = 0; i < n * n && !status; i++) matrix[i] = (float)basis[i];
-    for (size_t i = 0; i < n && !status; i++) eigen[i] = (float)values[i];
-    npg_release(&basis);
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    double *m = npg_arena_take(&scratch, n * n, sizeof *m);
+    double *vectors = npg_arena_take(&scratch, n * n, sizeof *vectors); /* columns */
+    npg_status status = npg_arena_status(&scratch);
+    for (size_t i = 0; i < n && !status; i++) {
+        m[i * n + i] = 2 * ((i > 0) + (i < n - 1));
+        if (i) m[i * n + i - 1] = m[(i - 1) * n + i] = -1;
+    }
+    if (!status) npg_jacobi(m, vectors, (int)n, SWEEPS);
+    for (size_t k = 0; k < n && !status; k++) {
+        eigen[k] = (float)m[k * n + k];
+        for (size_t j = 0; j < n; j++) matrix[k * n + j] = (float)vectors[j * n + k];
+    }
+    npg_arena_release(&scratch);
     return status;
 }
 

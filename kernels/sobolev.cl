@@ -1,7 +1,7 @@
 /* sobolev: x = (I + lambda L)^-1 y on every grid level, exactly.
  *
  * L of an n^3 grid is the Kronecker sum of three matrices of paths, which an orthonormal matrix C (n x n)
- * diagonalises (path_spectrum.h).  So the solve is C on each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper:
+ * diagonalises (sobolev.c).  So the solve is C on each axis, a division by the sum of eigenvalues, C^T on each axis: six passes, no iteration.  Paper:
  * section on the objectives, "Preconditioning"; the published code iterates conjugate gradients instead.
  *
  * levels: [L][NPG_GRID] (layout.h); the node (i, j, k) of a level is row

@@ -8,7 +8,6 @@
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "job/job.h"
-#include "optimize/solver.h"
 #include "pipeline/json_file.h"
 #include "pipeline/options.h"
 #include "pipeline/order.h"
@@ -195,9 +194,7 @@ static npg_export_facts export_facts(const npg_worker *worker)
                               .largest = is_known ? npg_place_largest(&state->map, box) : 0,
                               .diagonal = is_known ? state->scale * box->diagonal : 0,
                               .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
-                              .voxel_share = state->voxel_share,
-                              .has_grids = npg_job_of(worker) && npg_solver_of(worker)->needs_device,
-                              .placement = &state->map};
+                              .voxel_share = state->voxel_share};
 }
 
 /* About what the meshes and formats take: binary PLY, or OBJ text with its longer numbers.
@@ -414,11 +411,6 @@ static npg_status write_exports(npg_worker *worker)
                        "motion.glb has the reference's colours: morph targets of colours are an option of "
                        "glTF that few programs read");
     if (!status) status = npg_exporters_write(&state->choice, &facts, &watch);
-    if (!status && npg_exporters_name(state->exports, "vdb") && !facts.has_grids)
-        npg_worker_warn(
-            worker, false, -1,
-            "vdb has no latent grids: only --method grids and paper have any, and keep them in a job folder "
-            "(not pulled from)");
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, "
@@ -484,7 +476,7 @@ static npg_status conclude(npg_worker *worker)
 
 static npg_status check_own(const npg_worker *worker)
 {
-    static const char *const names[] = {"meshes", "obj", "volumes", "latents"};
+    static const char *const names[] = {"meshes", "obj", "volumes"};
     npg_status status = NPG_OK;
     for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++) {
         char folder[NPG_PATH_SIZE];

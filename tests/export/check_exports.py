@@ -195,7 +195,7 @@ def check_blender(run):
         if arrays["up"] == "y":
             pose = np.stack([pose[:, 0], -pose[:, 2], pose[:, 1]], 1)
         same(f"glb in Blender, frame {at}", look(thing, at), pose * unit, 2e-6 * size * unit)
-    for name in sorted(glob.glob(f"{run}/volumes/*.vdb"))[:2] + sorted(glob.glob(f"{run}/latents/*.vdb"))[:1]:
+    for name in sorted(glob.glob(f"{run}/volumes/*.vdb"))[:2] + sorted(glob.glob(f"{run}/job/*.vdb"))[:1]:
         start()
         bpy.ops.object.volume_import(filepath=name)
         grids = bpy.data.volumes[0].grids

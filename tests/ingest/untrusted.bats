@@ -135,7 +135,7 @@ untouched() {
         refused 2 "out/$name is a link" run in/frame_0000.ply -o out --confine "${small[@]}"
         untouched
     done
-    for name in obj volumes latents; do
+    for name in obj volumes; do
         rm -rf out
         mkdir out
         ln -s ../outside "out/$name"

@@ -31,7 +31,7 @@ make_capture() { # FOLDER UNIT
         diff -r "one.out/$name" "large.out/$name"
     done
     "$NEUPIG" run tiny -o tiny.grids "${small[@]}" --method '{"align": false, "width-1": 32, "width-2": 32}' --export vdb --scale 549755813888
-    [ -s tiny.grids/latents/window_000000.vdb ]
+    [ -s tiny.grids/job/window_000000.vdb ]
 }
 
 @test "a capture of 1e-12 units is written as it is; a format that can't hold it says so before the fit" {

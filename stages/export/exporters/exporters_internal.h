@@ -6,7 +6,6 @@
  *     OUT/motion.npz                 arrays for NumPy
  *     OUT/obj/<prefix>_0000.obj      a second sequence, where the first one is PLY
  *     OUT/volumes/<prefix>_0000.vdb  level set of every frame
- *     OUT/latents/window_000000.vdb  latent grids of every window
  *     OUT/exports.jsonl              one line per file of these, with size and checksum
  *
  * The mesh sequence is written while frames are solved, which is not the order of time, and is what a
@@ -49,13 +48,11 @@ typedef struct npg_export_facts {
     int64_t first_index, last_index; /* of the poses                                         */
     double fps;
     double metres_per_unit;
-    bool is_z_up;                          /* else y                                                      */
-    double largest, diagonal;              /* coordinate, and of the box; 0: not known yet                */
-    double longest;                        /* side of the box                                             */
-    double voxel_share;                    /* a level set's voxel, in longest sides                       */
-    bool has_grids;                        /* OUT/job holds the latent grids of this run's windows        */
-    const struct npg_placement *placement; /* the capture's coordinates to these; NULL: they are the same */
-    npg_export_log *log;                   /* where files are noted                                       */
+    bool is_z_up;             /* else y                                                      */
+    double largest, diagonal; /* coordinate, and of the box; 0: not known yet                */
+    double longest;           /* side of the box                                             */
+    double voxel_share;       /* a level set's voxel, in longest sides                       */
+    npg_export_log *log;      /* where files are noted                                       */
 } npg_export_facts;
 
 typedef struct npg_pose {

@@ -70,7 +70,7 @@ static npg_status remove_ours(void *user, const char *entry)
 
 npg_status npg_exporters_clear(const char *output)
 {
-    static const char *const folders[] = {"obj", "volumes", "latents"};
+    static const char *const folders[] = {"obj", "volumes"};
     npg_status status = npg_folder_each(output, NPG_DISK, remove_ours, &(clearing){output, true});
     for (size_t i = 0; i < sizeof folders / sizeof *folders && !status; i++) {
         char folder[NPG_PATH_SIZE];

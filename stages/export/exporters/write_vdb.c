@@ -1,16 +1,12 @@
-/* VDB writer: OUT/volumes/<prefix>_0000.vdb, the level set of every frame, and OUT/latents/window_000000.vdb,
- * the latent grids of every window.
+/* VDB writer: OUT/volumes/<prefix>_0000.vdb, the level set of every frame.
  *
  * A level set needs a closed surface: openings are covered by fans over their rims, the same in every frame.
  * The voxel is a share of the longest side of the capture's box. */
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "export/exporters/exporters_internal.h"
 #include "export/exporters/vdb.h"
 #include "job/vdb_file.h"
-#include "pipeline/order.h"
 
 typedef struct vdb_state {
     npg_writer writer;
@@ -87,83 +83,16 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     return status ? status : npg_export_made(facts->log, "vdb", file, pose->index, 1);
 }
 
-/* ---- the latent grids of a run's windows ---- */
-
-typedef struct latents {
-    const char *grids_path;
-    const npg_placement *placement;
-    npg_vdb_span span;
-} latents;
-
-static npg_status save_latents(void *user, const char *path)
-{
-    latents *l = user;
-    return npg_vdb_save_latents(path, &l->span, l->grids_path, l->placement);
-}
-
-static npg_status write_window_latents(const npg_export_facts *facts, const char *folder, int64_t serial)
-{
-    char name[64], file[80], path[NPG_PATH_SIZE], grids_path[NPG_PATH_SIZE];
-    snprintf(name, sizeof name, "window_%06lld.vdb", (long long)serial);
-    snprintf(file, sizeof file, "latents/%s", name);
-    npg_status status = npg_path_of(grids_path, folder, name);
-    if (!status) status = npg_path_of(path, facts->output, file);
-    latents l = {grids_path, facts->placement, {0}};
-    if (!status) status = npg_vdb_file_write(path, NULL, save_latents, &l);
-    if (!status)
-        status = npg_export_made(facts->log, "latents", file, l.span.first, l.span.last - l.span.first + 1);
-    return status;
-}
-
-typedef struct windows {
-    int64_t *serials; /* owned */
-    size_t count, capacity;
-} windows;
-
-static npg_status add_window(void *user, const char *name)
-{
-    windows *w = user;
-    long long serial;
-    int end = 0;
-    if (sscanf(name, "window_%lld.vdb%n", &serial, &end) != 1 || !end || name[end] || name[7] < '0')
-        return NPG_OK;
-    NPG_TRY(npg_grow(&w->serials, &w->capacity, w->count + 1, sizeof *w->serials, NPG_FOR_FILES));
-    w->serials[w->count++] = serial;
-    return NPG_OK;
-}
-
-/* OUT/latents/window_000000.vdb of every OUT/job/window_000000.vdb there is (vdb_latents.h says what is in them). */
-static npg_status write_latents(const npg_export_facts *facts)
-{
-    windows w = {0};
-    char folder[NPG_PATH_SIZE];
-    if (!facts->has_grids) return NPG_OK;
-    npg_status status = npg_path_of(folder, facts->output, "job");
-    if (!status) status = npg_export_folder(facts->output, "latents");
-    if (!status) status = npg_folder_each(folder, NPG_DISK, add_window, &w);
-    if (w.count) qsort(w.serials, w.count, sizeof *w.serials, npg_order_int64);
-    for (size_t i = 0; i < w.count && !status; i++)
-        status = write_window_latents(facts, folder, w.serials[i]);
-    npg_release(&w.serials);
-    return status;
-}
-
-static npg_status finish_vdb(void *state)
-{
-    return write_latents(((vdb_state *)state)->writer.facts);
-}
-
 static void close_vdb(void *state)
 {
     npg_release(&((vdb_state *)state)->faces);
 }
 
 const npg_exporter npg_exporter_vdb = {.name = "vdb",
-                                       .help = "OpenVDB level set per frame, latent grids per window",
+                                       .help = "OpenVDB level set per frame",
                                        .state_size = sizeof(vdb_state),
                                        .check = check,
                                        .bytes = bytes,
                                        .open = open_vdb,
                                        .pose = write_pose,
-                                       .finish = finish_vdb,
                                        .close = close_vdb};
