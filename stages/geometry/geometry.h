@@ -432,19 +432,12 @@ typedef struct npg_metrics_settings {
     double tau;          /* of the F-score, in diagonals: 0.005                            */
     double diagonal;     /* of the box of the first frame's truth, in the meshes' own unit */
     uint64_t seed;
-    int threads; /* 0: one per core; does not change the figures */
 } npg_metrics_settings;
 
-typedef struct npg_frame_metrics {
-    double cd, cd_to_truth, cd_from_truth; /* x 1e5; predicted -> truth, truth -> predicted */
-    double nc;                             /* NaN when the truth has no normals             */
-    double f, precision, recall;           /* 0..1                                          */
-} npg_frame_metrics;
-
-/* Compare one frame.  A truth without faces is a cloud: all its points stand for the samples, and its
+/* Fill cd to recall of one frame.  A truth without faces is a cloud: all its points stand for the samples, and its
  * vert_normals, if any, for the normals.  NPG_BAD_INPUT for a prediction without area or a truth without
  * points; NPG_MEMORY.  Cost: O(S log S) for S samples; memory about 80 S bytes. */
-npg_status npg_metrics_compare(npg_frame_metrics *out, const npg_mesh *predicted, const npg_mesh *truth,
+npg_status npg_metrics_compare(npg_eval_figures *out, const npg_mesh *predicted, const npg_mesh *truth,
                                const npg_metrics_settings *settings, uint64_t frame);
 
 /* For every predicted vertex the nearest vertex of the truth; *truth_of (V entries) is the caller's. */
@@ -455,9 +448,9 @@ double npg_metrics_drift(const npg_mesh *predicted, const npg_mesh *truth, const
                          double diagonal);
 
 /* S samples of a mesh, uniform by area: positions (S x 3), unit face normals (S x 3; zero for a face without
- * area) and the face of each (may be NULL).  NPG_BAD_INPUT when the mesh has no area. */
-npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const npg_mesh *mesh,
-                           size_t sample_count, uint64_t seed, uint64_t frame, uint64_t purpose);
+ * area).  NPG_BAD_INPUT when the mesh has no area. */
+npg_status npg_mesh_sample(float *pos, float *normals, const npg_mesh *mesh, size_t sample_count,
+                           uint64_t seed, uint64_t frame, uint64_t purpose);
 
 /* Diagonal of the box of N x 3 points. */
 double npg_points_diagonal(const float *points, size_t point_count);

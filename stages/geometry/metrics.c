@@ -40,8 +40,8 @@ static void sample_face(float pos[3], float normal_out[3], const npg_mesh *mesh,
     }
 }
 
-npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const npg_mesh *mesh,
-                           size_t sample_count, uint64_t seed, uint64_t frame, uint64_t purpose)
+npg_status npg_mesh_sample(float *pos, float *normals, const npg_mesh *mesh, size_t sample_count,
+                           uint64_t seed, uint64_t frame, uint64_t purpose)
 {
     double *cumulated, total = 0, normal[3];
     NPG_TRY(npg_alloc_array(&cumulated, NPG_FOR_QUERY, mesh->face_count, sizeof *cumulated));
@@ -54,7 +54,6 @@ npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const 
     for (size_t s = 0; s < sample_count && !status; s++) {
         size_t f = find_face(cumulated, mesh->face_count, npg_random_real(&random) * total);
         sample_face(pos + 3 * s, normals + 3 * s, mesh, f, &random);
-        if (face_of) face_of[s] = (uint32_t)f;
     }
     npg_release(&cumulated);
     return status;
@@ -64,8 +63,7 @@ npg_status npg_mesh_sample(float *pos, float *normals, uint32_t *face_of, const 
 typedef struct side {
     size_t count;
     const float *pos, *normals; /* normals may be NULL */
-    uint32_t *nearest;          /* of the other side   */
-    float *dist_sq;
+    npg_neighbours nearest;     /* of the other side   */
 } side;
 
 static npg_status open_side(side *s, npg_arena *arena, const npg_mesh *mesh,
@@ -74,25 +72,18 @@ static npg_status open_side(side *s, npg_arena *arena, const npg_mesh *mesh,
     size_t n = mesh->face_count ? settings->sample_count : mesh->vert_count;
     if (!n) return npg_error(NPG_BAD_INPUT, "the ground truth has no points");
     *s = (side){.count = n, .pos = mesh->vert_pos, .normals = mesh->vert_normals};
-    s->nearest = npg_arena_take(arena, n, sizeof *s->nearest);
-    s->dist_sq = npg_arena_take(arena, n, sizeof *s->dist_sq);
-    if (!mesh->face_count) return npg_arena_status(arena);
+    if (!mesh->face_count) return NPG_OK;
     float *pos = npg_arena_take(arena, n, 3 * sizeof *pos);
     float *normals = npg_arena_take(arena, n, 3 * sizeof *normals);
     s->pos = pos;
     s->normals = normals;
     NPG_TRY(npg_arena_status(arena));
-    return npg_mesh_sample(pos, normals, NULL, mesh, n, settings->seed, frame, purpose);
+    return npg_mesh_sample(pos, normals, mesh, n, settings->seed, frame, purpose);
 }
 
-static npg_status find_nearest(side *from, const side *to, int threads)
+static npg_status find_nearest(side *from, npg_arena *arena, const side *to)
 {
-    npg_kdtree *tree;
-    NPG_TRY(npg_kdtree_open(&tree, to->pos, to->count));
-    npg_status status =
-        npg_kdtree_nearest(tree, from->nearest, from->dist_sq, from->pos, from->count, 1, threads);
-    npg_kdtree_close(&tree);
-    return status;
+    return npg_neighbours_take(&from->nearest, arena, to->pos, to->count, from->pos, from->count, 1);
 }
 
 /* ---- figures ---- */
@@ -100,14 +91,14 @@ static npg_status find_nearest(side *from, const side *to, int threads)
 static double mean_dist_sq(const side *s, double diagonal)
 {
     double sum = 0;
-    for (size_t i = 0; i < s->count; i++) sum += (double)s->dist_sq[i];
+    for (size_t i = 0; i < s->count; i++) sum += (double)s->nearest.dist_sq[i];
     return sum / (double)s->count / (diagonal * diagonal);
 }
 
 static double share_within(const side *s, double dist)
 {
     size_t count = 0;
-    for (size_t i = 0; i < s->count; i++) count += (double)s->dist_sq[i] <= dist * dist;
+    for (size_t i = 0; i < s->count; i++) count += (double)s->nearest.dist_sq[i] <= dist * dist;
     return (double)count / (double)s->count;
 }
 
@@ -115,13 +106,13 @@ static double normal_agreement(const side *from, const side *to)
 {
     double sum = 0;
     for (size_t i = 0; i < from->count; i++) {
-        const float *a = from->normals + 3 * i, *b = to->normals + 3 * (size_t)from->nearest[i];
+        const float *a = from->normals + 3 * i, *b = to->normals + 3 * (size_t)from->nearest.index[i];
         sum += fabs((double)a[0] * (double)b[0] + (double)a[1] * (double)b[1] + (double)a[2] * (double)b[2]);
     }
     return sum / (double)from->count;
 }
 
-static void measure(npg_frame_metrics *out, const side *predicted, const side *truth,
+static void measure(npg_eval_figures *out, const side *predicted, const side *truth,
                     const npg_metrics_settings *settings)
 {
     double tau = settings->tau * settings->diagonal;
@@ -137,7 +128,7 @@ static void measure(npg_frame_metrics *out, const side *predicted, const side *t
         out->nc = 0.5 * (normal_agreement(predicted, truth) + normal_agreement(truth, predicted));
 }
 
-npg_status npg_metrics_compare(npg_frame_metrics *out, const npg_mesh *predicted, const npg_mesh *truth,
+npg_status npg_metrics_compare(npg_eval_figures *out, const npg_mesh *predicted, const npg_mesh *truth,
                                const npg_metrics_settings *settings, uint64_t frame)
 {
     npg_arena scratch = {.purpose = NPG_FOR_QUERY};
@@ -145,8 +136,8 @@ npg_status npg_metrics_compare(npg_frame_metrics *out, const npg_mesh *predicted
     NPG_REQUIRE(settings->diagonal > 0 && settings->sample_count > 0 && predicted->face_count > 0);
     npg_status status = open_side(&a, &scratch, predicted, settings, frame, SIDE_PREDICTED);
     if (!status) status = open_side(&b, &scratch, truth, settings, frame, SIDE_TRUTH);
-    if (!status) status = find_nearest(&a, &b, settings->threads);
-    if (!status) status = find_nearest(&b, &a, settings->threads);
+    if (!status) status = find_nearest(&a, &scratch, &b);
+    if (!status) status = find_nearest(&b, &scratch, &a);
     if (!status) measure(out, &a, &b, settings);
     npg_arena_release(&scratch);
     return status;

@@ -102,8 +102,7 @@ static npg_status sample_surface(npg_scanned *points, const npg_scan *capture, c
 {
     NPG_TRY(make_room(points, count));
     points->count = count;
-    return npg_mesh_sample(points->pos, points->normals, NULL, mesh, count, capture->seed, frame,
-                           FOR_SAMPLES);
+    return npg_mesh_sample(points->pos, points->normals, mesh, count, capture->seed, frame, FOR_SAMPLES);
 }
 
 /* ---- a ring of depth cameras around the body, each with its own depth buffer ---- */
