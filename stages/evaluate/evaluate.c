@@ -21,28 +21,6 @@ typedef struct aggregate {
     int64_t worst_number;
 } aggregate;
 
-/* The figures that the report sums up. */
-/* clang-format off */
-static const struct {
-    const char *name;
-    size_t offset;
-    bool is_small_bad;
-} summed[] = {
-    {"point_dist_median", offsetof(npg_figures, point_dist_median), false},
-    {"point_dist_mean",   offsetof(npg_figures, point_dist_mean),   false},
-    {"point_dist_p95",    offsetof(npg_figures, point_dist_p95),    false},
-    {"vertex_dist_mean",  offsetof(npg_figures, vertex_dist_mean),  false},
-    {"coverage",          offsetof(npg_figures, coverage),          true},
-    {"unsupported_share", offsetof(npg_figures, unsupported_share), false},
-    {"nowhere_share",     offsetof(npg_figures, nowhere_share),     false},
-    {"lost_share",        offsetof(npg_figures, lost_share),        false},
-    {"flipped_share",     offsetof(npg_figures, flipped_share),     false},
-    {"stretched_share",   offsetof(npg_figures, stretched_share),   false},
-    {"edge_change",       offsetof(npg_figures, edge_change),       false},
-    {"chamfer",           offsetof(npg_figures, chamfer),           false}};
-/* clang-format on */
-enum { MEDIAN = 0, P95 = 2, SUMMED = sizeof summed / sizeof *summed };
-
 typedef struct fault {
     int kind;            /* NPG_FAULT_* */
     double value, bound; /* in per cent */
@@ -52,12 +30,11 @@ typedef struct evaluate_state {
     /* options; the shares in per cent */
     double residual_max, coverage_min, flipped_max, stretched_max, unsupported_max, nowhere_max, lost_max;
     npg_measure_settings measured;
-    npg_topology_settings watch;
+    npg_topology watch;
     /* of the run */
     npg_measure *measure; /* opened for the first frame that has a mesh */
-    npg_topology *topology;
     npg_verdict *verdict;
-    aggregate sums[SUMMED];
+    aggregate sums[NPG_FIGURE_ROWS];
     int64_t *bad; /* numbers of the frames below the bar; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
     fault worst; /* of the bad ones, by how often it is the bar */
@@ -81,7 +58,7 @@ static npg_status check_vertices(const npg_frame *frame, const npg_mesh *referen
 static npg_figures no_figures(void)
 {
     npg_figures figures;
-    for (size_t i = 0; i < SUMMED; i++) *(double *)((char *)&figures + summed[i].offset) = (double)NAN;
+    for (int i = 0; i < NPG_FIGURE_ROWS; i++) *npg_figure_at(&figures, i) = (double)NAN;
     for (int i = 0; i < NPG_MISFITS; i++)
         figures.misfits[i] = (npg_misfit){(double)NAN, {(double)NAN, (double)NAN, (double)NAN}};
     for (int a = 0; a < 3; a++) figures.unsupported_at[a] = (double)NAN;
@@ -145,13 +122,13 @@ static fault fault_of(const evaluate_state *state, const npg_figures *f, double 
     return (fault){0};
 }
 
-static void add_up(evaluate_state *state, const npg_frame *frame)
+static void add_up(evaluate_state *state, npg_frame *frame)
 {
-    for (size_t i = 0; i < SUMMED; i++) {
-        double value = *(const double *)((const char *)&frame->figures + summed[i].offset);
+    for (int i = 0; i < NPG_FIGURE_ROWS; i++) {
+        double value = *npg_figure_at(&frame->figures, i);
         aggregate *sum = &state->sums[i];
         if (!isfinite(value)) continue;
-        bool is_worse = summed[i].is_small_bad ? value < sum->worst : value > sum->worst;
+        bool is_worse = npg_figure_rows[i].is_small_bad ? value < sum->worst : value > sum->worst;
         bool is_tie = value == sum->worst && frame->number < sum->worst_number;
         if (!sum->count++ || is_worse || is_tie) {
             sum->worst = value;
@@ -237,10 +214,10 @@ static npg_status judge_together(npg_worker *worker)
 static json_t *json_of_sums(const evaluate_state *state)
 {
     json_t *figures = json_object();
-    for (size_t i = 0; i < SUMMED; i++) {
+    for (size_t i = 0; i < NPG_FIGURE_ROWS; i++) {
         const aggregate *sum = &state->sums[i];
         if (!sum->count) continue;
-        json_object_set_new(figures, summed[i].name,
+        json_object_set_new(figures, npg_figure_rows[i].name,
                             json_pack("{sf sf sI}", "mean", sum->sum / (double)sum->count, "worst",
                                       sum->worst, "worst_frame", (json_int_t)sum->worst_number));
     }
@@ -250,7 +227,7 @@ static json_t *json_of_sums(const evaluate_state *state)
 /* The verdict in words. */
 static void put_into_words(json_t *report, const evaluate_state *state)
 {
-    const aggregate *median = &state->sums[MEDIAN], *p95 = &state->sums[P95];
+    const aggregate *median = &state->sums[NPG_FIGURE_MEDIAN], *p95 = &state->sums[NPG_FIGURE_P95];
     size_t frames = state->good_count + state->bad_count + state->skipped_count;
     char text[512];
     int length = snprintf(text, sizeof text, "%zu of %zu frames good", state->good_count, frames);
@@ -271,8 +248,7 @@ static void put_into_words(json_t *report, const evaluate_state *state)
 static npg_status flush(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_FUSE)
-        return state->topology ? npg_topology_finish(state->topology, worker) : NPG_OK;
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return npg_topology_finish(&state->watch, worker);
     NPG_TRY(judge_together(worker));
     json_t *report = npg_worker_report(worker), *bad = json_array();
     if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
@@ -289,17 +265,7 @@ static npg_status flush(npg_worker *worker)
                         state->bad_count);
     if (state->skipped_count)
         npg_worker_warn(worker, true, -1, "%zu frames were skipped", state->skipped_count);
-    return state->topology ? npg_topology_finish(state->topology, worker) : NPG_OK;
-}
-
-/* ---- the alarm ---- */
-
-static npg_status watch_topology(npg_worker *worker, const npg_frame *frame)
-{
-    evaluate_state *state = npg_worker_state(worker);
-    if (!state->topology)
-        NPG_TRY(npg_topology_open(&state->topology, &state->watch, npg_worker_facts(worker)->plan.key));
-    return npg_topology_add(state->topology, worker, frame);
+    return npg_topology_finish(&state->watch, worker);
 }
 
 /* ---- what an earlier run of the same job has measured ---- */
@@ -307,22 +273,17 @@ static npg_status watch_topology(npg_worker *worker, const npg_frame *frame)
 static npg_status restore_line(void *user, const json_t *line, const char *text, size_t size)
 {
     npg_worker *worker = user;
-    const json_t *figures = json_object_get(line, "figures");
+    evaluate_state *state = npg_worker_state(worker);
     npg_frame frame = {.index = (int64_t)json_integer_value(json_object_get(line, "index")),
                        .number = (int64_t)json_integer_value(json_object_get(line, "number")),
                        .is_shared = json_is_true(json_object_get(line, "shared")),
                        .is_skipped = json_is_true(json_object_get(line, "skipped")),
                        .figures = no_figures()};
     (void)text, (void)size;
-    if (!figures || frame.is_shared) return NPG_OK;
-    for (size_t i = 0; i < SUMMED; i++) {
-        const json_t *value = json_object_get(figures, summed[i].name);
-        if (json_is_number(value))
-            *(double *)((char *)&frame.figures + summed[i].offset) = json_number_value(value);
-    }
+    if (!json_object_get(line, "figures") || frame.is_shared) return NPG_OK;
     npg_frame_line_read(&frame.figures, line);
     NPG_TRY(take_frame(worker, &frame, false));
-    return watch_topology(worker, &frame);
+    return npg_topology_add(&state->watch, worker, &frame);
 }
 
 static npg_status restore(npg_worker *worker)
@@ -349,7 +310,7 @@ static npg_status watch_frame(npg_worker *worker, npg_frame *frame)
     frame->figures = no_figures();
     frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
     if (frame->vert_unit) NPG_TRY(measure_frame(worker, frame));
-    return watch_topology(worker, frame);
+    return npg_topology_add(&state->watch, worker, frame);
 }
 
 static npg_status watch_chunk(npg_worker *worker, npg_chunk *chunk)
@@ -371,7 +332,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
         if (has_mesh) NPG_TRY(measure_frame(worker, frame));
         NPG_TRY(take_frame(worker, frame, true));
-        NPG_TRY(watch_topology(worker, frame));
+        NPG_TRY(npg_topology_add(&state->watch, worker, frame));
     }
     return NPG_OK;
 }
@@ -380,7 +341,7 @@ static void uninit(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     npg_measure_close(&state->measure);
-    npg_topology_close(&state->topology);
+    npg_alarm_close(&state->watch.alarm);
     npg_verdict_close(&state->verdict);
     npg_release(&state->bad);
 }

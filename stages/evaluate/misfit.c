@@ -2,6 +2,7 @@
 #include "evaluate/evaluate_internal.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
@@ -26,18 +27,14 @@ struct npg_misfit_finder {
     const npg_mesh *reference; /* loan                                          */
     double size;               /* its diagonal                                  */
     bool is_closed;            /* has no border, and its frame saw all of it    */
-    npg_arena arena;           /* of all below, but for the edges and scratch   */
+    npg_arena arena;           /* of all below, but for the edges               */
     uint8_t *is_border;        /* V: on the border of what its frame saw        */
     uint32_t (*edges)[2];      /* E x 2; owned                                  */
     size_t edge_count;
-    float *edge_lengths; /* E, of the reference            */
-    uint32_t *part_of;   /* V: which part of the reference */
+    uint32_t *part_of; /* V: which part of the reference */
     size_t part_count;
     double *part_sums; /* of each part: area, area x position, points; x 5 */
     uint8_t *flags;    /* V                                                */
-    npg_arena scratch; /* of a frame                                       */
-    uint32_t *parents; /* of the places so far: max(N, V)                  */
-    double *sums;      /* their size and weighted middle: x 4              */
 };
 
 static double length_of(const float *vert_pos, const uint32_t edge[2])
@@ -60,11 +57,7 @@ static npg_status measure_reference(npg_misfit_finder *f)
     NPG_TRY(npg_mesh_components(f->part_of, &f->part_count, v, mesh->faces, mesh->face_count));
     NPG_TRY(npg_mesh_edges(&f->edges, &f->edge_count, mesh->faces, mesh->face_count));
     f->part_sums = npg_arena_take(&f->arena, f->part_count, 5 * sizeof *f->part_sums);
-    f->edge_lengths = npg_arena_take(&f->arena, f->edge_count, sizeof *f->edge_lengths);
-    NPG_TRY(npg_arena_status(&f->arena));
-    for (size_t e = 0; e < f->edge_count; e++)
-        f->edge_lengths[e] = (float)length_of(mesh->vert_pos, f->edges[e]);
-    return NPG_OK;
+    return npg_arena_status(&f->arena);
 }
 
 npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, double unseen_share)
@@ -74,7 +67,6 @@ npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, d
     finder->reference = reference;
     finder->is_closed = unseen_share <= UNSEEN_MOST;
     finder->arena.purpose = NPG_FOR_MESH;
-    finder->scratch.purpose = NPG_FOR_QUERY;
     npg_status status = measure_reference(finder);
     if (status) npg_misfit_close(&finder);
     *out = finder;
@@ -89,42 +81,27 @@ void npg_misfit_close(npg_misfit_finder **slot)
     npg_release(slot);
 }
 
-/* ---- places: sets of things that belong together ---- */
-
-static void begin_places(npg_misfit_finder *f, size_t count)
-{
-    for (size_t i = 0; i < count; i++) f->parents[i] = (uint32_t)i;
-    for (size_t i = 0; i < 4 * count; i++) f->sums[i] = 0;
-}
-
-static void add_to_place(npg_misfit_finder *f, uint32_t i, const float *pos, double weight)
-{
-    double *sum = f->sums + 4 * (size_t)npg_set_root(f->parents, i);
-    sum[0] += weight;
-    for (size_t a = 0; a < 3; a++) sum[1 + a] += weight * (double)pos[a];
-}
-
-/* The largest of the places; one that is smaller than `least` does not count. */
-static void largest_place(npg_misfit *misfit, const npg_misfit_finder *f, size_t count, double whole,
-                          double least)
-{
-    const double *best = NULL;
-    for (size_t i = 0; i < count; i++)
-        if (f->sums[4 * i] >= least && f->sums[4 * i] > (best ? best[0] : 0)) best = f->sums + 4 * i;
-    misfit->share = best && whole > 0 ? best[0] / whole : 0;
-    for (size_t a = 0; a < 3; a++) misfit->at[a] = best ? best[1 + a] / best[0] : (double)NAN;
-}
-
 /* ---- the four kinds ---- */
 
-static npg_status link_far(npg_misfit_finder *f, const float *far, size_t count, double link)
+/* The largest place is one where its share is `least` of all; `all` counts `per_all`. */
+static void take_place(npg_misfit *misfit, const npg_patch *place, double least, double per_all)
+{
+    if (!(place->share > 0) || place->share < least) return;
+    misfit->share = place->share * per_all;
+    for (int a = 0; a < 3; a++) misfit->at[a] = (double)place->at[a];
+}
+
+static npg_status largest_far(npg_patch *place, npg_arena *scratch, const float *far, size_t count,
+                              double link)
 {
     npg_neighbours near;
-    NPG_TRY(npg_neighbours_take(&near, &f->scratch, far, count, far, count, LINKS));
+    uint32_t *parents = npg_arena_take(scratch, count, sizeof *parents);
+    NPG_TRY(npg_neighbours_take(&near, scratch, far, count, far, count, LINKS));
+    for (size_t i = 0; i < count; i++) parents[i] = (uint32_t)i;
     for (size_t i = 0; i < LINKS * count; i++)
         if ((double)near.dist_sq[i] <= link * link)
-            npg_set_join(f->parents, (uint32_t)(i / LINKS), near.index[i]);
-    return NPG_OK;
+            npg_set_join(parents, (uint32_t)(i / LINKS), near.index[i]);
+    return npg_patch_of_sets(place, parents, NULL, far, NULL, count);
 }
 
 /* Points beyond the border of a reference that its frame saw in part are of what it did not see. */
@@ -139,23 +116,20 @@ static bool is_far(const npg_misfit_finder *f, const npg_surface_hit *hit, doubl
 static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
                            double reach, double link)
 {
+    npg_arena scratch = {.purpose = NPG_FOR_QUERY};
+    npg_patch place;
     size_t count = 0;
-    for (size_t i = 0; i < frame->point_count; i++) count += is_far(f, &frame->hits[i], reach);
-    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!count) return NPG_OK;
-    float *far = npg_arena_take(&f->scratch, count, 3 * sizeof *far);
-    NPG_TRY(npg_arena_status(&f->scratch));
-    begin_places(f, count);
-    count = 0;
-    for (size_t i = 0; i < frame->point_count; i++) {
+    float *far = npg_arena_take(&scratch, frame->point_count, 3 * sizeof *far);
+    for (size_t i = 0; i < frame->point_count && far; i++) {
         if (!is_far(f, &frame->hits[i], reach)) continue;
-        for (size_t a = 0; a < 3; a++) far[3 * count + a] = frame->points[3 * i + a];
-        count++;
+        memcpy(far + 3 * count++, frame->points + 3 * i, 3 * sizeof *far);
     }
-    NPG_TRY(link_far(f, far, count, link));
-    for (size_t i = 0; i < count; i++) add_to_place(f, (uint32_t)i, far + 3 * i, 1);
-    largest_place(misfit, f, count, (double)frame->point_count, LEAST_FAR);
-    return NPG_OK;
+    npg_status status = count ? largest_far(&place, &scratch, far, count, link) : npg_arena_status(&scratch);
+    if (!status && count) /* less a hair: shares are rounded */
+        take_place(misfit, &place, (LEAST_FAR - 1e-6) / (double)count,
+                   (double)count / (double)frame->point_count);
+    npg_arena_release(&scratch);
+    return status;
 }
 
 static bool is_in_sight(const npg_misfit_frame *frame, size_t v)
@@ -170,54 +144,41 @@ static void flag_off(npg_misfit_finder *f, const npg_misfit_frame *frame, double
         f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach && is_in_sight(frame, i);
 }
 
-static void join_flagged(npg_misfit_finder *f)
+static npg_status take_flagged(npg_misfit *misfit, const npg_misfit_finder *f, const npg_misfit_frame *frame)
 {
-    for (size_t e = 0; e < f->edge_count; e++)
-        if (f->flags[f->edges[e][0]] && f->flags[f->edges[e][1]])
-            npg_set_join(f->parents, f->edges[e][0], f->edges[e][1]);
+    npg_patch place;
+    NPG_TRY(npg_patch_largest(&place, f->flags, frame->vert_unit, frame->vert_areas, f->reference));
+    take_place(
+        misfit, &place,
+        fmax(LEAST_MISSED / (double)frame->point_count, LEAST_VERTS / (double)f->reference->vert_count), 1);
+    return NPG_OK;
 }
 
-static void add_flagged(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
+static npg_status find_unsupported(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                                   double reach)
 {
-    size_t v = f->reference->vert_count;
-    for (size_t i = 0; i < v; i++)
-        if (f->flags[i]) add_to_place(f, (uint32_t)i, frame->vert_unit + 3 * i, frame->vert_areas[i]);
-    double least = fmax(LEAST_MISSED / (double)frame->point_count, LEAST_VERTS / (double)v);
-    largest_place(misfit, f, v, frame->area, least * frame->area);
-}
-
-static void find_unsupported(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
-                             double reach)
-{
-    begin_places(f, f->reference->vert_count);
-    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!f->is_closed) return;
     flag_off(f, frame, reach);
-    join_flagged(f);
-    add_flagged(f, misfit, frame);
+    return take_flagged(misfit, f, frame);
 }
 
 /* Of the surface that is off the points only what is stretched stays flagged. */
-static void find_stretched(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
-                           double reach)
+static npg_status find_stretched(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
+                                 double reach)
 {
     enum { OFF = 1, ENDS_STRETCHED = 2 };
-    size_t v = f->reference->vert_count;
-    begin_places(f, v);
-    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!f->is_closed) return;
+    const npg_mesh *mesh = f->reference;
     flag_off(f, frame, reach);
     for (size_t e = 0; e < f->edge_count; e++) {
         uint32_t a = f->edges[e][0], b = f->edges[e][1];
         if (!f->flags[a] || !f->flags[b]) continue;
-        if (!(length_of(frame->vert_unit, f->edges[e]) > STRETCH_LEAST * (double)f->edge_lengths[e]))
+        if (!(length_of(frame->vert_unit, f->edges[e]) >
+              STRETCH_LEAST * length_of(mesh->vert_pos, f->edges[e])))
             continue;
         f->flags[a] |= ENDS_STRETCHED;
         f->flags[b] |= ENDS_STRETCHED;
     }
-    for (size_t i = 0; i < v; i++) f->flags[i] &= ENDS_STRETCHED;
-    join_flagged(f);
-    add_flagged(f, misfit, frame);
+    for (size_t i = 0; i < mesh->vert_count; i++) f->flags[i] &= ENDS_STRETCHED;
+    return take_flagged(misfit, f, frame);
 }
 
 /* Area, middle and points of every part as it lies in this frame, of what is in sight.  Returns all of that
@@ -241,8 +202,7 @@ static double sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
 
 static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
 {
-    *misfit = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
-    if (!f->is_closed || f->part_count < 2 || !frame->point_count) return;
+    if (f->part_count < 2 || !frame->point_count) return;
     double whole = sum_parts(f, frame);
     for (size_t p = 0; p < f->part_count; p++) {
         const double *sum = f->part_sums + 5 * p;
@@ -262,16 +222,11 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
     double least = fmax(REACH_SPACINGS * spacing, REACH_SIZE * f->size);
     double reach = fmin(fmax(least, REACH_MEDIANS * frame->point_dist_median), REACH_MOST * least);
     double link = fmax(LINK_SPACINGS * spacing, REACH_SIZE * f->size);
-    size_t v = f->reference->vert_count, most = frame->point_count > v ? frame->point_count : v;
-    f->parents = npg_arena_take(&f->scratch, most, sizeof *f->parents);
-    f->sums = npg_arena_take(&f->scratch, most, 4 * sizeof *f->sums);
-    npg_status status = npg_arena_status(&f->scratch);
-    if (!status) status = find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link);
-    if (!status) {
-        find_unsupported(f, &misfits[NPG_MISFIT_UNSUPPORTED], frame, reach);
-        find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame);
-        find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, OFF_SHARE * reach);
-    }
-    npg_arena_release(&f->scratch);
-    return status;
+    for (int i = 0; i < NPG_MISFITS; i++)
+        misfits[i] = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
+    NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
+    if (!f->is_closed) return NPG_OK;
+    find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame);
+    NPG_TRY(find_unsupported(f, &misfits[NPG_MISFIT_UNSUPPORTED], frame, reach));
+    return find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, OFF_SHARE * reach);
 }

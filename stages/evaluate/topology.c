@@ -5,51 +5,23 @@
 
 static const char *const directions[NPG_DIRECTIONS] = {"forward", "backward"};
 
-struct npg_topology {
-    npg_topology_settings settings;
-    int64_t key;
-    npg_alarm *alarm; /* owned */
-    bool is_reported[NPG_DIRECTIONS];
-};
-
-npg_status npg_topology_open(npg_topology **out, const npg_topology_settings *settings, int64_t key)
-{
-    npg_topology *topology;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&topology, NPG_FOR_RUN, sizeof *topology));
-    topology->settings = *settings;
-    topology->key = key;
-    npg_status status = npg_alarm_open(&topology->alarm, key);
-    if (status) npg_topology_close(&topology);
-    *out = topology;
-    return status;
-}
-
-void npg_topology_close(npg_topology **slot)
-{
-    if (!*slot) return;
-    npg_alarm_close(&(*slot)->alarm);
-    npg_release(slot);
-}
-
 /* One behind the last frame that is the run's own; open while the source is. */
-static int64_t own_end(const npg_topology_settings *settings, const npg_facts *facts)
+static int64_t own_end(const npg_topology *t, const npg_facts *facts)
 {
-    return facts->frame_count < 0 ? INT64_MAX : facts->frame_count - settings->shared_last;
+    return facts->frame_count < 0 ? INT64_MAX : facts->frame_count - t->shared_last;
 }
 
-bool npg_topology_is_shared(const npg_topology_settings *settings, const npg_facts *facts, int64_t index)
+bool npg_topology_is_shared(const npg_topology *t, const npg_facts *facts, int64_t index)
 {
-    return index < settings->shared_first || index >= own_end(settings, facts);
+    return index < t->shared_first || index >= own_end(t, facts);
 }
 
 /* Whether both parts are long enough to stand alone. */
 static bool may_split(const npg_topology *t, const npg_facts *facts, int direction, int64_t index)
 {
-    int64_t first = t->settings.shared_first, end = own_end(&t->settings, facts);
+    int64_t first = t->shared_first, end = own_end(t, facts);
     int64_t cut = direction == NPG_FORWARD ? index : index + 1;
-    return t->settings.mode == NPG_ALARM_SPLIT && cut - first >= t->settings.segment_min &&
-           end - cut >= t->settings.segment_min;
+    return t->mode == NPG_ALARM_SPLIT && cut - first >= t->segment_min && end - cut >= t->segment_min;
 }
 
 /* ---- the end of a run for another reference: OUT/topology.json ---- */
@@ -57,8 +29,9 @@ static bool may_split(const npg_topology *t, const npg_facts *facts, int directi
 static npg_status end_for_split(npg_topology *t, npg_worker *worker, int direction)
 {
     const npg_alarm_cause *cause = npg_alarm_raised(t->alarm, direction);
-    json_t *record = json_pack("{ss sI so}", "direction", directions[direction], "key_index",
-                               (json_int_t)t->key, "alarm", npg_alarm_json(cause));
+    json_t *record =
+        json_pack("{ss sI so}", "direction", directions[direction], "key_index",
+                  (json_int_t)npg_worker_facts(worker)->plan.key, "alarm", npg_alarm_json(cause));
     npg_status status = npg_json_write(npg_worker_settings(worker)->output, "topology.json", record);
     json_decref(record);
     return status
@@ -97,6 +70,7 @@ static npg_status report_both(npg_topology *t, npg_worker *worker)
 
 npg_status npg_topology_add(npg_topology *t, npg_worker *worker, const npg_frame *frame)
 {
+    if (!t->alarm) NPG_TRY(npg_alarm_open(&t->alarm, npg_worker_facts(worker)->plan.key));
     if (frame->is_shared) return NPG_OK;
     NPG_TRY(npg_alarm_add(t->alarm, frame));
     return report_both(t, worker);
@@ -104,6 +78,7 @@ npg_status npg_topology_add(npg_topology *t, npg_worker *worker, const npg_frame
 
 npg_status npg_topology_finish(npg_topology *t, npg_worker *worker)
 {
+    if (!t->alarm) return NPG_OK;
     json_t *record = json_object();
     npg_alarm_finish(t->alarm);
     for (int d = 0; d < NPG_DIRECTIONS; d++) {

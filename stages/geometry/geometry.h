@@ -373,6 +373,11 @@ typedef struct npg_patch {
 npg_status npg_patch_largest(npg_patch *patch, const uint8_t *is_marked, const float *vert_pos,
                              const double *vert_areas, const npg_mesh *mesh);
 
+/* The same of N things at pos (N x 3) that were joined (npg_set_join()), by weight (NULL: 1 each); is_marked
+ * NULL: all are. */
+npg_status npg_patch_of_sets(npg_patch *patch, uint32_t *parents, const uint8_t *is_marked, const float *pos,
+                             const double *weights, size_t count);
+
 /* Query: what the library itself asks of a surface beyond the public npg_surface_closest() (neupig.h):
  * closest points with a hint where to begin, and rays.
  *

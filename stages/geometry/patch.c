@@ -14,54 +14,40 @@ static void join_marked(uint32_t *parents, const uint8_t *is_marked, const npg_m
         }
 }
 
-/* Area and area x position of every set, in the row of its root; the root of the largest, V where there is
- * none.  *whole: the area of all vertices. */
-static size_t sum_sets(double *sums, double *whole, uint32_t *parents, const uint8_t *is_marked,
-                       const float *vert_pos, const double *vert_areas, size_t v)
+npg_status npg_patch_of_sets(npg_patch *patch, uint32_t *parents, const uint8_t *is_marked, const float *pos,
+                             const double *weights, size_t count)
 {
-    size_t best = v;
-    *whole = 0;
-    for (size_t i = 0; i < v; i++) {
-        *whole += vert_areas[i];
-        if (!is_marked[i]) continue;
+    double *sums, whole = 0; /* of every set, in the row of its root: weight, weight x position */
+    size_t best = count;
+    *patch = (npg_patch){0, {NAN, NAN, NAN}, 0};
+    NPG_TRY(npg_alloc_array(&sums, NPG_FOR_MESH, count, 4 * sizeof *sums));
+    for (size_t i = 0; i < count; i++) {
+        double weight = weights ? weights[i] : 1;
+        whole += weight;
+        if (is_marked && !is_marked[i]) continue;
         double *sum = sums + 4 * (size_t)npg_set_root(parents, (uint32_t)i);
-        sum[0] += vert_areas[i];
-        for (size_t a = 0; a < 3; a++) sum[1 + a] += vert_areas[i] * (double)vert_pos[3 * i + a];
+        sum[0] += weight;
+        for (size_t a = 0; a < 3; a++) sum[1 + a] += weight * (double)pos[3 * i + a];
     }
-    for (size_t i = 0; i < v; i++)
-        if (sums[4 * i] > (best < v ? sums[4 * best] : 0)) best = i;
-    return best;
-}
-
-static double farthest(const float at[3], uint32_t *parents, size_t root, const uint8_t *is_marked,
-                       const float *vert_pos, size_t v)
-{
-    double most = 0;
-    for (size_t i = 0; i < v; i++)
-        if (is_marked[i] && npg_set_root(parents, (uint32_t)i) == root)
-            most = fmax(most, npg_vec3_distance(at, vert_pos + 3 * i));
-    return most;
+    for (size_t i = 0; i < count; i++)
+        if (sums[4 * i] > (best < count ? sums[4 * best] : 0)) best = i;
+    if (best < count) patch->share = sums[4 * best] / whole;
+    for (size_t a = 0; a < 3 && best < count; a++)
+        patch->at[a] = (float)(sums[4 * best + 1 + a] / sums[4 * best]);
+    for (size_t i = 0; i < count && best < count; i++)
+        if ((!is_marked || is_marked[i]) && npg_set_root(parents, (uint32_t)i) == best)
+            patch->radius = fmax(patch->radius, npg_vec3_distance(patch->at, pos + 3 * i));
+    npg_release(&sums);
+    return NPG_OK;
 }
 
 npg_status npg_patch_largest(npg_patch *patch, const uint8_t *is_marked, const float *vert_pos,
                              const double *vert_areas, const npg_mesh *mesh)
 {
-    npg_arena scratch = {.purpose = NPG_FOR_MESH};
-    size_t v = mesh->vert_count, best = v;
-    double whole;
-    uint32_t *parents = npg_arena_take(&scratch, v, sizeof *parents);
-    double *sums = npg_arena_take(&scratch, v, 4 * sizeof *sums);
-    *patch = (npg_patch){0, {NAN, NAN, NAN}, 0};
-    npg_status status = npg_arena_status(&scratch);
-    if (!status) {
-        join_marked(parents, is_marked, mesh);
-        best = sum_sets(sums, &whole, parents, is_marked, vert_pos, vert_areas, v);
-    }
-    if (!status && best < v) {
-        patch->share = sums[4 * best] / whole;
-        for (size_t a = 0; a < 3; a++) patch->at[a] = (float)(sums[4 * best + 1 + a] / sums[4 * best]);
-        patch->radius = farthest(patch->at, parents, best, is_marked, vert_pos, v);
-    }
-    npg_arena_release(&scratch);
+    uint32_t *parents;
+    NPG_TRY(npg_alloc_array(&parents, NPG_FOR_MESH, mesh->vert_count, sizeof *parents));
+    join_marked(parents, is_marked, mesh);
+    npg_status status = npg_patch_of_sets(patch, parents, is_marked, vert_pos, vert_areas, mesh->vert_count);
+    npg_release(&parents);
     return status;
 }

@@ -44,26 +44,28 @@ static json_t *json_of_place(const double at[3])
     return place;
 }
 
+/* clang-format off */
+const npg_figure_row npg_figure_rows[NPG_FIGURE_ROWS] = {
+    {"point_dist_median", offsetof(npg_figures, point_dist_median), false},
+    {"point_dist_mean",   offsetof(npg_figures, point_dist_mean),   false},
+    {"point_dist_p95",    offsetof(npg_figures, point_dist_p95),    false},
+    {"vertex_dist_mean",  offsetof(npg_figures, vertex_dist_mean),  false},
+    {"coverage",          offsetof(npg_figures, coverage),          true},
+    {"unsupported_share", offsetof(npg_figures, unsupported_share), false},
+    {"nowhere_share",     offsetof(npg_figures, nowhere_share),     false},
+    {"lost_share",        offsetof(npg_figures, lost_share),        false},
+    {"flipped_share",     offsetof(npg_figures, flipped_share),     false},
+    {"stretched_share",   offsetof(npg_figures, stretched_share),   false},
+    {"edge_change",       offsetof(npg_figures, edge_change),       false},
+    {"chamfer",           offsetof(npg_figures, chamfer),           false}};
+/* clang-format on */
+
 static json_t *json_of_figures(const npg_figures *f)
 {
-    const struct {
-        const char *name;
-        double value;
-    } values[] = {{"point_dist_median", f->point_dist_median},
-                  {"point_dist_mean", f->point_dist_mean},
-                  {"point_dist_p95", f->point_dist_p95},
-                  {"vertex_dist_mean", f->vertex_dist_mean},
-                  {"coverage", f->coverage},
-                  {"unsupported_share", f->unsupported_share},
-                  {"nowhere_share", f->nowhere_share},
-                  {"lost_share", f->lost_share},
-                  {"flipped_share", f->flipped_share},
-                  {"stretched_share", f->stretched_share},
-                  {"edge_change", f->edge_change},
-                  {"chamfer", f->chamfer}};
     json_t *figures = json_object();
-    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
-        json_object_set_new(figures, values[i].name, npg_json_real(values[i].value));
+    for (int i = 0; i < NPG_FIGURE_ROWS; i++)
+        json_object_set_new(figures, npg_figure_rows[i].name,
+                            npg_json_real(*npg_figure_at((npg_figures *)f, i)));
     json_object_set_new(figures, "unsupported_at", json_of_place(f->unsupported_at));
     return figures;
 }
@@ -90,6 +92,10 @@ static double real_of(const json_t *value)
 void npg_frame_line_read(npg_figures *figures, const json_t *line)
 {
     const json_t *misfits = json_object_get(line, "misfits"), *marks = json_object_get(line, "marks");
+    for (int i = 0; i < NPG_FIGURE_ROWS; i++) {
+        const json_t *value = json_object_get(json_object_get(line, "figures"), npg_figure_rows[i].name);
+        if (json_is_number(value)) *npg_figure_at(figures, i) = json_number_value(value);
+    }
     for (size_t i = 0; i < 3 * NPG_MARKS; i++) figures->marks[i] = (float)real_of(json_array_get(marks, i));
     for (int i = 0; i < NPG_MISFITS; i++) {
         const json_t *misfit = json_object_get(misfits, misfit_names[i]);

@@ -143,7 +143,20 @@ npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts, cons
  * they are no such lines. */
 npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user);
 
-/* Misfits and marks of a line, exactly as they were; NaN where it has none. */
+/* The figures of a frame that are one number each, as a line has them and a report sums them up. */
+typedef struct npg_figure_row {
+    const char *name;
+    size_t offset; /* of a double in npg_figures */
+    bool is_small_bad;
+} npg_figure_row;
+enum { NPG_FIGURE_ROWS = 12, NPG_FIGURE_MEDIAN = 0, NPG_FIGURE_P95 = 2 };
+extern const npg_figure_row npg_figure_rows[NPG_FIGURE_ROWS];
+static inline double *npg_figure_at(npg_figures *figures, int row)
+{
+    return (double *)((char *)figures + npg_figure_rows[row].offset);
+}
+
+/* Figures that a line has; its misfits and marks exactly as they were, NaN where it has none. */
 void npg_frame_line_read(npg_figures *figures, const json_t *line);
 
 /* Their bytes on disk for good, and their checksum.  NPG_DISK. */
