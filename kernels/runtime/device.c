@@ -62,10 +62,8 @@ npg_status npg_device_describe(size_t i, npg_device_info *info)
     cl_device_id ids[NPG_DEVICES_MAX];
     size_t count;
     NPG_TRY(npg_kernel_cache_enter());
-    npg_status status = all_devices(ids, &count);
-    if (!status) status = i < count ? read_facts(info, ids[i]) : NPG_END;
-    npg_kernel_cache_leave();
-    return status;
+    NPG_TRY(all_devices(ids, &count));
+    return i < count ? read_facts(info, ids[i]) : NPG_END;
 }
 
 static bool contains_ignoring_case(const char *text, const char *part)
@@ -126,7 +124,6 @@ static npg_status fill_device(npg_device *device, const char *spec, const npg_tu
 {
     cl_int code;
     NPG_TRY(npg_kernel_cache_enter());
-    device->is_in_cache = true;
     NPG_TRY(choose_device(device, spec));
     device->tuning = tuning ? tuning : tuning_of_kind(&device->info);
     device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
@@ -154,7 +151,6 @@ void npg_device_close(npg_device **slot)
     npg_programs_close(device);
     if (device->queue) clReleaseCommandQueue(device->queue);
     if (device->context) clReleaseContext(device->context);
-    if (device->is_in_cache) npg_kernel_cache_leave();
     npg_release(slot);
 }
 

@@ -27,8 +27,7 @@ npg_status npg_device_describe(size_t i, npg_device_info *info);
 
 /* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the
  * list, or a part of its name.  NPG_DEVICE names the devices there are when none fits.  Compiled kernels are
- * cached on disk in a folder that one process uses at a time; a second process gets a folder of its own that
- * goes away at close. */
+ * kept on disk, in a folder that one process uses at a time. */
 npg_status npg_device_open(npg_device **device, const char *spec);
 
 /* The same with this tuning, not that for its kind of device; a loan, and NULL: by kind. */

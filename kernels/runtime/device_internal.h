@@ -25,20 +25,17 @@ struct npg_device {
     cl_context context;
     cl_command_queue queue;
     npg_program *programs; /* built so far, owned                                             */
-    bool is_in_cache;      /* the kernel cache has been entered and must be left              */
 };
 
 void npg_programs_close(npg_device *device);
 
 /* Kernel cache: where PoCL keeps compiled kernels.  Its cache is not safe between processes and goes stale
- * between versions, so each version of neupig has its own folder, used by the process that holds its
- * lock; any other process works in a private folder that is removed at the end, or, if it was killed, by a
- * later one. */
+ * between versions, so each version of neupig has its own folders, numbered, and a process locks the first one
+ * that is free until it ends. */
 
-/* Point the driver at the folder.  Call before the first OpenCL call; later calls count only.  A cache folder
- * that the user has set (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made. */
+/* Point the driver at the folder, once.  Call before the first OpenCL call.  A cache folder that the user has set
+ * (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made.  Threads: any. */
 npg_status npg_kernel_cache_enter(void);
-void npg_kernel_cache_leave(void);
 
 /* The text of every .cl file, embedded by the build. */
 
