@@ -69,10 +69,8 @@ printf '{"neupig_rig": 1, "tolerance": 0.1, "sensors": [{"depth": "depth.txt", "
 printf '{"neupig_rig": 1, "sensors": [{"depth": "d_%%d.png", %s, "colour": "c", "colour_camera": {"from_depth": []}}]}' "$camera" >rig/colour
 printf '\0%s' $'0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n' >trajectory/log
 printf '\1# images\n1.5 depth/1.png\n2e0 depth/2.png\n' >trajectory/list
-printf '\2<?xml?><opencv_storage><intrinsic><data>\n5. 0 1e0</data></intrinsic><R><data>1 0</data></R></opencv_storage>' >trajectory/xml
 printf '\3# x y z\n1 2 3\n 4 5e0 6\n' >trajectory/sensors
 printf '\3%s' $'1 1 2 3\n1 4 5 6\n0 7 8 9\n' >trajectory/numbered
-printf '\2%%YAML:1.0\nK: !!opencv-matrix\n  data: [ 5., 0.,\n 1 ]\nt:\n  data: [1]\n' >trajectory/yaml
 image() { # FILE KIND BASE64...: kind 0 depth, 1 mask, 2 colour; 24 x 24 pixels
     local file=$1 kind=$2
     shift 2

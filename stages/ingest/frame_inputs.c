@@ -29,46 +29,28 @@ static bool is_folder(const char *path)
 
 /* ---- a folder ---- */
 
-static bool has_ending(const char *name, const char *const *endings)
-{
-    size_t length = strlen(name);
-    for (; *endings; endings++) {
-        size_t size = strlen(*endings);
-        if (length > size && !strcasecmp(name + length - size, *endings)) return true;
-    }
-    return false;
-}
-
-/* Names in a folder that do not begin with a dot: the sub-folders, or the files with one of the endings (NULL: with
- * one that readers know). */
+/* Names in a folder that do not begin with a dot: the sub-folders, or the files with an ending that readers know. */
 typedef struct wanted {
     npg_paths *out;
-    const char *folder, *const *endings;
+    const char *folder;
     bool folders;
 } wanted;
 
 static npg_status add_wanted(void *user, const char *name)
 {
     const wanted *w = user;
-    bool is_wanted = w->folders || (w->endings ? has_ending(name, w->endings) : !!npg_format_by_ending(name));
-    if (name[0] == '.' || !is_wanted) return NPG_OK;
+    if (name[0] == '.' || !(w->folders || npg_format_by_ending(name))) return NPG_OK;
     char *path = npg_arena_path(w->out->arena, w->folder, name);
     NPG_TRY(npg_arena_status(w->out->arena));
-    return w->endings || is_folder(path) == w->folders ? add_path(w->out, path) : NPG_OK;
+    return is_folder(path) == w->folders ? add_path(w->out, path) : NPG_OK;
 }
 
-static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders,
-                              const char *const *endings)
+static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders)
 {
-    wanted w = {out, folder, endings, wants_folders};
+    wanted w = {out, folder, wants_folders};
     npg_status status = npg_folder_each(folder, NPG_BAD_INPUT, add_wanted, &w);
     sort_paths(out);
     return status;
-}
-
-npg_status npg_paths_list(npg_paths *out, const char *folder, const char *const *endings)
-{
-    return list_folder(out, folder, false, endings);
 }
 
 static const char *ending_of(const char *path)
@@ -128,7 +110,7 @@ static npg_status find_sub_folder(npg_arena *arena, const char **out, const char
 {
     static const char *const usual[] = {"points", "point_clouds"};
     npg_paths folders = {.arena = arena};
-    NPG_TRY(list_folder(&folders, folder, true, NULL));
+    NPG_TRY(list_folder(&folders, folder, true));
     const char *found = folders.count == 1 ? folders.paths[0] : NULL;
     for (size_t u = 0; u < 2; u++)
         for (size_t i = 0; i < folders.count; i++)
@@ -141,9 +123,9 @@ static npg_status find_sub_folder(npg_arena *arena, const char **out, const char
 static npg_status find_in_folder(npg_paths *out, const char *folder)
 {
     const char *inner = NULL;
-    NPG_TRY(list_folder(out, folder, false, NULL));
+    NPG_TRY(list_folder(out, folder, false));
     if (!out->count) NPG_TRY(find_sub_folder(out->arena, &inner, folder));
-    if (inner) NPG_TRY(list_folder(out, inner, false, NULL));
+    if (inner) NPG_TRY(list_folder(out, inner, false));
     NPG_TRY(keep_one_ending(out, inner ? inner : folder));
     if (out->count) return NPG_OK;
     return npg_error(NPG_BAD_INPUT, "%s: no file here has a format that can be read (" FORMATS_TEXT ")",

@@ -113,9 +113,9 @@ static void report_rig(npg_worker *worker, npg_rig *rig)
         json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name),
                                                  "images", (json_int_t)images));
     }
-    json_object_set_new(report, "rig", json_pack("{ss so}", "layout", rig->layout, "sensors", sensors));
-    npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig (%s) of %zu sensors, %zu frames", rig->path,
-                   rig->layout, rig->sensor_count, rig->frame_count);
+    json_object_set_new(report, "rig", json_pack("{so}", "sensors", sensors));
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig of %zu sensors, %zu frames", rig->path,
+                   rig->sensor_count, rig->frame_count);
     if (gaps)
         npg_worker_warn(worker, false, -1, "%zu of %zu images of the rig's sensors are missing", gaps,
                         rig->frame_count * rig->sensor_count);

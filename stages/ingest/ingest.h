@@ -73,7 +73,7 @@ typedef struct npg_camera {
 
 /* Rig: depth sensors with their calibration, and which image of which sensor belongs to which frame.
  *
- * Conventions of all layouts, once they are loaded: lengths in one unit (metres, as a rule), camera axes as
+ * Conventions, once it is loaded: lengths in one unit (metres, as a rule), camera axes as
  * in camera.c (x right, y down, z ahead), poses from sensor to world.
  *
  * A frame is what all sensors saw at one time.  A sensor whose image is missing then is a gap of that sensor,
@@ -133,7 +133,6 @@ typedef struct npg_rig_sensor {
 typedef struct npg_rig {
     npg_arena arena;     /* of all that it has, but the rays of its sensors */
     char *path, *folder; /* as given; the folder that its names start from  */
-    const char *layout;  /* "rig.json", "redwood", "tum", "opencv"          */
     char *unit;          /* of lengths, as rig.json names it; NULL: "m"     */
     npg_rig_settings settings;
     bool is_timed; /* frames are matched by time, else by number */
@@ -148,12 +147,11 @@ typedef struct npg_rig {
     const char *first_blank;
 } npg_rig;
 
-/* Whether a path is one: rig.json (any file *.json), or a folder of one of the known layouts that has no
- * frames of its own. */
+/* Whether a path is one: a rig.json (any file *.json), a folder with one, or one of depth images as other programs write
+ * them, which can't be opened without. */
 bool npg_rig_is(const char *path);
 
-/* Load the description; no image is decoded, but headers where a layout does not say the size.
- * NPG_BAD_INPUT names file and place. */
+/* Load the description; no image is decoded.  NPG_BAD_INPUT names file and place. */
 npg_status npg_rig_open(npg_rig **rig, const char *path, const npg_rig_settings *settings);
 void npg_rig_close(npg_rig **rig);
 

@@ -151,9 +151,6 @@ typedef struct npg_paths {
 /* In time order, at least one.  See npg_frame_files_open. */
 npg_status npg_paths_find(npg_paths *out, const char *input);
 
-/* The files of a folder with one of these endings, whatever its case, in natural order. */
-npg_status npg_paths_list(npg_paths *out, const char *folder, const char *const *endings);
-
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 
 /* What to do about numbers that no file has. */

@@ -139,7 +139,7 @@ npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
         const npg_frame_slot *slot = &list->slots[i];
         npg_frame frame = {0};
         if (!slot->path) continue;
-        const char *format = list->rig ? list->rig->layout : npg_reader_for(slot->path);
+        const char *format = list->rig ? "rig.json" : npg_reader_for(slot->path);
         NPG_TRY(npg_frame_files_each(list, i, add_bytes, probe->facts));
         npg_status status = npg_frame_files_read(list, i, &frame, &probe->origin);
         NPG_TRY(npg_probe_count(probe, status, &frame, format ? format : "unknown", slot->number));

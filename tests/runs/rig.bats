@@ -36,7 +36,7 @@ numpy() {
 }
 
 @test "the images of four sensors become a mesh close to the truth" {
-    [ "$(report out '["stages"]["ingest"]["rig"]["layout"]')" = rig.json ]
+    [ "$(report out '["stages"]["ingest"]["rig"]["sensors"].__len__()')" = 4 ]
     cd_mean=$(chamfer out capture/truth)
     echo "CD $cd_mean"
     awk -v cd="$cd_mean" 'BEGIN { exit !(cd < 4) }'
@@ -247,10 +247,37 @@ sys.stdout.buffer.write(b"\x89PNG\r\n\x1a\n"
     [[ "$output" == *"depth_0002.png"* ]]
 }
 
+@test "a rig.json is written for layouts of other programs" {
+    python3 "$BATS_TEST_DIRNAME/foreign_rigs.py" capture/rig foreign
+    "$NEUPIG" probe capture/rig/rig.json --json >own.json
+    for layout in tum redwood opencv; do
+        run "$NEUPIG" run foreign/$layout -o none
+        [ "$status" -eq 3 ]
+        [[ "$output" == *"without a rig.json: rig_json.py writes one"* ]]
+        "$BATS_TEST_DIRNAME/../../tools/rig_json.py" foreign/$layout --depth-scale 0.0005
+        "$NEUPIG" probe foreign/$layout --json >$layout.json
+    done
+    python3 - <<'END'
+import json
+own, tum, redwood, opencv = (json.load(open(f"{name}.json")) for name in ("own", "tum", "redwood", "opencv"))
+counts = {probe["sensors"][0]["points"] for probe in (own, tum, redwood, opencv)}
+print(counts, redwood["box"], opencv["box"])
+assert len(counts) == 1
+assert all(abs(a - b) < 1e-6 for side in ("low", "high") for a, b in zip(redwood["box"][side], opencv["box"][side]))
+END
+    run "$BATS_TEST_DIRNAME/../../tools/rig_json.py" foreign/tum
+    [ "$status" -eq 1 ]
+    [[ "$output" == *"there is one already"* ]]
+    run "$BATS_TEST_DIRNAME/../../tools/rig_json.py" capture/points
+    [[ "$output" == *"no layout that is known"* ]]
+}
+
 @test "a real recording: OpenCV files per frame" {
     data=${NEUPIG_TEST_DATA:-}/kinect-rig
     [ -d "$data" ] || skip "NEUPIG_TEST_DATA names no folder with kinect-rig"
-    run "$NEUPIG" run "$data" --sensor-poses none --frames 0:4 -o kinect --faces 2000 --quiet
+    cp -r "$data" recording
+    "$BATS_TEST_DIRNAME/../../tools/rig_json.py" recording
+    run "$NEUPIG" run recording --sensor-poses none --frames 0:4 -o kinect --faces 2000 --quiet
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     has_colours kinect/reference.ply

@@ -13,15 +13,13 @@
 
 #define SCANS_MAX 100 /* of a progressive file: more only cost time, and real ones have about ten */
 
-/* What a decoder is asked for.  It calls accept() with what the header says, and then decodes; with header_only it
- * stops there. */
+/* What a decoder is asked for.  It calls accept() with what the header says, and then decodes. */
 typedef struct image_job {
     const char *path;
     const unsigned char *data;
     size_t size;
     npg_image_kind kind;
     size_t width, height; /* wanted; 0: any */
-    int header_only;
     npg_image *image;
 } image_job;
 
@@ -32,8 +30,7 @@ void npg_image_clear(npg_image *image)
     *image = (npg_image){0};
 }
 
-/* NPG_BAD_INPUT for a size that is not the wanted one or beyond the limit; else the memory of the pixels
- * (none with header_only). */
+/* NPG_BAD_INPUT for a size that is not the wanted one or beyond the limit; else the memory of the pixels. */
 static npg_status accept(const image_job *job, size_t width, size_t height)
 {
     npg_image *image = job->image;
@@ -45,7 +42,6 @@ static npg_status accept(const image_job *job, size_t width, size_t height)
                          job->path, width, height, job->width, job->height);
     image->width = width;
     image->height = height;
-    if (job->header_only) return NPG_OK;
     if (job->kind == NPG_IMAGE_DEPTH)
         return npg_alloc_array(&image->depth, NPG_FOR_FILES, width * height, sizeof *image->depth);
     return npg_alloc_array(&image->bytes, NPG_FOR_FILES, width * height,
@@ -92,7 +88,7 @@ static npg_status check_kind(const png_reader *d)
                                            [PNG_COLOR_TYPE_GRAY_ALPHA] = "grey with alpha",
                                            [PNG_COLOR_TYPE_RGB_ALPHA] = "RGBA"};
     int depth = png_get_bit_depth(d->png, d->info), colour = png_get_color_type(d->png, d->info);
-    if (d->job->kind != NPG_IMAGE_DEPTH || d->job->header_only) return NPG_OK;
+    if (d->job->kind != NPG_IMAGE_DEPTH) return NPG_OK;
     if (depth == 16 && colour == PNG_COLOR_TYPE_GRAY) return NPG_OK;
     return npg_error(NPG_BAD_INPUT, "%s: a %d-bit %s PNG; a depth image must be 16-bit grey", d->job->path,
                      depth, colours[colour & 7] ? colours[colour & 7] : "unknown");
@@ -143,7 +139,7 @@ static void decode_png(png_reader *d)
     if (!d->status)
         d->status =
             accept(d->job, png_get_image_width(d->png, d->info), png_get_image_height(d->png, d->info));
-    if (d->status || d->job->header_only) return;
+    if (d->status) return;
     set_transforms(d);
     read_rows(d);
 }
@@ -209,7 +205,7 @@ static void decode_jpeg(jpeg_reader *d)
     jpeg_mem_src(jpeg, job->data, (unsigned long)job->size);
     jpeg_read_header(jpeg, TRUE);
     d->status = accept(job, jpeg->image_width, jpeg->image_height);
-    if (d->status || job->header_only) return;
+    if (d->status) return;
     if (jpeg->num_components != 1 && jpeg->num_components != 3) fail(d, "neither grey nor three colours");
     jpeg->out_color_space = job->kind == NPG_IMAGE_COLOUR ? JCS_RGB : JCS_GRAYSCALE;
     jpeg_start_decompress(jpeg);
@@ -248,35 +244,21 @@ static npg_status decode(const image_job *job)
     if (job->size >= sizeof png && !memcmp(job->data, png, sizeof png)) return read_png(job);
     if (job->size < sizeof jpeg || memcmp(job->data, jpeg, sizeof jpeg) != 0)
         return npg_error(NPG_BAD_INPUT, "%s: neither PNG nor JPEG", job->path);
-    if (job->kind == NPG_IMAGE_DEPTH && !job->header_only)
+    if (job->kind == NPG_IMAGE_DEPTH)
         return npg_error(NPG_BAD_INPUT, "%s: a JPEG can't be a depth image: it must be a 16-bit grey PNG",
                          job->path);
     return read_jpeg(job);
 }
 
-static npg_status read_image(image_job job)
-{
-    npg_arena scratch = {.purpose = NPG_FOR_FILES};
-    *job.image = (npg_image){0};
-    npg_status status = npg_file_whole(&scratch, &job.data, &job.size, job.path, NPG_IMAGE_FILE_MAX, "image");
-    if (!status) status = decode(&job);
-    npg_arena_release(&scratch);
-    if (status) npg_image_clear(job.image);
-    return status;
-}
-
 npg_status npg_image_read(npg_image *image, const char *path, npg_image_kind kind, size_t width,
                           size_t height)
 {
-    return read_image(
-        (image_job){.path = path, .kind = kind, .width = width, .height = height, .image = image});
-}
-
-npg_status npg_image_size(size_t *width, size_t *height, const char *path)
-{
-    npg_image image;
-    NPG_TRY(read_image((image_job){.path = path, .header_only = 1, .image = &image}));
-    *width = image.width;
-    *height = image.height;
-    return NPG_OK;
+    image_job job = {.path = path, .kind = kind, .width = width, .height = height, .image = image};
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    *image = (npg_image){0};
+    npg_status status = npg_file_whole(&scratch, &job.data, &job.size, path, NPG_IMAGE_FILE_MAX, "image");
+    if (!status) status = decode(&job);
+    npg_arena_release(&scratch);
+    if (status) npg_image_clear(image);
+    return status;
 }

@@ -1,4 +1,4 @@
-/* Rig: which layout a path is, its frames, and the pose of every shot. */
+/* Rig: what is one, its frames, and the pose of every shot. */
 #include "ingest/rig/rig_internal.h"
 
 #include <dirent.h>
@@ -12,7 +12,7 @@
 #include "pipeline/file.h"
 #include "pipeline/order.h"
 
-/* ---- which layout ---- */
+/* ---- what is one ---- */
 
 bool npg_rig_ends_with(const char *name, const char *ending)
 {
@@ -34,39 +34,27 @@ static bool has_camera_files(const char *folder)
     return found;
 }
 
-typedef npg_status load_fn(npg_rig *rig);
+/* Which other program has written the depth images of a folder; NULL: none that is known. */
+static const char *foreign_layout(const char *folder)
+{
+    bool has_camera =
+        npg_is_in_folder(folder, "intrinsic.json") || npg_is_in_folder(folder, "camera_intrinsic.json");
+    return npg_is_in_folder(folder, "depth.txt")             ? "TUM RGB-D"
+           : npg_is_in_folder(folder, "depth") && has_camera ? "Redwood and Open3D"
+           : has_camera_files(folder)                        ? "OpenCV"
+                                                             : NULL;
+}
 
-static load_fn *layout_of(const char *path, const char **name)
+static bool is_folder(const char *path)
 {
     struct stat info;
-    bool is_folder = !stat(path, &info) && S_ISDIR(info.st_mode);
-    static const struct {
-        const char *name;
-        load_fn *load;
-    } layouts[] = {{"rig.json", npg_rig_load_json},
-                   {"tum", npg_rig_load_tum},
-                   {"redwood", npg_rig_load_redwood},
-                   {"opencv", npg_rig_load_opencv}};
-    int at = -1;
-    if (!is_folder)
-        at = npg_rig_ends_with(path, ".json") ? 0 : -1;
-    else if (npg_is_in_folder(path, "rig.json"))
-        at = 0;
-    else if (npg_is_in_folder(path, "depth.txt"))
-        at = 1;
-    else if (npg_is_in_folder(path, "depth") &&
-             (npg_is_in_folder(path, "intrinsic.json") || npg_is_in_folder(path, "camera_intrinsic.json")))
-        at = 2;
-    else if (has_camera_files(path))
-        at = 3;
-    *name = at < 0 ? NULL : layouts[at].name;
-    return at < 0 ? NULL : layouts[at].load;
+    return !stat(path, &info) && S_ISDIR(info.st_mode);
 }
 
 bool npg_rig_is(const char *path)
 {
-    const char *name;
-    return layout_of(path, &name) != NULL;
+    if (!is_folder(path)) return npg_rig_ends_with(path, ".json");
+    return npg_is_in_folder(path, "rig.json") || foreign_layout(path);
 }
 
 const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
@@ -76,9 +64,8 @@ const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1, .tolera
 /* The folder that names start from: the path itself, or the one its file lies in. */
 static char *find_folder(npg_rig *rig)
 {
-    struct stat info;
     char *folder = npg_arena_text(&rig->arena, rig->path), *slash = folder ? strrchr(folder, '/') : NULL;
-    if (!folder || (!stat(folder, &info) && S_ISDIR(info.st_mode))) return folder;
+    if (!folder || is_folder(folder)) return folder;
     if (!slash) return npg_arena_text(&rig->arena, ".");
     slash[slash == folder] = 0;
     return folder;
@@ -86,16 +73,18 @@ static char *find_folder(npg_rig *rig)
 
 static npg_status load(npg_rig *rig, const char *path)
 {
-    load_fn *read = layout_of(path, &rig->layout);
-    if (!read)
+    const char *foreign =
+        is_folder(path) && !npg_is_in_folder(path, "rig.json") ? foreign_layout(path) : NULL;
+    if (foreign)
         return npg_error(NPG_BAD_INPUT,
-                         "%s: no rig: neither a rig.json, nor a folder with depth.txt (TUM), "
-                         "depth/ and intrinsic.json (Redwood), or *_camera.xml (OpenCV)",
-                         path);
+                         "%s: depth images as %s has them, without a rig.json: rig_json.py writes one "
+                         "(in tools/, installed in share/neupig/)",
+                         path, foreign);
+    if (!npg_rig_is(path)) return npg_error(NPG_BAD_INPUT, "%s: no rig.json", path);
     rig->path = npg_arena_text(&rig->arena, path);
     rig->folder = rig->path ? find_folder(rig) : NULL;
     NPG_TRY(npg_arena_status(&rig->arena));
-    NPG_TRY(read(rig));
+    NPG_TRY(npg_rig_load_json(rig));
     return npg_rig_join(rig);
 }
 

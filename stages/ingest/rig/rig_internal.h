@@ -46,9 +46,6 @@ npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_
 npg_status npg_rig_join(npg_rig *rig);
 
 npg_status npg_rig_load_json(npg_rig *rig);
-npg_status npg_rig_load_redwood(npg_rig *rig);
-npg_status npg_rig_load_tum(npg_rig *rig);
-npg_status npg_rig_load_opencv(npg_rig *rig);
 
 /* Images by lists of "time path" lines (paths from the list's folder), poses by a trajectory with times, or
  * none (NULL); colours are those nearest in time.  Images without a pose are left out and counted. */
@@ -60,10 +57,6 @@ bool npg_rig_ends_with(const char *name, const char *ending);
 /* "<rig's folder>/<name>", a text of the rig's, refused under confine where it leads out; NPG_BAD_INPUT where it is
  * not there and must be. */
 npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_be);
-
-/* intrinsic.json as Open3D writes it: {"width", "height", "intrinsic_matrix": nine numbers, columns first}.
- * NPG_BAD_INPUT. */
-npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path);
 
 /* Where images are timed, or trajectories come in order: files of "time path" lines and of poses. */
 typedef struct npg_stamped {
@@ -85,12 +78,6 @@ npg_status npg_read_image_list(npg_stamped_list *list, npg_arena *arena, const c
 npg_status npg_read_trajectory(npg_stamped_list *list, npg_arena *arena, const char *path);
 /* The nearest in time within the tolerance, NULL without one. */
 const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s, double tolerance_s);
-
-/* OpenCV's FileStorage, XML or YAML: matrices by name, numbers in rows.  *found is how many numbers there
- * are, 0 where the name is not in the file; more than `most` is NPG_BAD_INPUT. */
-npg_status npg_opencv_open(npg_arena *arena, char **text, const char *path);
-npg_status npg_opencv_matrix(const char *text, const char *path, const char *name, double *values,
-                             size_t most, size_t *found);
 
 /* What one depth image gave, in the sensor's own axes. */
 typedef struct npg_depth_points {
@@ -132,9 +119,6 @@ typedef struct npg_image {
  * damage.  NPG_MEMORY.  *image is empty after a failure.  Thread-safe. */
 npg_status npg_image_read(npg_image *image, const char *path, npg_image_kind kind, size_t width,
                           size_t height);
-
-/* Width and height from the header alone; errors as above. */
-npg_status npg_image_size(size_t *width, size_t *height, const char *path);
 
 void npg_image_clear(npg_image *image);
 

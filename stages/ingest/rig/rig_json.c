@@ -108,17 +108,13 @@ static npg_status get_pose(const place *p, const json_t *object, const char *key
 
 /* ---- cameras ---- */
 
-/* Width and height; *is_good is false where they are none of an image. */
-static npg_status get_size(const place *p, const json_t *object, npg_camera *camera, bool must_be_whole,
-                           bool *is_good)
+static npg_status get_side(const place *p, const json_t *object, const char *key, size_t *side)
 {
-    double width = 0, height = 0;
-    NPG_TRY(get_number(p, object, "width", true, &width));
-    NPG_TRY(get_number(p, object, "height", true, &height));
-    *is_good = width >= 1 && height >= 1 && width <= NPG_IMAGE_SIDE_MAX && height <= NPG_IMAGE_SIDE_MAX &&
-               (!must_be_whole || (width == floor(width) && height == floor(height)));
-    camera->width = *is_good ? (size_t)width : 0;
-    camera->height = *is_good ? (size_t)height : 0;
+    double value = 0;
+    NPG_TRY(get_number(p, object, key, true, &value));
+    if (!(value >= 1 && value <= NPG_IMAGE_SIDE_MAX && value == floor(value)))
+        return bad(p, "width", "and height must be whole numbers of pixels");
+    *side = (size_t)value;
     return NPG_OK;
 }
 
@@ -131,11 +127,11 @@ static npg_status get_camera(const place *p, const json_t *object, npg_camera *c
     double *const values[] = {&camera->fx, &camera->fy, &camera->cx, &camera->cy};
     size_t count;
     char where[512];
-    bool is_there, is_good;
+    bool is_there;
     *camera = (npg_camera){0};
     NPG_TRY(check_keys(p, object, is_colour ? colour_keys : keys));
-    NPG_TRY(get_size(p, object, camera, true, &is_good));
-    if (!is_good) return bad(p, "width", "and height must be whole numbers of pixels");
+    NPG_TRY(get_side(p, object, "width", &camera->width));
+    NPG_TRY(get_side(p, object, "height", &camera->height));
     for (size_t i = 0; i < 4; i++) NPG_TRY(get_number(p, object, keys[2 + i], true, values[i]));
     NPG_TRY(get_numbers(p, object, "distortion", camera->distortion, NPG_DISTORTIONS, &count));
     if (count && count != 4 && count != 5 && count != 8)
@@ -354,37 +350,6 @@ npg_status npg_rig_load_json(npg_rig *rig)
     NPG_TRY(npg_arena_status(&rig->arena));
     NPG_TRY(read_json(&root, &text, file));
     npg_status status = load_root(rig, file, root);
-    json_decref(root);
-    npg_release(&text);
-    return status;
-}
-
-/* ---- Open3D's intrinsics ---- */
-
-static npg_status get_intrinsic(const place *p, const json_t *root, npg_camera *camera)
-{
-    double m[9];
-    size_t count;
-    bool is_good;
-    NPG_TRY(get_size(p, root, camera, false, &is_good));
-    NPG_TRY(get_numbers(p, root, "intrinsic_matrix", m, 9, &count));
-    if (count != 9) return bad(p, "intrinsic_matrix", "must be nine numbers, columns first");
-    if (!is_good) return bad(p, "width", "and height must be pixels");
-    camera->fx = m[0];
-    camera->fy = m[4];
-    camera->cx = m[6];
-    camera->cy = m[7];
-    return npg_camera_check(camera, p->file);
-}
-
-npg_status npg_rig_read_intrinsic(npg_camera *camera, const char *path)
-{
-    json_t *root;
-    char *text;
-    const place p = {.file = path};
-    *camera = (npg_camera){0};
-    NPG_TRY(read_json(&root, &text, path));
-    npg_status status = get_intrinsic(&p, root, camera);
     json_decref(root);
     npg_release(&text);
     return status;

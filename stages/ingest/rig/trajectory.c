@@ -1,4 +1,4 @@
-/* Trajectory: files of times and image paths, and of poses, one or several lines each. */
+/* Trajectory: files of times and image paths, and of poses, one or several lines each; sensors of such images. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -135,4 +135,72 @@ const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s,
         if (!best || fabs(list->items[i].time_s - time_s) < fabs(best->time_s - time_s))
             best = &list->items[i];
     return best && fabs(best->time_s - time_s) <= tolerance_s ? best : NULL;
+}
+
+/* ---- images with times ---- */
+
+/* A path as a list names it: from the list's folder. */
+static npg_status path_in_list(npg_rig *rig, char **path, const char *list, const char *name)
+{
+    const char *slash = strrchr(list, '/');
+    char joined[8192];
+    int length = slash && name[0] != '/'
+                     ? snprintf(joined, sizeof joined, "%.*s/%s", (int)(slash - list), list, name)
+                     : snprintf(joined, sizeof joined, "%s", name);
+    if (length < 0 || (size_t)length >= sizeof joined)
+        return npg_error(NPG_BAD_INPUT, "%s: a path is too long", list);
+    return npg_rig_path(rig, path, joined, true);
+}
+
+typedef struct timed {
+    npg_arena scratch;
+    npg_stamped_list depth, colour, poses;
+} timed;
+
+static npg_status read_timed(timed *t, npg_rig *rig, const char *const files[3])
+{
+    npg_stamped_list *const lists[] = {&t->depth, &t->colour, &t->poses};
+    for (size_t i = 0; i < 3; i++) {
+        char *path;
+        if (!files[i]) continue;
+        NPG_TRY(npg_rig_path(rig, &path, files[i], true));
+        NPG_TRY(i < 2 ? npg_read_image_list(lists[i], &t->scratch, path)
+                      : npg_read_trajectory(lists[i], &t->scratch, path));
+    }
+    return NPG_OK;
+}
+
+static npg_status add_timed(npg_rig *rig, npg_rig_sensor *sensor, const timed *t, const char *const files[3])
+{
+    double tolerance = rig->settings.tolerance_s;
+    for (size_t i = 0; i < t->depth.count; i++) {
+        npg_rig_shot shot = {.time_s = t->depth.items[i].time_s, .number = (int64_t)i};
+        const npg_stamped *colour = npg_stamped_near(&t->colour, shot.time_s, tolerance),
+                          *pose = npg_stamped_near(&t->poses, shot.time_s, tolerance);
+        if (files[2] && !pose) {
+            rig->left_out++;
+            continue;
+        }
+        shot.has_pose = pose != NULL;
+        if (pose) memcpy(shot.pose, pose->pose, sizeof shot.pose);
+        NPG_TRY(path_in_list(rig, &shot.depth, files[0], t->depth.items[i].path));
+        if (colour) NPG_TRY(path_in_list(rig, &shot.colour, files[1], colour->path));
+        NPG_TRY(npg_rig_add_shot(rig, sensor, &shot));
+    }
+    if (sensor->shot_count) return NPG_OK;
+    return npg_error(NPG_BAD_INPUT,
+                     "%s: none of the %zu depth images of %s has a pose within %g s: images out of step",
+                     rig->path, t->depth.count, files[0], tolerance);
+}
+
+npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *depth, const char *colour,
+                              const char *poses)
+{
+    timed t = {.scratch.purpose = NPG_FOR_FILES};
+    const char *const files[] = {depth, colour, poses};
+    rig->is_timed = true;
+    npg_status status = read_timed(&t, rig, files);
+    if (!status) status = add_timed(rig, sensor, &t, files);
+    npg_arena_release(&t.scratch);
+    return status;
 }
