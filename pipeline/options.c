@@ -22,7 +22,6 @@ struct npg_options {
     char **texts; /* count of them: what the user set, or NULL; each owned */
     npg_custom_stage custom[NPG_CUSTOM_STAGES_MAX]; /* custom_count of them */
     size_t custom_count;
-    char *ignored; /* owned, or NULL */
 };
 
 /* ---- the tables as one list ---- */
@@ -199,7 +198,6 @@ void npg_options_close(npg_options **slot)
 {
     if (!slot || !*slot) return;
     for (size_t i = 0; (*slot)->texts && i < (*slot)->count; i++) npg_release(&(*slot)->texts[i]);
-    npg_release(&(*slot)->ignored);
     npg_object_close(slot);
 }
 
@@ -212,7 +210,6 @@ npg_status npg_options_copy(npg_options **out, const npg_options *options)
         if (options && options->texts[i]) status = npg_copy_text(&copy->texts[i], options->texts[i]);
     for (size_t i = 0; options && i < options->custom_count && !status; i++)
         status = copy_custom(copy, &options->custom[i]);
-    if (!status && options && options->ignored) status = npg_copy_text(&copy->ignored, options->ignored);
     if (status) npg_options_close(&copy);
     *out = copy;
     return status;
@@ -336,7 +333,9 @@ npg_status npg_options_set_key(npg_options *options, const char *name, const jso
     else if (json_is_real(value))
         snprintf(number, sizeof number, "%.17g", json_real_value(value));
     else
-        return npg_error(NPG_USAGE, "option %s: neither text, number nor true/false", name);
+        return npg_option_gone(name)
+                   ? unknown(options, name)
+                   : npg_error(NPG_USAGE, "option %s: neither text, number nor true/false", name);
     return set_list_or_text(options, name, number);
 }
 
@@ -345,18 +344,6 @@ npg_status npg_options_set_json(npg_options *options, const char *name, const js
     if (strcmp(plain_name(name), "method") != 0) return npg_options_set_key(options, name, value);
     if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
     return npg_method_apply(options, value, name);
-}
-
-const char *npg_options_ignored(const npg_options *options)
-{
-    return options->ignored ? options->ignored : "";
-}
-
-void npg_options_ignore(npg_options *options, char **text)
-{
-    npg_release(&options->ignored);
-    options->ignored = *text;
-    *text = NULL;
 }
 
 bool npg_options_is_set(const npg_options *options, const char *name)

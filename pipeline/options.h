@@ -126,11 +126,6 @@ npg_status npg_options_set_json(npg_options *options, const char *name, const st
 /* The same, where a method can only be one of the names: inside a method. */
 npg_status npg_options_set_key(npg_options *options, const char *name, const struct json_t *value);
 
-/* What a method of the published code asked for that has no counterpart here, separated by commas; "" when
- * there is nothing.  The setter takes over the text. */
-const char *npg_options_ignored(const npg_options *options);
-void npg_options_ignore(npg_options *options, char **text);
-
 /* Why there is no option of this name, and what to do instead; NULL when there never was one. */
 const char *npg_option_gone(const char *name);
 
@@ -144,9 +139,7 @@ extern const npg_preset npg_presets[];
 /* ---- methods: what the option "method" takes beside the names of npg_presets (method.c) ---- */
 
 /* Set options from a JSON object as text, or from a file of one.  The object holds options by their names
- * ("preset" is the method that they are added to), or is a configuration of the paper's published code, known
- * by its sections "optimization", "grid" and "mlp": that chooses the method "paper" and sets what has a
- * counterpart; npg_options_ignored() then says what has none.  NPG_USAGE names place and cause. */
+ * ("preset" is the method that they are added to).  NPG_USAGE names place and cause. */
 npg_status npg_method_set(npg_options *options, const char *value);
 
 /* The same for an object that was read; errors name it as `place`. */

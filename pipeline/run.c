@@ -347,24 +347,12 @@ static npg_status begin(npg_run *run)
     return status;
 }
 
-/* Of a method of the published code. */
-static void warn_of_ignored(npg_run *run)
-{
-    char text[1024];
-    const char *ignored = npg_options_ignored(run->options);
-    if (!*ignored) return;
-    snprintf(text, sizeof text, "method: no counterpart here, so without effect: %s", ignored);
-    npg_run_log(run, NPG_LOG_WARNING, "run", -1, text);
-    json_object_set_new(run->report, "method_ignored", npg_json_text(ignored));
-}
-
 static npg_status do_passes(npg_run *run)
 {
     npg_status begun = begin(run);
     if (begun == NPG_END) npg_latch_abort(run->begun_latch); /* nobody waits for passes that never come */
     if (begun) return begun == NPG_END ? NPG_OK : begun;
     npg_latch_raise(run->begun_latch, 1);
-    warn_of_ignored(run);
     if (!run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));

@@ -94,7 +94,6 @@ static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settin
                          "option task-index: %lld is not below the task-count of %lld; the first task is 0",
                          (long long)s->task_index, (long long)s->task_count);
     NPG_TRY(npg_batch_open(batch, cli->operands[0], &given));
-    npg_batch_warn_of_ignored(cli->options, "--method");
     (*batch)->task_index = (size_t)s->task_index;
     (*batch)->task_count = (size_t)s->task_count;
     return NPG_OK;

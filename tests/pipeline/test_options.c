@@ -353,7 +353,7 @@ static void a_bad_method_is_named(void **state)
                                   {"{\"preset\": \"other.json\"}", "other.json"},
                                   {"{\"method\": {\"epochs\": 1}}", "method"},
                                   {"{\"quality\": \"best\"}", "--method best"},
-                                  {"{\"grid\": {\"n_level\": 99}}", "grid.n_level"},
+                                  {"{\"grid\": {\"n_level\": 99}}", "method_json.py"},
                                   {"[1]", "method"}};
     (void)state;
     npg_options *options = open_all();
@@ -406,21 +406,6 @@ static void a_list_sets_its_parts(void **state)
     npg_options_close(&options);
 }
 
-static void a_published_method_says_what_it_ignores(void **state)
-{
-    (void)state;
-    npg_options *options = open_all(), *copy;
-    assert_string_equal(npg_options_ignored(options), "");
-    const char *text = "{\"grid\": {\"n_level\": 3, \"solver\": \"CG\"}, \"rotation_method\": \"none\"}";
-    assert_int_equal(npg_options_set(options, "method", text), NPG_OK);
-    assert_string_equal(npg_options_get(options, "grid-levels"), "3");
-    assert_int_equal(npg_options_copy(&copy, options), NPG_OK);
-    assert_string_equal(npg_options_get(copy, "method"), "paper");
-    assert_string_equal(npg_options_ignored(copy), "rotation_method = \"none\", grid.solver");
-    npg_options_close(&options);
-    npg_options_close(&copy);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -438,7 +423,6 @@ int main(void)
         cmocka_unit_test(a_method_is_a_name_a_text_or_a_file),
         cmocka_unit_test(a_bad_method_is_named),
         cmocka_unit_test(a_list_sets_its_parts),
-        cmocka_unit_test(a_published_method_says_what_it_ignores),
     };
     return cmocka_run_group_tests(tests, open_folder, close_folder);
 }

@@ -66,13 +66,6 @@ static npg_status set_given(npg_options *options, const npg_options *given)
     return NPG_OK;
 }
 
-void npg_batch_warn_of_ignored(const npg_options *options, const char *place)
-{
-    const char *ignored = npg_options_ignored(options);
-    if (*ignored)
-        fprintf(stderr, "neupig: warning: %s: no counterpart here, so without effect: %s\n", place, ignored);
-}
-
 /* A run of a batch reads files and is alone with its output. */
 static npg_status check_options(const npg_options *options)
 {
@@ -93,76 +86,13 @@ static npg_status confine(bool *is_confined, npg_options *options)
     return NPG_OK;
 }
 
-#define MESH_ENDINGS ".ply .obj"
-
-/* ---- inside of a capture ---- */
-
-static bool is_folder(const char *path)
-{
-    struct stat info;
-    return !stat(path, &info) && S_ISDIR(info.st_mode);
-}
-
-/* *found: whether files of these endings lie in the folder. */
-static npg_status holds(bool *found, const char *folder, const char *endings)
-{
-    npg_listing files = {0};
-    npg_status status = npg_listing_add(&files, folder, endings);
-    *found = !status;
-    npg_listing_close(&files);
-    return status == NPG_MEMORY ? status : NPG_OK;
-}
-
-typedef struct inside {
-    npg_arena *arena;
-    const char *folder;
-    bool is_confined;
-} inside;
-
-/* The first of the names that is a sub-folder with files of these endings; NULL when none is. */
-static npg_status find_first(char **found, const inside *in, const char *const *names, const char *endings)
-{
-    for (*found = NULL; *names && !*found; names++) {
-        bool is_there;
-        char *path = npg_arena_path(in->arena, in->folder, *names);
-        NPG_TRY(npg_arena_status(in->arena));
-        if (!is_folder(path)) continue;
-        if (in->is_confined) NPG_TRY(npg_path_confine(path, in->folder));
-        NPG_TRY(holds(&is_there, path, endings));
-        if (is_there) *found = path;
-    }
-    return NPG_OK;
-}
-
-/* Where frames lie in the folder that is a capture's input becomes its input: the sub-folder points/,
- * point_clouds/, points_clouds/ or pcl_seqs/ when that holds any, else the folder; only meshes in truth/ or gt/:
- * that.  So the layout of the paper's published code is understood (<capture>/point_clouds/0000.ply ... beside
- * <capture>/gt/0000.obj ..., or gt/ alone), and that of neupig synth. */
-static npg_status find_inside(npg_batch *batch, npg_capture *capture, bool is_confined)
-{
-    static const char *const truths[] = {"truth", "gt", NULL};
-    static const char *const of_clouds[] = {"points", "point_clouds", "points_clouds", NULL};
-    static const char *const raw[] = {"pcl_seqs", NULL};
-    const inside in = {&batch->arena, capture->input, is_confined};
-    bool own = false;
-    char *truth, *found;
-    NPG_TRY(find_first(&truth, &in, truths, MESH_ENDINGS));
-    NPG_TRY(find_first(&found, &in, of_clouds, NPG_CLOUDS));
-    if (!found) NPG_TRY(holds(&own, in.folder, NPG_CLOUDS));
-    if (!found && !own) NPG_TRY(find_first(&found, &in, raw, NPG_CLOUDS));
-    capture->of_mesh_vertices = !found && !own && truth;
-    if (capture->of_mesh_vertices) found = truth;
-    if (found) capture->input = found;
-    return NPG_OK;
-}
-
 /* Of a batch that is a folder, whoever fills it, a capture is not read that is a link out of it. */
-static npg_status find_input(npg_batch *batch, npg_capture *capture, bool is_confined)
+static npg_status check_input(const npg_batch *batch, const npg_capture *capture, bool is_confined)
 {
     struct stat info;
-    if (stat(capture->input, &info) || !S_ISDIR(info.st_mode)) return NPG_OK;
-    if (is_confined && batch->is_folder) NPG_TRY(npg_path_confine(capture->input, batch->path));
-    return find_inside(batch, capture, is_confined);
+    if (!is_confined || !batch->is_folder || stat(capture->input, &info) || !S_ISDIR(info.st_mode))
+        return NPG_OK;
+    return npg_path_confine(capture->input, batch->path);
 }
 
 npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char *folder, const char *text,
@@ -175,7 +105,7 @@ npg_status npg_batch_complete(npg_batch *batch, npg_capture *capture, const char
     if (given->max_time_s >= 0) capture->max_time_s = given->max_time_s;
     if (given->segments) capture->segments = given->segments;
     NPG_TRY(npg_path_from(&batch->arena, &capture->input, folder, text));
-    npg_status status = find_input(batch, capture, is_confined);
+    npg_status status = check_input(batch, capture, is_confined);
     if (status == NPG_BAD_INPUT)
         capture->refusal = npg_arena_text(&batch->arena, npg_error_text());
     else

@@ -26,13 +26,12 @@ typedef struct npg_verdict {
 enum { NPG_BATCH_SEGMENTS_UNSAID, NPG_BATCH_SEGMENTS_ONE, NPG_BATCH_SEGMENTS_AUTO };
 
 typedef struct npg_capture {
-    char *name;            /* of its folder in the output                                  */
-    char *input, *output;  /* absolute paths                                               */
-    npg_options *options;  /* of its run, input and output among them; owned               */
-    char *refusal;         /* why it is not even started, NULL: it is                      */
-    double max_time_s;     /* 0: no limit                                                  */
-    int segments;          /* NPG_BATCH_SEGMENTS_..                                        */
-    bool of_mesh_vertices; /* its points are the vertices of meshes: nothing else is there */
+    char *name;           /* of its folder in the output                                  */
+    char *input, *output; /* absolute paths                                               */
+    npg_options *options; /* of its run, input and output among them; owned               */
+    char *refusal;        /* why it is not even started, NULL: it is                      */
+    double max_time_s;    /* 0: no limit                                                  */
+    int segments;         /* NPG_BATCH_SEGMENTS_..                                        */
     npg_verdict verdict;
 } npg_capture;
 
@@ -63,10 +62,6 @@ bool npg_batch_is_mine(const npg_batch *batch, size_t i);
 /* ---- for the two that fill a batch ---- */
 
 npg_status npg_batch_read_manifest(npg_batch *batch, const npg_batch_given *given);
-
-/* Say on standard error what a method of the published code asks for that has no counterpart here; place: where
- * it was read. */
-void npg_batch_warn_of_ignored(const npg_options *options, const char *place);
 
 /* Add a capture with fresh options.  NPG_USAGE: a name that can't be a folder's or that another one has. */
 npg_status npg_batch_add(npg_batch *batch, npg_capture **capture, const char *name);

@@ -78,9 +78,7 @@ static npg_status set_method(const manifest *m, npg_capture *capture, const json
     if (!text || *text == '{' || !strpbrk(text, "./"))
         return npg_options_set_json(capture->options, "method", value);
     NPG_TRY(npg_path_from(&m->batch->arena, &path, m->folder, text));
-    NPG_TRY(npg_options_set(capture->options, "method", path));
-    npg_batch_warn_of_ignored(capture->options, path);
-    return NPG_OK;
+    return npg_options_set(capture->options, "method", path);
 }
 
 /* All of an object, the method first. */

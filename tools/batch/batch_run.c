@@ -36,9 +36,6 @@ static void report_start(work *w, const npg_capture *capture)
 {
     npg_reporter_log(w->reporter, NPG_LOG_INFO, npg_clock_s() - w->begun_s, capture->name,
                      "started (%zu of %zu)", w->ended + w->running + 1, w->mine);
-    if (capture->of_mesh_vertices)
-        npg_reporter_log(w->reporter, NPG_LOG_WARNING, npg_clock_s() - w->begun_s, capture->name,
-                         "%s holds meshes and no clouds: their vertices are the points", capture->input);
     npg_reporter_print(w->reporter,
                        json_pack("{s:s,s:o}", "event", "start", "name", npg_json_text(capture->name)));
 }
