@@ -100,7 +100,8 @@ static size_t state_bytes(const state *s)
 
 static void pack_state(const state *s, unsigned char *to)
 {
-    memcpy(npg_group_pack(to, &s->group), &s->sum, sizeof s->sum);
+    memcpy(to, s->group.sides[0], npg_group_bytes(&s->group));
+    memcpy(to + npg_group_bytes(&s->group), &s->sum, sizeof s->sum);
 }
 
 /* Behind the last frame that a window waits for: the state on disk is written when that is solved. */
@@ -114,7 +115,8 @@ static npg_status keep_point(state *s)
 
 static void unpack_state(state *s, const unsigned char *from)
 {
-    memcpy(&s->sum, npg_group_unpack(&s->group, from), sizeof s->sum);
+    npg_group_begin(&s->group, from);
+    memcpy(&s->sum, from + npg_group_bytes(&s->group), sizeof s->sum);
 }
 
 static npg_status restore_state(npg_worker *worker)
@@ -206,8 +208,8 @@ static npg_status count_hidden(const npg_worker *worker, npg_waiting *w, npg_sid
     w->since = npg_arena_take(&w->arena, nodes, sizeof *w->since);
     NPG_TRY(npg_arena_status(&w->arena));
     if (w->frame.index != npg_worker_facts(worker)->plan.key)
-        npg_tracker_since(s->tracker, w->since, at->since);
-    memcpy(at->since, w->since, nodes * sizeof *at->since);
+        npg_tracker_since(s->tracker, w->since, npg_side_since(at));
+    memcpy(npg_side_since(at), w->since, nodes * sizeof *w->since);
     return NPG_OK;
 }
 
@@ -219,7 +221,8 @@ static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
                                       AGAIN_WIDTH, 1};
     NPG_TRY(npg_pose_cache_start(&s->cache, s->tracker, w->frame.index, at->now, &w->is_known));
     if (w->cloud.count) {
-        const npg_prior_poses prior = {.pose = w->is_known || !at->has_before ? at->now : at->before};
+        const npg_prior_poses prior = {.pose =
+                                           w->is_known || !at->has_before ? at->now : npg_side_before(at)};
         NPG_TRY(npg_tracker_fit(s->tracker, &w->tracked, at->now, &w->cloud, &prior,
                                 w->is_known ? &again : NULL));
         NPG_TRY(count_hidden(worker, w, at));
@@ -276,19 +279,19 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     NPG_TRY(npg_group_add(&w, &s->group, frame));
     if (npg_pose_cache_has_group(&s->cache)) return npg_pose_cache_read(&s->cache, w->frame.index, w->pose);
     NPG_TRY(take_points(worker, w));
-    npg_side *at = &s->group.ways[w->frame.index < facts->plan.key];
+    npg_side *at = s->group.ways[w->frame.index < facts->plan.key];
     bool is_key = w->frame.index == facts->plan.key;
     if (at->is_past) {
         leave_past(w, at);
         return NPG_OK;
     }
-    if (!is_key) npg_side_step_on(at, nodes_of(s), w->frame.index);
+    if (!is_key) npg_side_step_on(at, w->frame.index);
     NPG_TRY(fit_pose(worker, w, at));
     bool is_reached = true;
     if (!is_key && is_growing(worker, w->cloud.sensor_count)) NPG_TRY(reaches(&is_reached, worker, w));
     if (!is_reached) leave_past(w, at);
     at->index = w->frame.index;
-    if (is_key) npg_side_copy(&s->group.ways[1], at, nodes_of(s));
+    if (is_key) npg_side_copy(s->group.ways[1], at);
     return NPG_OK;
 }
 

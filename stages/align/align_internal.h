@@ -120,27 +120,6 @@ typedef struct npg_recover_frame {
     bool is_fixed;           /* of the group before: a place to start from, no more                         */
 } npg_recover_frame;
 
-/* Who tries, and what for.  should_stop may be NULL; it is asked before each fit. */
-typedef struct npg_attempts {
-    npg_tracker *tracker;
-    double *trial;    /* K x 12, scratch; the caller's                     */
-    const char *what; /* is done with frames, for the error: "followed on" */
-    bool (*should_stop)(void *user);
-    void *user;
-} npg_attempts;
-
-/* Where an attempt starts. */
-typedef struct npg_start {
-    const double *now, *before;       /* K x 12; before: NULL, or the motion since then goes on */
-    const npg_tracker_effort *effort; /* NULL: the usual one */
-} npg_start;
-
-/* Fit the frame from there, hidden parts held by `poses`.  *taken: whether its pose and what was tracked
- * become the new ones, those of a Chamfer distance of at most `share` times the old one.  NPG_STOPPED,
- * NPG_MEMORY, NPG_DIVERGED. */
-npg_status npg_attempt(const npg_attempts *attempts, bool *taken, npg_recover_frame *frame,
-                       const npg_start *from, const npg_prior_poses *poses, double share);
-
 /* What was done; frames. */
 typedef struct npg_recover_result {
     int64_t tried; /* fits                       */
@@ -172,31 +151,31 @@ typedef struct npg_backward_result {
 npg_status npg_track_backward(npg_tracker *tracker, npg_backward_result *result, npg_recover_frame *frames,
                               size_t count, int64_t key, bool (*should_stop)(void *user), void *user);
 
-/* Sides: the poses that the frames on one side of the keyframe start from, the last two that were found. */
-
+/* Side: the poses that the frames on one side of the keyframe start from, the last two that were found.  One
+ * piece of memory, so that equal sides have equal bytes. */
 typedef struct npg_side {
-    double *now, *before; /* K x 12 */
-    float *since;         /* K: frames since a sensor saw what a node carries; of now */
-    int64_t index;        /* of now */
+    size_t node_count; /* K              */
+    int64_t index;     /* of `now`       */
+    npg_tracked now_tracked, before_tracked;
     bool has_now, has_before;
     bool is_past; /* what a growing reference reaches */
-    npg_tracked now_tracked, before_tracked;
+    double now[]; /* K x 12; behind it those of the frame before, and `since` */
 } npg_side;
 
-/* Zeros become a side at rest without any frame, its arrays the arena's; K nodes, here and below.
- * NPG_MEMORY. */
-npg_status npg_side_open(npg_side *side, npg_arena *arena, size_t node_count);
+static inline double *npg_side_before(npg_side *side)
+{
+    return side->now + NPG_POSE_SIZE * side->node_count;
+}
 
-/* Content, not arrays. */
-void npg_side_copy(npg_side *to, const npg_side *from, size_t node_count);
+/* K: frames since a sensor saw what a node carries; of now. */
+static inline float *npg_side_since(npg_side *side)
+{
+    return (float *)(npg_side_before(side) + NPG_POSE_SIZE * side->node_count);
+}
 
 /* `now` becomes `before`, and the pose that the motion so far leads to becomes `now`, of frame `index`. */
-void npg_side_step_on(npg_side *side, size_t node_count, int64_t index);
-
-/* To npg_side_bytes() bytes, which are the same for equal sides, and back; both return where they end. */
-size_t npg_side_bytes(size_t node_count);
-unsigned char *npg_side_pack(unsigned char *to, const npg_side *side, size_t node_count);
-const unsigned char *npg_side_unpack(npg_side *side, const unsigned char *from, size_t node_count);
+void npg_side_step_on(npg_side *side, int64_t index);
+void npg_side_copy(npg_side *to, const npg_side *from);
 
 /* Group: the frames that wait to be aligned together, and where the two ways outward from the key stand. */
 
@@ -217,10 +196,9 @@ typedef struct npg_waiting {
 } npg_waiting;
 
 typedef struct npg_group {
-    npg_arena arena;     /* of both sides and ways */
-    size_t node_count;   /* K */
-    npg_side sides[2];   /* forward, backward: of the frames that are passed on */
-    npg_side ways[2];    /* the same with those that wait                       */
+    npg_arena arena;     /* of both sides and ways, one behind the other */
+    npg_side *sides[2];  /* forward, backward: of the frames that are passed on */
+    npg_side *ways[2];   /* the same with those that wait                       */
     npg_waiting *frames; /* in order of arrival; owned, with what they own      */
     size_t count, capacity;
 } npg_group;
@@ -236,10 +214,9 @@ npg_status npg_group_add(npg_waiting **waiting, npg_group *group, npg_frame *fra
 /* None waits any more. */
 void npg_group_clear(npg_group *group);
 
-/* Both sides as bytes.  unpack: the ways, too, begin where the sides are. */
+/* Both sides are npg_group_bytes() bytes from sides[0] on; begin: the ways, too, are where they are. */
 size_t npg_group_bytes(const npg_group *group);
-unsigned char *npg_group_pack(unsigned char *to, const npg_group *group);
-const unsigned char *npg_group_unpack(npg_group *group, const unsigned char *from);
+void npg_group_begin(npg_group *group, const void *sides);
 
 /* `frames` (count + NPG_GROUP_FIXED), in order of their indices: those that wait and, as fixed ones, the last
  * two of either side.  Loans of the group.  Returns how many there are. */

@@ -29,8 +29,25 @@ static const npg_tracker_effort wider = {.steps = 80, .stiffness = 100, .width_u
 
 /* ---- one fit, compared ---- */
 
-npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *frame, const npg_start *from,
-                       const npg_prior_poses *poses, double share)
+/* Who tries, and what for. */
+typedef struct attempts {
+    npg_tracker *tracker;
+    double *trial;    /* K x 12, scratch                                   */
+    const char *what; /* is done with frames, for the error: "followed on" */
+    bool (*should_stop)(void *user);
+    void *user;
+} attempts;
+
+/* Where an attempt starts. */
+typedef struct start {
+    const double *now, *before;       /* K x 12; before: NULL, or the motion since then goes on */
+    const npg_tracker_effort *effort; /* NULL: the usual one */
+} start;
+
+/* Fit the frame from there, hidden parts held by `poses`.  *taken: whether its pose and what was tracked
+ * become the new ones, those of a Chamfer distance of at most `share` times the old one. */
+static npg_status attempt(const attempts *a, bool *taken, npg_recover_frame *frame, const start *from,
+                          const npg_prior_poses *poses, double share)
 {
     size_t nodes = npg_tracker_node_count(a->tracker), bytes = npg_pose_bytes(nodes);
     npg_tracked tracked;
@@ -51,7 +68,7 @@ npg_status npg_attempt(const npg_attempts *a, bool *taken, npg_recover_frame *fr
 /* ---- lost frames ---- */
 
 typedef struct recovery {
-    npg_attempts attempts;
+    attempts by;
     npg_recover_frame *frames;
     size_t count;
     double level;       /* Chamfer distance of the best quarter        */
@@ -117,7 +134,7 @@ typedef struct alike {
  * limbs, so its pose is a guess at that. */
 static npg_status compare(alike *found, const recovery *r, size_t k, size_t i)
 {
-    const npg_graph *graph = npg_tracker_graph(r->attempts.tracker);
+    const npg_graph *graph = npg_tracker_graph(r->by.tracker);
     npg_rigid guess;
     found->frame = k;
     NPG_TRY(npg_pose_between(&guess, graph, r->frames[k].pose, r->frames[i].pose));
@@ -155,16 +172,16 @@ static const npg_recover_frame *frame_at(const recovery *r, size_t i, int away)
 }
 
 typedef struct starts {
-    npg_start list[STARTS_MOST];
+    start list[STARTS_MOST];
     size_t count, moved; /* moved: of them, in r->moved */
 } starts;
 
 static void add_moved(starts *s, const recovery *r, const alike *from, const npg_tracker_effort *effort)
 {
-    const npg_graph *graph = npg_tracker_graph(r->attempts.tracker);
+    const npg_graph *graph = npg_tracker_graph(r->by.tracker);
     double *pose = r->moved + s->moved++ * graph->node_count * NPG_POSE_SIZE;
     npg_pose_move(pose, graph, r->frames[from->frame].pose, &from->motion);
-    s->list[s->count++] = (npg_start){pose, NULL, effort};
+    s->list[s->count++] = (start){pose, NULL, effort};
 }
 
 static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
@@ -181,22 +198,20 @@ static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
     }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way), *before = frame_at(r, i, 2 * way);
-        if (now && before && !is_off(r, now))
-            s->list[s->count++] = (npg_start){now->pose, before->pose, &wide};
+        if (now && before && !is_off(r, now)) s->list[s->count++] = (start){now->pose, before->pose, &wide};
     }
     for (int way = -1; way <= 1; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way);
-        if (now && !is_off(r, now))
-            s->list[s->count++] = (npg_start){now->pose, NULL, sweep ? &wider : &wide};
+        if (now && !is_off(r, now)) s->list[s->count++] = (start){now->pose, NULL, sweep ? &wider : &wide};
     }
     return NPG_OK;
 }
 
-static npg_status try_start(recovery *r, npg_recover_frame *frame, const npg_start *from)
+static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *from)
 {
     const npg_prior_poses prior = {.pose = from->now};
     bool taken;
-    NPG_TRY(npg_attempt(&r->attempts, &taken, frame, from, &prior, BETTER));
+    NPG_TRY(attempt(&r->by, &taken, frame, from, &prior, BETTER));
     r->result->tried++;
     return NPG_OK;
 }
@@ -249,7 +264,7 @@ static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int
 /* Of a frame without points, of the group before, its pose says where the body was. */
 static npg_status open_look(npg_look *look, const recovery *r, const npg_recover_frame *frame)
 {
-    const npg_graph *graph = npg_tracker_graph(r->attempts.tracker);
+    const npg_graph *graph = npg_tracker_graph(r->by.tracker);
     float *places;
     if (!is_known(frame)) return NPG_OK;
     if (frame->cloud.points) return npg_look_open(look, frame->cloud.points, frame->cloud.count);
@@ -267,8 +282,8 @@ static npg_status open_recovery(recovery *r, npg_arena *scratch)
     NPG_TRY(npg_arena_status(scratch));
     set_levels(r);
     if (!list_lost(r)) return NPG_END;
-    size_t pose_bytes = npg_pose_bytes(npg_tracker_node_count(r->attempts.tracker));
-    r->attempts.trial = npg_arena_take(scratch, 1, pose_bytes);
+    size_t pose_bytes = npg_pose_bytes(npg_tracker_node_count(r->by.tracker));
+    r->by.trial = npg_arena_take(scratch, 1, pose_bytes);
     r->moved = npg_arena_take(scratch, MOVED_MOST, pose_bytes);
     r->looks = npg_arena_take(scratch, r->count, sizeof *r->looks);
     NPG_TRY(npg_arena_status(scratch));
@@ -294,7 +309,7 @@ static npg_status run_sweeps(recovery *r)
 npg_status npg_recover(npg_tracker *tracker, npg_recover_result *result, npg_recover_frame *frames,
                        size_t count, bool (*should_stop)(void *user), void *user)
 {
-    recovery r = {.attempts = {tracker, NULL, "lost frames were tried again", should_stop, user},
+    recovery r = {.by = {tracker, NULL, "lost frames were tried again", should_stop, user},
                   .frames = frames,
                   .count = count,
                   .result = result};
@@ -310,10 +325,10 @@ npg_status npg_recover(npg_tracker *tracker, npg_recover_result *result, npg_rec
 /* ---- backward ---- */
 
 /* step: +1 from the first frame on, -1 from the last one. */
-static npg_status sweep_side(const npg_attempts *attempts, npg_backward_result *result,
-                             npg_recover_frame *frames, size_t count, int64_t key, int step)
+static npg_status sweep_side(const attempts *by, npg_backward_result *result, npg_recover_frame *frames,
+                             size_t count, int64_t key, int step)
 {
-    npg_start from = {0}; /* the poses of the two frames beyond */
+    start from = {0}; /* the poses of the two frames beyond */
     for (size_t i = 0; i < count; i++) {
         npg_recover_frame *frame = &frames[step > 0 ? i : count - 1 - i];
         if (step > 0 ? frame->index >= key : frame->index <= key) break;
@@ -321,7 +336,7 @@ static npg_status sweep_side(const npg_attempts *attempts, npg_backward_result *
         if (from.now) {
             const npg_prior_poses prior = {frame->pose, from.now, frame->since};
             bool taken;
-            NPG_TRY(npg_attempt(attempts, &taken, frame, &from, &prior, WORSE));
+            NPG_TRY(attempt(by, &taken, frame, &from, &prior, WORSE));
             result->tried++;
             result->taken += taken;
         }
@@ -334,11 +349,11 @@ static npg_status sweep_side(const npg_attempts *attempts, npg_backward_result *
 npg_status npg_track_backward(npg_tracker *tracker, npg_backward_result *result, npg_recover_frame *frames,
                               size_t count, int64_t key, bool (*should_stop)(void *user), void *user)
 {
-    npg_attempts attempts = {tracker, NULL, "frames were followed back", should_stop, user};
+    attempts by = {tracker, NULL, "frames were followed back", should_stop, user};
     *result = (npg_backward_result){0};
-    NPG_TRY(npg_alloc(&attempts.trial, NPG_FOR_FIT, npg_pose_bytes(npg_tracker_node_count(tracker))));
-    npg_status status = sweep_side(&attempts, result, frames, count, key, 1);
-    if (!status) status = sweep_side(&attempts, result, frames, count, key, -1);
-    npg_release(&attempts.trial);
+    NPG_TRY(npg_alloc(&by.trial, NPG_FOR_FIT, npg_pose_bytes(npg_tracker_node_count(tracker))));
+    npg_status status = sweep_side(&by, result, frames, count, key, 1);
+    if (!status) status = sweep_side(&by, result, frames, count, key, -1);
+    npg_release(&by.trial);
     return status;
 }
