@@ -227,7 +227,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     if (!s->skin) NPG_TRY(open_gathering(worker, c));
     if (c->colours && !s->colours)
         NPG_TRY(npg_colour_cells_open(&s->colours, COLOUR_SIDE * s->spacing, COLOURS_MOST));
-    NPG_TRY(npg_skin_pose(s->skin, frame->vert_unit));
+    npg_skin_pose(s->skin, frame->vert_unit);
     NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
     if (s->frames > 1 && median > MISALIGNED * s->usual) {

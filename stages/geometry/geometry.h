@@ -460,20 +460,52 @@ npg_status npg_mesh_sample(float *pos, float *normals, const npg_mesh *mesh, siz
 /* Diagonal of the box of N x 3 points. */
 double npg_points_diagonal(const float *points, size_t point_count);
 
-/* Attach: points tied to a surface, carried along when the surface moves.
+/* Skinning: where points of a deformed surface's neighbourhood are when the surface is at rest.
  *
- * At rest every point p is tied to the closest point c = sum w_k v_k of the surface (face, weights w) and
- * keeps the offset p - c.  In a moved pose the point is c' + R (p - c), with c' = sum w_k v'_k and R a
- * rotation:
+ *     x = c + R^T (p - c')
  *
- *   - it takes the surface normal at c (vertex normals, mixed by w, unit length) into the one at c';
- *   - around the normal it turns by the angle that fits the three corners, seen along the normal, best in the
- *     sense of least squares.
- *
- * So a point on the surface stays on it, one off it keeps its distance to c, and a rigid motion is followed
- * exactly.  Directions (normals) turn by the same R.
- *
- * Threads: one attachment belongs to one thread at a time. */
+ * c' is the point of the deformed surface closest to p, c the same point of the reference, R the rotation of
+ * the surface there: its faces' frames, averaged over the neighbourhood. */
+
+typedef struct npg_skin npg_skin;
+
+/* A point at rest, and the surface it was carried by. */
+typedef struct npg_skinned {
+    float point[3];  /* x */
+    float normal[3]; /* the point's own, turned back; without one the surface's */
+    float foot[3];   /* c */
+    float facing[3]; /* the surface's normal at c */
+    float offset;    /* (p - c') along the deformed surface's normal */
+    float dist;      /* |p - c'| */
+    bool is_beyond;  /* c' is on the surface's border: the point lies past what is known */
+    float agreement; /* cosine of the point's normal and the surface's; 1 without one */
+} npg_skinned;
+
+/* A counted reference of the mesh is kept.  NPG_MEMORY. */
+npg_status npg_skin_open(npg_skin **skin, npg_mesh *reference);
+void npg_skin_close(npg_skin **skin);
+
+/* Whether the reference has a border. */
+bool npg_skin_is_open(const npg_skin *skin);
+
+/* The surface is now where vert_unit (V x 3) says. */
+void npg_skin_pose(npg_skin *skin, const float *vert_unit);
+
+/* out (N) of points (N x 3, unit) with their normals (N x 3, or NULL).  Uses all cores; the result does not
+ * depend on how many.  The reference has normals.  NPG_MEMORY. */
+npg_status npg_skin_to_rest(npg_skin *skin, npg_skinned *out, const float *points, const float *normals,
+                            size_t count);
+
+/* The other way: where a place near the surface at rest is now, p = c' + R (place - c).  hit: the point of
+ * the reference that it hangs on.  Thread-safe but for npg_skin_pose(). */
+void npg_skin_from_rest(const npg_skin *skin, float now[3], const npg_surface_hit *hit, const float place[3]);
+
+/* Bytes that it takes at most. */
+size_t npg_skin_memory(size_t vert_count, size_t points);
+
+/* Attach: points tied to a surface, carried along when it moves: each hangs on the closest point of the surface at
+ * rest as npg_skin_from_rest() has it, so that one on the surface stays on it, one off it keeps its distance, and a
+ * rigid motion is followed exactly.  Directions (normals) turn by the same R.  For one thread at a time. */
 
 typedef struct npg_attachment npg_attachment;
 
@@ -499,49 +531,6 @@ npg_status npg_attach_move(npg_attachment *attachment, const float *vert_pos, do
 
 /* NULL inside is fine. */
 void npg_attach_close(npg_attachment **attachment);
-
-/* Skinning: where points of a deformed surface's neighbourhood are when the surface is at rest.
- *
- *     x = c + R^T (p - c')
- *
- * c' is the point of the deformed surface closest to p, c the same point of the reference, R the rotation of
- * the surface there: its faces' frames, averaged over the neighbourhood. */
-
-typedef struct npg_skin npg_skin;
-
-/* A point at rest, and the surface it was carried by. */
-typedef struct npg_skinned {
-    float point[3];  /* x */
-    float normal[3]; /* the point's own, turned back; without one the surface's */
-    float foot[3];   /* c */
-    float facing[3]; /* the surface's normal at c */
-    float offset;    /* (p - c') along the deformed surface's normal */
-    float dist;      /* |p - c'| */
-    bool is_beyond;  /* c' is on the surface's border: the point lies past what is known */
-    float agreement; /* cosine of the point's normal and the surface's; 1 without one */
-} npg_skinned;
-
-/* reference: unit coordinates, with normals; a counted reference is kept.  NPG_MEMORY. */
-npg_status npg_skin_open(npg_skin **skin, npg_mesh *reference);
-void npg_skin_close(npg_skin **skin);
-
-/* Whether the reference has a border. */
-bool npg_skin_is_open(const npg_skin *skin);
-
-/* The surface is now where vert_unit (V x 3) says.  NPG_MEMORY. */
-npg_status npg_skin_pose(npg_skin *skin, const float *vert_unit);
-
-/* out (N) of points (N x 3, unit) with their normals (N x 3, or NULL).  Uses all cores; the result does not
- * depend on how many.  NPG_MEMORY. */
-npg_status npg_skin_to_rest(npg_skin *skin, npg_skinned *out, const float *points, const float *normals,
-                            size_t count);
-
-/* The other way: where a place near the surface at rest is now, p = c' + R (place - c).  hit: the point of
- * the reference that it hangs on.  Thread-safe but for npg_skin_pose(). */
-void npg_skin_from_rest(const npg_skin *skin, float now[3], const npg_surface_hit *hit, const float place[3]);
-
-/* Bytes that it takes at most. */
-size_t npg_skin_memory(size_t vert_count, size_t points);
 
 /* Proxy: a decimated copy of a mesh whose vertices are vertices of it.
  *

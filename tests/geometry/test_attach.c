@@ -186,10 +186,11 @@ static void a_bend_keeps_distance_and_turns_normals(void **state)
     for (size_t i = 0; i < N; i++) {
         double q[3], x = (double)points[3 * i];
         roll(q, x, (double)points[3 * i + 1], (double)points[3 * i + 2]);
-        /* chords of 0.1 on a circle of radius 2 are off by 0.0006 */
-        for (size_t a = 0; a < 3; a++) assert_true(fabs(moved[3 * i + a] - q[a]) < 2e-3);
-        assert_true(fabs((double)moved_normals[3 * i] + sin(x / 2)) < 0.01);
-        assert_true(fabs((double)moved_normals[3 * i + 2] - cos(x / 2)) < 0.01);
+        /* rotations are averaged over two rings, on a border not around the vertex: off by 0.02 where an edge
+         * turns by 0.05 */
+        for (size_t a = 0; a < 3; a++) assert_true(fabs(moved[3 * i + a] - q[a]) < 4e-3);
+        assert_true(fabs((double)moved_normals[3 * i] + sin(x / 2)) < 0.03);
+        assert_true(fabs((double)moved_normals[3 * i + 2] - cos(x / 2)) < 0.03);
     }
     npg_attach_close(&t);
     npg_mesh_unref(&strip);
